@@ -1,0 +1,26 @@
+"""Filaments for OpenMM: Brownian dynamics of extensible cylinder chains."""
+
+from .build import Filament, Filaments
+from .errors import InputError, InstabilityError, TimeStepWarning
+from .filament import DSDNA, F_ACTIN, MICROTUBULE, FilamentType
+from .friction import EndCorrections, SegmentFriction, stokes_friction
+from .timestep import TimeStep, recommended_time_step
+from .version import __version__
+
+__all__ = [
+    "DSDNA",
+    "EndCorrections",
+    "F_ACTIN",
+    "Filament",
+    "FilamentType",
+    "Filaments",
+    "InputError",
+    "InstabilityError",
+    "MICROTUBULE",
+    "SegmentFriction",
+    "TimeStep",
+    "TimeStepWarning",
+    "__version__",
+    "recommended_time_step",
+    "stokes_friction",
+]

@@ -1,0 +1,539 @@
+"""Filaments: puts filaments into a Topology, a System and positions, new or existing."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import openmm
+from openmm import app, unit
+
+from .engines import portable
+from .engines.redistribution import ChainSet, joint_tensions
+from .equilibrium import draw_chain
+from .errors import InputError
+from .filament import FilamentType
+from .quantities import DIMENSIONLESS, FORCE, FRICTION, LENGTH, TEMPERATURE, VISCOSITY
+from .quantities import in_units_of, non_negative, positive, whole_number
+from .tension import segment_end_forces, split_external_forces
+from .timestep import recommended_time_step, warn_if_unstable
+
+NODE_NAME = "NOD"
+"""Atom name of a filament node in topologies."""
+
+
+@dataclass(frozen=True)
+class Filament:
+    """One filament: its type, initial node positions (n, 3) in nm and clamped nodes."""
+
+    type: FilamentType
+    positions: np.ndarray
+    clamped: tuple
+
+    @property
+    def segments(self):
+        """Number of segments."""
+        return len(self.positions) - 1
+
+
+class Filaments:
+    """Filaments in a solvent, to be added to an OpenMM System.
+
+    Parameters
+    ----------
+    viscosity : pressure*time
+        Viscosity of the solvent; a plain number is in kJ ps/(mol nm^3), 602214 of which are 1 Pa s.
+    temperature : temperature
+        For eq. (20), equilibrium draws and the default temperature of the integrator.
+
+    Examples
+    --------
+    >>> from openmm import unit
+    >>> from openmm_cylchain import F_ACTIN, Filaments
+    >>> filaments = Filaments(viscosity=1.71e-3 * unit.pascal * unit.second, temperature=310 * unit.kelvin)
+    >>> filaments.add_straight(F_ACTIN, segments=10, start=[0, 0, 0], direction=[1, 0, 0])
+    0
+    >>> topology, system, positions = filaments.build()
+    >>> system.getNumParticles()
+    11
+    """
+
+    def __init__(self, viscosity, temperature):
+        self._viscosity = positive(viscosity, VISCOSITY, "viscosity")
+        self._temperature = non_negative(temperature, TEMPERATURE, "temperature")
+        self._filaments = []
+        self._nodes = None
+
+    def __len__(self):
+        return len(self._filaments)
+
+    def __getitem__(self, index):
+        return self._filaments[index]
+
+    @property
+    def viscosity(self):
+        """Viscosity of the solvent in kJ ps/(mol nm^3)."""
+        return self._viscosity
+
+    @property
+    def temperature(self):
+        """Temperature in K."""
+        return self._temperature
+
+    @property
+    def node_indices(self):
+        """List of arrays: the particle indices of the nodes of every filament, once they are in a System."""
+        if self._nodes is None:
+            raise InputError("The filaments are not in a System yet: call build or add_to first.")
+        return self._nodes
+
+    def add_straight(self, filament_type, segments, start, direction, clamped=()):
+        """Add a straight filament with segments of rest length.
+
+        Parameters
+        ----------
+        filament_type : FilamentType
+        segments : int
+        start : (3,) length
+            Position of the first node.
+        direction : (3,) array
+            Direction from the first node to the last; need not be normalised.
+        clamped : sequence of int
+            Nodes that do not move; negative numbers count from the end.
+
+        Returns
+        -------
+        int
+            The filament's number.
+        """
+        label = self._label(filament_type)
+        segments = whole_number(segments, 1, f"{label}: segments")
+        start = _vector(start, LENGTH, f"{label}: start")
+        direction = _direction(direction, label)
+        distance = np.arange(segments + 1) * filament_type.segment_length
+        return self._add(filament_type, start + distance[:, None] * direction, clamped, label)
+
+    def add_nodes(self, filament_type, positions, clamped=()):
+        """Add a filament with given node positions.
+
+        Rest lengths are the type's segment length, whatever the distances between the nodes are.
+
+        Parameters
+        ----------
+        filament_type : FilamentType
+        positions : (n, 3) length
+            At least two nodes.
+        clamped : sequence of int
+            Nodes that do not move; negative numbers count from the end.
+
+        Returns
+        -------
+        int
+            The filament's number.
+        """
+        label = self._label(filament_type)
+        positions = np.atleast_1d(in_units_of(positions, LENGTH, f"{label}: positions"))
+        if positions.ndim != 2 or positions.shape[1] != 3:
+            raise InputError(f"{label}: positions must have the shape (n, 3), but have {positions.shape}.")
+        if len(positions) < 2:
+            raise InputError(f"{label} needs at least two nodes (one segment), but has {len(positions)}.")
+        return self._add(filament_type, positions.copy(), clamped, label)
+
+    def add_equilibrium(self, filament_type, segments, seed, start=(0.0, 0.0, 0.0), direction=None, clamped=()):
+        """Add a filament drawn from the exact equilibrium of the free discrete chain.
+
+        Segment lengths come from rho(l), joint angles from rho(c) (see ``openmm_cylchain.equilibrium``).
+
+        Parameters
+        ----------
+        filament_type : FilamentType
+        segments : int
+        seed : int
+            The same seed gives the same chain.
+        start : (3,) length
+            Position of the first node.
+        direction : (3,) array, optional
+            Direction of the first segment; drawn from the sphere if not given.
+        clamped : sequence of int
+            Nodes that do not move; negative numbers count from the end.
+
+        Returns
+        -------
+        int
+            The filament's number.
+        """
+        label = self._label(filament_type)
+        segments = whole_number(segments, 1, f"{label}: segments")
+        start = _vector(start, LENGTH, f"{label}: start")
+        if direction is not None:
+            direction = _direction(direction, label)
+        if self._temperature == 0:
+            raise InputError(f"{label}: an equilibrium draw needs a temperature above zero.")
+        generator = np.random.default_rng(whole_number(seed, 0, f"{label}: seed"))
+        positions = draw_chain(filament_type, segments, self._temperature, generator, start, direction)
+        return self._add(filament_type, positions, clamped, label)
+
+    def _label(self, filament_type):
+        if not isinstance(filament_type, FilamentType):
+            raise InputError(
+                f"Filament {len(self)}: filament_type must be a FilamentType, such as F_ACTIN, but is "
+                f"{filament_type!r}."
+            )
+        return f"Filament {len(self)} ({filament_type.name})"
+
+    def _add(self, filament_type, positions, clamped, label):
+        if self._nodes is not None:
+            raise InputError(f"{label} comes too late: the filaments are already in a System.")
+        lengths = np.linalg.norm(np.diff(positions, axis=0), axis=1)
+        if np.any(lengths == 0.0):
+            node = int(np.argmax(lengths == 0.0))
+            raise InputError(f"{label}: nodes {node} and {node + 1} coincide; move them apart.")
+        if filament_type.maximum_extension is not None:
+            self._check_extension(filament_type, lengths, label)
+        _check_folds(filament_type, positions, label)
+        clamped = _clamped_nodes(clamped, len(positions), label)
+        # Resistance and bounds are computed now, so that a filament that cannot be simulated is refused here.
+        filament_type.segment_friction(self._viscosity, self._temperature, len(positions) - 1)
+        self._filaments.append(Filament(filament_type, positions, clamped))
+        return len(self) - 1
+
+    @staticmethod
+    def _check_extension(filament_type, lengths, label):
+        extension = np.abs(lengths - filament_type.segment_length)
+        segment = int(np.argmax(extension))
+        if extension[segment] >= filament_type.maximum_extension:
+            raise InputError(
+                f"{label}: segment {segment} is {lengths[segment]:.4g} nm long, outside the FENE potential's "
+                f"{filament_type.segment_length:g} -/+ {filament_type.maximum_extension:g} nm."
+            )
+
+    def build(self, box_vectors=None, stretching_force_group=0, bending_force_group=0):
+        """Put the filaments into a new Topology, System and positions.
+
+        Parameters
+        ----------
+        box_vectors : three (3,) lengths, optional
+            Periodic box vectors of the System and the Topology.
+        stretching_force_group, bending_force_group : int
+            Force groups of the chain's own forces, to report their energies apart.
+
+        Returns
+        -------
+        topology : openmm.app.Topology
+        system : openmm.System
+        positions : (particles, 3) Quantity in nm
+        """
+        topology, system = app.Topology(), openmm.System()
+        if box_vectors is not None:
+            vectors = [openmm.Vec3(*_vector(vector, LENGTH, "box_vectors")) for vector in box_vectors]
+            system.setDefaultPeriodicBoxVectors(*vectors)
+            topology.setPeriodicBoxVectors(vectors * unit.nanometer)
+        positions = self.add_to(
+            topology, system, np.zeros((0, 3)) * unit.nanometer, stretching_force_group, bending_force_group
+        )
+        return topology, system, positions
+
+    def add_to(self, topology, system, positions, stretching_force_group=0, bending_force_group=0):
+        """Put the filaments into an existing Topology and System, behind what is there.
+
+        One filament becomes one chain of the Topology, with a residue and an atom (named "NOD") for each
+        node and bonds along it. Everything that was in the Topology and the System stays as it is.
+
+        Parameters
+        ----------
+        topology : openmm.app.Topology
+            Changed in place.
+        system : openmm.System
+            Changed in place. Non-bonded forces of the System that ask for parameters of every particle get
+            none for the nodes: NonbondedForce and CustomNonbondedForce are given non-interacting entries.
+        positions : (particles, 3) length
+            Positions of the particles that are there.
+        stretching_force_group, bending_force_group : int
+            Force groups of the chain's own forces, to report their energies apart.
+
+        Returns
+        -------
+        (particles, 3) Quantity in nm
+            The positions of everything.
+        """
+        positions = self._check_target(topology, system, positions)
+        self._check_force_groups(stretching_force_group, bending_force_group)
+        first = system.getNumParticles()
+        self._nodes = []
+        for number, filament in enumerate(self._filaments):
+            self._nodes.append(np.arange(first, first + len(filament.positions)))
+            first += len(filament.positions)
+            self._add_to_topology(topology, filament, number)
+            self._add_particles(system, filament)
+        self._add_noninteracting_entries(system, positions)
+        portable.add_stretching_forces(system, self._segments(), stretching_force_group)
+        portable.add_bending_forces(system, self._joints(), bending_force_group)
+        everything = np.concatenate([positions] + [filament.positions for filament in self._filaments])
+        return everything * unit.nanometer
+
+    def _check_target(self, topology, system, positions):
+        if not self._filaments:
+            raise InputError("There are no filaments to add: call add_straight, add_nodes or add_equilibrium first.")
+        if self._nodes is not None:
+            raise InputError("These filaments are already in a System; make another Filaments for another System.")
+        positions = np.asarray(in_units_of(positions, LENGTH, "positions"))
+        count = system.getNumParticles()
+        if topology.getNumAtoms() != count:
+            raise InputError(
+                f"The Topology has {topology.getNumAtoms()} atoms, but the System has {count} particles."
+            )
+        if positions.size == 0 and count == 0:
+            positions = np.zeros((0, 3))
+        if positions.shape != (count, 3):
+            raise InputError(f"positions must have the shape ({count}, 3), but have {positions.shape}.")
+        for force in system.getForces():
+            if force.getName().startswith((portable.STRETCHING_NAME, portable.BENDING_NAME)):
+                raise InputError("The System already holds filaments: add all of them through one Filaments object.")
+        return positions
+
+    @staticmethod
+    def _check_force_groups(*groups):
+        for group in groups:
+            if whole_number(group, 0, "force group") > 31:
+                raise InputError(f"A force group must be between 0 and 31, but is {group}.")
+
+    @staticmethod
+    def _add_to_topology(topology, filament, number):
+        chain = topology.addChain(f"F{number}")
+        previous = None
+        for node in range(len(filament.positions)):
+            residue = topology.addResidue(filament.type.name, chain, str(node + 1))
+            atom = topology.addAtom(NODE_NAME, None, residue)
+            if previous is not None:
+                topology.addBond(previous, atom)
+            previous = atom
+
+    @staticmethod
+    def _add_particles(system, filament):
+        # Each segment's mass goes to its two ends in equal parts.
+        masses = np.full(len(filament.positions), filament.type.segment_mass)
+        masses[[0, -1]] *= 0.5
+        masses[list(filament.clamped)] = 0.0
+        for mass in masses:
+            system.addParticle(mass)
+
+    @staticmethod
+    def _add_noninteracting_entries(system, existing):
+        missing = system.getNumParticles() - len(existing)
+        for force in system.getForces():
+            if isinstance(force, openmm.NonbondedForce):
+                for _ in range(missing):
+                    force.addParticle(0.0, 1.0, 0.0)
+            elif isinstance(force, openmm.CustomNonbondedForce):
+                _exclude_from_custom_nonbonded(force, len(existing), missing)
+
+    def _segments(self):
+        for filament, nodes in zip(self._filaments, self._nodes):
+            for minus, plus in zip(nodes[:-1], nodes[1:]):
+                yield filament.type, int(minus), int(plus)
+
+    def _joints(self):
+        for filament, nodes in zip(self._filaments, self._nodes):
+            for before, joint, after in zip(nodes[:-2], nodes[1:-1], nodes[2:]):
+                yield filament.type, int(before), int(joint), int(after)
+
+    def recommended_time_step(self, scheme="midpoint"):
+        """The recommended step for the filament that allows the least: a TimeStep (see ``timestep``)."""
+        steps = [
+            recommended_time_step(filament.type, self._viscosity, self._temperature, scheme, filament.segments)
+            for filament in self._filaments
+        ]
+        if not steps:
+            raise InputError("There are no filaments to recommend a time step for.")
+        return min(steps, key=lambda step: step.step)
+
+    def create_integrator(
+        self, system, step_size, scheme="midpoint", temperature=None, particle_friction=None, random_seed=0
+    ):
+        """Create the integrator that moves the filaments and everything else in the System.
+
+        Call it when all forces and particles are in the System: it also adds to the System the force
+        that redistributes forces along the chains.
+
+        Parameters
+        ----------
+        system : openmm.System
+            The System that the filaments were put into.
+        step_size : time
+        scheme : {"midpoint", "euler"}
+            See ``openmm_cylchain.engines.portable.PortableIntegrator``.
+        temperature : temperature, optional
+            That of the filaments if not given.
+        particle_friction : energy*time/length^2, or array of them
+            Friction coefficients of the particles outside filaments, in the order of their indices; a
+            number holds for all of them. Values for massless particles are ignored: those do not move.
+            ``stokes_friction`` computes one.
+        random_seed : int
+            0 draws a fresh seed from the operating system.
+
+        Returns
+        -------
+        PortableIntegrator
+
+        Warns
+        -----
+        TimeStepWarning
+            If the step exceeds a bound of stability.
+        """
+        step_size = positive(step_size, unit.picosecond, "step_size")
+        nodes = np.concatenate(self.node_indices)
+        if system.getNumParticles() <= nodes.max():
+            raise InputError("This is not the System that the filaments were put into: it has too few particles.")
+        self._check_constraints(system)
+        chains = self._chain_set(system)
+        others, frictions = self._other_particles(system, nodes, particle_friction)
+        for filament in {(f.type, f.segments): f for f in self._filaments}.values():
+            warn_if_unstable(filament.type, self._viscosity, self._temperature, step_size, filament.segments)
+        rest_lengths = np.concatenate([np.full(f.segments, f.type.segment_length) for f in self._filaments])
+        labels = [f"Filament {number} ({f.type.name})" for number, f in enumerate(self._filaments)]
+        computation = portable.ChainDisplacements(chains, nodes, rest_lengths, labels, others, frictions)
+        integrator_temperature = self._temperature if temperature is None else temperature
+        portable.add_redistribution(system, computation)
+        return portable.PortableIntegrator(system, integrator_temperature, step_size, scheme, random_seed)
+
+    def joint_tensions(self, context):
+        """Virtual forces Phi at the joints, eqs. (22)-(24), in the context's present configuration.
+
+        Phi of joint i is the force that segment i + 1 exerts on segment i; its component along the chain is
+        positive under tension. Random forces are left out: this is the mean over the noise of a step.
+        Stretching and bending belong to their segments; any other force on a shared node is given to the
+        two segments in equal parts.
+
+        Parameters
+        ----------
+        context : openmm.Context
+            Of a System that these filaments were put into.
+
+        Returns
+        -------
+        list of (segments - 1, 3) Quantity in kJ/(mol nm), one for each filament
+        """
+        state = context.getState(positions=True, forces=True)
+        positions = state.getPositions(asNumpy=True)._value
+        forces = state.getForces(asNumpy=True)._value
+        chains = self._chain_set(context.getSystem())
+        ends = [segment_end_forces(f.type, positions[nodes]) for f, nodes in zip(self._filaments, self._nodes)]
+        minus = np.concatenate([minus for minus, plus in ends])
+        plus = np.concatenate([plus for minus, plus in ends])
+        nodes = np.concatenate(self._nodes)
+        minus, plus = split_external_forces(chains, forces[nodes], minus, plus)
+        tensions = joint_tensions(chains, positions[nodes], minus, plus)
+        boundaries = np.cumsum([filament.segments for filament in self._filaments])[:-1]
+        return [part[:-1] * FORCE for part in np.split(tensions, boundaries)]
+
+    def _check_constraints(self, system):
+        owner = {node: number for number, nodes in enumerate(self._nodes) for node in nodes}
+        for index in range(system.getNumConstraints()):
+            first, second, _ = system.getConstraintParameters(index)
+            for particle in (first, second):
+                if particle in owner:
+                    number = owner[particle]
+                    raise InputError(
+                        f"Filament {number} ({self[number].type.name}): node {particle - self._nodes[number][0]} has "
+                        "a System constraint. Segments are held by stiff springs, not by constraints: remove it."
+                    )
+        if system.getNumConstraints():
+            raise InputError(
+                f"Particles {first} and {second} have a System constraint, which the portable engine cannot keep: "
+                "replace it by a bond."
+            )
+
+    def _chain_set(self, system):
+        fixed = []
+        for number, (filament, nodes) in enumerate(zip(self._filaments, self._nodes)):
+            label = f"Filament {number} ({filament.type.name})"
+            virtual = [node for node in nodes if system.isVirtualSite(int(node))]
+            if virtual:
+                raise InputError(f"{label}: particle {virtual[0]} is a node and cannot be a virtual site.")
+            massless = [system.getParticleMass(int(node))._value == 0.0 for node in nodes]
+            if all(massless):
+                raise InputError(f"{label} has only nodes of mass zero: leave at least one free to move.")
+            fixed.extend(massless)
+        frictions = [
+            filament.type.segment_friction(self._viscosity, self._temperature, filament.segments)
+            for filament in self._filaments
+        ]
+        repeats = [filament.segments for filament in self._filaments]
+        return ChainSet(
+            node_counts=np.array([len(filament.positions) for filament in self._filaments]),
+            fixed=np.array(fixed),
+            **{
+                name: np.repeat([getattr(friction, name) for friction in frictions], repeats)
+                for name in ("parallel", "perpendicular", "rotational", "extensional")
+            },
+        )
+
+    def _other_particles(self, system, nodes, particle_friction):
+        outside = np.setdiff1d(np.arange(system.getNumParticles()), nodes)
+        mobile = np.array([system.getParticleMass(int(index))._value != 0.0 for index in outside], dtype=bool)
+        if not mobile.any():
+            return outside[mobile], np.zeros(0)
+        if particle_friction is None:
+            raise InputError(
+                f"{mobile.sum()} particles outside filaments can move, but have no friction: give particle_friction."
+            )
+        friction = np.asarray(in_units_of(particle_friction, FRICTION, "particle_friction"))
+        if friction.ndim and friction.shape != outside.shape:
+            raise InputError(
+                f"particle_friction must be a number or have one entry for each of the {len(outside)} particles "
+                f"outside filaments, but has the shape {friction.shape}."
+            )
+        friction = np.broadcast_to(friction, outside.shape)[mobile]
+        if np.any(friction <= 0):
+            raise InputError(
+                f"particle_friction must be positive, but is {friction.min():g} for particle "
+                f"{outside[mobile][np.argmin(friction)]}."
+            )
+        return outside[mobile], np.array(friction)
+
+
+def _vector(value, target, name):
+    vector = np.asarray(in_units_of(value, target, name))
+    if vector.shape != (3,):
+        raise InputError(f"{name} must have three components, but has the shape {vector.shape}.")
+    return vector
+
+
+def _direction(direction, label):
+    direction = _vector(direction, DIMENSIONLESS, f"{label}: direction")
+    norm = np.linalg.norm(direction)
+    if norm == 0:
+        raise InputError(f"{label}: direction must not be the zero vector.")
+    return direction / norm
+
+
+def _check_folds(filament_type, positions, label):
+    if filament_type.bending_rigidity == 0.0:
+        return
+    difference = np.diff(positions, axis=0)
+    tangents = difference / np.linalg.norm(difference, axis=1)[:, None]
+    cosines = np.einsum("ij,ij->i", tangents[1:], tangents[:-1])
+    energies = filament_type.bending_energy(cosines)
+    if not np.all(np.isfinite(energies)) or np.any(cosines < -1.0 + 1e-12):
+        joint = int(np.argmin(cosines)) + 1
+        raise InputError(
+            f"{label}: the segments before and after node {joint} are antiparallel, where the bending force is not "
+            "defined; move the node."
+        )
+
+
+def _clamped_nodes(clamped, count, label):
+    nodes = set()
+    for node in clamped:
+        number = whole_number(node + count if node < 0 else node, 0, f"{label}: clamped node")
+        if number >= count:
+            raise InputError(f"{label}: clamped node {node} does not exist; there are {count} nodes.")
+        nodes.add(number)
+    if len(nodes) == count:
+        raise InputError(f"{label} has all of its nodes clamped (mass zero): leave at least one free to move.")
+    return tuple(sorted(nodes))
+
+
+def _exclude_from_custom_nonbonded(force, existing, missing):
+    for _ in range(missing):
+        force.addParticle([0.0] * force.getNumPerParticleParameters())
+    if missing and force.getNumInteractionGroups() == 0:
+        force.addInteractionGroup(range(existing), range(existing))

@@ -1,0 +1,379 @@
+"""The portable engine: stock OpenMM forces, a CustomIntegrator and one PythonForce.
+
+It runs wherever OpenMM runs. Each step the integrator hands the total forces and then the
+configuration to a PythonForce, in a force group of its own, *through the positions*; the PythonForce
+returns displacements as "forces". A context parameter tells it what the positions hold; between steps
+the parameter says "idle" and the PythonForce contributes nothing, so that reported forces and energies
+are the physical ones.
+"""
+
+import threading
+
+import numpy as np
+import openmm
+from openmm import unit
+
+from ..errors import InputError, InstabilityError
+from ..potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
+from ..quantities import BOLTZMANN, TEMPERATURE, TIME, non_negative, positive, whole_number
+from ..timestep import SCHEMES, check_scheme
+from .redistribution import STEPS
+
+REDISTRIBUTION_NAME = "CylinderChainRedistribution"
+STRETCHING_NAME = "CylinderChainStretching"
+BENDING_NAME = "CylinderChainBending"
+
+_IDLE, _FORCES, _CONFIGURATION = 0.0, 1.0, 2.0
+_PHASE = "cylinder_chain_phase"
+_SCHEME = "cylinder_chain_scheme"
+_KT = "cylinder_chain_kT"
+_STEP_SIZE = "cylinder_chain_step_size"
+_SEED = "cylinder_chain_seed"
+_STEPS_TAKEN = "cylinder_chain_steps_taken"
+_INTEGRATOR_KT = "cylinder_chain_integrator_kT"
+_INTEGRATOR_SEED = "cylinder_chain_integrator_seed"
+_START = "cylinder_chain_start"
+
+
+def add_stretching_forces(system, segments, force_group):
+    """Add one CustomBondForce for each stretching model in use.
+
+    Parameters
+    ----------
+    system : openmm.System
+    segments : iterable of (FilamentType, particle, particle)
+    force_group : int
+    """
+    forces = {}
+    for filament_type, minus, plus in segments:
+        model = filament_type.stretching_model
+        values = [filament_type.segment_stiffness, filament_type.segment_length]
+        names = ["stretching_stiffness", "rest_length"]
+        if filament_type.maximum_extension is not None:
+            values.append(filament_type.maximum_extension)
+            names.append("maximum_extension")
+        if model not in forces:
+            forces[model] = _named_force(
+                openmm.CustomBondForce(STRETCHING_POTENTIALS[model].expression), STRETCHING_NAME, model, force_group
+            )
+            for name in names:
+                forces[model].addPerBondParameter(name)
+        forces[model].addBond(minus, plus, values)
+    for force in forces.values():
+        system.addForce(force)
+
+
+def add_bending_forces(system, joints, force_group):
+    """Add one CustomAngleForce for each bending model in use.
+
+    Parameters
+    ----------
+    system : openmm.System
+    joints : iterable of (FilamentType, particle, particle, particle)
+    force_group : int
+    """
+    forces = {}
+    for filament_type, before, joint, after in joints:
+        if filament_type.bending_rigidity == 0.0:
+            continue
+        model = filament_type.bending_model
+        if model not in forces:
+            forces[model] = _named_force(
+                openmm.CustomAngleForce(BENDING_POTENTIALS[model].expression), BENDING_NAME, model, force_group
+            )
+            forces[model].addPerAngleParameter("bending_stiffness")
+        forces[model].addAngle(before, joint, after, [filament_type.joint_stiffness])
+    for force in forces.values():
+        system.addForce(force)
+
+
+def _named_force(force, name, model, force_group):
+    force.setName(f"{name} ({model})")
+    force.setForceGroup(force_group)
+    return force
+
+
+class ChainDisplacements:
+    """The computation of the PythonForce: displacements of all particles in one step.
+
+    It can be pickled, so a System that holds it can be serialised to XML.
+
+    Parameters
+    ----------
+    chains : ChainSet
+    nodes : (nodes,) int array
+        Particle index of every node.
+    rest_lengths : (segments,) array
+    labels : list of str
+        What to call each chain in messages.
+    others : (others,) int array
+        Mobile particles outside chains.
+    frictions : (others,) array
+        Their friction coefficients in kJ ps/(mol nm^2).
+    """
+
+    def __init__(self, chains, nodes, rest_lengths, labels, others, frictions):
+        self._chains = chains
+        self._nodes = nodes
+        self._rest_lengths = rest_lengths
+        self._labels = labels
+        self._others = others
+        self._frictions = frictions
+        self._forces = {}
+
+    def __getstate__(self):
+        return {**self.__dict__, "_forces": {}}
+
+    def __call__(self, state):
+        parameters = state.getParameters()
+        phase = parameters[_PHASE]
+        vectors = state.getPositions(asNumpy=True)._value
+        result = np.zeros_like(vectors)
+        # Contexts that step in parallel do so in different threads, which keeps their forces apart.
+        thread = threading.get_ident()
+        if phase == _FORCES:
+            self._forces[thread] = np.array(vectors)
+        elif phase == _CONFIGURATION and thread in self._forces:
+            self._displace(result, vectors, self._forces.pop(thread), parameters)
+        return 0.0, result
+
+    def _displace(self, result, positions, forces, parameters):
+        kT, step = parameters[_KT], parameters[_STEP_SIZE]
+        steps_taken = int(parameters[_STEPS_TAKEN])
+        chains = self._chains
+        gaussian = _gaussian_vectors(
+            int(parameters[_SEED]), steps_taken, 2 * chains.segment_count + len(self._others)
+        )
+        translational, rotational, other = np.split(gaussian, [chains.segment_count, 2 * chains.segment_count])
+        advance = STEPS[SCHEMES[int(parameters[_SCHEME])]]
+        with np.errstate(all="ignore"):
+            try:
+                displacements = advance(
+                    chains, positions[self._nodes], forces[self._nodes], kT, step, translational, rotational
+                )
+            except InstabilityError:
+                displacements = np.full((chains.node_count, 3), np.nan)
+        self._check_chains(displacements, positions[self._nodes], forces[self._nodes], steps_taken)
+        result[self._nodes] = displacements
+        friction = self._frictions[:, None]
+        result[self._others] = step / friction * forces[self._others] + np.sqrt(2.0 * kT * step / friction) * other
+        self._check_others(result, steps_taken)
+
+    def _check_chains(self, displacements, nodes, forces, steps_taken):
+        first = self._chains.first_node
+        with np.errstate(all="ignore"):
+            change = np.linalg.norm(displacements[first + 1] - displacements[first], axis=1)
+            # Written so that NaN counts as unstable.
+            unstable = ~(change < self._rest_lengths)
+        if not unstable.any():
+            return
+        # A singular resistance spoils every chain, so the culprit is looked for in what went in.
+        finite = np.isfinite(nodes).all(axis=1) & np.isfinite(forces).all(axis=1)
+        culprits = np.flatnonzero(~(finite[first] & finite[first + 1]))
+        if not len(culprits):
+            culprits = np.flatnonzero(unstable)
+            scale = np.linalg.norm(forces[first], axis=1) + np.linalg.norm(forces[first + 1], axis=1)
+            culprits = culprits[np.argsort(-scale[culprits], kind="stable")]
+        segment = culprits[0]
+        chain, number = self._chains.locate_segment(segment)
+        if not (finite[first[segment]] and finite[first[segment] + 1]):
+            what = "the force on it, or its position, is not finite"
+        else:
+            what = f"its ends would move by {change[segment]:.3g} nm against each other in one step"
+        raise InstabilityError(
+            f"{self._labels[chain]} has blown up at segment {number} in step {steps_taken}: {what}. "
+            "Positions are those before this step. Use a smaller time step, or look for overlapping particles "
+            "or excessive forces."
+        )
+
+    def _check_others(self, result, steps_taken):
+        broken = ~np.isfinite(result[self._others]).all(axis=1)
+        if broken.any():
+            raise InstabilityError(
+                f"Particle {self._others[np.argmax(broken)]}, outside filaments, has blown up in step {steps_taken}: "
+                "the force on it is not finite. Use a smaller time step, or look for overlapping particles."
+            )
+
+
+def _gaussian_vectors(seed, steps_taken, count):
+    # Counter-based: the noise of a step depends on the seed and the step's number alone, not on the platform, on
+    # other Contexts or on how the run was split.
+    bits = np.random.Philox(key=[seed, 0], counter=[0, 0, steps_taken, 0])
+    return np.random.Generator(bits).standard_normal((count, 3))
+
+
+def add_redistribution(system, computation):
+    """Add the PythonForce with a ChainDisplacements to the System, replacing an earlier one.
+
+    It gets the highest force group that no other force uses.
+
+    Raises
+    ------
+    InputError
+        If all 32 force groups are taken.
+    """
+    for index in reversed(range(system.getNumForces())):
+        if system.getForce(index).getName() == REDISTRIBUTION_NAME:
+            system.removeForce(index)
+    taken = {force.getForceGroup() for force in system.getForces()}
+    free = [group for group in range(31, -1, -1) if group not in taken]
+    if not free:
+        raise InputError("The portable engine needs a force group of its own, but all 32 are in use: free one.")
+    force = openmm.PythonForce(
+        computation,
+        {_PHASE: _IDLE, _SCHEME: 0.0, _KT: 0.0, _STEP_SIZE: 0.0, _SEED: 0.0, _STEPS_TAKEN: 0.0},
+    )
+    force.setName(REDISTRIBUTION_NAME)
+    force.setForceGroup(free[0])
+    # A periodic PythonForce sees positions as they are stored. Otherwise, GPU platforms would shift the vectors that
+    # are passed through the positions by the box vectors by which they have wrapped each molecule.
+    force.setUsesPeriodicBoundaryConditions(system.usesPeriodicBoundaryConditions())
+    system.addForce(force)
+
+
+def _redistribution_group(system):
+    groups = {}
+    for force in system.getForces():
+        groups.setdefault(force.getForceGroup(), []).append(force)
+    for group, forces in groups.items():
+        for force in forces:
+            if force.getName() == REDISTRIBUTION_NAME:
+                _check_alone(system, force, forces)
+                return group
+    raise InputError("The System has no filaments with an integrator: call Filaments.create_integrator.")
+
+
+def _check_alone(system, redistribution, forces):
+    for force in forces:
+        if force.getName() != REDISTRIBUTION_NAME:
+            raise InputError(
+                f"Force {force.getName()!r} is in force group {force.getForceGroup()}, which the portable engine "
+                "needs for itself: give it another group, or add it before the integrator is created."
+            )
+    if redistribution.usesPeriodicBoundaryConditions() != system.usesPeriodicBoundaryConditions():
+        raise InputError(
+            "The System has become periodic since its filaments got an integrator: call Filaments.create_integrator "
+            "after all forces have been added."
+        )
+
+
+class PortableIntegrator(openmm.CustomIntegrator):
+    """Brownian dynamics of filaments, and of all other particles, on any OpenMM platform.
+
+    Weak order one in the step size. Scheme ``"midpoint"`` is Fixman's, with the right drift on chains;
+    ``"euler"`` is Section 4 of Pesek et al., Soft Matter 2016, 12, 3360, kept for comparison: its drift
+    is that of free segments, and equilibrium averages of chains are biased at any step size.
+
+    Parameters
+    ----------
+    system : openmm.System
+        With filaments and the redistribution force that ``Filaments.create_integrator`` adds.
+    temperature : temperature
+        Zero is allowed: no noise.
+    step_size : time
+    scheme : {"midpoint", "euler"}
+    random_seed : int
+        0 draws a fresh seed from the operating system for this integrator.
+
+    Notes
+    -----
+    The noise of a step depends on the seed and on the number of steps taken, which checkpoints and
+    saved States carry along. A restart from a checkpoint with the same seed is therefore
+    bit-identical on the same platform; a restart with another seed is independent. Velocities are
+    displacements divided by the step; there is no kinetic energy.
+
+    Raises
+    ------
+    InputError
+        For an unknown scheme, a negative temperature, a step size that is not positive, or a System
+        without filaments.
+    """
+
+    def __init__(self, system, temperature, step_size, scheme="midpoint", random_seed=0):
+        super().__init__(positive(step_size, TIME, "step_size"))
+        check_scheme(scheme)
+        self._scheme = scheme
+        self._system = system
+        self._checked = False
+        group = _redistribution_group(system)
+        self.addGlobalVariable(_INTEGRATOR_KT, 0.0)
+        self.addGlobalVariable(_INTEGRATOR_SEED, 0.0)
+        self.addPerDofVariable(_START, 0.0)
+        self._add_program(f"f{group}", SCHEMES.index(scheme))
+        self.setKineticEnergyExpression("0")
+        self.setIntegrationForceGroups(set(range(32)) - {group})
+        self.setTemperature(temperature)
+        self.setRandomNumberSeed(random_seed)
+
+    def _add_program(self, redistribution, scheme):
+        self.addUpdateContextState()
+        for parameter, value in (
+            (_SCHEME, str(scheme)),
+            (_KT, _INTEGRATOR_KT),
+            (_STEP_SIZE, "dt"),
+            (_SEED, _INTEGRATOR_SEED),
+            (_STEPS_TAKEN, f"{_STEPS_TAKEN}+1"),
+        ):
+            self.addComputeGlobal(parameter, value)
+        self.addComputePerDof(_START, "x")
+
+        # Hand over the forces. The PythonForce answers zero.
+        self.addComputePerDof("x", "f")
+        self.addComputeGlobal(_PHASE, str(_FORCES))
+        self.addComputePerDof("x", f"{_START}+{redistribution}")
+
+        # Hand over the configuration. The PythonForce answers with displacements.
+        self.addComputeGlobal(_PHASE, str(_CONFIGURATION))
+        self.addComputePerDof("x", f"x+{redistribution}")
+        self.addComputePerDof("v", f"(x-{_START})/dt")
+        self.addConstrainPositions()
+        self.addComputeGlobal(_PHASE, str(_IDLE))
+
+    def step(self, steps):
+        """Advance by a number of steps.
+
+        Raises
+        ------
+        InstabilityError
+            If a chain or a particle blows up; positions are then those before the failing step.
+        InputError
+            If forces added since the integrator was created stand in its way.
+        """
+        if not self._checked:
+            _redistribution_group(self._system)
+            self._checked = True
+        # States and checkpoints carry variables of the integrator that wrote them; the seed is this one's own.
+        if self.getGlobalVariableByName(_INTEGRATOR_SEED) != self._key:
+            self.setGlobalVariableByName(_INTEGRATOR_SEED, self._key)
+        try:
+            super().step(steps)
+        except openmm.OpenMMException as error:
+            if "has blown up" in str(error):
+                raise InstabilityError(str(error)) from None
+            raise
+
+    def getScheme(self):
+        """The name of the integration scheme."""
+        return self._scheme
+
+    def getTemperature(self):
+        """The temperature of the bath (kelvin)."""
+        return self.getGlobalVariableByName(_INTEGRATOR_KT) / BOLTZMANN * unit.kelvin
+
+    def setTemperature(self, temperature):
+        """Set the temperature of the bath. Friction coefficients stay as they are."""
+        value = BOLTZMANN * non_negative(temperature, TEMPERATURE, "temperature")
+        self.setGlobalVariableByName(_INTEGRATOR_KT, value)
+
+    def computeSystemTemperature(self):
+        """The temperature of the bath: overdamped motion has no temperature of its own."""
+        return self.getTemperature()
+
+    def setRandomNumberSeed(self, seed):
+        """Set the seed of the noise; 0 draws one from the operating system."""
+        seed = whole_number(seed, 0, "random_seed")
+        if seed >= 2**31:
+            raise InputError(f"random_seed must be below 2^31, but is {seed}.")
+        super().setRandomNumberSeed(seed)
+        self._key = float(seed if seed else np.random.SeedSequence().generate_state(1)[0])
+        self.setGlobalVariableByName(_INTEGRATOR_SEED, self._key)

@@ -1,0 +1,124 @@
+"""Exact equilibrium of the discrete chain: marginals of segment lengths and joint angles, and draws.
+
+In node coordinates the equilibrium is exp(-V/k_B T). With l0, not l, in the bending potential, segment
+lengths and joint angles are independent,
+
+    rho(l) ~ l^2 exp(-V_el(l)/k_B T)        eq. (19) of Pesek et al., Soft Matter 2016, 12, 3360
+    rho(c) ~ exp(-V_b(c)/k_B T)             c = t1.t2 in [-1, 1]
+
+and the azimuth of every joint is uniform, so every average below is exact at any stiffness.
+"""
+
+import numpy as np
+
+from .quantities import TEMPERATURE, positive, thermal_energy
+
+_GRID = 20001
+
+
+class _Marginal:
+    """A density exp(log_density) on a grid fine enough for both averages and draws."""
+
+    def __init__(self, coordinate, log_density):
+        weight = np.exp(log_density - np.max(log_density))
+        spacing = np.diff(coordinate)
+        cumulative = np.concatenate([[0.0], np.cumsum(0.5 * (weight[1:] + weight[:-1]) * spacing)])
+        self._coordinate = coordinate
+        self._weight = weight
+        self._cumulative = cumulative / cumulative[-1]
+
+    def mean(self, function):
+        """Average of ``function`` (of the coordinate) by Simpson's rule."""
+        from scipy.integrate import simpson
+
+        values = np.where(self._weight > 0, function(self._coordinate), 0.0)
+        return simpson(values * self._weight, x=self._coordinate) / simpson(self._weight, x=self._coordinate)
+
+    def sample(self, generator, size):
+        """Independent draws by inversion of the cumulative distribution."""
+        return np.interp(generator.random(size), self._cumulative, self._coordinate)
+
+
+class SegmentLengthDistribution(_Marginal):
+    """Equilibrium distribution of the length of a segment, eq. (19): rho(l) ~ l^2 exp(-V_el/k_B T).
+
+    Parameters
+    ----------
+    filament_type : FilamentType
+    temperature : temperature, above zero
+    """
+
+    def __init__(self, filament_type, temperature):
+        kT = thermal_energy(positive(temperature, TEMPERATURE, "temperature"))
+        rest, stiffness = filament_type.segment_length, filament_type.segment_stiffness
+        if filament_type.stretching_model == "fene":
+            extension = filament_type.maximum_extension * (1.0 - 1e-12)
+            low, high = rest - extension, rest + extension
+        else:
+            low, high = 0.0, np.inf
+        # Twelve standard deviations about the most probable length leave out less than 1e-30.
+        width = np.sqrt(kT / stiffness)
+        mode = 0.5 * (rest + np.sqrt(rest**2 + 8.0 * width**2))
+        length = np.linspace(max(low, mode - 12.0 * width), min(high, mode + 12.0 * width), _GRID)
+        with np.errstate(divide="ignore"):
+            super().__init__(length, 2.0 * np.log(length) - filament_type.stretching_energy(length) / kT)
+
+
+class JointAngleDistribution(_Marginal):
+    """Equilibrium distribution of the cosine c = t1.t2 of a joint: rho(c) ~ exp(-V_b/k_B T) on [-1, 1].
+
+    Parameters
+    ----------
+    filament_type : FilamentType
+    temperature : temperature, above zero
+    """
+
+    def __init__(self, filament_type, temperature):
+        kT = thermal_energy(positive(temperature, TEMPERATURE, "temperature"))
+        # V_b is at least (a/l0)(1-c)*0.8, so a grid in 1-c up to 60 k_B T l0/a holds all of a stiff joint.
+        stiffness = filament_type.joint_stiffness / kT
+        widest = 2.0 if stiffness < 50.0 else min(2.0, 100.0 / stiffness)
+        cosine = 1.0 - np.linspace(widest, 0.0, _GRID)
+        with np.errstate(divide="ignore", over="ignore"):
+            energy = filament_type.bending_energy(cosine) if stiffness > 0 else np.zeros_like(cosine)
+        super().__init__(cosine, -energy / kT)
+
+
+def draw_chain(filament_type, segments, temperature, generator, start=(0.0, 0.0, 0.0), direction=None):
+    """Node positions of a chain drawn from the equilibrium of the free discrete chain.
+
+    Parameters
+    ----------
+    filament_type : FilamentType
+    segments : int
+    temperature : temperature, above zero
+    generator : numpy.random.Generator
+    start : (3,) array, nm
+        Position of the first node.
+    direction : (3,) array, optional
+        Unit vector of the first segment; drawn from the sphere if not given.
+
+    Returns
+    -------
+    (segments + 1, 3) array in nm
+    """
+    lengths = SegmentLengthDistribution(filament_type, temperature).sample(generator, segments)
+    cosines = JointAngleDistribution(filament_type, temperature).sample(generator, segments - 1)
+    azimuths = generator.uniform(0.0, 2.0 * np.pi, segments - 1)
+    if direction is None:
+        direction = generator.normal(size=3)
+    tangent = np.asarray(direction, dtype=float) / np.linalg.norm(direction)
+    normal = np.cross(tangent, np.eye(3)[np.argmin(np.abs(tangent))])
+    normal /= np.linalg.norm(normal)
+    tangents = [tangent]
+    for cosine, azimuth in zip(cosines, azimuths):
+        binormal = np.cross(tangent, normal)
+        across = np.cos(azimuth) * normal + np.sin(azimuth) * binormal
+        sine = np.sqrt((1.0 - cosine) * (1.0 + cosine))
+        tangent, normal = cosine * tangent + sine * across, cosine * across - sine * tangent
+        tangent /= np.linalg.norm(tangent)
+        normal -= tangent * (tangent @ normal)
+        normal /= np.linalg.norm(normal)
+        tangents.append(tangent)
+    steps = lengths[:, None] * np.array(tangents)
+    return np.asarray(start, dtype=float) + np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])

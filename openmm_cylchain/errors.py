@@ -1,0 +1,13 @@
+"""Exceptions and warnings of the package."""
+
+
+class InputError(ValueError):
+    """Input that cannot be simulated: the message says what is wrong, where, and what to do."""
+
+
+class InstabilityError(RuntimeError):
+    """A simulation that has blown up: the message names the filament, the segment and the step."""
+
+
+class TimeStepWarning(UserWarning):
+    """A time step above a stability bound: the message names the bound."""
