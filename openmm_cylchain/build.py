@@ -14,7 +14,7 @@ from .filament import FilamentType
 from .quantities import DIMENSIONLESS, FORCE, FRICTION, LENGTH, TEMPERATURE, VISCOSITY
 from .quantities import in_units_of, non_negative, positive, whole_number
 from .tension import segment_end_forces, split_external_forces
-from .timestep import recommended_time_step, warn_if_unstable
+from .timestep import check_scheme, recommended_time_step, warn_if_unstable
 
 NODE_NAME = "NOD"
 """Atom name of a filament node in topologies."""
@@ -391,8 +391,9 @@ class Filaments:
         labels = [f"Filament {number} ({f.type.name})" for number, f in enumerate(self._filaments)]
         computation = portable.ChainDisplacements(chains, nodes, rest_lengths, labels, others, frictions)
         integrator_temperature = self._temperature if temperature is None else temperature
-        portable.add_redistribution(system, computation)
-        return portable.PortableIntegrator(system, integrator_temperature, step_size, scheme, random_seed)
+        check_scheme(scheme)
+        group = portable.add_redistribution(system, computation)
+        return portable.PortableIntegrator(system, group, integrator_temperature, step_size, scheme, random_seed)
 
     def joint_tensions(self, context):
         """Virtual forces Phi at the joints, eqs. (22)-(24), in the context's present configuration.

@@ -43,6 +43,11 @@ def _angle_over_sine(cosine):
     return np.where(straight, 1.0 + angle**2 / 6.0, angle / np.where(straight, 1.0, np.maximum(sine, 1e-300)))
 
 
+def _inverse(value):
+    with np.errstate(divide="ignore"):
+        return np.divide(1.0, value)
+
+
 BENDING_POTENTIALS = {
     potential.name: potential
     for potential in (
@@ -63,8 +68,8 @@ BENDING_POTENTIALS = {
         # Eq. (27) of Pesek et al. 2016: curvature of the inscribed circle, which diverges for antiparallel segments.
         BendingPotential(
             name="inscribed-circle",
-            energy=lambda stiffness, c: 2.0 * stiffness * (1.0 - c) / (1.0 + c),
-            derivative=lambda stiffness, c: -4.0 * stiffness / (1.0 + c) ** 2,
+            energy=lambda stiffness, c: 2.0 * stiffness * (1.0 - c) * _inverse(1.0 + c),
+            derivative=lambda stiffness, c: -4.0 * stiffness * _inverse(1.0 + c) ** 2,
             expression="2*bending_stiffness*(cos(theta/2)/sin(theta/2))^2",
         ),
     )

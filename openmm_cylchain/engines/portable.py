@@ -7,6 +7,8 @@ the parameter says "idle" and the PythonForce contributes nothing, so that repor
 are the physical ones.
 """
 
+import hashlib
+import pickle
 import threading
 
 import numpy as np
@@ -33,6 +35,9 @@ _STEPS_TAKEN = "cylinder_chain_steps_taken"
 _INTEGRATOR_KT = "cylinder_chain_integrator_kT"
 _INTEGRATOR_SEED = "cylinder_chain_integrator_seed"
 _START = "cylinder_chain_start"
+
+# CustomIntegrator draws from one random generator per process, which is not safe in two threads at once.
+_STEPPING = threading.Lock()
 
 
 def add_stretching_forces(system, segments, force_group):
@@ -124,6 +129,10 @@ class ChainDisplacements:
     def __getstate__(self):
         return {**self.__dict__, "_forces": {}}
 
+    def fingerprint(self):
+        """A short text that equal computations share."""
+        return hashlib.sha256(pickle.dumps(self)).hexdigest()[:16]
+
     def __call__(self, state):
         parameters = state.getParameters()
         phase = parameters[_PHASE]
@@ -203,19 +212,30 @@ def _gaussian_vectors(seed, steps_taken, count):
 
 
 def add_redistribution(system, computation):
-    """Add the PythonForce with a ChainDisplacements to the System, replacing an earlier one.
+    """Give the System a PythonForce with a ChainDisplacements, in a force group of its own.
 
-    It gets the highest force group that no other force uses.
+    An equal one that is there already is used again. One that differs stays, idle, because Contexts
+    may be using it: OpenMM does not copy forces.
+
+    Returns
+    -------
+    int
+        The force group: the highest that no other force uses.
 
     Raises
     ------
     InputError
         If all 32 force groups are taken.
     """
-    for index in reversed(range(system.getNumForces())):
-        if system.getForce(index).getName() == REDISTRIBUTION_NAME:
-            system.removeForce(index)
-    taken = {force.getForceGroup() for force in system.getForces()}
+    # A periodic PythonForce sees positions as they are stored. Otherwise, GPU platforms would shift the vectors that
+    # are passed through the positions by the box vectors by which they have wrapped each molecule.
+    periodic = system.usesPeriodicBoundaryConditions()
+    fingerprint = f"{REDISTRIBUTION_NAME} {computation.fingerprint()} {'periodic' if periodic else 'open'}"
+    taken = {}
+    for force in system.getForces():
+        if force.getName() == fingerprint:
+            return force.getForceGroup()
+        taken[force.getForceGroup()] = force
     free = [group for group in range(31, -1, -1) if group not in taken]
     if not free:
         raise InputError("The portable engine needs a force group of its own, but all 32 are in use: free one.")
@@ -223,38 +243,30 @@ def add_redistribution(system, computation):
         computation,
         {_PHASE: _IDLE, _SCHEME: 0.0, _KT: 0.0, _STEP_SIZE: 0.0, _SEED: 0.0, _STEPS_TAKEN: 0.0},
     )
-    force.setName(REDISTRIBUTION_NAME)
+    force.setName(fingerprint)
     force.setForceGroup(free[0])
-    # A periodic PythonForce sees positions as they are stored. Otherwise, GPU platforms would shift the vectors that
-    # are passed through the positions by the box vectors by which they have wrapped each molecule.
-    force.setUsesPeriodicBoundaryConditions(system.usesPeriodicBoundaryConditions())
+    force.setUsesPeriodicBoundaryConditions(periodic)
     system.addForce(force)
+    return free[0]
 
 
-def _redistribution_group(system):
-    groups = {}
-    for force in system.getForces():
-        groups.setdefault(force.getForceGroup(), []).append(force)
-    for group, forces in groups.items():
-        for force in forces:
-            if force.getName() == REDISTRIBUTION_NAME:
-                _check_alone(system, force, forces)
-                return group
-    raise InputError("The System has no filaments with an integrator: call Filaments.create_integrator.")
-
-
-def _check_alone(system, redistribution, forces):
-    for force in forces:
-        if force.getName() != REDISTRIBUTION_NAME:
-            raise InputError(
-                f"Force {force.getName()!r} is in force group {force.getForceGroup()}, which the portable engine "
-                "needs for itself: give it another group, or add it before the integrator is created."
-            )
-    if redistribution.usesPeriodicBoundaryConditions() != system.usesPeriodicBoundaryConditions():
+def _check_redistribution(system, group):
+    forces = [force for force in system.getForces() if force.getForceGroup() == group]
+    if not any(force.getName().startswith(REDISTRIBUTION_NAME) for force in forces):
         raise InputError(
-            "The System has become periodic since its filaments got an integrator: call Filaments.create_integrator "
-            "after all forces have been added."
+            f"The System has no filaments with an integrator in force group {group}: call Filaments.create_integrator."
         )
+    for force in forces:
+        if not force.getName().startswith(REDISTRIBUTION_NAME):
+            raise InputError(
+                f"Force {force.getName()!r} is in force group {group}, which the portable engine needs for itself: "
+                "give it another group, or add it before the integrator is created."
+            )
+        if force.usesPeriodicBoundaryConditions() != system.usesPeriodicBoundaryConditions():
+            raise InputError(
+                "The System has become periodic since its filaments got an integrator: call "
+                "Filaments.create_integrator after all forces have been added."
+            )
 
 
 class PortableIntegrator(openmm.CustomIntegrator):
@@ -267,7 +279,9 @@ class PortableIntegrator(openmm.CustomIntegrator):
     Parameters
     ----------
     system : openmm.System
-        With filaments and the redistribution force that ``Filaments.create_integrator`` adds.
+        With filaments.
+    force_group : int
+        Group of the redistribution force that ``Filaments.create_integrator`` has added to it.
     temperature : temperature
         Zero is allowed: no noise.
     step_size : time
@@ -289,19 +303,20 @@ class PortableIntegrator(openmm.CustomIntegrator):
         without filaments.
     """
 
-    def __init__(self, system, temperature, step_size, scheme="midpoint", random_seed=0):
+    def __init__(self, system, force_group, temperature, step_size, scheme="midpoint", random_seed=0):
         super().__init__(positive(step_size, TIME, "step_size"))
         check_scheme(scheme)
         self._scheme = scheme
         self._system = system
+        self._force_group = force_group
         self._checked = False
-        group = _redistribution_group(system)
+        _check_redistribution(system, force_group)
         self.addGlobalVariable(_INTEGRATOR_KT, 0.0)
         self.addGlobalVariable(_INTEGRATOR_SEED, 0.0)
         self.addPerDofVariable(_START, 0.0)
-        self._add_program(f"f{group}", SCHEMES.index(scheme))
+        self._add_program(f"f{force_group}", SCHEMES.index(scheme))
         self.setKineticEnergyExpression("0")
-        self.setIntegrationForceGroups(set(range(32)) - {group})
+        self.setIntegrationForceGroups(set(range(32)) - {force_group})
         self.setTemperature(temperature)
         self.setRandomNumberSeed(random_seed)
 
@@ -332,6 +347,8 @@ class PortableIntegrator(openmm.CustomIntegrator):
     def step(self, steps):
         """Advance by a number of steps.
 
+        Integrators may be stepped from different threads, but take turns: use processes to run in parallel.
+
         Raises
         ------
         InstabilityError
@@ -340,13 +357,14 @@ class PortableIntegrator(openmm.CustomIntegrator):
             If forces added since the integrator was created stand in its way.
         """
         if not self._checked:
-            _redistribution_group(self._system)
+            _check_redistribution(self._system, self._force_group)
             self._checked = True
         # States and checkpoints carry variables of the integrator that wrote them; the seed is this one's own.
         if self.getGlobalVariableByName(_INTEGRATOR_SEED) != self._key:
             self.setGlobalVariableByName(_INTEGRATOR_SEED, self._key)
         try:
-            super().step(steps)
+            with _STEPPING:
+                super().step(steps)
         except openmm.OpenMMException as error:
             if "has blown up" in str(error):
                 raise InstabilityError(str(error)) from None

@@ -1,0 +1,65 @@
+"""Equilibrium of chains against exact values, for every engine, platform and scheme."""
+
+import pytest
+from conftest import PLATFORMS
+from physics_cases import CASES, ENGINES, exact_means, measured_means
+
+SIGMAS = 4.0
+# Of the step's own error: an explicit scheme of weak order one makes the variance of a mode of rate lambda too large
+# by lambda dt/2, which is at most 1 % at a hundredth of the stability bound.
+STEP_ERROR = 0.01
+
+
+def _deviations(case, measured):
+    exact = exact_means(case)
+    deviations = {}
+    for name, (mean, error) in measured.items():
+        excess = abs(mean - exact[name])
+        if name.endswith("energy"):
+            excess = max(0.0, excess - STEP_ERROR * exact[name])
+        deviations[name] = excess / error
+    return deviations
+
+
+def _check(name, engine, platform):
+    case = CASES[name]
+    measured = measured_means(case, engine, platform, "midpoint")
+    exact = exact_means(case)
+    for energy in ("stretching energy", "bending energy"):
+        if energy in measured:
+            assert 0.05 * exact[energy] > SIGMAS * measured[energy][1], f"too few samples to see 5 % of {energy}"
+    deviations = _deviations(case, measured)
+    assert max(deviations.values()) < SIGMAS, (deviations, measured, exact)
+
+
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("engine", ENGINES)
+def test_midpoint_keeps_equilibrium(name, engine):
+    _check(name, engine, "Reference")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("platform", [platform for platform in PLATFORMS if platform != "Reference"])
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("engine", ENGINES)
+def test_midpoint_keeps_equilibrium_on_platform(name, engine, platform):
+    _check(name, engine, platform)
+
+
+@pytest.mark.parametrize("name", ["freely-jointed", "f-actin-60nm"])
+@pytest.mark.parametrize("engine", ENGINES)
+def test_printed_scheme_fails(name, engine):
+    _check_printed_scheme_fails(name, engine)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in CASES if name not in ("freely-jointed", "f-actin-60nm")])
+@pytest.mark.parametrize("engine", ENGINES)
+def test_printed_scheme_fails_elsewhere(name, engine):
+    _check_printed_scheme_fails(name, engine)
+
+
+def _check_printed_scheme_fails(name, engine):
+    case = CASES[name]
+    deviations = _deviations(case, measured_means(case, engine, "Reference", "euler"))
+    assert max(deviations.values()) > SIGMAS, deviations
