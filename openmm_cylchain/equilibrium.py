@@ -10,6 +10,7 @@ and the azimuth of every joint is uniform, so every average below is exact at an
 """
 
 import numpy as np
+from scipy.integrate import simpson
 
 from .quantities import TEMPERATURE, positive, thermal_energy
 
@@ -29,14 +30,17 @@ class _Marginal:
 
     def mean(self, function):
         """Average of ``function`` (of the coordinate) by Simpson's rule."""
-        from scipy.integrate import simpson
-
         values = np.where(self._weight > 0, function(self._coordinate), 0.0)
         return simpson(values * self._weight, x=self._coordinate) / simpson(self._weight, x=self._coordinate)
 
     def sample(self, generator, size):
         """Independent draws by inversion of the cumulative distribution."""
         return np.interp(generator.random(size), self._cumulative, self._coordinate)
+
+
+def _grid(low, high):
+    # Dense towards both ends, where potentials diverge within a narrow layer.
+    return low + (high - low) * 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, _GRID)))
 
 
 class SegmentLengthDistribution(_Marginal):
@@ -59,7 +63,7 @@ class SegmentLengthDistribution(_Marginal):
         # Twelve standard deviations about the most probable length leave out less than 1e-30.
         width = np.sqrt(kT / stiffness)
         mode = 0.5 * (rest + np.sqrt(rest**2 + 8.0 * width**2))
-        length = np.linspace(max(low, mode - 12.0 * width), min(high, mode + 12.0 * width), _GRID)
+        length = _grid(max(low, mode - 12.0 * width), min(high, mode + 12.0 * width))
         with np.errstate(divide="ignore"):
             super().__init__(length, 2.0 * np.log(length) - filament_type.stretching_energy(length) / kT)
 
@@ -78,10 +82,9 @@ class JointAngleDistribution(_Marginal):
         # V_b is at least (a/l0)(1-c)*0.8, so a grid in 1-c up to 60 k_B T l0/a holds all of a stiff joint.
         stiffness = filament_type.joint_stiffness / kT
         widest = 2.0 if stiffness < 50.0 else min(2.0, 100.0 / stiffness)
-        cosine = 1.0 - np.linspace(widest, 0.0, _GRID)
+        cosine = _grid(1.0 - widest, 1.0)
         with np.errstate(divide="ignore", over="ignore"):
-            energy = filament_type.bending_energy(cosine) if stiffness > 0 else np.zeros_like(cosine)
-        super().__init__(cosine, -energy / kT)
+            super().__init__(cosine, -filament_type.bending_energy(cosine) / kT)
 
 
 def draw_chain(filament_type, segments, temperature, generator, start=(0.0, 0.0, 0.0), direction=None):

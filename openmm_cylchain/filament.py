@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 
+import numpy as np
 from openmm import unit
 
 from .errors import InputError
@@ -232,10 +233,14 @@ class FilamentType:
 
     def bending_energy(self, cosine):
         """Energy of joints with the given cosines t1.t2 in kJ/mol."""
+        if self.bending_rigidity == 0.0:
+            return np.zeros_like(cosine, dtype=float)
         return self.bending_potential.energy(self.joint_stiffness, cosine)
 
     def bending_derivative(self, cosine):
         """Derivative dV_b/dc at the given cosines t1.t2 in kJ/mol."""
+        if self.bending_rigidity == 0.0:
+            return np.zeros_like(cosine, dtype=float)
         return self.bending_potential.derivative(self.joint_stiffness, cosine)
 
     def persistence_length_at(self, temperature):
