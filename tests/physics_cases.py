@@ -20,7 +20,7 @@ NANOMETER = unit.nanometer
 ENGINES = ("portable",)
 
 
-def _soft_chain(name, **bending):
+def soft_chain(name, **bending):
     """Segments of 100 nm that stretch by a tenth; slow extension, so that few steps reach far."""
     base = FilamentType(
         name=name, diameter=6, segment_length=100, stretching_stiffness=100 * KT / 100**2, **bending
@@ -41,18 +41,18 @@ class Case:
 
 
 CASES = {
-    "freely-jointed": Case(_soft_chain("FJC", bending_rigidity=0.0), 2, 1500, 2000, 0.01),
+    "freely-jointed": Case(soft_chain("FJC", bending_rigidity=0.0), 2, 1500, 2000, 0.01),
     "inscribed-circle": Case(
-        _soft_chain("CIRC", bending_rigidity=2 * KT * 100, bending_model="inscribed-circle"), 8, 800, 1000, 0.01
+        soft_chain("CIRC", bending_rigidity=2 * KT * 100, bending_model="inscribed-circle"), 8, 800, 1000, 0.01
     ),
     "kratky-porod": Case(
-        _soft_chain("KP", bending_rigidity=2 * KT * 100, bending_model="kratky-porod"), 8, 800, 1000, 0.01
+        soft_chain("KP", bending_rigidity=2 * KT * 100, bending_model="kratky-porod"), 8, 800, 1000, 0.01
     ),
     "quadratic": Case(
-        _soft_chain("QUAD", bending_rigidity=2 * KT * 100, bending_model="quadratic"), 8, 800, 1000, 0.01
+        soft_chain("QUAD", bending_rigidity=2 * KT * 100, bending_model="quadratic"), 8, 800, 1000, 0.01
     ),
     "fene": Case(
-        replace(_soft_chain("FENE", bending_rigidity=2 * KT * 100), stretching_model="fene", maximum_extension=50.0),
+        replace(soft_chain("FENE", bending_rigidity=2 * KT * 100), stretching_model="fene", maximum_extension=50.0),
         8,
         800,
         1000,
@@ -111,6 +111,7 @@ def _observables(case, nodes):
     tangent = difference / length[..., None]
     cosine = np.einsum("ijk,ijk->ij", tangent[:, 1:], tangent[:, :-1])
     values = {
+        "squared end-to-end distance": np.sum((nodes[:, -1:] - nodes[:, :1]) ** 2, axis=2),
         "stretching energy": kind.stretching_energy(length) / KT,
         "length": length / kind.segment_length,
         "cosine": cosine,

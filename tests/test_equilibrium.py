@@ -2,7 +2,9 @@
 
 import pytest
 from conftest import PLATFORMS
-from physics_cases import CASES, ENGINES, exact_means, measured_means
+from physics_cases import CASES, ENGINES, KT, TEMPERATURE, Case, exact_means, measured_means, soft_chain
+
+from openmm_cylchain.theory import chain_mean_square_end_to_end, wlc_mean_square_end_to_end
 
 SIGMAS = 4.0
 # Of the step's own error: an explicit scheme of weak order one makes the variance of a mode of rate lambda too large
@@ -13,7 +15,8 @@ STEP_ERROR = 0.01
 def _deviations(case, measured):
     exact = exact_means(case)
     deviations = {}
-    for name, (mean, error) in measured.items():
+    for name in exact:
+        mean, error = measured[name]
         excess = abs(mean - exact[name])
         if name.endswith("energy"):
             excess = max(0.0, excess - STEP_ERROR * exact[name])
@@ -63,3 +66,25 @@ def _check_printed_scheme_fails(name, engine):
     case = CASES[name]
     deviations = _deviations(case, measured_means(case, engine, "Reference", "euler"))
     assert max(deviations.values()) > SIGMAS, deviations
+
+
+# Contour length over persistence length, with the segments that resolve it and the chains that measure it.
+END_TO_END = [(0.05, 16, 150), (0.2, 16, 150), (1.0, 32, 300), (5.0, 24, 2200)]
+
+
+@pytest.mark.parametrize(("ratio", "segments", "chains"), END_TO_END)
+@pytest.mark.parametrize("engine", ENGINES)
+def test_drawn_chains_keep_their_end_to_end_distance(engine, ratio, segments, chains):
+    length = 100.0
+    kind = soft_chain("WLC", bending_rigidity=KT * segments * length / ratio)
+    case = Case(kind, segments, chains, 100, 0.02)
+    mean, error = measured_means(case, engine, "Reference", "midpoint")["squared end-to-end distance"]
+    exact = chain_mean_square_end_to_end(kind, segments, TEMPERATURE)
+    assert abs(mean - exact) < SIGMAS * error
+    assert 0.05 * exact > SIGMAS * error
+
+    # A joint of the inscribed-circle model is stiffer than a length l0 of wormlike chain by O(l0/l_p), and thermal
+    # stretching lengthens segments by a percent each.
+    wormlike = wlc_mean_square_end_to_end(segments * length, segments * length / ratio)
+    discretisation = 1.5 * ratio / segments + 2 * (exact_means(case)["length"] - 1.0)
+    assert abs(mean - wormlike) < SIGMAS * error + discretisation * wormlike
