@@ -7,12 +7,13 @@ import openmm
 from openmm import app, unit
 
 from .engines import portable
-from .engines.redistribution import ChainSet, joint_tensions
+from .engines.description import describe_chains, describe_other_particles, filament_label, refuse_constraints
+from .engines.redistribution import joint_tensions
 from .equilibrium import draw_chain
 from .errors import InputError
 from .filament import FilamentType
-from .quantities import DIMENSIONLESS, FORCE, FRICTION, LENGTH, TEMPERATURE, VISCOSITY
-from .quantities import in_units_of, non_negative, positive, whole_number
+from .placement import check_shape, clamped_nodes, unit_vector, vector
+from .quantities import FORCE, LENGTH, TEMPERATURE, VISCOSITY, in_units_of, non_negative, positive, whole_number
 from .tension import segment_end_forces, split_external_forces
 from .timestep import check_scheme, recommended_time_step, warn_if_unstable
 
@@ -106,8 +107,8 @@ class Filaments:
         """
         label = self._label(filament_type)
         segments = whole_number(segments, 1, f"{label}: segments")
-        start = _vector(start, LENGTH, f"{label}: start")
-        direction = _direction(direction, label)
+        start = vector(start, LENGTH, f"{label}: start")
+        direction = unit_vector(direction, label)
         distance = np.arange(segments + 1) * filament_type.segment_length
         return self._add(filament_type, start + distance[:, None] * direction, clamped, label)
 
@@ -162,9 +163,9 @@ class Filaments:
         """
         label = self._label(filament_type)
         segments = whole_number(segments, 1, f"{label}: segments")
-        start = _vector(start, LENGTH, f"{label}: start")
+        start = vector(start, LENGTH, f"{label}: start")
         if direction is not None:
-            direction = _direction(direction, label)
+            direction = unit_vector(direction, label)
         if self._temperature == 0:
             raise InputError(f"{label}: an equilibrium draw needs a temperature above zero.")
         generator = np.random.default_rng(whole_number(seed, 0, f"{label}: seed"))
@@ -182,28 +183,15 @@ class Filaments:
     def _add(self, filament_type, positions, clamped, label):
         if self._nodes is not None:
             raise InputError(f"{label} comes too late: the filaments are already in a System.")
-        lengths = np.linalg.norm(np.diff(positions, axis=0), axis=1)
-        if np.any(lengths == 0.0):
-            node = int(np.argmax(lengths == 0.0))
-            raise InputError(f"{label}: nodes {node} and {node + 1} coincide; move them apart.")
-        if filament_type.maximum_extension is not None:
-            self._check_extension(filament_type, lengths, label)
-        _check_folds(filament_type, positions, label)
-        clamped = _clamped_nodes(clamped, len(positions), label)
-        # Resistance and bounds are computed now, so that a filament that cannot be simulated is refused here.
-        filament_type.segment_friction(self._viscosity, self._temperature, len(positions) - 1)
+        check_shape(filament_type, positions, label)
+        clamped = clamped_nodes(clamped, len(positions), label)
+        # Friction is computed now, so that a filament that has none is refused here.
+        try:
+            filament_type.segment_friction(self._viscosity, self._temperature, len(positions) - 1)
+        except InputError as error:
+            raise InputError(f"{label}: {error}") from None
         self._filaments.append(Filament(filament_type, positions, clamped))
         return len(self) - 1
-
-    @staticmethod
-    def _check_extension(filament_type, lengths, label):
-        extension = np.abs(lengths - filament_type.segment_length)
-        segment = int(np.argmax(extension))
-        if extension[segment] >= filament_type.maximum_extension:
-            raise InputError(
-                f"{label}: segment {segment} is {lengths[segment]:.4g} nm long, outside the FENE potential's "
-                f"{filament_type.segment_length:g} -/+ {filament_type.maximum_extension:g} nm."
-            )
 
     def build(self, box_vectors=None, stretching_force_group=0, bending_force_group=0):
         """Put the filaments into a new Topology, System and positions.
@@ -223,7 +211,7 @@ class Filaments:
         """
         topology, system = app.Topology(), openmm.System()
         if box_vectors is not None:
-            vectors = [openmm.Vec3(*_vector(vector, LENGTH, "box_vectors")) for vector in box_vectors]
+            vectors = [openmm.Vec3(*vector(edge, LENGTH, "box_vectors")) for edge in box_vectors]
             system.setDefaultPeriodicBoxVectors(*vectors)
             topology.setPeriodicBoxVectors(vectors * unit.nanometer)
         positions = self.add_to(
@@ -382,18 +370,22 @@ class Filaments:
         nodes = np.concatenate(self.node_indices)
         if system.getNumParticles() <= nodes.max():
             raise InputError("This is not the System that the filaments were put into: it has too few particles.")
-        self._check_constraints(system)
-        chains = self._chain_set(system)
-        others, frictions = self._other_particles(system, nodes, particle_friction)
+        refuse_constraints(system, self._filaments, self._nodes)
+        chains = self.chain_set(system)
+        others, frictions = describe_other_particles(system, nodes, particle_friction)
         for filament in {(f.type, f.segments): f for f in self._filaments}.values():
             warn_if_unstable(filament.type, self._viscosity, self._temperature, step_size, filament.segments)
         rest_lengths = np.concatenate([np.full(f.segments, f.type.segment_length) for f in self._filaments])
-        labels = [f"Filament {number} ({f.type.name})" for number, f in enumerate(self._filaments)]
+        labels = [filament_label(number, filament) for number, filament in enumerate(self._filaments)]
         computation = portable.ChainDisplacements(chains, nodes, rest_lengths, labels, others, frictions)
         integrator_temperature = self._temperature if temperature is None else temperature
         check_scheme(scheme)
         group = portable.add_redistribution(system, computation)
         return portable.PortableIntegrator(system, group, integrator_temperature, step_size, scheme, random_seed)
+
+    def chain_set(self, system):
+        """The filaments as an engine sees them (a ``ChainSet``): friction of segments and fixed nodes."""
+        return describe_chains(system, self._filaments, self.node_indices, self._viscosity, self._temperature)
 
     def joint_tensions(self, context):
         """Virtual forces Phi at the joints, eqs. (22)-(24), in the context's present configuration.
@@ -415,7 +407,7 @@ class Filaments:
         state = context.getState(positions=True, forces=True)
         positions = state.getPositions(asNumpy=True)._value
         forces = state.getForces(asNumpy=True)._value
-        chains = self._chain_set(context.getSystem())
+        chains = self.chain_set(context.getSystem())
         ends = [segment_end_forces(f.type, positions[nodes]) for f, nodes in zip(self._filaments, self._nodes)]
         minus = np.concatenate([minus for minus, plus in ends])
         plus = np.concatenate([plus for minus, plus in ends])
@@ -424,113 +416,6 @@ class Filaments:
         tensions = joint_tensions(chains, positions[nodes], minus, plus)
         boundaries = np.cumsum([filament.segments for filament in self._filaments])[:-1]
         return [part[:-1] * FORCE for part in np.split(tensions, boundaries)]
-
-    def _check_constraints(self, system):
-        owner = {node: number for number, nodes in enumerate(self._nodes) for node in nodes}
-        for index in range(system.getNumConstraints()):
-            first, second, _ = system.getConstraintParameters(index)
-            for particle in (first, second):
-                if particle in owner:
-                    number = owner[particle]
-                    raise InputError(
-                        f"Filament {number} ({self[number].type.name}): node {particle - self._nodes[number][0]} has "
-                        "a System constraint. Segments are held by stiff springs, not by constraints: remove it."
-                    )
-        if system.getNumConstraints():
-            raise InputError(
-                f"Particles {first} and {second} have a System constraint, which the portable engine cannot keep: "
-                "replace it by a bond."
-            )
-
-    def _chain_set(self, system):
-        fixed = []
-        for number, (filament, nodes) in enumerate(zip(self._filaments, self._nodes)):
-            label = f"Filament {number} ({filament.type.name})"
-            virtual = [node for node in nodes if system.isVirtualSite(int(node))]
-            if virtual:
-                raise InputError(f"{label}: particle {virtual[0]} is a node and cannot be a virtual site.")
-            massless = [system.getParticleMass(int(node))._value == 0.0 for node in nodes]
-            if all(massless):
-                raise InputError(f"{label} has only nodes of mass zero: leave at least one free to move.")
-            fixed.extend(massless)
-        frictions = [
-            filament.type.segment_friction(self._viscosity, self._temperature, filament.segments)
-            for filament in self._filaments
-        ]
-        repeats = [filament.segments for filament in self._filaments]
-        return ChainSet(
-            node_counts=np.array([len(filament.positions) for filament in self._filaments]),
-            fixed=np.array(fixed),
-            **{
-                name: np.repeat([getattr(friction, name) for friction in frictions], repeats)
-                for name in ("parallel", "perpendicular", "rotational", "extensional")
-            },
-        )
-
-    def _other_particles(self, system, nodes, particle_friction):
-        outside = np.setdiff1d(np.arange(system.getNumParticles()), nodes)
-        mobile = np.array([system.getParticleMass(int(index))._value != 0.0 for index in outside], dtype=bool)
-        if not mobile.any():
-            return outside[mobile], np.zeros(0)
-        if particle_friction is None:
-            raise InputError(
-                f"{mobile.sum()} particles outside filaments can move, but have no friction: give particle_friction."
-            )
-        friction = np.asarray(in_units_of(particle_friction, FRICTION, "particle_friction"))
-        if friction.ndim and friction.shape != outside.shape:
-            raise InputError(
-                f"particle_friction must be a number or have one entry for each of the {len(outside)} particles "
-                f"outside filaments, but has the shape {friction.shape}."
-            )
-        friction = np.broadcast_to(friction, outside.shape)[mobile]
-        if np.any(friction <= 0):
-            raise InputError(
-                f"particle_friction must be positive, but is {friction.min():g} for particle "
-                f"{outside[mobile][np.argmin(friction)]}."
-            )
-        return outside[mobile], np.array(friction)
-
-
-def _vector(value, target, name):
-    vector = np.asarray(in_units_of(value, target, name))
-    if vector.shape != (3,):
-        raise InputError(f"{name} must have three components, but has the shape {vector.shape}.")
-    return vector
-
-
-def _direction(direction, label):
-    direction = _vector(direction, DIMENSIONLESS, f"{label}: direction")
-    norm = np.linalg.norm(direction)
-    if norm == 0:
-        raise InputError(f"{label}: direction must not be the zero vector.")
-    return direction / norm
-
-
-def _check_folds(filament_type, positions, label):
-    if filament_type.bending_rigidity == 0.0:
-        return
-    difference = np.diff(positions, axis=0)
-    tangents = difference / np.linalg.norm(difference, axis=1)[:, None]
-    cosines = np.einsum("ij,ij->i", tangents[1:], tangents[:-1])
-    energies = filament_type.bending_energy(cosines)
-    if not np.all(np.isfinite(energies)) or np.any(cosines < -1.0 + 1e-12):
-        joint = int(np.argmin(cosines)) + 1
-        raise InputError(
-            f"{label}: the segments before and after node {joint} are antiparallel, where the bending force is not "
-            "defined; move the node."
-        )
-
-
-def _clamped_nodes(clamped, count, label):
-    nodes = set()
-    for node in clamped:
-        number = whole_number(node + count if node < 0 else node, 0, f"{label}: clamped node")
-        if number >= count:
-            raise InputError(f"{label}: clamped node {node} does not exist; there are {count} nodes.")
-        nodes.add(number)
-    if len(nodes) == count:
-        raise InputError(f"{label} has all of its nodes clamped (mass zero): leave at least one free to move.")
-    return tuple(sorted(nodes))
 
 
 def _exclude_from_custom_nonbonded(force, existing, missing):

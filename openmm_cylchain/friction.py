@@ -8,8 +8,7 @@ import math
 from dataclasses import dataclass
 
 from .errors import InputError
-from .quantities import LENGTH, MASS, STIFFNESS, TIME, VISCOSITY
-from .quantities import positive, thermal_energy
+from .quantities import LENGTH, MASS, STIFFNESS, TIME, VISCOSITY, positive, thermal_energy
 
 
 @dataclass(frozen=True)

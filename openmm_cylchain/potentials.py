@@ -4,8 +4,8 @@ Every potential is written once as a function of its own coordinate: the cosine 
 between neighbouring segments for bending, the segment length ``l`` for stretching.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Callable
 
 import numpy as np
 

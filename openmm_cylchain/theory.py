@@ -14,8 +14,18 @@ import numpy as np
 from .equilibrium import JointAngleDistribution, SegmentLengthDistribution
 from .errors import InputError
 from .friction import rotational_relaxation_time
-from .quantities import DIMENSIONLESS, FORCE, LENGTH, STIFFNESS, TEMPERATURE, TIME
-from .quantities import in_units_of, positive, thermal_energy, whole_number
+from .quantities import (
+    DIMENSIONLESS,
+    FORCE,
+    LENGTH,
+    STIFFNESS,
+    TEMPERATURE,
+    TIME,
+    in_units_of,
+    positive,
+    thermal_energy,
+    whole_number,
+)
 
 
 def _not_negative(value, dimension, name):

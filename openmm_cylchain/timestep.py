@@ -10,8 +10,7 @@ import warnings
 from dataclasses import dataclass
 
 from .errors import InputError, TimeStepWarning
-from .quantities import BENDING_RIGIDITY, LENGTH, STIFFNESS, TIME, VISCOSITY
-from .quantities import in_units_of, positive, thermal_energy
+from .quantities import BENDING_RIGIDITY, LENGTH, STIFFNESS, TIME, VISCOSITY, in_units_of, positive, thermal_energy
 
 SCHEMES = ("euler", "midpoint")
 

@@ -1,5 +1,7 @@
 """Fixtures that several test modules share."""
 
+import os
+
 import openmm
 import pytest
 
@@ -18,6 +20,19 @@ def _usable(name):
 
 
 PLATFORMS = [name for name in _WANTED if _usable(name)]
+
+
+def pytest_configure():
+    """Fail early if a platform that must be tested is missing, rather than test less in silence."""
+    required = filter(None, os.environ.get("OPENMM_CYLCHAIN_TEST_PLATFORMS", "").split(","))
+    missing = set(required) - set(PLATFORMS)
+    if missing:
+        raise pytest.UsageError(f"OpenMM platforms that must be tested are missing: {', '.join(sorted(missing))}")
+
+
+def pytest_report_header():
+    """Name the platforms under test."""
+    return f"OpenMM platforms: {', '.join(PLATFORMS)}"
 
 
 @pytest.fixture(params=PLATFORMS, scope="session")

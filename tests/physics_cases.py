@@ -6,7 +6,7 @@ import numpy as np
 import openmm
 from openmm import unit
 
-from openmm_cylchain import F_ACTIN, FilamentType, Filaments
+from openmm_cylchain import F_ACTIN, Filaments, FilamentType
 from openmm_cylchain.equilibrium import JointAngleDistribution, SegmentLengthDistribution
 from openmm_cylchain.quantities import BOLTZMANN
 from openmm_cylchain.timestep import stability_bounds

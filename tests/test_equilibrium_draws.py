@@ -11,7 +11,7 @@ import pytest
 from openmm import unit
 from scipy.integrate import quad
 
-from openmm_cylchain import DSDNA, F_ACTIN, MICROTUBULE, FilamentType, Filaments, InputError
+from openmm_cylchain import DSDNA, F_ACTIN, MICROTUBULE, Filaments, FilamentType, InputError
 from openmm_cylchain.equilibrium import JointAngleDistribution, SegmentLengthDistribution, draw_chain
 
 TEMPERATURE = 300.0

@@ -85,7 +85,9 @@ def test_arguments_are_keywords():
         FilamentType("ROD", 5.0, 100.0)
 
 
-@pytest.mark.parametrize("original", [variant(), F_ACTIN, DSDNA, MICROTUBULE, variant(end_corrections=EndCorrections())])
+@pytest.mark.parametrize(
+    "original", [variant(), F_ACTIN, DSDNA, MICROTUBULE, variant(end_corrections=EndCorrections())]
+)
 def test_copies_are_equal_and_hash_alike(original):
     for twin in (copy.copy(original), copy.deepcopy(original), pickle.loads(pickle.dumps(original))):
         assert twin == original

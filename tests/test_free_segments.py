@@ -6,7 +6,7 @@ import pytest
 from physics_cases import KT, TEMPERATURE, VISCOSITY
 from scipy.optimize import curve_fit
 
-from openmm_cylchain import F_ACTIN, FilamentType, Filaments
+from openmm_cylchain import F_ACTIN, Filaments, FilamentType
 from openmm_cylchain.friction import rotational_relaxation_time
 from openmm_cylchain.theory import free_segment_mean_square_displacement, mean_orientation
 

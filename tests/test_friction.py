@@ -34,7 +34,9 @@ def test_extension_of_table_2(actin):
     assert actin.extensional / PN_US_NM == pytest.approx(631150.3, rel=1e-6)
 
 
-@pytest.mark.parametrize("length, diameter, viscosity", [(100.0, 10.0, 602.0), (2400.0, 6.0, 1029.8), (40.0, 25.0, 1.0)])
+@pytest.mark.parametrize(
+    "length, diameter, viscosity", [(100.0, 10.0, 602.0), (2400.0, 6.0, 1029.8), (40.0, 25.0, 1.0)]
+)
 def test_equation_6(length, diameter, viscosity):
     ratio = math.log(length) - math.log(diameter)
     assert module.translational_friction_parallel(length, diameter, viscosity) == pytest.approx(

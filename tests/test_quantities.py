@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from openmm import Vec3, unit
 
-from openmm_cylchain import InputError
-from openmm_cylchain import quantities
+from openmm_cylchain import InputError, quantities
 from openmm_cylchain.quantities import in_units_of, non_negative, positive, thermal_energy, whole_number
 
 # 1 pN nm = 1e-21 J; times 6.02214076e23 per mole, divided by 1000 J per kJ.

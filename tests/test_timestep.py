@@ -15,14 +15,14 @@ from openmm_cylchain import (
     DSDNA,
     F_ACTIN,
     MICROTUBULE,
-    FilamentType,
     Filaments,
+    FilamentType,
     InputError,
     SegmentFriction,
     TimeStepWarning,
     recommended_time_step,
+    timestep,
 )
-from openmm_cylchain import timestep
 from openmm_cylchain.engines.redistribution import STEPS, ChainSet, resistance_bands
 
 MICROSECOND = 1e6  # ps

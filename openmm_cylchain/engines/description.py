@@ -1,0 +1,103 @@
+"""What an engine has to know of filaments and their System, checked against the System."""
+
+import numpy as np
+
+from ..errors import InputError
+from ..quantities import FRICTION, in_units_of
+from .redistribution import ChainSet
+
+
+def filament_label(number, filament):
+    """What to call a filament in messages."""
+    return f"Filament {number} ({filament.type.name})"
+
+
+def refuse_constraints(system, filaments, node_indices):
+    """Raise InputError if the System has constraints, naming the filament that one is on."""
+    owner = {node: number for number, nodes in enumerate(node_indices) for node in nodes}
+    for index in range(system.getNumConstraints()):
+        first, second, _ = system.getConstraintParameters(index)
+        for particle in (first, second):
+            if particle in owner:
+                number = owner[particle]
+                raise InputError(
+                    f"{filament_label(number, filaments[number])}: node {particle - node_indices[number][0]} has a "
+                    "System constraint. Segments are held by stiff springs, not by constraints: remove it."
+                )
+    if system.getNumConstraints():
+        raise InputError(
+            f"Particles {first} and {second} have a System constraint, which the portable engine cannot keep: "
+            "replace it by a bond."
+        )
+
+
+def describe_chains(system, filaments, node_indices, viscosity, temperature):
+    """The filaments as a ChainSet. Nodes of mass zero in the System are fixed.
+
+    Raises
+    ------
+    InputError
+        If a node is a virtual site, or all nodes of a filament have mass zero.
+    """
+    fixed = []
+    for number, (filament, nodes) in enumerate(zip(filaments, node_indices)):
+        label = filament_label(number, filament)
+        virtual = [node for node in nodes if system.isVirtualSite(int(node))]
+        if virtual:
+            raise InputError(f"{label}: particle {virtual[0]} is a node and cannot be a virtual site.")
+        massless = [_mass(system, node) == 0.0 for node in nodes]
+        if all(massless):
+            raise InputError(f"{label} has only nodes of mass zero: leave at least one free to move.")
+        fixed.extend(massless)
+    frictions = [filament.type.segment_friction(viscosity, temperature, filament.segments) for filament in filaments]
+    segments = [filament.segments for filament in filaments]
+    return ChainSet(
+        node_counts=np.array(segments) + 1,
+        fixed=np.array(fixed),
+        **{
+            name: np.repeat([getattr(friction, name) for friction in frictions], segments)
+            for name in ("parallel", "perpendicular", "rotational", "extensional")
+        },
+    )
+
+
+def describe_other_particles(system, nodes, particle_friction):
+    """Indices and friction coefficients of the mobile particles outside filaments.
+
+    Parameters
+    ----------
+    nodes : int array
+        Particle indices of all nodes.
+    particle_friction : energy*time/length^2, array of them, or None
+        In the order of the indices of the particles outside filaments, massless ones included.
+
+    Raises
+    ------
+    InputError
+        If there are such particles but no friction, or it has the wrong shape or is not positive.
+    """
+    outside = np.setdiff1d(np.arange(system.getNumParticles()), nodes)
+    mobile = np.array([_mass(system, index) != 0.0 for index in outside], dtype=bool)
+    if not mobile.any():
+        return outside[mobile], np.zeros(0)
+    if particle_friction is None:
+        raise InputError(
+            f"{mobile.sum()} particles outside filaments can move, but have no friction: give particle_friction."
+        )
+    friction = np.asarray(in_units_of(particle_friction, FRICTION, "particle_friction"))
+    if friction.ndim and friction.shape != outside.shape:
+        raise InputError(
+            f"particle_friction must be a number or have one entry for each of the {len(outside)} particles "
+            f"outside filaments, but has the shape {friction.shape}."
+        )
+    friction = np.broadcast_to(friction, outside.shape)[mobile]
+    if np.any(friction <= 0):
+        raise InputError(
+            f"particle_friction must be positive, but is {friction.min():g} for particle "
+            f"{outside[mobile][np.argmin(friction)]}."
+        )
+    return outside[mobile], np.array(friction)
+
+
+def _mass(system, particle):
+    return system.getParticleMass(int(particle))._value
