@@ -230,8 +230,9 @@ class Filaments:
         topology : openmm.app.Topology
             Changed in place.
         system : openmm.System
-            Changed in place. Non-bonded forces of the System that ask for parameters of every particle get
-            none for the nodes: NonbondedForce and CustomNonbondedForce are given non-interacting entries.
+            Changed in place. NonbondedForce and CustomNonbondedForce, which ask for parameters of every
+            particle, are given non-interacting entries for the nodes. (Where they use a long-range dispersion
+            correction, its constant changes, because OpenMM averages it over all particles.)
         positions : (particles, 3) length
             Positions of the particles that are there.
         stretching_force_group, bending_force_group : int

@@ -9,6 +9,8 @@ lengths and joint angles are independent,
 and the azimuth of every joint is uniform, so every average below is exact at any stiffness.
 """
 
+from functools import lru_cache
+
 import numpy as np
 from scipy.integrate import simpson
 
@@ -87,6 +89,11 @@ class JointAngleDistribution(_Marginal):
             super().__init__(cosine, -filament_type.bending_energy(cosine) / kT)
 
 
+@lru_cache(maxsize=32)
+def _distributions(filament_type, temperature):
+    return SegmentLengthDistribution(filament_type, temperature), JointAngleDistribution(filament_type, temperature)
+
+
 def draw_chain(filament_type, segments, temperature, generator, start=(0.0, 0.0, 0.0), direction=None):
     """Node positions of a chain drawn from the equilibrium of the free discrete chain.
 
@@ -105,8 +112,9 @@ def draw_chain(filament_type, segments, temperature, generator, start=(0.0, 0.0,
     -------
     (segments + 1, 3) array in nm
     """
-    lengths = SegmentLengthDistribution(filament_type, temperature).sample(generator, segments)
-    cosines = JointAngleDistribution(filament_type, temperature).sample(generator, segments - 1)
+    length_distribution, angle_distribution = _distributions(filament_type, temperature)
+    lengths = length_distribution.sample(generator, segments)
+    cosines = angle_distribution.sample(generator, segments - 1)
     azimuths = generator.uniform(0.0, 2.0 * np.pi, segments - 1)
     if direction is None:
         direction = generator.normal(size=3)

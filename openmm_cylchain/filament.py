@@ -164,14 +164,13 @@ class FilamentType:
             self._fail("give either extension_relaxation_time or extensional_friction, not both.")
 
     def _check_choices(self):
-        if self.bending_model not in BENDING_POTENTIALS:
-            self._fail(f"bending_model must be one of {', '.join(BENDING_POTENTIALS)}, but is {self.bending_model!r}.")
-        if self.stretching_model not in STRETCHING_POTENTIALS:
-            self._fail(
-                f"stretching_model must be one of {', '.join(STRETCHING_POTENTIALS)}, but is {self.stretching_model!r}."
-            )
-        if self.friction_length not in ("segment", "filament"):
-            self._fail(f"friction_length must be 'segment' or 'filament', but is {self.friction_length!r}.")
+        for attribute, choices in (
+            ("bending_model", tuple(BENDING_POTENTIALS)),
+            ("stretching_model", tuple(STRETCHING_POTENTIALS)),
+            ("friction_length", ("segment", "filament")),
+        ):
+            if getattr(self, attribute) not in choices:
+                self._fail(f"{attribute} must be one of {', '.join(choices)}, but is {getattr(self, attribute)!r}.")
         if (self.stretching_model == "fene") != (self.maximum_extension is not None):
             self._fail("maximum_extension must be given for stretching_model 'fene', and only for it.")
         if self.maximum_extension is not None and self.maximum_extension > self.segment_length:

@@ -41,8 +41,9 @@ def _check_folds(filament_type, positions, label):
 def clamped_nodes(clamped, count, label):
     """Return the clamped nodes, counted from the start and sorted; raise InputError for one that does not exist."""
     nodes = set()
-    for node in clamped:
-        number = whole_number(node + count if node < 0 else node, 0, f"{label}: clamped node")
+    for node in np.atleast_1d(np.asarray(clamped, dtype=object)):
+        number = whole_number(node, -count, f"{label}: clamped node")
+        number += count if number < 0 else 0
         if number >= count:
             raise InputError(f"{label}: clamped node {node} does not exist; there are {count} nodes.")
         nodes.add(number)

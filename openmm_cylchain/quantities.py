@@ -41,9 +41,12 @@ def in_units_of(value, target, name):
     if isinstance(value, unit.Quantity):
         value = _converted(value, target, name)
     try:
-        number = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} must be a number or an array of numbers, but is {value!r}.") from None
+        array = np.asarray(value)
+    except ValueError:
+        array = np.asarray(None)
+    if array.dtype.kind not in "iuf" and array.size and value is not None:
+        raise InputError(f"{name} must be a number or an array of numbers, but is {value!r}.")
+    number = array.astype(float)
     if not np.all(np.isfinite(number)):
         raise InputError(f"{name} must be finite, but contains NaN or infinity.")
     return float(number) if number.ndim == 0 else number

@@ -85,8 +85,8 @@ def test_joint_angle_moments(model, stiffness):
     joint = JointAngleDistribution(filament_type, TEMPERATURE)
     norm = bend_integral(model, stiffness, lambda bend: 1.0)
     for power in (1, 2, 3):
-        expected = bend_integral(model, stiffness, lambda bend: bend**power) / norm
-        assert joint.mean(lambda c: (1 - c) ** power) == pytest.approx(expected, rel=1e-6)
+        expected = bend_integral(model, stiffness, lambda bend, power=power: bend**power) / norm
+        assert joint.mean(lambda c, power=power: (1 - c) ** power) == pytest.approx(expected, rel=1e-6)
     energy = bend_integral(model, stiffness, lambda bend: bending_energy(model, stiffness, bend)) / norm
     assert joint.mean(filament_type.bending_energy) / KT == pytest.approx(energy, rel=1e-6, abs=1e-15)
 
@@ -160,8 +160,8 @@ def test_segment_length_moments(stiffness, extension):
     segment = SegmentLengthDistribution(filament_type, TEMPERATURE)
     norm = length_integral(stiffness, extension, lambda length: 1.0)
     for power in (1, 2):
-        strain = length_integral(stiffness, extension, lambda length: (length - 1) ** power) / norm
-        assert segment.mean(lambda length: (length / 10 - 1) ** power) == pytest.approx(strain, rel=1e-5)
+        strain = length_integral(stiffness, extension, lambda length, power=power: (length - 1) ** power) / norm
+        assert segment.mean(lambda length, power=power: (length / 10 - 1) ** power) == pytest.approx(strain, rel=1e-5)
     energy = length_integral(stiffness, extension, lambda length: stretching_energy(stiffness, extension, length))
     assert segment.mean(filament_type.stretching_energy) / KT == pytest.approx(energy / norm, rel=1e-5)
 

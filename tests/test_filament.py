@@ -297,7 +297,7 @@ def test_required(attribute):
         ),
         (dict(bending_model="harmonic"), "bending_model must be one of .*inscribed-circle"),
         (dict(stretching_model="hooke"), "stretching_model must be one of harmonic, fene"),
-        (dict(friction_length="chain"), "friction_length must be 'segment' or 'filament'"),
+        (dict(friction_length="chain"), "friction_length must be one of segment, filament"),
         (dict(stretching_model="fene"), "maximum_extension must be given for stretching_model 'fene'"),
         (dict(maximum_extension=10.0), "maximum_extension must be given for stretching_model 'fene', and only for it"),
         (dict(stretching_model="fene", maximum_extension=101.0), "maximum_extension must not exceed segment_length"),

@@ -250,14 +250,19 @@ def add_redistribution(system, computation):
     return free[0]
 
 
+def _is_redistribution(force):
+    # By its parameters: XML files written by OpenMM 8.5 lose the names of PythonForces.
+    return isinstance(force, openmm.PythonForce) and _PHASE in dict(force.getGlobalParameters())
+
+
 def _check_redistribution(system, group):
     forces = [force for force in system.getForces() if force.getForceGroup() == group]
-    if not any(force.getName().startswith(REDISTRIBUTION_NAME) for force in forces):
+    if not any(_is_redistribution(force) for force in forces):
         raise InputError(
             f"The System has no filaments with an integrator in force group {group}: call Filaments.create_integrator."
         )
     for force in forces:
-        if not force.getName().startswith(REDISTRIBUTION_NAME):
+        if not _is_redistribution(force):
             raise InputError(
                 f"Force {force.getName()!r} is in force group {group}, which the portable engine needs for itself: "
                 "give it another group, or add it before the integrator is created."
