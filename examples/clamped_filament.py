@@ -121,9 +121,7 @@ left.set_title("Shapes of an actin filament pulled at its tip")
 
 grid = np.geomspace(0.003, 0.2, 25)
 right.plot(grid, grid * PICONEWTON * length**3 / (3 * rigidity), "--", color="0.5", label="$FL^3/3a$")
-right.plot(
-    grid, [elastica(f * PICONEWTON, rigidity, length)[-1, 1] for f in grid], color="0.2", label="elastica"
-)
+right.plot(grid, [elastica(f * PICONEWTON, rigidity, length)[-1, 1] for f in grid], color="0.2", label="elastica")
 for force, shape, colour in zip(FORCES, shapes, colours):
     right.plot(force, shape[-1, 1], "o", color=colour, markersize=8)
 right.plot([], [], "o", color=colours[1], markersize=8, label="simulation")

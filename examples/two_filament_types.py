@@ -97,10 +97,7 @@ for name, filament_type in types.items():
     exact = chain_tangent_correlation(filament_type, np.arange(len(mean)), TEMPERATURE)
     simulated = -filament_type.segment_length / np.log(mean[1]) / 1000
     expected = chain_persistence_length(filament_type, TEMPERATURE) / 1000
-    print(
-        f"{name:12} {1 - mean[1]:.3e} +/- {error[1]:.0e}   {1 - exact[1]:.3e} "
-        f"{simulated:14.4g} {expected:12.4g}"
-    )
+    print(f"{name:12} {1 - mean[1]:.3e} +/- {error[1]:.0e}   {1 - exact[1]:.3e} {simulated:14.4g} {expected:12.4g}")
     for filament in nodes:
         shapes.plot(
             frames[-1, filament, 0] / 1000,

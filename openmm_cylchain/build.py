@@ -266,9 +266,7 @@ class Filaments:
         positions = np.asarray(in_units_of(positions, LENGTH, "positions"))
         count = system.getNumParticles()
         if topology.getNumAtoms() != count:
-            raise InputError(
-                f"The Topology has {topology.getNumAtoms()} atoms, but the System has {count} particles."
-            )
+            raise InputError(f"The Topology has {topology.getNumAtoms()} atoms, but the System has {count} particles.")
         if positions.size == 0 and count == 0:
             positions = np.zeros((0, 3))
         if positions.shape != (count, 3):

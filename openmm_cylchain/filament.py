@@ -267,9 +267,7 @@ class FilamentType:
         length, diameter = self.segment_length, self.diameter
         logarithm_length = length * segments if self.friction_length == "filament" else length
         corrections = self.end_corrections
-        parallel = translational_friction_parallel(
-            length, diameter, viscosity, corrections.parallel, logarithm_length
-        )
+        parallel = translational_friction_parallel(length, diameter, viscosity, corrections.parallel, logarithm_length)
         perpendicular = translational_friction_perpendicular(
             length, diameter, viscosity, corrections.perpendicular, logarithm_length
         )

@@ -117,12 +117,8 @@ STRETCHING_POTENTIALS = {
         StretchingPotential(
             name="fene",
             energy=_fene_energy,
-            derivative=lambda k, l0, extension, length: k
-            * (length - l0)
-            / (1.0 - ((length - l0) / extension) ** 2),
-            expression=(
-                "-0.5*stretching_stiffness*maximum_extension^2*log(1-((r-rest_length)/maximum_extension)^2)"
-            ),
+            derivative=lambda k, l0, extension, length: k * (length - l0) / (1.0 - ((length - l0) / extension) ** 2),
+            expression=("-0.5*stretching_stiffness*maximum_extension^2*log(1-((r-rest_length)/maximum_extension)^2)"),
         ),
     )
 }

@@ -22,9 +22,7 @@ ENGINES = ("portable",)
 
 def soft_chain(name, **bending):
     """Segments of 100 nm that stretch by a tenth; slow extension, so that few steps reach far."""
-    base = FilamentType(
-        name=name, diameter=6, segment_length=100, stretching_stiffness=100 * KT / 100**2, **bending
-    )
+    base = FilamentType(name=name, diameter=6, segment_length=100, stretching_stiffness=100 * KT / 100**2, **bending)
     friction = base.segment_friction(VISCOSITY, TEMPERATURE)
     return replace(base, extensional_friction=2 * friction.rotational)
 
@@ -48,9 +46,7 @@ CASES = {
     "kratky-porod": Case(
         soft_chain("KP", bending_rigidity=2 * KT * 100, bending_model="kratky-porod"), 8, 800, 1000, 0.01
     ),
-    "quadratic": Case(
-        soft_chain("QUAD", bending_rigidity=2 * KT * 100, bending_model="quadratic"), 8, 800, 1000, 0.01
-    ),
+    "quadratic": Case(soft_chain("QUAD", bending_rigidity=2 * KT * 100, bending_model="quadratic"), 8, 800, 1000, 0.01),
     "fene": Case(
         replace(soft_chain("FENE", bending_rigidity=2 * KT * 100), stretching_model="fene", maximum_extension=50.0),
         8,

@@ -75,11 +75,14 @@ def bending_forces(model, nodes):
     t1, t2 = first / l1, second / l2
     theta = 2 * math.atan2(np.linalg.norm(t2 - t1), np.linalg.norm(t2 + t1))
     stiffness = RIGIDITY / LENGTH
-    slope = stiffness * {
-        "kratky-porod": math.sin(theta),
-        "quadratic": theta,
-        "inscribed-circle": 2 * math.tan(theta / 2) / math.cos(theta / 2) ** 2,
-    }[model]
+    slope = (
+        stiffness
+        * {
+            "kratky-porod": math.sin(theta),
+            "quadratic": theta,
+            "inscribed-circle": 2 * math.tan(theta / 2) / math.cos(theta / 2) ** 2,
+        }[model]
+    )
     if theta == 0.0:
         return np.zeros((3, 3))
     axis = np.cross(t1, t2)
@@ -143,9 +146,7 @@ def computed(platform):
     filaments = Filaments(1000.0, 300)
     for models, angle, lengths, seed in CASES:
         filaments.add_nodes(TYPES[models], nodes_of(angle, lengths, seed))
-    _, system, positions = filaments.build(
-        stretching_force_group=STRETCHING_GROUP, bending_force_group=BENDING_GROUP
-    )
+    _, system, positions = filaments.build(stretching_force_group=STRETCHING_GROUP, bending_force_group=BENDING_GROUP)
     context = openmm.Context(system, openmm.VerletIntegrator(0.001), platform)
     context.setPositions(positions)
     result = {}
@@ -182,8 +183,6 @@ def test_bending_forces(computed, model):
         assert np.abs(forces - expected).max() <= tolerance, (shape, forces, expected)
 
 
-
-
 def stretching_tolerance(platform, model, nodes, expected):
     if platform != "OpenCL":
         return 1e-7 * np.abs(expected).max() + 1e-7
@@ -211,9 +210,7 @@ def energy_of(platform):
     filaments = Filaments(1000.0, 300)
     for models in MODELS:
         filaments.add_straight(TYPES[models], 2, [0, 0, 0], [1, 0, 0])
-    _, system, rest = filaments.build(
-        stretching_force_group=STRETCHING_GROUP, bending_force_group=BENDING_GROUP
-    )
+    _, system, rest = filaments.build(stretching_force_group=STRETCHING_GROUP, bending_force_group=BENDING_GROUP)
     context = openmm.Context(system, openmm.VerletIntegrator(0.001), platform)
     rest = rest.value_in_unit(unit.nanometer)
 

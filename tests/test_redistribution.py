@@ -210,12 +210,8 @@ def test_midpoint_drift_is_the_divergence_of_the_mobility():
     samples = np.empty((pairs, 9))
     for pair in range(pairs):
         translational, rotational = generator.normal(size=(2, 2, 3))
-        forward = redistribution.midpoint_step(
-            chains, nodes, np.zeros((3, 3)), kT, step, translational, rotational
-        )
-        backward = redistribution.midpoint_step(
-            chains, nodes, np.zeros((3, 3)), kT, step, -translational, -rotational
-        )
+        forward = redistribution.midpoint_step(chains, nodes, np.zeros((3, 3)), kT, step, translational, rotational)
+        backward = redistribution.midpoint_step(chains, nodes, np.zeros((3, 3)), kT, step, -translational, -rotational)
         samples[pair] = (forward + backward).reshape(-1) / (2 * step)
     error = samples.std(axis=0, ddof=1) / np.sqrt(pairs)
     assert np.all(np.abs(samples.mean(axis=0) - drift) < 4 * error)

@@ -172,9 +172,7 @@ def test_chain_end_to_end_is_the_double_sum_over_segments():
     def energy(length):
         return 0.5 * chain.segment_stiffness * (length - LENGTH) ** 2
 
-    mean, square = (
-        average_over_length(energy, 0.0, 5 * LENGTH, lambda length, n=n: length**n) for n in (1, 2)
-    )
+    mean, square = (average_over_length(energy, 0.0, 5 * LENGTH, lambda length, n=n: length**n) for n in (1, 2))
     table = np.array([[square if i == j else mean**2 * cosine ** abs(i - j) for i in range(7)] for j in range(7)])
     assert theory.mean_joint_cosine(chain, TEMPERATURE) == pytest.approx(cosine, rel=1e-9)
     assert theory.chain_mean_square_end_to_end(chain, segments, TEMPERATURE) == pytest.approx(table.sum(), rel=1e-9)

@@ -150,9 +150,7 @@ class ChainDisplacements:
         kT, step = parameters[_KT], parameters[_STEP_SIZE]
         steps_taken = int(parameters[_STEPS_TAKEN])
         chains = self._chains
-        gaussian = _gaussian_vectors(
-            int(parameters[_SEED]), steps_taken, 2 * chains.segment_count + len(self._others)
-        )
+        gaussian = _gaussian_vectors(int(parameters[_SEED]), steps_taken, 2 * chains.segment_count + len(self._others))
         translational, rotational, other = np.split(gaussian, [chains.segment_count, 2 * chains.segment_count])
         advance = STEPS[SCHEMES[int(parameters[_SCHEME])]]
         with np.errstate(all="ignore"):

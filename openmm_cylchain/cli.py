@@ -1,0 +1,128 @@
+"""The console script ``openmm-cylchain``: runs a configuration, or explains its time step.
+
+Exit codes: 0 done, 1 the simulation blew up or a file could not be written, 2 wrong input, 130 and 143
+interrupted by SIGINT and SIGTERM.
+"""
+
+import argparse
+import sys
+import warnings
+
+from .errors import InputError, InstabilityError, TimeStepWarning
+from .version import __version__
+
+_FAILED, _WRONG_INPUT, _KEYBOARD_INTERRUPT = 1, 2, 130
+
+
+def main(arguments=None):
+    """Run the console script and return its exit code.
+
+    Parameters
+    ----------
+    arguments : list of str, optional
+        Those of the command line if not given.
+    """
+    options = _parser().parse_args(arguments)
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", TimeStepWarning)
+        show = warnings.showwarning
+        warnings.showwarning = lambda message, category, *rest: (
+            _say("warning", message) if issubclass(category, TimeStepWarning) else show(message, category, *rest)
+        )
+        try:
+            options.command(options)
+        except InputError as error:
+            _say("error", error)
+            return _WRONG_INPUT
+        except InstabilityError as error:
+            _say("error", error)
+            return _FAILED
+        except OSError as error:
+            _say("error", f"{error}. A run that has been interrupted by this can be continued with --resume.")
+            return _FAILED
+        except KeyboardInterrupt:
+            _say("error", "interrupted; a run can be continued with --resume.")
+            return _KEYBOARD_INTERRUPT
+        except SystemExit as exit_request:
+            return exit_request.code
+    return 0
+
+
+def _say(kind, message):
+    print(f"{kind}: {message}", file=sys.stderr, flush=True)
+
+
+def _parser():
+    parser = argparse.ArgumentParser(
+        prog="openmm-cylchain", description="Brownian dynamics of filaments with OpenMM, from a configuration file."
+    )
+    parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    run = commands.add_parser("run", help="simulate a configuration and compare it with theory")
+    run.add_argument("configuration", metavar="CONFIG", help="TOML file that describes filaments, solvent and run")
+    run.add_argument("--output", metavar="DIR", required=True, help="directory for the files of the run")
+    run.add_argument("--resume", action="store_true", help="continue the run in DIR from its last checkpoint")
+    run.set_defaults(command=_run)
+
+    timestep = commands.add_parser("timestep", help="print the bounds on the time step and the recommended step")
+    timestep.add_argument("configuration", metavar="CONFIG", help="TOML file that describes filaments and solvent")
+    timestep.set_defaults(command=_time_step)
+    return parser
+
+
+def _run(options):
+    from .configuration import read_configuration
+    from .run import RunInterrupted, run
+    from .run_directory import RunDirectory
+
+    configuration = read_configuration(options.configuration)
+    try:
+        run(configuration, options.output, options.resume)
+    except RunInterrupted as interruption:
+        _say("interrupted", interruption)
+        raise SystemExit(128 + interruption.signal_number) from None
+
+    from .summary import format_summary, load_trajectory, summarise, write_summary
+    from .summary_figure import write_figure
+
+    directory = RunDirectory(options.output)
+    trajectory = load_trajectory(configuration, directory)
+    groups = summarise(configuration, trajectory)
+    write_summary(configuration, directory, groups)
+    write_figure(configuration, directory, trajectory)
+    print()
+    print(format_summary(configuration, groups))
+    print(f"\nWritten to {directory.path}: {directory.summary.name}, {directory.figure.name}")
+
+
+_BOUND_LABELS = {
+    "translation": "diffusion along the axis, eq. (54)",
+    "rotation": "diffusion by rotation, eq. (55)",
+    "diffusion": "diffusion of an end, eq. (56)",
+    "stretching": "relaxation of a length, eq. (57)",
+    "bending": "relaxation of a joint, eq. (58)",
+}
+
+
+def _time_step(options):
+    from .configuration import read_configuration
+    from .physical_units import format_time
+    from .timestep import recommended_time_step, stability_bounds, time_step_bounds
+
+    configuration = read_configuration(options.configuration)
+    solvent, settings = configuration.solvent, configuration.simulation
+    for group in configuration.filaments:
+        arguments = (group.type, solvent.viscosity, solvent.temperature)
+        recommended = recommended_time_step(*arguments, settings.scheme, group.segments)
+        stability = min(stability_bounds(*arguments, group.segments).values())
+        print(f"{group.type.name}, {group.segments} segments of {group.type.segment_length:g} nm")
+        for name, bound in time_step_bounds(*arguments, segments=group.segments).items():
+            print(f"  {_BOUND_LABELS[name]:<36} {format_time(bound, 4):>12}")
+        print(f"  {'stability of the chain':<36} {format_time(stability, 4):>12}")
+        print(f"  {'recommended':<36} {format_time(recommended.step, 4):>12}  ({recommended.reason})")
+        print(f"  {'in this configuration':<36} {format_time(settings.time_step, 4):>12}")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,449 @@
+"""Runs: their files, resuming after a kill at any moment, refusals, signals and blow-ups."""
+
+import csv
+import json
+import math
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+import mdtraj
+import numpy as np
+import pytest
+
+from openmm_cylchain import F_ACTIN, InputError
+from openmm_cylchain.cli import main
+from openmm_cylchain.configuration import parse_configuration, read_configuration
+from openmm_cylchain.run import create_filaments, run
+from openmm_cylchain.run_directory import RunDirectory, read_energies
+from openmm_cylchain.summary import format_summary, load_trajectory, summarise
+
+SHORT = """
+title = "short"
+[solvent]
+temperature = "310 K"
+viscosity = "1.71 mPa*s"
+[[filament]]
+type = "F_ACTIN"
+segments = 6
+count = 3
+[[filament]]
+type = "F_ACTIN"
+segments = 4
+start = "straight"
+clamped = [0]
+[simulation]
+time_step = "10 ns"
+duration = "12 us"
+report_interval = "0.2 us"
+checkpoint_interval = "0.6 us"
+seed = 5
+"""
+
+FRAMES = 61
+COMMAND = [sys.executable, "-m", "openmm_cylchain.cli", "run"]
+
+
+def configured(tmp_path, text=SHORT, **changes):
+    for key, value in changes.items():
+        text, count = re.subn(rf"(?m)^{key} = .*$", f"{key} = {value}", text, count=1)
+        if not count:
+            text += f"{key} = {value}\n"
+    path = tmp_path / "input.toml"
+    path.write_text(text)
+    return str(path)
+
+
+def start(config, output, *options):
+    return subprocess.Popen(
+        [*COMMAND, config, "--output", str(output), *options],
+        cwd=output.parent,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def finish(process):
+    output, errors = process.communicate(timeout=60)
+    return process.returncode, output, errors
+
+
+def wait_for_size(path, size, process):
+    deadline = time.monotonic() + 30
+    while not (path.exists() and path.stat().st_size >= size):
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < deadline
+        time.sleep(0.002)
+
+
+def frame_bytes(path):
+    # Everything behind the header, which holds the date.
+    return path.read_bytes()[276:]
+
+
+def assert_same_run(output, reference):
+    assert frame_bytes(output / "trajectory.dcd") == frame_bytes(reference / "trajectory.dcd")
+    assert (output / "energies.csv").read_bytes() == (reference / "energies.csv").read_bytes()
+    # Number of frames and last step in the header.
+    assert (output / "trajectory.dcd").read_bytes()[:92] == (reference / "trajectory.dcd").read_bytes()[:92]
+
+
+@pytest.fixture(scope="module")
+def unbroken(tmp_path_factory):
+    """The directory of a run of SHORT that nothing disturbed."""
+    folder = tmp_path_factory.mktemp("unbroken")
+    assert main(["run", configured(folder), "--output", str(folder / "out")]) == 0
+    return folder / "out"
+
+
+def test_files_of_a_run(unbroken):
+    names = {path.name for path in unbroken.iterdir()}
+    assert names == {
+        ".lock",
+        "checkpoint.chk",
+        "configuration.toml",
+        "energies.csv",
+        "summary.json",
+        "summary.png",
+        "topology.cif",
+        "trajectory.dcd",
+    }
+    assert (unbroken / "configuration.toml").read_text() == SHORT
+    assert (unbroken / "summary.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+
+
+def test_mdtraj_reads_trajectory_and_topology(unbroken):
+    trajectory = mdtraj.load_dcd(str(unbroken / "trajectory.dcd"), top=str(unbroken / "topology.cif"))
+    topology = trajectory.topology
+    assert trajectory.n_frames == FRAMES
+    assert [chain.n_atoms for chain in topology.chains] == [7, 7, 7, 5]
+    assert topology.n_bonds == 3 * 6 + 4
+    assert all(
+        bond[1].index == bond[0].index + 1 and bond[0].residue.chain == bond[1].residue.chain for bond in topology.bonds
+    )
+    assert {residue.name for residue in topology.residues} == {"ACT"}
+    initial = np.concatenate([f.positions for f in create_filaments(parse_configuration(SHORT))])
+    np.testing.assert_allclose(trajectory.xyz[0], initial, rtol=1e-6, atol=1e-3)
+    np.testing.assert_array_equal(trajectory.xyz[:, 21], np.broadcast_to(trajectory.xyz[0, 21], (FRAMES, 3)))
+
+
+def test_energies_are_those_of_the_trajectory(unbroken):
+    with open(unbroken / "energies.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [int(row["step"]) for row in rows] == list(range(0, 1201, 20))
+    assert [float(row["time (ps)"]) for row in rows] == [1e4 * step for step in range(0, 1201, 20)]
+    energies = read_energies(unbroken / "energies.csv")
+    configuration = read_configuration(unbroken / "configuration.toml")
+    trajectory = load_trajectory(configuration, RunDirectory(unbroken))
+    np.testing.assert_allclose(trajectory.time, energies["time (ps)"])
+    kT = 8.31446261815324e-3 * 310
+    stretching, bending, distances = 0.0, 0.0, []
+    for chain in trajectory.topology.chains:
+        nodes = trajectory.xyz[:, [atom.index for atom in chain.atoms]].astype(float)
+        segments = np.diff(nodes, axis=1)
+        lengths = np.linalg.norm(segments, axis=2)
+        tangents = segments / lengths[:, :, None]
+        stretching += F_ACTIN.stretching_energy(lengths).sum(axis=1)
+        bending += F_ACTIN.bending_energy((tangents[:, 1:] * tangents[:, :-1]).sum(axis=2)).sum(axis=1)
+        distances.append(np.linalg.norm(nodes[:, -1] - nodes[:, 0], axis=1))
+    tolerance = dict(rtol=1e-2, atol=0.05)
+    np.testing.assert_allclose(energies["stretching energy (kJ/mol)"], stretching, **tolerance)
+    np.testing.assert_allclose(energies["bending energy (kJ/mol)"], bending, **tolerance)
+    np.testing.assert_allclose(energies["potential energy (kJ/mol)"], stretching + bending, **tolerance)
+    np.testing.assert_allclose(energies["stretching energy per segment (kT)"], stretching / 22 / kT, **tolerance)
+    np.testing.assert_allclose(energies["bending energy per joint (kT)"], bending / 18 / kT, **tolerance)
+    np.testing.assert_allclose(energies["mean end-to-end distance (nm)"], np.mean(distances, axis=0), rtol=1e-6)
+
+
+def test_summary_has_both_groups(unbroken):
+    summary = json.loads((unbroken / "summary.json").read_text())
+    assert summary["simulated time (ps)"] == 12e6
+    free, straight = summary["groups"]
+    assert (free["filaments"], free["segments"], free["in_equilibrium"]) == (3, 6, True)
+    assert (straight["filaments"], straight["segments"], straight["in_equilibrium"]) == (1, 4, False)
+    assert {o["verdict"] for o in straight["observables"]} == {"not comparable"}
+    assert any("Started straight" in note for note in straight["notes"])
+    observables = {o["name"]: o for o in free["observables"]}
+    assert observables["stretching energy per segment"]["theory"] == pytest.approx(0.5, rel=1e-3)
+    assert observables["bending energy per joint"]["theory"] == pytest.approx(0.98, rel=1e-3)
+    assert observables["segment length"]["value"] == pytest.approx(360, rel=1e-3)
+    assert all(o["standard_error"] >= 0 for o in free["observables"])
+
+
+def test_equilibrium_run_agrees_with_theory(tmp_path):
+    # Time step of a fifth of the recommended one: its error is below the statistical one.
+    config = configured(
+        tmp_path,
+        SHORT.split('[[filament]]\ntype = "F_ACTIN"\nsegments = 4')[0] + "[simulation]\n",
+        count=24,
+        time_step='"2 ns"',
+        duration='"4 us"',
+        report_interval='"0.1 us"',
+    )
+    configuration = read_configuration(config)
+    run(configuration, tmp_path / "out")
+    groups = summarise(configuration, load_trajectory(configuration, RunDirectory(tmp_path / "out")))
+    for observable in groups[0].observables:
+        if observable.verdict != "reference":
+            assert abs(observable.deviation) < 4.0, observable
+    assert "24 independent filaments" in " ".join(groups[0].notes)
+    assert "24 × ACT, 6 segments" in format_summary(configuration, groups)
+
+
+def test_killed_run_resumes_to_the_same_files(tmp_path, unbroken):
+    output = tmp_path / "out"
+    config = configured(tmp_path)
+    frame = 3 * (4 * 26 + 8)
+    for frames in (6, 14, 35):
+        process = start(config, output, *(["--resume"] if output.exists() else []))
+        wait_for_size(output / "trajectory.dcd", 276 + frames * frame, process)
+        process.kill()
+        assert finish(process)[0] == -signal.SIGKILL
+        assert (output / "checkpoint.chk").exists()
+    code, text, errors = finish(start(config, output, "--resume"))
+    assert code == 0, errors
+    assert "Resuming at step" in text
+    assert_same_run(output, unbroken)
+
+
+@pytest.fixture
+def halfway(tmp_path, unbroken):
+    """A directory with a checkpoint and what came after it, as a kill would leave it."""
+    output = tmp_path / "out"
+    process = start(configured(tmp_path), output)
+    wait_for_size(output / "trajectory.dcd", 276 + 14 * 3 * (4 * 26 + 8), process)
+    process.kill()
+    process.communicate()
+    return output
+
+
+@pytest.mark.parametrize(
+    ("file", "rest"),
+    [
+        ("trajectory.dcd", b"\x68\x00\x00\x00" + b"\x01" * 50),
+        ("trajectory.dcd", b"\x68"),
+        ("energies.csv", b"260,26000"),
+        ("energies.csv", b"\n"),
+        ("checkpoint.chk.new", b'{"format": "openmm'),
+        ("topology.cif.new", b"data_"),
+    ],
+)
+def test_partial_writes_are_cut_off(halfway, unbroken, file, rest):
+    with open(halfway / file, "ab") as target:
+        target.write(rest)
+    assert main(["run", str(halfway.parent / "input.toml"), "--output", str(halfway), "--resume"]) == 0
+    assert_same_run(halfway, unbroken)
+
+
+@pytest.mark.parametrize(
+    "left", [(), ("configuration.toml",), ("configuration.toml", "topology.cif", "trajectory.dcd")]
+)
+def test_resume_before_the_first_checkpoint_starts_again(tmp_path, unbroken, left, capsys):
+    output = tmp_path / "out"
+    output.mkdir()
+    for name in left:
+        shutil.copy(unbroken / name, output)
+    assert main(["run", configured(tmp_path), "--output", str(output), "--resume"]) == 0
+    assert "starting from the beginning" in capsys.readouterr().out
+    assert_same_run(output, unbroken)
+
+
+def copied(unbroken, tmp_path):
+    shutil.copytree(unbroken, tmp_path / "out")
+    return str(tmp_path / "out")
+
+
+def test_resume_of_a_finished_run_redoes_the_summary(tmp_path, unbroken, capsys):
+    output = copied(unbroken, tmp_path)
+    os.remove(os.path.join(output, "summary.json"))
+    assert main(["run", configured(tmp_path), "--output", output, "--resume"]) == 0
+    assert "finished" in capsys.readouterr().out
+    assert_same_run(tmp_path / "out", unbroken)
+    assert (tmp_path / "out" / "summary.json").read_text() == (unbroken / "summary.json").read_text()
+
+
+def assert_refused(arguments, capsys, *fragments, code=2):
+    assert main(arguments) == code
+    errors = capsys.readouterr().err
+    assert errors.startswith("error: ") and "Traceback" not in errors
+    for fragment in fragments:
+        assert fragment in errors
+
+
+def test_resume_with_another_configuration_is_refused(tmp_path, unbroken, capsys):
+    output = copied(unbroken, tmp_path)
+    config = configured(tmp_path, seed=6, count=2)
+    assert_refused(
+        ["run", config, "--output", output, "--resume"], capsys, "[simulation] seed", "[[filament]] number 1: count"
+    )
+    # A comment changes nothing.
+    assert main(["run", configured(tmp_path, SHORT + "# comment\n"), "--output", output, "--resume"]) == 0
+
+
+def test_directory_of_a_run_is_refused_without_resume(tmp_path, unbroken, capsys):
+    output = copied(unbroken, tmp_path)
+    before = (tmp_path / "out" / "trajectory.dcd").read_bytes()
+    assert_refused(["run", configured(tmp_path), "--output", output], capsys, "already holds a run", "--resume")
+    assert (tmp_path / "out" / "trajectory.dcd").read_bytes() == before
+    os.remove(os.path.join(output, "configuration.toml"))
+    assert_refused(["run", configured(tmp_path), "--output", output, "--resume"], capsys, "no configuration.toml")
+
+
+def test_damaged_run_is_refused(tmp_path, unbroken, capsys):
+    output = copied(unbroken, tmp_path)
+    arguments = ["run", configured(tmp_path), "--output", output, "--resume"]
+    checkpoint = tmp_path / "out" / "checkpoint.chk"
+    content = checkpoint.read_bytes()
+    checkpoint.write_bytes(content[:-1])
+    assert_refused(arguments, capsys, "checkpoint.chk is damaged")
+    checkpoint.write_bytes(re.sub(rb'"version": "[^"]*"', b'"version": "0.0.1"', content))
+    assert_refused(arguments, capsys, "started with openmm_cylchain 0.0.1")
+    checkpoint.write_bytes(content.replace(b'"step": 1200', b'"step": 1140'))
+    with open(tmp_path / "out" / "trajectory.dcd", "r+b") as file:
+        file.truncate(1000)
+    assert_refused(arguments, capsys, "trajectory.dcd is missing or shorter")
+
+
+def test_output_that_is_a_file_is_refused(tmp_path, capsys):
+    (tmp_path / "out").write_text("")
+    assert_refused(["run", configured(tmp_path), "--output", str(tmp_path / "out")], capsys, "is a file")
+
+
+def test_two_runs_in_one_directory_are_refused(tmp_path, capsys):
+    config = configured(tmp_path)
+    with RunDirectory(tmp_path / "out"):
+        assert_refused(["run", config, "--output", str(tmp_path / "out")], capsys, "Another run is writing")
+        code, _, errors = finish(start(config, tmp_path / "out"))
+        assert code == 2 and "Another run is writing" in errors
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
+def test_signals_end_a_run_with_a_checkpoint(tmp_path, unbroken, number, code):
+    output = tmp_path / "out"
+    # No checkpoint is due before the end: the one that is found is due to the signal.
+    text = configured(tmp_path, checkpoint_interval='"12 us"')
+    process = start(text, output)
+    wait_for_size(output / "trajectory.dcd", 276 + 8 * 3 * (4 * 26 + 8), process)
+    process.send_signal(number)
+    returned, _, errors = finish(process)
+    assert returned == code
+    assert "--resume" in errors and "Traceback" not in errors
+    assert main(["run", text, "--output", str(output), "--resume"]) == 0
+    assert_same_run(output, unbroken)
+
+
+def test_blow_up_is_reported_and_leaves_no_broken_frame(tmp_path, capsys):
+    config = configured(
+        tmp_path, time_step='"400 ns"', duration='"80 us"', report_interval='"0.4 us"', checkpoint_interval='"0.4 us"'
+    )
+    output = tmp_path / "out"
+    assert main(["run", config, "--output", str(output)]) == 1
+    errors = capsys.readouterr().err
+    assert "warning: A time step of 4e+05 ps exceeds the stretching bound" in errors
+    assert re.search(r"error: Filament \d \(ACT\) has blown up at segment \d in step \d+", errors)
+    assert "another directory" in errors and "Traceback" not in errors
+    trajectory = mdtraj.load_dcd(str(output / "trajectory.dcd"), top=str(output / "topology.cif"))
+    assert 1 <= trajectory.n_frames < 200
+    assert np.all(np.isfinite(trajectory.xyz))
+    energies = read_energies(output / "energies.csv")
+    assert len(energies["step"]) == trajectory.n_frames
+    assert all(np.all(np.isfinite(column)) for column in energies.values())
+
+
+def test_infinite_energy_is_not_written(tmp_path, capsys):
+    # A FENE segment that a large step carries beyond its maximum extension, at positions that are finite.
+    text = SHORT.replace("segments = 6", 'segments = 6\nstretching_model = "fene"\nmaximum_extension = "1 nm"')
+    config = configured(
+        tmp_path, text, time_step='"60 ns"', duration='"60 us"', report_interval='"60 ns"', checkpoint_interval='"6 us"'
+    )
+    output = tmp_path / "out"
+    assert main(["run", config, "--output", str(output)]) == 1
+    assert re.search(r"error: Filament \d \(ACT\) has blown up at segment \d by step \d+", capsys.readouterr().err)
+    energies = read_energies(output / "energies.csv")
+    assert all(np.all(np.isfinite(column)) for column in energies.values())
+
+
+@pytest.mark.parametrize(
+    ("changes", "fragment"),
+    [
+        ({"platform": '"Abacus"'}, "Reference"),
+        ({"precision": '"single"'}, "precision cannot be chosen on the platform Reference"),
+        ({"temperature": '"310 m"'}, "[solvent] temperature"),
+    ],
+)
+def test_wrong_input_leaves_no_directory(tmp_path, capsys, changes, fragment):
+    config = configured(tmp_path, **changes)
+    assert_refused(["run", config, "--output", str(tmp_path / "out")], capsys, fragment)
+    assert not (tmp_path / "out").exists()
+
+
+def test_filaments_are_laid_out_side_by_side():
+    configuration = parse_configuration(SHORT.replace("count = 3", "count = 15"))
+    filaments = create_filaments(configuration)
+    centers = np.array([f.positions.mean(axis=0) for f in filaments])
+    distances = np.linalg.norm(centers[:, None] - centers[None], axis=-1)
+    extent = max(np.linalg.norm(f.positions - c, axis=1).max() for f, c in zip(filaments, centers))
+    assert distances[~np.eye(16, dtype=bool)].min() > extent
+    np.testing.assert_allclose(centers.mean(axis=0), 0.0, atol=1e-6)
+    # Every filament has a shape of its own.
+    assert not np.allclose(filaments[0].positions - centers[0], filaments[1].positions - centers[1])
+
+
+def test_position_and_direction_are_those_of_the_first_node_and_segment():
+    text = SHORT.replace("count = 3", 'count = 2\nposition = ["1 nm", "2 nm", "3 nm"]\ndirection = [0, 3, 0]')
+    first, second, _ = create_filaments(parse_configuration(text))
+    for filament in (first, second):
+        np.testing.assert_allclose(filament.positions[0], (1.0, 2.0, 3.0))
+        tangent = filament.positions[1] - filament.positions[0]
+        np.testing.assert_allclose(tangent / np.linalg.norm(tangent), (0.0, 1.0, 0.0), atol=1e-12)
+    assert not np.allclose(first.positions, second.positions)
+
+
+def test_timestep_explains_the_bounds(tmp_path, capsys):
+    assert main(["timestep", configured(tmp_path)]) == 0
+    text = capsys.readouterr().out
+    assert "eq. (57)" in text and "200 ns" in text
+    assert re.search(r"recommended +10 ns", text)
+
+
+def test_version(capsys):
+    with pytest.raises(SystemExit) as caught:
+        main(["--version"])
+    assert caught.value.code == 0
+    assert capsys.readouterr().out.startswith("openmm-cylchain ")
+
+
+def test_freely_jointed_and_single_segments_have_a_summary(tmp_path):
+    text = SHORT.replace("segments = 6", 'segments = 3\nbending_rigidity = "0 pN*nm^2"').replace(
+        "segments = 4", "segments = 1"
+    )
+    config = configured(tmp_path, text, duration='"1 us"')
+    assert main(["run", config, "--output", str(tmp_path / "out")]) == 0
+    jointed, single = json.loads((tmp_path / "out" / "summary.json").read_text())["groups"]
+    assert "bending energy per joint" not in {o["name"] for o in jointed["observables"]}
+    assert "cosine of joint angle" not in {o["name"] for o in single["observables"]}
+    config = configured(
+        tmp_path,
+        SHORT.split('[[filament]]\ntype = "F_ACTIN"\nsegments = 4')[0] + "[simulation]\n",
+        segments=1,
+        time_step='"10 ns"',
+        duration='"1 us"',
+        report_interval='"0.2 us"',
+    )
+    assert main(["run", config, "--output", str(tmp_path / "single")]) == 0
+    column = read_energies(tmp_path / "single" / "energies.csv")["bending energy per joint (kT)"]
+    assert all(math.isnan(value) for value in column)
+
+
+def test_run_as_a_function_raises(tmp_path):
+    configuration = parse_configuration(SHORT)
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "energies.csv").write_text("")
+    with pytest.raises(InputError, match="already holds a run"):
+        run(configuration, tmp_path / "out")
