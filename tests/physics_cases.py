@@ -24,7 +24,7 @@ def soft_chain(name, **bending):
     """Segments of 100 nm that stretch by a tenth; slow extension, so that few steps reach far."""
     base = FilamentType(name=name, diameter=6, segment_length=100, stretching_stiffness=100 * KT / 100**2, **bending)
     friction = base.segment_friction(VISCOSITY, TEMPERATURE)
-    return replace(base, extensional_friction=2 * friction.rotational)
+    return replace(base, extensional_friction=4 * friction.rotational)
 
 
 @dataclass(frozen=True)
