@@ -1,0 +1,62 @@
+#ifndef CYLCHAIN_CHAIN_H_
+#define CYLCHAIN_CHAIN_H_
+
+#include <vector>
+
+/**
+ * The mechanics of extensible cylinder chains, with nothing of OpenMM in it.
+ *
+ * Equation numbers refer to Pesek et al., Soft Matter 2016, 12, 3360. Any consistent set of units will do; the
+ * plugin uses nm, ps and kJ/mol.
+ */
+namespace cylchain {
+
+/** Bending energy of a joint whose segments have tangents with the cosine c, for a stiffness a/l0. */
+enum class BendingModel {
+    /** (a/l0) (1-c), eq. (26). */
+    KratkyPorod = 0,
+    /** (a/2 l0) theta^2. */
+    Quadratic = 1,
+    /** (2a/l0) (1-c)/(1+c), eq. (27). */
+    InscribedCircle = 2
+};
+
+/** Stretching energy of a segment of length l. */
+enum class StretchingModel {
+    /** (k/2) (l-l0)^2, eq. (7). */
+    Harmonic = 0,
+    /** -(k/2) D^2 ln(1-((l-l0)/D)^2). */
+    FENE = 1
+};
+
+/** How positions are advanced in a step. */
+enum class Scheme {
+    /** Section 4 of the paper: the thermal torque of a free segment is sent through the constraints. */
+    Euler = 0,
+    /** Fixman's midpoint: the right drift on chains. */
+    Midpoint = 1
+};
+
+/** One segment: its potential and its friction (3), kept at the values of the rest length. */
+struct Segment {
+    double restLength, stiffness, maximumExtension;
+    double parallel, perpendicular, rotational, extensional;
+};
+
+/** A chain of segments that share nodes: segment s joins the nodes s (its minus end) and s+1 (its plus end). */
+struct Chain {
+    /** Particle of each node. */
+    std::vector<int> nodes;
+    /** One less than nodes. */
+    std::vector<Segment> segments;
+    /** Stiffness a/l0 of each joint: one less than segments. */
+    std::vector<double> joints;
+    BendingModel bending;
+    StretchingModel stretching;
+    /** Nodes that do not move. */
+    std::vector<bool> fixed;
+};
+
+} // namespace cylchain
+
+#endif /*CYLCHAIN_CHAIN_H_*/

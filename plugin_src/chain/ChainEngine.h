@@ -1,0 +1,80 @@
+#ifndef CYLCHAIN_CHAIN_ENGINE_H_
+#define CYLCHAIN_CHAIN_ENGINE_H_
+
+#include "Chain.h"
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace cylchain {
+
+/** Energies of a pack of chains. */
+struct ChainEnergy {
+    double stretching = 0, bending = 0;
+};
+
+/** Where a step has gone wrong: a segment whose ends would move against each other by more than its rest length. */
+struct Instability {
+    int chain = -1, segment = -1;
+    double change = 0;
+};
+
+/** What a step needs besides positions and forces. */
+struct StepSettings {
+    Scheme scheme;
+    double kT, stepSize;
+    /** The noise of a step is a function of the seed, the step's number and the chain's number alone. */
+    std::uint64_t seed, step;
+};
+
+/**
+ * Forces and displacements of many chains. Chains are gathered into packs that are computed in the lanes of the
+ * processor's vector registers; packs are independent, so they can be given to different threads, and no result
+ * depends on which thread computes what.
+ *
+ * Positions, forces and displacements are arrays of three doubles for each particle.
+ */
+class ChainEngine {
+public:
+    /**
+     * @param chains   the chains; no particle may be a node of two of them
+     */
+    explicit ChainEngine(const std::vector<Chain>& chains);
+    ~ChainEngine();
+    int getNumPacks() const;
+    /**
+     * Add the forces on the nodes of a pack.
+     *
+     * @param box            the three vectors of a periodic box (nine doubles), to take each segment as its shortest
+     *                       image, or NULL
+     * @param includeEnergy  whether to compute the energies; they are zero otherwise
+     */
+    ChainEnergy addForces(int pack, const double* positions, double* forces, const double* box, bool includeEnergy) const;
+    /**
+     * Get the particles of a pack, in no particular order, with -1 for places that are empty.
+     */
+    const std::vector<int>& getParticles(int pack) const;
+    /**
+     * Set the forces on the nodes of a pack to zero.
+     */
+    void clearForces(int pack, double* forces) const;
+    /**
+     * Compute the displacements of the nodes of a pack in one step under given total forces: noise, resistance,
+     * redistribution.
+     *
+     * @param displacements  receives those of the pack's nodes
+     * @return the first instability found, with chain = -1 if there is none
+     */
+    Instability step(int pack, const double* positions, const double* forces, const double* box,
+            const StepSettings& settings, double* displacements) const;
+    /** The instruction set in use: "avx512", "avx2" or "baseline". */
+    static std::string getInstructionSet();
+private:
+    struct Implementation;
+    std::unique_ptr<Implementation> implementation;
+};
+
+} // namespace cylchain
+
+#endif /*CYLCHAIN_CHAIN_ENGINE_H_*/

@@ -1,0 +1,322 @@
+/**
+ * This tests the mechanics of chains on their own: forces against finite differences of the energy, steps against a
+ * dense solution, noise against its covariance, and that no chain depends on its neighbours in a pack.
+ */
+
+#include "../ChainEngine.h"
+#include "../Gaussian.h"
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+using namespace cylchain;
+using namespace std;
+
+typedef vector<double> Array;
+
+static void check(bool condition, const string& what) {
+    if (!condition)
+        throw runtime_error(what);
+}
+
+static void checkClose(double expected, double found, double scale, double tolerance, const string& what) {
+    // Written so that NaN fails.
+    if (!(fabs(expected-found) <= tolerance*scale))
+        throw runtime_error(what+": expected "+to_string(expected)+", found "+to_string(found));
+}
+
+/** Bent chains of different lengths with different segments; node positions are appended to x. */
+static vector<Chain> makeChains(const vector<int>& segments, BendingModel bending, StretchingModel stretching, Array& x) {
+    GaussianStream stream(1, 2, 3);
+    vector<Chain> chains;
+    int particle = 0;
+    for (int count : segments) {
+        Chain chain;
+        chain.bending = bending;
+        chain.stretching = stretching;
+        double node[] = {100.0*chains.size(), 0, 0};
+        for (int s = 0; s <= count; s++) {
+            chain.nodes.push_back(particle++);
+            chain.fixed.push_back(s == 1 && count == 5);
+            x.insert(x.end(), node, node+3);
+            Array g(8);
+            stream.fill(g.data(), 8);
+            if (s < count)
+                chain.segments.push_back({10+0.5*g[0], 30+g[1], 6, 5+0.2*g[2], 8+0.2*g[3], 70+g[4], 200+g[0]});
+            if (s > 0 && s < count)
+                chain.joints.push_back(20+g[1]);
+            node[0] += 9.5+0.3*g[5];
+            node[1] += 4*g[6];
+            node[2] += 4*g[7];
+            double* last = &x[x.size()-3];
+            double length = 0;
+            for (int k = 0; k < 3; k++)
+                length += (node[k]-last[k])*(node[k]-last[k]);
+            for (int k = 0; k < 3; k++)
+                node[k] = last[k]+(node[k]-last[k])*(10+0.5*g[2])/sqrt(length);
+        }
+        chains.push_back(chain);
+    }
+    return chains;
+}
+
+static double energyOf(const ChainEngine& engine, const Array& x) {
+    Array forces(x.size());
+    double energy = 0;
+    for (int pack = 0; pack < engine.getNumPacks(); pack++) {
+        ChainEnergy one = engine.addForces(pack, x.data(), forces.data(), NULL, true);
+        energy += one.stretching+one.bending;
+    }
+    return energy;
+}
+
+static Array forcesOf(const ChainEngine& engine, const Array& x, const double* box = NULL) {
+    Array forces(x.size());
+    for (int pack = 0; pack < engine.getNumPacks(); pack++)
+        engine.addForces(pack, x.data(), forces.data(), box, false);
+    return forces;
+}
+
+static Array stepOf(const ChainEngine& engine, const Array& x, const Array& f, const StepSettings& settings,
+            const double* box = NULL) {
+    Array displacements(x.size());
+    for (int pack = 0; pack < engine.getNumPacks(); pack++)
+        check(engine.step(pack, x.data(), f.data(), box, settings, displacements.data()).chain < 0, "unstable step");
+    return displacements;
+}
+
+/** The resistance of all chains as a dense matrix, with the rows and columns of fixed nodes those of the identity. */
+static vector<Array> denseResistance(const vector<Chain>& chains, const Array& x) {
+    vector<Array> z(x.size(), Array(x.size()));
+    vector<bool> fixed(x.size()/3);
+    for (const Chain& chain : chains) {
+        for (size_t node = 0; node < chain.nodes.size(); node++)
+            fixed[chain.nodes[node]] = chain.fixed[node];
+        for (size_t s = 0; s < chain.segments.size(); s++) {
+            const Segment& segment = chain.segments[s];
+            const int ends[] = {chain.nodes[s], chain.nodes[s+1]};
+            double t[3], square = 0;
+            for (int k = 0; k < 3; k++) {
+                t[k] = x[3*ends[1]+k]-x[3*ends[0]+k];
+                square += t[k]*t[k];
+            }
+            for (int i = 0; i < 3; i++)
+                for (int j = 0; j < 3; j++) {
+                    const double tt = t[i]*t[j]/square, one = (i == j)-tt;
+                    const double trans = 0.25*(segment.parallel*tt+segment.perpendicular*one);
+                    const double turn = (segment.extensional*tt+segment.rotational*one)/square;
+                    for (int a = 0; a < 2; a++)
+                        for (int b = 0; b < 2; b++)
+                            z[3*ends[a]+i][3*ends[b]+j] += trans+(a == b ? turn : -turn);
+                }
+        }
+    }
+    for (size_t i = 0; i < x.size(); i++)
+        for (size_t j = 0; j < x.size(); j++)
+            if (fixed[i/3] || fixed[j/3])
+                z[i][j] = (i == j);
+    return z;
+}
+
+static Array denseSolution(vector<Array> a, Array b) {
+    const int n = b.size();
+    for (int i = 0; i < n; i++)
+        for (int row = i+1; row < n; row++) {
+            const double factor = a[row][i]/a[i][i];
+            for (int column = i; column < n; column++)
+                a[row][column] -= factor*a[i][column];
+            b[row] -= factor*b[i];
+        }
+    for (int i = n-1; i >= 0; i--) {
+        for (int column = i+1; column < n; column++)
+            b[i] -= a[i][column]*b[column];
+        b[i] /= a[i][i];
+    }
+    return b;
+}
+
+static const vector<int> SEGMENTS = {5, 5, 4, 1, 2, 9, 5, 5, 5, 5, 3, 8, 9};
+
+static void testForces() {
+    for (int bending = 0; bending < 3; bending++)
+        for (int stretching = 0; stretching < 2; stretching++) {
+            Array x;
+            ChainEngine engine(makeChains(SEGMENTS, (BendingModel) bending, (StretchingModel) stretching, x));
+            const Array forces = forcesOf(engine, x);
+            const double width = 1e-5;
+            for (size_t i = 0; i < x.size(); i++) {
+                Array moved = x;
+                moved[i] += width;
+                const double above = energyOf(engine, moved);
+                moved[i] -= 2*width;
+                const double below = energyOf(engine, moved);
+                checkClose(-(above-below)/(2*width), forces[i], 100, 1e-6, "force");
+            }
+        }
+}
+
+static void testStraightAndFoldedChains() {
+    for (int bending = 0; bending < 3; bending++)
+        for (double angle : {0.0, 1e-9, 1e-5, 1e-2, 1.0, 3.0, 3.1}) {
+            Array unused;
+            vector<Chain> chains = makeChains({2}, (BendingModel) bending, StretchingModel::Harmonic, unused);
+            const double length[] = {chains[0].segments[0].restLength, chains[0].segments[1].restLength};
+            const Array x = {0, 0, 0, length[0], 0, 0, length[0]+length[1]*cos(angle), length[1]*sin(angle), 0};
+            ChainEngine engine(chains);
+            const double stiffness = chains[0].joints[0], half = tan(0.5*angle);
+            const double expected[] = {stiffness*2*pow(sin(0.5*angle), 2), 0.5*stiffness*angle*angle, 2*stiffness*half*half};
+            const double torque[] = {stiffness*sin(angle), stiffness*angle, 2*stiffness*half*(1+half*half)};
+            checkClose(expected[bending], energyOf(engine, x), expected[bending]+1e-20, 1e-9, "bending energy");
+            const Array forces = forcesOf(engine, x);
+            checkClose(torque[bending]/length[0], -forces[1], torque[bending]/length[0]+1e-12, 1e-8, "bending force");
+        }
+}
+
+static void testStepsWithoutNoise() {
+    Array x;
+    const vector<Chain> chains = makeChains(SEGMENTS, BendingModel::InscribedCircle, StretchingModel::Harmonic, x);
+    ChainEngine engine(chains);
+    Array f = forcesOf(engine, x);
+    for (size_t i = 0; i < f.size(); i++)
+        f[i] += sin(i);
+    const double h = 0.01;
+    Array held = f;
+    for (const Chain& chain : chains)
+        for (size_t node = 0; node < chain.nodes.size(); node++)
+            for (int k = 0; k < 3; k++)
+                if (chain.fixed[node])
+                    held[3*chain.nodes[node]+k] = 0;
+    const Array velocity = denseSolution(denseResistance(chains, x), held);
+    Array halfway = x;
+    for (size_t i = 0; i < x.size(); i++)
+        halfway[i] += 0.5*h*velocity[i];
+    const Array later = denseSolution(denseResistance(chains, halfway), held);
+    const Array euler = stepOf(engine, x, f, {Scheme::Euler, 0, h, 1, 1});
+    const Array midpoint = stepOf(engine, x, f, {Scheme::Midpoint, 0, h, 1, 1});
+    for (size_t i = 0; i < x.size(); i++) {
+        checkClose(h*velocity[i], euler[i], h, 1e-11, "Euler step");
+        checkClose(h*later[i], midpoint[i], h, 1e-11, "midpoint step");
+    }
+}
+
+static void testPeriodicImages() {
+    Array x;
+    ChainEngine engine(makeChains(SEGMENTS, BendingModel::InscribedCircle, StretchingModel::Harmonic, x));
+    const double box[] = {60, 0, 0, 10, 50, 0, -5, 8, 70};
+    Array wrapped = x;
+    for (size_t i = 0; i < x.size()/3; i++)
+        for (int vector = 0; vector < 3; vector++)
+            for (int k = 0; k < 3; k++)
+                wrapped[3*i+k] += box[3*vector+k]*((int) (i*(vector+1)%3)-1);
+    const Array f = forcesOf(engine, x), g = forcesOf(engine, wrapped, box);
+    const Array a = stepOf(engine, x, f, {Scheme::Midpoint, 1, 0.001, 1, 1});
+    const Array b = stepOf(engine, wrapped, f, {Scheme::Midpoint, 1, 0.001, 1, 1}, box);
+    for (size_t i = 0; i < x.size(); i++) {
+        checkClose(f[i], g[i], 100, 1e-10, "force across the box");
+        checkClose(a[i], b[i], 1, 1e-10, "step across the box");
+    }
+}
+
+static void testCovarianceOfNoise() {
+    Array x;
+    const vector<Chain> chains = makeChains({3, 2}, BendingModel::KratkyPorod, StretchingModel::Harmonic, x);
+    ChainEngine engine(chains);
+    const int n = x.size(), draws = 40000;
+    const double kT = 2.5, h = 1e-6;
+    const vector<Array> z = denseResistance(chains, x);
+    vector<Array> sum(n, Array(n)), successive(n, Array(n));
+    Array before(n), zero(n);
+    for (int draw = 0; draw < draws; draw++) {
+        // Forces, not displacements, so that the expectation needs no inverse: cov(Z dx) = 2 kT h Z.
+        const Array dx = stepOf(engine, x, zero, {Scheme::Midpoint, kT, h, 7, (uint64_t) draw});
+        Array f(n);
+        for (int i = 0; i < n; i++)
+            for (int j = 0; j < n; j++)
+                f[i] += z[i][j]*dx[j];
+        for (int i = 0; i < n; i++)
+            for (int j = 0; j < n; j++) {
+                sum[i][j] += f[i]*f[j]/draws;
+                successive[i][j] += f[i]*before[j]/draws;
+            }
+        before = f;
+    }
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < n; j++) {
+            const double scale = 2*kT*h;
+            const double error = scale*sqrt((z[i][i]*z[j][j]+z[i][j]*z[i][j])/draws);
+            checkClose(scale*z[i][j], sum[i][j], error, 5, "covariance");
+            checkClose(0, successive[i][j], scale*sqrt(z[i][i]*z[j][j]/draws), 5, "covariance of successive steps");
+        }
+}
+
+static void testChainsDoNotDependOnTheirPack() {
+    Array x;
+    const vector<Chain> chains = makeChains(SEGMENTS, BendingModel::InscribedCircle, StretchingModel::Harmonic, x);
+    ChainEngine together(chains), alone({chains[0]});
+    const Array f(x.size(), 0.5);
+    for (uint64_t step = 0; step < 2000; step++) {
+        const StepSettings settings = {Scheme::Midpoint, 2.5, 1e-4, 11, step};
+        const Array a = stepOf(together, x, f, settings);
+        Array b(x.size());
+        alone.step(0, x.data(), f.data(), NULL, settings, b.data());
+        for (int i = 0; i < 3*6; i++)
+            checkClose(a[i], b[i], 1, 1e-13, "chain alone");
+    }
+}
+
+static void testInstability() {
+    Array x;
+    const vector<Chain> chains = makeChains(SEGMENTS, BendingModel::InscribedCircle, StretchingModel::Harmonic, x);
+    ChainEngine engine(chains);
+    for (double force : {1e9, (double) NAN}) {
+        Array f(x.size()), displacements(x.size());
+        f[3*chains[5].nodes[9]] = force;
+        for (int pack = 0; pack < engine.getNumPacks(); pack++) {
+            Instability found = engine.step(pack, x.data(), f.data(), NULL, {Scheme::Euler, 0, 1, 1, 1}, displacements.data());
+            check(found.chain == -1 || found.chain == 5, "wrong chain");
+            if (found.chain == 5)
+                return;
+        }
+    }
+    throw runtime_error("instability not found");
+}
+
+static void testGaussianMoments() {
+    const int count = 4000000;
+    Array values(count);
+    GaussianStream(3, 4, 5).fill(values.data(), count);
+    double moments[5] = {}, beyond = 0;
+    for (double v : values) {
+        for (int k = 1; k < 5; k++)
+            moments[k] += pow(v, k)/count;
+        beyond += (fabs(v) > 3.6541528853610088);
+    }
+    checkClose(0, moments[1], sqrt(1.0/count), 4, "mean");
+    checkClose(1, moments[2], sqrt(2.0/count), 4, "variance");
+    checkClose(0, moments[3], sqrt(15.0/count), 4, "third moment");
+    checkClose(3, moments[4], sqrt(96.0/count), 4, "fourth moment");
+    const double tail = erfc(3.6541528853610088/sqrt(2.0))*count;
+    checkClose(tail, beyond, sqrt(tail), 4, "tail");
+}
+
+int main() {
+    try {
+        testForces();
+        testStraightAndFoldedChains();
+        testStepsWithoutNoise();
+        testPeriodicImages();
+        testCovarianceOfNoise();
+        testChainsDoNotDependOnTheirPack();
+        testInstability();
+        testGaussianMoments();
+    }
+    catch (const exception& error) {
+        printf("FAILED (%s): %s\n", ChainEngine::getInstructionSet().c_str(), error.what());
+        return 1;
+    }
+    printf("Passed with %s\n", ChainEngine::getInstructionSet().c_str());
+    return 0;
+}
