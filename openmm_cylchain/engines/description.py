@@ -26,7 +26,7 @@ def refuse_constraints(system, filaments, node_indices):
                 )
     if system.getNumConstraints():
         raise InputError(
-            f"Particles {first} and {second} have a System constraint, which the portable engine cannot keep: "
+            f"Particles {first} and {second} have a System constraint, which the dynamics of filaments cannot keep: "
             "replace it by a bond."
         )
 

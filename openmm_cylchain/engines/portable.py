@@ -19,6 +19,7 @@ from ..errors import InputError, InstabilityError
 from ..potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
 from ..quantities import BOLTZMANN, TEMPERATURE, TIME, non_negative, positive, whole_number
 from ..timestep import SCHEMES, check_scheme
+from .description import describe_chains, describe_other_particles, filament_label, refuse_constraints
 from .redistribution import STEPS
 
 REDISTRIBUTION_NAME = "CylinderChainRedistribution"
@@ -38,6 +39,52 @@ _START = "cylinder_chain_start"
 
 # CustomIntegrator draws from one random generator per process, which is not safe in two threads at once.
 _STEPPING = threading.Lock()
+
+
+def add_forces(system, filaments, node_indices, viscosity, temperature, stretching_force_group, bending_force_group):
+    """Add the chains' own forces to a System that holds their nodes.
+
+    Parameters
+    ----------
+    system : openmm.System
+    filaments : sequence of Filament
+    node_indices : sequence of int arrays
+        Particle indices of the nodes of each filament.
+    viscosity, temperature : float
+        Not used by this engine, whose integrator holds the friction.
+    stretching_force_group, bending_force_group : int
+    """
+    segments, joints = [], []
+    for filament, indices in zip(filaments, node_indices):
+        nodes = [int(index) for index in indices]
+        segments += [(filament.type, *ends) for ends in zip(nodes, nodes[1:])]
+        joints += [(filament.type, *triple) for triple in zip(nodes, nodes[1:], nodes[2:])]
+    add_stretching_forces(system, segments, stretching_force_group)
+    add_bending_forces(system, joints, bending_force_group)
+
+
+def create_integrator(
+    system,
+    filaments,
+    node_indices,
+    viscosity,
+    temperature,
+    bath_temperature,
+    step_size,
+    scheme,
+    particle_friction,
+    seed,
+):
+    """Create the integrator of a System with filaments; see ``Filaments.create_integrator``."""
+    refuse_constraints(system, filaments, node_indices)
+    chains = describe_chains(system, filaments, node_indices, viscosity, temperature)
+    nodes = np.concatenate(node_indices)
+    others, frictions = describe_other_particles(system, nodes, particle_friction)
+    rest_lengths = np.concatenate([np.full(one.segments, one.type.segment_length) for one in filaments])
+    labels = [filament_label(number, filament) for number, filament in enumerate(filaments)]
+    computation = ChainDisplacements(chains, nodes, rest_lengths, labels, others, frictions)
+    group = add_redistribution(system, computation)
+    return PortableIntegrator(system, group, bath_temperature, step_size, scheme, seed)
 
 
 def add_stretching_forces(system, segments, force_group):

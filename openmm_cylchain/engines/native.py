@@ -1,0 +1,188 @@
+"""The compiled engine: a CylinderChainForce and a CylinderChainIntegrator from the plugin, on the Reference and CPU
+platforms.
+
+Importing this module loads the plugin into OpenMM. An ImportError says why that cannot be done.
+"""
+
+import re
+from pathlib import Path
+
+import openmm
+
+from ..errors import InputError, InstabilityError
+from ..quantities import TEMPERATURE, TIME, non_negative, positive, whole_number
+from ..timestep import check_scheme
+from .description import describe_chains, describe_other_particles, filament_label, refuse_constraints
+
+
+def _load_plugin():
+    try:
+        from ..plugin_version import OPENMM_VERSION
+    except ModuleNotFoundError:
+        raise ImportError(
+            f"the package in {Path(__file__).parents[1]} has no compiled plugin. Install it with pip, and run Python "
+            "outside its source directory."
+        ) from None
+    installed = openmm.Platform.getOpenMMVersion()
+    if installed.split(".")[:2] != OPENMM_VERSION.split(".")[:2]:
+        raise ImportError(
+            f"the plugin was built against OpenMM {OPENMM_VERSION}, but OpenMM {installed} is installed. "
+            "Install openmm_cylchain again."
+        )
+    from .. import plugin
+
+    libraries = sorted((Path(plugin._plugin.__file__).parent / "lib" / "plugins").glob("libOpenMMCylinderChain*"))
+    if not libraries:
+        raise ImportError("the installation lacks the plugin's libraries for OpenMM. Install openmm_cylchain again.")
+    try:
+        for library in libraries:
+            openmm.Platform.loadPluginLibrary(str(library))
+    except openmm.OpenMMException as error:
+        raise ImportError(f"OpenMM cannot load the plugin: {error}") from None
+    return plugin
+
+
+plugin = _load_plugin()
+CylinderChainForce = plugin.CylinderChainForce
+CylinderChainIntegrator = plugin.CylinderChainIntegrator
+
+BENDING_MODELS = {
+    "kratky-porod": CylinderChainForce.KratkyPorod,
+    "quadratic": CylinderChainForce.Quadratic,
+    "inscribed-circle": CylinderChainForce.InscribedCircle,
+}
+STRETCHING_MODELS = {"harmonic": CylinderChainForce.Harmonic, "fene": CylinderChainForce.FENE}
+SCHEMES = {"euler": CylinderChainIntegrator.Euler, "midpoint": CylinderChainIntegrator.Midpoint}
+
+_OTHER_FRICTION = 1.0
+
+
+def add_forces(system, filaments, node_indices, viscosity, temperature, stretching_force_group, bending_force_group):
+    """Add the chains to a System that holds their nodes: one CylinderChainForce.
+
+    Parameters
+    ----------
+    system : openmm.System
+    filaments : sequence of Filament
+    node_indices : sequence of int arrays
+        Particle indices of the nodes of each filament.
+    viscosity, temperature : float
+        For the friction of the segments.
+    stretching_force_group, bending_force_group : int
+        One number for both.
+
+    Raises
+    ------
+    InputError
+        If the force groups differ.
+    """
+    if stretching_force_group != bending_force_group:
+        raise InputError(
+            "The compiled engine has one force for stretching and bending: give them the same force group. "
+            "CylinderChainForce.computeEnergies tells their energies apart."
+        )
+    force = CylinderChainForce()
+    force.setForceGroup(int(stretching_force_group))
+    for filament, nodes in zip(filaments, node_indices):
+        _add_chain(force, filament, nodes, viscosity, temperature)
+    system.addForce(force)
+
+
+def _add_chain(force, filament, nodes, viscosity, temperature):
+    kind = filament.type
+    friction = kind.segment_friction(viscosity, temperature, filament.segments)
+    force.addChain(
+        [int(node) for node in nodes],
+        BENDING_MODELS[kind.bending_model],
+        STRETCHING_MODELS[kind.stretching_model],
+        kind.segment_length,
+        kind.segment_stiffness,
+        0.0 if kind.maximum_extension is None else kind.maximum_extension,
+        kind.joint_stiffness,
+        friction.parallel,
+        friction.perpendicular,
+        friction.rotational,
+        friction.extensional,
+    )
+
+
+def create_integrator(
+    system,
+    filaments,
+    node_indices,
+    viscosity,
+    temperature,
+    bath_temperature,
+    step_size,
+    scheme,
+    particle_friction,
+    seed,
+):
+    """Create the integrator of a System with filaments; see ``Filaments.create_integrator``."""
+    refuse_constraints(system, filaments, node_indices)
+    describe_chains(system, filaments, node_indices, viscosity, temperature)
+    nodes = [node for nodes in node_indices for node in nodes]
+    others, frictions = describe_other_particles(system, nodes, particle_friction)
+    labels = [filament_label(number, filament) for number, filament in enumerate(filaments)]
+    integrator = NativeIntegrator(bath_temperature, step_size, scheme, seed, labels)
+    for particle, friction in zip(others, frictions):
+        integrator.setParticleFriction(int(particle), float(friction))
+    return integrator
+
+
+class NativeIntegrator(CylinderChainIntegrator):
+    """A CylinderChainIntegrator that knows filaments by their labels and raises the errors of this package.
+
+    Parameters
+    ----------
+    temperature : temperature
+        Zero is allowed: no noise.
+    step_size : time
+    scheme : {"midpoint", "euler"}
+    random_seed : int
+        0 draws a fresh seed for each Context.
+    labels : sequence of str
+        What to call each chain in messages.
+
+    Raises
+    ------
+    InputError
+        For an unknown scheme, a negative temperature or a step size that is not positive.
+    """
+
+    def __init__(self, temperature, step_size, scheme="midpoint", random_seed=0, labels=()):
+        temperature = non_negative(temperature, TEMPERATURE, "temperature")
+        super().__init__(temperature, _OTHER_FRICTION, positive(step_size, TIME, "step_size"))
+        check_scheme(scheme)
+        self._labels = list(labels)
+        self.setScheme(SCHEMES[scheme])
+        self.setRandomNumberSeed(random_seed)
+
+    def step(self, steps):
+        """Advance by a number of steps.
+
+        Raises
+        ------
+        InstabilityError
+            If a chain or a particle blows up; positions are then those before the failing step.
+        """
+        try:
+            super().step(steps)
+        except openmm.OpenMMException as error:
+            if "has blown up" in str(error):
+                raise InstabilityError(self._with_labels(str(error))) from None
+            raise
+
+    def _with_labels(self, message):
+        message = message.replace("outside chains", "outside filaments")
+        chain = re.match(r"Chain (\d+)", message)
+        if chain is None or int(chain[1]) >= len(self._labels):
+            return message
+        return self._labels[int(chain[1])] + message[chain.end() :]
+
+    def setRandomNumberSeed(self, seed):
+        """Set the seed of the noise; 0 draws one for each Context that is created."""
+        seed = whole_number(seed, 0, "random_seed")
+        if seed >= 2**31:
+            raise InputError(f"random_seed must be below 2^31, but is {seed}.")
+        super().setRandomNumberSeed(seed)

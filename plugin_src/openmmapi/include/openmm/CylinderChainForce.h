@@ -1,0 +1,225 @@
+#ifndef OPENMM_CYLINDERCHAINFORCE_H_
+#define OPENMM_CYLINDERCHAINFORCE_H_
+
+#include "openmm/Context.h"
+#include "openmm/Force.h"
+#include <vector>
+
+namespace OpenMM {
+
+/**
+ * This class describes filaments as extensible cylinder chains (Pesek et al., Soft Matter 2016, 12, 3360) and computes
+ * their stretching and bending forces.
+ *
+ * A chain is a sequence of particles, its nodes.  Each two nodes that follow each other are the ends of a segment: a
+ * deformable cylinder with a stretching energy and four friction coefficients.  Each two segments that follow each
+ * other meet in a joint with a bending energy.  To use this class, create a CylinderChainForce object, then call
+ * addChain() once for each chain.  All segments and joints of a chain begin with the same parameters; call
+ * setSegmentParameters() and setJointParameters() for chains that are not uniform.
+ *
+ * The friction coefficients have no influence on forces and energies.  CylinderChainIntegrator reads them here, and
+ * moves the chains accordingly.  Every other Integrator takes this class for an ordinary Force.
+ *
+ * After a Context has been created, parameters of segments and joints may be changed: call updateParametersInContext()
+ * to copy them over.
+ */
+class CylinderChainForce : public Force {
+public:
+    /**
+     * The bending energy of a joint of stiffness b whose segments have the directions t1 and t2, with c = t1.t2.
+     */
+    enum BendingModel {
+        /**
+         * b (1-c), eq. (26)
+         */
+        KratkyPorod = 0,
+        /**
+         * (b/2) theta^2, where theta is the angle between t1 and t2
+         */
+        Quadratic = 1,
+        /**
+         * 2b (1-c)/(1+c), eq. (27): it diverges where a joint folds back
+         */
+        InscribedCircle = 2
+    };
+    /**
+     * The stretching energy of a segment of length l, rest length l0 and stiffness k.
+     */
+    enum StretchingModel {
+        /**
+         * (k/2) (l-l0)^2, eq. (7)
+         */
+        Harmonic = 0,
+        /**
+         * -(k/2) D^2 ln(1-((l-l0)/D)^2): the length stays within l0-D and l0+D
+         */
+        FENE = 1
+    };
+    /**
+     * Create a CylinderChainForce.
+     */
+    CylinderChainForce();
+    /**
+     * Get the number of chains.
+     */
+    int getNumChains() const {
+        return chains.size();
+    }
+    /**
+     * Add a chain.
+     *
+     * @param particles              the indices of the particles that are its nodes, in the order of the chain: at
+     *                               least two, and none of them twice
+     * @param bendingModel           the bending energy of its joints
+     * @param stretchingModel        the stretching energy of its segments
+     * @param restLength             the rest length l0 of each segment, measured in nm
+     * @param stretchingStiffness    the stretching stiffness k of each segment, measured in kJ/mol/nm^2
+     * @param maximumExtension       the maximum extension D of each segment, measured in nm; it has no effect unless
+     *                               the stretching model is FENE
+     * @param jointStiffness         the bending stiffness b of each joint, measured in kJ/mol: the bending rigidity
+     *                               divided by the rest length
+     * @param parallelFriction       the friction of each segment against motion along itself, measured in
+     *                               kJ ps/mol/nm^2
+     * @param perpendicularFriction  the friction of each segment against motion across itself, measured in
+     *                               kJ ps/mol/nm^2
+     * @param rotationalFriction     the friction of each segment against rotation, measured in kJ ps/mol
+     * @param extensionalFriction    the friction of each segment against a change of its length, measured in kJ ps/mol
+     * @return the index of the chain that was added
+     */
+    int addChain(const std::vector<int>& particles, BendingModel bendingModel, StretchingModel stretchingModel,
+            double restLength, double stretchingStiffness, double maximumExtension, double jointStiffness,
+            double parallelFriction, double perpendicularFriction, double rotationalFriction,
+            double extensionalFriction);
+    /**
+     * Get the particles that are the nodes of a chain.
+     *
+     * @param chain  the index of the chain
+     * @return the indices of the particles, in the order of the chain
+     */
+    const std::vector<int>& getChainParticles(int chain) const;
+    /**
+     * Get the models of a chain.
+     *
+     * @param chain                 the index of the chain
+     * @param[out] bendingModel     the bending energy of its joints, a BendingModel
+     * @param[out] stretchingModel  the stretching energy of its segments, a StretchingModel
+     */
+    void getChainModels(int chain, int& bendingModel, int& stretchingModel) const;
+    /**
+     * Get the number of segments of a chain: one less than it has nodes.
+     *
+     * @param chain  the index of the chain
+     */
+    int getNumSegments(int chain) const;
+    /**
+     * Get the number of joints of a chain: one less than it has segments.
+     *
+     * @param chain  the index of the chain
+     */
+    int getNumJoints(int chain) const;
+    /**
+     * Get the parameters of a segment.
+     *
+     * @param chain                       the index of the chain
+     * @param segment                     the index of the segment in the chain
+     * @param[out] restLength             the rest length l0, measured in nm
+     * @param[out] stretchingStiffness    the stretching stiffness k, measured in kJ/mol/nm^2
+     * @param[out] maximumExtension       the maximum extension D, measured in nm
+     * @param[out] parallelFriction       the friction against motion along the segment, measured in kJ ps/mol/nm^2
+     * @param[out] perpendicularFriction  the friction against motion across the segment, measured in kJ ps/mol/nm^2
+     * @param[out] rotationalFriction     the friction against rotation, measured in kJ ps/mol
+     * @param[out] extensionalFriction    the friction against a change of length, measured in kJ ps/mol
+     */
+    void getSegmentParameters(int chain, int segment, double& restLength, double& stretchingStiffness,
+            double& maximumExtension, double& parallelFriction, double& perpendicularFriction,
+            double& rotationalFriction, double& extensionalFriction) const;
+    /**
+     * Set the parameters of a segment.
+     *
+     * @param chain                  the index of the chain
+     * @param segment                the index of the segment in the chain
+     * @param restLength             the rest length l0, measured in nm
+     * @param stretchingStiffness    the stretching stiffness k, measured in kJ/mol/nm^2
+     * @param maximumExtension       the maximum extension D, measured in nm
+     * @param parallelFriction       the friction against motion along the segment, measured in kJ ps/mol/nm^2
+     * @param perpendicularFriction  the friction against motion across the segment, measured in kJ ps/mol/nm^2
+     * @param rotationalFriction     the friction against rotation, measured in kJ ps/mol
+     * @param extensionalFriction    the friction against a change of length, measured in kJ ps/mol
+     */
+    void setSegmentParameters(int chain, int segment, double restLength, double stretchingStiffness,
+            double maximumExtension, double parallelFriction, double perpendicularFriction,
+            double rotationalFriction, double extensionalFriction);
+    /**
+     * Get the parameters of a joint.
+     *
+     * @param chain           the index of the chain
+     * @param joint           the index of the joint in the chain: joint j is where segments j and j+1 meet
+     * @param[out] stiffness  the bending stiffness b, measured in kJ/mol
+     */
+    void getJointParameters(int chain, int joint, double& stiffness) const;
+    /**
+     * Set the parameters of a joint.
+     *
+     * @param chain      the index of the chain
+     * @param joint      the index of the joint in the chain: joint j is where segments j and j+1 meet
+     * @param stiffness  the bending stiffness b, measured in kJ/mol
+     */
+    void setJointParameters(int chain, int joint, double stiffness);
+    /**
+     * Copy the parameters of segments and joints to a Context, so that changes made by setSegmentParameters() and
+     * setJointParameters() take effect in it.  Models and particles cannot be changed in this way, and neither can
+     * chains be added.
+     */
+    void updateParametersInContext(Context& context);
+    /**
+     * Compute the energies of a Context's chains in its present positions, separately.
+     *
+     * @param context          a Context of a System that holds this Force
+     * @param[out] stretching  the stretching energy of all segments, measured in kJ/mol
+     * @param[out] bending     the bending energy of all joints, measured in kJ/mol
+     */
+    void computeEnergies(Context& context, double& stretching, double& bending) const;
+    /**
+     * Set whether the distance between nodes that follow each other should be that of their nearest periodic images.
+     * By default it is not: the positions of a chain's nodes are taken as they are, even in a periodic box.
+     */
+    void setUsesPeriodicBoundaryConditions(bool periodic);
+    /**
+     * Get whether this Force makes use of periodic boundary conditions.
+     */
+    bool usesPeriodicBoundaryConditions() const;
+protected:
+    ForceImpl* createImpl() const;
+private:
+    class ChainInfo;
+    class SegmentInfo;
+    const ChainInfo& getChain(int chain) const;
+    ChainInfo& getChain(int chain);
+    std::vector<ChainInfo> chains;
+    bool usePeriodic;
+};
+
+/**
+ * The parameters of a segment.
+ */
+class CylinderChainForce::SegmentInfo {
+public:
+    double restLength, stretchingStiffness, maximumExtension;
+    double parallelFriction, perpendicularFriction, rotationalFriction, extensionalFriction;
+};
+
+/**
+ * The parameters of a chain.
+ */
+class CylinderChainForce::ChainInfo {
+public:
+    std::vector<int> particles;
+    BendingModel bendingModel;
+    StretchingModel stretchingModel;
+    std::vector<SegmentInfo> segments;
+    std::vector<double> joints;
+};
+
+} // namespace OpenMM
+
+#endif /*OPENMM_CYLINDERCHAINFORCE_H_*/

@@ -1,0 +1,194 @@
+#ifndef OPENMM_CYLINDERCHAININTEGRATOR_H_
+#define OPENMM_CYLINDERCHAININTEGRATOR_H_
+
+#include "openmm/Integrator.h"
+#include "openmm/Kernel.h"
+#include <cstdint>
+#include <iosfwd>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace OpenMM {
+
+class CylinderChainForceImpl;
+
+/**
+ * This is an Integrator which simulates a System that contains filaments, described by a CylinderChainForce, using
+ * Brownian dynamics.
+ *
+ * The nodes of each chain move together: in each step, the forces on them and a random force are redistributed along
+ * the chain (Pesek et al., Soft Matter 2016, 12, 3360).  That takes all forces of the System into account.  The random
+ * forces are correlated as the friction of the segments demands.
+ *
+ * All other particles move independently of each other.  The friction coefficient of a particle outside chains is its
+ * mass times getFriction(), as BrownianIntegrator has it, unless setParticleFriction() gives it one of its own.
+ *
+ * Particles whose mass is zero do not move; this includes nodes of chains, but not all nodes of the same chain.
+ * Virtual sites follow the particles they depend on, but cannot be nodes.  Constraints are not supported.
+ *
+ * Motion is overdamped: there is no kinetic energy.  Velocities are displacements divided by the step size.
+ *
+ * The noise of a step depends only on the random number seed and on the number of steps taken since the Context was
+ * created.  Checkpoints contain both, so a simulation that goes on from a checkpoint is identical to one that was
+ * not interrupted.  A State contains the number of steps taken only.
+ *
+ * A chain or a particle may become unstable: because the step is too large, or because a force is.  step() then throws
+ * an exception that tells where and when, and leaves the positions as they were before the step that failed.
+ */
+class CylinderChainIntegrator : public Integrator {
+public:
+    /**
+     * The ways to advance chains by one step.  Both are of weak order one in the step size.
+     */
+    enum Scheme {
+        /**
+         * Section 4 of Pesek et al. 2016.  Its drift is that of free segments: equilibrium averages of chains are
+         * biased at every step size.
+         */
+        Euler = 0,
+        /**
+         * Fixman's midpoint, which has the right drift.  It is the default.
+         */
+        Midpoint = 1
+    };
+    /**
+     * Create a CylinderChainIntegrator.
+     *
+     * @param temperature    the temperature of the heat bath (in Kelvin)
+     * @param frictionCoeff  the friction coefficient of particles outside chains, divided by their mass (in 1/ps)
+     * @param stepSize       the step size with which to integrate the system (in picoseconds)
+     */
+    CylinderChainIntegrator(double temperature, double frictionCoeff, double stepSize);
+    /**
+     * Get the temperature of the heat bath (in Kelvin).
+     */
+    double getTemperature() const {
+        return temperature;
+    }
+    /**
+     * Set the temperature of the heat bath (in Kelvin).  Friction coefficients stay as they are.
+     *
+     * @param temp  the temperature of the heat bath, measured in Kelvin
+     */
+    void setTemperature(double temp);
+    /**
+     * Get the friction coefficient of particles outside chains, divided by their mass (in 1/ps).
+     */
+    double getFriction() const {
+        return friction;
+    }
+    /**
+     * Set the friction coefficient of particles outside chains, divided by their mass (in 1/ps).
+     *
+     * @param coeff  the friction coefficient, measured in 1/ps
+     */
+    void setFriction(double coeff);
+    /**
+     * Get the particles outside chains that have a friction coefficient of their own, and those coefficients,
+     * measured in kJ ps/mol/nm^2.
+     */
+    const std::map<int, double>& getParticleFrictions() const {
+        return particleFrictions;
+    }
+    /**
+     * Give a particle outside chains a friction coefficient of its own.  In a Context that exists already, this takes
+     * effect when it is reinitialized.
+     *
+     * @param particle  the index of the particle
+     * @param coeff     the friction coefficient, measured in kJ ps/mol/nm^2
+     */
+    void setParticleFriction(int particle, double coeff);
+    /**
+     * Get how chains are advanced by one step.
+     */
+    Scheme getScheme() const {
+        return scheme;
+    }
+    /**
+     * Set how chains are advanced by one step.
+     */
+    void setScheme(Scheme scheme);
+    /**
+     * Get the random number seed.  See setRandomNumberSeed() for details.
+     */
+    int getRandomNumberSeed() const {
+        return randomNumberSeed;
+    }
+    /**
+     * Set the random number seed.  Two simulations with the same seed and otherwise identical are identical, on any
+     * number of threads, if the forces are.
+     *
+     * If seed is set to 0 (which is the default value assigned), a unique seed is chosen when a Context is created from
+     * this Integrator.  In a Context that exists already, a new seed takes effect when it is reinitialized.
+     */
+    void setRandomNumberSeed(int seed) {
+        randomNumberSeed = seed;
+    }
+    /**
+     * Get the temperature of the heat bath (in Kelvin): overdamped motion has no temperature of its own.
+     */
+    double computeSystemTemperature() const {
+        return temperature;
+    }
+    /**
+     * Advance a simulation through time by taking a series of time steps.
+     *
+     * @param steps  the number of time steps to take
+     */
+    void step(int steps);
+protected:
+    /**
+     * This will be called by the Context when it is created.  It informs the Integrator of what context it will be
+     * integrating, and gives it a chance to do any necessary initialization.  It will also get called again if the
+     * application calls reinitialize() on the Context.
+     */
+    void initialize(ContextImpl& context);
+    /**
+     * This will be called by the Context when it is destroyed to let the Integrator do any necessary cleanup.  It will
+     * also get called again if the application calls reinitialize() on the Context.
+     */
+    void cleanup();
+    /**
+     * Get the names of all Kernels used by this Integrator.
+     */
+    std::vector<std::string> getKernelNames();
+    /**
+     * There is no kinetic energy.
+     */
+    double computeKineticEnergy();
+    /**
+     * Computing the kinetic energy for this integrator does not require forces.
+     */
+    bool kineticEnergyRequiresForce() const;
+    /**
+     * Write the seed and the number of steps taken to a checkpoint.
+     */
+    void createCheckpoint(std::ostream& stream) const;
+    /**
+     * Read the seed and the number of steps taken from a checkpoint.
+     */
+    void loadCheckpoint(std::istream& stream);
+    /**
+     * Write the number of steps taken to a State.
+     */
+    void serializeParameters(SerializationNode& node) const;
+    /**
+     * Read the number of steps taken from a State.
+     */
+    void deserializeParameters(const SerializationNode& node);
+private:
+    void checkSystem(const System& system, const CylinderChainForceImpl& chains) const;
+    double temperature, friction;
+    std::map<int, double> particleFrictions;
+    Scheme scheme;
+    int randomNumberSeed;
+    std::uint64_t noiseSeed, stepsTaken;
+    bool chainsAreAlone;
+    int chainForceGroup;
+    Kernel kernel;
+};
+
+} // namespace OpenMM
+
+#endif /*OPENMM_CYLINDERCHAININTEGRATOR_H_*/

@@ -1,0 +1,103 @@
+#ifndef OPENMM_CYLINDERCHAINKERNELS_H_
+#define OPENMM_CYLINDERCHAINKERNELS_H_
+
+#include "openmm/CylinderChainForce.h"
+#include "openmm/CylinderChainIntegrator.h"
+#include "openmm/KernelImpl.h"
+#include "openmm/Platform.h"
+#include "openmm/System.h"
+#include "openmm/internal/ContextImpl.h"
+#include <cstdint>
+#include <string>
+
+namespace OpenMM {
+
+/**
+ * This kernel is invoked by CylinderChainForce to calculate the forces acting on the system and the energy of the
+ * system.
+ */
+class CalcCylinderChainForceKernel : public KernelImpl {
+public:
+    static std::string Name() {
+        return "CalcCylinderChainForce";
+    }
+    CalcCylinderChainForceKernel(std::string name, const Platform& platform) : KernelImpl(name, platform) {
+    }
+    /**
+     * Initialize the kernel.
+     *
+     * @param system  the System this kernel will be applied to
+     * @param force   the CylinderChainForce this kernel will be used for
+     */
+    virtual void initialize(const System& system, const CylinderChainForce& force) = 0;
+    /**
+     * Execute the kernel to calculate the forces and/or energy.
+     *
+     * @param context        the context in which to execute this kernel
+     * @param includeForces  true if forces should be calculated
+     * @param includeEnergy  true if the energy should be calculated
+     * @return the potential energy due to the force
+     */
+    virtual double execute(ContextImpl& context, bool includeForces, bool includeEnergy) = 0;
+    /**
+     * Calculate the energies of stretching and bending separately.
+     *
+     * @param context          the context in which to execute this kernel
+     * @param[out] stretching  the stretching energy of all segments
+     * @param[out] bending     the bending energy of all joints
+     */
+    virtual void computeEnergies(ContextImpl& context, double& stretching, double& bending) = 0;
+    /**
+     * Copy changed parameters over to a context.
+     *
+     * @param context  the context to copy parameters to
+     * @param force    the CylinderChainForce to copy the parameters from
+     */
+    virtual void copyParametersToContext(ContextImpl& context, const CylinderChainForce& force) = 0;
+};
+
+/**
+ * This kernel is invoked by CylinderChainIntegrator to take one time step.
+ */
+class IntegrateCylinderChainStepKernel : public KernelImpl {
+public:
+    static std::string Name() {
+        return "IntegrateCylinderChainStep";
+    }
+    IntegrateCylinderChainStepKernel(std::string name, const Platform& platform) : KernelImpl(name, platform) {
+    }
+    /**
+     * Initialize the kernel.
+     *
+     * @param system       the System this kernel will be applied to
+     * @param integrator   the CylinderChainIntegrator this kernel will be used for
+     * @param forceKernel  the kernel that holds the chains of the context
+     */
+    virtual void initialize(const System& system, const CylinderChainIntegrator& integrator,
+            CalcCylinderChainForceKernel& forceKernel) = 0;
+    /**
+     * Execute the kernel.  If a chain or a particle blows up, an exception is thrown and nothing has moved.
+     *
+     * @param context     the context in which to execute this kernel
+     * @param integrator  the CylinderChainIntegrator this kernel is being used for
+     * @param seed        the seed of the noise
+     * @param step        the number of the step.  The noise depends on this and on the seed alone.
+     */
+    virtual void execute(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed,
+            std::uint64_t step) = 0;
+    /**
+     * Take several steps where there are no other forces than those of the chains, which are computed here.  Chains
+     * do not know of each other then, so each can be advanced by all steps at once.
+     *
+     * @param step        the number of the first step
+     * @param count       the number of steps
+     * @return the number of steps that were taken: fewer than count if the one after them would blow up, or 0 if this
+     *         cannot be done for the context
+     */
+    virtual int executeTogether(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed,
+            std::uint64_t step, int count) = 0;
+};
+
+} // namespace OpenMM
+
+#endif /*OPENMM_CYLINDERCHAINKERNELS_H_*/

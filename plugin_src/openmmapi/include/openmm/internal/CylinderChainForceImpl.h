@@ -1,0 +1,48 @@
+#ifndef OPENMM_CYLINDERCHAINFORCEIMPL_H_
+#define OPENMM_CYLINDERCHAINFORCEIMPL_H_
+
+#include "openmm/CylinderChainForce.h"
+#include "openmm/Kernel.h"
+#include "openmm/internal/ForceImpl.h"
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace OpenMM {
+
+/**
+ * This is the internal implementation of CylinderChainForce.
+ */
+class CylinderChainForceImpl : public ForceImpl {
+public:
+    explicit CylinderChainForceImpl(const CylinderChainForce& owner);
+    void initialize(ContextImpl& context);
+    const CylinderChainForce& getOwner() const {
+        return owner;
+    }
+    void updateContextState(ContextImpl& context, bool& forcesInvalid) {
+        // Nothing is modified between steps.
+    }
+    double calcForcesAndEnergy(ContextImpl& context, bool includeForces, bool includeEnergy, int groups);
+    std::map<std::string, double> getDefaultParameters() {
+        return std::map<std::string, double>();
+    }
+    std::vector<std::string> getKernelNames();
+    std::vector<std::pair<int, int> > getBondedParticles() const;
+    void updateParametersInContext(ContextImpl& context);
+    void computeEnergies(ContextImpl& context, double& stretching, double& bending);
+    /**
+     * Get the Kernel that holds the chains of the Context, which CylinderChainIntegrator moves.
+     */
+    Kernel& getKernel() {
+        return kernel;
+    }
+private:
+    const CylinderChainForce& owner;
+    Kernel kernel;
+};
+
+} // namespace OpenMM
+
+#endif /*OPENMM_CYLINDERCHAINFORCEIMPL_H_*/

@@ -1,0 +1,55 @@
+#include "openmm/internal/CylinderChainDescription.h"
+#include "openmm/OpenMMException.h"
+
+using namespace std;
+
+namespace OpenMM {
+
+static void copyParameters(const CylinderChainForce& force, int index, cylchain::Chain& chain) {
+    for (size_t i = 0; i < chain.segments.size(); i++) {
+        cylchain::Segment& segment = chain.segments[i];
+        force.getSegmentParameters(index, i, segment.restLength, segment.stiffness, segment.maximumExtension,
+                segment.parallel, segment.perpendicular, segment.rotational, segment.extensional);
+    }
+    for (size_t i = 0; i < chain.joints.size(); i++)
+        force.getJointParameters(index, i, chain.joints[i]);
+}
+
+static cylchain::Chain describeTopology(const CylinderChainForce& force, int index) {
+    cylchain::Chain chain;
+    int bending, stretching;
+    force.getChainModels(index, bending, stretching);
+    chain.bending = (cylchain::BendingModel) bending;
+    chain.stretching = (cylchain::StretchingModel) stretching;
+    chain.nodes = force.getChainParticles(index);
+    chain.segments.resize(force.getNumSegments(index));
+    chain.joints.resize(force.getNumJoints(index));
+    return chain;
+}
+
+vector<cylchain::Chain> describeChains(const System& system, const CylinderChainForce& force) {
+    vector<cylchain::Chain> chains;
+    for (int i = 0; i < force.getNumChains(); i++) {
+        cylchain::Chain chain = describeTopology(force, i);
+        for (int node : chain.nodes)
+            chain.fixed.push_back(system.getParticleMass(node) == 0.0);
+        copyParameters(force, i, chain);
+        chains.push_back(chain);
+    }
+    return chains;
+}
+
+void updateChains(vector<cylchain::Chain>& chains, const CylinderChainForce& force) {
+    if (force.getNumChains() != (int) chains.size())
+        throw OpenMMException("updateParametersInContext: The number of chains has changed");
+    for (int i = 0; i < force.getNumChains(); i++) {
+        const cylchain::Chain present = describeTopology(force, i);
+        if (present.nodes != chains[i].nodes)
+            throw OpenMMException("updateParametersInContext: The particles of a chain have changed");
+        if (present.bending != chains[i].bending || present.stretching != chains[i].stretching)
+            throw OpenMMException("updateParametersInContext: The models of a chain have changed");
+        copyParameters(force, i, chains[i]);
+    }
+}
+
+} // namespace OpenMM

@@ -1,0 +1,155 @@
+#include "openmm/CylinderChainForce.h"
+#include "openmm/OpenMMException.h"
+#include "openmm/internal/AssertionUtilities.h"
+#include "openmm/internal/CylinderChainForceImpl.h"
+#include <cmath>
+#include <set>
+#include <string>
+
+using namespace OpenMM;
+using namespace std;
+
+static void checkPositive(double value, const char* name) {
+    // Written so that NaN fails.
+
+    if (!(value > 0 && isfinite(value)))
+        throw OpenMMException(string("CylinderChainForce: ")+name+" must be positive and finite");
+}
+
+static void checkStiffness(double stiffness) {
+    if (!(stiffness >= 0 && isfinite(stiffness)))
+        throw OpenMMException("CylinderChainForce: The stiffness of a joint cannot be negative and must be finite");
+}
+
+CylinderChainForce::CylinderChainForce() : usePeriodic(false) {
+}
+
+int CylinderChainForce::addChain(const vector<int>& particles, BendingModel bendingModel, StretchingModel stretchingModel,
+        double restLength, double stretchingStiffness, double maximumExtension, double jointStiffness,
+        double parallelFriction, double perpendicularFriction, double rotationalFriction, double extensionalFriction) {
+    if (particles.size() < 2)
+        throw OpenMMException("CylinderChainForce: A chain must have at least two particles");
+    set<int> distinct;
+    for (int particle : particles) {
+        if (particle < 0)
+            throw OpenMMException("CylinderChainForce: Illegal particle index: "+to_string(particle));
+        if (!distinct.insert(particle).second)
+            throw OpenMMException("CylinderChainForce: Particle "+to_string(particle)+" appears twice in a chain");
+    }
+    if (bendingModel < KratkyPorod || bendingModel > InscribedCircle)
+        throw OpenMMException("CylinderChainForce: Illegal bending model: "+to_string((int) bendingModel));
+    if (stretchingModel < Harmonic || stretchingModel > FENE)
+        throw OpenMMException("CylinderChainForce: Illegal stretching model: "+to_string((int) stretchingModel));
+    checkStiffness(jointStiffness);
+    ChainInfo chain;
+    chain.particles = particles;
+    chain.bendingModel = bendingModel;
+    chain.stretchingModel = stretchingModel;
+    chain.segments.resize(particles.size()-1);
+    chain.joints.assign(particles.size()-2, jointStiffness);
+    chains.push_back(chain);
+    const int index = chains.size()-1;
+    try {
+        for (int segment = 0; segment < getNumSegments(index); segment++)
+            setSegmentParameters(index, segment, restLength, stretchingStiffness, maximumExtension, parallelFriction,
+                    perpendicularFriction, rotationalFriction, extensionalFriction);
+    }
+    catch (...) {
+        chains.pop_back();
+        throw;
+    }
+    return index;
+}
+
+const CylinderChainForce::ChainInfo& CylinderChainForce::getChain(int chain) const {
+    ASSERT_VALID_INDEX(chain, chains);
+    return chains[chain];
+}
+
+CylinderChainForce::ChainInfo& CylinderChainForce::getChain(int chain) {
+    ASSERT_VALID_INDEX(chain, chains);
+    return chains[chain];
+}
+
+const vector<int>& CylinderChainForce::getChainParticles(int chain) const {
+    return getChain(chain).particles;
+}
+
+void CylinderChainForce::getChainModels(int chain, int& bendingModel, int& stretchingModel) const {
+    bendingModel = getChain(chain).bendingModel;
+    stretchingModel = getChain(chain).stretchingModel;
+}
+
+int CylinderChainForce::getNumSegments(int chain) const {
+    return getChain(chain).segments.size();
+}
+
+int CylinderChainForce::getNumJoints(int chain) const {
+    return getChain(chain).joints.size();
+}
+
+void CylinderChainForce::getSegmentParameters(int chain, int segment, double& restLength, double& stretchingStiffness,
+        double& maximumExtension, double& parallelFriction, double& perpendicularFriction, double& rotationalFriction,
+        double& extensionalFriction) const {
+    const vector<SegmentInfo>& segments = getChain(chain).segments;
+    ASSERT_VALID_INDEX(segment, segments);
+    const SegmentInfo& info = segments[segment];
+    restLength = info.restLength;
+    stretchingStiffness = info.stretchingStiffness;
+    maximumExtension = info.maximumExtension;
+    parallelFriction = info.parallelFriction;
+    perpendicularFriction = info.perpendicularFriction;
+    rotationalFriction = info.rotationalFriction;
+    extensionalFriction = info.extensionalFriction;
+}
+
+void CylinderChainForce::setSegmentParameters(int chain, int segment, double restLength, double stretchingStiffness,
+        double maximumExtension, double parallelFriction, double perpendicularFriction, double rotationalFriction,
+        double extensionalFriction) {
+    vector<SegmentInfo>& segments = getChain(chain).segments;
+    ASSERT_VALID_INDEX(segment, segments);
+    checkPositive(restLength, "The rest length");
+    checkPositive(stretchingStiffness, "The stretching stiffness");
+    if (getChain(chain).stretchingModel == FENE)
+        checkPositive(maximumExtension, "The maximum extension");
+    checkPositive(parallelFriction, "The parallel friction");
+    checkPositive(perpendicularFriction, "The perpendicular friction");
+    checkPositive(rotationalFriction, "The rotational friction");
+    checkPositive(extensionalFriction, "The extensional friction");
+    segments[segment] = {restLength, stretchingStiffness, maximumExtension, parallelFriction, perpendicularFriction,
+            rotationalFriction, extensionalFriction};
+}
+
+void CylinderChainForce::getJointParameters(int chain, int joint, double& stiffness) const {
+    const vector<double>& joints = getChain(chain).joints;
+    ASSERT_VALID_INDEX(joint, joints);
+    stiffness = joints[joint];
+}
+
+void CylinderChainForce::setJointParameters(int chain, int joint, double stiffness) {
+    vector<double>& joints = getChain(chain).joints;
+    ASSERT_VALID_INDEX(joint, joints);
+    checkStiffness(stiffness);
+    joints[joint] = stiffness;
+}
+
+void CylinderChainForce::updateParametersInContext(Context& context) {
+    dynamic_cast<CylinderChainForceImpl&>(getImplInContext(context)).updateParametersInContext(getContextImpl(context));
+}
+
+void CylinderChainForce::computeEnergies(Context& context, double& stretching, double& bending) const {
+    dynamic_cast<CylinderChainForceImpl&>(getImplInContext(context)).computeEnergies(getContextImpl(context),
+            stretching, bending);
+}
+
+void CylinderChainForce::setUsesPeriodicBoundaryConditions(bool periodic) {
+    usePeriodic = periodic;
+}
+
+bool CylinderChainForce::usesPeriodicBoundaryConditions() const {
+    return usePeriodic;
+}
+
+ForceImpl* CylinderChainForce::createImpl() const {
+    return new CylinderChainForceImpl(*this);
+}

@@ -1,0 +1,59 @@
+#include "openmm/internal/CylinderChainForceImpl.h"
+#include "openmm/CylinderChainKernels.h"
+#include "openmm/OpenMMException.h"
+#include "openmm/System.h"
+#include "openmm/internal/ContextImpl.h"
+
+using namespace OpenMM;
+using namespace std;
+
+CylinderChainForceImpl::CylinderChainForceImpl(const CylinderChainForce& owner) : owner(owner) {
+    forceGroup = owner.getForceGroup();
+}
+
+void CylinderChainForceImpl::initialize(ContextImpl& context) {
+    const System& system = context.getSystem();
+    vector<int> chainOfParticle(system.getNumParticles(), -1);
+    for (int chain = 0; chain < owner.getNumChains(); chain++)
+        for (int particle : owner.getChainParticles(chain)) {
+            if (particle >= system.getNumParticles())
+                throw OpenMMException("CylinderChainForce: Illegal particle index: "+to_string(particle));
+            if (chainOfParticle[particle] != -1)
+                throw OpenMMException("CylinderChainForce: Particle "+to_string(particle)+" is in two chains: "+
+                        to_string(chainOfParticle[particle])+" and "+to_string(chain));
+            chainOfParticle[particle] = chain;
+        }
+    kernel = context.getPlatform().createKernel(CalcCylinderChainForceKernel::Name(), context);
+    kernel.getAs<CalcCylinderChainForceKernel>().initialize(system, owner);
+}
+
+double CylinderChainForceImpl::calcForcesAndEnergy(ContextImpl& context, bool includeForces, bool includeEnergy, int groups) {
+    if ((groups&(1<<forceGroup)) != 0)
+        return kernel.getAs<CalcCylinderChainForceKernel>().execute(context, includeForces, includeEnergy);
+    return 0.0;
+}
+
+vector<string> CylinderChainForceImpl::getKernelNames() {
+    return {CalcCylinderChainForceKernel::Name()};
+}
+
+vector<pair<int, int> > CylinderChainForceImpl::getBondedParticles() const {
+    // Chains are molecules.
+
+    vector<pair<int, int> > bonds;
+    for (int chain = 0; chain < owner.getNumChains(); chain++) {
+        const vector<int>& particles = owner.getChainParticles(chain);
+        for (size_t i = 1; i < particles.size(); i++)
+            bonds.push_back(make_pair(particles[i-1], particles[i]));
+    }
+    return bonds;
+}
+
+void CylinderChainForceImpl::updateParametersInContext(ContextImpl& context) {
+    kernel.getAs<CalcCylinderChainForceKernel>().copyParametersToContext(context, owner);
+    context.systemChanged();
+}
+
+void CylinderChainForceImpl::computeEnergies(ContextImpl& context, double& stretching, double& bending) {
+    kernel.getAs<CalcCylinderChainForceKernel>().computeEnergies(context, stretching, bending);
+}

@@ -1,0 +1,191 @@
+#include "openmm/CylinderChainIntegrator.h"
+#include "openmm/Context.h"
+#include "openmm/CylinderChainKernels.h"
+#include "openmm/OpenMMException.h"
+#include <algorithm>
+#include "openmm/internal/ContextImpl.h"
+#include "openmm/internal/CylinderChainForceImpl.h"
+#include "openmm/internal/OSRngSeed.h"
+#include "openmm/serialization/SerializationNode.h"
+#include <cmath>
+#include <istream>
+#include <ostream>
+
+using namespace OpenMM;
+using namespace std;
+
+/**
+ * How many steps are taken between looks at anything but chains.
+ */
+static const int STEPS_TOGETHER = 32;
+
+static CylinderChainForceImpl& findChains(ContextImpl& context) {
+    CylinderChainForceImpl* found = NULL;
+    for (ForceImpl* impl : context.getForceImpls()) {
+        CylinderChainForceImpl* chains = dynamic_cast<CylinderChainForceImpl*>(impl);
+        if (chains != NULL) {
+            if (found != NULL)
+                throw OpenMMException("The System contains multiple CylinderChainForces: put all chains into one");
+            found = chains;
+        }
+    }
+    if (found == NULL)
+        throw OpenMMException("The System does not contain a CylinderChainForce");
+    return *found;
+}
+
+CylinderChainIntegrator::CylinderChainIntegrator(double temperature, double frictionCoeff, double stepSize) :
+        scheme(Midpoint), noiseSeed(0), stepsTaken(0) {
+    setTemperature(temperature);
+    setFriction(frictionCoeff);
+    setStepSize(stepSize);
+    setConstraintTolerance(1e-5);
+    setRandomNumberSeed(0);
+}
+
+void CylinderChainIntegrator::initialize(ContextImpl& contextRef) {
+    if (owner != NULL && &contextRef.getOwner() != owner)
+        throw OpenMMException("This Integrator is already bound to a context");
+    const System& system = contextRef.getSystem();
+    CylinderChainForceImpl& chains = findChains(contextRef);
+    checkSystem(system, chains);
+    context = &contextRef;
+    owner = &contextRef.getOwner();
+    kernel = context->getPlatform().createKernel(IntegrateCylinderChainStepKernel::Name(), contextRef);
+    kernel.getAs<IntegrateCylinderChainStepKernel>().initialize(system, *this,
+            chains.getKernel().getAs<CalcCylinderChainForceKernel>());
+    chainsAreAlone = (contextRef.getForceImpls().size() == 1);
+    chainForceGroup = chains.getOwner().getForceGroup();
+    noiseSeed = (uint32_t) (randomNumberSeed == 0 ? osrngseed() : randomNumberSeed);
+    stepsTaken = 0;
+}
+
+void CylinderChainIntegrator::checkSystem(const System& system, const CylinderChainForceImpl& chains) const {
+    if (!(getStepSize() > 0 && isfinite(getStepSize())))
+        throw OpenMMException("CylinderChainIntegrator: The step size must be positive");
+    if (system.getNumConstraints() > 0) {
+        int particle1, particle2;
+        double distance;
+        system.getConstraintParameters(0, particle1, particle2, distance);
+        throw OpenMMException("CylinderChainIntegrator does not support constraints, but there is one between particles "+
+                to_string(particle1)+" and "+to_string(particle2));
+    }
+    const CylinderChainForce& force = chains.getOwner();
+    vector<bool> isNode(system.getNumParticles(), false);
+    for (int chain = 0; chain < force.getNumChains(); chain++) {
+        bool mobile = false;
+        for (int particle : force.getChainParticles(chain)) {
+            if (system.isVirtualSite(particle))
+                throw OpenMMException("Particle "+to_string(particle)+" is a node of chain "+to_string(chain)+
+                        " and cannot be a virtual site");
+            isNode[particle] = true;
+            mobile = (mobile || system.getParticleMass(particle) != 0.0);
+        }
+        if (!mobile)
+            throw OpenMMException("All nodes of chain "+to_string(chain)+" are massless: at least one must be free to move");
+    }
+    for (auto& entry : particleFrictions) {
+        if (entry.first < 0 || entry.first >= system.getNumParticles())
+            throw OpenMMException("CylinderChainIntegrator: Illegal particle index: "+to_string(entry.first));
+        if (isNode[entry.first])
+            throw OpenMMException("Particle "+to_string(entry.first)+
+                    " is a node of a chain and cannot have a friction coefficient of its own");
+    }
+}
+
+void CylinderChainIntegrator::setTemperature(double temp) {
+    if (!(temp >= 0 && isfinite(temp)))
+        throw OpenMMException("Temperature cannot be negative");
+    temperature = temp;
+}
+
+void CylinderChainIntegrator::setFriction(double coeff) {
+    if (!(coeff > 0 && isfinite(coeff)))
+        throw OpenMMException("Friction must be positive");
+    friction = coeff;
+}
+
+void CylinderChainIntegrator::setParticleFriction(int particle, double coeff) {
+    if (particle < 0)
+        throw OpenMMException("CylinderChainIntegrator: Illegal particle index: "+to_string(particle));
+    if (!(coeff > 0 && isfinite(coeff)))
+        throw OpenMMException("Friction must be positive");
+    particleFrictions[particle] = coeff;
+}
+
+void CylinderChainIntegrator::setScheme(Scheme scheme) {
+    if (scheme != Euler && scheme != Midpoint)
+        throw OpenMMException("CylinderChainIntegrator: Illegal scheme: "+to_string((int) scheme));
+    this->scheme = scheme;
+}
+
+void CylinderChainIntegrator::cleanup() {
+    kernel = Kernel();
+}
+
+vector<string> CylinderChainIntegrator::getKernelNames() {
+    return {IntegrateCylinderChainStepKernel::Name()};
+}
+
+double CylinderChainIntegrator::computeKineticEnergy() {
+    return 0.0;
+}
+
+bool CylinderChainIntegrator::kineticEnergyRequiresForce() const {
+    return false;
+}
+
+void CylinderChainIntegrator::step(int steps) {
+    if (context == NULL)
+        throw OpenMMException("This Integrator is not bound to a context!");
+    IntegrateCylinderChainStepKernel& stepKernel = kernel.getAs<IntegrateCylinderChainStepKernel>();
+    for (int done = 0; done < steps;) {
+        context->updateContextState();
+
+        // Where there are only chains, several steps are taken at once.  The first one is not among them, because OpenMM
+        // checks that positions have been set, nor is one that blows up.
+
+        if (done > 0 && chainsAreAlone && (getIntegrationForceGroups()&(1<<chainForceGroup)) != 0) {
+            const int count = min(steps-done, STEPS_TOGETHER);
+            const int taken = stepKernel.executeTogether(*context, *this, noiseSeed, stepsTaken, count);
+            stepsTaken += taken;
+            done += taken;
+            if (taken == count)
+                continue;
+        }
+        context->calcForcesAndEnergy(true, false, getIntegrationForceGroups());
+        stepKernel.execute(*context, *this, noiseSeed, stepsTaken);
+        stepsTaken++;
+        done++;
+    }
+}
+
+void CylinderChainIntegrator::createCheckpoint(ostream& stream) const {
+    const int version = 1;
+    stream.write((const char*) &version, sizeof(version));
+    stream.write((const char*) &noiseSeed, sizeof(noiseSeed));
+    stream.write((const char*) &stepsTaken, sizeof(stepsTaken));
+}
+
+void CylinderChainIntegrator::loadCheckpoint(istream& stream) {
+    int version = 0;
+    uint64_t seed = 0, steps = 0;
+    stream.read((char*) &version, sizeof(version));
+    stream.read((char*) &seed, sizeof(seed));
+    stream.read((char*) &steps, sizeof(steps));
+    if (!stream || version != 1)
+        throw OpenMMException("loadCheckpoint: Checkpoint was not created with a CylinderChainIntegrator");
+    noiseSeed = seed;
+    stepsTaken = steps;
+}
+
+void CylinderChainIntegrator::serializeParameters(SerializationNode& node) const {
+    node.setIntProperty("version", 1);
+    node.setLongProperty("stepsTaken", stepsTaken);
+}
+
+void CylinderChainIntegrator::deserializeParameters(const SerializationNode& node) {
+    if (node.getIntProperty("version") != 1)
+        throw OpenMMException("Unsupported version number");
+    stepsTaken = node.getLongProperty("stepsTaken");
+}

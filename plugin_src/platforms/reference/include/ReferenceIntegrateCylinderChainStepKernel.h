@@ -1,0 +1,40 @@
+#ifndef OPENMM_REFERENCEINTEGRATECYLINDERCHAINSTEPKERNEL_H_
+#define OPENMM_REFERENCEINTEGRATECYLINDERCHAINSTEPKERNEL_H_
+
+#include "ParallelLoop.h"
+#include "ReferenceCalcCylinderChainForceKernel.h"
+#include "openmm/CylinderChainKernels.h"
+#include <vector>
+
+namespace OpenMM {
+
+/**
+ * This kernel is invoked by CylinderChainIntegrator to take one time step.
+ */
+class ReferenceIntegrateCylinderChainStepKernel : public IntegrateCylinderChainStepKernel {
+public:
+    ReferenceIntegrateCylinderChainStepKernel(std::string name, const Platform& platform, ContextImpl& context);
+    void initialize(const System& system, const CylinderChainIntegrator& integrator,
+            CalcCylinderChainForceKernel& forceKernel);
+    void execute(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed, std::uint64_t step);
+    int executeTogether(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed, std::uint64_t step,
+            int count);
+private:
+    void displaceChains(ContextImpl& context, const cylchain::StepSettings& settings);
+    int advancePack(ContextImpl& context, int pack, cylchain::StepSettings settings, int count);
+    void displaceOthers(ContextImpl& context, const cylchain::StepSettings& settings, double friction);
+    void displaceBlock(int block, const std::vector<Vec3>& forces, const cylchain::StepSettings& settings, double friction);
+    void reportInstability(ContextImpl& context, int chain, std::uint64_t step) const;
+    void checkOthers(std::uint64_t step) const;
+    ParallelLoop loop;
+    ReferenceCalcCylinderChainForceKernel* chainKernel;
+    // Particles outside chains, and those of them that can move.
+
+    std::vector<int> outside, others;
+    std::vector<double> masses, particleFrictions;
+    std::vector<Vec3> displacements, newPositions;
+};
+
+} // namespace OpenMM
+
+#endif /*OPENMM_REFERENCEINTEGRATECYLINDERCHAINSTEPKERNEL_H_*/

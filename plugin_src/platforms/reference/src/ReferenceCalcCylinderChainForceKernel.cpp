@@ -1,0 +1,63 @@
+#include "ReferenceCalcCylinderChainForceKernel.h"
+#include "openmm/internal/CylinderChainDescription.h"
+#include "openmm/reference/ReferencePlatform.h"
+
+using namespace OpenMM;
+using namespace cylchain;
+using namespace std;
+
+static ReferencePlatform::PlatformData& extractData(ContextImpl& context) {
+    return *reinterpret_cast<ReferencePlatform::PlatformData*>(context.getPlatformData());
+}
+
+ReferenceCalcCylinderChainForceKernel::ReferenceCalcCylinderChainForceKernel(string name, const Platform& platform,
+        ContextImpl& context) : CalcCylinderChainForceKernel(name, platform), loop(context), periodic(false) {
+}
+
+void ReferenceCalcCylinderChainForceKernel::initialize(const System& system, const CylinderChainForce& force) {
+    chains = describeChains(system, force);
+    engine.reset(new ChainEngine(chains));
+    periodic = force.usesPeriodicBoundaryConditions();
+}
+
+const double* ReferenceCalcCylinderChainForceKernel::getBox(ContextImpl& context) const {
+    return periodic ? &extractData(context).periodicBoxVectors[0][0] : NULL;
+}
+
+ChainEnergy ReferenceCalcCylinderChainForceKernel::addForces(ContextImpl& context, vector<Vec3>& forces, bool includeEnergy) {
+    const double* positions = &(*extractData(context).positions)[0][0];
+    const double* box = getBox(context);
+    vector<ChainEnergy> energies(engine->getNumPacks());
+    loop.run(energies.size(), [&] (int pack) {
+        energies[pack] = engine->addForces(pack, positions, &forces[0][0], box, includeEnergy);
+    });
+
+    // The sum does not depend on the order in which threads have finished.
+
+    ChainEnergy total;
+    for (const ChainEnergy& energy : energies) {
+        total.stretching += energy.stretching;
+        total.bending += energy.bending;
+    }
+    return total;
+}
+
+double ReferenceCalcCylinderChainForceKernel::execute(ContextImpl& context, bool includeForces, bool includeEnergy) {
+    vector<Vec3> unused;
+    if (!includeForces)
+        unused.resize(context.getSystem().getNumParticles());
+    ChainEnergy energy = addForces(context, includeForces ? *extractData(context).forces : unused, includeEnergy);
+    return energy.stretching+energy.bending;
+}
+
+void ReferenceCalcCylinderChainForceKernel::computeEnergies(ContextImpl& context, double& stretching, double& bending) {
+    vector<Vec3> unused(context.getSystem().getNumParticles());
+    ChainEnergy energy = addForces(context, unused, true);
+    stretching = energy.stretching;
+    bending = energy.bending;
+}
+
+void ReferenceCalcCylinderChainForceKernel::copyParametersToContext(ContextImpl& context, const CylinderChainForce& force) {
+    updateChains(chains, force);
+    engine.reset(new ChainEngine(chains));
+}

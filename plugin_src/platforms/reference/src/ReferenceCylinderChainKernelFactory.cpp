@@ -1,0 +1,30 @@
+#include "ReferenceCylinderChainKernelFactory.h"
+#include "ReferenceCalcCylinderChainForceKernel.h"
+#include "ReferenceIntegrateCylinderChainStepKernel.h"
+#include "openmm/OpenMMException.h"
+#include "openmm/reference/ReferencePlatform.h"
+
+using namespace OpenMM;
+using namespace std;
+
+extern "C" void registerPlatforms() {
+}
+
+extern "C" void registerKernelFactories() {
+    for (int i = 0; i < Platform::getNumPlatforms(); i++) {
+        Platform& platform = Platform::getPlatform(i);
+        if (dynamic_cast<ReferencePlatform*>(&platform) != NULL) {
+            ReferenceCylinderChainKernelFactory* factory = new ReferenceCylinderChainKernelFactory();
+            platform.registerKernelFactory(CalcCylinderChainForceKernel::Name(), factory);
+            platform.registerKernelFactory(IntegrateCylinderChainStepKernel::Name(), factory);
+        }
+    }
+}
+
+KernelImpl* ReferenceCylinderChainKernelFactory::createKernelImpl(string name, const Platform& platform, ContextImpl& context) const {
+    if (name == CalcCylinderChainForceKernel::Name())
+        return new ReferenceCalcCylinderChainForceKernel(name, platform, context);
+    if (name == IntegrateCylinderChainStepKernel::Name())
+        return new ReferenceIntegrateCylinderChainStepKernel(name, platform, context);
+    throw OpenMMException("Tried to create kernel with illegal kernel name '"+name+"'");
+}

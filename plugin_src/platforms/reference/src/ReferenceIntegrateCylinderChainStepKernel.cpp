@@ -1,0 +1,245 @@
+#include "ReferenceIntegrateCylinderChainStepKernel.h"
+#include "Gaussian.h"
+#include "openmm/OpenMMException.h"
+#include "openmm/reference/ReferencePlatform.h"
+#include "openmm/reference/ReferenceVirtualSites.h"
+#include "openmm/reference/SimTKOpenMMRealType.h"
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+using namespace OpenMM;
+using namespace cylchain;
+using namespace std;
+
+/**
+ * Particles outside chains share a stream of random numbers in blocks of this size.
+ */
+static const int BLOCK_SIZE = 64;
+
+static ReferencePlatform::PlatformData& extractData(ContextImpl& context) {
+    return *reinterpret_cast<ReferencePlatform::PlatformData*>(context.getPlatformData());
+}
+
+static double norm(const Vec3& v) {
+    return sqrt(v.dot(v));
+}
+
+static StepSettings settingsOf(const CylinderChainIntegrator& integrator, uint64_t seed, uint64_t step) {
+    StepSettings settings;
+    settings.scheme = (integrator.getScheme() == CylinderChainIntegrator::Euler ? Scheme::Euler : Scheme::Midpoint);
+    settings.kT = BOLTZ*integrator.getTemperature();
+    settings.stepSize = integrator.getStepSize();
+    settings.seed = seed;
+    settings.step = step;
+    return settings;
+}
+
+static bool isFinite(const Vec3& v) {
+    return isfinite(v[0]) && isfinite(v[1]) && isfinite(v[2]);
+}
+
+ReferenceIntegrateCylinderChainStepKernel::ReferenceIntegrateCylinderChainStepKernel(string name, const Platform& platform,
+        ContextImpl& context) : IntegrateCylinderChainStepKernel(name, platform), loop(context), chainKernel(NULL) {
+}
+
+void ReferenceIntegrateCylinderChainStepKernel::initialize(const System& system, const CylinderChainIntegrator& integrator,
+        CalcCylinderChainForceKernel& forceKernel) {
+    chainKernel = &dynamic_cast<ReferenceCalcCylinderChainForceKernel&>(forceKernel);
+    const int numParticles = system.getNumParticles();
+    vector<bool> isNode(numParticles, false);
+    for (const Chain& chain : chainKernel->getChains())
+        for (int node : chain.nodes)
+            isNode[node] = true;
+    outside.clear();
+    others.clear();
+    masses.resize(numParticles);
+    for (int i = 0; i < numParticles; i++) {
+        masses[i] = system.getParticleMass(i);
+        if (isNode[i])
+            continue;
+        outside.push_back(i);
+        if (masses[i] != 0.0)
+            others.push_back(i);
+    }
+
+    // Particles that have no friction coefficient of their own are marked by zero.
+
+    particleFrictions.assign(numParticles, 0.0);
+    for (auto& entry : integrator.getParticleFrictions())
+        particleFrictions[entry.first] = entry.second;
+    displacements.assign(numParticles, Vec3());
+    newPositions.assign(numParticles, Vec3());
+}
+
+void ReferenceIntegrateCylinderChainStepKernel::execute(ContextImpl& context, const CylinderChainIntegrator& integrator,
+        uint64_t seed, uint64_t step) {
+    const StepSettings settings = settingsOf(integrator, seed, step);
+    displaceChains(context, settings);
+    displaceOthers(context, settings, integrator.getFriction());
+
+    // Nothing has blown up, so the new positions replace the old ones.
+
+    ReferencePlatform::PlatformData& data = extractData(context);
+    for (int i : outside)
+        newPositions[i] = (*data.positions)[i]+displacements[i];
+    for (int i : others)
+        (*data.velocities)[i] = displacements[i]/settings.stepSize;
+    data.positions->swap(newPositions);
+    data.virtualSites->computePositions(context.getSystem(), *data.positions, data.periodicBoxVectors);
+    data.time += settings.stepSize;
+    data.stepCount++;
+}
+
+int ReferenceIntegrateCylinderChainStepKernel::executeTogether(ContextImpl& context, const CylinderChainIntegrator& integrator,
+        uint64_t seed, uint64_t step, int count) {
+    if (!others.empty())
+        return 0;
+    const StepSettings settings = settingsOf(integrator, seed, step);
+    ReferencePlatform::PlatformData& data = extractData(context);
+    vector<int> taken(chainKernel->getEngine().getNumPacks());
+    auto advance = [&] (int steps) {
+        loop.run(taken.size(), [&] (int pack) {
+            taken[pack] = advancePack(context, pack, settings, steps);
+        });
+        return *min_element(taken.begin(), taken.end());
+    };
+
+    // If a chain blows up, all of them are taken to the step before.
+
+    int done = advance(count);
+    if (done < count)
+        done = advance(done);
+    for (int particle : outside)
+        newPositions[particle] = (*data.positions)[particle];
+    data.positions->swap(newPositions);
+    data.virtualSites->computePositions(context.getSystem(), *data.positions, data.periodicBoxVectors);
+    data.time += done*settings.stepSize;
+    data.stepCount += done;
+    return done;
+}
+
+int ReferenceIntegrateCylinderChainStepKernel::advancePack(ContextImpl& context, int pack, StepSettings settings, int count) {
+    ReferencePlatform::PlatformData& data = extractData(context);
+    const ChainEngine& engine = chainKernel->getEngine();
+    const double* box = chainKernel->getBox(context);
+    double* forces = &(*data.forces)[0][0];
+    const vector<int>& particles = engine.getParticles(pack);
+    for (int particle : particles)
+        if (particle >= 0)
+            newPositions[particle] = (*data.positions)[particle];
+    for (int done = 0; done < count; done++, settings.step++) {
+        const double* positions = &newPositions[0][0];
+        engine.clearForces(pack, forces);
+        engine.addForces(pack, positions, forces, box, false);
+        if (engine.step(pack, positions, forces, box, settings, &displacements[0][0]).chain != -1)
+            return done;
+        for (int particle : particles)
+            if (particle >= 0)
+                newPositions[particle] += displacements[particle];
+    }
+    for (int particle : particles)
+        if (particle >= 0 && count > 0)
+            (*data.velocities)[particle] = displacements[particle]/settings.stepSize;
+    return count;
+}
+
+void ReferenceIntegrateCylinderChainStepKernel::displaceChains(ContextImpl& context, const StepSettings& settings) {
+    ReferencePlatform::PlatformData& data = extractData(context);
+    const ChainEngine& engine = chainKernel->getEngine();
+    const double* positions = &(*data.positions)[0][0];
+    const double* forces = &(*data.forces)[0][0];
+    const double* box = chainKernel->getBox(context);
+    vector<Instability> instabilities(engine.getNumPacks());
+    loop.run(instabilities.size(), [&] (int pack) {
+        instabilities[pack] = engine.step(pack, positions, forces, box, settings, &displacements[0][0]);
+        for (int particle : engine.getParticles(pack))
+            if (particle >= 0) {
+                newPositions[particle] = (*data.positions)[particle]+displacements[particle];
+                (*data.velocities)[particle] = displacements[particle]/settings.stepSize;
+            }
+    });
+
+    // Whatever the order of packs, report the first chain.
+
+    int first = -1;
+    for (const Instability& instability : instabilities)
+        if (instability.chain != -1 && (first == -1 || instability.chain < first))
+            first = instability.chain;
+    if (first != -1)
+        reportInstability(context, first, settings.step);
+}
+
+void ReferenceIntegrateCylinderChainStepKernel::reportInstability(ContextImpl& context, int chain, uint64_t step) const {
+    const vector<Vec3>& positions = *extractData(context).positions;
+    const vector<Vec3>& forces = *extractData(context).forces;
+    const Chain& culprit = chainKernel->getChains()[chain];
+    const vector<int>& nodes = culprit.nodes;
+    stringstream message;
+    message << "Chain " << chain << " has blown up at segment ";
+    message.precision(3);
+
+    // A force that is not finite spoils the whole chain, so look for where it acts.
+
+    int segment = 0;
+    while (segment < (int) nodes.size() && isFinite(positions[nodes[segment]]) && isFinite(forces[nodes[segment]]))
+        segment++;
+    if (segment < (int) nodes.size()) {
+        message << max(segment-1, 0) << " in step " << step+1 << ": the force on it, or its position, is not finite";
+    }
+    else {
+        // An excessive force moves its neighbors as well, so choose the segment with the greatest.
+
+        double greatest = -1, change = 0;
+        for (int i = 0; i < (int) culprit.segments.size(); i++) {
+            const double length = norm(displacements[nodes[i+1]]-displacements[nodes[i]]);
+            const double force = norm(forces[nodes[i]])+norm(forces[nodes[i+1]]);
+            if (!(length < culprit.segments[i].restLength) && force > greatest) {
+                greatest = force;
+                segment = i;
+                change = length;
+            }
+        }
+        message << segment << " in step " << step+1 << ": its ends would move by " << change
+                << " nm against each other in one step";
+    }
+    message << ". Positions are those before this step. "
+            "Use a smaller time step, or look for overlapping particles or excessive forces.";
+    throw OpenMMException(message.str());
+}
+
+void ReferenceIntegrateCylinderChainStepKernel::displaceOthers(ContextImpl& context, const StepSettings& settings, double friction) {
+    const vector<Vec3>& forces = *extractData(context).forces;
+    const int numBlocks = (others.size()+BLOCK_SIZE-1)/BLOCK_SIZE;
+    loop.run(numBlocks, [&] (int block) {
+        displaceBlock(block, forces, settings, friction);
+    });
+    checkOthers(settings.step);
+}
+
+void ReferenceIntegrateCylinderChainStepKernel::displaceBlock(int block, const vector<Vec3>& forces,
+        const StepSettings& settings, double friction) {
+    // Chains use the streams up to their number.
+
+    GaussianStream stream(settings.seed, settings.step, chainKernel->getChains().size()+block);
+    double gaussian[3*BLOCK_SIZE];
+    const int start = block*BLOCK_SIZE;
+    const int end = min((int) others.size(), start+BLOCK_SIZE);
+    stream.fill(gaussian, 3*(end-start));
+    for (int i = start; i < end; i++) {
+        const int particle = others[i];
+        const double own = particleFrictions[particle];
+        const double mobility = 1/(own > 0 ? own : friction*masses[particle]);
+        const double noise = sqrt(2*settings.kT*settings.stepSize*mobility);
+        const double* g = &gaussian[3*(i-start)];
+        displacements[particle] = forces[particle]*(settings.stepSize*mobility)+Vec3(g[0], g[1], g[2])*noise;
+    }
+}
+
+void ReferenceIntegrateCylinderChainStepKernel::checkOthers(uint64_t step) const {
+    for (int particle : others)
+        if (!isFinite(displacements[particle]))
+            throw OpenMMException("Particle "+to_string(particle)+", outside chains, has blown up in step "+
+                    to_string(step+1)+": the force on it is not finite. Positions are those before this step. "
+                    "Use a smaller time step, or look for overlapping particles.");
+}

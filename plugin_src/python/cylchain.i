@@ -1,0 +1,189 @@
+%module(package="openmm_cylchain") plugin
+
+// Headers of OpenMM hold nested classes, keywords of Python and typemaps that are not defined yet: nothing of this
+// module.
+
+#pragma SWIG nowarn=314,325,453
+%import(module="openmm") "swig/OpenMMSwigHeaders.i"
+%include "swig/typemaps.i"
+%include <std_map.i>
+%include <std_string.i>
+%include <std_vector.i>
+
+namespace std {
+    %template(vectori) vector<int>;
+    %template(mapid) map<int, double>;
+}
+
+%{
+#include "openmm/CylinderChainForce.h"
+#include "openmm/CylinderChainIntegrator.h"
+#include "OpenMM.h"
+#include "OpenMMAmoeba.h"
+#include "OpenMMDrude.h"
+#include "openmm/RPMDIntegrator.h"
+#include "openmm/RPMDMonteCarloBarostat.h"
+#include "openmm/serialization/XmlSerializer.h"
+#include <sstream>
+
+using namespace OpenMM;
+%}
+
+%feature("autodoc", "0");
+%nodefaultctor;
+
+/*
+ * Exceptions keep their text and become openmm.OpenMMException.
+ */
+
+%{
+static void raiseOpenMMException(const std::exception& e) {
+    PyObject* module = PyImport_ImportModule("openmm");
+    PyObject* type = (module == NULL ? NULL : PyObject_GetAttrString(module, "OpenMMException"));
+    if (type != NULL)
+        PyErr_SetString(type, e.what());
+    Py_XDECREF(type);
+    Py_XDECREF(module);
+}
+%}
+
+%exception {
+    try {
+        $action
+    }
+    catch (std::exception& e) {
+        raiseOpenMMException(e);
+        SWIG_fail;
+    }
+}
+
+%exception OpenMM::CylinderChainIntegrator::step {
+    PyThreadState* threadState = PyEval_SaveThread();
+    try {
+        $action
+    }
+    catch (std::exception& e) {
+        PyEval_RestoreThread(threadState);
+        raiseOpenMMException(e);
+        SWIG_fail;
+    }
+    PyEval_RestoreThread(threadState);
+}
+
+/*
+ * Getters return tuples, and units where OpenMM would.
+ */
+
+%typemap(out) const std::vector<int>& {
+    $result = PyTuple_New($1->size());
+    for (size_t i = 0; i < $1->size(); i++)
+        PyTuple_SetItem($result, i, PyLong_FromLong((*$1)[i]));
+}
+
+%typemap(out) const std::map<int, double>& {
+    $result = PyDict_New();
+    for (auto& entry : *$1) {
+        PyObject* key = PyLong_FromLong(entry.first);
+        PyObject* value = PyFloat_FromDouble(entry.second);
+        PyDict_SetItem($result, key, value);
+        Py_DECREF(key);
+        Py_DECREF(value);
+    }
+}
+
+%apply int& OUTPUT {int& bendingModel, int& stretchingModel};
+%apply double& OUTPUT {double& restLength, double& stretchingStiffness, double& maximumExtension,
+        double& parallelFriction, double& perpendicularFriction, double& rotationalFriction,
+        double& extensionalFriction, double& stiffness, double& stretching, double& bending};
+
+%pythoncode %{
+import openmm
+from openmm import unit
+
+_LENGTH = unit.nanometer
+_ENERGY = unit.kilojoule_per_mole
+_STIFFNESS = unit.kilojoule_per_mole/unit.nanometer**2
+_FRICTION = unit.kilojoule_per_mole*unit.picosecond/unit.nanometer**2
+_ROTATIONAL_FRICTION = unit.kilojoule_per_mole*unit.picosecond
+_SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONAL_FRICTION, _ROTATIONAL_FRICTION)
+%}
+
+%pythonappend OpenMM::CylinderChainForce::getSegmentParameters(int, int, double&, double&, double&, double&, double&,
+        double&, double&) const %{
+    val = [unit.Quantity(v, u) for v, u in zip(val, _SEGMENT_UNITS)]
+%}
+%pythonappend OpenMM::CylinderChainForce::getJointParameters(int, int, double&) const %{
+    val = unit.Quantity(val, _ENERGY)
+%}
+%pythonappend OpenMM::CylinderChainForce::computeEnergies(Context&, double&, double&) const %{
+    val = [unit.Quantity(v, _ENERGY) for v in val]
+%}
+%pythonappend OpenMM::CylinderChainIntegrator::getTemperature() const %{
+    val = unit.Quantity(val, unit.kelvin)
+%}
+%pythonappend OpenMM::CylinderChainIntegrator::computeSystemTemperature() const %{
+    val = unit.Quantity(val, unit.kelvin)
+%}
+%pythonappend OpenMM::CylinderChainIntegrator::getFriction() const %{
+    val = unit.Quantity(val, 1/unit.picosecond)
+%}
+%pythonappend OpenMM::CylinderChainIntegrator::getParticleFrictions() const %{
+    val = {particle: unit.Quantity(friction, _FRICTION) for particle, friction in val.items()}
+%}
+
+/*
+ * XmlSerializer.deserialize() and System.getForce() return objects of the base class: cast() and isinstance() deal with
+ * those.  Copies and pickles go through XML.
+ */
+
+%define %concreteClass(Class, Base)
+%newobject OpenMM::Class::_fromXml;
+%extend OpenMM::Class {
+    static OpenMM::Class& cast(OpenMM::Base& object) {
+        OpenMM::Class* result = dynamic_cast<OpenMM::Class*>(&object);
+        if (result == NULL)
+            throw OpenMM::OpenMMException("The object is not a " #Class);
+        return *result;
+    }
+    static bool isinstance(OpenMM::Base& object) {
+        return dynamic_cast<OpenMM::Class*>(&object) != NULL;
+    }
+    static OpenMM::Class* _fromXml(const std::string& xml) {
+        std::stringstream stream(xml);
+        OpenMM::Base* object = OpenMM::XmlSerializer::deserialize<OpenMM::Base>(stream);
+        OpenMM::Class* result = dynamic_cast<OpenMM::Class*>(object);
+        if (result == NULL) {
+            delete object;
+            throw OpenMM::OpenMMException("The object is not a " #Class);
+        }
+        return result;
+    }
+    %pythoncode %{
+    def __getstate__(self):
+        attributes = {key: value for key, value in self.__dict__.items() if key != "this"}
+        return openmm.XmlSerializer.serialize(self), attributes
+
+    def __setstate__(self, state):
+        xml, attributes = state
+        self.this = Class._fromXml(xml).this
+        self.__dict__.update(attributes)
+
+    def __copy__(self):
+        return self.__deepcopy__({})
+
+    def __deepcopy__(self, memo):
+        from copy import deepcopy
+        duplicate = self.__class__.__new__(self.__class__)
+        duplicate.__setstate__(deepcopy(self.__getstate__(), memo))
+        return duplicate
+    %}
+}
+%enddef
+
+%concreteClass(CylinderChainForce, Force)
+%concreteClass(CylinderChainIntegrator, Integrator)
+
+%ignore OpenMM::CylinderChainForce::SegmentInfo;
+%ignore OpenMM::CylinderChainForce::ChainInfo;
+%include "openmm/CylinderChainForce.h"
+%include "openmm/CylinderChainIntegrator.h"

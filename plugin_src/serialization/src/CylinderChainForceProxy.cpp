@@ -1,0 +1,83 @@
+#include "openmm/serialization/CylinderChainForceProxy.h"
+#include "openmm/CylinderChainForce.h"
+#include "openmm/OpenMMException.h"
+#include "openmm/serialization/SerializationNode.h"
+#include <memory>
+
+using namespace OpenMM;
+using namespace std;
+
+CylinderChainForceProxy::CylinderChainForceProxy() : SerializationProxy("CylinderChainForce") {
+}
+
+void CylinderChainForceProxy::serialize(const void* object, SerializationNode& node) const {
+    node.setIntProperty("version", 1);
+    const CylinderChainForce& force = *reinterpret_cast<const CylinderChainForce*>(object);
+    node.setIntProperty("forceGroup", force.getForceGroup());
+    node.setStringProperty("name", force.getName());
+    node.setBoolProperty("usesPeriodic", force.usesPeriodicBoundaryConditions());
+    SerializationNode& chains = node.createChildNode("Chains");
+    for (int i = 0; i < force.getNumChains(); i++) {
+        int bendingModel, stretchingModel;
+        force.getChainModels(i, bendingModel, stretchingModel);
+        SerializationNode& chain = chains.createChildNode("Chain");
+        chain.setIntProperty("bendingModel", bendingModel).setIntProperty("stretchingModel", stretchingModel);
+        SerializationNode& particles = chain.createChildNode("Particles");
+        for (int particle : force.getChainParticles(i))
+            particles.createChildNode("Particle").setIntProperty("index", particle);
+        SerializationNode& segments = chain.createChildNode("Segments");
+        for (int j = 0; j < force.getNumSegments(i); j++) {
+            double restLength, stiffness, maximumExtension, parallel, perpendicular, rotational, extensional;
+            force.getSegmentParameters(i, j, restLength, stiffness, maximumExtension, parallel, perpendicular, rotational,
+                    extensional);
+            segments.createChildNode("Segment").setDoubleProperty("restLength", restLength)
+                    .setDoubleProperty("stiffness", stiffness).setDoubleProperty("maximumExtension", maximumExtension)
+                    .setDoubleProperty("parallel", parallel).setDoubleProperty("perpendicular", perpendicular)
+                    .setDoubleProperty("rotational", rotational).setDoubleProperty("extensional", extensional);
+        }
+        SerializationNode& joints = chain.createChildNode("Joints");
+        for (int j = 0; j < force.getNumJoints(i); j++) {
+            double stiffness;
+            force.getJointParameters(i, j, stiffness);
+            joints.createChildNode("Joint").setDoubleProperty("stiffness", stiffness);
+        }
+    }
+}
+
+static void addSegment(CylinderChainForce& force, int chain, int segment, const SerializationNode& node) {
+    force.setSegmentParameters(chain, segment, node.getDoubleProperty("restLength"), node.getDoubleProperty("stiffness"),
+            node.getDoubleProperty("maximumExtension"), node.getDoubleProperty("parallel"),
+            node.getDoubleProperty("perpendicular"), node.getDoubleProperty("rotational"),
+            node.getDoubleProperty("extensional"));
+}
+
+static void addChain(CylinderChainForce& force, const SerializationNode& node) {
+    vector<int> particles;
+    for (auto& particle : node.getChildNode("Particles").getChildren())
+        particles.push_back(particle.getIntProperty("index"));
+    auto& segments = node.getChildNode("Segments").getChildren();
+    auto& joints = node.getChildNode("Joints").getChildren();
+    if (particles.size() < 2 || segments.size()+1 != particles.size() || joints.size()+2 != particles.size())
+        throw OpenMMException("CylinderChainForce: A chain has the wrong number of segments or joints");
+
+    // Add a chain of placeholders, and then set the parameters.
+
+    const int chain = force.addChain(particles, (CylinderChainForce::BendingModel) node.getIntProperty("bendingModel"),
+            (CylinderChainForce::StretchingModel) node.getIntProperty("stretchingModel"), 1, 1, 1, 0, 1, 1, 1, 1);
+    for (size_t j = 0; j < segments.size(); j++)
+        addSegment(force, chain, j, segments[j]);
+    for (size_t j = 0; j < joints.size(); j++)
+        force.setJointParameters(chain, j, joints[j].getDoubleProperty("stiffness"));
+}
+
+void* CylinderChainForceProxy::deserialize(const SerializationNode& node) const {
+    if (node.getIntProperty("version") != 1)
+        throw OpenMMException("Unsupported version number");
+    unique_ptr<CylinderChainForce> force(new CylinderChainForce());
+    force->setForceGroup(node.getIntProperty("forceGroup"));
+    force->setName(node.getStringProperty("name"));
+    force->setUsesPeriodicBoundaryConditions(node.getBoolProperty("usesPeriodic"));
+    for (auto& chain : node.getChildNode("Chains").getChildren())
+        addChain(*force, chain);
+    return force.release();
+}

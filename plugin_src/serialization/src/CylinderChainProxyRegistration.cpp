@@ -1,0 +1,16 @@
+#include "openmm/CylinderChainForce.h"
+#include "openmm/CylinderChainIntegrator.h"
+#include "openmm/serialization/CylinderChainForceProxy.h"
+#include "openmm/serialization/CylinderChainIntegratorProxy.h"
+#include <typeinfo>
+
+using namespace OpenMM;
+
+/**
+ * Register the proxies when the library is loaded.
+ */
+static const bool registered = []() {
+    SerializationProxy::registerProxy(typeid(CylinderChainForce), new CylinderChainForceProxy());
+    SerializationProxy::registerProxy(typeid(CylinderChainIntegrator), new CylinderChainIntegratorProxy());
+    return true;
+}();
