@@ -6,8 +6,8 @@ import numpy as np
 import openmm
 from openmm import app, unit
 
-from .engines import portable
-from .engines.description import describe_chains, describe_other_particles, filament_label, refuse_constraints
+from .engines import choose_engine, load_engine
+from .engines.description import describe_chains
 from .engines.redistribution import joint_tensions
 from .equilibrium import draw_chain
 from .errors import InputError
@@ -44,6 +44,10 @@ class Filaments:
         Viscosity of the solvent; a plain number is in kJ ps/(mol nm^3), 602214 of which are 1 Pa s.
     temperature : temperature
         For eq. (20), equilibrium draws and the default temperature of the integrator.
+    engine : {"compiled", "portable"}, optional
+        What computes the chains: the compiled plugin, which is much faster and runs on the Reference and
+        CPU platforms, or stock OpenMM forces and NumPy, on every platform. The compiled one if it is
+        installed and none is named.
 
     Examples
     --------
@@ -57,7 +61,9 @@ class Filaments:
     11
     """
 
-    def __init__(self, viscosity, temperature):
+    def __init__(self, viscosity, temperature, engine=None):
+        self._engine_name = choose_engine(engine)
+        self._engine = load_engine(self._engine_name)
         self._viscosity = positive(viscosity, VISCOSITY, "viscosity")
         self._temperature = non_negative(temperature, TEMPERATURE, "temperature")
         self._filaments = []
@@ -68,6 +74,11 @@ class Filaments:
 
     def __getitem__(self, index):
         return self._filaments[index]
+
+    @property
+    def engine(self):
+        """Name of the engine that computes the filaments."""
+        return self._engine_name
 
     @property
     def viscosity(self):
@@ -201,7 +212,8 @@ class Filaments:
         box_vectors : three (3,) lengths, optional
             Periodic box vectors of the System and the Topology.
         stretching_force_group, bending_force_group : int
-            Force groups of the chain's own forces, to report their energies apart.
+            Force groups of the chain's own forces. The compiled engine has one force for both, so they must
+            not differ.
 
         Returns
         -------
@@ -236,7 +248,8 @@ class Filaments:
         positions : (particles, 3) length
             Positions of the particles that are there.
         stretching_force_group, bending_force_group : int
-            Force groups of the chain's own forces, to report their energies apart.
+            Force groups of the chain's own forces. The compiled engine has one force for both, so they must
+            not differ.
 
         Returns
         -------
@@ -253,8 +266,15 @@ class Filaments:
             self._add_to_topology(topology, filament, number)
             self._add_particles(system, filament)
         self._add_noninteracting_entries(system, positions)
-        portable.add_stretching_forces(system, self._segments(), stretching_force_group)
-        portable.add_bending_forces(system, self._joints(), bending_force_group)
+        self._engine.add_forces(
+            system,
+            self._filaments,
+            self._nodes,
+            self._viscosity,
+            self._temperature,
+            stretching_force_group,
+            bending_force_group,
+        )
         everything = np.concatenate([positions] + [filament.positions for filament in self._filaments])
         return everything * unit.nanometer
 
@@ -272,7 +292,7 @@ class Filaments:
         if positions.shape != (count, 3):
             raise InputError(f"positions must have the shape ({count}, 3), but have {positions.shape}.")
         for force in system.getForces():
-            if force.getName().startswith((portable.STRETCHING_NAME, portable.BENDING_NAME)):
+            if force.getName().startswith("CylinderChain"):
                 raise InputError("The System already holds filaments: add all of them through one Filaments object.")
         return positions
 
@@ -312,16 +332,6 @@ class Filaments:
             elif isinstance(force, openmm.CustomNonbondedForce):
                 _exclude_from_custom_nonbonded(force, len(existing), missing)
 
-    def _segments(self):
-        for filament, nodes in zip(self._filaments, self._nodes):
-            for minus, plus in zip(nodes[:-1], nodes[1:]):
-                yield filament.type, int(minus), int(plus)
-
-    def _joints(self):
-        for filament, nodes in zip(self._filaments, self._nodes):
-            for before, joint, after in zip(nodes[:-2], nodes[1:-1], nodes[2:]):
-                yield filament.type, int(before), int(joint), int(after)
-
     def recommended_time_step(self, scheme="midpoint"):
         """The recommended step for the filament that allows the least: a TimeStep (see ``timestep``)."""
         steps = [
@@ -346,7 +356,7 @@ class Filaments:
             The System that the filaments were put into.
         step_size : time
         scheme : {"midpoint", "euler"}
-            See ``openmm_cylchain.engines.portable.PortableIntegrator``.
+            Fixman's midpoint, with the right drift on chains, or Section 4 of the paper, biased on chains.
         temperature : temperature, optional
             That of the filaments if not given.
         particle_friction : energy*time/length^2, or array of them
@@ -358,7 +368,8 @@ class Filaments:
 
         Returns
         -------
-        PortableIntegrator
+        openmm.Integrator
+            Of the engine: a NativeIntegrator or a PortableIntegrator.
 
         Warns
         -----
@@ -366,21 +377,23 @@ class Filaments:
             If the step exceeds a bound of stability.
         """
         step_size = positive(step_size, unit.picosecond, "step_size")
-        nodes = np.concatenate(self.node_indices)
-        if system.getNumParticles() <= nodes.max():
+        if system.getNumParticles() <= max(nodes.max() for nodes in self.node_indices):
             raise InputError("This is not the System that the filaments were put into: it has too few particles.")
-        refuse_constraints(system, self._filaments, self._nodes)
-        chains = self.chain_set(system)
-        others, frictions = describe_other_particles(system, nodes, particle_friction)
         for filament in {(f.type, f.segments): f for f in self._filaments}.values():
             warn_if_unstable(filament.type, self._viscosity, self._temperature, step_size, filament.segments)
-        rest_lengths = np.concatenate([np.full(f.segments, f.type.segment_length) for f in self._filaments])
-        labels = [filament_label(number, filament) for number, filament in enumerate(self._filaments)]
-        computation = portable.ChainDisplacements(chains, nodes, rest_lengths, labels, others, frictions)
-        integrator_temperature = self._temperature if temperature is None else temperature
         check_scheme(scheme)
-        group = portable.add_redistribution(system, computation)
-        return portable.PortableIntegrator(system, group, integrator_temperature, step_size, scheme, random_seed)
+        return self._engine.create_integrator(
+            system,
+            self._filaments,
+            self._nodes,
+            self._viscosity,
+            self._temperature,
+            self._temperature if temperature is None else temperature,
+            step_size,
+            scheme,
+            particle_friction,
+            random_seed,
+        )
 
     def chain_set(self, system):
         """The filaments as an engine sees them (a ``ChainSet``): friction of segments and fixed nodes."""

@@ -2,7 +2,8 @@
 
     [solvent]            temperature, viscosity
     [[filament]]         one or more: type or a description, segments, count, start, position, direction, clamped
-    [simulation]         scheme, time_step, duration, report_interval, checkpoint_interval, seed, platform, precision
+    [simulation]         scheme, time_step, duration, report_interval, checkpoint_interval, seed, engine, platform,
+                         precision
 
 Every mistake is an InputError that names the table and the key, and says what to do.
 """
@@ -16,6 +17,7 @@ from pathlib import Path
 
 from . import filament as filament_types
 from . import physical_units as units
+from .engines import ENGINES
 from .errors import InputError
 from .filament import FilamentType
 from .friction import EndCorrections
@@ -65,6 +67,7 @@ class SimulationSettings:
     steps_per_report: int
     steps_per_checkpoint: int
     seed: int
+    engine: str
     platform: str
     precision: str
 
@@ -386,6 +389,7 @@ _SIMULATION_KEYS = (
     "report_interval",
     "checkpoint_interval",
     "seed",
+    "engine",
     "platform",
     "precision",
 )
@@ -415,6 +419,7 @@ def _simulation(table, solvent, filaments):
         steps_per_report=steps_per_report,
         steps_per_checkpoint=reports_per_checkpoint * steps_per_report,
         seed=seed,
+        engine=table.choice("engine", ENGINES, None),
         platform=table.text("platform", "Reference"),
         precision=table.choice("precision", PRECISIONS, None),
     )

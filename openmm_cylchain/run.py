@@ -19,7 +19,6 @@ from .quantities import thermal_energy
 from .run_directory import Checkpoint, EnergyTable, RunDirectory, TrajectoryFile, write_atomically
 from .theory import chain_mean_square_end_to_end
 
-_STRETCHING_GROUP, _BENDING_GROUP = 0, 1
 _SECONDS_BETWEEN_CHECKS = 0.2
 
 
@@ -68,7 +67,7 @@ def run(configuration, output, resume=False):
             _write_topology(directory, simulation.topology, positions)
             simulation.context.setPositions(positions)
         else:
-            _restore(simulation.context, checkpoint)
+            _restore(simulation.context, checkpoint, filaments.engine)
             print(f"Resuming at step {checkpoint.step}, {format_time(checkpoint.step * settings.time_step)}.")
         try:
             _Recorder(configuration, filaments, simulation, directory, checkpoint).run_to_end()
@@ -94,7 +93,7 @@ def create_filaments(configuration):
     Filaments
     """
     solvent = configuration.solvent
-    filaments = Filaments(solvent.viscosity, solvent.temperature)
+    filaments = Filaments(solvent.viscosity, solvent.temperature, configuration.simulation.engine)
     centers = _grid_centers(configuration)
     for group in configuration.filaments:
         for _ in range(group.count):
@@ -138,9 +137,7 @@ def _extent(group, temperature):
 
 def _create_simulation(configuration, filaments):
     settings = configuration.simulation
-    topology, system, positions = filaments.build(
-        stretching_force_group=_STRETCHING_GROUP, bending_force_group=_BENDING_GROUP
-    )
+    topology, system, positions = filaments.build()
     integrator = filaments.create_integrator(
         system, settings.time_step, scheme=settings.scheme, random_seed=settings.seed
     )
@@ -180,7 +177,12 @@ def _write_topology(directory, topology, positions):
     write_atomically(directory.topology, text.getvalue().encode())
 
 
-def _restore(context, checkpoint):
+def _restore(context, checkpoint, engine):
+    if checkpoint.engine != engine:
+        raise InputError(
+            f"The run was started with the {checkpoint.engine} engine, and this is the {engine} one: resume with that, "
+            "or start it again in another directory."
+        )
     try:
         context.loadCheckpoint(checkpoint.state)
     except openmm.OpenMMException as error:
@@ -254,10 +256,7 @@ class _Recorder:
         context = self._simulation.context
         state = context.getState(positions=True)
         positions = state.getPositions(asNumpy=True).value_in_unit(unit.nanometer)
-        stretching, bending = (
-            context.getState(energy=True, groups={group}).getPotentialEnergy().value_in_unit(unit.kilojoule_per_mole)
-            for group in (_STRETCHING_GROUP, _BENDING_GROUP)
-        )
+        stretching, bending = self._energies_of(positions)
         self._check_finite(positions, stretching, bending)
         self._trajectory.write(positions)
         self._energies.write(
@@ -272,6 +271,17 @@ class _Recorder:
                 self._mean_end_to_end_distance(positions),
             ),
         )
+
+    def _energies_of(self, positions):
+        stretching = bending = 0.0
+        for filament, nodes in zip(self._filaments, self._filaments.node_indices):
+            segments = np.diff(positions[nodes], axis=0)
+            with np.errstate(all="ignore"):
+                lengths = np.linalg.norm(segments, axis=1)
+                tangents = segments / lengths[:, None]
+                stretching += np.sum(filament.type.stretching_energy(lengths))
+                bending += np.sum(filament.type.bending_energy(np.sum(tangents[1:] * tangents[:-1], axis=1)))
+        return float(stretching), float(bending)
 
     def _mean_end_to_end_distance(self, positions):
         ends = np.array([(nodes[0], nodes[-1]) for nodes in self._filaments.node_indices])
@@ -294,6 +304,7 @@ class _Recorder:
         self._directory.write_checkpoint(
             Checkpoint(
                 step=self._step,
+                engine=self._filaments.engine,
                 trajectory_size=size,
                 trajectory_header=header,
                 energies_size=self._energies.synchronise(),

@@ -51,6 +51,7 @@ class Checkpoint:
     """State of a run after ``step`` steps: OpenMM's checkpoint and the extent of the files at that moment."""
 
     step: int
+    engine: str
     trajectory_size: int
     trajectory_header: bytes
     energies_size: int
@@ -146,6 +147,7 @@ class RunDirectory:
             "format": _MAGIC,
             "version": __version__,
             "step": checkpoint.step,
+            "engine": checkpoint.engine,
             "trajectory_size": checkpoint.trajectory_size,
             "trajectory_header": checkpoint.trajectory_header.hex(),
             "energies_size": checkpoint.energies_size,
@@ -164,6 +166,7 @@ class RunDirectory:
             version = header["version"]
             checkpoint = Checkpoint(
                 step=header["step"],
+                engine=header["engine"],
                 trajectory_size=header["trajectory_size"],
                 trajectory_header=bytes.fromhex(header["trajectory_header"]),
                 energies_size=header["energies_size"],

@@ -45,3 +45,12 @@ def platform(request):
 def reference():
     """The Reference platform: slow, but in double precision throughout."""
     return openmm.Platform.getPlatformByName("Reference")
+
+
+ENGINES = ("portable", "compiled")
+
+
+@pytest.fixture(params=ENGINES)
+def engine(request):
+    """Every engine in turn."""
+    return request.param

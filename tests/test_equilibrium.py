@@ -1,8 +1,17 @@
 """Equilibrium of chains against exact values, for every engine, platform and scheme."""
 
 import pytest
-from conftest import PLATFORMS
-from physics_cases import CASES, ENGINES, KT, TEMPERATURE, Case, exact_means, measured_means, soft_chain
+from conftest import ENGINES
+from physics_cases import (
+    CASES,
+    ENGINE_PLATFORMS,
+    KT,
+    TEMPERATURE,
+    Case,
+    exact_means,
+    measured_means,
+    soft_chain,
+)
 
 from openmm_cylchain.theory import chain_mean_square_end_to_end, wlc_mean_square_end_to_end
 
@@ -42,9 +51,8 @@ def test_midpoint_keeps_equilibrium(name, engine):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("platform", [platform for platform in PLATFORMS if platform != "Reference"])
+@pytest.mark.parametrize(("engine", "platform"), [pair for pair in ENGINE_PLATFORMS if pair[1] != "Reference"])
 @pytest.mark.parametrize("name", CASES)
-@pytest.mark.parametrize("engine", ENGINES)
 def test_midpoint_keeps_equilibrium_on_platform(name, engine, platform):
     _check(name, engine, platform)
 

@@ -3,6 +3,7 @@
 import numpy as np
 import openmm
 import pytest
+from conftest import ENGINES
 from physics_cases import KT, TEMPERATURE, VISCOSITY
 from scipy.optimize import curve_fit
 
@@ -23,9 +24,9 @@ TAU = rotational_relaxation_time(FRICTION, TEMPERATURE)
 SIGMAS = 4.0
 
 
-def _run(count, scheme, samples=30, duration=2.0, steps_per_sample=32):
+def _run(count, engine, scheme, samples=30, duration=2.0, steps_per_sample=32):
     """Mean orientation and squared displacements of segments that all start along x."""
-    filaments = Filaments(VISCOSITY, TEMPERATURE)
+    filaments = Filaments(VISCOSITY, TEMPERATURE, engine=engine)
     for _ in range(count):
         filaments.add_straight(SEGMENT, 1, [0, 0, 0], [1, 0, 0])
     _, system, positions = filaments.build()
@@ -63,9 +64,10 @@ def _check(times, tangents, displacements):
 
 
 @pytest.mark.parametrize("scheme", ["euler", "midpoint"])
-def test_rotation_and_diffusion_of_728_segments(scheme):
+@pytest.mark.parametrize("engine", ENGINES)
+def test_rotation_and_diffusion_of_728_segments(engine, scheme):
     """As Figs 7 and 8, whose fit gives 2.685 +- 0.028 ms where (29) gives 2.676 ms."""
-    times, tangents, displacements = _run(728, scheme)
+    times, tangents, displacements = _run(728, engine, scheme)
     _check(times, tangents, displacements)
 
     # Relaxation time by fit, its error from groups of segments.
@@ -81,9 +83,10 @@ def test_rotation_and_diffusion_of_728_segments(scheme):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["euler", "midpoint"])
-def test_rotation_and_diffusion_to_a_percent(scheme):
+@pytest.mark.parametrize("engine", ENGINES)
+def test_rotation_and_diffusion_to_a_percent(engine, scheme):
     """Enough segments that 5 % of friction or noise would show at a single time."""
-    times, tangents, displacements = _run(20 * 728, scheme)
+    times, tangents, displacements = _run(20 * 728, engine, scheme)
     _check(times, tangents, displacements)
     squares, error = _mean(displacements[..., 1] ** 2)
     assert np.all(0.05 * squares > SIGMAS * error)

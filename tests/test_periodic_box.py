@@ -27,7 +27,7 @@ def _crowded_box():
         system.addParticle(1e5)
     grid = np.stack(np.meshgrid(*[np.arange(4)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)[:beads]
     positions = grid * BOX / 4 + generator.uniform(-50, 50, size=(beads, 3))
-    filaments = Filaments(VISCOSITY, 310)
+    filaments = Filaments(VISCOSITY, 310, "portable")
     for number in range(6):
         filaments.add_equilibrium(F_ACTIN, 8, seed=number, start=generator.uniform(0, BOX, 3))
     system.setDefaultPeriodicBoxVectors(*(BOX * np.eye(3)))

@@ -143,7 +143,7 @@ def nodes_of(angle, lengths, seed):
 @pytest.fixture(scope="module")
 def computed(platform):
     """Forces of bending and of stretching of all CASES on one platform."""
-    filaments = Filaments(1000.0, 300)
+    filaments = Filaments(1000.0, 300, "portable")
     for models, angle, lengths, seed in CASES:
         filaments.add_nodes(TYPES[models], nodes_of(angle, lengths, seed))
     _, system, positions = filaments.build(stretching_force_group=STRETCHING_GROUP, bending_force_group=BENDING_GROUP)
@@ -207,7 +207,7 @@ def test_stretching_forces(computed, model):
 @pytest.fixture(scope="module")
 def energy_of(platform):
     """A function: the bending and stretching energy of one chain. The others are straight and at rest meanwhile."""
-    filaments = Filaments(1000.0, 300)
+    filaments = Filaments(1000.0, 300, "portable")
     for models in MODELS:
         filaments.add_straight(TYPES[models], 2, [0, 0, 0], [1, 0, 0])
     _, system, rest = filaments.build(stretching_force_group=STRETCHING_GROUP, bending_force_group=BENDING_GROUP)
@@ -255,7 +255,7 @@ def test_forces_by_hand_are_the_gradient_of_energies_by_hand(models, angle):
 
 @pytest.mark.parametrize("models", MODELS)
 def test_reference_forces_are_the_gradient_of_reference_energies(models, reference):
-    filaments = Filaments(1000.0, 300)
+    filaments = Filaments(1000.0, 300, "portable")
     filaments.add_nodes(TYPES[models], moved(joint(1.2, (103.0, 98.5)), 3))
     _, system, positions = filaments.build()
     context = openmm.Context(system, openmm.VerletIntegrator(0.001), reference)
@@ -339,7 +339,7 @@ def test_forces_on_the_ends_of_segments_add_up_to_nodal_forces(models):
 
 @pytest.mark.parametrize("models", MODELS)
 def test_antiparallel_segments_are_refused(models):
-    filaments = Filaments(1000.0, 300)
+    filaments = Filaments(1000.0, 300, "portable")
     filaments.add_straight(TYPES[models], 2, [0, 0, 0], [1, 0, 0])
     folded = [[0, 0, 0], [100, 0, 0], [200, 0, 0], [100, 0, 0], [0, 0, 0]]
     with pytest.raises(InputError, match=r"Filament 1 \(ROD\).*node 2 are antiparallel.*move the node"):
@@ -349,7 +349,7 @@ def test_antiparallel_segments_are_refused(models):
 
 def test_antiparallel_segments_of_a_freely_jointed_chain_are_allowed(reference):
     free = dataclasses.replace(TYPES["inscribed-circle", "harmonic"], bending_rigidity=0.0)
-    filaments = Filaments(1000.0, 300)
+    filaments = Filaments(1000.0, 300, "portable")
     filaments.add_nodes(free, [[0, 0, 0], [100, 0, 0], [0, 0, 0.0]])
     _, system, positions = filaments.build()
     context = openmm.Context(system, openmm.VerletIntegrator(0.001), reference)
@@ -359,7 +359,7 @@ def test_antiparallel_segments_of_a_freely_jointed_chain_are_allowed(reference):
 
 @pytest.mark.parametrize("lengths", [(110.0, 100.0), (100.0, 89.999), (100.0, 130.0)])
 def test_fene_segments_beyond_their_limit_are_refused(lengths):
-    filaments = Filaments(1000.0, 300)
+    filaments = Filaments(1000.0, 300, "portable")
     segment = int(np.argmax(np.abs(np.array(lengths) - 100)))
     with pytest.raises(InputError, match=rf"Filament 0 \(ROD\): segment {segment} is .* nm long, outside the FENE"):
         filaments.add_nodes(TYPES["quadratic", "fene"], joint(0.3, lengths))

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import openmm
 import pytest
+from conftest import ENGINES
 from physics_cases import TEMPERATURE, VISCOSITY
 
 from openmm_cylchain import DSDNA, F_ACTIN, Filaments
@@ -90,10 +91,10 @@ SLOW_DNA = replace(DSDNA, extension_relaxation_time=1e5)  # ps: one long step st
 CHAINS = [(F_ACTIN, 1, 1), (F_ACTIN, 2, 2), (SLOW_DNA, 3, 3), (F_ACTIN, 64, 4)]
 
 
-@pytest.fixture(scope="module")
-def mixed_system():
+@pytest.fixture(scope="module", params=ENGINES)
+def mixed_system(request):
     """Bent chains of 1, 2, 3 and 64 segments in one System, with external forces on all nodes."""
-    filaments = Filaments(VISCOSITY, TEMPERATURE)
+    filaments = Filaments(VISCOSITY, TEMPERATURE, engine=request.param)
     for kind, segments, seed in CHAINS:
         filaments.add_nodes(kind, _bent_chain(kind, segments, seed))
     _, system, positions = filaments.build()

@@ -303,6 +303,8 @@ def test_damaged_run_is_refused(tmp_path, unbroken, capsys):
     assert_refused(arguments, capsys, "checkpoint.chk is damaged")
     checkpoint.write_bytes(re.sub(rb'"version": "[^"]*"', b'"version": "0.0.1"', content))
     assert_refused(arguments, capsys, "started with openmm_cylchain 0.0.1")
+    checkpoint.write_bytes(re.sub(rb'"engine": "[^"]*"', b'"engine": "other"', content).replace(b"1200", b"1140"))
+    assert_refused(arguments, capsys, "started with the other engine")
     checkpoint.write_bytes(content.replace(b'"step": 1200', b'"step": 1140'))
     with open(tmp_path / "out" / "trajectory.dcd", "r+b") as file:
         file.truncate(1000)
