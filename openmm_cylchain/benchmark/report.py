@@ -1,0 +1,119 @@
+"""Rows of a benchmark: as a table, as JSON, and its progress on standard error."""
+
+import json
+import math
+import sys
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from ..errors import InputError
+from ..run_directory import write_atomically
+
+
+@dataclass(frozen=True)
+class Row:
+    """A measured value with its standard error (None if it was measured once) and its unit ("1" for a ratio)."""
+
+    name: str
+    value: float
+    error: float | None
+    unit: str
+
+
+@dataclass(frozen=True)
+class Report:
+    """Results of a benchmark.
+
+    Attributes
+    ----------
+    title : str
+    machine : dict
+        See ``measurement.describe_machine``.
+    settings : dict
+        How it was measured.
+    rows : list of Row
+    missing : dict
+        What could not be measured, with the reason.
+    """
+
+    title: str
+    machine: dict
+    settings: dict
+    rows: list
+    missing: dict
+
+
+def row(name, estimate, unit):
+    """A Row from an Estimate."""
+    return Row(name, estimate.value, estimate.error, unit)
+
+
+def format_report(report):
+    """A table for people."""
+    lines = [
+        report.title,
+        f"{report.machine['processor']}, {report.machine['processors']} processors, "
+        f"load {_format_load(report.machine['load_average'])} at the start",
+        "",
+    ]
+    texts = [(each.name, *_format_value(each.value, each.error), each.unit) for each in report.rows]
+    widths = [max((len(text[column]) for text in texts), default=0) for column in range(3)]
+    for name, value, error, unit in texts:
+        unit = "" if unit == "1" else unit
+        lines.append(f"{name:<{widths[0]}}  {value:>{widths[1]}} {error:<{widths[2]}}  {unit}".rstrip())
+    lines.extend(f"{name} missing: {reason}" for name, reason in report.missing.items())
+    return "\n".join(lines)
+
+
+def _format_load(load):
+    return "unknown" if load is None else f"{load:.2f}"
+
+
+def _format_value(value, error):
+    scale = error if error else abs(value) / 100.0
+    decimals = max(0, 1 - math.floor(math.log10(scale))) if scale > 0 else 0
+    return f"{value:.{decimals}f}", "" if error is None else f"± {error:.{decimals}f}"
+
+
+def check_json_path(path):
+    """Raise InputError if a file cannot be written there, before hours are spent on its content."""
+    path = Path(path)
+    if path.is_dir() or not path.parent.is_dir():
+        what = "is a directory" if path.is_dir() else f"is in {path.parent}, which is not a directory"
+        raise InputError(f"{path} {what}: give the path of a file.")
+
+
+def write_json(report, path):
+    """Write machine, settings, rows and what is missing to a file."""
+    content = {
+        "machine": report.machine,
+        "settings": report.settings,
+        "rows": [asdict(each) for each in report.rows],
+        "missing": report.missing,
+    }
+    write_atomically(Path(path), (json.dumps(content, indent=2, allow_nan=False) + "\n").encode())
+
+
+class Progress:
+    """Says on standard error what a benchmark is at, in one line that is overwritten if it is a terminal."""
+
+    def __init__(self, stream=None):
+        self._stream = sys.stderr if stream is None else stream
+        self._start = time.monotonic()
+        self._width = 0
+
+    def __call__(self, message):
+        line = f"{time.monotonic() - self._start:6.1f} s  {message}"
+        if self._stream.isatty():
+            self._stream.write("\r" + line.ljust(self._width))
+            self._width = len(line)
+        else:
+            self._stream.write(line + "\n")
+        self._stream.flush()
+
+    def finish(self):
+        """Leave the line that was overwritten."""
+        if self._stream.isatty():
+            self._stream.write("\n")
+            self._stream.flush()
