@@ -35,7 +35,7 @@ class Estimate:
     error: float | None
 
 
-def time_interleaved(cases, repetitions, seconds, say=lambda message: None):
+def time_interleaved(cases, repetitions, seconds, say=lambda message: None, minimum_steps=1):
     """Time cases in turn, over and over.
 
     Parameters
@@ -44,9 +44,11 @@ def time_interleaved(cases, repetitions, seconds, say=lambda message: None):
     repetitions : int
         How many times every case is timed.
     seconds : float
-        About how long a case advances in each repetition; at least one step.
+        About how long a case advances in each repetition.
     say : callable (str), optional
         Told how far it is.
+    minimum_steps : int
+        How many steps a case advances in each repetition at least.
 
     Returns
     -------
@@ -54,7 +56,7 @@ def time_interleaved(cases, repetitions, seconds, say=lambda message: None):
         The seconds per step of every case, one for each repetition.
     """
     say("warming up")
-    steps = {case.name: _steps_within(case, seconds) for case in cases}
+    steps = {case.name: max(minimum_steps, _steps_within(case, seconds)) for case in cases}
     times = {case.name: [] for case in cases}
     for repetition in range(repetitions):
         say(f"timing, repetition {repetition + 1} of {repetitions}")
