@@ -1,5 +1,7 @@
 """Equilibrium of chains against exact values, for every engine, platform and scheme."""
 
+from dataclasses import replace
+
 import pytest
 from conftest import ENGINES
 from physics_cases import (
@@ -70,8 +72,12 @@ def test_printed_scheme_fails_elsewhere(name, engine):
     _check_printed_scheme_fails(name, engine)
 
 
+# The bias of DNA's segment length, 0.08 %, is 4.4 standard errors of the case as it is.
+MORE_CHAINS = {"dna-8nm": 3}
+
+
 def _check_printed_scheme_fails(name, engine):
-    case = CASES[name]
+    case = replace(CASES[name], chains=CASES[name].chains * MORE_CHAINS.get(name, 1))
     deviations = _deviations(case, measured_means(case, engine, "Reference", "euler"))
     assert max(deviations.values()) > SIGMAS, deviations
 

@@ -57,7 +57,7 @@ void ReferenceCalcCylinderChainForceKernel::computeEnergies(ContextImpl& context
     bending = energy.bending;
 }
 
-void ReferenceCalcCylinderChainForceKernel::copyParametersToContext(ContextImpl& context, const CylinderChainForce& force) {
+void ReferenceCalcCylinderChainForceKernel::copyParametersToContext(ContextImpl&, const CylinderChainForce& force) {
     updateChains(chains, force);
     engine.reset(new ChainEngine(chains));
 }

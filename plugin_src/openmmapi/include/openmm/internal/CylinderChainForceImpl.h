@@ -21,7 +21,7 @@ public:
     const CylinderChainForce& getOwner() const {
         return owner;
     }
-    void updateContextState(ContextImpl& context, bool& forcesInvalid) {
+    void updateContextState(ContextImpl&, bool&) {
         // Nothing is modified between steps.
     }
     double calcForcesAndEnergy(ContextImpl& context, bool includeForces, bool includeEnergy, int groups);
