@@ -355,8 +355,10 @@ class Filaments:
         system : openmm.System
             The System that the filaments were put into.
         step_size : time
-        scheme : {"midpoint", "euler"}
-            Fixman's midpoint, with the right drift on chains, or Section 4 of the paper, biased on chains.
+        scheme : {"midpoint", "implicit", "euler"}
+            Fixman's midpoint, with the right drift on chains; the implicit scheme of the compiled engine, which takes
+            stretching and bending at the end of the step, and steps a thousand times as long; or Section 4 of the
+            paper, biased on chains.
         temperature : temperature, optional
             That of the filaments if not given.
         particle_friction : energy*time/length^2, or array of them
@@ -379,9 +381,9 @@ class Filaments:
         step_size = positive(step_size, unit.picosecond, "step_size")
         if system.getNumParticles() <= max(nodes.max() for nodes in self.node_indices):
             raise InputError("This is not the System that the filaments were put into: it has too few particles.")
-        for filament in {(f.type, f.segments): f for f in self._filaments}.values():
-            warn_if_unstable(filament.type, self._viscosity, self._temperature, step_size, filament.segments)
         check_scheme(scheme)
+        for filament in {(f.type, f.segments): f for f in self._filaments}.values():
+            warn_if_unstable(filament.type, self._viscosity, self._temperature, step_size, filament.segments, scheme)
         return self._engine.create_integrator(
             system,
             self._filaments,

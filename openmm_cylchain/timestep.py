@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from .errors import InputError, TimeStepWarning
 from .quantities import BENDING_RIGIDITY, LENGTH, STIFFNESS, TIME, VISCOSITY, in_units_of, positive, thermal_energy
 
-SCHEMES = ("euler", "midpoint")
+EXPLICIT_SCHEMES = ("euler", "midpoint")
+SCHEMES = (*EXPLICIT_SCHEMES, "implicit")
 
 
 def translation_bound(friction, diameter, temperature, confidence=3.0):
@@ -176,7 +177,9 @@ _REASONS = {
     "for accuracy",
     "turning": "rotational diffusion of a segment: it may turn by {angle:g} rad in a step, or less where its "
     "extensional friction is large",
+    "relaxation": "relaxation of the whole filament, which takes {relaxation_steps:g} steps",
 }
+_RELAXATION_STEPS = 20.0
 _ACCURACY_MARGIN = 20.0
 _TURNING_ANGLE = 0.1
 _NOISE_LEAK = 0.1
@@ -208,8 +211,9 @@ def recommended_time_step(filament_type, viscosity, temperature, scheme="midpoin
     filament_type : FilamentType
     viscosity : pressure*time
     temperature : temperature
-    scheme : {"midpoint", "euler"}
-        Both are explicit and have the same bounds; "euler" has a bias on chains that no step removes.
+    scheme : {"midpoint", "euler", "implicit"}
+        "midpoint" and "euler" are explicit and have the same bounds; "euler" has a bias on chains that no step
+        removes. "implicit" is not bound by stretching and bending, see ``implicit_time_step``.
     segments : int
 
     Returns
@@ -217,6 +221,8 @@ def recommended_time_step(filament_type, viscosity, temperature, scheme="midpoin
     TimeStep
     """
     check_scheme(scheme)
+    if scheme == "implicit":
+        return implicit_time_step(filament_type, viscosity, temperature, segments)
     friction = filament_type.segment_friction(viscosity, temperature, segments)
     bounds = stability_bounds(filament_type, viscosity, temperature, segments)
     allowed = {name: bound / _ACCURACY_MARGIN for name, bound in bounds.items()}
@@ -231,15 +237,51 @@ def recommended_time_step(filament_type, viscosity, temperature, scheme="midpoin
     return TimeStep(step=allowed[binding], reason=reason, bounds=bounds)
 
 
+def implicit_time_step(filament_type, viscosity, temperature, segments=2):
+    """The step of scheme "implicit" at which equilibrium energies of a chain are good to 2 %.
+
+    Its equilibrium is exact for linear forces at any step; what is left comes from segments that turn within one.
+    A segment turns by the mean square of what a free segment does, 2 k_B T dt/gamma_rot, or, if that is less, of what
+    its neighbours allow: after dt, waves of up to the length xi = (a dt l0/gamma_perp)^(1/4) have relaxed, which turns
+    it by k_B T xi/a. Either must stay below 0.1^2. A step must also resolve the slowest relaxation of the filament,
+    gamma_perp/(l0 a) (L/4.73)^4, by 20 steps.
+
+    Returns
+    -------
+    TimeStep
+    """
+    kT = thermal_energy(temperature)
+    friction = filament_type.segment_friction(viscosity, temperature, segments)
+    length, rigidity = filament_type.segment_length, filament_type.bending_rigidity
+    friction_per_length = friction.perpendicular / length
+    turning = math.inf
+    if kT > 0.0:
+        free = _TURNING_ANGLE**2 * friction.rotational / (2.0 * kT)
+        turning = free
+    bends = segments > 1 and rigidity > 0.0
+    if bends and kT > 0.0:
+        turning = max(free, friction_per_length * (_TURNING_ANGLE**2 * rigidity / kT) ** 4 / rigidity)
+    bounds = {"turning": turning}
+    allowed = dict(bounds)
+    if bends:
+        bounds["relaxation"] = friction_per_length * (segments * length / 4.73) ** 4 / rigidity
+        allowed["relaxation"] = bounds["relaxation"] / _RELAXATION_STEPS
+    binding = min(allowed, key=allowed.get)
+    reason = _REASONS[binding].format(angle=_TURNING_ANGLE, relaxation_steps=_RELAXATION_STEPS)
+    return TimeStep(step=allowed[binding], reason=reason, bounds=bounds)
+
+
 def check_scheme(scheme):
     """Raise InputError unless ``scheme`` names an integration scheme."""
     if scheme not in SCHEMES:
         raise InputError(f"scheme must be one of {', '.join(SCHEMES)}, but is {scheme!r}.")
 
 
-def warn_if_unstable(filament_type, viscosity, temperature, step, segments=1):
-    """Issue a TimeStepWarning, naming the bound, if ``step`` exceeds a stability bound of the type."""
+def warn_if_unstable(filament_type, viscosity, temperature, step, segments=1, scheme="midpoint"):
+    """Issue a TimeStepWarning, naming the bound, if ``step`` exceeds a stability bound of an explicit scheme."""
     step = positive(step, TIME, "time step")
+    if scheme not in EXPLICIT_SCHEMES:
+        return
     for name, bound in stability_bounds(filament_type, viscosity, temperature, segments).items():
         if step > bound:
             recommended = recommended_time_step(filament_type, viscosity, temperature, segments=segments)

@@ -5,6 +5,8 @@ import os
 import openmm
 import pytest
 
+from openmm_cylchain.timestep import EXPLICIT_SCHEMES
+
 _WANTED = ("Reference", "CPU", "OpenCL")
 
 
@@ -48,6 +50,7 @@ def reference():
 
 
 ENGINES = ("portable", "compiled")
+ENGINE_SCHEMES = [(engine, scheme) for engine in ENGINES for scheme in EXPLICIT_SCHEMES] + [("compiled", "implicit")]
 
 
 @pytest.fixture(params=ENGINES)

@@ -121,17 +121,18 @@ def _observables(case, nodes):
     return {name: value.mean(axis=1) for name, value in values.items()}
 
 
-def measured_means(case, engine, platform, scheme, seed=20):
+def measured_means(case, engine, platform, scheme, seed=20, step=None):
     """Means over independent chains with their standard errors: {name: (mean, error)}.
 
     Chains start from the exact equilibrium, so a run that keeps it needs no equilibration; the first
-    quarter of the run lets a wrong scheme leave it.
+    quarter of the run lets a wrong scheme leave it. The step is that of the case if it is not given.
     """
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine=engine)
     for chain in range(case.chains):
         filaments.add_equilibrium(case.type, case.segments, seed=chain)
     _, system, positions = filaments.build()
-    integrator = filaments.create_integrator(system, time_step(case), scheme=scheme, random_seed=seed)
+    step = time_step(case) if step is None else step
+    integrator = filaments.create_integrator(system, step, scheme=scheme, random_seed=seed)
     context = openmm.Context(system, integrator, openmm.Platform.getPlatform(platform))
     context.setPositions(positions)
     integrator.step(case.steps // 4)

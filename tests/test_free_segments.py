@@ -3,7 +3,7 @@
 import numpy as np
 import openmm
 import pytest
-from conftest import ENGINES
+from conftest import ENGINE_SCHEMES
 from physics_cases import KT, TEMPERATURE, VISCOSITY
 from scipy.optimize import curve_fit
 
@@ -63,8 +63,7 @@ def _check(times, tangents, displacements):
         assert np.all(np.abs(mean - expected) < SIGMAS * error)
 
 
-@pytest.mark.parametrize("scheme", ["euler", "midpoint"])
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(("engine", "scheme"), ENGINE_SCHEMES)
 def test_rotation_and_diffusion_of_728_segments(engine, scheme):
     """As Figs 7 and 8, whose fit gives 2.685 +- 0.028 ms where (29) gives 2.676 ms."""
     times, tangents, displacements = _run(728, engine, scheme)
@@ -82,8 +81,7 @@ def test_rotation_and_diffusion_of_728_segments(engine, scheme):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scheme", ["euler", "midpoint"])
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(("engine", "scheme"), ENGINE_SCHEMES)
 def test_rotation_and_diffusion_to_a_percent(engine, scheme):
     """Enough segments that 5 % of friction or noise would show at a single time."""
     times, tangents, displacements = _run(20 * 728, engine, scheme)

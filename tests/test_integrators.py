@@ -6,6 +6,7 @@ import warnings
 import numpy as np
 import openmm
 import pytest
+from conftest import ENGINE_SCHEMES
 from openmm import app, unit
 from physics_cases import ENGINE_PLATFORMS, KT, TEMPERATURE, VISCOSITY
 from test_redistribution import _bent_chain, _dense_resistance
@@ -58,7 +59,7 @@ def mixed_integrator(filaments, system, **options):
     return filaments.create_integrator(system, STEP, particle_friction=friction, **options)
 
 
-@pytest.mark.parametrize("scheme", ["euler", "midpoint"])
+@pytest.mark.parametrize(("engine", "scheme"), ENGINE_SCHEMES)
 def test_noise_covariance_between_all_degrees_of_freedom(engine, scheme):
     """Cov(dx) = 2 k_B T dt Z^-1 within each chain and for a free particle, zero across and between steps."""
     topology, system = app.Topology(), openmm.System()

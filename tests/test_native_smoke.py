@@ -367,4 +367,4 @@ def test_refused_arguments():
         CylinderChainForce.cast(openmm.HarmonicBondForce())
     with pytest.raises(InputError, match="same force group"):
         filaments_of("compiled").build(stretching_force_group=0, bending_force_group=1)
-    assert native.SCHEMES.keys() == {"euler", "midpoint"}
+    assert native.SCHEMES.keys() == {"euler", "midpoint", "implicit"}

@@ -296,7 +296,7 @@ SOFT = FilamentType(
 )
 
 
-@pytest.mark.parametrize("scheme", timestep.SCHEMES)
+@pytest.mark.parametrize("scheme", timestep.EXPLICIT_SCHEMES)
 @pytest.mark.parametrize(
     "filament_type, binding, reason",
     [

@@ -52,7 +52,11 @@ BENDING_MODELS = {
     "inscribed-circle": CylinderChainForce.InscribedCircle,
 }
 STRETCHING_MODELS = {"harmonic": CylinderChainForce.Harmonic, "fene": CylinderChainForce.FENE}
-SCHEMES = {"euler": CylinderChainIntegrator.Euler, "midpoint": CylinderChainIntegrator.Midpoint}
+SCHEMES = {
+    "euler": CylinderChainIntegrator.Euler,
+    "midpoint": CylinderChainIntegrator.Midpoint,
+    "implicit": CylinderChainIntegrator.Implicit,
+}
 
 _OTHER_FRICTION = 1.0
 
@@ -138,7 +142,7 @@ class NativeIntegrator(CylinderChainIntegrator):
     temperature : temperature
         Zero is allowed: no noise.
     step_size : time
-    scheme : {"midpoint", "euler"}
+    scheme : {"midpoint", "implicit", "euler"}
     random_seed : int
         0 draws a fresh seed for each Context.
     labels : sequence of str

@@ -18,7 +18,7 @@ from openmm import unit
 from ..errors import InputError, InstabilityError
 from ..potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
 from ..quantities import BOLTZMANN, TEMPERATURE, TIME, non_negative, positive, whole_number
-from ..timestep import SCHEMES, check_scheme
+from ..timestep import EXPLICIT_SCHEMES, check_scheme
 from .description import describe_chains, describe_other_particles, filament_label, refuse_constraints
 from .redistribution import STEPS
 
@@ -199,7 +199,7 @@ class ChainDisplacements:
         chains = self._chains
         gaussian = _gaussian_vectors(int(parameters[_SEED]), steps_taken, 2 * chains.segment_count + len(self._others))
         translational, rotational, other = np.split(gaussian, [chains.segment_count, 2 * chains.segment_count])
-        advance = STEPS[SCHEMES[int(parameters[_SCHEME])]]
+        advance = STEPS[EXPLICIT_SCHEMES[int(parameters[_SCHEME])]]
         with np.errstate(all="ignore"):
             try:
                 displacements = advance(
@@ -356,6 +356,11 @@ class PortableIntegrator(openmm.CustomIntegrator):
     def __init__(self, system, force_group, temperature, step_size, scheme="midpoint", random_seed=0):
         super().__init__(positive(step_size, TIME, "step_size"))
         check_scheme(scheme)
+        if scheme not in EXPLICIT_SCHEMES:
+            raise InputError(
+                f"The portable engine does not have scheme {scheme!r}: use the compiled engine, or one of "
+                f"{', '.join(EXPLICIT_SCHEMES)}."
+            )
         self._scheme = scheme
         self._system = system
         self._force_group = force_group
@@ -364,7 +369,7 @@ class PortableIntegrator(openmm.CustomIntegrator):
         self.addGlobalVariable(_INTEGRATOR_KT, 0.0)
         self.addGlobalVariable(_INTEGRATOR_SEED, 0.0)
         self.addPerDofVariable(_START, 0.0)
-        self._add_program(f"f{force_group}", SCHEMES.index(scheme))
+        self._add_program(f"f{force_group}", EXPLICIT_SCHEMES.index(scheme))
         self.setKineticEnergyExpression("0")
         self.setIntegrationForceGroups(set(range(32)) - {force_group})
         self.setTemperature(temperature)

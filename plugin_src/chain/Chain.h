@@ -34,7 +34,9 @@ enum class Scheme {
     /** Section 4 of the paper: the thermal torque of a free segment is sent through the constraints. */
     Euler = 0,
     /** Fixman's midpoint: the right drift on chains. */
-    Midpoint = 1
+    Midpoint = 1,
+    /** The chain's own forces at the end of the step, so that they do not limit it. */
+    Implicit = 2
 };
 
 /** One segment: its potential and its friction (3), kept at the values of the rest length. */

@@ -18,6 +18,8 @@ struct ChainEnergy {
 struct Instability {
     int chain = -1, segment = -1;
     double change = 0;
+    /** The number of chains for which an implicit step was taken in parts, because its equations were not solved. */
+    int divided = 0;
 };
 
 /** What a step needs besides positions and forces. */
@@ -26,6 +28,8 @@ struct StepSettings {
     double kT, stepSize;
     /** The noise of a step is a function of the seed, the step's number and the chain's number alone. */
     std::uint64_t seed, step;
+    /** Which part of a step, if it is taken in parts. */
+    std::uint32_t part = 0;
 };
 
 /**
@@ -60,8 +64,8 @@ public:
      */
     void clearForces(int pack, double* forces) const;
     /**
-     * Compute the displacements of the nodes of a pack in one step under given total forces: noise, resistance,
-     * redistribution.
+     * Compute the displacements of the nodes of a pack in one step: noise, resistance, redistribution. The forces are
+     * all those on the nodes; for the implicit scheme, all but those of the chains themselves.
      *
      * @param displacements  receives those of the pack's nodes
      * @return the first instability found, with chain = -1 if there is none

@@ -315,8 +315,10 @@ template <int W> class GaussianLanes {
     typedef typename Lanes<W>::Bits Bits;
 public:
     GaussianLanes(const ChainPack& pack, const StepSettings& settings) : layers(GaussianStream::layers()) {
+        // Seeds have 32 bits; those above them tell the parts of a step apart.
+        const std::uint64_t seed = settings.seed^((std::uint64_t) settings.part<<32);
         for (int i = 0; i < W; i++) {
-            const GaussianStream stream(settings.seed, settings.step, pack.chain[i]);
+            const GaussianStream stream(seed, settings.step, pack.chain[i]);
             for (int k = 0; k < 4; k++)
                 word(state[k], i) = stream.state[k];
         }
@@ -351,9 +353,26 @@ public:
                     lane(result, i) = finish(word(bits, i), i);
         return result;
     }
+    /** The next normal number of one lane alone. */
+    double nextOfLane(int i) {
+        return advance(i, [] (GaussianStream& stream) {return stream.next();});
+    }
+    /** The next number of one lane alone that is uniform between 0 and 1. */
+    double uniform(int i) {
+        return advance(i, [] (GaussianStream& stream) {return stream.uniform();});
+    }
 private:
     const GaussianStream::Layer* layers;
     Bits state[4];
+    template <class Draw> double advance(int i, Draw draw) {
+        GaussianStream stream;
+        for (int k = 0; k < 4; k++)
+            stream.state[k] = word(state[k], i);
+        const double result = draw(stream);
+        for (int k = 0; k < 4; k++)
+            word(state[k], i) = stream.state[k];
+        return result;
+    }
     static std::uint64_t word(const Bits& bits, int i) {
         return reinterpret_cast<const std::uint64_t*>(&bits)[i];
     }
@@ -454,6 +473,15 @@ template <int W> Instability stepPack(const ChainPack& pack, const double* posit
     return result;
 }
 
+#include "ImplicitLoops.h"
+
+template <int W> Instability stepPackAs(const ChainPack& pack, const double* positions, const double* forces,
+            const double* box, const StepSettings& settings, double* displacements) {
+    if (settings.scheme == Scheme::Implicit)
+        return stepPackImplicitly<W>(pack, positions, forces, box, settings, displacements);
+    return stepPack<W>(pack, positions, forces, box, settings, displacements);
+}
+
 ChainEnergy addForcesOfPack(const ChainPack& pack, const double* positions, double* forces, const double* box,
             bool includeEnergy) {
     switch (pack.lanes) {
@@ -467,10 +495,10 @@ ChainEnergy addForcesOfPack(const ChainPack& pack, const double* positions, doub
 Instability stepOfPack(const ChainPack& pack, const double* positions, const double* forces, const double* box,
             const StepSettings& settings, double* displacements) {
     switch (pack.lanes) {
-        case 8: return stepPack<8>(pack, positions, forces, box, settings, displacements);
-        case 4: return stepPack<4>(pack, positions, forces, box, settings, displacements);
-        case 2: return stepPack<2>(pack, positions, forces, box, settings, displacements);
-        default: return stepPack<1>(pack, positions, forces, box, settings, displacements);
+        case 8: return stepPackAs<8>(pack, positions, forces, box, settings, displacements);
+        case 4: return stepPackAs<4>(pack, positions, forces, box, settings, displacements);
+        case 2: return stepPackAs<2>(pack, positions, forces, box, settings, displacements);
+        default: return stepPackAs<1>(pack, positions, forces, box, settings, displacements);
     }
 }
 

@@ -45,7 +45,7 @@ inline std::uint64_t rotated(std::uint64_t x, int k) {
     return (x<<k)|(x>>(64-k));
 }
 
-inline std::uint64_t next(std::uint64_t state[4]) {
+inline std::uint64_t bitsOf(std::uint64_t state[4]) {
     const std::uint64_t result = rotated(state[0]+state[3], 23)+state[0];
     const std::uint64_t t = state[1]<<17;
     state[2] ^= state[0];
@@ -57,7 +57,7 @@ inline std::uint64_t next(std::uint64_t state[4]) {
     return result;
 }
 
-inline double uniform(std::uint64_t bits) {
+inline double fraction(std::uint64_t bits) {
     return (bits>>11)*(1.0/9007199254740992.0);
 }
 
@@ -76,7 +76,7 @@ const GaussianStream::Layer* GaussianStream::layers() {
 void GaussianStream::fill(double* values, int count) {
     const Layer* table = layers();
     for (int i = 0; i < count; i++) {
-        const std::uint64_t bits = next(state);
+        const std::uint64_t bits = bitsOf(state);
         const double magnitude = (double) (bits>>12);
         const Layer& layer = table[bits&0xff];
         const double x = magnitude*layer.width;
@@ -85,6 +85,16 @@ void GaussianStream::fill(double* values, int count) {
         else
             values[i] = finish(bits, state);
     }
+}
+
+double GaussianStream::next() {
+    double value;
+    fill(&value, 1);
+    return value;
+}
+
+double GaussianStream::uniform() {
+    return fraction(bitsOf(state));
 }
 
 double GaussianStream::finish(std::uint64_t bits, std::uint64_t state[4]) {
@@ -98,15 +108,15 @@ double GaussianStream::finish(std::uint64_t bits, std::uint64_t state[4]) {
             return sign*x;
         if (layer == 0) {
             while (true) {
-                const double beyond = -std::log1p(-uniform(next(state)))/Ziggurat::tail;
-                const double y = -std::log1p(-uniform(next(state)));
+                const double beyond = -std::log1p(-fraction(bitsOf(state)))/Ziggurat::tail;
+                const double y = -std::log1p(-fraction(bitsOf(state)));
                 if (2*y > beyond*beyond)
                     return sign*(Ziggurat::tail+beyond);
             }
         }
         const double top = table.height[layer-1], bottom = table.height[layer];
-        if (bottom+(top-bottom)*uniform(next(state)) < std::exp(-0.5*x*x))
+        if (bottom+(top-bottom)*fraction(bitsOf(state)) < std::exp(-0.5*x*x))
             return sign*x;
-        bits = next(state);
+        bits = bitsOf(state);
     }
 }

@@ -18,7 +18,12 @@ public:
     struct Layer {
         double width, inside;
     };
+    GaussianStream() = default;
     GaussianStream(std::uint64_t seed, std::uint64_t step, std::uint64_t index);
+    /** The next number. */
+    double next();
+    /** The next number of a stream of numbers that are uniform between 0 and 1. */
+    double uniform();
     /** Fill an array. */
     void fill(double* values, int count);
     /** The state of the generator, for loops that advance several streams at once. */

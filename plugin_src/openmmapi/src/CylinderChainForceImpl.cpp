@@ -7,7 +7,7 @@
 using namespace OpenMM;
 using namespace std;
 
-CylinderChainForceImpl::CylinderChainForceImpl(const CylinderChainForce& owner) : owner(owner) {
+CylinderChainForceImpl::CylinderChainForceImpl(const CylinderChainForce& owner) : owner(owner), excluded(false) {
     forceGroup = owner.getForceGroup();
 }
 
@@ -28,7 +28,7 @@ void CylinderChainForceImpl::initialize(ContextImpl& context) {
 }
 
 double CylinderChainForceImpl::calcForcesAndEnergy(ContextImpl& context, bool includeForces, bool includeEnergy, int groups) {
-    if ((groups&(1<<forceGroup)) != 0)
+    if ((groups&(1<<forceGroup)) != 0 && !excluded)
         return kernel.getAs<CalcCylinderChainForceKernel>().execute(context, includeForces, includeEnergy);
     return 0.0;
 }

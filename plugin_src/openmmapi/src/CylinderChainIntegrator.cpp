@@ -35,7 +35,7 @@ static CylinderChainForceImpl& findChains(ContextImpl& context) {
 }
 
 CylinderChainIntegrator::CylinderChainIntegrator(double temperature, double frictionCoeff, double stepSize) :
-        scheme(Midpoint), noiseSeed(0), stepsTaken(0) {
+        scheme(Midpoint), noiseSeed(0), stepsTaken(0), dividedSteps(0), chains(NULL) {
     setTemperature(temperature);
     setFriction(frictionCoeff);
     setStepSize(stepSize);
@@ -47,17 +47,17 @@ void CylinderChainIntegrator::initialize(ContextImpl& contextRef) {
     if (owner != NULL && &contextRef.getOwner() != owner)
         throw OpenMMException("This Integrator is already bound to a context");
     const System& system = contextRef.getSystem();
-    CylinderChainForceImpl& chains = findChains(contextRef);
-    checkSystem(system, chains);
+    chains = &findChains(contextRef);
+    checkSystem(system, *chains);
     context = &contextRef;
     owner = &contextRef.getOwner();
     kernel = context->getPlatform().createKernel(IntegrateCylinderChainStepKernel::Name(), contextRef);
     kernel.getAs<IntegrateCylinderChainStepKernel>().initialize(system, *this,
-            chains.getKernel().getAs<CalcCylinderChainForceKernel>());
+            chains->getKernel().getAs<CalcCylinderChainForceKernel>());
     chainsAreAlone = (contextRef.getForceImpls().size() == 1);
-    chainForceGroup = chains.getOwner().getForceGroup();
     noiseSeed = (uint32_t) (randomNumberSeed == 0 ? osrngseed() : randomNumberSeed);
     stepsTaken = 0;
+    dividedSteps = 0;
 }
 
 void CylinderChainIntegrator::checkSystem(const System& system, const CylinderChainForceImpl& chains) const {
@@ -114,7 +114,7 @@ void CylinderChainIntegrator::setParticleFriction(int particle, double coeff) {
 }
 
 void CylinderChainIntegrator::setScheme(Scheme scheme) {
-    if (scheme != Euler && scheme != Midpoint)
+    if (scheme != Euler && scheme != Midpoint && scheme != Implicit)
         throw OpenMMException("CylinderChainIntegrator: Illegal scheme: "+to_string((int) scheme));
     this->scheme = scheme;
 }
@@ -139,22 +139,28 @@ void CylinderChainIntegrator::step(int steps) {
     if (context == NULL)
         throw OpenMMException("This Integrator is not bound to a context!");
     IntegrateCylinderChainStepKernel& stepKernel = kernel.getAs<IntegrateCylinderChainStepKernel>();
+    const bool includesChains = (getIntegrationForceGroups()&(1<<chains->getOwner().getForceGroup())) != 0;
     for (int done = 0; done < steps;) {
         context->updateContextState();
 
         // Where there are only chains, several steps are taken at once.  The first one is not among them, because OpenMM
         // checks that positions have been set, nor is one that blows up.
 
-        if (done > 0 && chainsAreAlone && (getIntegrationForceGroups()&(1<<chainForceGroup)) != 0) {
+        if (done > 0 && chainsAreAlone && includesChains) {
             const int count = min(steps-done, STEPS_TOGETHER);
-            const int taken = stepKernel.executeTogether(*context, *this, noiseSeed, stepsTaken, count);
+            const int taken = stepKernel.executeTogether(*context, *this, noiseSeed, stepsTaken, count, dividedSteps);
             stepsTaken += taken;
             done += taken;
             if (taken == count)
                 continue;
         }
-        context->calcForcesAndEnergy(true, false, getIntegrationForceGroups());
-        stepKernel.execute(*context, *this, noiseSeed, stepsTaken);
+        {
+            // The implicit scheme computes the forces of the chains itself.
+
+            CylinderChainForceImpl::Exclusion exclusion(*chains, scheme == Implicit);
+            context->calcForcesAndEnergy(true, false, getIntegrationForceGroups());
+        }
+        stepKernel.execute(*context, *this, noiseSeed, stepsTaken, dividedSteps);
         stepsTaken++;
         done++;
     }

@@ -39,7 +39,7 @@ class CylinderChainForceImpl;
 class CylinderChainIntegrator : public Integrator {
 public:
     /**
-     * The ways to advance chains by one step.  Both are of weak order one in the step size.
+     * The ways to advance chains by one step.  All are of weak order one in the step size.
      */
     enum Scheme {
         /**
@@ -50,7 +50,13 @@ public:
         /**
          * Fixman's midpoint, which has the right drift.  It is the default.
          */
-        Midpoint = 1
+        Midpoint = 1,
+        /**
+         * The forces of the chains are taken at the end of the step, those of all other Forces at its start.  Stretching
+         * and bending do not limit the step, and keep their equilibrium.  If the force group of the CylinderChainForce
+         * is not among the integration force groups, this is the same as Midpoint.
+         */
+        Implicit = 2
     };
     /**
      * Create a CylinderChainIntegrator.
@@ -109,6 +115,14 @@ public:
      * Set how chains are advanced by one step.
      */
     void setScheme(Scheme scheme);
+    /**
+     * Get how many times a step of a chain was taken in parts since the Context was created, because the equations of
+     * the implicit scheme could not be solved, or a segment would have moved by more than its length.  The parts have
+     * fresh noise.  If this is more than a few in a thousand steps, the step is too large.
+     */
+    long long getNumDividedSteps() const {
+        return dividedSteps;
+    }
     /**
      * Get the random number seed.  See setRandomNumberSeed() for details.
      */
@@ -184,8 +198,9 @@ private:
     Scheme scheme;
     int randomNumberSeed;
     std::uint64_t noiseSeed, stepsTaken;
+    long long dividedSteps;
     bool chainsAreAlone;
-    int chainForceGroup;
+    CylinderChainForceImpl* chains;
     Kernel kernel;
 };
 

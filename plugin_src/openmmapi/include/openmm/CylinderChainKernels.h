@@ -82,20 +82,22 @@ public:
      * @param integrator  the CylinderChainIntegrator this kernel is being used for
      * @param seed        the seed of the noise
      * @param step        the number of the step.  The noise depends on this and on the seed alone.
+     * @param divided     increased by the number of chains whose step was taken in parts
      */
     virtual void execute(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed,
-            std::uint64_t step) = 0;
+            std::uint64_t step, long long& divided) = 0;
     /**
      * Take several steps where there are no other forces than those of the chains, which are computed here.  Chains
      * do not know of each other then, so each can be advanced by all steps at once.
      *
      * @param step        the number of the first step
      * @param count       the number of steps
+     * @param divided     increased by the number of steps of a chain that were taken in parts
      * @return the number of steps that were taken: fewer than count if the one after them would blow up, or 0 if this
      *         cannot be done for the context
      */
     virtual int executeTogether(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed,
-            std::uint64_t step, int count) = 0;
+            std::uint64_t step, int count, long long& divided) = 0;
 };
 
 } // namespace OpenMM

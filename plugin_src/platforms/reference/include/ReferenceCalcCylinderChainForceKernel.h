@@ -27,6 +27,12 @@ public:
         return chains;
     }
     /**
+     * Get the force group of the chains.
+     */
+    int getForceGroup() const {
+        return forceGroup;
+    }
+    /**
      * Get the engine that computes with the present parameters of the chains.
      */
     const cylchain::ChainEngine& getEngine() const {
@@ -43,6 +49,7 @@ private:
     std::vector<cylchain::Chain> chains;
     std::unique_ptr<cylchain::ChainEngine> engine;
     bool periodic;
+    int forceGroup;
 };
 
 } // namespace OpenMM

@@ -16,15 +16,17 @@ public:
     ReferenceIntegrateCylinderChainStepKernel(std::string name, const Platform& platform, ContextImpl& context);
     void initialize(const System& system, const CylinderChainIntegrator& integrator,
             CalcCylinderChainForceKernel& forceKernel);
-    void execute(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed, std::uint64_t step);
+    void execute(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed, std::uint64_t step,
+            long long& divided);
     int executeTogether(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed, std::uint64_t step,
-            int count);
+            int count, long long& divided);
 private:
-    void displaceChains(ContextImpl& context, const cylchain::StepSettings& settings);
-    int advancePack(ContextImpl& context, int pack, cylchain::StepSettings settings, int count);
+    cylchain::StepSettings settingsOf(const CylinderChainIntegrator& integrator, std::uint64_t seed, std::uint64_t step) const;
+    void displaceChains(ContextImpl& context, const cylchain::StepSettings& settings, long long& divided);
+    int advancePack(ContextImpl& context, int pack, cylchain::StepSettings settings, int count, long long& divided);
     void displaceOthers(ContextImpl& context, const cylchain::StepSettings& settings, double friction);
     void displaceBlock(int block, const std::vector<Vec3>& forces, const cylchain::StepSettings& settings, double friction);
-    void reportInstability(ContextImpl& context, int chain, std::uint64_t step) const;
+    void reportInstability(ContextImpl& context, int chain, const cylchain::StepSettings& settings) const;
     void checkOthers(std::uint64_t step) const;
     ParallelLoop loop;
     ReferenceCalcCylinderChainForceKernel* chainKernel;

@@ -11,12 +11,13 @@ static ReferencePlatform::PlatformData& extractData(ContextImpl& context) {
 }
 
 ReferenceCalcCylinderChainForceKernel::ReferenceCalcCylinderChainForceKernel(string name, const Platform& platform,
-        ContextImpl& context) : CalcCylinderChainForceKernel(name, platform), loop(context), periodic(false) {
+        ContextImpl& context) : CalcCylinderChainForceKernel(name, platform), loop(context), periodic(false), forceGroup(0) {
 }
 
 void ReferenceCalcCylinderChainForceKernel::initialize(const System& system, const CylinderChainForce& force) {
     chains = describeChains(system, force);
     engine.reset(new ChainEngine(chains));
+    forceGroup = force.getForceGroup();
     periodic = force.usesPeriodicBoundaryConditions();
 }
 

@@ -6,6 +6,7 @@
 #include "openmm/reference/SimTKOpenMMRealType.h"
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <sstream>
 
 using namespace OpenMM;
@@ -23,16 +24,6 @@ static ReferencePlatform::PlatformData& extractData(ContextImpl& context) {
 
 static double norm(const Vec3& v) {
     return sqrt(v.dot(v));
-}
-
-static StepSettings settingsOf(const CylinderChainIntegrator& integrator, uint64_t seed, uint64_t step) {
-    StepSettings settings;
-    settings.scheme = (integrator.getScheme() == CylinderChainIntegrator::Euler ? Scheme::Euler : Scheme::Midpoint);
-    settings.kT = BOLTZ*integrator.getTemperature();
-    settings.stepSize = integrator.getStepSize();
-    settings.seed = seed;
-    settings.step = step;
-    return settings;
 }
 
 static bool isFinite(const Vec3& v) {
@@ -72,10 +63,27 @@ void ReferenceIntegrateCylinderChainStepKernel::initialize(const System& system,
     newPositions.assign(numParticles, Vec3());
 }
 
+StepSettings ReferenceIntegrateCylinderChainStepKernel::settingsOf(const CylinderChainIntegrator& integrator, uint64_t seed,
+        uint64_t step) const {
+    StepSettings settings;
+    if (integrator.getScheme() == CylinderChainIntegrator::Euler)
+        settings.scheme = Scheme::Euler;
+    else if (integrator.getScheme() == CylinderChainIntegrator::Implicit &&
+            (integrator.getIntegrationForceGroups()&(1<<chainKernel->getForceGroup())) != 0)
+        settings.scheme = Scheme::Implicit;
+    else
+        settings.scheme = Scheme::Midpoint;
+    settings.kT = BOLTZ*integrator.getTemperature();
+    settings.stepSize = integrator.getStepSize();
+    settings.seed = seed;
+    settings.step = step;
+    return settings;
+}
+
 void ReferenceIntegrateCylinderChainStepKernel::execute(ContextImpl& context, const CylinderChainIntegrator& integrator,
-        uint64_t seed, uint64_t step) {
+        uint64_t seed, uint64_t step, long long& divided) {
     const StepSettings settings = settingsOf(integrator, seed, step);
-    displaceChains(context, settings);
+    displaceChains(context, settings, divided);
     displaceOthers(context, settings, integrator.getFriction());
 
     // Nothing has blown up, so the new positions replace the old ones.
@@ -92,15 +100,17 @@ void ReferenceIntegrateCylinderChainStepKernel::execute(ContextImpl& context, co
 }
 
 int ReferenceIntegrateCylinderChainStepKernel::executeTogether(ContextImpl& context, const CylinderChainIntegrator& integrator,
-        uint64_t seed, uint64_t step, int count) {
+        uint64_t seed, uint64_t step, int count, long long& divided) {
     if (!others.empty())
         return 0;
     const StepSettings settings = settingsOf(integrator, seed, step);
     ReferencePlatform::PlatformData& data = extractData(context);
     vector<int> taken(chainKernel->getEngine().getNumPacks());
+    vector<long long> dividedInPack(taken.size());
     auto advance = [&] (int steps) {
         loop.run(taken.size(), [&] (int pack) {
-            taken[pack] = advancePack(context, pack, settings, steps);
+            dividedInPack[pack] = 0;
+            taken[pack] = advancePack(context, pack, settings, steps, dividedInPack[pack]);
         });
         return *min_element(taken.begin(), taken.end());
     };
@@ -110,6 +120,7 @@ int ReferenceIntegrateCylinderChainStepKernel::executeTogether(ContextImpl& cont
     int done = advance(count);
     if (done < count)
         done = advance(done);
+    divided = accumulate(dividedInPack.begin(), dividedInPack.end(), divided);
     for (int particle : outside)
         newPositions[particle] = (*data.positions)[particle];
     data.positions->swap(newPositions);
@@ -119,7 +130,8 @@ int ReferenceIntegrateCylinderChainStepKernel::executeTogether(ContextImpl& cont
     return done;
 }
 
-int ReferenceIntegrateCylinderChainStepKernel::advancePack(ContextImpl& context, int pack, StepSettings settings, int count) {
+int ReferenceIntegrateCylinderChainStepKernel::advancePack(ContextImpl& context, int pack, StepSettings settings, int count,
+        long long& divided) {
     ReferencePlatform::PlatformData& data = extractData(context);
     const ChainEngine& engine = chainKernel->getEngine();
     const double* box = chainKernel->getBox(context);
@@ -131,9 +143,12 @@ int ReferenceIntegrateCylinderChainStepKernel::advancePack(ContextImpl& context,
     for (int done = 0; done < count; done++, settings.step++) {
         const double* positions = &newPositions[0][0];
         engine.clearForces(pack, forces);
-        engine.addForces(pack, positions, forces, box, false);
-        if (engine.step(pack, positions, forces, box, settings, &displacements[0][0]).chain != -1)
+        if (settings.scheme != Scheme::Implicit)
+            engine.addForces(pack, positions, forces, box, false);
+        const Instability instability = engine.step(pack, positions, forces, box, settings, &displacements[0][0]);
+        if (instability.chain != -1)
             return done;
+        divided += instability.divided;
         for (int particle : particles)
             if (particle >= 0)
                 newPositions[particle] += displacements[particle];
@@ -144,7 +159,8 @@ int ReferenceIntegrateCylinderChainStepKernel::advancePack(ContextImpl& context,
     return count;
 }
 
-void ReferenceIntegrateCylinderChainStepKernel::displaceChains(ContextImpl& context, const StepSettings& settings) {
+void ReferenceIntegrateCylinderChainStepKernel::displaceChains(ContextImpl& context, const StepSettings& settings,
+        long long& divided) {
     ReferencePlatform::PlatformData& data = extractData(context);
     const ChainEngine& engine = chainKernel->getEngine();
     const double* positions = &(*data.positions)[0][0];
@@ -167,10 +183,13 @@ void ReferenceIntegrateCylinderChainStepKernel::displaceChains(ContextImpl& cont
         if (instability.chain != -1 && (first == -1 || instability.chain < first))
             first = instability.chain;
     if (first != -1)
-        reportInstability(context, first, settings.step);
+        reportInstability(context, first, settings);
+    for (const Instability& instability : instabilities)
+        divided += instability.divided;
 }
 
-void ReferenceIntegrateCylinderChainStepKernel::reportInstability(ContextImpl& context, int chain, uint64_t step) const {
+void ReferenceIntegrateCylinderChainStepKernel::reportInstability(ContextImpl& context, int chain,
+        const StepSettings& settings) const {
     const vector<Vec3>& positions = *extractData(context).positions;
     const vector<Vec3>& forces = *extractData(context).forces;
     const Chain& culprit = chainKernel->getChains()[chain];
@@ -185,7 +204,7 @@ void ReferenceIntegrateCylinderChainStepKernel::reportInstability(ContextImpl& c
     while (segment < (int) nodes.size() && isFinite(positions[nodes[segment]]) && isFinite(forces[nodes[segment]]))
         segment++;
     if (segment < (int) nodes.size()) {
-        message << max(segment-1, 0) << " in step " << step+1 << ": the force on it, or its position, is not finite";
+        message << max(segment-1, 0) << " in step " << settings.step+1 << ": the force on it, or its position, is not finite";
     }
     else {
         // An excessive force moves its neighbors as well, so choose the segment with the greatest.
@@ -200,8 +219,11 @@ void ReferenceIntegrateCylinderChainStepKernel::reportInstability(ContextImpl& c
                 change = length;
             }
         }
-        message << segment << " in step " << step+1 << ": its ends would move by " << change
-                << " nm against each other in one step";
+        message << segment << " in step " << settings.step+1 << ": ";
+        if (settings.scheme == Scheme::Implicit)
+            message << "the equations of the implicit scheme cannot be solved";
+        else
+            message << "its ends would move by " << change << " nm against each other in one step";
     }
     message << ". Positions are those before this step. "
             "Use a smaller time step, or look for overlapping particles or excessive forces.";

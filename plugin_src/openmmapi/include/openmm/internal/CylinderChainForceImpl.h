@@ -16,6 +16,20 @@ namespace OpenMM {
  */
 class CylinderChainForceImpl : public ForceImpl {
 public:
+    /**
+     * While an object of this class exists, the Force contributes nothing.
+     */
+    class Exclusion {
+    public:
+        Exclusion(CylinderChainForceImpl& force, bool exclude) : force(force) {
+            force.excluded = exclude;
+        }
+        ~Exclusion() {
+            force.excluded = false;
+        }
+    private:
+        CylinderChainForceImpl& force;
+    };
     explicit CylinderChainForceImpl(const CylinderChainForce& owner);
     void initialize(ContextImpl& context);
     const CylinderChainForce& getOwner() const {
@@ -41,6 +55,7 @@ public:
 private:
     const CylinderChainForce& owner;
     Kernel kernel;
+    bool excluded;
 };
 
 } // namespace OpenMM

@@ -1,0 +1,604 @@
+/**
+ * Scheme "implicit" over the segments of a pack. ChainLoops.h includes this file into the namespace of an instruction
+ * set.
+ *
+ * A step solves, for the new nodes y, with the middle m = (x+y)/2 of the old and the new nodes,
+ *
+ *     Z(m) (y-x)/h = f + f_random(x) + f_drift(x) - sum_a T_a J_a(m)
+ *
+ * where the a are the lengths of segments and the bends of joints, each with an energy k q^2/2, J_a(m) is the gradient
+ * of q_a, and
+ *
+ *     T_a = k (theta q_a(y) + (1-theta) q_a(x) - (2 theta-1)^(1/2) q_random),    theta = max(1/2, 1-1/z).
+ *
+ * z is the step over the relaxation time of the fastest mode; q_random is drawn afresh from the equilibrium of q_a. For
+ * linear forces and any h, the nodes have exactly the covariance k_B T/k then. The friction g of a length, gamma_def/l^2,
+ * and its noise are parts of T_a rather than of Z and f_random, so that noise along a segment stays along it when the
+ * segment turns. What lengths lack of the drift k_B T div(Z^-1) then is a metric force,
+ *
+ *     f_drift = -k_B T sum_a (k (2 theta-1) + g/h) H_a (Z/h+K)^-1 J_a
+ *
+ * with the second derivatives H_a of the lengths. It takes the blocks of the inverse next to its diagonal, which follow
+ * from those of the elimination.
+ */
+
+/** The largest change of a segment in the last iteration, over its rest length. */
+const double NEWTON_TOLERANCE = 3e-3;
+const int NEWTON_ITERATIONS = 14;
+/** A step that does not converge is cut into at most two to this power. */
+const int LARGEST_DIVISION = 6;
+/** The part of the friction against turning that compression may take away in the iteration's matrix. */
+const double COMPRESSION = 0.9;
+/** A bend is drawn as a Gaussian with rejection if the joint is stiffer than this many k_B T, or else from the sphere. */
+const double STIFF_JOINT = 2;
+const double TINY = 1e-300;
+
+template <class Real> struct Matrix {
+    Vector<Real> x, y, z;
+    static Matrix axial(Real s, Real r, const Vector<Real>& t) {
+        const Vector<Real> v = t*r;
+        return {{s+v.x*t.x, v.x*t.y, v.x*t.z}, {v.y*t.x, s+v.y*t.y, v.y*t.z}, {v.z*t.x, v.z*t.y, s+v.z*t.z}};
+    }
+    static Matrix outer(const Vector<Real>& a, const Vector<Real>& b) {
+        return {b*a.x, b*a.y, b*a.z};
+    }
+    Matrix operator+(const Matrix& m) const {return {x+m.x, y+m.y, z+m.z};}
+    Matrix operator-(const Matrix& m) const {return {x-m.x, y-m.y, z-m.z};}
+    Matrix operator*(Real s) const {return {x*s, y*s, z*s};}
+    Vector<Real> operator*(const Vector<Real>& v) const {return {x.dot(v), y.dot(v), z.dot(v)};}
+    Matrix operator*(const Matrix& m) const {
+        return {m.x*x.x+m.y*x.y+m.z*x.z, m.x*y.x+m.y*y.y+m.z*y.z, m.x*z.x+m.y*z.y+m.z*z.z};
+    }
+    Matrix transposed() const {
+        return {{x.x, y.x, z.x}, {x.y, y.y, z.y}, {x.z, y.z, z.z}};
+    }
+    Matrix inverse() const {
+        const Vector<Real> a = crossProduct(y, z), b = crossProduct(z, x), c = crossProduct(x, y);
+        return Matrix {a, b, c}.transposed()*(1/x.dot(a));
+    }
+};
+
+/** A bend b = f (t2-t1), with the energy (stiffness/2) b^2, and df/dc, for the cosine c. */
+template <class Real> struct BendFactor {
+    Real f, slope;
+};
+
+template <class Real> inline BendFactor<Real> bendFactor(BendingModel model, const Vector<Real>& difference) {
+    const Real square = difference.dot(difference);
+    if (model == BendingModel::KratkyPorod)
+        return {1+Real{}, Real{}};
+    if (model == BendingModel::InscribedCircle) {
+        const Real sum = 4-square+1e-12;
+        const Real f = 2/root(sum);
+        return {f, -f/sum};
+    }
+    BendFactor<Real> result;
+    for (int i = 0; i < (int) (sizeof(Real)/sizeof(double)); i++) {
+        Real copy = square;
+        const double chord = std::fmin(std::sqrt(lane(copy, i)), 2.0), half = std::asin(0.5*chord);
+        const bool small = chord < 1e-3;
+        lane(result.f, i) = small ? 1+chord*chord/24 : 2*half/chord;
+        lane(result.slope, i) = small ? -1.0/12 : -(1/chord-half*std::cos(half)*2/(chord*chord))/std::sin(2*half);
+    }
+    return result;
+}
+
+/** The square of a bend for the cosine c. */
+inline double bendSquare(BendingModel model, double c) {
+    if (model == BendingModel::InscribedCircle)
+        return 4*(1-c)/(1+c);
+    if (model == BendingModel::KratkyPorod)
+        return 2*(1-c);
+    return std::acos(c)*std::acos(c);
+}
+
+/** The density of a bend with the given square in the plane of b over that of a Gaussian. */
+inline double bendMeasure(BendingModel model, double square) {
+    if (model == BendingModel::InscribedCircle)
+        return 1/((1+0.25*square)*(1+0.25*square));
+    if (model == BendingModel::KratkyPorod)
+        return square < 4 ? 1 : 0;
+    const double angle = std::sqrt(square);
+    return angle < M_PI ? (angle > 1e-8 ? std::sin(angle)/angle : 1) : 0;
+}
+
+/** Extend a coordinate q with the energy (stiffness/2) q^2 to FENE: its value and slope for an extension e. */
+inline void feneCoordinate(double inverse, double e, double& q, double& slope) {
+    const double limit = 1-1e-9, relative = std::fmax(-limit, std::fmin(limit, e*inverse));
+    const double square = relative*relative;
+    const double root = square > 1e-8 ? std::sqrt(-std::log1p(-square)) : std::fabs(relative)*(1+0.25*square);
+    slope = square > 1e-8 ? std::fabs(relative)/((1-square)*root) : 1+0.75*square;
+    q = std::copysign(root, relative)/inverse+slope*(e-relative/inverse);
+}
+
+/** The length of a segment as a coordinate with the energy (stiffness/2) q^2. */
+template <class Real> inline void stretchCoordinate(StretchingModel model, Real inverse, Real e, Real& q, Real& slope) {
+    q = e;
+    slope = 1+Real{};
+    if (model == StretchingModel::FENE)
+        for (int i = 0; i < (int) (sizeof(Real)/sizeof(double)); i++)
+            feneCoordinate(lane(inverse, i), lane(e, i), lane(q, i), lane(slope, i));
+}
+
+template <class Real> inline Real larger(Real a, Real b) {
+    Real result;
+    for (int i = 0; i < (int) (sizeof(Real)/sizeof(double)); i++)
+        lane(result, i) = lane(a, i) > lane(b, i) ? lane(a, i) : lane(b, i);
+    return result;
+}
+
+/** Two vectors that are orthogonal to a unit vector and to each other (Duff et al., J. Comput. Graph. Tech. 2017, 6, 1). */
+template <class Real> inline void orthogonal(const Vector<Real>& n, Vector<Real>& first, Vector<Real>& second) {
+    Real sign;
+    Vector<Real> copy = n;
+    for (int i = 0; i < (int) (sizeof(Real)/sizeof(double)); i++)
+        lane(sign, i) = std::copysign(1.0, lane(copy.z, i));
+    const Real a = -1/(sign+n.z), b = n.x*n.y*a;
+    first = {1+sign*n.x*n.x*a, sign*b, -sign*n.x};
+    second = {b, sign+n.y*n.y*a, -n.y};
+}
+
+/** What a step keeps of a segment, and of the joint with the segment before. */
+template <class Real> struct ImplicitSegment {
+    // At the start: the vector, its direction and length, the coordinate of the length, and the bend.
+    Vector<Real> difference, tangent, bend, bisector;
+    Real length, coordinate;
+    // The noise, and how implicit the segment and the joint are.
+    Vector<Real> randomBend;
+    Real randomCoordinate, randomTension, theta, jointTheta;
+    // Of the last iteration: the direction of the new segment, its tension and how the tension changes.
+    Vector<Real> newTangent;
+    Real tension, response;
+    Real multiplier;
+};
+
+/** What elimination leaves of a node: y = solution - next y(+1) - second y(+2). */
+template <class Real> struct ImplicitNode {
+    Matrix<Real> inverse, next, second;
+    Vector<Real> solution;
+};
+
+template <int W> class ImplicitStep {
+    typedef typename Lanes<W>::Type Real;
+    typedef Vector<Real> Vec;
+    typedef Matrix<Real> Mat;
+public:
+    struct Memory {
+        Scratch segments, nodes, vectors;
+    };
+    ImplicitStep(const ChainPack& pack, const StepSettings& settings, Memory& memory) : pack(pack), settings(settings),
+            n(pack.nodes), h(settings.stepSize) {
+        segments = memory.segments.template reserve<ImplicitSegment<Real> >(n);
+        nodes = memory.nodes.template reserve<ImplicitNode<Real> >(n);
+        f = memory.vectors.template reserve<Vec>(3*n);
+        change = f+n;
+        x = change+n;
+    }
+    /**
+     * Take one step.
+     *
+     * @param start   the nodes before
+     * @param forces  the forces on them, but for those of the chains
+     * @param y       receives the nodes after
+     * @param failed  receives true for each lane that has not converged or whose segments change by more than their
+     *                length
+     */
+    void take(const Vec* start, const Vec* forces, Vec* y, bool* failed) {
+        for (int node = 0; node < n; node++) {
+            x[node] = y[node] = start[node];
+            f[node] = forces[node];
+        }
+        describe();
+        if (settings.kT > 0)
+            addNoise();
+        Real active = 1+Real{};
+        for (int iteration = 0; iteration < NEWTON_ITERATIONS; iteration++) {
+            eliminate(y);
+            if (iteration == 0 && settings.kT > 0) {
+                addMetricForces();
+                eliminate(y);
+            }
+            substitute();
+            for (int node = 0; node < n; node++)
+                y[node] = y[node]+change[node]*active;
+            if (!anyUnfinished(active))
+                break;
+        }
+        for (int i = 0; i < W; i++)
+            failed[i] = lane(active, i) != 0;
+        findExcessiveChanges(y, failed);
+    }
+private:
+    const ChainPack& pack;
+    const StepSettings& settings;
+    const int n;
+    const double h;
+    ImplicitSegment<Real>* segments;
+    ImplicitNode<Real>* nodes;
+    Vec *f, *change, *x;
+
+    /** Describe the start of a step, without noise. */
+    void describe() {
+        for (int s = 0; s < n-1; s++) {
+            ImplicitSegment<Real>& segment = segments[s];
+            segment.difference = x[s+1]-x[s];
+            segment.length = root(segment.difference.dot(segment.difference));
+            segment.tangent = segment.difference*(1/segment.length);
+            Real slope;
+            stretchCoordinate(pack.stretching, property<Real>(pack, s, ChainPack::InverseExtension),
+                    segment.length-property<Real>(pack, s, ChainPack::RestLength), segment.coordinate, slope);
+            const Real l0 = property<Real>(pack, s, ChainPack::RestLength);
+            const Real stretchRate = h*property<Real>(pack, s, ChainPack::Stiffness)*l0*l0+TINY;
+            segment.theta = larger<Real>(0.5+Real{}, 1-property<Real>(pack, s, ChainPack::Extensional)/stretchRate);
+            segment.randomCoordinate = segment.randomTension = segment.multiplier = Real{};
+            segment.randomBend = Vec {};
+            if (s > 0)
+                describeJoint(s);
+        }
+    }
+    void describeJoint(int s) {
+        ImplicitSegment<Real>& segment = segments[s];
+        const Vec sum = segments[s-1].tangent+segment.tangent, bent = segment.tangent-segments[s-1].tangent;
+        segment.bisector = sum*(1/root(sum.dot(sum)+TINY));
+        segment.bend = bent*bendFactor<Real>(pack.bending, bent).f;
+        const Real friction = -larger<Real>(-property<Real>(pack, s-1, ChainPack::Rotational),
+                -property<Real>(pack, s, ChainPack::Rotational));
+        const Real bendRate = 4*h*loaded<Real>(pack.joints, s)+TINY;
+        segment.jointTheta = larger<Real>(0.5+Real{}, 1-friction/bendRate);
+    }
+    /** Draw the random forces, lengths and bends. */
+    void addNoise() {
+        GaussianLanes<W> gaussian(pack, settings);
+        const double amplitude = std::sqrt(2*settings.kT/h);
+        for (int s = 0; s < n-1; s++) {
+            ImplicitSegment<Real>& segment = segments[s];
+            const Vec t = segment.tangent;
+            const Vec a = {gaussian.next(), gaussian.next(), gaussian.next()};
+            const Vec b = {gaussian.next(), gaussian.next(), gaussian.next()};
+            const Real across = property<Real>(pack, s, ChainPack::RootPerpendicular);
+            const Real along = property<Real>(pack, s, ChainPack::RootParallel);
+            const Vec force = (a*across+t*((along-across)*t.dot(a)))*(0.5*amplitude+Real{});
+            const Real perLength = amplitude/segment.length;
+            const Vec pair = (b-t*t.dot(b))*(property<Real>(pack, s, ChainPack::RootRotational)*perLength);
+            f[s] = f[s]+force-pair;
+            f[s+1] = f[s+1]+force+pair;
+
+            segment.randomTension = t.dot(b)*(property<Real>(pack, s, ChainPack::RootExtensional)*perLength);
+            drawLength(gaussian, s);
+            if (s > 0)
+                drawBend(gaussian, s);
+        }
+    }
+    void drawLength(GaussianLanes<W>& gaussian, int s) {
+        ImplicitSegment<Real>& segment = segments[s];
+        const Real stiffness = property<Real>(pack, s, ChainPack::Stiffness);
+        const Real deviation = root(settings.kT/(stiffness+TINY));
+        Real random = gaussian.next();
+        if (pack.stretching == StretchingModel::FENE) {
+            // The density of lengths, seen as one of coordinates.
+            Real inverse = property<Real>(pack, s, ChainPack::InverseExtension), scale = deviation;
+            for (int i = 0; i < W; i++) {
+                double square = lane(random, i)*lane(scale, i)*lane(inverse, i);
+                square *= square;
+                while (square > 1e-8 && s < pack.nodesOfLane[i]-1) {
+                    const double relative = std::sqrt(-std::expm1(-square));
+                    if (gaussian.uniform(i) < std::exp(-square)*std::sqrt(square)/relative)
+                        break;
+                    lane(random, i) = gaussian.nextOfLane(i);
+                    square = lane(random, i)*lane(scale, i)*lane(inverse, i);
+                    square *= square;
+                }
+            }
+        }
+        segment.randomCoordinate = random*deviation*root(2*segment.theta-1);
+    }
+    void drawBend(GaussianLanes<W>& gaussian, int s) {
+        ImplicitSegment<Real>& segment = segments[s];
+        Real stiffness = loaded<Real>(pack.joints, s)/settings.kT, share = root(2*segment.jointTheta-1);
+        Real first = gaussian.next(), second = gaussian.next();
+        for (int i = 0; i < W; i++) {
+            const double k = lane(stiffness, i);
+            double a = lane(first, i), b = lane(second, i);
+            if (k == 0 || lane(share, i) == 0)
+                a = b = 0;
+            else if (k > STIFF_JOINT) {
+                while (gaussian.uniform(i) > bendMeasure(pack.bending, (a*a+b*b)/k)) {
+                    a = gaussian.nextOfLane(i);
+                    b = gaussian.nextOfLane(i);
+                }
+                a /= std::sqrt(k);
+                b /= std::sqrt(k);
+            }
+            else {
+                double square;
+                do
+                    square = bendSquare(pack.bending, 2*gaussian.uniform(i)-1);
+                while (gaussian.uniform(i) > std::exp(-0.5*k*square));
+                const double scale = std::sqrt(square/(a*a+b*b));
+                a *= scale;
+                b *= scale;
+            }
+            lane(first, i) = a*lane(share, i);
+            lane(second, i) = b*lane(share, i);
+        }
+        Vec e1, e2;
+        orthogonal(segment.bisector, e1, e2);
+        segment.randomBend = e1*first+e2*second;
+    }
+    /** The equations of a node and its coupling to the next two, while they are gathered. */
+    struct Row {
+        Mat diagonal, lower, upper, second;
+        Vec right;
+    };
+    /** Linearise the equations around y, and eliminate the nodes from first to last. */
+    void eliminate(const Vec* y) {
+        Row before = {}, here = {}, after = {};
+        here.right = f[0];
+        for (int s = 0; s < n-1; s++) {
+            after = Row {};
+            after.right = f[s+1];
+            addSegment(y, s, here, after);
+            if (s > 0) {
+                addJoint(y, s, before, here, after);
+                eliminate(s-1, before, here, after);
+            }
+            before = here;
+            here = after;
+        }
+        after = Row {};
+        eliminate(n-2, before, here, after);
+        Row none = {};
+        eliminate(n-1, here, none, none);
+    }
+    void addSegment(const Vec* y, int s, Row& here, Row& after) {
+        ImplicitSegment<Real>& segment = segments[s];
+        const Vec difference = y[s+1]-y[s];
+        const Real length = root(difference.dot(difference));
+        const Vec t = difference*(1/length);
+        const Vec middle = (segment.difference+difference)*(0.5+Real{});
+        const Real inverseSquare = 1/middle.dot(middle), inverse = root(inverseSquare);
+        const Vec direction = middle*inverse;
+
+        // Friction.
+        const Real acrossTrans = 0.25*property<Real>(pack, s, ChainPack::Perpendicular);
+        const Real alongTrans = 0.25*property<Real>(pack, s, ChainPack::Parallel);
+        const Real acrossTurn = property<Real>(pack, s, ChainPack::Rotational)*inverseSquare;
+        const Mat same = Mat::axial((acrossTrans+acrossTurn)/h, (alongTrans-acrossTrans-acrossTurn)/h, direction);
+        const Mat other = Mat::axial((acrossTrans-acrossTurn)/h, (alongTrans-acrossTrans+acrossTurn)/h, direction);
+        const Vec first = y[s]-x[s], second = y[s+1]-x[s+1];
+
+        // Tension.
+        const Real stiffness = property<Real>(pack, s, ChainPack::Stiffness);
+        const Real l0 = property<Real>(pack, s, ChainPack::RestLength);
+        const Real reciprocal = property<Real>(pack, s, ChainPack::InverseExtension);
+        Real coordinate, slope, unused, middleSlope;
+        stretchCoordinate(pack.stretching, reciprocal, length-l0, coordinate, slope);
+        stretchCoordinate(pack.stretching, reciprocal, 0.5*(segment.length+length)-l0, unused, middleSlope);
+        const Real drag = property<Real>(pack, s, ChainPack::Extensional)/(segment.length*length*h);
+        const Real tension = stiffness*middleSlope*(segment.theta*coordinate+(1-segment.theta)*segment.coordinate-
+                segment.randomCoordinate)+drag*(length-segment.length)-segment.randomTension;
+        const Real response = stiffness*middleSlope*segment.theta*slope+drag*segment.length/length;
+        const Vec pull = direction*tension;
+        const Real turning = 0.5*larger<Real>(segment.multiplier/length, -COMPRESSION*acrossTurn/h);
+        const Mat elastic = Mat::axial(turning, -turning, t)+Mat::outer(direction*response, t);
+        segment.newTangent = t;
+        segment.tension = tension;
+        segment.response = response;
+
+        here.diagonal = here.diagonal+same+elastic;
+        after.diagonal = after.diagonal+same+elastic;
+        here.lower = here.lower+other-elastic;
+        here.upper = here.upper+other-elastic;
+        here.right = here.right-same*first-other*second+pull;
+        after.right = after.right-same*second-other*first-pull;
+    }
+    void addJoint(const Vec* y, int s, Row& before, Row& here, Row& after) {
+        const Vec y1 = y[s]-y[s-1], y2 = y[s+1]-y[s];
+        const Vec newTangent1 = y1*(1/root(y1.dot(y1))), newTangent2 = y2*(1/root(y2.dot(y2)));
+        const Vec newBent = newTangent2-newTangent1;
+        const Vec newBend = newBent*bendFactor<Real>(pack.bending, newBent).f;
+        const ImplicitSegment<Real>& segment = segments[s];
+        const Vec middle1 = segments[s-1].difference+y1, middle2 = segment.difference+y2;
+        const Real inverse1 = 1/root(middle1.dot(middle1)), inverse2 = 1/root(middle2.dot(middle2));
+        const Vec t1 = middle1*inverse1, t2 = middle2*inverse2;
+        const Real perLength1 = 2*inverse1, perLength2 = 2*inverse2;
+
+        // The random bend turns with the joint.
+        const Vec sum = segments[s-1].tangent+segment.tangent+newTangent1+newTangent2;
+        const Vec bisector = sum*(1/root(sum.dot(sum)+TINY));
+        const Vec axis = crossProduct(segment.bisector, bisector);
+        const Real cosine = segment.bisector.dot(bisector);
+        const Vec random = segment.randomBend*cosine+crossProduct(axis, segment.randomBend)+
+                axis*(axis.dot(segment.randomBend)/(1+cosine+1e-12));
+
+        const Real stiffness = loaded<Real>(pack.joints, s);
+        const Vec u = newBend*segment.jointTheta+segment.bend*(1-segment.jointTheta)-random;
+        const Vec bent = t2-t1;
+        const BendFactor<Real> factor = bendFactor<Real>(pack.bending, bent);
+        const Real twist = factor.slope*u.dot(bent);
+        Vec force1 = t2*twist-u*factor.f, force2 = u*factor.f+t1*twist;
+        force1 = (force1-t1*t1.dot(force1))*(stiffness*perLength1);
+        force2 = (force2-t2*t2.dot(force2))*(stiffness*perLength2);
+        before.right = before.right+force1;
+        here.right = here.right-force1+force2;
+        after.right = after.right-force2;
+
+        const Real scale = stiffness*segment.jointTheta*factor.f*factor.f;
+        const Real scale1 = scale*perLength1*perLength1, scale2 = scale*perLength2*perLength2;
+        const Mat first = Mat::axial(scale1, -scale1, t1), last = Mat::axial(scale2, -scale2, t2);
+        const Real c = t1.dot(t2);
+        const Vec projected = t2-t1*c;
+        // -(1-t1 t1)(1-t2 t2)
+        const Mat mixed = (Mat::axial(1+Real{}, -1+Real{}, t1)-Mat::outer(projected, t2))*(-scale*perLength1*perLength2);
+        const Mat mixedT = mixed.transposed();
+        before.diagonal = before.diagonal+first;
+        here.diagonal = here.diagonal+first+last-mixed-mixedT;
+        after.diagonal = after.diagonal+last;
+        before.upper = before.upper+mixed-first;
+        before.lower = before.lower+mixedT-first;
+        here.upper = here.upper+mixed-last;
+        here.lower = here.lower+mixedT-last;
+        before.second = before.second-mixed;
+    }
+    /** Eliminate a node from the equations of the next two. Nothing passes through a fixed one. */
+    void eliminate(int node, const Row& row, Row& next, Row& second) {
+        const Real mobile = loaded<Real>(pack.mobile, node);
+        Mat diagonal = row.diagonal;
+        diagonal.x.x += 1-mobile;
+        diagonal.y.y += 1-mobile;
+        diagonal.z.z += 1-mobile;
+        ImplicitNode<Real>& result = nodes[node];
+        result.inverse = diagonal.inverse()*mobile;
+        result.next = result.inverse*row.upper;
+        result.second = result.inverse*row.second;
+        result.solution = result.inverse*row.right;
+        const Mat secondT = row.second.transposed();
+        next.diagonal = next.diagonal-row.lower*result.next;
+        next.upper = next.upper-row.lower*result.second;
+        next.lower = next.lower-secondT*result.next;
+        next.right = next.right-row.lower*result.solution;
+        second.diagonal = second.diagonal-secondT*result.second;
+        second.right = second.right-secondT*result.solution;
+    }
+    /** Find the changes of y, and the tensions that come with them. */
+    void substitute() {
+        for (int node = n-1; node >= 0; node--) {
+            change[node] = nodes[node].solution;
+            if (node < n-1)
+                change[node] = change[node]-nodes[node].next*change[node+1];
+            if (node < n-2)
+                change[node] = change[node]-nodes[node].second*change[node+2];
+        }
+        for (int s = 0; s < n-1; s++) {
+            ImplicitSegment<Real>& segment = segments[s];
+            segment.multiplier = segment.tension+segment.response*segment.newTangent.dot(change[s+1]-change[s]);
+        }
+    }
+    /**
+     * Add the metric forces of the lengths. The matrix is symmetric in the first iteration, so the blocks of its
+     * inverse follow from those of its elimination, from last to first.
+     */
+    void addMetricForces() {
+        Mat same = nodes[n-1].inverse, other = {}, sameAfter = {};
+        for (int s = n-2; s >= 0; s--) {
+            // Blocks of the inverse: (s,s), (s,s+1) and (s,s+2).
+            const ImplicitNode<Real>& node = nodes[s];
+            Mat newOther = node.next*same, newSecond = node.next*other;
+            newOther = (newOther+node.second*other.transposed())*(-1+Real{});
+            newSecond = (newSecond+node.second*sameAfter)*(-1+Real{});
+            const Mat newSame = node.inverse-node.next*newOther.transposed()-node.second*newSecond.transposed();
+
+            const ImplicitSegment<Real>& segment = segments[s];
+            const Vec t = segment.tangent;
+            Vec response = (same+newSame-newOther-newOther.transposed())*t;
+            response = response-t*t.dot(response);
+            const Real drag = property<Real>(pack, s, ChainPack::Extensional)/(segment.length*segment.length*h);
+            const Real noise = property<Real>(pack, s, ChainPack::Stiffness)*(2*segment.theta-1)+drag;
+            const Vec force = response*(settings.kT*noise/segment.length);
+            f[s] = f[s]+force;
+            f[s+1] = f[s+1]-force;
+            sameAfter = same;
+            same = newSame;
+            other = newOther;
+        }
+    }
+    /** Whether any lane has not converged; those that have are taken out. NaN counts as not converged. */
+    bool anyUnfinished(Real& active) {
+        Real excess = Real{};
+        for (int s = 0; s < n-1; s++) {
+            const Vec difference = change[s+1]-change[s];
+            const Real l0 = property<Real>(pack, s, ChainPack::RestLength)*NEWTON_TOLERANCE;
+            Real ratio = difference.dot(difference)/(l0*l0);
+            for (int i = 0; i < W; i++)
+                if (!(lane(ratio, i) < lane(excess, i)))
+                    lane(excess, i) = lane(ratio, i);
+        }
+        bool any = false;
+        for (int i = 0; i < W; i++) {
+            if (lane(excess, i) < 1)
+                lane(active, i) = 0;
+            any |= lane(active, i) != 0;
+        }
+        return any;
+    }
+    void findExcessiveChanges(const Vec* y, bool* failed) {
+        for (int s = 0; s < n-1; s++) {
+            const Vec difference = y[s+1]-y[s]-segments[s].difference;
+            Real square = difference.dot(difference), limit = property<Real>(pack, s, ChainPack::RestLength);
+            for (int i = 0; i < W; i++)
+                failed[i] |= s < pack.nodesOfLane[i]-1 && !(lane(square, i) < lane(limit, i)*lane(limit, i));
+        }
+    }
+};
+
+/** Advance the lanes that failed, from the start, by the same time in more and more parts. */
+template <int W> void divideStep(const ChainPack& pack, const Vector<typename Lanes<W>::Type>* x,
+            const Vector<typename Lanes<W>::Type>* f, StepSettings settings, Vector<typename Lanes<W>::Type>* y,
+            bool* failed, typename ImplicitStep<W>::Memory& memory, Scratch& scratch) {
+    typedef typename Lanes<W>::Type Real;
+    const double h = settings.stepSize;
+    Vector<Real>* from = scratch.reserve<Vector<Real> >(2*pack.nodes);
+    Vector<Real>* to = from+pack.nodes;
+    for (int division = 1; division <= LARGEST_DIVISION; division++) {
+        const int parts = 1<<division;
+        settings.stepSize = h/parts;
+        bool failedNow[W] = {}, failedPart[W];
+        for (int node = 0; node < pack.nodes; node++)
+            to[node] = x[node];
+        for (int part = 0; part < parts; part++) {
+            settings.part = parts+part;
+            for (int node = 0; node < pack.nodes; node++)
+                from[node] = to[node];
+            ImplicitStep<W>(pack, settings, memory).take(from, f, to, failedPart);
+            for (int i = 0; i < W; i++)
+                failedNow[i] |= failedPart[i];
+        }
+        bool any = false;
+        for (int i = 0; i < W; i++) {
+            if (failed[i] && !failedNow[i]) {
+                failed[i] = false;
+                for (int node = 0; node < pack.nodes; node++) {
+                    lane(y[node].x, i) = lane(to[node].x, i);
+                    lane(y[node].y, i) = lane(to[node].y, i);
+                    lane(y[node].z, i) = lane(to[node].z, i);
+                }
+            }
+            any |= failed[i];
+        }
+        if (!any)
+            return;
+    }
+}
+
+template <int W> Instability stepPackImplicitly(const ChainPack& pack, const double* positions, const double* forces,
+            const double* box, const StepSettings& settings, double* displacements) {
+    typedef typename Lanes<W>::Type Real;
+    static thread_local typename ImplicitStep<W>::Memory memory;
+    static thread_local Scratch vectors, scratch;
+    const int n = pack.nodes;
+    Vector<Real>* x = vectors.reserve<Vector<Real> >(3*n);
+    Vector<Real>* f = x+n;
+    Vector<Real>* y = f+n;
+    gatherPositions<W>(pack, positions, box, x);
+    gather<W>(pack, forces, f);
+    bool failed[W];
+    ImplicitStep<W>(pack, settings, memory).take(x, f, y, failed);
+    Instability result;
+    for (int i = 0; i < W; i++)
+        result.divided += failed[i];
+    if (result.divided > 0)
+        divideStep<W>(pack, x, f, settings, y, failed, memory, scratch);
+    for (int node = 0; node < n; node++)
+        for (int i = 0; i < W; i++) {
+            const int particle = pack.particles[node*W+i];
+            if (particle >= 0) {
+                displacements[3*particle] = lane(y[node].x, i)-lane(x[node].x, i);
+                displacements[3*particle+1] = lane(y[node].y, i)-lane(x[node].y, i);
+                displacements[3*particle+2] = lane(y[node].z, i)-lane(x[node].z, i);
+            }
+        }
+    for (int i = 0; i < W; i++)
+        if (failed[i] && result.chain < 0)
+            result.chain = pack.chain[i];
+    return result;
+}
