@@ -486,7 +486,9 @@ private:
             Mat newOther = node.next*same, newSecond = node.next*other;
             newOther = (newOther+node.second*other.transposed())*(-1+Real{});
             newSecond = (newSecond+node.second*sameAfter)*(-1+Real{});
-            const Mat newSame = node.inverse-node.next*newOther.transposed()-node.second*newSecond.transposed();
+            // Errors that are not symmetric would grow from node to node.
+            Mat newSame = node.inverse-node.next*newOther.transposed()-node.second*newSecond.transposed();
+            newSame = (newSame+newSame.transposed())*(0.5+Real{});
 
             const ImplicitSegment<Real>& segment = segments[s];
             const Vec t = segment.tangent;
