@@ -243,7 +243,8 @@ def implicit_time_step(filament_type, viscosity, temperature, segments=2):
     Its equilibrium is exact for linear forces at any step; what is left comes from segments that turn within one.
     A segment turns by the mean square of what a free segment does, 2 k_B T dt/gamma_rot, or, if that is less, of what
     its neighbours allow: after dt, waves of up to the length xi = (a dt l0/gamma_perp)^(1/4) have relaxed, which turns
-    it by k_B T xi/a. Either must stay below 0.1^2. A step must also resolve the slowest relaxation of the filament,
+    it by k_B T xi/a, and the filament turns as a whole by 24 k_B T dt l0/(gamma_perp L^3). Either must stay below
+    0.1^2. A step must also resolve the slowest relaxation of the filament,
     gamma_perp/(l0 a) (L/4.73)^4, by 20 steps.
 
     Returns
@@ -260,7 +261,9 @@ def implicit_time_step(filament_type, viscosity, temperature, segments=2):
         turning = free
     bends = segments > 1 and rigidity > 0.0
     if bends and kT > 0.0:
-        turning = max(free, friction_per_length * (_TURNING_ANGLE**2 * rigidity / kT) ** 4 / rigidity)
+        waves = friction_per_length * (_TURNING_ANGLE**2 * rigidity / kT) ** 4 / rigidity
+        whole = _TURNING_ANGLE**2 * friction_per_length * (segments * length) ** 3 / (24.0 * kT)
+        turning = max(free, min(waves, whole))
     bounds = {"turning": turning}
     allowed = dict(bounds)
     if bends:

@@ -14,6 +14,9 @@
 namespace cylchain {
 namespace CYLCHAIN_LOOPS {
 
+// Called functions cannot keep vectors in registers.
+#define CYLCHAIN_INLINE inline __attribute__((always_inline))
+
 template <int W> struct Lanes {
     typedef double Type __attribute__((vector_size(8*W)));
     typedef std::uint64_t Bits __attribute__((vector_size(8*W)));
@@ -23,11 +26,11 @@ template <> struct Lanes<1> {
     typedef std::uint64_t Bits;
 };
 
-template <class Real> inline double& lane(Real& value, int i) {
+template <class Real> CYLCHAIN_INLINE double& lane(Real& value, int i) {
     return reinterpret_cast<double*>(&value)[i];
 }
 
-template <class Real> inline Real root(Real value) {
+template <class Real> CYLCHAIN_INLINE Real root(Real value) {
     Real result;
     for (int i = 0; i < (int) (sizeof(Real)/sizeof(double)); i++)
         lane(result, i) = std::sqrt(lane(value, i));
@@ -36,10 +39,10 @@ template <class Real> inline Real root(Real value) {
 
 template <class Real> struct Vector {
     Real x, y, z;
-    Vector operator+(const Vector& v) const {return {x+v.x, y+v.y, z+v.z};}
-    Vector operator-(const Vector& v) const {return {x-v.x, y-v.y, z-v.z};}
-    Vector operator*(Real s) const {return {x*s, y*s, z*s};}
-    Real dot(const Vector& v) const {return x*v.x+y*v.y+z*v.z;}
+    CYLCHAIN_INLINE Vector operator+(const Vector& v) const {return {x+v.x, y+v.y, z+v.z};}
+    CYLCHAIN_INLINE Vector operator-(const Vector& v) const {return {x-v.x, y-v.y, z-v.z};}
+    CYLCHAIN_INLINE Vector operator*(Real s) const {return {x*s, y*s, z*s};}
+    CYLCHAIN_INLINE Real dot(const Vector& v) const {return x*v.x+y*v.y+z*v.z;}
 };
 
 /** A symmetric 3x3 matrix. */
@@ -87,7 +90,7 @@ private:
     std::size_t size = 0;
 };
 
-template <class Real> inline Real loaded(const std::vector<double>& values, std::size_t index) {
+template <class Real> CYLCHAIN_INLINE Real loaded(const std::vector<double>& values, std::size_t index) {
     Real result;
     for (int i = 0; i < (int) (sizeof(Real)/sizeof(double)); i++)
         lane(result, i) = values[index*(sizeof(Real)/sizeof(double))+i];
@@ -135,7 +138,7 @@ template <int W> void gatherPositions(const ChainPack& pack, const double* posit
     }
 }
 
-template <class Real> inline Real property(const ChainPack& pack, int segment, int which) {
+template <class Real> CYLCHAIN_INLINE Real property(const ChainPack& pack, int segment, int which) {
     return loaded<Real>(pack.properties, (std::size_t) segment*ChainPack::NumProperties+which);
 }
 
@@ -164,7 +167,7 @@ inline double bendingEnergy(BendingModel model, double stiffness, double c, doub
     return 0.5*stiffness*angle*angle;
 }
 
-template <class Real> inline Vector<Real> crossProduct(const Vector<Real>& a, const Vector<Real>& b) {
+template <class Real> CYLCHAIN_INLINE Vector<Real> crossProduct(const Vector<Real>& a, const Vector<Real>& b) {
     return {a.y*b.z-a.z*b.y, a.z*b.x-a.x*b.z, a.x*b.y-a.y*b.x};
 }
 

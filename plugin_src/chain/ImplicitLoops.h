@@ -35,24 +35,24 @@ const double TINY = 1e-300;
 
 template <class Real> struct Matrix {
     Vector<Real> x, y, z;
-    static Matrix axial(Real s, Real r, const Vector<Real>& t) {
+    static CYLCHAIN_INLINE Matrix axial(Real s, Real r, const Vector<Real>& t) {
         const Vector<Real> v = t*r;
         return {{s+v.x*t.x, v.x*t.y, v.x*t.z}, {v.y*t.x, s+v.y*t.y, v.y*t.z}, {v.z*t.x, v.z*t.y, s+v.z*t.z}};
     }
-    static Matrix outer(const Vector<Real>& a, const Vector<Real>& b) {
+    static CYLCHAIN_INLINE Matrix outer(const Vector<Real>& a, const Vector<Real>& b) {
         return {b*a.x, b*a.y, b*a.z};
     }
-    Matrix operator+(const Matrix& m) const {return {x+m.x, y+m.y, z+m.z};}
-    Matrix operator-(const Matrix& m) const {return {x-m.x, y-m.y, z-m.z};}
-    Matrix operator*(Real s) const {return {x*s, y*s, z*s};}
-    Vector<Real> operator*(const Vector<Real>& v) const {return {x.dot(v), y.dot(v), z.dot(v)};}
-    Matrix operator*(const Matrix& m) const {
+    CYLCHAIN_INLINE Matrix operator+(const Matrix& m) const {return {x+m.x, y+m.y, z+m.z};}
+    CYLCHAIN_INLINE Matrix operator-(const Matrix& m) const {return {x-m.x, y-m.y, z-m.z};}
+    CYLCHAIN_INLINE Matrix operator*(Real s) const {return {x*s, y*s, z*s};}
+    CYLCHAIN_INLINE Vector<Real> operator*(const Vector<Real>& v) const {return {x.dot(v), y.dot(v), z.dot(v)};}
+    CYLCHAIN_INLINE Matrix operator*(const Matrix& m) const {
         return {m.x*x.x+m.y*x.y+m.z*x.z, m.x*y.x+m.y*y.y+m.z*y.z, m.x*z.x+m.y*z.y+m.z*z.z};
     }
-    Matrix transposed() const {
+    CYLCHAIN_INLINE Matrix transposed() const {
         return {{x.x, y.x, z.x}, {x.y, y.y, z.y}, {x.z, y.z, z.z}};
     }
-    Matrix inverse() const {
+    CYLCHAIN_INLINE Matrix inverse() const {
         const Vector<Real> a = crossProduct(y, z), b = crossProduct(z, x), c = crossProduct(x, y);
         return Matrix {a, b, c}.transposed()*(1/x.dot(a));
     }
@@ -63,7 +63,7 @@ template <class Real> struct BendFactor {
     Real f, slope;
 };
 
-template <class Real> inline BendFactor<Real> bendFactor(BendingModel model, const Vector<Real>& difference) {
+template <class Real> CYLCHAIN_INLINE BendFactor<Real> bendFactor(BendingModel model, const Vector<Real>& difference) {
     const Real square = difference.dot(difference);
     if (model == BendingModel::KratkyPorod)
         return {1+Real{}, Real{}};
@@ -112,7 +112,7 @@ inline void feneCoordinate(double inverse, double e, double& q, double& slope) {
 }
 
 /** The length of a segment as a coordinate with the energy (stiffness/2) q^2. */
-template <class Real> inline void stretchCoordinate(StretchingModel model, Real inverse, Real e, Real& q, Real& slope) {
+template <class Real> CYLCHAIN_INLINE void stretchCoordinate(StretchingModel model, Real inverse, Real e, Real& q, Real& slope) {
     q = e;
     slope = 1+Real{};
     if (model == StretchingModel::FENE)
@@ -120,15 +120,12 @@ template <class Real> inline void stretchCoordinate(StretchingModel model, Real 
             feneCoordinate(lane(inverse, i), lane(e, i), lane(q, i), lane(slope, i));
 }
 
-template <class Real> inline Real larger(Real a, Real b) {
-    Real result;
-    for (int i = 0; i < (int) (sizeof(Real)/sizeof(double)); i++)
-        lane(result, i) = lane(a, i) > lane(b, i) ? lane(a, i) : lane(b, i);
-    return result;
+template <class Real> CYLCHAIN_INLINE Real larger(Real a, Real b) {
+    return a > b ? a : b;
 }
 
 /** Two vectors that are orthogonal to a unit vector and to each other (Duff et al., J. Comput. Graph. Tech. 2017, 6, 1). */
-template <class Real> inline void orthogonal(const Vector<Real>& n, Vector<Real>& first, Vector<Real>& second) {
+template <class Real> CYLCHAIN_INLINE void orthogonal(const Vector<Real>& n, Vector<Real>& first, Vector<Real>& second) {
     Real sign;
     Vector<Real> copy = n;
     for (int i = 0; i < (int) (sizeof(Real)/sizeof(double)); i++)
@@ -194,11 +191,9 @@ public:
         Real active = 1+Real{};
         for (int iteration = 0; iteration < NEWTON_ITERATIONS; iteration++) {
             eliminate(y);
-            if (iteration == 0 && settings.kT > 0) {
-                addMetricForces();
-                eliminate(y);
-            }
             substitute();
+            if (iteration == 0 && settings.kT > 0)
+                addMetricForces();
             for (int node = 0; node < n; node++)
                 y[node] = y[node]+change[node]*active;
             if (!anyUnfinished(active))
@@ -329,28 +324,34 @@ private:
     struct Row {
         Mat diagonal, lower, upper, second;
         Vec right;
+        void clear(const Vec& force) {
+            diagonal = lower = upper = second = Mat {};
+            right = force;
+        }
     };
     /** Linearise the equations around y, and eliminate the nodes from first to last. */
     void eliminate(const Vec* y) {
-        Row before = {}, here = {}, after = {};
-        here.right = f[0];
+        Row rows[3];
+        Row *before = rows, *here = rows+1, *after = rows+2;
+        here->clear(f[0]);
         for (int s = 0; s < n-1; s++) {
-            after = Row {};
-            after.right = f[s+1];
-            addSegment(y, s, here, after);
+            after->clear(f[s+1]);
+            addSegment(y, s, *here, *after);
             if (s > 0) {
-                addJoint(y, s, before, here, after);
-                eliminate(s-1, before, here, after);
+                addJoint(y, s, *before, *here, *after);
+                eliminate(s-1, *before, *here, *after);
             }
+            Row* const free = before;
             before = here;
             here = after;
+            after = free;
         }
-        after = Row {};
-        eliminate(n-2, before, here, after);
-        Row none = {};
-        eliminate(n-1, here, none, none);
+        after->clear(Vec {});
+        eliminate(n-2, *before, *here, *after);
+        before->clear(Vec {});
+        eliminate(n-1, *here, *after, *before);
     }
-    void addSegment(const Vec* y, int s, Row& here, Row& after) {
+    CYLCHAIN_INLINE void addSegment(const Vec* y, int s, Row& here, Row& after) {
         ImplicitSegment<Real>& segment = segments[s];
         const Vec difference = y[s+1]-y[s];
         const Real length = root(difference.dot(difference));
@@ -392,7 +393,7 @@ private:
         here.right = here.right-same*first-other*second+pull;
         after.right = after.right-same*second-other*first-pull;
     }
-    void addJoint(const Vec* y, int s, Row& before, Row& here, Row& after) {
+    CYLCHAIN_INLINE void addJoint(const Vec* y, int s, Row& before, Row& here, Row& after) {
         const Vec y1 = y[s]-y[s-1], y2 = y[s+1]-y[s];
         const Vec newTangent1 = y1*(1/root(y1.dot(y1))), newTangent2 = y2*(1/root(y2.dot(y2)));
         const Vec newBent = newTangent2-newTangent1;
@@ -441,7 +442,7 @@ private:
         before.second = before.second-mixed;
     }
     /** Eliminate a node from the equations of the next two. Nothing passes through a fixed one. */
-    void eliminate(int node, const Row& row, Row& next, Row& second) {
+    CYLCHAIN_INLINE void eliminate(int node, const Row& row, Row& next, Row& second) {
         const Real mobile = loaded<Real>(pack.mobile, node);
         Mat diagonal = row.diagonal;
         diagonal.x.x += 1-mobile;
@@ -510,10 +511,8 @@ private:
         for (int s = 0; s < n-1; s++) {
             const Vec difference = change[s+1]-change[s];
             const Real l0 = property<Real>(pack, s, ChainPack::RestLength)*NEWTON_TOLERANCE;
-            Real ratio = difference.dot(difference)/(l0*l0);
-            for (int i = 0; i < W; i++)
-                if (!(lane(ratio, i) < lane(excess, i)))
-                    lane(excess, i) = lane(ratio, i);
+            const Real ratio = difference.dot(difference)/(l0*l0);
+            excess = ratio < excess ? excess : ratio;
         }
         bool any = false;
         for (int i = 0; i < W; i++) {
