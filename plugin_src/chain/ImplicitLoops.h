@@ -324,41 +324,48 @@ private:
     struct Row {
         Mat diagonal, lower, upper, second;
         Vec right;
-        void clear(const Vec& force) {
-            diagonal = lower = upper = second = Mat {};
-            right = force;
-        }
+    };
+    /** The new segment, and the one between the old nodes and the new. */
+    struct Geometry {
+        Vec difference, tangent, middleTangent;
+        Real length, middleInverse;
     };
     /** Linearise the equations around y, and eliminate the nodes from first to last. */
     void eliminate(const Vec* y) {
         Row rows[3];
         Row *before = rows, *here = rows+1, *after = rows+2;
-        here->clear(f[0]);
+        Geometry previous, current;
+        here->diagonal = Mat {};
+        here->right = f[0];
         for (int s = 0; s < n-1; s++) {
-            after->clear(f[s+1]);
-            addSegment(y, s, *here, *after);
+            describeNew(y, s, current);
+            addSegment(y, s, current, *here, *after);
             if (s > 0) {
-                addJoint(y, s, *before, *here, *after);
-                eliminate(s-1, *before, *here, *after);
+                addJoint(s, previous, current, *before, *here, *after);
+                eliminate<2>(s-1, *before, *here, *after);
             }
+            previous = current;
             Row* const free = before;
             before = here;
             here = after;
             after = free;
         }
-        after->clear(Vec {});
-        eliminate(n-2, *before, *here, *after);
-        before->clear(Vec {});
-        eliminate(n-1, *here, *after, *before);
+        eliminate<1>(n-2, *before, *here, *after);
+        eliminate<0>(n-1, *here, *after, *before);
     }
-    CYLCHAIN_INLINE void addSegment(const Vec* y, int s, Row& here, Row& after) {
+    CYLCHAIN_INLINE void describeNew(const Vec* y, int s, Geometry& geometry) {
+        geometry.difference = y[s+1]-y[s];
+        geometry.length = root(geometry.difference.dot(geometry.difference));
+        geometry.tangent = geometry.difference*(1/geometry.length);
+        const Vec middle = (segments[s].difference+geometry.difference)*(0.5+Real{});
+        geometry.middleInverse = 1/root(middle.dot(middle));
+        geometry.middleTangent = middle*geometry.middleInverse;
+    }
+    /** Add a segment to the equations of its nodes. It is the first to do so for all but the first one's diagonal. */
+    CYLCHAIN_INLINE void addSegment(const Vec* y, int s, const Geometry& geometry, Row& here, Row& after) {
         ImplicitSegment<Real>& segment = segments[s];
-        const Vec difference = y[s+1]-y[s];
-        const Real length = root(difference.dot(difference));
-        const Vec t = difference*(1/length);
-        const Vec middle = (segment.difference+difference)*(0.5+Real{});
-        const Real inverseSquare = 1/middle.dot(middle), inverse = root(inverseSquare);
-        const Vec direction = middle*inverse;
+        const Real length = geometry.length, inverseSquare = geometry.middleInverse*geometry.middleInverse;
+        const Vec t = geometry.tangent, direction = geometry.middleTangent;
 
         // Friction.
         const Real acrossTrans = 0.25*property<Real>(pack, s, ChainPack::Perpendicular);
@@ -386,26 +393,23 @@ private:
         segment.tension = tension;
         segment.response = response;
 
-        here.diagonal = here.diagonal+same+elastic;
-        after.diagonal = after.diagonal+same+elastic;
-        here.lower = here.lower+other-elastic;
-        here.upper = here.upper+other-elastic;
+        after.diagonal = same+elastic;
+        here.diagonal = here.diagonal+after.diagonal;
+        here.lower = here.upper = other-elastic;
         here.right = here.right-same*first-other*second+pull;
-        after.right = after.right-same*second-other*first-pull;
+        after.right = f[s+1]-same*second-other*first-pull;
     }
-    CYLCHAIN_INLINE void addJoint(const Vec* y, int s, Row& before, Row& here, Row& after) {
-        const Vec y1 = y[s]-y[s-1], y2 = y[s+1]-y[s];
-        const Vec newTangent1 = y1*(1/root(y1.dot(y1))), newTangent2 = y2*(1/root(y2.dot(y2)));
-        const Vec newBent = newTangent2-newTangent1;
-        const Vec newBend = newBent*bendFactor<Real>(pack.bending, newBent).f;
+    /** Add the joint between two segments to the equations of their nodes. */
+    CYLCHAIN_INLINE void addJoint(int s, const Geometry& geometry1, const Geometry& geometry2, Row& before, Row& here,
+                Row& after) {
         const ImplicitSegment<Real>& segment = segments[s];
-        const Vec middle1 = segments[s-1].difference+y1, middle2 = segment.difference+y2;
-        const Real inverse1 = 1/root(middle1.dot(middle1)), inverse2 = 1/root(middle2.dot(middle2));
-        const Vec t1 = middle1*inverse1, t2 = middle2*inverse2;
-        const Real perLength1 = 2*inverse1, perLength2 = 2*inverse2;
+        const Vec t1 = geometry1.middleTangent, t2 = geometry2.middleTangent;
+        const Real perLength1 = geometry1.middleInverse, perLength2 = geometry2.middleInverse;
+        const Vec newBent = geometry2.tangent-geometry1.tangent;
+        const Vec newBend = newBent*bendFactor<Real>(pack.bending, newBent).f;
 
         // The random bend turns with the joint.
-        const Vec sum = segments[s-1].tangent+segment.tangent+newTangent1+newTangent2;
+        const Vec sum = segments[s-1].tangent+segment.tangent+geometry1.tangent+geometry2.tangent;
         const Vec bisector = sum*(1/root(sum.dot(sum)+TINY));
         const Vec axis = crossProduct(segment.bisector, bisector);
         const Real cosine = segment.bisector.dot(bisector);
@@ -439,10 +443,10 @@ private:
         before.lower = before.lower+mixedT-first;
         here.upper = here.upper+mixed-last;
         here.lower = here.lower+mixedT-last;
-        before.second = before.second-mixed;
+        before.second = mixed*(-1+Real{});
     }
-    /** Eliminate a node from the equations of the next two. Nothing passes through a fixed one. */
-    CYLCHAIN_INLINE void eliminate(int node, const Row& row, Row& next, Row& second) {
+    /** Eliminate a node from the equations of those of the next two that exist. Nothing passes through a fixed one. */
+    template <int FOLLOWING> CYLCHAIN_INLINE void eliminate(int node, const Row& row, Row& next, Row& second) {
         const Real mobile = loaded<Real>(pack.mobile, node);
         Mat diagonal = row.diagonal;
         diagonal.x.x += 1-mobile;
@@ -450,16 +454,22 @@ private:
         diagonal.z.z += 1-mobile;
         ImplicitNode<Real>& result = nodes[node];
         result.inverse = diagonal.inverse()*mobile;
-        result.next = result.inverse*row.upper;
-        result.second = result.inverse*row.second;
         result.solution = result.inverse*row.right;
-        const Mat secondT = row.second.transposed();
-        next.diagonal = next.diagonal-row.lower*result.next;
-        next.upper = next.upper-row.lower*result.second;
-        next.lower = next.lower-secondT*result.next;
-        next.right = next.right-row.lower*result.solution;
-        second.diagonal = second.diagonal-secondT*result.second;
-        second.right = second.right-secondT*result.solution;
+        if (FOLLOWING > 0) {
+            result.next = result.inverse*row.upper;
+            next.diagonal = next.diagonal-row.lower*result.next;
+            next.right = next.right-row.lower*result.solution;
+        }
+        if (FOLLOWING > 1) {
+            const Mat secondT = row.second.transposed();
+            result.second = result.inverse*row.second;
+            next.upper = next.upper-row.lower*result.second;
+            next.lower = next.lower-secondT*result.next;
+            second.diagonal = second.diagonal-secondT*result.second;
+            second.right = second.right-secondT*result.solution;
+        }
+        else
+            result.second = Mat {};
     }
     /** Find the changes of y, and the tensions that come with them. */
     void substitute() {
