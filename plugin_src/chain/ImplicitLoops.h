@@ -22,8 +22,8 @@
  * from those of the elimination.
  */
 
-/** The largest change of a segment in the last iteration, over its rest length. */
-const double NEWTON_TOLERANCE = 3e-3;
+/** The largest change of a segment in the last iteration, over its rest length; a fifth of it remains as an error. */
+const double NEWTON_TOLERANCE = 1e-2;
 const int NEWTON_ITERATIONS = 14;
 /** A step that does not converge is cut into at most two to this power. */
 const int LARGEST_DIVISION = 6;
