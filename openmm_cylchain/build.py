@@ -1,6 +1,6 @@
 """Filaments: puts filaments into a Topology, a System and positions, new or existing."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import openmm
@@ -12,8 +12,18 @@ from .engines.redistribution import joint_tensions
 from .equilibrium import draw_chain
 from .errors import InputError
 from .filament import FilamentType
-from .placement import check_shape, clamped_nodes, unit_vector, vector
-from .quantities import FORCE, LENGTH, TEMPERATURE, VISCOSITY, in_units_of, non_negative, positive, whole_number
+from .placement import check_shape, clamped_nodes, named_nodes, unit_vector, vector
+from .quantities import (
+    FORCE,
+    LENGTH,
+    STIFFNESS,
+    TEMPERATURE,
+    VISCOSITY,
+    in_units_of,
+    non_negative,
+    positive,
+    whole_number,
+)
 from .tension import segment_end_forces, split_external_forces
 from .timestep import check_scheme, recommended_time_step, warn_if_unstable
 
@@ -33,6 +43,25 @@ class Filament:
     def segments(self):
         """Number of segments."""
         return len(self.positions) - 1
+
+
+@dataclass(frozen=True)
+class Tether:
+    """A harmonic spring between a node and a point: energy (k/2) d^2 for their distance d.
+
+    Attributes
+    ----------
+    filament, node : int
+    point : tuple of three floats
+        In nm.
+    stiffness : float
+        k in kJ/(mol nm^2).
+    """
+
+    filament: int
+    node: int
+    point: tuple
+    stiffness: float
 
 
 class Filaments:
@@ -67,6 +96,7 @@ class Filaments:
         self._viscosity = positive(viscosity, VISCOSITY, "viscosity")
         self._temperature = non_negative(temperature, TEMPERATURE, "temperature")
         self._filaments = []
+        self._tethers = []
         self._nodes = None
 
     def __len__(self):
@@ -183,6 +213,73 @@ class Filaments:
         positions = draw_chain(filament_type, segments, self._temperature, generator, start, direction)
         return self._add(filament_type, positions, clamped, label)
 
+    def add_tether(self, filament, node, point, stiffness):
+        """Tether a node to a point by a harmonic spring, such as an optical trap: energy (k/2) |x - point|^2.
+
+        Scheme "implicit" takes tethers at the end of the step, like the filament's own forces, so they may be as stiff
+        as a segment. The explicit schemes, and other OpenMM forces in all schemes, need a step well below
+        2 gamma/k, where gamma is the friction of what the spring pulls, at least a quarter of a segment's parallel
+        friction per segment that meets in the node.
+
+        Parameters
+        ----------
+        filament : int
+            The filament's number.
+        node : int
+            The node's number in the filament; negative numbers count from the end. A node can have one tether.
+        point : (3,) length
+        stiffness : energy/length^2
+
+        Returns
+        -------
+        int
+            The tether's number, for ``move_tether``.
+
+        Raises
+        ------
+        InputError
+            For a filament or node that does not exist, a second tether, or a stiffness that is not positive.
+        """
+        label = f"Tether {len(self._tethers)}"
+        if self._nodes is not None:
+            raise InputError(f"{label} comes too late: the filaments are already in a System.")
+        filament = whole_number(filament, 0, f"{label}: filament")
+        if filament >= len(self):
+            raise InputError(f"{label}: filament {filament} does not exist; there are {len(self)}.")
+        (node,) = named_nodes([node], len(self[filament].positions), f"{label}:")
+        if any((one.filament, one.node) == (filament, node) for one in self._tethers):
+            raise InputError(f"{label}: node {node} of filament {filament} has a tether already.")
+        point = tuple(float(x) for x in vector(point, LENGTH, f"{label}: point"))
+        stiffness = positive(stiffness, STIFFNESS, f"{label}: stiffness")
+        self._tethers.append(Tether(filament, node, point, stiffness))
+        return len(self._tethers) - 1
+
+    def move_tether(self, context, tether, point, stiffness=None):
+        """Move the point of a tether in a Context, and change its stiffness if one is given.
+
+        Parameters
+        ----------
+        context : openmm.Context
+            Of the System that these filaments were put into.
+        tether : int
+            Number of the tether, as ``add_tether`` returned it.
+        point : (3,) length
+        stiffness : energy/length^2, optional
+
+        Raises
+        ------
+        InputError
+            For a tether that does not exist, or a point or a stiffness that is no such thing.
+        """
+        tether = whole_number(tether, 0, "tether")
+        if tether >= len(self._tethers):
+            raise InputError(f"Tether {tether} does not exist; there are {len(self._tethers)}.")
+        point = tuple(float(x) for x in vector(point, LENGTH, f"Tether {tether}: point"))
+        old = self._tethers[tether]
+        stiffness = old.stiffness if stiffness is None else positive(stiffness, STIFFNESS, f"Tether {tether}: stiffness")
+        self._engine.move_tether(context, tether, replace(old, point=point, stiffness=stiffness), self.node_indices)
+        self._tethers[tether] = replace(old, point=point, stiffness=stiffness)
+
     def _label(self, filament_type):
         if not isinstance(filament_type, FilamentType):
             raise InputError(
@@ -270,6 +367,7 @@ class Filaments:
             system,
             self._filaments,
             self._nodes,
+            self._tethers,
             self._viscosity,
             self._temperature,
             stretching_force_group,

@@ -38,18 +38,24 @@ def _check_folds(filament_type, positions, label):
         )
 
 
-def clamped_nodes(clamped, count, label):
-    """Return the clamped nodes, counted from the start and sorted; raise InputError for one that does not exist."""
-    nodes = set()
-    for node in np.atleast_1d(np.asarray(clamped, dtype=object)):
-        number = whole_number(node, -count, f"{label}: clamped node")
+def named_nodes(nodes, count, label):
+    """Return nodes, counted from the start and sorted; raise InputError for one that does not exist."""
+    numbers = set()
+    for node in np.atleast_1d(np.asarray(nodes, dtype=object)):
+        number = whole_number(node, -count, f"{label} node")
         number += count if number < 0 else 0
         if number >= count:
-            raise InputError(f"{label}: clamped node {node} does not exist; there are {count} nodes.")
-        nodes.add(number)
+            raise InputError(f"{label} node {node} does not exist; there are {count} nodes.")
+        numbers.add(number)
+    return tuple(sorted(numbers))
+
+
+def clamped_nodes(clamped, count, label):
+    """Return the clamped nodes, counted from the start and sorted; raise InputError for one that does not exist."""
+    nodes = named_nodes(clamped, count, f"{label}: clamped")
     if len(nodes) == count:
         raise InputError(f"{label} has all of its nodes clamped (mass zero): leave at least one free to move.")
-    return tuple(sorted(nodes))
+    return nodes
 
 
 def check_shape(filament_type, positions, label):

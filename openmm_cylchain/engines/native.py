@@ -61,7 +61,9 @@ SCHEMES = {
 _OTHER_FRICTION = 1.0
 
 
-def add_forces(system, filaments, node_indices, viscosity, temperature, stretching_force_group, bending_force_group):
+def add_forces(
+    system, filaments, node_indices, tethers, viscosity, temperature, stretching_force_group, bending_force_group
+):
     """Add the chains to a System that holds their nodes: one CylinderChainForce.
 
     Parameters
@@ -70,6 +72,7 @@ def add_forces(system, filaments, node_indices, viscosity, temperature, stretchi
     filaments : sequence of Filament
     node_indices : sequence of int arrays
         Particle indices of the nodes of each filament.
+    tethers : sequence of Tether
     viscosity, temperature : float
         For the friction of the segments.
     stretching_force_group, bending_force_group : int
@@ -89,7 +92,20 @@ def add_forces(system, filaments, node_indices, viscosity, temperature, stretchi
     force.setForceGroup(int(stretching_force_group))
     for filament, nodes in zip(filaments, node_indices):
         _add_chain(force, filament, nodes, viscosity, temperature)
+    for tether in tethers:
+        force.addTether(tether.filament, tether.node, openmm.Vec3(*tether.point), tether.stiffness)
     system.addForce(force)
+
+
+def move_tether(context, index, tether, node_indices):
+    """Change a tether in a Context; see ``Filaments.move_tether``."""
+    for force in context.getSystem().getForces():
+        if CylinderChainForce.isinstance(force):
+            force = CylinderChainForce.cast(force)
+            force.setTetherParameters(
+                index, tether.filament, tether.node, openmm.Vec3(*tether.point), tether.stiffness
+            )
+            force.updateParametersInContext(context)
 
 
 def _add_chain(force, filament, nodes, viscosity, temperature):

@@ -25,6 +25,7 @@ from .redistribution import STEPS
 REDISTRIBUTION_NAME = "CylinderChainRedistribution"
 STRETCHING_NAME = "CylinderChainStretching"
 BENDING_NAME = "CylinderChainBending"
+TETHER_NAME = "CylinderChainTethers"
 
 _IDLE, _FORCES, _CONFIGURATION = 0.0, 1.0, 2.0
 _PHASE = "cylinder_chain_phase"
@@ -41,7 +42,9 @@ _START = "cylinder_chain_start"
 _STEPPING = threading.Lock()
 
 
-def add_forces(system, filaments, node_indices, viscosity, temperature, stretching_force_group, bending_force_group):
+def add_forces(
+    system, filaments, node_indices, tethers, viscosity, temperature, stretching_force_group, bending_force_group
+):
     """Add the chains' own forces to a System that holds their nodes.
 
     Parameters
@@ -50,6 +53,8 @@ def add_forces(system, filaments, node_indices, viscosity, temperature, stretchi
     filaments : sequence of Filament
     node_indices : sequence of int arrays
         Particle indices of the nodes of each filament.
+    tethers : sequence of Tether
+        Their force joins the stretching forces' group.
     viscosity, temperature : float
         Not used by this engine, whose integrator holds the friction.
     stretching_force_group, bending_force_group : int
@@ -61,6 +66,29 @@ def add_forces(system, filaments, node_indices, viscosity, temperature, stretchi
         joints += [(filament.type, *triple) for triple in zip(nodes, nodes[1:], nodes[2:])]
     add_stretching_forces(system, segments, stretching_force_group)
     add_bending_forces(system, joints, bending_force_group)
+    if tethers:
+        add_tethers(system, tethers, node_indices, stretching_force_group)
+
+
+def add_tethers(system, tethers, node_indices, force_group):
+    """Add one CustomExternalForce for all tethers."""
+    force = openmm.CustomExternalForce("0.5*tether_stiffness*((x-tether_x)^2+(y-tether_y)^2+(z-tether_z)^2)")
+    for name in ("tether_x", "tether_y", "tether_z", "tether_stiffness"):
+        force.addPerParticleParameter(name)
+    force.setName(TETHER_NAME)
+    force.setForceGroup(force_group)
+    for tether in tethers:
+        force.addParticle(int(node_indices[tether.filament][tether.node]), [*tether.point, tether.stiffness])
+    system.addForce(force)
+
+
+def move_tether(context, index, tether, node_indices):
+    """Change a tether in a Context; see ``Filaments.move_tether``."""
+    for force in context.getSystem().getForces():
+        if force.getName() == TETHER_NAME:
+            node = int(node_indices[tether.filament][tether.node])
+            force.setParticleParameters(index, node, [*tether.point, tether.stiffness])
+            force.updateParametersInContext(context)
 
 
 def create_integrator(

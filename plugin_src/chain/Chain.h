@@ -45,6 +45,12 @@ struct Segment {
     double parallel, perpendicular, rotational, extensional;
 };
 
+/** A spring between a node and a point: its energy is (stiffness/2) d^2 for their distance d. */
+struct Tether {
+    int node;
+    double point[3], stiffness;
+};
+
 /** A chain of segments that share nodes: segment s joins the nodes s (its minus end) and s+1 (its plus end). */
 struct Chain {
     /** Particle of each node. */
@@ -57,6 +63,7 @@ struct Chain {
     StretchingModel stretching;
     /** Nodes that do not move. */
     std::vector<bool> fixed;
+    std::vector<Tether> tethers;
 };
 
 } // namespace cylchain

@@ -48,6 +48,8 @@ void fillLane(ChainPack& pack, int lane, const Chain& chain, int index) {
     }
     for (size_t joint = 0; joint < chain.joints.size(); joint++)
         pack.joints[(joint+1)*lanes+lane] = chain.joints[joint];
+    for (const Tether& tether : chain.tethers)
+        pack.tethers.push_back({tether, lane});
     for (int s = 0; s < pack.nodes-1; s++) {
         const bool filling = (s >= (int) chain.segments.size());
         const Segment segment = filling ? Segment {1, 0, 1, 0, 0, 0, 0} : chain.segments[s];
@@ -82,6 +84,9 @@ ChainPack packed(const vector<Chain>& chains, const vector<int>& members) {
     pack.properties.resize((places-pack.lanes)*ChainPack::NumProperties);
     for (int lane = 0; lane < pack.lanes; lane++)
         fillLane(pack, lane, chains[members[lane]], members[lane]);
+    stable_sort(pack.tethers.begin(), pack.tethers.end(), [] (const LaneTether& a, const LaneTether& b) {
+        return a.node < b.node;
+    });
     return pack;
 }
 

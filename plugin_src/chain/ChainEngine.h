@@ -11,7 +11,7 @@ namespace cylchain {
 
 /** Energies of a pack of chains. */
 struct ChainEnergy {
-    double stretching = 0, bending = 0;
+    double stretching = 0, bending = 0, tethers = 0;
 };
 
 /** Where a step has gone wrong: a segment whose ends would move against each other by more than its rest length. */

@@ -112,6 +112,15 @@ template <int W> void gather(const ChainPack& pack, const double* values, Vector
         }
 }
 
+/** Take a displacement to its nearest image. */
+inline void wrap(double* d, const double* box) {
+    for (int k = 2; k >= 0; k--) {
+        const double images = std::floor(d[k]/box[4*k]+0.5);
+        for (int j = 0; j < 3; j++)
+            d[j] -= images*box[3*k+j];
+    }
+}
+
 /** Bring positions into lanes. Each node is the image that is nearest to the one before it if there is a box. */
 template <int W> void gatherPositions(const ChainPack& pack, const double* positions, const double* box,
             Vector<typename Lanes<W>::Type>* x) {
@@ -126,11 +135,7 @@ template <int W> void gatherPositions(const ChainPack& pack, const double* posit
             for (int node = 1; node < pack.nodesOfLane[i]; node++) {
                 double d[] = {lane(x[node].x, i)-lane(x[node-1].x, i), lane(x[node].y, i)-lane(x[node-1].y, i),
                         lane(x[node].z, i)-lane(x[node-1].z, i)};
-                for (int k = 2; k >= 0; k--) {
-                    const double images = std::floor(d[k]/box[4*k]+0.5);
-                    for (int j = 0; j < 3; j++)
-                        d[j] -= images*box[3*k+j];
-                }
+                wrap(d, box);
                 lane(x[node].x, i) = lane(x[node-1].x, i)+d[0];
                 lane(x[node].y, i) = lane(x[node-1].y, i)+d[1];
                 lane(x[node].z, i) = lane(x[node-1].z, i)+d[2];
@@ -169,6 +174,16 @@ inline double bendingEnergy(BendingModel model, double stiffness, double c, doub
 
 template <class Real> CYLCHAIN_INLINE Vector<Real> crossProduct(const Vector<Real>& a, const Vector<Real>& b) {
     return {a.y*b.z-a.z*b.y, a.z*b.x-a.x*b.z, a.x*b.y-a.y*b.x};
+}
+
+/** The vector from a tether's point to its node. */
+template <int W> void tetherVector(const LaneTether& tether, Vector<typename Lanes<W>::Type>* x, const double* box,
+            double* d) {
+    d[0] = lane(x[tether.node].x, tether.lane)-tether.point[0];
+    d[1] = lane(x[tether.node].y, tether.lane)-tether.point[1];
+    d[2] = lane(x[tether.node].z, tether.lane)-tether.point[2];
+    if (box != NULL)
+        wrap(d, box);
 }
 
 template <int W> ChainEnergy addForcesTo(const ChainPack& pack, const double* positions, double* forces,
@@ -233,6 +248,14 @@ template <int W> ChainEnergy addForcesTo(const ChainPack& pack, const double* po
         inverseBefore = inverse;
     }
     f[pack.nodes-1] = push;
+    for (const LaneTether& tether : pack.tethers) {
+        double d[3];
+        tetherVector<W>(tether, x, box, d);
+        lane(f[tether.node].x, tether.lane) -= tether.stiffness*d[0];
+        lane(f[tether.node].y, tether.lane) -= tether.stiffness*d[1];
+        lane(f[tether.node].z, tether.lane) -= tether.stiffness*d[2];
+        energy.tethers += 0.5*tether.stiffness*(d[0]*d[0]+d[1]*d[1]+d[2]*d[2]);
+    }
     for (int node = 0; node < pack.nodes; node++)
         for (int i = 0; i < W; i++) {
             const int particle = pack.particles[node*W+i];

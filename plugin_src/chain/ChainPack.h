@@ -6,6 +6,11 @@
 
 namespace cylchain {
 
+/** A tether of the chain in a lane. */
+struct LaneTether : Tether {
+    int lane;
+};
+
 /**
  * Chains side by side: the numbers of all chains for one segment lie next to each other, one in each lane. Chains that
  * are shorter than the longest one are filled up with segments without friction whose nodes are fixed.
@@ -27,6 +32,8 @@ struct ChainPack {
     std::vector<double> joints;
     /** One for each node that moves, [node][lane]; zero for others. */
     std::vector<double> mobile;
+    /** The tethers of all lanes, by their nodes. */
+    std::vector<LaneTether> tethers;
 };
 
 /** The loops over a pack, compiled for one instruction set. */

@@ -6,7 +6,7 @@
  *
  *     Z(m) (y-x)/h = f + f_random(x) + f_drift(x) - sum_a T_a J_a(m)
  *
- * where the a are the lengths of segments and the bends of joints, each with an energy k q^2/2, J_a(m) is the gradient
+ * where the a are the lengths of segments, the bends of joints and the components of tethers, each with an energy k q^2/2, J_a(m) is the gradient
  * of q_a, and
  *
  *     T_a = k (theta q_a(y) + (1-theta) q_a(x) - (2 theta-1)^(1/2) q_random),    theta = max(1/2, 1-1/z).
@@ -149,6 +149,11 @@ template <class Real> struct ImplicitSegment {
     Real multiplier;
 };
 
+/** What a step keeps of a tether: the vector from its point to its node at the start, its noise and how implicit it is. */
+struct ImplicitTether {
+    double start[3], random[3], theta;
+};
+
 /** What elimination leaves of a node: y = solution - next y(+1) - second y(+2). */
 template <class Real> struct ImplicitNode {
     Matrix<Real> inverse, next, second;
@@ -161,10 +166,11 @@ template <int W> class ImplicitStep {
     typedef Matrix<Real> Mat;
 public:
     struct Memory {
-        Scratch segments, nodes, vectors;
+        Scratch segments, nodes, vectors, tethers;
     };
-    ImplicitStep(const ChainPack& pack, const StepSettings& settings, Memory& memory) : pack(pack), settings(settings),
-            n(pack.nodes), h(settings.stepSize) {
+    ImplicitStep(const ChainPack& pack, const StepSettings& settings, const double* box, Memory& memory) : pack(pack),
+            settings(settings), box(box), n(pack.nodes), h(settings.stepSize) {
+        tethers = memory.tethers.template reserve<ImplicitTether>(pack.tethers.size());
         segments = memory.segments.template reserve<ImplicitSegment<Real> >(n);
         nodes = memory.nodes.template reserve<ImplicitNode<Real> >(n);
         f = memory.vectors.template reserve<Vec>(3*n);
@@ -206,10 +212,12 @@ public:
 private:
     const ChainPack& pack;
     const StepSettings& settings;
+    const double* const box;
     const int n;
     const double h;
     ImplicitSegment<Real>* segments;
     ImplicitNode<Real>* nodes;
+    ImplicitTether* tethers;
     Vec *f, *change, *x;
 
     /** Describe the start of a step, without noise. */
@@ -230,6 +238,8 @@ private:
             if (s > 0)
                 describeJoint(s);
         }
+        for (std::size_t i = 0; i < pack.tethers.size(); i++)
+            describeTether(pack.tethers[i], tethers[i]);
     }
     void describeJoint(int s) {
         ImplicitSegment<Real>& segment = segments[s];
@@ -241,7 +251,21 @@ private:
         const Real bendRate = 4*h*loaded<Real>(pack.joints, s)+TINY;
         segment.jointTheta = larger<Real>(0.5+Real{}, 1-friction/bendRate);
     }
-    /** Draw the random forces, lengths and bends. */
+    void describeTether(const LaneTether& tether, ImplicitTether& result) {
+        tetherVector<W>(tether, x, box, result.start);
+        double friction = 0;
+        for (int s = tether.node-1; s <= tether.node; s++)
+            if (s >= 0 && s < pack.nodesOfLane[tether.lane]-1) {
+                Real parallel = property<Real>(pack, s, ChainPack::Parallel), l0 = property<Real>(pack, s, ChainPack::RestLength);
+                Real extensional = property<Real>(pack, s, ChainPack::Extensional);
+                const double length = lane(l0, tether.lane);
+                friction += 0.25*lane(parallel, tether.lane)+lane(extensional, tether.lane)/(length*length);
+            }
+        result.theta = std::fmax(0.5, 1-friction/(h*tether.stiffness+TINY));
+        for (double& random : result.random)
+            random = 0;
+    }
+    /** Draw the random forces, lengths and bends, and those of tethers. */
     void addNoise() {
         GaussianLanes<W> gaussian(pack, settings);
         const double amplitude = std::sqrt(2*settings.kT/h);
@@ -262,6 +286,11 @@ private:
             drawLength(gaussian, s);
             if (s > 0)
                 drawBend(gaussian, s);
+        }
+        for (std::size_t i = 0; i < pack.tethers.size(); i++) {
+            const double deviation = std::sqrt(settings.kT/(pack.tethers[i].stiffness+TINY)*(2*tethers[i].theta-1));
+            for (double& random : tethers[i].random)
+                random = deviation*gaussian.nextOfLane(pack.tethers[i].lane);
         }
     }
     void drawLength(GaussianLanes<W>& gaussian, int s) {
@@ -335,11 +364,13 @@ private:
         Row rows[3];
         Row *before = rows, *here = rows+1, *after = rows+2;
         Geometry previous, current;
+        std::size_t tether = 0;
         here->diagonal = Mat {};
         here->right = f[0];
         for (int s = 0; s < n-1; s++) {
             describeNew(y, s, current);
             addSegment(y, s, current, *here, *after);
+            addTethers(y, s, tether, *here);
             if (s > 0) {
                 addJoint(s, previous, current, *before, *here, *after);
                 eliminate<2>(s-1, *before, *here, *after);
@@ -350,6 +381,7 @@ private:
             here = after;
             after = free;
         }
+        addTethers(y, n-1, tether, *here);
         eliminate<1>(n-2, *before, *here, *after);
         eliminate<0>(n-1, *here, *after, *before);
     }
@@ -398,6 +430,21 @@ private:
         here.lower = here.upper = other-elastic;
         here.right = here.right-same*first-other*second+pull;
         after.right = f[s+1]-same*second-other*first-pull;
+    }
+    /** Add the tethers of a node, the next ones, to its equations. */
+    void addTethers(const Vec* y, int node, std::size_t& next, Row& row) {
+        for (; next < pack.tethers.size() && pack.tethers[next].node == node; next++) {
+            const int i = pack.tethers[next].lane;
+            const ImplicitTether& tether = tethers[next];
+            Vec moved = y[node]-x[node];
+            const double stiffness = pack.tethers[next].stiffness, implicit = stiffness*tether.theta;
+            lane(row.right.x, i) -= implicit*lane(moved.x, i)+stiffness*(tether.start[0]-tether.random[0]);
+            lane(row.right.y, i) -= implicit*lane(moved.y, i)+stiffness*(tether.start[1]-tether.random[1]);
+            lane(row.right.z, i) -= implicit*lane(moved.z, i)+stiffness*(tether.start[2]-tether.random[2]);
+            lane(row.diagonal.x.x, i) += implicit;
+            lane(row.diagonal.y.y, i) += implicit;
+            lane(row.diagonal.z.z, i) += implicit;
+        }
     }
     /** Add the joint between two segments to the equations of their nodes. */
     CYLCHAIN_INLINE void addJoint(int s, const Geometry& geometry1, const Geometry& geometry2, Row& before, Row& here,
@@ -545,7 +592,7 @@ private:
 /** Advance the lanes that failed, from the start, by the same time in more and more parts. */
 template <int W> void divideStep(const ChainPack& pack, const Vector<typename Lanes<W>::Type>* x,
             const Vector<typename Lanes<W>::Type>* f, StepSettings settings, Vector<typename Lanes<W>::Type>* y,
-            bool* failed, typename ImplicitStep<W>::Memory& memory, Scratch& scratch) {
+            const double* box, bool* failed, typename ImplicitStep<W>::Memory& memory, Scratch& scratch) {
     typedef typename Lanes<W>::Type Real;
     const double h = settings.stepSize;
     Vector<Real>* from = scratch.reserve<Vector<Real> >(2*pack.nodes);
@@ -560,7 +607,7 @@ template <int W> void divideStep(const ChainPack& pack, const Vector<typename La
             settings.part = parts+part;
             for (int node = 0; node < pack.nodes; node++)
                 from[node] = to[node];
-            ImplicitStep<W>(pack, settings, memory).take(from, f, to, failedPart);
+            ImplicitStep<W>(pack, settings, box, memory).take(from, f, to, failedPart);
             for (int i = 0; i < W; i++)
                 failedNow[i] |= failedPart[i];
         }
@@ -593,12 +640,12 @@ template <int W> Instability stepPackImplicitly(const ChainPack& pack, const dou
     gatherPositions<W>(pack, positions, box, x);
     gather<W>(pack, forces, f);
     bool failed[W];
-    ImplicitStep<W>(pack, settings, memory).take(x, f, y, failed);
+    ImplicitStep<W>(pack, settings, box, memory).take(x, f, y, failed);
     Instability result;
     for (int i = 0; i < W; i++)
         result.divided += failed[i];
     if (result.divided > 0)
-        divideStep<W>(pack, x, f, settings, y, failed, memory, scratch);
+        divideStep<W>(pack, x, f, settings, y, box, failed, memory, scratch);
     for (int node = 0; node < n; node++)
         for (int i = 0; i < W; i++) {
             const int particle = pack.particles[node*W+i];

@@ -91,7 +91,18 @@ static void raiseOpenMMException(const std::exception& e) {
     }
 }
 
-%apply int& OUTPUT {int& bendingModel, int& stretchingModel};
+%apply int& OUTPUT {int& bendingModel, int& stretchingModel, int& chain, int& node};
+
+%typemap(in, numinputs=0) Vec3& point (OpenMM::Vec3 value) {
+    $1 = &value;
+}
+
+%typemap(argout, fragment="Vec3_to_PyVec3") Vec3& point {
+    $result = SWIG_Python_AppendOutput($result, Vec3_to_PyVec3(*$1), 1);
+}
+
+%typemap(argout) const Vec3& point {
+}
 %apply double& OUTPUT {double& restLength, double& stretchingStiffness, double& maximumExtension,
         double& parallelFriction, double& perpendicularFriction, double& rotationalFriction,
         double& extensionalFriction, double& stiffness, double& stretching, double& bending};
@@ -114,6 +125,10 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %}
 %pythonappend OpenMM::CylinderChainForce::getJointParameters(int, int, double&) const %{
     val = unit.Quantity(val, _ENERGY)
+%}
+%pythonappend OpenMM::CylinderChainForce::getTetherParameters(int, int&, int&, Vec3&, double&) const %{
+    val[2] = unit.Quantity(val[2], _LENGTH)
+    val[3] = unit.Quantity(val[3], _STIFFNESS)
 %}
 %pythonappend OpenMM::CylinderChainForce::computeEnergies(Context&, double&, double&) const %{
     val = [unit.Quantity(v, _ENERGY) for v in val]
@@ -185,5 +200,6 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 
 %ignore OpenMM::CylinderChainForce::SegmentInfo;
 %ignore OpenMM::CylinderChainForce::ChainInfo;
+%ignore OpenMM::CylinderChainForce::TetherInfo;
 %include "openmm/CylinderChainForce.h"
 %include "openmm/CylinderChainIntegrator.h"

@@ -27,6 +27,20 @@ static cylchain::Chain describeTopology(const CylinderChainForce& force, int ind
     return chain;
 }
 
+static void copyTethers(const CylinderChainForce& force, vector<cylchain::Chain>& chains) {
+    for (cylchain::Chain& chain : chains)
+        chain.tethers.clear();
+    for (int i = 0; i < force.getNumTethers(); i++) {
+        int chain;
+        cylchain::Tether tether;
+        Vec3 point;
+        force.getTetherParameters(i, chain, tether.node, point, tether.stiffness);
+        for (int k = 0; k < 3; k++)
+            tether.point[k] = point[k];
+        chains[chain].tethers.push_back(tether);
+    }
+}
+
 vector<cylchain::Chain> describeChains(const System& system, const CylinderChainForce& force) {
     vector<cylchain::Chain> chains;
     for (int i = 0; i < force.getNumChains(); i++) {
@@ -36,6 +50,7 @@ vector<cylchain::Chain> describeChains(const System& system, const CylinderChain
         copyParameters(force, i, chain);
         chains.push_back(chain);
     }
+    copyTethers(force, chains);
     return chains;
 }
 
@@ -50,6 +65,7 @@ void updateChains(vector<cylchain::Chain>& chains, const CylinderChainForce& for
             throw OpenMMException("updateParametersInContext: The models of a chain have changed");
         copyParameters(force, i, chains[i]);
     }
+    copyTethers(force, chains);
 }
 
 } // namespace OpenMM

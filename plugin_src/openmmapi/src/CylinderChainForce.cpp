@@ -21,6 +21,10 @@ static void checkStiffness(double stiffness) {
         throw OpenMMException("CylinderChainForce: The stiffness of a joint cannot be negative and must be finite");
 }
 
+static string twoTethers(int chain, int node) {
+    return "CylinderChainForce: Node "+to_string(node)+" of chain "+to_string(chain)+" cannot have two tethers";
+}
+
 CylinderChainForce::CylinderChainForce() : usePeriodic(false) {
 }
 
@@ -131,6 +135,44 @@ void CylinderChainForce::setJointParameters(int chain, int joint, double stiffne
     ASSERT_VALID_INDEX(joint, joints);
     checkStiffness(stiffness);
     joints[joint] = stiffness;
+}
+
+void CylinderChainForce::checkTether(int chain, int node, const Vec3& point, double stiffness) const {
+    const vector<int>& particles = getChain(chain).particles;
+    ASSERT_VALID_INDEX(node, particles);
+    for (int i = 0; i < 3; i++)
+        if (!isfinite(point[i]))
+            throw OpenMMException("CylinderChainForce: The point of a tether must be finite");
+    if (!(stiffness >= 0 && isfinite(stiffness)))
+        throw OpenMMException("CylinderChainForce: The stiffness of a tether cannot be negative and must be finite");
+}
+
+int CylinderChainForce::addTether(int chain, int node, const Vec3& point, double stiffness) {
+    checkTether(chain, node, point, stiffness);
+    if (!tetheredNodes.insert({chain, node}).second)
+        throw OpenMMException(twoTethers(chain, node));
+    tethers.push_back({chain, node, point, stiffness});
+    return tethers.size()-1;
+}
+
+void CylinderChainForce::getTetherParameters(int index, int& chain, int& node, Vec3& point, double& stiffness) const {
+    ASSERT_VALID_INDEX(index, tethers);
+    chain = tethers[index].chain;
+    node = tethers[index].node;
+    point = tethers[index].point;
+    stiffness = tethers[index].stiffness;
+}
+
+void CylinderChainForce::setTetherParameters(int index, int chain, int node, const Vec3& point, double stiffness) {
+    ASSERT_VALID_INDEX(index, tethers);
+    checkTether(chain, node, point, stiffness);
+    TetherInfo& tether = tethers[index];
+    if (tether.chain != chain || tether.node != node) {
+        if (!tetheredNodes.insert({chain, node}).second)
+            throw OpenMMException(twoTethers(chain, node));
+        tetheredNodes.erase({tether.chain, tether.node});
+    }
+    tether = {chain, node, point, stiffness};
 }
 
 void CylinderChainForce::updateParametersInContext(Context& context) {

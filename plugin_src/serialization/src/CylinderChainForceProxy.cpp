@@ -11,7 +11,7 @@ CylinderChainForceProxy::CylinderChainForceProxy() : SerializationProxy("Cylinde
 }
 
 void CylinderChainForceProxy::serialize(const void* object, SerializationNode& node) const {
-    node.setIntProperty("version", 1);
+    node.setIntProperty("version", 2);
     const CylinderChainForce& force = *reinterpret_cast<const CylinderChainForce*>(object);
     node.setIntProperty("forceGroup", force.getForceGroup());
     node.setStringProperty("name", force.getName());
@@ -42,6 +42,16 @@ void CylinderChainForceProxy::serialize(const void* object, SerializationNode& n
             joints.createChildNode("Joint").setDoubleProperty("stiffness", stiffness);
         }
     }
+    SerializationNode& tethers = node.createChildNode("Tethers");
+    for (int i = 0; i < force.getNumTethers(); i++) {
+        int chain, tethered;
+        Vec3 point;
+        double stiffness;
+        force.getTetherParameters(i, chain, tethered, point, stiffness);
+        tethers.createChildNode("Tether").setIntProperty("chain", chain).setIntProperty("node", tethered)
+                .setDoubleProperty("x", point[0]).setDoubleProperty("y", point[1]).setDoubleProperty("z", point[2])
+                .setDoubleProperty("stiffness", stiffness);
+    }
 }
 
 static void addSegment(CylinderChainForce& force, int chain, int segment, const SerializationNode& node) {
@@ -71,7 +81,8 @@ static void addChain(CylinderChainForce& force, const SerializationNode& node) {
 }
 
 void* CylinderChainForceProxy::deserialize(const SerializationNode& node) const {
-    if (node.getIntProperty("version") != 1)
+    const int version = node.getIntProperty("version");
+    if (version < 1 || version > 2)
         throw OpenMMException("Unsupported version number");
     unique_ptr<CylinderChainForce> force(new CylinderChainForce());
     force->setForceGroup(node.getIntProperty("forceGroup"));
@@ -79,5 +90,10 @@ void* CylinderChainForceProxy::deserialize(const SerializationNode& node) const 
     force->setUsesPeriodicBoundaryConditions(node.getBoolProperty("usesPeriodic"));
     for (auto& chain : node.getChildNode("Chains").getChildren())
         addChain(*force, chain);
+    if (version > 1)
+        for (auto& tether : node.getChildNode("Tethers").getChildren())
+            force->addTether(tether.getIntProperty("chain"), tether.getIntProperty("node"),
+                    Vec3(tether.getDoubleProperty("x"), tether.getDoubleProperty("y"), tether.getDoubleProperty("z")),
+                    tether.getDoubleProperty("stiffness"));
     return force.release();
 }

@@ -3,6 +3,9 @@
 
 #include "openmm/Context.h"
 #include "openmm/Force.h"
+#include "openmm/Vec3.h"
+#include <set>
+#include <utility>
 #include <vector>
 
 namespace OpenMM {
@@ -17,11 +20,13 @@ namespace OpenMM {
  * addChain() once for each chain.  All segments and joints of a chain begin with the same parameters; call
  * setSegmentParameters() and setJointParameters() for chains that are not uniform.
  *
+ * Nodes may be tethered to points, for instance to those of optical traps: see addTether().
+ *
  * The friction coefficients have no influence on forces and energies.  CylinderChainIntegrator reads them here, and
  * moves the chains accordingly.  Every other Integrator takes this class for an ordinary Force.
  *
- * After a Context has been created, parameters of segments and joints may be changed: call updateParametersInContext()
- * to copy them over.
+ * After a Context has been created, parameters of segments, joints and tethers may be changed: call
+ * updateParametersInContext() to copy them over.
  */
 class CylinderChainForce : public Force {
 public:
@@ -166,9 +171,49 @@ public:
      */
     void setJointParameters(int chain, int joint, double stiffness);
     /**
-     * Copy the parameters of segments and joints to a Context, so that changes made by setSegmentParameters() and
-     * setJointParameters() take effect in it.  Models and particles cannot be changed in this way, and neither can
-     * chains be added.
+     * Get the number of tethers.
+     */
+    int getNumTethers() const {
+        return tethers.size();
+    }
+    /**
+     * Tether a node to a point by a harmonic spring with the energy (k/2) d^2 for their distance d; the distance to
+     * the nearest periodic image if this Force makes use of periodic boundary conditions.  A node can have one tether.
+     *
+     * CylinderChainIntegrator's scheme Implicit treats tethers like the other forces of chains, so they may be as stiff
+     * as segments.
+     *
+     * @param chain      the index of the chain
+     * @param node       the index of the node in the chain
+     * @param point      the point, measured in nm
+     * @param stiffness  the stiffness k of the spring, measured in kJ/mol/nm^2
+     * @return the index of the tether that was added
+     */
+    int addTether(int chain, int node, const Vec3& point, double stiffness);
+    /**
+     * Get the parameters of a tether.
+     *
+     * @param index           the index of the tether
+     * @param[out] chain      the index of the chain
+     * @param[out] node       the index of the node in the chain
+     * @param[out] point      the point, measured in nm
+     * @param[out] stiffness  the stiffness k of the spring, measured in kJ/mol/nm^2
+     */
+    void getTetherParameters(int index, int& chain, int& node, Vec3& point, double& stiffness) const;
+    /**
+     * Set the parameters of a tether.
+     *
+     * @param index      the index of the tether
+     * @param chain      the index of the chain
+     * @param node       the index of the node in the chain
+     * @param point      the point, measured in nm
+     * @param stiffness  the stiffness k of the spring, measured in kJ/mol/nm^2
+     */
+    void setTetherParameters(int index, int chain, int node, const Vec3& point, double stiffness);
+    /**
+     * Copy the parameters of segments, joints and tethers to a Context, so that changes made by setSegmentParameters(),
+     * setJointParameters() and setTetherParameters() take effect in it.  Models and particles cannot be changed in this
+     * way, and neither can chains be added; tethers can.
      */
     void updateParametersInContext(Context& context);
     /**
@@ -193,9 +238,13 @@ protected:
 private:
     class ChainInfo;
     class SegmentInfo;
+    class TetherInfo;
     const ChainInfo& getChain(int chain) const;
     ChainInfo& getChain(int chain);
+    void checkTether(int chain, int node, const Vec3& point, double stiffness) const;
     std::vector<ChainInfo> chains;
+    std::vector<TetherInfo> tethers;
+    std::set<std::pair<int, int> > tetheredNodes;
     bool usePeriodic;
 };
 
@@ -206,6 +255,16 @@ class CylinderChainForce::SegmentInfo {
 public:
     double restLength, stretchingStiffness, maximumExtension;
     double parallelFriction, perpendicularFriction, rotationalFriction, extensionalFriction;
+};
+
+/**
+ * The parameters of a tether.
+ */
+class CylinderChainForce::TetherInfo {
+public:
+    int chain, node;
+    Vec3 point;
+    double stiffness;
 };
 
 /**

@@ -39,6 +39,7 @@ ChainEnergy ReferenceCalcCylinderChainForceKernel::addForces(ContextImpl& contex
     for (const ChainEnergy& energy : energies) {
         total.stretching += energy.stretching;
         total.bending += energy.bending;
+        total.tethers += energy.tethers;
     }
     return total;
 }
@@ -48,7 +49,7 @@ double ReferenceCalcCylinderChainForceKernel::execute(ContextImpl& context, bool
     if (!includeForces)
         unused.resize(context.getSystem().getNumParticles());
     ChainEnergy energy = addForces(context, includeForces ? *extractData(context).forces : unused, includeEnergy);
-    return energy.stretching+energy.bending;
+    return energy.stretching+energy.bending+energy.tethers;
 }
 
 void ReferenceCalcCylinderChainForceKernel::computeEnergies(ContextImpl& context, double& stretching, double& bending) {

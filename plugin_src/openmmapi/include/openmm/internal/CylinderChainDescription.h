@@ -14,7 +14,7 @@ namespace OpenMM {
 std::vector<cylchain::Chain> describeChains(const System& system, const CylinderChainForce& force);
 
 /**
- * Copy the parameters of segments and joints to a description that exists already, for
+ * Copy the parameters of segments, joints and tethers to a description that exists already, for
  * CylinderChainForce::updateParametersInContext().
  */
 void updateChains(std::vector<cylchain::Chain>& chains, const CylinderChainForce& force);
