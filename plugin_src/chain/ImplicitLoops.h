@@ -141,12 +141,12 @@ template <class Real> struct ImplicitSegment {
     Vector<Real> difference, tangent, bend, bisector;
     Real length, coordinate;
     // The noise, and how implicit the segment and the joint are.
-    Vector<Real> randomBend;
+    Vector<Real> randomBend, randomPair;
     Real randomCoordinate, randomTension, theta, jointTheta;
     // Of the last iteration: the direction of the new segment, its tension and how the tension changes.
     Vector<Real> newTangent;
     Real tension, response;
-    Real multiplier;
+    Real multiplier, extra;
 };
 
 /** What a step keeps of a tether: the vector from its point to its node at the start, its noise and how implicit it is. */
@@ -198,8 +198,13 @@ public:
         for (int iteration = 0; iteration < NEWTON_ITERATIONS; iteration++) {
             eliminate(y);
             substitute();
-            if (iteration == 0 && settings.kT > 0)
+            if (iteration == 0 && settings.kT > 0) {
+                if (stiffenTautSegments()) {
+                    eliminate(y);
+                    substitute();
+                }
                 addMetricForces();
+            }
             for (int node = 0; node < n; node++)
                 y[node] = y[node]+change[node]*active;
             if (!anyUnfinished(active))
@@ -233,7 +238,7 @@ private:
             const Real l0 = property<Real>(pack, s, ChainPack::RestLength);
             const Real stretchRate = h*property<Real>(pack, s, ChainPack::Stiffness)*l0*l0+TINY;
             segment.theta = larger<Real>(0.5+Real{}, 1-property<Real>(pack, s, ChainPack::Extensional)/stretchRate);
-            segment.randomCoordinate = segment.randomTension = segment.multiplier = Real{};
+            segment.randomCoordinate = segment.randomTension = segment.multiplier = segment.extra = Real{};
             segment.randomBend = Vec {};
             if (s > 0)
                 describeJoint(s);
@@ -281,6 +286,7 @@ private:
             const Vec pair = (b-t*t.dot(b))*(property<Real>(pack, s, ChainPack::RootRotational)*perLength);
             f[s] = f[s]+force-pair;
             f[s+1] = f[s+1]+force+pair;
+            segment.randomPair = pair;
 
             segment.randomTension = t.dot(b)*(property<Real>(pack, s, ChainPack::RootExtensional)*perLength);
             drawLength(gaussian, s);
@@ -393,6 +399,25 @@ private:
         geometry.middleInverse = 1/root(middle.dot(middle));
         geometry.middleTangent = middle*geometry.middleInverse;
     }
+    /** Whether any segment is taut: its tension turns it back faster than a step resolves. */
+    bool stiffenTautSegments() {
+        bool any = false;
+        for (int s = 0; s < n-1; s++) {
+            ImplicitSegment<Real>& segment = segments[s];
+            const Real l0 = property<Real>(pack, s, ChainPack::RestLength), rotational = property<Real>(pack, s, ChainPack::Rotational);
+            const Real friction = 0.25*property<Real>(pack, s, ChainPack::Perpendicular)+rotational/(l0*l0);
+            const Real rate = h*segment.multiplier/segment.length;
+            const Real excess = larger<Real>(0.5*rate-friction, Real{});
+            segment.extra = excess*segment.length*segment.length;
+            Real test = rate/(friction+TINY);
+            for (int i = 0; i < W; i++)
+                any |= lane(test, i) > 0.5;
+            const Vec pair = segment.randomPair*(root(1+segment.extra/(rotational+TINY))-1);
+            f[s] = f[s]-pair;
+            f[s+1] = f[s+1]+pair;
+        }
+        return any;
+    }
     /** Add a segment to the equations of its nodes. It is the first to do so for all but the first one's diagonal. */
     CYLCHAIN_INLINE void addSegment(const Vec* y, int s, const Geometry& geometry, Row& here, Row& after) {
         ImplicitSegment<Real>& segment = segments[s];
@@ -402,7 +427,7 @@ private:
         // Friction.
         const Real acrossTrans = 0.25*property<Real>(pack, s, ChainPack::Perpendicular);
         const Real alongTrans = 0.25*property<Real>(pack, s, ChainPack::Parallel);
-        const Real acrossTurn = property<Real>(pack, s, ChainPack::Rotational)*inverseSquare;
+        const Real acrossTurn = (property<Real>(pack, s, ChainPack::Rotational)+segment.extra)*inverseSquare;
         const Mat same = Mat::axial((acrossTrans+acrossTurn)/h, (alongTrans-acrossTrans-acrossTurn)/h, direction);
         const Mat other = Mat::axial((acrossTrans-acrossTurn)/h, (alongTrans-acrossTrans+acrossTurn)/h, direction);
         const Vec first = y[s]-x[s], second = y[s+1]-x[s+1];
