@@ -6,7 +6,7 @@ import numpy as np
 import openmm
 from openmm import app, unit
 
-from .engines import choose_engine, load_engine
+from .engines import choose_engine, default_scheme, load_engine
 from .engines.description import describe_chains
 from .engines.redistribution import joint_tensions
 from .equilibrium import draw_chain
@@ -430,8 +430,12 @@ class Filaments:
             elif isinstance(force, openmm.CustomNonbondedForce):
                 _exclude_from_custom_nonbonded(force, len(existing), missing)
 
-    def recommended_time_step(self, scheme="midpoint"):
-        """The recommended step for the filament that allows the least: a TimeStep (see ``timestep``)."""
+    def recommended_time_step(self, scheme=None):
+        """The recommended step for the filament that allows the least: a TimeStep (see ``timestep``).
+
+        The scheme is the engine's default if not given. Other forces in the System may need a smaller step.
+        """
+        scheme = default_scheme(self._engine_name) if scheme is None else scheme
         steps = [
             recommended_time_step(filament.type, self._viscosity, self._temperature, scheme, filament.segments)
             for filament in self._filaments
@@ -441,7 +445,7 @@ class Filaments:
         return min(steps, key=lambda step: step.step)
 
     def create_integrator(
-        self, system, step_size, scheme="midpoint", temperature=None, particle_friction=None, random_seed=0
+        self, system, step_size, scheme=None, temperature=None, particle_friction=None, random_seed=0
     ):
         """Create the integrator that moves the filaments and everything else in the System.
 
@@ -453,10 +457,10 @@ class Filaments:
         system : openmm.System
             The System that the filaments were put into.
         step_size : time
-        scheme : {"midpoint", "implicit", "euler"}
-            Fixman's midpoint, with the right drift on chains; the implicit scheme of the compiled engine, which takes
-            stretching and bending at the end of the step, and steps a thousand times as long; or Section 4 of the
-            paper, biased on chains.
+        scheme : {"implicit", "midpoint", "euler"}, optional
+            "implicit", the compiled engine's default, takes stretching, bending and tethers at the end of the step,
+            and steps a thousand times as long as the others. "midpoint", the portable engine's default, is Fixman's
+            explicit scheme with the right drift on chains. "euler" is Section 4 of the paper, biased on chains.
         temperature : temperature, optional
             That of the filaments if not given.
         particle_friction : energy*time/length^2, or array of them
@@ -479,6 +483,7 @@ class Filaments:
         step_size = positive(step_size, unit.picosecond, "step_size")
         if system.getNumParticles() <= max(nodes.max() for nodes in self.node_indices):
             raise InputError("This is not the System that the filaments were put into: it has too few particles.")
+        scheme = default_scheme(self._engine_name) if scheme is None else scheme
         check_scheme(scheme)
         for filament in {(f.type, f.segments): f for f in self._filaments}.values():
             warn_if_unstable(filament.type, self._viscosity, self._temperature, step_size, filament.segments, scheme)

@@ -96,8 +96,17 @@ def _add_benchmarks(parser):
     )
     scaling.add_argument("--engine", choices=ENGINES, help="default: the fastest that is available")
     scaling.set_defaults(command=_benchmark_scaling)
-    for benchmark in (engines, scaling):
-        benchmark.add_argument("--quick", action="store_true", help="a rough measurement within about 20 s")
+    time_step = benchmarks.add_parser(
+        "time-step", help="errors and speed against the step, for every scheme and several systems, about ten minutes"
+    )
+    time_step.add_argument("--plot", metavar="FILE", help="draw the errors to FILE, a .png, .svg or .pdf")
+    time_step.set_defaults(command=_benchmark_time_step)
+    bead_spring = benchmarks.add_parser(
+        "bead-spring", help="segments of 10 to 1200 nm beside touching beads of stock OpenMM, several minutes"
+    )
+    bead_spring.set_defaults(command=_benchmark_bead_spring)
+    for benchmark in (engines, scaling, time_step, bead_spring):
+        benchmark.add_argument("--quick", action="store_true", help="a rough measurement within a minute")
         benchmark.add_argument("--json", metavar="FILE", help="write machine, settings and results to FILE as well")
 
 
@@ -172,11 +181,37 @@ def _benchmark_scaling(options):
     _benchmark(options, lambda say: benchmark_scaling(options.engine, QUICK if options.quick else FULL, say))
 
 
+def _benchmark_time_step(options):
+    from .benchmark.report import check_output_path
+    from .benchmark.time_step import FULL, QUICK, benchmark_time_step
+    from .benchmark.time_step_figure import write_figure
+
+    if options.plot is not None:
+        check_output_path(options.plot)
+    results = []
+
+    def measure(say):
+        report, measured = benchmark_time_step(QUICK if options.quick else FULL, say)
+        results.extend(measured)
+        return report
+
+    _benchmark(options, measure)
+    if options.plot is not None:
+        write_figure(results, options.plot)
+        print(f"Drawn to {options.plot}")
+
+
+def _benchmark_bead_spring(options):
+    from .benchmark.bead_spring import FULL, QUICK, benchmark_bead_spring
+
+    _benchmark(options, lambda say: benchmark_bead_spring(QUICK if options.quick else FULL, say))
+
+
 def _benchmark(options, measure):
-    from .benchmark.report import Progress, check_json_path, format_report, write_json
+    from .benchmark.report import Progress, check_output_path, format_report, write_json
 
     if options.json is not None:
-        check_json_path(options.json)
+        check_output_path(options.json)
     progress = Progress()
     try:
         report = measure(progress)

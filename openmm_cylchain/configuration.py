@@ -17,7 +17,7 @@ from pathlib import Path
 
 from . import filament as filament_types
 from . import physical_units as units
-from .engines import ENGINES
+from .engines import ENGINES, default_scheme
 from .errors import InputError
 from .filament import FilamentType
 from .friction import EndCorrections
@@ -396,7 +396,8 @@ _SIMULATION_KEYS = (
 
 
 def _simulation(table, solvent, filaments):
-    scheme = table.choice("scheme", SCHEMES, "midpoint")
+    engine = table.choice("engine", ENGINES, None)
+    scheme = table.choice("scheme", SCHEMES, None) or default_scheme(engine)
     report = table.quantity("report_interval", units.TIME)
     if table.text("time_step", example='"recommended"') == "recommended":
         time_step = _recommended_divisor(report, scheme, solvent, filaments)
@@ -419,7 +420,7 @@ def _simulation(table, solvent, filaments):
         steps_per_report=steps_per_report,
         steps_per_checkpoint=reports_per_checkpoint * steps_per_report,
         seed=seed,
-        engine=table.choice("engine", ENGINES, None),
+        engine=engine,
         platform=table.text("platform", "Reference"),
         precision=table.choice("precision", PRECISIONS, None),
     )
@@ -432,7 +433,7 @@ def _recommended_divisor(report, scheme, solvent, filaments):
         recommended_time_step(group.type, solvent.viscosity, solvent.temperature, scheme, group.segments).step
         for group in filaments
     )
-    return report / math.ceil(report / largest * (1.0 - 1e-3))
+    return report / max(1, math.ceil(report / largest * (1.0 - 1e-3)))
 
 
 def _multiple(name, interval, base_name, base):

@@ -9,6 +9,7 @@ import math
 import warnings
 from dataclasses import dataclass
 
+from .engines import default_scheme
 from .errors import InputError, TimeStepWarning
 from .quantities import BENDING_RIGIDITY, LENGTH, STIFFNESS, TIME, VISCOSITY, in_units_of, positive, thermal_energy
 
@@ -195,7 +196,7 @@ def stability_bounds(filament_type, viscosity, temperature, segments=1):
     return bounds
 
 
-def recommended_time_step(filament_type, viscosity, temperature, scheme="midpoint", segments=2):
+def recommended_time_step(filament_type, viscosity, temperature, scheme=None, segments=2):
     """The step at which equilibrium energies of a chain are good to about 5 %.
 
     Explicit schemes of weak order one leave a harmonic mode of rate lambda with a variance too large by
@@ -211,8 +212,8 @@ def recommended_time_step(filament_type, viscosity, temperature, scheme="midpoin
     filament_type : FilamentType
     viscosity : pressure*time
     temperature : temperature
-    scheme : {"midpoint", "euler", "implicit"}
-        "midpoint" and "euler" are explicit and have the same bounds; "euler" has a bias on chains that no step
+    scheme : {"implicit", "midpoint", "euler"}, optional
+        That of the fastest engine that is available if not given. "midpoint" and "euler" are explicit and have the same bounds; "euler" has a bias on chains that no step
         removes. "implicit" is not bound by stretching and bending, see ``implicit_time_step``.
     segments : int
 
@@ -220,6 +221,7 @@ def recommended_time_step(filament_type, viscosity, temperature, scheme="midpoin
     -------
     TimeStep
     """
+    scheme = default_scheme() if scheme is None else scheme
     check_scheme(scheme)
     if scheme == "implicit":
         return implicit_time_step(filament_type, viscosity, temperature, segments)
@@ -287,7 +289,7 @@ def warn_if_unstable(filament_type, viscosity, temperature, step, segments=1, sc
         return
     for name, bound in stability_bounds(filament_type, viscosity, temperature, segments).items():
         if step > bound:
-            recommended = recommended_time_step(filament_type, viscosity, temperature, segments=segments)
+            recommended = recommended_time_step(filament_type, viscosity, temperature, scheme, segments)
             warnings.warn(
                 f"A time step of {step:.4g} ps exceeds the {name} bound of {bound:.4g} ps of filament type "
                 f"{filament_type.name!r}: the simulation will blow up. Recommended: {recommended}.",

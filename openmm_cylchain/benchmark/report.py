@@ -4,7 +4,7 @@ import json
 import math
 import sys
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from ..errors import InputError
@@ -35,6 +35,10 @@ class Report:
     rows : list of Row
     missing : dict
         What could not be measured, with the reason.
+    details : list of Row
+        More rows, for JSON alone.
+    table : str
+        What people see of the details.
     """
 
     title: str
@@ -42,6 +46,8 @@ class Report:
     settings: dict
     rows: list
     missing: dict
+    details: list = field(default_factory=list)
+    table: str = ""
 
 
 def row(name, estimate, unit):
@@ -57,6 +63,8 @@ def format_report(report):
         f"load {_format_load(report.machine['load_average'])} at the start",
         "",
     ]
+    if report.table:
+        lines += [report.table, ""]
     texts = [(each.name, *_format_value(each.value, each.error), each.unit) for each in report.rows]
     widths = [max((len(text[column]) for text in texts), default=0) for column in range(3)]
     for name, value, error, unit in texts:
@@ -76,7 +84,7 @@ def _format_value(value, error):
     return f"{value:.{decimals}f}", "" if error is None else f"± {error:.{decimals}f}"
 
 
-def check_json_path(path):
+def check_output_path(path):
     """Raise InputError if a file cannot be written there, before hours are spent on its content."""
     path = Path(path)
     if path.is_dir() or not path.parent.is_dir():
@@ -89,7 +97,7 @@ def write_json(report, path):
     content = {
         "machine": report.machine,
         "settings": report.settings,
-        "rows": [asdict(each) for each in report.rows],
+        "rows": [asdict(each) for each in (*report.rows, *report.details)],
         "missing": report.missing,
     }
     write_atomically(Path(path), (json.dumps(content, indent=2, allow_nan=False) + "\n").encode())

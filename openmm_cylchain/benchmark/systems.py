@@ -59,7 +59,7 @@ def simulate_filaments(engine, chains, segments, platform, properties):
     for positions in _node_positions(chains, segments):
         filaments.add_nodes(F_ACTIN, positions)
     topology, system, positions = filaments.build()
-    integrator = filaments.create_integrator(system, TIME_STEP, random_seed=1)
+    integrator = filaments.create_integrator(system, TIME_STEP, scheme="midpoint", random_seed=1)
     return _started(filaments, topology, system, integrator, positions, platform, properties)
 
 

@@ -10,6 +10,25 @@ ENGINES = ("compiled", "portable")
 _MODULES = {"compiled": f"{__name__}.native", "portable": f"{__name__}.portable"}
 
 
+_DEFAULT_SCHEMES = {"compiled": "implicit", "portable": "midpoint"}
+
+
+def default_scheme(engine=None):
+    """The integration scheme that an engine uses if none is named.
+
+    Parameters
+    ----------
+    engine : {"compiled", "portable"}, optional
+        The fastest that is available if not given.
+
+    Raises
+    ------
+    InputError
+        If there is no such engine, or it is not available.
+    """
+    return _DEFAULT_SCHEMES[choose_engine(engine)]
+
+
 def load_engine(name=None):
     """The module of an engine, with its ``add_forces`` and ``create_integrator``.
 

@@ -158,7 +158,7 @@ class NativeIntegrator(CylinderChainIntegrator):
     temperature : temperature
         Zero is allowed: no noise.
     step_size : time
-    scheme : {"midpoint", "implicit", "euler"}
+    scheme : {"implicit", "midpoint", "euler"}
     random_seed : int
         0 draws a fresh seed for each Context.
     labels : sequence of str
@@ -170,7 +170,7 @@ class NativeIntegrator(CylinderChainIntegrator):
         For an unknown scheme, a negative temperature or a step size that is not positive.
     """
 
-    def __init__(self, temperature, step_size, scheme="midpoint", random_seed=0, labels=()):
+    def __init__(self, temperature, step_size, scheme="implicit", random_seed=0, labels=()):
         temperature = non_negative(temperature, TEMPERATURE, "temperature")
         super().__init__(temperature, _OTHER_FRICTION, positive(step_size, TIME, "step_size"))
         check_scheme(scheme)

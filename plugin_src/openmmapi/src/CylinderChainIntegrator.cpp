@@ -35,7 +35,7 @@ static CylinderChainForceImpl& findChains(ContextImpl& context) {
 }
 
 CylinderChainIntegrator::CylinderChainIntegrator(double temperature, double frictionCoeff, double stepSize) :
-        scheme(Midpoint), noiseSeed(0), stepsTaken(0), dividedSteps(0), chains(NULL) {
+        scheme(Implicit), noiseSeed(0), stepsTaken(0), dividedSteps(0), chains(NULL) {
     setTemperature(temperature);
     setFriction(frictionCoeff);
     setStepSize(stepSize);

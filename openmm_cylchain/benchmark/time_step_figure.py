@@ -1,0 +1,68 @@
+"""A figure of the errors against the step, for the documentation."""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from ..timestep import SCHEMES
+from .time_step import CRITERIA
+
+_COLORS = {"euler": "tab:red", "midpoint": "tab:orange", "implicit": "tab:blue"}
+_MICROSECOND = 1e6
+_LIMITS = (0.05, 200.0)
+
+
+def write_figure(results, path):
+    """Draw the largest errors of equilibrium and dynamics of every system against the step.
+
+    Parameters
+    ----------
+    results : list of SystemErrors
+    path : str or Path
+        Its suffix chooses the format.
+    """
+    columns = min(3, len(results))
+    rows = -(-len(results) // columns)
+    figure = Figure(figsize=(1.0 + 3.6 * columns, 0.8 + 2.7 * rows), layout="constrained")
+    FigureCanvasAgg(figure)
+    panels = figure.subplots(rows, columns, squeeze=False, sharey=True).ravel()
+    for panel, result in zip(panels, results):
+        _draw(panel, result)
+    for panel in panels[len(results) :]:
+        panel.set_axis_off()
+    for row in range(rows):
+        panels[row * columns].set_ylabel("largest error (%)")
+    panels[0].legend(fontsize="x-small", loc="upper left")
+    figure.savefig(Path(path), dpi=150)
+
+
+def _draw(panel, result):
+    equilibrium, dynamics = CRITERIA[""]
+    for scheme in SCHEMES:
+        steps = [one for one in result.of_scheme(scheme) if np.isfinite(one.largest_equilibrium_error)]
+        color = _COLORS[scheme]
+        panel.plot(
+            [one.step / _MICROSECOND for one in steps],
+            [100 * one.largest_equilibrium_error for one in steps],
+            "o-",
+            color=color,
+            markersize=3,
+            label=f"{scheme}, equilibrium",
+        )
+        compared = [one for one in steps if one.dynamics]
+        panel.plot(
+            [one.step / _MICROSECOND for one in compared],
+            [100 * one.largest_dynamic_error for one in compared],
+            "x--",
+            color=color,
+            markersize=4,
+            linewidth=0.8,
+            label=f"{scheme}, dynamics",
+        )
+    panel.axhline(100 * equilibrium, color="gray", linewidth=0.8)
+    panel.axhline(100 * dynamics, color="gray", linewidth=0.8, linestyle="--")
+    panel.axvline(result.recommended / _MICROSECOND, color="tab:green", linewidth=0.8, label="recommended (implicit)")
+    panel.set(xscale="log", yscale="log", ylim=_LIMITS, xlabel="step (µs)")
+    panel.set_title(result.system.label, fontsize="small")
