@@ -8,6 +8,7 @@ from openmm import unit
 
 from openmm_cylchain import DSDNA, F_ACTIN, MICROTUBULE, EndCorrections, FilamentType, InputError
 from openmm_cylchain.configuration import changed_keys, parse_configuration, read_configuration
+from openmm_cylchain.engines import default_scheme
 from openmm_cylchain.physical_units import (
     BENDING_RIGIDITY,
     FORCE,
@@ -111,7 +112,7 @@ def test_defaults():
         (),
     )
     assert (settings.scheme, settings.seed, settings.platform, settings.precision) == (
-        "midpoint",
+        default_scheme(),
         1,
         "Reference",
         None,
@@ -200,7 +201,7 @@ def test_a_filament_type_of_ones_own():
 
 
 def test_recommended_time_step_divides_the_report_interval():
-    simulation = SIMULATION.replace('"10 ns"', '"recommended"')
+    simulation = SIMULATION.replace('"10 ns"', '"recommended"\nscheme = "midpoint"')
     assert parse(simulation=simulation).simulation.time_step == pytest.approx(1e4, rel=1e-3)
     # Of two types the more demanding one decides.
     settings = parse(filament=FILAMENT + OWN_TYPE, simulation=simulation).simulation

@@ -223,7 +223,7 @@ def test_system_survives_xml(engine, platform):
 
 def test_step_size_and_temperature_can_change(engine):
     filaments, system, positions = mixed_system(engine)
-    integrator = mixed_integrator(filaments, system, random_seed=1)
+    integrator = mixed_integrator(filaments, system, scheme="midpoint", random_seed=1)
     context = _context(system, integrator, positions)
     integrator.step(1)
     integrator.setTemperature(0 * unit.kelvin)
@@ -323,7 +323,7 @@ def test_blow_up_names_filament_segment_and_step_and_keeps_positions_finite(engi
     _, system, positions = filaments.build()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        integrator = filaments.create_integrator(system, STEP, random_seed=1)
+        integrator = filaments.create_integrator(system, STEP, scheme="midpoint", random_seed=1)
     context = _context(system, integrator, positions, platform)
     with pytest.raises(InstabilityError, match=r"Filament 1 \(DNA\) has blown up at segment \d in step \d+"):
         integrator.step(1000)
@@ -358,7 +358,7 @@ def test_blow_up_within_steps_at_once_leaves_all_chains_at_the_step_before(engin
         _, system, positions = filaments.build()
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            integrator = filaments.create_integrator(system, 170.0, random_seed=1)
+            integrator = filaments.create_integrator(system, 170.0, scheme="midpoint", random_seed=1)
         return integrator, _context(system, integrator, positions)
 
     integrator, context = start()

@@ -265,19 +265,20 @@ def test_update_parameters_in_context():
     assert 2 * (positions_of(context) - start) == pytest.approx(displacement, rel=1e-6, abs=1e-9)
 
 
-def test_blow_up_names_filament_segment_and_step():
+@pytest.mark.parametrize(("scheme", "excess"), [("midpoint", "would move by"), ("implicit", "cannot be solved")])
+def test_blow_up_names_filament_segment_and_step(scheme, excess):
     filaments = filaments_of("compiled")
     _, system, positions = filaments.build()
     force = openmm.CustomExternalForce("-pull*x")
     force.addGlobalParameter("pull", 0.0)
     force.addParticle(int(filaments.node_indices[1][3]))
     system.addForce(force)
-    integrator = filaments.create_integrator(system, STEP["F_ACTIN"], random_seed=1)
+    integrator = filaments.create_integrator(system, STEP["F_ACTIN"], scheme=scheme, random_seed=1)
     context = openmm.Context(system, integrator, openmm.Platform.getPlatformByName("CPU"))
     context.setPositions(positions)
     integrator.step(2)
     before = positions_of(context)
-    for pull, what in ((1e9, "would move by"), (np.nan, "not finite")):
+    for pull, what in ((1e12, excess), (np.nan, "not finite")):
         context.setParameter("pull", pull)
         with pytest.raises(
             InstabilityError, match=r"Filament 1 \(.*\) has blown up at segment [23] in step 3: .*" + what

@@ -342,7 +342,7 @@ def test_signals_end_a_run_with_a_checkpoint(tmp_path, unbroken, number, code):
 
 def test_blow_up_is_reported_and_leaves_no_broken_frame(tmp_path, capsys):
     config = configured(
-        tmp_path, time_step='"400 ns"', duration='"80 us"', report_interval='"0.4 us"', checkpoint_interval='"0.4 us"'
+        tmp_path, scheme='"midpoint"', time_step='"400 ns"', duration='"80 us"', report_interval='"0.4 us"', checkpoint_interval='"0.4 us"'
     )
     output = tmp_path / "out"
     assert main(["run", config, "--output", str(output)]) == 1
@@ -362,7 +362,7 @@ def test_infinite_energy_is_not_written(tmp_path, capsys):
     # A FENE segment that a large step carries beyond its maximum extension, at positions that are finite.
     text = SHORT.replace("segments = 6", 'segments = 6\nstretching_model = "fene"\nmaximum_extension = "1 nm"')
     config = configured(
-        tmp_path, text, time_step='"60 ns"', duration='"60 us"', report_interval='"60 ns"', checkpoint_interval='"6 us"'
+        tmp_path, text, scheme='"midpoint"', time_step='"60 ns"', duration='"60 us"', report_interval='"60 ns"', checkpoint_interval='"6 us"'
     )
     output = tmp_path / "out"
     assert main(["run", config, "--output", str(output)]) == 1
@@ -408,10 +408,13 @@ def test_position_and_direction_are_those_of_the_first_node_and_segment():
 
 
 def test_timestep_explains_the_bounds(tmp_path, capsys):
-    assert main(["timestep", configured(tmp_path)]) == 0
+    assert main(["timestep", configured(tmp_path, scheme='"midpoint"')]) == 0
     text = capsys.readouterr().out
     assert "eq. (57)" in text and "200 ns" in text
     assert re.search(r"recommended +10 ns", text)
+    assert main(["timestep", configured(tmp_path, scheme='"implicit"')]) == 0
+    text = capsys.readouterr().out
+    assert re.search(r"recommended +[0-9.]+ us", text) and "relaxation of the whole filament" in text
 
 
 def test_version(capsys):

@@ -18,7 +18,6 @@ from ..engines import choose_engine
 from ..equilibrium import JointAngleDistribution, SegmentLengthDistribution, draw_chain
 from ..filament import FilamentType
 from ..physical_units import format_time
-from ..quantities import VISCOSITY, in_units_of
 from .measurement import Case, Estimate, describe_machine, median, ratio, scaled, time_interleaved
 from .report import Report, row
 from .systems import one_thread_platform
@@ -43,8 +42,8 @@ class BeadEffort:
     segment_effort: Effort
 
 
-FULL = BeadEffort(SEGMENTS, 64, 2000, Effort((), frames=120, share=1.0, every=1, repetitions=9))
-QUICK = BeadEffort((60, 3), 16, 400, Effort((), frames=60, share=0.5, every=3, repetitions=3))
+FULL = BeadEffort(SEGMENTS, 64, 2000, Effort((), frames=240, share=1.0, every=1, repetitions=9))
+QUICK = BeadEffort((60, 3), 16, 400, Effort((), frames=80, share=0.5, every=3, repetitions=3))
 
 
 def benchmark_bead_spring(effort=FULL, say=lambda message: None):
@@ -120,7 +119,7 @@ class _Beads:
             stretching_modulus=F_ACTIN.segment_stiffness * F_ACTIN.segment_length,
         )
         self._temperature = F_ACTIN_SYSTEM.temperature
-        self._friction = 3.0 * math.pi * in_units_of(F_ACTIN_SYSTEM.viscosity, VISCOSITY, "viscosity") * diameter
+        self._friction = 3.0 * math.pi * F_ACTIN_SYSTEM.viscosity * diameter
         generator = np.random.default_rng(1)
         self._positions = np.concatenate(
             [draw_chain(self._type, self.count - 1, self._temperature, generator) for _ in range(chains)]

@@ -6,10 +6,10 @@ from openmm import unit
 
 from .. import DSDNA, F_ACTIN, MICROTUBULE
 from ..filament import FilamentType
-from ..quantities import BOLTZMANN
+from ..quantities import BOLTZMANN, VISCOSITY
 
 _TEMPERATURE = 310.0
-_VISCOSITY = 1.71e-3 * unit.pascal * unit.second
+_VISCOSITY = (1.71e-3 * unit.pascal * unit.second * unit.AVOGADRO_CONSTANT_NA).value_in_unit(VISCOSITY)
 _STRETCHING_MODULUS = F_ACTIN.segment_stiffness * F_ACTIN.segment_length
 
 
@@ -25,7 +25,8 @@ class BenchmarkSystem:
         For people.
     type : FilamentType
     segments, chains : int
-    temperature, viscosity
+    temperature, viscosity : float
+        In K and kJ ps/(mol nm^3).
     """
 
     name: str
@@ -33,8 +34,8 @@ class BenchmarkSystem:
     type: FilamentType
     segments: int
     chains: int
-    temperature: object = _TEMPERATURE
-    viscosity: object = _VISCOSITY
+    temperature: float = _TEMPERATURE
+    viscosity: float = _VISCOSITY
 
 
 def actin(length):
@@ -63,8 +64,8 @@ WORKLOAD = BenchmarkSystem(
     F_ACTIN,
     64,
     200,
-    temperature=4.14 * unit.piconewton * unit.nanometer / unit.BOLTZMANN_CONSTANT_kB,
-    viscosity=1e-3 * unit.pascal * unit.second,
+    temperature=(4.14 * unit.piconewton * unit.nanometer / unit.BOLTZMANN_CONSTANT_kB).value_in_unit(unit.kelvin),
+    viscosity=_VISCOSITY / 1.71,
 )
 """The workload on which other simulators of filaments were compared."""
 

@@ -26,7 +26,7 @@
 const double NEWTON_TOLERANCE = 1e-2;
 const int NEWTON_ITERATIONS = 14;
 /** A step that does not converge is cut into at most two to this power. */
-const int LARGEST_DIVISION = 6;
+const int LARGEST_DIVISION = 10;
 /** The part of the friction against turning that compression may take away in the iteration's matrix. */
 const double COMPRESSION = 0.9;
 /** A bend is drawn as a Gaussian with rejection if the joint is stiffer than this many k_B T, or else from the sphere. */
@@ -628,13 +628,17 @@ template <int W> void divideStep(const ChainPack& pack, const Vector<typename La
         bool failedNow[W] = {}, failedPart[W];
         for (int node = 0; node < pack.nodes; node++)
             to[node] = x[node];
-        for (int part = 0; part < parts; part++) {
+        bool hope = true;
+        for (int part = 0; part < parts && hope; part++) {
             settings.part = parts+part;
             for (int node = 0; node < pack.nodes; node++)
                 from[node] = to[node];
             ImplicitStep<W>(pack, settings, box, memory).take(from, f, to, failedPart);
-            for (int i = 0; i < W; i++)
+            hope = false;
+            for (int i = 0; i < W; i++) {
                 failedNow[i] |= failedPart[i];
+                hope |= failed[i] && !failedNow[i];
+            }
         }
         bool any = false;
         for (int i = 0; i < W; i++) {

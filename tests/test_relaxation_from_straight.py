@@ -1,0 +1,57 @@
+"""Relaxation of a straight filament whose first node is trapped: Figs. 15 and 16 of Pesek et al. 2016."""
+
+import numpy as np
+import openmm
+import pytest
+from physics_cases import KT, TEMPERATURE, VISCOSITY
+
+from openmm_cylchain import F_ACTIN, Filaments
+
+pytestmark = pytest.mark.slow
+
+CHAINS, SEGMENTS = 1600, 64
+TIMES = (10, 20, 50, 100, 200)
+MICROSECOND = 1e6
+
+
+def _relax(scheme, step, times, seed):
+    """{time: (mean, error) of the shortening, and of the stretching energy of a segment over k_B T}."""
+    filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
+    for chain in range(CHAINS):
+        filaments.add_straight(F_ACTIN, SEGMENTS, [0, 0, 0], [1, 0, 0])
+        filaments.add_tether(chain, 0, [0, 0, 0], F_ACTIN.segment_stiffness)
+    _, system, positions = filaments.build()
+    integrator = filaments.create_integrator(system, step * MICROSECOND, scheme=scheme, random_seed=seed)
+    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("CPU"))
+    context.setPositions(positions)
+    result, taken = {}, 0
+    for moment in times:
+        integrator.step(round(moment / step) - taken)
+        taken = round(moment / step)
+        nodes = context.getState(positions=True).getPositions(asNumpy=True)._value.reshape(CHAINS, SEGMENTS + 1, 3)
+        lengths = np.linalg.norm(np.diff(nodes, axis=1), axis=2)
+        shortening = SEGMENTS * F_ACTIN.segment_length - (nodes[:, -1, 0] - nodes[:, 0, 0])
+        stretching = F_ACTIN.stretching_energy(lengths).mean(axis=1) / KT
+        result[moment] = [(values.mean(), values.std(ddof=1) / np.sqrt(CHAINS)) for values in (shortening, stretching)]
+    return result
+
+
+@pytest.fixture(scope="module")
+def reference():
+    return _relax("midpoint", 0.02, TIMES[1:], seed=1)
+
+
+@pytest.mark.parametrize("step", [1, 5, 10])
+def test_shortening_is_that_of_fine_steps(reference, step):
+    relaxation = _relax("implicit", step, [moment for moment in TIMES if moment >= step], seed=2)
+    for moment in relaxation:
+        if moment in reference and moment >= 10 * step:
+            (mean, error), (expected, expected_error) = relaxation[moment][0], reference[moment][0]
+            relative_error = np.hypot(error / mean, expected_error / expected)
+            assert 4 * relative_error < 0.05
+            assert abs(mean / expected - 1) < 0.05, (moment, mean / expected, relative_error)
+    if step == 1:
+        # Bends stretch the straight filament until its ends have come nearer.
+        overshoot, error = relaxation[10][1]
+        assert overshoot - 4 * error > 1.2 * 0.5
+        assert relaxation[200][1][0] + 4 * relaxation[200][1][1] < 1.1 * 0.5
