@@ -1,0 +1,300 @@
+/**
+ * This tests the implicit scheme on its own: steps without noise against a dense solution of its equations, written down
+ * independently, that no chain depends on its neighbours in a pack, and that steps that cannot be taken are divided.
+ */
+
+#include "TestChains.h"
+
+/** A bend b = f (t2-t1), with the energy (stiffness/2) b^2. */
+static Array bendOf(BendingModel model, const double* x) {
+    double t1[3], t2[3], square1 = 0, square2 = 0, chordSquare = 0;
+    for (int k = 0; k < 3; k++) {
+        t1[k] = x[3+k]-x[k];
+        t2[k] = x[6+k]-x[3+k];
+        square1 += t1[k]*t1[k];
+        square2 += t2[k]*t2[k];
+    }
+    Array bend(3);
+    for (int k = 0; k < 3; k++) {
+        bend[k] = t2[k]/sqrt(square2)-t1[k]/sqrt(square1);
+        chordSquare += bend[k]*bend[k];
+    }
+    const double chord = sqrt(chordSquare), angle = 2*asin(0.5*chord);
+    double length = chord;
+    if (model == BendingModel::Quadratic)
+        length = angle;
+    if (model == BendingModel::InscribedCircle)
+        length = 2*tan(0.5*angle);
+    for (double& component : bend)
+        component *= chord > 0 ? length/chord : 1;
+    return bend;
+}
+
+static double lengthOf(const double* x) {
+    return sqrt((x[3]-x[0])*(x[3]-x[0])+(x[4]-x[1])*(x[4]-x[1])+(x[5]-x[2])*(x[5]-x[2]));
+}
+
+/** A coordinate with the energy (stiffness/2) q^2. */
+static double stretchOf(StretchingModel model, const Segment& segment, double length) {
+    const double e = length-segment.restLength, d = segment.maximumExtension;
+    if (model == StretchingModel::Harmonic)
+        return e;
+    return copysign(d*sqrt(-log1p(-e*e/(d*d))), e);
+}
+
+/** The residual of the scheme's equations for new nodes y. */
+static Array residualOf(const vector<Chain>& chains, const Array& x, const Array& y, const Array& f, double h) {
+    Array middle(x.size()), residual = f;
+    for (size_t i = 0; i < x.size(); i++)
+        middle[i] = 0.5*(x[i]+y[i]);
+    vector<Chain> withoutExtensional = chains;
+    for (Chain& chain : withoutExtensional)
+        for (Segment& segment : chain.segments)
+            segment.extensional = 0;
+    const vector<Array> z = denseResistance(withoutExtensional, middle);
+    for (size_t i = 0; i < x.size(); i++)
+        for (size_t j = 0; j < x.size(); j++)
+            residual[i] -= z[i][j]*(y[j]-x[j])/h;
+    const double width = 1e-6;
+    for (const Chain& chain : chains) {
+        for (size_t s = 0; s < chain.segments.size(); s++) {
+            const Segment& segment = chain.segments[s];
+            const int first = 3*chain.nodes[s];
+            const double before = lengthOf(&x[first]), after = lengthOf(&y[first]);
+            const double theta = fmax(0.5, 1-segment.extensional/(h*segment.stiffness*segment.restLength*segment.restLength));
+            const double between = 0.5*(before+after);
+            const double slope = (stretchOf(chain.stretching, segment, between+width)-
+                    stretchOf(chain.stretching, segment, between-width))/(2*width);
+            const double tension = segment.stiffness*slope*(theta*stretchOf(chain.stretching, segment, after)+
+                    (1-theta)*stretchOf(chain.stretching, segment, before))+
+                    segment.extensional/(before*after)*(after-before)/h;
+            const double length = lengthOf(&middle[first]);
+            for (int k = 0; k < 3; k++) {
+                const double pull = tension*(middle[first+3+k]-middle[first+k])/length;
+                residual[first+k] += pull;
+                residual[first+3+k] -= pull;
+            }
+        }
+        for (size_t j = 0; j < chain.joints.size(); j++) {
+            const int first = 3*chain.nodes[j];
+            const double friction = fmin(chain.segments[j].rotational, chain.segments[j+1].rotational);
+            const double theta = fmax(0.5, 1-friction/(4*h*chain.joints[j]));
+            const Array before = bendOf(chain.bending, &x[first]), after = bendOf(chain.bending, &y[first]);
+            for (int i = 0; i < 9; i++) {
+                Array moved(middle.begin()+first, middle.begin()+first+9);
+                moved[i] += width;
+                const Array above = bendOf(chain.bending, moved.data());
+                moved[i] -= 2*width;
+                const Array below = bendOf(chain.bending, moved.data());
+                for (int k = 0; k < 3; k++)
+                    residual[first+i] -= chain.joints[j]*(theta*after[k]+(1-theta)*before[k])*(above[k]-below[k])/(2*width);
+            }
+        }
+        for (const Tether& tether : chain.tethers) {
+            double friction = 0;
+            for (int s = tether.node-1; s <= tether.node; s++)
+                if (s >= 0 && s < (int) chain.segments.size()) {
+                    const Segment& segment = chain.segments[s];
+                    friction += 0.25*segment.parallel+segment.extensional/(segment.restLength*segment.restLength);
+                }
+            const double theta = fmax(0.5, 1-friction/(h*tether.stiffness));
+            for (int k = 0; k < 3; k++) {
+                const int i = 3*chain.nodes[tether.node]+k;
+                residual[i] -= tether.stiffness*(theta*y[i]+(1-theta)*x[i]-tether.point[k]);
+            }
+        }
+    }
+    for (const Chain& chain : chains)
+        for (size_t node = 0; node < chain.nodes.size(); node++)
+            for (int k = 0; k < 3; k++)
+                if (chain.fixed[node])
+                    residual[3*chain.nodes[node]+k] = x[3*chain.nodes[node]+k]-y[3*chain.nodes[node]+k];
+    return residual;
+}
+
+/** Solve the equations by Newton's method with differences for derivatives, beginning near the solution. */
+static Array solutionNear(const vector<Chain>& chains, const Array& x, Array y, const Array& f, double h) {
+    const int n = x.size();
+    for (int iteration = 0; iteration < 6; iteration++) {
+        const Array residual = residualOf(chains, x, y, f, h);
+        vector<Array> jacobian(n, Array(n));
+        for (int j = 0; j < n; j++) {
+            Array moved = y;
+            moved[j] += 1e-6;
+            const Array changed = residualOf(chains, x, moved, f, h);
+            for (int i = 0; i < n; i++)
+                jacobian[i][j] = (residual[i]-changed[i])/1e-6;
+        }
+        const Array change = denseSolution(jacobian, residual);
+        for (int i = 0; i < n; i++)
+            y[i] += change[i];
+    }
+    return y;
+}
+
+static vector<Chain> tethered(vector<Chain> chains, const Array& x) {
+    for (Chain& chain : chains)
+        for (int node : {0, 2})
+            if (node < (int) chain.nodes.size()) {
+                const double* position = &x[3*chain.nodes[node]];
+                chain.tethers.push_back({node, {position[0]+1, position[1], position[2]-1}, 25});
+            }
+    return chains;
+}
+
+static void testStepsWithoutNoise() {
+    for (int bending = 0; bending < 3; bending++)
+        for (int stretching = 0; stretching < 2; stretching++)
+            for (bool tethers : {false, true}) {
+                Array x;
+                vector<Chain> chains = makeChains({3, 5, 1}, (BendingModel) bending, (StretchingModel) stretching, x);
+                if (tethers)
+                    chains = tethered(chains, x);
+                ChainEngine engine(chains);
+                Array f(x.size());
+                for (size_t i = 0; i < f.size(); i++)
+                    f[i] = sin(i);
+                for (double h : {0.001, 0.03, 1.0}) {
+                    const Array change = stepOf(engine, x, f, {Scheme::Implicit, 0, h, 1, 1});
+                    Array y = x;
+                    for (size_t i = 0; i < x.size(); i++)
+                        y[i] += change[i];
+                    const Array solution = solutionNear(chains, x, y, f, h);
+                    const Array residual = residualOf(chains, x, solution, f, h);
+                    for (size_t i = 0; i < x.size(); i++) {
+                        checkClose(0, residual[i], 1, 1e-4, "residual of the dense solution");
+                        checkClose(solution[i], y[i], 10, 3e-3, "implicit step");
+                    }
+                }
+            }
+}
+
+static void testConvergenceToExplicitSteps() {
+    Array x;
+    const vector<Chain> chains = makeChains(SEGMENTS, BendingModel::Quadratic, StretchingModel::FENE, x);
+    ChainEngine engine(chains);
+    const Array f(x.size(), 0.5), own = forcesOf(engine, x);
+    Array all = f;
+    for (size_t i = 0; i < x.size(); i++)
+        all[i] += own[i];
+    double difference[2];
+    for (int halved = 0; halved < 2; halved++) {
+        const double h = halved ? 5e-4 : 1e-3;
+        const Array implicit = stepOf(engine, x, f, {Scheme::Implicit, 0, h, 1, 1});
+        const Array midpoint = stepOf(engine, x, all, {Scheme::Midpoint, 0, h, 1, 1});
+        difference[halved] = 0;
+        for (size_t i = 0; i < x.size(); i++)
+            difference[halved] = fmax(difference[halved], fabs(implicit[i]-midpoint[i])/h);
+    }
+    checkClose(0.5*difference[0], difference[1], difference[0], 0.05, "difference from midpoint, of first order");
+}
+
+static void testChainsDoNotDependOnTheirPack() {
+    Array x;
+    const vector<Chain> chains = tethered(makeChains(SEGMENTS, BendingModel::InscribedCircle, StretchingModel::FENE, x), x);
+    ChainEngine together(chains), alone({chains[0]});
+    const Array f(x.size(), 0.5);
+    for (uint64_t step = 0; step < 500; step++) {
+        const StepSettings settings = {Scheme::Implicit, 2.5, 0.05, 11, step};
+        const Array a = stepOf(together, x, f, settings);
+        Array b(x.size());
+        alone.step(0, x.data(), f.data(), NULL, settings, b.data());
+        for (int i = 0; i < 3*6; i++)
+            checkClose(a[i], b[i], 1, 1e-9, "chain alone");
+    }
+}
+
+static void testPeriodicImages() {
+    Array x;
+    const vector<Chain> chains = tethered(makeChains(SEGMENTS, BendingModel::KratkyPorod, StretchingModel::Harmonic, x), x);
+    ChainEngine engine(chains);
+    const double box[] = {60, 0, 0, 10, 50, 0, -5, 8, 70};
+    Array wrapped = x;
+    for (size_t i = 0; i < x.size()/3; i++)
+        for (int vector = 0; vector < 3; vector++)
+            for (int k = 0; k < 3; k++)
+                wrapped[3*i+k] += box[3*vector+k]*((int) (i*(vector+1)%3)-1);
+    const Array f(x.size(), 0.5);
+    const Array a = stepOf(engine, x, f, {Scheme::Implicit, 1, 0.1, 1, 1});
+    const Array b = stepOf(engine, wrapped, f, {Scheme::Implicit, 1, 0.1, 1, 1}, box);
+    for (size_t i = 0; i < x.size(); i++)
+        checkClose(a[i], b[i], 1, 1e-8, "step across the box");
+}
+
+static void testLongChainsOfShortSegments() {
+    // Joints that are stiff and a step that is long: the matrix is as ill-conditioned as it gets.
+    Chain chain;
+    Array x;
+    const int count = 300;
+    for (int node = 0; node <= count; node++) {
+        chain.nodes.push_back(node);
+        chain.fixed.push_back(false);
+        x.insert(x.end(), {(double) node, 0, 0});
+    }
+    chain.segments.assign(count, {1, 1e4, 0, 1, 1.5, 0.1, 0.08});
+    chain.joints.assign(count-1, 5e3);
+    chain.bending = BendingModel::InscribedCircle;
+    chain.stretching = StretchingModel::Harmonic;
+    ChainEngine engine({chain});
+    const Array f(x.size());
+    Array forces(x.size()), displacements(x.size());
+    double energy = 0;
+    const int steps = 400, first = 100;
+    for (int step = 0; step < steps; step++) {
+        Instability found = engine.step(0, x.data(), f.data(), NULL, {Scheme::Implicit, 1, 10, 5, (uint64_t) step},
+                displacements.data());
+        check(found.chain == -1 && found.divided == 0, "long chain");
+        for (size_t i = 0; i < x.size(); i++)
+            x[i] += displacements[i];
+        const ChainEnergy now = engine.addForces(0, x.data(), forces.data(), NULL, true);
+        if (step >= first)
+            energy += (now.stretching+now.bending)/(0.5*count+count-1)/(steps-first);
+    }
+    checkClose(1, energy, 1, 0.03, "energy of a long chain");
+}
+
+static void testDivision() {
+    Array x;
+    const vector<Chain> chains = makeChains(SEGMENTS, BendingModel::InscribedCircle, StretchingModel::Harmonic, x);
+    ChainEngine engine(chains);
+    Array moved = x, f(x.size()), displacements(x.size());
+    moved[3*chains[5].nodes[4]+2] += 30;
+    int divided = 0;
+    for (int pack = 0; pack < engine.getNumPacks(); pack++) {
+        const Instability found = engine.step(pack, moved.data(), f.data(), NULL, {Scheme::Implicit, 0, 1, 1, 1},
+                displacements.data());
+        check(found.chain == -1, "a node that was moved");
+        divided += found.divided;
+    }
+    check(divided == 1, "one chain should take its step in parts");
+    Array after = moved;
+    for (size_t i = 0; i < x.size(); i++)
+        after[i] += displacements[i];
+    check(energyOf(engine, after) < 1e-2*energyOf(engine, moved), "energy should fall");
+    f[3*chains[5].nodes[4]] = NAN;
+    for (int pack = 0; pack < engine.getNumPacks(); pack++) {
+        const Instability found = engine.step(pack, x.data(), f.data(), NULL, {Scheme::Implicit, 1, 0.1, 1, 1},
+                displacements.data());
+        check(found.chain == -1 || found.chain == 5, "wrong chain");
+        if (found.chain == 5)
+            return;
+    }
+    throw runtime_error("instability not found");
+}
+
+int main() {
+    try {
+        testStepsWithoutNoise();
+        testConvergenceToExplicitSteps();
+        testChainsDoNotDependOnTheirPack();
+        testPeriodicImages();
+        testLongChainsOfShortSegments();
+        testDivision();
+    }
+    catch (const exception& error) {
+        printf("FAILED (%s): %s\n", ChainEngine::getInstructionSet().c_str(), error.what());
+        return 1;
+    }
+    printf("Passed with %s\n", ChainEngine::getInstructionSet().c_str());
+    return 0;
+}
