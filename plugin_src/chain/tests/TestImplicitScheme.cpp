@@ -270,7 +270,7 @@ static void testDivision() {
     Array after = moved;
     for (size_t i = 0; i < x.size(); i++)
         after[i] += displacements[i];
-    check(energyOf(engine, after) < 1e-2*energyOf(engine, moved), "energy should fall");
+    check(energyOf(engine, after) < energyOf(engine, x), "energy should fall");
     f[3*chains[5].nodes[4]] = NAN;
     for (int pack = 0; pack < engine.getNumPacks(); pack++) {
         const Instability found = engine.step(pack, x.data(), f.data(), NULL, {Scheme::Implicit, 1, 0.1, 1, 1},
