@@ -5,6 +5,7 @@ import io
 import signal
 import threading
 import time
+import warnings
 
 import numpy as np
 import openmm
@@ -12,7 +13,7 @@ from openmm import app, unit
 
 from .build import Filaments
 from .equilibrium import draw_chain
-from .errors import InputError, InstabilityError
+from .errors import InputError, InstabilityError, TimeStepWarning
 from .physical_units import format_time
 from .progress import Progress
 from .quantities import thermal_energy
@@ -20,6 +21,7 @@ from .run_directory import Checkpoint, EnergyTable, RunDirectory, TrajectoryFile
 from .theory import chain_mean_square_end_to_end
 
 _SECONDS_BETWEEN_CHECKS = 0.2
+_LARGEST_DIVIDED_SHARE = 1e-3
 
 
 class RunInterrupted(Exception):  # noqa: N818 - not an error
@@ -71,11 +73,25 @@ def run(configuration, output, resume=False):
             print(f"Resuming at step {checkpoint.step}, {format_time(checkpoint.step * settings.time_step)}.")
         try:
             _Recorder(configuration, filaments, simulation, directory, checkpoint).run_to_end()
+            _warn_of_divided_steps(simulation, len(filaments), settings.steps - (checkpoint.step if checkpoint else 0))
         except InstabilityError as error:
             raise InstabilityError(
                 f"{error} What came before is kept in {directory.path}; run the changed configuration in another "
                 "directory."
             ) from None
+
+
+def _warn_of_divided_steps(simulation, filaments, steps):
+    if not hasattr(simulation.integrator, "getNumDividedSteps"):
+        return
+    share = simulation.integrator.getNumDividedSteps() / (filaments * steps)
+    if share > _LARGEST_DIVIDED_SHARE:
+        warnings.warn(
+            f"{100 * share:.2g} % of all steps of filaments were divided, because the equations of the implicit scheme "
+            "could not be solved: averages may be biased. Use a smaller time step.",
+            TimeStepWarning,
+            stacklevel=2,
+        )
 
 
 def create_filaments(configuration):

@@ -112,7 +112,8 @@ class _Beads:
         self.count = round(CONTOUR_LENGTH / diameter) + 1
         self._type = FilamentType(
             name="BEAD",
-            diameter=diameter,
+            # Any that is thinner than long; only the energies of this type are used.
+            diameter=0.5 * diameter,
             segment_length=diameter,
             bending_rigidity=F_ACTIN.bending_rigidity,
             bending_model="quadratic",

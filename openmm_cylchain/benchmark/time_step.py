@@ -92,6 +92,12 @@ class StepErrors:
         """Whether no error exceeds what is allowed; without a finer run to compare with, equilibrium alone."""
         return _largest(self.equilibrium) <= equilibrium and _largest(self.dynamics) <= dynamics
 
+    def surely_fails(self, equilibrium, dynamics):
+        """Whether an error exceeds what is allowed by more than twice its standard error."""
+        allowed = [(error, equilibrium) for error in self.equilibrium.values()]
+        allowed += [(error, dynamics) for error in self.dynamics.values()]
+        return any(abs(error.value) > limit + 2.0 * (error.error or 0.0) for error, limit in allowed)
+
     @property
     def largest_equilibrium_error(self):
         """The largest of the equilibrium errors."""
@@ -120,12 +126,13 @@ class SystemErrors:
         return sorted((one for one in self.steps if one.scheme == scheme), key=lambda one: one.step)
 
     def largest_step(self, scheme, equilibrium, dynamics):
-        """The StepErrors of the largest step that passes together with all smaller ones, or None."""
+        """The StepErrors of the largest step that passes, below the first that surely fails, or None."""
         largest = None
         for one in self.of_scheme(scheme):
-            if not one.passes(equilibrium, dynamics):
+            if one.surely_fails(equilibrium, dynamics):
                 break
-            largest = one
+            if one.passes(equilibrium, dynamics):
+                largest = one
         return largest
 
 
