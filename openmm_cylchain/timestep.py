@@ -178,6 +178,7 @@ _REASONS = {
     "for accuracy",
     "turning": "rotational diffusion of a segment: it may turn by {angle:g} rad in a step, or less where its "
     "extensional friction is large",
+    "rotation": "rotation of segments: they may turn by {angle:g} rad in a step",
     "relaxation": "relaxation of the whole filament, which takes {relaxation_steps:g} steps",
 }
 _RELAXATION_STEPS = 20.0
@@ -271,7 +272,7 @@ def implicit_time_step(filament_type, viscosity, temperature, segments=2):
         waves = friction_per_length * (_IMPLICIT_TURNING_ANGLE**2 * rigidity / kT) ** 4 / rigidity
         whole = _IMPLICIT_TURNING_ANGLE**2 * friction_per_length * (segments * length) ** 3 / (24.0 * kT)
         turning = max(free, min(waves, whole))
-    bounds = {"turning": turning}
+    bounds = {"rotation": turning}
     allowed = dict(bounds)
     if bends:
         bounds["relaxation"] = friction_per_length * (segments * length / 4.73) ** 4 / rigidity

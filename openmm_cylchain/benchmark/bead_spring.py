@@ -64,7 +64,7 @@ def benchmark_bead_spring(effort=FULL, say=lambda message: None):
     beads = _Beads(effort.chains)
     bead_step = beads.largest_step(effort.bead_steps, say)
     rows.append(row("largest_step_beads", Estimate(bead_step / _MICROSECOND, None), "us"))
-    cases.append(Case("beads", beads.context(bead_step).getIntegrator().step))
+    cases.append(Case("beads", beads.stepper(bead_step)))
     for count in effort.segments:
         system = _segments_system(count, effort.chains)
         result = measure_system(system, effort.segment_effort, say, ("implicit",))
@@ -126,7 +126,16 @@ class _Beads:
             [draw_chain(self._type, self.count - 1, self._temperature, generator) for _ in range(chains)]
         )
 
-    def context(self, step):
+    def stepper(self, step):
+        """What advances the chains by a number of steps."""
+        context = self._context(step)
+
+        def advance(steps):
+            context.getIntegrator().step(steps)
+
+        return advance
+
+    def _context(self, step):
         system = openmm.System()
         bonds, angles = openmm.HarmonicBondForce(), openmm.HarmonicAngleForce()
         angles.setForceGroup(1)
@@ -159,7 +168,7 @@ class _Beads:
         return largest
 
     def _energy_errors(self, step, steps):
-        context = self.context(step)
+        context = self._context(step)
         context.getIntegrator().step(steps // 4)
         energies = []
         for _ in range(50):

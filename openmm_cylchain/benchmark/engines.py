@@ -15,7 +15,7 @@ import openmm
 from ..engines import ENGINES, available_engines
 from .measurement import Case, describe_machine, median, processors, ratio, scaled, time_interleaved
 from .report import Report, row
-from .systems import TIME_STEP, simulate_beads, simulate_filaments
+from .systems import SCHEME, TIME_STEP, simulate_beads, simulate_filaments
 
 CHAINS, SEGMENTS = 200, 64
 SPEED_UNIT = "10^6 segment steps/s"
@@ -60,7 +60,7 @@ def benchmark_engines(effort=FULL, chains=CHAINS, segments=SEGMENTS, say=lambda 
         "segments_per_chain": segments,
         "particles": chains * (segments + 1),
         "time_step_ps": TIME_STEP,
-        "scheme": "midpoint",
+        "scheme": SCHEME,
         "repetitions": effort.repetitions,
         "seconds_per_repetition": effort.seconds,
         "compared_on_one_thread": compared,

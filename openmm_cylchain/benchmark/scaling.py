@@ -11,7 +11,7 @@ from ..engines import available_engines, choose_engine
 from .measurement import Case, describe_machine, difference, median, ratio, scaled, time_interleaved
 from .memory import STOCK, MeasurementError, measure_growth
 from .report import Report, row
-from .systems import TIME_STEP, one_thread_platform, simulate_filaments
+from .systems import SCHEME, TIME_STEP, one_thread_platform, simulate_filaments
 
 CHAIN_LENGTH = 64
 COST_UNIT = "ns per segment and step"
@@ -116,7 +116,7 @@ def benchmark_scaling(engine=None, effort=FULL, say=lambda message: None):
         "platform": one_thread_platform()[0],
         "threads": 1,
         "time_step_ps": TIME_STEP,
-        "scheme": "midpoint",
+        "scheme": SCHEME,
         "repetitions": effort.repetitions,
         "memory_repetitions": effort.memory_repetitions,
         "seconds_per_repetition": effort.seconds,

@@ -19,7 +19,7 @@
  *     f_drift = -k_B T sum_a (k (2 theta-1) + g/h) H_a (Z/h+K)^-1 J_a
  *
  * with the second derivatives H_a of the lengths. It takes the blocks of the inverse next to its diagonal, which follow
- * from those of the elimination.
+ * from those of the elimination. IMPLICIT_SCHEME.md explains all this.
  */
 
 /** The largest change of a segment in the last iteration, over its rest length; a fifth of it remains as an error. */
@@ -31,6 +31,8 @@ const int LARGEST_DIVISION = 10;
 const double COMPRESSION = 0.9;
 /** A bend is drawn as a Gaussian with rejection if the joint is stiffer than this many k_B T, or else from the sphere. */
 const double STIFF_JOINT = 2;
+/** The tension of a segment turns it back by this much of what resists, in a step. */
+const double NEARLY_TAUT = 0.5;
 const double TINY = 1e-300;
 
 template <class Real> struct Matrix {
@@ -399,24 +401,47 @@ private:
         geometry.middleInverse = 1/root(middle.dot(middle));
         geometry.middleTangent = middle*geometry.middleInverse;
     }
-    /** Whether any segment is taut: its tension turns it back faster than a step resolves. */
+    /** The friction of a segment's ends against turning, and the stiffness with which its tension turns it back, in a step. */
+    void turningRates(int s, Real& friction, Real& tension) const {
+        const Real l0 = property<Real>(pack, s, ChainPack::RestLength);
+        friction = 0.25*property<Real>(pack, s, ChainPack::Perpendicular)+
+                property<Real>(pack, s, ChainPack::Rotational)/(l0*l0)+TINY;
+        tension = h*segments[s].multiplier/segments[s].length;
+    }
+    /**
+     * Give friction and its noise to segments that are taut: whose tension turns them back faster than a step resolves.
+     *
+     * @return whether any chain has a segment that comes near to it
+     */
     bool stiffenTautSegments() {
-        bool any = false;
+        Real greatest = Real{};
         for (int s = 0; s < n-1; s++) {
+            Real friction, tension;
+            turningRates(s, friction, tension);
+            greatest = larger<Real>(greatest, tension/friction);
+        }
+        bool any = false;
+        Real taut = Real{};
+        for (int i = 0; i < W; i++)
+            if (lane(greatest, i) > NEARLY_TAUT) {
+                lane(taut, i) = 1;
+                any = true;
+            }
+        if (!any)
+            return false;
+        for (int s = 0; s < n-1; s++) {
+            Real friction, tension;
+            turningRates(s, friction, tension);
             ImplicitSegment<Real>& segment = segments[s];
-            const Real l0 = property<Real>(pack, s, ChainPack::RestLength), rotational = property<Real>(pack, s, ChainPack::Rotational);
-            const Real friction = 0.25*property<Real>(pack, s, ChainPack::Perpendicular)+rotational/(l0*l0);
-            const Real rate = h*segment.multiplier/segment.length;
-            const Real excess = larger<Real>(0.5*rate-friction, Real{});
-            segment.extra = excess*segment.length*segment.length;
-            Real test = rate/(friction+TINY);
-            for (int i = 0; i < W; i++)
-                any |= lane(test, i) > 0.5;
+            const Real rotational = property<Real>(pack, s, ChainPack::Rotational);
+            segment.extra = taut*larger<Real>(0.5*tension-friction, Real{})*segment.length*segment.length;
+            // Chains that are not taut solve the same equations once more.
+            segment.multiplier = segment.multiplier*taut;
             const Vec pair = segment.randomPair*(root(1+segment.extra/(rotational+TINY))-1);
             f[s] = f[s]-pair;
             f[s+1] = f[s+1]+pair;
         }
-        return any;
+        return true;
     }
     /** Add a segment to the equations of its nodes. It is the first to do so for all but the first one's diagonal. */
     CYLCHAIN_INLINE void addSegment(const Vec* y, int s, const Geometry& geometry, Row& here, Row& after) {

@@ -193,7 +193,12 @@ static void testChainsDoNotDependOnTheirPack() {
     Array x;
     const vector<Chain> chains = tethered(makeChains(SEGMENTS, BendingModel::InscribedCircle, StretchingModel::FENE, x), x);
     ChainEngine together(chains), alone({chains[0]});
-    const Array f(x.size(), 0.5);
+    // Some of its neighbours are taut.
+    Array f(x.size(), 0.5);
+    for (int chain : {1, 7}) {
+        f[3*chains[chain].nodes.front()] -= 200;
+        f[3*chains[chain].nodes.back()] += 200;
+    }
     for (uint64_t step = 0; step < 500; step++) {
         const StepSettings settings = {Scheme::Implicit, 2.5, 0.05, 11, step};
         const Array a = stepOf(together, x, f, settings);

@@ -48,13 +48,13 @@ public:
          */
         Euler = 0,
         /**
-         * Fixman's midpoint, which has the right drift.  It is the default.
+         * Fixman's midpoint, which has the right drift.
          */
         Midpoint = 1,
         /**
-         * The forces of the chains are taken at the end of the step, those of all other Forces at its start.  Stretching
-         * and bending do not limit the step, and keep their equilibrium.  If the force group of the CylinderChainForce
-         * is not among the integration force groups, this is the same as Midpoint.
+         * The forces of the chains are taken at the end of the step, those of all other Forces at its start.  Stretching,
+         * bending and tethers do not limit the step, and keep their equilibrium.  It is the default.  If the force group
+         * of the CylinderChainForce is not among the integration force groups, this is the same as Midpoint.
          */
         Implicit = 2
     };
