@@ -196,8 +196,8 @@ static void testChainsDoNotDependOnTheirPack() {
     // Some of its neighbours are taut.
     Array f(x.size(), 0.5);
     for (int chain : {1, 7}) {
-        f[3*chains[chain].nodes.front()] -= 200;
-        f[3*chains[chain].nodes.back()] += 200;
+        f[3*chains[chain].nodes.front()] -= 600;
+        f[3*chains[chain].nodes.back()] += 600;
     }
     for (uint64_t step = 0; step < 500; step++) {
         const StepSettings settings = {Scheme::Implicit, 2.5, 0.05, 11, step};
