@@ -182,12 +182,11 @@ def _benchmark_scaling(options):
 
 
 def _benchmark_time_step(options):
-    from .benchmark.report import check_output_path
     from .benchmark.time_step import FULL, QUICK, benchmark_time_step
-    from .benchmark.time_step_figure import write_figure
+    from .benchmark.time_step_figure import check_figure_path, write_figure
 
     if options.plot is not None:
-        check_output_path(options.plot)
+        check_figure_path(options.plot)
     results = []
 
     def measure(say):

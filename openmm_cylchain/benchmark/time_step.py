@@ -429,19 +429,18 @@ def format_errors(result):
     lines = [f"{result.system.label} (errors in %; recommended {format_time(result.recommended, 3)})", header]
     for scheme in SCHEMES:
         for one in result.of_scheme(scheme):
-            columns = [
-                _percent(one.equilibrium.get(name))
-                for name in ("stretching energy", "bending energy", "end-to-end distance")
-            ]
-            dynamics = f"{100 * one.largest_dynamic_error:.1f}" if one.dynamics else "–"
-            speed = one.step / _MICROSECOND / one.seconds_per_step.value
-            lines.append(
-                f"{scheme:<9} {format_time(one.step, 2):>8} {columns[0]:>15} {columns[1]:>15} {columns[2]:>15} "
-                f"{dynamics:>9} {speed:>9.3g}"
-                if "blown up" not in one.equilibrium
-                else f"{scheme:<9} {format_time(one.step, 2):>8} {'blown up':>15}"
-            )
+            lines.append(f"{scheme:<9} {format_time(one.step, 2):>8} {_columns(one)}")
     return "\n".join(lines)
+
+
+def _columns(one):
+    if not np.isfinite(one.largest_equilibrium_error):
+        return f"{'blown up':>15}"
+    names = ("stretching energy", "bending energy", "end-to-end distance")
+    columns = [f"{_percent(one.equilibrium.get(name)):>15}" for name in names]
+    columns.append(f"{100 * one.largest_dynamic_error:>9.1f}" if one.dynamics else f"{'–':>9}")
+    columns.append(f"{one.step / _MICROSECOND / one.seconds_per_step.value:>9.3g}")
+    return " ".join(columns)
 
 
 def _percent(error):

@@ -6,12 +6,22 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from ..errors import InputError
 from ..timestep import SCHEMES
+from .report import check_output_path
 from .time_step import CRITERIA
 
 _COLORS = {"euler": "tab:red", "midpoint": "tab:orange", "implicit": "tab:blue"}
 _MICROSECOND = 1e6
 _LIMITS = (0.05, 200.0)
+_FORMATS = (".png", ".svg", ".pdf")
+
+
+def check_figure_path(path):
+    """Raise InputError if a figure cannot be written there."""
+    check_output_path(path)
+    if Path(path).suffix not in _FORMATS:
+        raise InputError(f"{path} must end in one of {', '.join(_FORMATS)}, which chooses the format of the figure.")
 
 
 def write_figure(results, path):
