@@ -189,6 +189,62 @@ def test_a_hard_pull_is_taken_in_parts():
     assert context.getIntegrator().getNumDividedSteps() > 0
 
 
+@pytest.mark.parametrize("direction", [(1, 0, 0), (-1, 0, 0), (0, 1, 0)])
+@pytest.mark.parametrize("nanonewton", [0.1, 1, 10])
+def test_filaments_that_are_pulled_and_pushed_hard_come_back(direction, nanonewton):
+    """Both ends are pulled apart, pushed together or sheared, and let go: filaments return to equilibrium, or the run stops."""
+    filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
+    for chain in range(24):
+        filaments.add_equilibrium(F_ACTIN, 16, seed=chain, direction=[1, 0, 0])
+    _, system, positions = filaments.build()
+    force = openmm.CustomExternalForce("-pull*(fx*x+fy*y+fz*z)")
+    force.addGlobalParameter("pull", nanonewton * 602.214)
+    for component in ("fx", "fy", "fz"):
+        force.addPerParticleParameter(component)
+    for nodes in filaments.node_indices:
+        force.addParticle(int(nodes[0]), [-each for each in direction])
+        force.addParticle(int(nodes[-1]), direction)
+    system.addForce(force)
+    integrator = filaments.create_integrator(system, 5 * MICROSECOND, scheme="implicit", random_seed=1)
+    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
+    context.setPositions(positions)
+    try:
+        integrator.step(100)
+    except InstabilityError as error:
+        assert "the equations of the implicit scheme cannot be solved" in str(error)
+        assert np.isfinite(_positions(context)).all()
+        assert nanonewton > 1
+        return
+    context.setParameter("pull", 0.0)
+    integrator.step(2000)
+    energy = context.getState(energy=True).getPotentialEnergy()._value / KT
+    expected = 24 * (0.5 * 16 + 0.98 * 15)
+    assert abs(energy - expected) < 4 * np.sqrt(expected)
+
+
+@pytest.mark.parametrize("model", ["kratky-porod", "quadratic", "inscribed-circle"])
+@pytest.mark.parametrize("angle", [np.pi, np.pi - 1e-9, np.pi - 0.01, 3.0])
+def test_segments_that_are_folded_back_open_or_stop_the_run(model, angle):
+    filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
+    filaments.add_straight(replace(F_ACTIN, bending_model=model), 3, [0, 0, 0], [1, 0, 0])
+    context = _context(filaments, MICROSECOND)
+    nodes = np.zeros((4, 3))
+    nodes[1:3] = [[360, 0, 0], [720, 0, 0]]
+    nodes[3] = nodes[2] + 360 * np.array([np.cos(angle), np.sin(angle), 0])
+    context.setPositions(nodes)
+    try:
+        context.getIntegrator().step(1500)
+    except InstabilityError as error:
+        assert "Filament 0 (ACT) has blown up" in str(error)
+        assert np.array_equal(_positions(context), nodes)
+        return
+    tangents = np.diff(_positions(context), axis=0)
+    lengths = np.linalg.norm(tangents, axis=1)
+    assert np.all(np.abs(lengths - 360) < 10)
+    cosines = np.sum(tangents[1:] * tangents[:-1], axis=1) / (lengths[1:] * lengths[:-1])
+    assert np.all(cosines > 0.5)
+
+
 def test_forces_that_are_not_finite_are_named_and_nothing_moves():
     filaments = _actin()
     topology, system, positions = filaments.build()
