@@ -276,9 +276,11 @@ class Filaments:
             raise InputError(f"Tether {tether} does not exist; there are {len(self._tethers)}.")
         point = tuple(float(x) for x in vector(point, LENGTH, f"Tether {tether}: point"))
         old = self._tethers[tether]
-        stiffness = old.stiffness if stiffness is None else positive(stiffness, STIFFNESS, f"Tether {tether}: stiffness")
-        self._engine.move_tether(context, tether, replace(old, point=point, stiffness=stiffness), self.node_indices)
-        self._tethers[tether] = replace(old, point=point, stiffness=stiffness)
+        if stiffness is None:
+            stiffness = old.stiffness
+        new = replace(old, point=point, stiffness=positive(stiffness, STIFFNESS, f"Tether {tether}: stiffness"))
+        self._engine.move_tether(context, tether, new, self.node_indices)
+        self._tethers[tether] = new
 
     def _label(self, filament_type):
         if not isinstance(filament_type, FilamentType):

@@ -249,11 +249,9 @@ def implicit_time_step(filament_type, viscosity, temperature, segments=2):
     A segment turns by the mean square of what a free segment does, 2 k_B T dt/gamma_rot, or, if that is less, of what
     its neighbours allow: after dt, waves of up to the length xi = (a dt l0/gamma_perp)^(1/4) have relaxed, which turns
     it by k_B T xi/a, and the filament turns as a whole by 24 k_B T dt l0/(gamma_perp L^3). Either must stay below
-    0.15^2. Measured with ``openmm-cylchain benchmark time-step``, F-actin, microtubules, DNA and chains with free joints
-    keep equilibrium within 5 % and dynamics within 10 % at that step and at several times as much.
-
-    A step must also resolve the slowest relaxation of the filament,
-    gamma_perp/(l0 a) (L/4.73)^4, by 20 steps.
+    0.15^2. Measured with ``openmm-cylchain benchmark time-step``, F-actin, microtubules, DNA and chains with free
+    joints keep equilibrium within 5 % and dynamics within 10 % at that step and at several times as much. A step must
+    also resolve the slowest relaxation of the filament, gamma_perp/(l0 a) (L/4.73)^4, by 20 steps.
 
     Returns
     -------

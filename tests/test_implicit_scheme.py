@@ -19,9 +19,7 @@ MICROSECOND = 1e6
 
 def _context(filaments, step, temperature=None, platform="Reference", seed=1, properties=None):
     topology, system, positions = filaments.build()
-    integrator = filaments.create_integrator(
-        system, step, scheme="implicit", temperature=temperature, random_seed=seed
-    )
+    integrator = filaments.create_integrator(system, step, scheme="implicit", temperature=temperature, random_seed=seed)
     context = openmm.Context(system, integrator, openmm.Platform.getPlatform(platform), properties or {})
     context.setPositions(positions)
     return context
@@ -71,7 +69,8 @@ def test_equilibrium_of_lengths_much_stiffer_than_the_step_resolves():
     A scheme that treats lengths as constraints would give the distribution of rigid rods, <cos^2> = 0.32.
     """
     base = CASES["freely-jointed"]
-    case = replace(base, type=replace(base.type, stretching_stiffness=1e4 * base.type.segment_stiffness), chains=3000, steps=2400)
+    stiff = replace(base.type, stretching_stiffness=1e4 * base.type.segment_stiffness)
+    case = replace(base, type=stiff, chains=3000, steps=2400)
     step = recommended_time_step(case.type, VISCOSITY, TEMPERATURE, "implicit", case.segments).step / 4
     measured = measured_means(case, "compiled", "Reference", "implicit", step=step)
     mean, error = measured["squared cosine"]
@@ -192,7 +191,7 @@ def test_a_hard_pull_is_taken_in_parts():
 @pytest.mark.parametrize("direction", [(1, 0, 0), (-1, 0, 0), (0, 1, 0)])
 @pytest.mark.parametrize("nanonewton", [0.1, 1, 10])
 def test_filaments_that_are_pulled_and_pushed_hard_come_back(direction, nanonewton):
-    """Both ends are pulled apart, pushed together or sheared, and let go: filaments return to equilibrium, or the run stops."""
+    """Ends are pulled apart, pushed together or sheared, and let go: equilibrium comes back, or the run stops."""
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
     for chain in range(24):
         filaments.add_equilibrium(F_ACTIN, 16, seed=chain, direction=[1, 0, 0])

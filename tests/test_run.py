@@ -342,7 +342,12 @@ def test_signals_end_a_run_with_a_checkpoint(tmp_path, unbroken, number, code):
 
 def test_blow_up_is_reported_and_leaves_no_broken_frame(tmp_path, capsys):
     config = configured(
-        tmp_path, scheme='"midpoint"', time_step='"400 ns"', duration='"80 us"', report_interval='"0.4 us"', checkpoint_interval='"0.4 us"'
+        tmp_path,
+        scheme='"midpoint"',
+        time_step='"400 ns"',
+        duration='"80 us"',
+        report_interval='"0.4 us"',
+        checkpoint_interval='"0.4 us"',
     )
     output = tmp_path / "out"
     assert main(["run", config, "--output", str(output)]) == 1
@@ -362,7 +367,13 @@ def test_infinite_energy_is_not_written(tmp_path, capsys):
     # A FENE segment that a large step carries beyond its maximum extension, at positions that are finite.
     text = SHORT.replace("segments = 6", 'segments = 6\nstretching_model = "fene"\nmaximum_extension = "1 nm"')
     config = configured(
-        tmp_path, text, scheme='"midpoint"', time_step='"60 ns"', duration='"60 us"', report_interval='"60 ns"', checkpoint_interval='"6 us"'
+        tmp_path,
+        text,
+        scheme='"midpoint"',
+        time_step='"60 ns"',
+        duration='"60 us"',
+        report_interval='"60 ns"',
+        checkpoint_interval='"6 us"',
     )
     output = tmp_path / "out"
     assert main(["run", config, "--output", str(output)]) == 1

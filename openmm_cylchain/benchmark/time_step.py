@@ -287,11 +287,7 @@ def _reduce(system, nodes, seconds):
         "displacement": nodes[:, :, _middle(system.segments + 1)],
     }
     lags = {1, 2} | {lag for lag in (REFERENCE_FACTOR, 2 * REFERENCE_FACTOR) if lag < len(nodes)}
-    displacements = {
-        (name, lag): _mean_square_change(values, lag)
-        for name, values in series.items()
-        for lag in lags
-    }
+    displacements = {(name, lag): _mean_square_change(values, lag) for name, values in series.items() for lag in lags}
     square = np.sum(ends**2, axis=2)
     return _Run(energies, square[late].mean(axis=0), square[0], displacements, seconds)
 

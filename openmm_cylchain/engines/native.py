@@ -20,8 +20,8 @@ def _load_plugin():
         from ..plugin_version import OPENMM_VERSION
     except ModuleNotFoundError:
         raise ImportError(
-            f"the package in {Path(__file__).parents[1]} has no compiled plugin. Install it with pip and a C++ compiler, "
-            "without OPENMM_CYLCHAIN_PORTABLE, and run Python outside its source directory."
+            f"the package in {Path(__file__).parents[1]} has no compiled plugin. Install it with pip and a C++ "
+            "compiler, without OPENMM_CYLCHAIN_PORTABLE, and run Python outside its source directory."
         ) from None
     installed = openmm.Platform.getOpenMMVersion()
     if installed.split(".")[:2] != OPENMM_VERSION.split(".")[:2]:
@@ -102,9 +102,7 @@ def move_tether(context, index, tether, node_indices):
     for force in context.getSystem().getForces():
         if CylinderChainForce.isinstance(force):
             force = CylinderChainForce.cast(force)
-            force.setTetherParameters(
-                index, tether.filament, tether.node, openmm.Vec3(*tether.point), tether.stiffness
-            )
+            force.setTetherParameters(index, tether.filament, tether.node, openmm.Vec3(*tether.point), tether.stiffness)
             force.updateParametersInContext(context)
 
 
