@@ -10,7 +10,6 @@ spheres, the filament with that of cylinders.
 """
 
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import matplotlib
@@ -23,7 +22,7 @@ import openmm
 from openmm import app, unit
 
 from openmm_cylchain import DSDNA, Filaments, stokes_friction
-from openmm_cylchain.theory import bending_energy_mean
+from openmm_cylchain.theory import bending_energy_mean, stretching_energy_mean
 
 BOX = 60.0  # nm
 PARTICLES = 150
@@ -34,7 +33,10 @@ STEPS = 6000
 FRAMES = 100
 VISCOSITY = 1e-3 * unit.pascal * unit.second
 TEMPERATURE = 310 * unit.kelvin
-BENDING_GROUP = 1
+CHAIN_GROUP = 1
+# Contacts are explicit forces: a step must stay well below 2 gamma/k, 2 ns for a node against a particle. The filament
+# alone would allow more, see filaments.recommended_time_step().
+STEP = 0.1 * unit.nanosecond
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else "output_lennard_jones_box")
 steps = int(sys.argv[2]) if len(sys.argv) > 2 else STEPS
@@ -42,14 +44,13 @@ folder.mkdir(parents=True, exist_ok=True)
 generator = np.random.default_rng(5)
 
 # An ordinary OpenMM system: particles on a lattice, with places near the filament left out.
-dna = replace(DSDNA, extension_relaxation_time=0.4 * unit.nanosecond)
 filaments = Filaments(VISCOSITY, TEMPERATURE)
-filaments.add_equilibrium(dna, SEGMENTS, seed=3, start=[5, 30, 30], direction=[1, 0, 0])
+filaments.add_equilibrium(DSDNA, SEGMENTS, seed=3, start=[5, 30, 30], direction=[1, 0, 0])
 lattice = (np.stack(np.meshgrid(*[np.arange(9)] * 3, indexing="ij"), axis=-1).reshape(-1, 3) + 0.5) * BOX / 9
 axis = np.concatenate([np.linspace(*pair) for pair in zip(filaments[0].positions[:-1], filaments[0].positions[1:])])
 gaps = lattice[:, None] - axis
 gaps -= BOX * np.round(gaps / BOX)
-away = np.linalg.norm(gaps, axis=2).min(axis=1) > 0.5 * (DIAMETER + dna.diameter)
+away = np.linalg.norm(gaps, axis=2).min(axis=1) > 0.5 * (DIAMETER + DSDNA.diameter)
 particle_positions = generator.permutation(lattice[away])[:PARTICLES]
 
 topology, system = app.Topology(), openmm.System()
@@ -67,10 +68,10 @@ for _ in range(PARTICLES):
     attraction.addParticle(0, DIAMETER, ATTRACTION)
 
 # The filament joins them. It takes no part in forces that were there before.
-positions = filaments.add_to(topology, system, particle_positions, bending_force_group=BENDING_GROUP)
+positions = filaments.add_to(topology, system, particle_positions, CHAIN_GROUP, CHAIN_GROUP)
 
 # Particles and nodes touch at the sum of their radii.
-contact = 0.5 * (DIAMETER + dna.diameter)
+contact = 0.5 * (DIAMETER + DSDNA.diameter)
 repulsion = openmm.CustomNonbondedForce(
     "step(contact-r)*4*epsilon*((s/r)^12-(s/r)^6+0.25); s=contact/2^(1/6); epsilon=2.5"
 )
@@ -82,21 +83,19 @@ for _ in range(system.getNumParticles()):
 repulsion.addInteractionGroup(range(PARTICLES), [int(node) for node in filaments.node_indices[0]])
 system.addForce(repulsion)
 
-step = filaments.recommended_time_step().step
-integrator = filaments.create_integrator(
-    system, step, particle_friction=stokes_friction(DIAMETER * unit.nanometer, VISCOSITY), random_seed=1
-)
+friction = stokes_friction(DIAMETER * unit.nanometer, VISCOSITY)
+integrator = filaments.create_integrator(system, STEP, particle_friction=friction, random_seed=1)
 simulation = app.Simulation(topology, system, integrator, openmm.Platform.getPlatformByName("CPU"))
 simulation.context.setPositions(positions)
 with open(folder / "box.cif", "w") as file:
     app.PDBxFile.writeFile(topology, positions, file, keepIds=True)
 interval = max(1, steps // FRAMES)
 simulation.reporters.append(app.DCDReporter(str(folder / "box.dcd"), interval))
-bending = []
+energies = []
 for _ in range(steps // interval):
     simulation.step(interval)
-    state = simulation.context.getState(energy=True, groups={BENDING_GROUP})
-    bending.append(state.getPotentialEnergy()._value / (SEGMENTS - 1))
+    state = simulation.context.getState(energy=True, groups={CHAIN_GROUP})
+    energies.append(state.getPotentialEnergy()._value)
 final = simulation.context.getState(positions=True).getPositions(asNumpy=True).value_in_unit(unit.nanometer)
 nodes = final[filaments.node_indices[0]]
 particles = final[:PARTICLES]
@@ -104,12 +103,12 @@ particles = final[:PARTICLES]
 moved = np.sqrt(np.mean(np.sum((particles - particle_positions) ** 2, axis=1)))
 gaps = particles[:, None] - nodes
 gaps -= BOX * np.round(gaps / BOX)
-print(f"{steps} steps of {step:.3g} ps, {steps * step / 1000:.0f} ns in all")
+print(f"{steps} steps of {STEP}, {(steps * STEP).value_in_unit(unit.nanosecond):.0f} ns in all")
 print(f"particles moved by {moved:.1f} nm (root mean square)")
 print(f"closest particle to a node: {np.linalg.norm(gaps, axis=2).min():.2f} nm; they touch at {contact:.2f} nm")
 print(f"end-to-end distance of the filament: {np.linalg.norm(nodes[-1] - nodes[0]):.1f} nm")
-exact = bending_energy_mean(dna, TEMPERATURE)
-print(f"bending energy of a joint: {np.mean(bending):.2f} kJ/mol, {exact:.2f} in equilibrium without particles")
+exact = SEGMENTS * stretching_energy_mean(DSDNA, TEMPERATURE) + (SEGMENTS - 1) * bending_energy_mean(DSDNA, TEMPERATURE)
+print(f"energy of the filament: {np.mean(energies):.1f} kJ/mol, {exact:.1f} in equilibrium without particles")
 
 
 def surface(axes, points, colour):
@@ -139,9 +138,9 @@ for particle in particles % BOX:
     surface(axes, sphere(particle, DIAMETER / 2), "#bfe0f5")
 for first, second in zip(inside[:-1], inside[1:]):
     for start, end in zip(np.linspace(first, second, 5)[:-1], np.linspace(first, second, 5)[1:]):
-        surface(axes, cylinder(start, end, dna.diameter / 2), "#d9482f")
+        surface(axes, cylinder(start, end, DSDNA.diameter / 2), "#d9482f")
 for node in inside:
-    surface(axes, sphere(node, 0.55 * dna.diameter), "#922b21")
+    surface(axes, sphere(node, 0.55 * DSDNA.diameter), "#922b21")
 for low in range(3):
     for second in (0, BOX):
         for third in (0, BOX):

@@ -1,6 +1,6 @@
 """Actin filaments and microtubules in one System: how fast does each forget its direction?
 
-Filaments of both kinds, 6 um long, start in equilibrium at 37 C and move for 50 us. The cosine of the angle
+Filaments of both kinds, 6 um long, start in equilibrium at 37 C and move for 0.1 s. The cosine of the angle
 between two pieces of a filament falls off as exp(-s/l_p) with the distance s between them; the persistence length
 l_p is 17 um for actin and 5 mm for microtubules.
 
@@ -8,7 +8,6 @@ l_p is 17 um for actin and 5 mm for microtubules.
 """
 
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import matplotlib
@@ -35,12 +34,9 @@ folder = Path(sys.argv[1] if len(sys.argv) > 1 else "output_two_filament_types")
 steps = int(sys.argv[2]) if len(sys.argv) > 2 else STEPS
 folder.mkdir(parents=True, exist_ok=True)
 
-# Both get the extension relaxation time of Pesek et al. (0.1 us) so that the same step suits both.
 types = {
-    name: replace(preset, extension_relaxation_time=0.1 * unit.microsecond).with_segment_length(
-        CONTOUR / SEGMENTS[name]
-    )
-    for name, preset in (("actin", F_ACTIN), ("microtubule", MICROTUBULE))
+    "actin": F_ACTIN.with_segment_length(CONTOUR / SEGMENTS["actin"]),
+    "microtubule": MICROTUBULE.with_segment_length(CONTOUR / SEGMENTS["microtubule"]),
 }
 filaments = Filaments(viscosity=1e-3 * unit.pascal * unit.second, temperature=TEMPERATURE)
 members = {

@@ -1,6 +1,5 @@
 """The Python examples run, in a process of their own, and write what they say."""
 
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -21,11 +20,9 @@ CASES = [
 
 
 def run(name, folder, steps):
-    search_path = os.pathsep.join([str(EXAMPLES.parent), os.environ.get("PYTHONPATH", "")])
     return subprocess.run(
         [sys.executable, str(EXAMPLES / f"{name}.py"), str(folder), str(steps)],
         cwd=folder.parent,
-        env={**os.environ, "PYTHONPATH": search_path},
         capture_output=True,
         text=True,
         timeout=120,
