@@ -97,6 +97,7 @@ class Filaments:
         self._temperature = non_negative(temperature, TEMPERATURE, "temperature")
         self._filaments = []
         self._tethers = []
+        self._tethered_nodes = set()
         self._nodes = None
 
     def __len__(self):
@@ -247,11 +248,12 @@ class Filaments:
         if filament >= len(self):
             raise InputError(f"{label}: filament {filament} does not exist; there are {len(self)}.")
         (node,) = named_nodes([node], len(self[filament].positions), f"{label}:")
-        if any((one.filament, one.node) == (filament, node) for one in self._tethers):
+        if (filament, node) in self._tethered_nodes:
             raise InputError(f"{label}: node {node} of filament {filament} has a tether already.")
         point = tuple(float(x) for x in vector(point, LENGTH, f"{label}: point"))
         stiffness = positive(stiffness, STIFFNESS, f"{label}: stiffness")
         self._tethers.append(Tether(filament, node, point, stiffness))
+        self._tethered_nodes.add((filament, node))
         return len(self._tethers) - 1
 
     def move_tether(self, context, tether, point, stiffness=None):
