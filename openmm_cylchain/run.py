@@ -19,9 +19,9 @@ from .progress import Progress
 from .quantities import thermal_energy
 from .run_directory import Checkpoint, EnergyTable, RunDirectory, TrajectoryFile, write_atomically
 from .theory import chain_mean_square_end_to_end
+from .timestep import LARGEST_DIVIDED_SHARE
 
 _SECONDS_BETWEEN_CHECKS = 0.2
-_LARGEST_DIVIDED_SHARE = 1e-3
 
 
 class RunInterrupted(Exception):  # noqa: N818 - not an error
@@ -85,7 +85,7 @@ def _warn_of_divided_steps(simulation, filaments, steps):
     if not hasattr(simulation.integrator, "getNumDividedSteps"):
         return
     share = simulation.integrator.getNumDividedSteps() / (filaments * steps)
-    if share > _LARGEST_DIVIDED_SHARE:
+    if share > LARGEST_DIVIDED_SHARE:
         warnings.warn(
             f"{100 * share:.2g} % of all steps of filaments were divided, because the equations of the implicit scheme "
             "could not be solved: averages may be biased. Use a smaller time step.",

@@ -181,6 +181,9 @@ _REASONS = {
     "rotation": "rotation of segments: they may turn by {angle:g} rad in a step",
     "relaxation": "relaxation of the whole filament, which takes {relaxation_steps:g} steps",
 }
+LARGEST_DIVIDED_SHARE = 1e-3
+"""Scheme "implicit" divides steps whose equations it cannot solve: a larger share of them may bias averages."""
+
 _RELAXATION_STEPS = 20.0
 _ACCURACY_MARGIN = 20.0
 _TURNING_ANGLE = 0.1

@@ -41,6 +41,8 @@ def test_largest_step_is_below_the_first_that_surely_fails():
         given("midpoint", 1.0, np.inf, error=None),
     ]
     result = SystemErrors(F_ACTIN_SYSTEM, steps, 4.0)
+    divided = replace(steps[2], divided=0.01)
+    assert SystemErrors(F_ACTIN_SYSTEM, [*steps[:2], divided], 4.0).largest_step("implicit", 0.05, 0.10).step == 1.0
     # The error of -5.1 % is within two standard errors of 5 %.
     assert result.largest_step("implicit", 0.05, 0.10).step == 5.0
     assert result.largest_step("implicit", 0.02, 0.05).step == 1.0

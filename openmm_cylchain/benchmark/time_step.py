@@ -4,7 +4,8 @@ A step is large enough to be useful as long as it is right. The criterion is tha
 (equilibrium within 5 %, dynamics within 10 %), also applied with 2 % and 5 %. Chains start in their exact equilibrium.
 
 Equilibrium: the mean energies of stretching and bending against the exact ones, and the mean square end-to-end
-distance against that of the same chains at the start. The first quarter of a run is left out of the means.
+distance against that of the same chains at the start. The first quarter of a run is left out of the means. A step that
+is taken in parts more often than once in a thousand is too large, whatever the means.
 
 Dynamics: how much of its correlation the end-to-end vector has lost after a lag, the same of the direction of the
 segments in the middle quarter of a chain, and the mean square displacement of the nodes there, at lags of 10 and 20
@@ -23,7 +24,7 @@ from ..engines import choose_engine
 from ..equilibrium import JointAngleDistribution, SegmentLengthDistribution
 from ..errors import InstabilityError
 from ..physical_units import format_time
-from ..timestep import EXPLICIT_SCHEMES, SCHEMES, recommended_time_step, stability_bounds
+from ..timestep import EXPLICIT_SCHEMES, LARGEST_DIVIDED_SHARE, SCHEMES, recommended_time_step, stability_bounds
 from .measurement import Case, Estimate, describe_machine, median, ratio, scaled, time_interleaved
 from .report import Report, row
 from .systems import one_thread_platform, simulate_beads
@@ -80,6 +81,8 @@ class StepErrors:
         Relative errors by observable, as Estimates; infinite where the run has blown up. Dynamics is empty if there
         is no finer run to compare with.
     seconds_per_step : Estimate
+    divided : float
+        The share of steps of chains that were taken in parts.
     """
 
     scheme: str
@@ -87,13 +90,18 @@ class StepErrors:
     equilibrium: dict
     dynamics: dict
     seconds_per_step: Estimate
+    divided: float = 0.0
 
     def passes(self, equilibrium, dynamics):
         """Whether no error exceeds what is allowed; without a finer run to compare with, equilibrium alone."""
+        if self.divided > LARGEST_DIVIDED_SHARE:
+            return False
         return _largest(self.equilibrium) <= equilibrium and _largest(self.dynamics) <= dynamics
 
     def surely_fails(self, equilibrium, dynamics):
-        """Whether an error exceeds what is allowed by more than twice its standard error."""
+        """Whether an error exceeds what is allowed by more than twice its standard error, or steps were divided."""
+        if self.divided > LARGEST_DIVIDED_SHARE:
+            return True
         allowed = [(error, equilibrium) for error in self.equilibrium.values()]
         allowed += [(error, dynamics) for error in self.dynamics.values()]
         return any(abs(error.value) > limit + 2.0 * (error.error or 0.0) for error, limit in allowed)
@@ -194,7 +202,7 @@ def measure_system(system, effort, say=lambda message: None, schemes=SCHEMES):
                 references[_key(step)] = run.displacements
             reference = references.get(_key(step / REFERENCE_FACTOR))
             errors = _equilibrium_errors(system, run), _dynamic_errors(run, reference)
-            steps.append(StepErrors(scheme, step, *errors, median(run.seconds_per_step)))
+            steps.append(StepErrors(scheme, step, *errors, median(run.seconds_per_step), run.divided))
     return SystemErrors(system, steps, _recommended(system, "implicit"))
 
 
@@ -235,6 +243,7 @@ class _Run:
     start_square_distance: np.ndarray
     displacements: dict
     seconds_per_step: list
+    divided: float
 
 
 def _simulate(system, chains, scheme, step, frames):
@@ -251,7 +260,8 @@ def _simulate(system, chains, scheme, step, frames):
             return None
         seconds.append((time.perf_counter() - start) / STEPS_PER_FRAME)
         nodes.append(_positions(context).reshape(shape))
-    return _reduce(system, np.array(nodes), seconds)
+    divided = integrator.getNumDividedSteps() / (chains * frames * STEPS_PER_FRAME)
+    return _reduce(system, np.array(nodes), seconds, divided)
 
 
 def _context(system, chains, scheme, step):
@@ -271,7 +281,7 @@ def _positions(context):
     return context.getState(positions=True).getPositions(asNumpy=True)._value
 
 
-def _reduce(system, nodes, seconds):
+def _reduce(system, nodes, seconds, divided):
     differences = np.diff(nodes, axis=2)
     lengths = np.linalg.norm(differences, axis=3)
     tangents = differences / lengths[..., None]
@@ -289,7 +299,7 @@ def _reduce(system, nodes, seconds):
     lags = {1, 2} | {lag for lag in (REFERENCE_FACTOR, 2 * REFERENCE_FACTOR) if lag < len(nodes)}
     displacements = {(name, lag): _mean_square_change(values, lag) for name, values in series.items() for lag in lags}
     square = np.sum(ends**2, axis=2)
-    return _Run(energies, square[late].mean(axis=0), square[0], displacements, seconds)
+    return _Run(energies, square[late].mean(axis=0), square[0], displacements, seconds, divided)
 
 
 def _middle(count):
@@ -371,6 +381,7 @@ def _speed_rows(actin, effort, say, missing):
             missing[f"simulated_time_per_second_{scheme}"] = "no step that was tried is accurate enough"
         else:
             steps[scheme] = (actin.system, scheme, largest.step)
+    steps["implicit_recommended"] = (actin.system, "implicit", actin.recommended)
     workload = measure_system(WORKLOAD, effort, say, ("implicit",))
     largest = workload.largest_step("implicit", *CRITERIA[""])
     if largest is None:
@@ -391,6 +402,10 @@ def _speed_rows(actin, effort, say, missing):
             speeds = ratio(times[scheme], times["implicit"])
             factor = steps["implicit"][2] / steps[scheme][2]
             rows.append(row(f"simulated_time_implicit_over_{scheme}", scaled(speeds, factor), "1"))
+    if "euler" in steps:
+        speeds = ratio(times["euler"], times["implicit_recommended"])
+        factor = actin.recommended / steps["euler"][2]
+        rows.append(row("simulated_time_implicit_over_euler_at_recommended_step", scaled(speeds, factor), "1"))
     if "cytosim_workload" in steps:
         rows.append(row("largest_step_implicit_cytosim_workload", Estimate(largest.step / _MICROSECOND, None), "us"))
         speed = median(1e-12 * largest.step / times["cytosim_workload"])
@@ -421,7 +436,9 @@ def _error_rows(result):
 
 def format_errors(result):
     """A table of the errors of a system in per cent, a line for each scheme and step."""
-    header = f"{'scheme':<9} {'step':>8} {'V_el':>15} {'V_b':>15} {'R^2':>15} {'dynamics':>9} {'µs/s':>9}"
+    header = (
+        f"{'scheme':<9} {'step':>8} {'V_el':>15} {'V_b':>15} {'R^2':>15} {'dynamics':>9} {'divided':>8} {'µs/s':>9}"
+    )
     lines = [f"{result.system.label} (errors in %; recommended {format_time(result.recommended, 3)})", header]
     for scheme in SCHEMES:
         for one in result.of_scheme(scheme):
@@ -435,6 +452,7 @@ def _columns(one):
     names = ("stretching energy", "bending energy", "end-to-end distance")
     columns = [f"{_percent(one.equilibrium.get(name)):>15}" for name in names]
     columns.append(f"{100 * one.largest_dynamic_error:>9.1f}" if one.dynamics else f"{'–':>9}")
+    columns.append(f"{100 * one.divided:>8.2g}" if one.divided else f"{'–':>8}")
     columns.append(f"{one.step / _MICROSECOND / one.seconds_per_step.value:>9.3g}")
     return " ".join(columns)
 
