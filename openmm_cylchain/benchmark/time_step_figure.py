@@ -52,27 +52,17 @@ def _draw(panel, result):
     equilibrium, dynamics = CRITERIA[""]
     for scheme in SCHEMES:
         steps = [one for one in result.of_scheme(scheme) if np.isfinite(one.largest_equilibrium_error)]
-        color = _COLORS[scheme]
-        panel.plot(
-            [one.step / _MICROSECOND for one in steps],
-            [100 * one.largest_equilibrium_error for one in steps],
-            "o-",
-            color=color,
-            markersize=3,
-            label=f"{scheme}, equilibrium",
-        )
-        compared = [one for one in steps if one.dynamics]
-        panel.plot(
-            [one.step / _MICROSECOND for one in compared],
-            [100 * one.largest_dynamic_error for one in compared],
-            "x--",
-            color=color,
-            markersize=4,
-            linewidth=0.8,
-            label=f"{scheme}, dynamics",
-        )
+        errors = [(one.step, one.largest_equilibrium_error) for one in steps]
+        _draw_errors(panel, errors, "o-", color=_COLORS[scheme], label=f"{scheme}, equilibrium")
+        errors = [(one.step, one.largest_dynamic_error) for one in steps if one.dynamics]
+        _draw_errors(panel, errors, "x--", color=_COLORS[scheme], label=f"{scheme}, dynamics", linewidth=0.8)
     panel.axhline(100 * equilibrium, color="gray", linewidth=0.8)
     panel.axhline(100 * dynamics, color="gray", linewidth=0.8, linestyle="--")
     panel.axvline(result.recommended / _MICROSECOND, color="tab:green", linewidth=0.8, label="recommended (implicit)")
     panel.set(xscale="log", yscale="log", ylim=_LIMITS, xlabel="step (µs)")
     panel.set_title(result.system.label, fontsize="small")
+
+
+def _draw_errors(panel, errors, style, **properties):
+    steps, values = np.array(errors).reshape(-1, 2).T
+    panel.plot(steps / _MICROSECOND, 100 * values, style, markersize=4, **properties)

@@ -168,20 +168,14 @@ static void testGaussianMoments() {
 }
 
 int main() {
-    try {
-        testForces();
-        testStraightAndFoldedChains();
-        testStepsWithoutNoise();
-        testPeriodicImages();
-        testCovarianceOfNoise();
-        testChainsDoNotDependOnTheirPack();
-        testInstability();
-        testGaussianMoments();
-    }
-    catch (const exception& error) {
-        printf("FAILED (%s): %s\n", ChainEngine::getInstructionSet().c_str(), error.what());
-        return 1;
-    }
-    printf("Passed with %s\n", ChainEngine::getInstructionSet().c_str());
-    return 0;
+    return runTests({
+        testForces,
+        testStraightAndFoldedChains,
+        testStepsWithoutNoise,
+        testPeriodicImages,
+        testCovarianceOfNoise,
+        testChainsDoNotDependOnTheirPack,
+        testInstability,
+        testGaussianMoments
+    });
 }

@@ -142,4 +142,18 @@ inline Array denseSolution(vector<Array> a, Array b) {
 
 const vector<int> SEGMENTS = {5, 5, 4, 1, 2, 9, 5, 5, 5, 5, 3, 8, 9};
 
+/** Run all tests, and return the exit code of the program. */
+inline int runTests(const vector<void (*)()>& tests) {
+    try {
+        for (auto test : tests)
+            test();
+    }
+    catch (const exception& error) {
+        printf("FAILED (%s): %s\n", ChainEngine::getInstructionSet().c_str(), error.what());
+        return 1;
+    }
+    printf("Passed with %s\n", ChainEngine::getInstructionSet().c_str());
+    return 0;
+}
+
 #endif /*CYLCHAIN_TEST_CHAINS_H_*/

@@ -288,18 +288,12 @@ static void testDivision() {
 }
 
 int main() {
-    try {
-        testStepsWithoutNoise();
-        testConvergenceToExplicitSteps();
-        testChainsDoNotDependOnTheirPack();
-        testPeriodicImages();
-        testLongChainsOfShortSegments();
-        testDivision();
-    }
-    catch (const exception& error) {
-        printf("FAILED (%s): %s\n", ChainEngine::getInstructionSet().c_str(), error.what());
-        return 1;
-    }
-    printf("Passed with %s\n", ChainEngine::getInstructionSet().c_str());
-    return 0;
+    return runTests({
+        testStepsWithoutNoise,
+        testConvergenceToExplicitSteps,
+        testChainsDoNotDependOnTheirPack,
+        testPeriodicImages,
+        testLongChainsOfShortSegments,
+        testDivision
+    });
 }
