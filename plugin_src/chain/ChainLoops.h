@@ -499,6 +499,8 @@ template <int W> Instability stepPack(const ChainPack& pack, const double* posit
     return result;
 }
 
+#include "Matrix.h"
+#include "ChainCoordinates.h"
 #include "ImplicitLoops.h"
 
 template <int W> Instability stepPackAs(const ChainPack& pack, const double* positions, const double* forces,
