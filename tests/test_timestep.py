@@ -324,9 +324,32 @@ def test_recommended_step_of_one_segment_does_not_bend():
 
 
 def test_recommended_step_at_zero_temperature_is_finite():
-    step = recommended_time_step(F_ACTIN, VISCOSITY, 0)
-    assert 0 < step.step < math.inf
-    assert step.bounds["turning"] == math.inf
+    for scheme, bound in (("midpoint", "turning"), ("implicit", "rotation")):
+        step = recommended_time_step(F_ACTIN, VISCOSITY, 0, scheme)
+        assert 0 < step.step < math.inf
+        assert step.bounds[bound] == math.inf
+
+
+@pytest.mark.parametrize(
+    "filament_type, segments, reason",
+    [(F_ACTIN, 64, "rotation of segments"), (F_ACTIN.with_segment_length(30), 10, "relaxation of the whole filament")],
+)
+def test_recommended_step_of_the_implicit_scheme(filament_type, segments, reason):
+    friction = filament_type.segment_friction(VISCOSITY, TEMPERATURE, segments)
+    length, rigidity = filament_type.segment_length, filament_type.bending_rigidity
+    contour = segments * length
+    density = friction.perpendicular / length
+    free = 0.15**2 * friction.rotational / (2 * KT)
+    # A wave of the length xi relaxes within the step and turns by k_B T xi/a.
+    xi = 0.15**2 * rigidity / KT
+    waves = density * xi**4 / rigidity
+    # A rod turns with 2 k_B T dt/(gamma_perp L^3/12 l0).
+    whole = 0.15**2 * density * contour**3 / 12 / (2 * KT)
+    relaxation = density * (contour / 4.73) ** 4 / rigidity
+    step = recommended_time_step(filament_type, VISCOSITY, TEMPERATURE, "implicit", segments)
+    assert step.step == pytest.approx(min(max(free, min(waves, whole)), relaxation / 20), rel=1e-9)
+    assert reason in step.reason
+    assert set(step.bounds) == {"rotation", "relaxation"}
 
 
 def test_recommended_step_of_actin():
