@@ -287,7 +287,7 @@ def _reduce(system, nodes, seconds, divided):
     tangents = differences / lengths[..., None]
     late = slice(len(nodes) // 4, None)
     energies = {"stretching energy": system.type.stretching_energy(lengths[late]).mean(axis=(0, 2))}
-    if system.type.bending_rigidity > 0:
+    if system.type.bending_rigidity > 0 and system.segments > 1:
         cosines = np.einsum("fcsk,fcsk->fcs", tangents[late, :, 1:], tangents[late, :, :-1])
         energies["bending energy"] = system.type.bending_energy(cosines).mean(axis=(0, 2))
     ends = nodes[:, :, -1] - nodes[:, :, 0]
