@@ -158,7 +158,7 @@ def _time_step(options):
         print(f"{group.type.name}, {group.segments} segments of {group.type.segment_length:g} nm")
         for name, bound in time_step_bounds(*arguments, segments=group.segments).items():
             print(f"  {_BOUND_LABELS[name]:<36} {format_time(bound, 4):>12}")
-        print(f"  {'stability of the chain':<36} {format_time(stability, 4):>12}")
+        print(f"  {'stability of explicit schemes':<36} {format_time(stability, 4):>12}")
         print(f"  {'recommended':<36} {format_time(recommended.step, 4):>12}  ({recommended.reason})")
         print(f"  {'in this configuration':<36} {format_time(settings.time_step, 4):>12}")
 

@@ -3,9 +3,9 @@
 The beads are moved by OpenMM's BrownianIntegrator, with its own bonds and angles: 201 beads of 6 nm that touch, with
 the stretching modulus and the bending rigidity of the filament and the friction 3 pi eta d of each. Their step is the
 largest of 0.1, 0.2, 0.5, 1 … ps at which the mean energies of bonds and angles are within 5 % of the exact ones.
-Segments of 10 to 1200 nm are moved by scheme "implicit", with the recommended step, which resolves the slowest relaxation
-of the filament, or the largest at which energies and end-to-end distance are within 5 % and dynamics within 10 %, if that
-is smaller: see ``time_step``. As many filaments of either kind are timed in turn.
+Segments of 10 to 1200 nm are moved by scheme "implicit", with the recommended step, which resolves the slowest
+relaxation of the filament, or the largest at which energies and end-to-end distance are within 5 % and dynamics within
+10 %, if that is smaller: see ``time_step``. As many filaments of either kind are timed in turn.
 """
 
 import math
