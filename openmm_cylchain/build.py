@@ -1,11 +1,13 @@
 """Filaments: puts filaments into a Topology, a System and positions, new or existing."""
 
+from collections import defaultdict
 from dataclasses import dataclass, replace
 
 import numpy as np
 import openmm
 from openmm import app, unit
 
+from .attachments import ATTACHMENT_NAME, add_virtual_site, attachment_positions, locate, neighbors
 from .engines import choose_engine, default_scheme, load_engine
 from .engines.description import describe_chains
 from .engines.redistribution import joint_tensions
@@ -98,6 +100,9 @@ class Filaments:
         self._filaments = []
         self._tethers = []
         self._tethered_nodes = set()
+        self._attachments = []
+        self._attachments_of = defaultdict(list)
+        self._attachment_indices = None
         self._nodes = None
 
     def __len__(self):
@@ -127,6 +132,18 @@ class Filaments:
         if self._nodes is None:
             raise InputError("The filaments are not in a System yet: call build or add_to first.")
         return self._nodes
+
+    @property
+    def attachments(self):
+        """Tuple of the attachment points, in the order of their numbers."""
+        return tuple(self._attachments)
+
+    @property
+    def attachment_indices(self):
+        """Particle indices of the attachment points, in the order of their numbers, once they are in a System."""
+        if self._attachment_indices is None:
+            raise InputError("The filaments are not in a System yet: call build or add_to first.")
+        return self._attachment_indices
 
     def add_straight(self, filament_type, segments, start, direction, clamped=()):
         """Add a straight filament with segments of rest length.
@@ -244,9 +261,7 @@ class Filaments:
         label = f"Tether {len(self._tethers)}"
         if self._nodes is not None:
             raise InputError(f"{label} comes too late: the filaments are already in a System.")
-        filament = whole_number(filament, 0, f"{label}: filament")
-        if filament >= len(self):
-            raise InputError(f"{label}: filament {filament} does not exist; there are {len(self)}.")
+        filament = self._filament_number(filament, label)
         (node,) = named_nodes([node], len(self[filament].positions), f"{label}:")
         if (filament, node) in self._tethered_nodes:
             raise InputError(f"{label}: node {node} of filament {filament} has a tether already.")
@@ -255,6 +270,43 @@ class Filaments:
         self._tethers.append(Tether(filament, node, point, stiffness))
         self._tethered_nodes.add((filament, node))
         return len(self._tethers) - 1
+
+    def add_attachment(self, filament, arc_length=None, segment=None, fraction=None):
+        """Add an attachment point: a virtual site on a segment, on which any OpenMM force can act.
+
+        It is at ``(1 - fraction) x_minus + fraction x_plus`` of its segment's ends and follows them in the same
+        step; a force on it acts at that place of the cylinder (step 5 of Section 4 of the paper). It becomes a
+        particle of its own behind the nodes of its filament, in the Topology with the name "ATT";
+        ``attachment_indices`` says which.
+
+        Parameters
+        ----------
+        filament : int
+            The filament's number.
+        arc_length : length, optional
+            Distance from the first node along segments of rest length. Give this, or a segment.
+        segment : int, optional
+            The segment's number; negative numbers count from the end.
+        fraction : float, optional
+            Place on the segment, from 0 at its first node to 1 at its last; 0.5 if not given.
+
+        Returns
+        -------
+        int
+            The attachment point's number.
+
+        Raises
+        ------
+        InputError
+            For a filament, segment or place that does not exist.
+        """
+        label = f"Attachment point {len(self._attachments)}"
+        if self._nodes is not None:
+            raise InputError(f"{label} comes too late: the filaments are already in a System.")
+        filament = self._filament_number(filament, label)
+        self._attachments.append(locate(self[filament], filament, label, arc_length, segment, fraction))
+        self._attachments_of[filament].append(len(self._attachments) - 1)
+        return len(self._attachments) - 1
 
     def move_tether(self, context, tether, point, stiffness=None):
         """Move the point of a tether in a Context, and change its stiffness if one is given.
@@ -283,6 +335,12 @@ class Filaments:
         new = replace(old, point=point, stiffness=positive(stiffness, STIFFNESS, f"Tether {tether}: stiffness"))
         self._engine.move_tether(context, tether, new, self.node_indices)
         self._tethers[tether] = new
+
+    def _filament_number(self, filament, label):
+        filament = whole_number(filament, 0, f"{label}: filament")
+        if filament >= len(self):
+            raise InputError(f"{label}: filament {filament} does not exist; there are {len(self)}.")
+        return filament
 
     def _label(self, filament_type):
         if not isinstance(filament_type, FilamentType):
@@ -359,13 +417,15 @@ class Filaments:
         """
         positions = self._check_target(topology, system, positions)
         self._check_force_groups(stretching_force_group, bending_force_group)
-        first = system.getNumParticles()
         self._nodes = []
+        self._attachment_indices = np.zeros(len(self._attachments), dtype=int)
+        everything = [positions]
         for number, filament in enumerate(self._filaments):
+            first = system.getNumParticles()
             self._nodes.append(np.arange(first, first + len(filament.positions)))
-            first += len(filament.positions)
-            self._add_to_topology(topology, filament, number)
             self._add_particles(system, filament)
+            everything += [filament.positions, self._add_attachments(system, number)]
+            self._add_to_topology(topology, filament, number, system.getNumParticles() - first)
         self._add_noninteracting_entries(system, positions)
         self._engine.add_forces(
             system,
@@ -377,8 +437,14 @@ class Filaments:
             stretching_force_group,
             bending_force_group,
         )
-        everything = np.concatenate([positions] + [filament.positions for filament in self._filaments])
-        return everything * unit.nanometer
+        return np.concatenate(everything) * unit.nanometer
+
+    def _add_attachments(self, system, number):
+        # Those of one filament; returns their positions.
+        attachments = [self._attachments[index] for index in self._attachments_of[number]]
+        for index, attachment in zip(self._attachments_of[number], attachments):
+            self._attachment_indices[index] = add_virtual_site(system, attachment, self._nodes[number])
+        return attachment_positions(attachments, self._filaments[number].positions)
 
     def _check_target(self, topology, system, positions):
         if not self._filaments:
@@ -405,13 +471,14 @@ class Filaments:
                 raise InputError(f"A force group must be between 0 and 31, but is {group}.")
 
     @staticmethod
-    def _add_to_topology(topology, filament, number):
+    def _add_to_topology(topology, filament, number, particles):
         chain = topology.addChain(f"F{number}")
+        nodes = len(filament.positions)
         previous = None
-        for node in range(len(filament.positions)):
-            residue = topology.addResidue(filament.type.name, chain, str(node + 1))
-            atom = topology.addAtom(NODE_NAME, None, residue)
-            if previous is not None:
+        for particle in range(particles):
+            residue = topology.addResidue(filament.type.name, chain, str(particle + 1))
+            atom = topology.addAtom(NODE_NAME if particle < nodes else ATTACHMENT_NAME, None, residue)
+            if 0 < particle < nodes:
                 topology.addBond(previous, atom)
             previous = atom
 
@@ -424,15 +491,22 @@ class Filaments:
         for mass in masses:
             system.addParticle(mass)
 
-    @staticmethod
-    def _add_noninteracting_entries(system, existing):
+    def _add_noninteracting_entries(self, system, existing):
         missing = system.getNumParticles() - len(existing)
         for force in system.getForces():
             if isinstance(force, openmm.NonbondedForce):
                 for _ in range(missing):
                     force.addParticle(0.0, 1.0, 0.0)
+                # Particles in one place would give 0/0, even if they do not interact.
+                for pair in self._coinciding():
+                    force.addException(*pair, 0.0, 1.0, 0.0)
             elif isinstance(force, openmm.CustomNonbondedForce):
                 _exclude_from_custom_nonbonded(force, len(existing), missing)
+
+    def _coinciding(self):
+        for number, nodes in enumerate(self._nodes):
+            mine = self._attachments_of[number]
+            yield from neighbors([self._attachments[index] for index in mine], self._attachment_indices[mine], nodes)
 
     def recommended_time_step(self, scheme=None):
         """The recommended step for the filament that allows the least: a TimeStep (see ``timestep``).
