@@ -134,6 +134,11 @@ class Filaments:
         return self._nodes
 
     @property
+    def tethers(self):
+        """Tuple of the tethers, in the order of their numbers, with the points to which they were moved last."""
+        return tuple(self._tethers)
+
+    @property
     def attachments(self):
         """Tuple of the attachment points, in the order of their numbers."""
         return tuple(self._attachments)

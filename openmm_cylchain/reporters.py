@@ -1,0 +1,159 @@
+"""Reporters of filaments and tethers, for ``simulation.reporters`` of OpenMM's app layer.
+
+They write CSV with a line for each filament or tether and report, which tables and spreadsheets read as it is, and keep
+what they wrote as NumPy arrays.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from .errors import InputError
+from .quantities import whole_number
+
+
+class _TableReporter:
+    # What reporters of a table have in common: a line for each thing and report.
+
+    _columns = ()
+    _thing = ""
+
+    def __init__(self, file, reportInterval, append=False):  # noqa: N803 - OpenMM's name
+        self._interval = whole_number(reportInterval, 1, "reportInterval")
+        self._rows = []
+        self._reports = []
+        self._owned = isinstance(file, (str, Path))
+        if self._owned:
+            file = open(file, "a" if append else "w", newline="")  # noqa: SIM115 - closed with the reporter
+        elif file is not None and not hasattr(file, "write"):
+            raise InputError(f"file must be a path, a file that is open for writing, or None, but is {file!r}.")
+        self._file = file
+        if file is not None and not (append and self._owned and file.tell() > 0):
+            print(",".join(("step", "time_ps", self._thing, *self._columns)), file=file)
+
+    def describeNextReport(self, simulation):  # noqa: N802 - OpenMM's name
+        """When the next report is due, and that it needs positions; as OpenMM asks for it."""
+        steps = self._interval - simulation.currentStep % self._interval
+        return {"steps": steps, "periodic": False, "include": ["positions"]}
+
+    def report(self, simulation, state):
+        """Write a report; OpenMM calls it."""
+        time = state.getTime()._value
+        values = self._values(state.getPositions(asNumpy=True)._value)
+        self._reports.append((simulation.currentStep, time))
+        self._rows.append(values)
+        if self._file is None:
+            return
+        for number, row in enumerate(values):
+            cells = (simulation.currentStep, f"{time:.10g}", number, *(f"{value:.10g}" for value in row))
+            print(",".join(str(cell) for cell in cells), file=self._file)
+        self._file.flush()
+
+    def _values(self, positions):
+        raise NotImplementedError
+
+    @property
+    def step(self):
+        """The steps of all reports so far."""
+        return np.array([step for step, _ in self._reports], dtype=int)
+
+    @property
+    def time(self):
+        """The times of all reports so far, in ps."""
+        return np.array([time for _, time in self._reports], dtype=float)
+
+    def __getitem__(self, column):
+        """An array (reports, filaments or tethers) of a column."""
+        if column not in self._columns:
+            raise InputError(f"There is no column {column!r}: known are {', '.join(self._columns)}.")
+        table = np.array(self._rows, dtype=float).reshape(len(self._rows), -1, len(self._columns))
+        return table[:, :, self._columns.index(column)]
+
+    def close(self):
+        """Close the file, if the reporter has opened it."""
+        if self._owned and self._file is not None:
+            self._file.close()
+            self._file = None
+
+    def __del__(self):
+        if getattr(self, "_owned", False):
+            self.close()
+
+
+class FilamentReporter(_TableReporter):
+    """Reports energies, end-to-end distance and contour length of every filament.
+
+    Columns: ``stretching_energy`` and ``bending_energy`` in kJ/mol, ``end_to_end_distance`` and ``contour_length`` in
+    nm. ``reporter["contour_length"]`` is an array (reports, filaments).
+
+    Parameters
+    ----------
+    file : str, Path, file object or None
+        None keeps the arrays alone.
+    reportInterval : int
+        In steps.
+    filaments : Filaments
+    append : bool
+        Go on with a file that exists.
+
+    Examples
+    --------
+    >>> simulation.reporters.append(FilamentReporter("filaments.csv", 100, filaments))  # doctest: +SKIP
+    """
+
+    _columns = ("stretching_energy", "bending_energy", "end_to_end_distance", "contour_length")
+    _thing = "filament"
+
+    def __init__(self, file, reportInterval, filaments, append=False):  # noqa: N803 - OpenMM's name
+        self._filaments = filaments
+        self._nodes = filaments.node_indices
+        super().__init__(file, reportInterval, append)
+
+    def _values(self, positions):
+        return [_describe(filament.type, positions[nodes]) for filament, nodes in zip(self._filaments, self._nodes)]
+
+
+def _describe(filament_type, nodes):
+    segments = np.diff(nodes, axis=0)
+    lengths = np.linalg.norm(segments, axis=1)
+    tangents = segments / lengths[:, None]
+    bending = 0.0
+    if filament_type.bending_rigidity > 0:
+        bending = np.sum(filament_type.bending_energy(np.sum(tangents[1:] * tangents[:-1], axis=1)))
+    stretching = np.sum(filament_type.stretching_energy(lengths))
+    return float(stretching), float(bending), float(np.linalg.norm(nodes[-1] - nodes[0])), float(lengths.sum())
+
+
+class TetherReporter(_TableReporter):
+    """Reports where every tether's point and node are, and the force of the tether on its node, -k (x - point).
+
+    Columns: ``point_x``, ``point_y``, ``point_z``, ``extension_x``, ``extension_y``, ``extension_z`` (x - point) in nm,
+    ``force_x``, ``force_y``, ``force_z`` in kJ/(mol nm). Points and stiffnesses are those of ``Filaments.move_tether``.
+
+    Parameters
+    ----------
+    file : str, Path, file object or None
+        None keeps the arrays alone.
+    reportInterval : int
+        In steps.
+    filaments : Filaments
+    append : bool
+        Go on with a file that exists.
+    """
+
+    _columns = tuple(f"{what}_{axis}" for what in ("point", "extension", "force") for axis in "xyz")
+    _thing = "tether"
+
+    def __init__(self, file, reportInterval, filaments, append=False):  # noqa: N803 - OpenMM's name
+        if not filaments.tethers:
+            raise InputError("There are no tethers to report: call add_tether first.")
+        self._filaments = filaments
+        self._nodes = filaments.node_indices
+        super().__init__(file, reportInterval, append)
+
+    def _values(self, positions):
+        rows = []
+        for tether in self._filaments.tethers:
+            extension = positions[self._nodes[tether.filament][tether.node]] - tether.point
+            rows.append((*tether.point, *extension, *(-tether.stiffness * extension)))
+        return rows
