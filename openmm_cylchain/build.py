@@ -129,8 +129,7 @@ class Filaments:
     @property
     def node_indices(self):
         """List of arrays: the particle indices of the nodes of every filament, once they are in a System."""
-        if self._nodes is None:
-            raise InputError("The filaments are not in a System yet: call build or add_to first.")
+        self._refuse_unless_built()
         return self._nodes
 
     @property
@@ -146,8 +145,7 @@ class Filaments:
     @property
     def attachment_indices(self):
         """Particle indices of the attachment points, in the order of their numbers, once they are in a System."""
-        if self._attachment_indices is None:
-            raise InputError("The filaments are not in a System yet: call build or add_to first.")
+        self._refuse_unless_built()
         return self._attachment_indices
 
     def add_straight(self, filament_type, segments, start, direction, clamped=()):
@@ -264,8 +262,7 @@ class Filaments:
             For a filament or node that does not exist, a second tether, or a stiffness that is not positive.
         """
         label = f"Tether {len(self._tethers)}"
-        if self._nodes is not None:
-            raise InputError(f"{label} comes too late: the filaments are already in a System.")
+        self._refuse_if_built(label)
         filament = self._filament_number(filament, label)
         (node,) = named_nodes([node], len(self[filament].positions), f"{label}:")
         if (filament, node) in self._tethered_nodes:
@@ -306,8 +303,7 @@ class Filaments:
             For a filament, segment or place that does not exist.
         """
         label = f"Attachment point {len(self._attachments)}"
-        if self._nodes is not None:
-            raise InputError(f"{label} comes too late: the filaments are already in a System.")
+        self._refuse_if_built(label)
         filament = self._filament_number(filament, label)
         self._attachments.append(locate(self[filament], filament, label, arc_length, segment, fraction))
         self._attachments_of[filament].append(len(self._attachments) - 1)
@@ -341,6 +337,14 @@ class Filaments:
         self._engine.move_tether(context, tether, new, self.node_indices)
         self._tethers[tether] = new
 
+    def _refuse_if_built(self, label):
+        if self._nodes is not None:
+            raise InputError(f"{label} comes too late: the filaments are already in a System.")
+
+    def _refuse_unless_built(self):
+        if self._nodes is None:
+            raise InputError("The filaments are not in a System yet: call build or add_to first.")
+
     def _filament_number(self, filament, label):
         filament = whole_number(filament, 0, f"{label}: filament")
         if filament >= len(self):
@@ -356,8 +360,7 @@ class Filaments:
         return f"Filament {len(self)} ({filament_type.name})"
 
     def _add(self, filament_type, positions, clamped, label):
-        if self._nodes is not None:
-            raise InputError(f"{label} comes too late: the filaments are already in a System.")
+        self._refuse_if_built(label)
         check_shape(filament_type, positions, label)
         clamped = clamped_nodes(clamped, len(positions), label)
         # Friction is computed now, so that a filament that has none is refused here.

@@ -3,6 +3,7 @@
 A wall pushes back what is beyond it, with the energy ``(k/2) d^2`` for the depth d to which a particle has got in.
 """
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,19 +19,20 @@ WALL_NAME = "Wall"
 _TINY = "1e-30"
 
 
-class Shape:
+class Shape(ABC):
     """A region that particles are kept in.
 
     ``expression`` is the square of the depth d beyond the wall in OpenMM's syntax, a function of x, y and z in nm.
     """
 
     @property
+    @abstractmethod
     def expression(self):
-        raise NotImplementedError
+        """The square of the depth for OpenMM."""
 
+    @abstractmethod
     def square_depth(self, positions):
         """The square of the depth, in nm^2, for positions (..., 3); zero inside."""
-        raise NotImplementedError
 
 
 def _number(value):

@@ -242,6 +242,14 @@ class FilamentType:
             return np.zeros_like(cosine, dtype=float)
         return self.bending_potential.derivative(self.joint_stiffness, cosine)
 
+    def chain_energies(self, nodes):
+        """Stretching and bending energy, in kJ/mol, of a chain with node positions (n, 3) in nm."""
+        segments = np.diff(nodes, axis=0)
+        lengths = np.linalg.norm(segments, axis=1)
+        tangents = segments / lengths[:, None]
+        cosines = np.sum(tangents[1:] * tangents[:-1], axis=1)
+        return float(np.sum(self.stretching_energy(lengths))), float(np.sum(self.bending_energy(cosines)))
+
     def persistence_length_at(self, temperature):
         """Persistence length a/(k_B T) in nm at a temperature."""
         kT = thermal_energy(positive(temperature, TEMPERATURE, "temperature"))

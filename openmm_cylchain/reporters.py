@@ -4,6 +4,7 @@ They write CSV with a line for each filament or tether and report, which tables 
 what they wrote as NumPy arrays.
 """
 
+from abc import ABC, abstractmethod
 from pathlib import Path
 
 import numpy as np
@@ -12,13 +13,15 @@ from .errors import InputError
 from .quantities import whole_number
 
 
-class _TableReporter:
+class _TableReporter(ABC):
     # What reporters of a table have in common: a line for each thing and report.
 
     _columns = ()
     _thing = ""
 
-    def __init__(self, file, reportInterval, append=False):  # noqa: N803 - OpenMM's name
+    def __init__(self, file, reportInterval, filaments, append=False):  # noqa: N803 - OpenMM's name
+        self._filaments = filaments
+        self._nodes = filaments.node_indices
         self._interval = whole_number(reportInterval, 1, "reportInterval")
         self._rows = []
         self._reports = []
@@ -49,8 +52,9 @@ class _TableReporter:
             print(",".join(str(cell) for cell in cells), file=self._file)
         self._file.flush()
 
+    @abstractmethod
     def _values(self, positions):
-        raise NotImplementedError
+        """A row of numbers for each thing."""
 
     @property
     def step(self):
@@ -104,24 +108,13 @@ class FilamentReporter(_TableReporter):
     _columns = ("stretching_energy", "bending_energy", "end_to_end_distance", "contour_length")
     _thing = "filament"
 
-    def __init__(self, file, reportInterval, filaments, append=False):  # noqa: N803 - OpenMM's name
-        self._filaments = filaments
-        self._nodes = filaments.node_indices
-        super().__init__(file, reportInterval, append)
-
     def _values(self, positions):
         return [_describe(filament.type, positions[nodes]) for filament, nodes in zip(self._filaments, self._nodes)]
 
 
 def _describe(filament_type, nodes):
-    segments = np.diff(nodes, axis=0)
-    lengths = np.linalg.norm(segments, axis=1)
-    tangents = segments / lengths[:, None]
-    bending = 0.0
-    if filament_type.bending_rigidity > 0:
-        bending = np.sum(filament_type.bending_energy(np.sum(tangents[1:] * tangents[:-1], axis=1)))
-    stretching = np.sum(filament_type.stretching_energy(lengths))
-    return float(stretching), float(bending), float(np.linalg.norm(nodes[-1] - nodes[0])), float(lengths.sum())
+    contour_length = np.linalg.norm(np.diff(nodes, axis=0), axis=1).sum()
+    return *filament_type.chain_energies(nodes), np.linalg.norm(nodes[-1] - nodes[0]), contour_length
 
 
 class TetherReporter(_TableReporter):
@@ -147,9 +140,7 @@ class TetherReporter(_TableReporter):
     def __init__(self, file, reportInterval, filaments, append=False):  # noqa: N803 - OpenMM's name
         if not filaments.tethers:
             raise InputError("There are no tethers to report: call add_tether first.")
-        self._filaments = filaments
-        self._nodes = filaments.node_indices
-        super().__init__(file, reportInterval, append)
+        super().__init__(file, reportInterval, filaments, append)
 
     def _values(self, positions):
         rows = []

@@ -291,13 +291,11 @@ class _Recorder:
     def _energies_of(self, positions):
         stretching = bending = 0.0
         for filament, nodes in zip(self._filaments, self._filaments.node_indices):
-            segments = np.diff(positions[nodes], axis=0)
             with np.errstate(all="ignore"):
-                lengths = np.linalg.norm(segments, axis=1)
-                tangents = segments / lengths[:, None]
-                stretching += np.sum(filament.type.stretching_energy(lengths))
-                bending += np.sum(filament.type.bending_energy(np.sum(tangents[1:] * tangents[:-1], axis=1)))
-        return float(stretching), float(bending)
+                energies = filament.type.chain_energies(positions[nodes])
+            stretching += energies[0]
+            bending += energies[1]
+        return stretching, bending
 
     def _mean_end_to_end_distance(self, positions):
         ends = np.array([(nodes[0], nodes[-1]) for nodes in self._filaments.node_indices])

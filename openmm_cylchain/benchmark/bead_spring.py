@@ -16,14 +16,15 @@ import openmm
 
 from .. import F_ACTIN
 from ..engines import choose_engine
-from ..equilibrium import JointAngleDistribution, SegmentLengthDistribution, draw_chain
+from ..equilibrium import draw_chain
 from ..filament import FilamentType
 from ..physical_units import format_time
+from ..theory import bending_energy_mean, stretching_energy_mean
 from .measurement import Case, Estimate, describe_machine, median, ratio, scaled, time_interleaved
 from .report import Report, row
-from .systems import one_thread_platform
-from .time_step import CRITERIA, Effort, ladder, measure_system, stepper
-from .time_step_systems import F_ACTIN_SYSTEM, BenchmarkSystem, actin
+from .systems import bonds, harmonic_angles, one_thread_context
+from .time_step import CRITERIA, Effort, ladder, measure_system, stepper, system_stepper
+from .time_step_systems import F_ACTIN_SYSTEM, STRETCHING_MODULUS, BenchmarkSystem, actin
 
 CONTOUR_LENGTH = 1200.0
 SEGMENTS = (120, 60, 40, 20, 10, 5, 3, 2, 1)
@@ -65,7 +66,7 @@ def benchmark_bead_spring(effort=FULL, say=lambda message: None):
     beads = _Beads(effort.chains)
     bead_step = beads.largest_step(effort.bead_steps, say)
     rows.append(row("largest_step_beads", Estimate(bead_step / _MICROSECOND, None), "us"))
-    cases.append(Case("beads", beads.stepper(bead_step)))
+    cases.append(Case("beads", stepper(beads.context(bead_step))))
     for count in effort.segments:
         system = _segments_system(count, effort.chains)
         result = measure_system(system, effort.segment_effort, say, ("implicit",))
@@ -77,7 +78,7 @@ def benchmark_bead_spring(effort=FULL, say=lambda message: None):
         steps[system.name] = step
         rows.append(row(f"largest_step_{system.name}", Estimate(largest.step / _MICROSECOND, None), "us"))
         rows.append(row(f"step_{system.name}", Estimate(step / _MICROSECOND, None), "us"))
-        cases.append(Case(system.name, stepper(system, "implicit", step)))
+        cases.append(Case(system.name, system_stepper(system, "implicit", step)))
     times = time_interleaved(cases, effort.segment_effort.repetitions, 0.2, say)
     speeds = {name: ratio(times["beads"], times[name]) for name in steps}
     simulated = {name: scaled(speeds[name], step / bead_step) for name, step in steps.items()}
@@ -120,7 +121,7 @@ class _Beads:
             segment_length=diameter,
             bending_rigidity=F_ACTIN.bending_rigidity,
             bending_model="quadratic",
-            stretching_modulus=F_ACTIN.segment_stiffness * F_ACTIN.segment_length,
+            stretching_modulus=STRETCHING_MODULUS,
         )
         self._temperature = F_ACTIN_SYSTEM.temperature
         self._friction = 3.0 * math.pi * F_ACTIN_SYSTEM.viscosity * diameter
@@ -129,34 +130,17 @@ class _Beads:
             [draw_chain(self._type, self.count - 1, self._temperature, generator) for _ in range(chains)]
         )
 
-    def stepper(self, step):
-        """What advances the chains by a number of steps."""
-        context = self._context(step)
-
-        def advance(steps):
-            context.getIntegrator().step(steps)
-
-        return advance
-
-    def _context(self, step):
+    def context(self, step):
         system = openmm.System()
-        bonds, angles = openmm.HarmonicBondForce(), openmm.HarmonicAngleForce()
-        angles.setForceGroup(1)
         for _ in range(self._chains * self.count):
             system.addParticle(1.0)
-        for first in range(0, self._chains * self.count, self.count):
-            for bead in range(first, first + self.count - 1):
-                bonds.addBond(bead, bead + 1, self._type.segment_length, self._type.segment_stiffness)
-            for bead in range(first, first + self.count - 2):
-                angles.addAngle(bead, bead + 1, bead + 2, math.pi, self._type.joint_stiffness)
-        system.addForce(bonds)
+        angles = harmonic_angles(self._type, self._chains, self.count - 1)
+        angles.setForceGroup(1)
+        system.addForce(bonds(self._type, self._chains, self.count - 1))
         system.addForce(angles)
         integrator = openmm.BrownianIntegrator(self._temperature, self._friction, step)
         integrator.setRandomNumberSeed(1)
-        name, properties = one_thread_platform()
-        context = openmm.Context(system, integrator, openmm.Platform.getPlatform(name), properties)
-        context.setPositions(self._positions)
-        return context
+        return one_thread_context(system, integrator, self._positions)
 
     def largest_step(self, steps, say):
         """The largest step that keeps the energies, together with all smaller ones."""
@@ -171,7 +155,7 @@ class _Beads:
         return largest
 
     def _energy_errors(self, step, steps):
-        context = self._context(step)
+        context = self.context(step)
         context.getIntegrator().step(steps // 4)
         energies = []
         for _ in range(50):
@@ -182,10 +166,8 @@ class _Beads:
             states = [context.getState(energy=True, groups={group}) for group in (0, 1)]
             energies.append([state.getPotentialEnergy()._value for state in states])
         means = np.mean(energies, axis=0) / self._chains
-        lengths = SegmentLengthDistribution(self._type, self._temperature)
-        angles = JointAngleDistribution(self._type, self._temperature)
         exact = (
-            (self.count - 1) * lengths.mean(self._type.stretching_energy),
-            (self.count - 2) * angles.mean(self._type.bending_energy),
+            (self.count - 1) * stretching_energy_mean(self._type, self._temperature),
+            (self.count - 2) * bending_energy_mean(self._type, self._temperature),
         )
         return [abs(mean / value - 1.0) for mean, value in zip(means, exact)]

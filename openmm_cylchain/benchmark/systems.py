@@ -42,6 +42,12 @@ def one_thread_platform():
     return ONE_THREAD if ONE_THREAD[0] in names else ("Reference", {})
 
 
+def one_thread_context(system, integrator, positions):
+    """A Context on the platform on which one thread computes."""
+    platform, properties = one_thread_platform()
+    return _started(None, None, system, integrator, positions, platform, properties).context
+
+
 def simulate_filaments(engine, chains, segments, platform, properties):
     """Actin filaments in equilibrium, with an engine, ready to step.
 
@@ -86,9 +92,9 @@ def simulate_beads(angle_force, chains, segments, platform, properties):
     topology, system = _bead_topology(chains, segments), openmm.System()
     for _ in range(chains * (segments + 1)):
         system.addParticle(1.0)
-    system.addForce(_bonds(chains, segments))
+    system.addForce(bonds(F_ACTIN, chains, segments))
     if angle_force == "harmonic":
-        system.addForce(_harmonic_angles(chains, segments))
+        system.addForce(harmonic_angles(F_ACTIN, chains, segments))
     else:
         joints = ((F_ACTIN, *triple) for triple in _successive(chains, segments, 3))
         add_bending_forces(system, joints, 0)
@@ -122,17 +128,19 @@ def _successive(chains, segments, count):
             yield tuple(range(particle, particle + count))
 
 
-def _bonds(chains, segments):
+def bonds(filament_type, chains, segments):
+    """A HarmonicBondForce between successive particles of chains, with the stiffness of a filament's segments."""
     force = openmm.HarmonicBondForce()
     for pair in _successive(chains, segments, 2):
-        force.addBond(*pair, F_ACTIN.segment_length, F_ACTIN.segment_stiffness)
+        force.addBond(*pair, filament_type.segment_length, filament_type.segment_stiffness)
     return force
 
 
-def _harmonic_angles(chains, segments):
+def harmonic_angles(filament_type, chains, segments):
+    """A HarmonicAngleForce along chains, with the stiffness of a filament's joints."""
     force = openmm.HarmonicAngleForce()
     for triple in _successive(chains, segments, 3):
-        force.addAngle(*triple, np.pi, F_ACTIN.joint_stiffness)
+        force.addAngle(*triple, np.pi, filament_type.joint_stiffness)
     return force
 
 

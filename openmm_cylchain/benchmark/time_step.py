@@ -17,17 +17,16 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-import openmm
 
 from .. import Filaments
 from ..engines import choose_engine
-from ..equilibrium import JointAngleDistribution, SegmentLengthDistribution
 from ..errors import InstabilityError
 from ..physical_units import format_time
+from ..theory import bending_energy_mean, stretching_energy_mean
 from ..timestep import EXPLICIT_SCHEMES, LARGEST_DIVIDED_SHARE, SCHEMES, recommended_time_step, stability_bounds
 from .measurement import Case, Estimate, describe_machine, median, ratio, scaled, time_interleaved
 from .report import Report, row
-from .systems import one_thread_platform, simulate_beads
+from .systems import one_thread_context, one_thread_platform, simulate_beads
 from .time_step_systems import F_ACTIN_SYSTEM, SYSTEMS, WORKLOAD
 
 STEPS_PER_FRAME = 10
@@ -271,10 +270,7 @@ def _context(system, chains, scheme, step):
         filaments.add_equilibrium(system.type, system.segments, seed)
     _, openmm_system, positions = filaments.build()
     integrator = filaments.create_integrator(openmm_system, step, scheme=scheme, random_seed=1)
-    name, properties = one_thread_platform()
-    context = openmm.Context(openmm_system, integrator, openmm.Platform.getPlatform(name), properties)
-    context.setPositions(positions)
-    return context
+    return one_thread_context(openmm_system, integrator, positions)
 
 
 def _positions(context):
@@ -315,11 +311,9 @@ def _mean_square_change(values, lag):
 
 def _equilibrium_errors(system, run):
     kind = system.type
-    exact = {
-        "stretching energy": SegmentLengthDistribution(kind, system.temperature).mean(kind.stretching_energy),
-    }
+    exact = {"stretching energy": stretching_energy_mean(kind, system.temperature)}
     if "bending energy" in run.energies:
-        exact["bending energy"] = JointAngleDistribution(kind, system.temperature).mean(kind.bending_energy)
+        exact["bending energy"] = bending_energy_mean(kind, system.temperature)
     errors = {name: _mean(run.energies[name] / value - 1.0) for name, value in exact.items()}
     change = (run.square_distance - run.start_square_distance) / run.start_square_distance.mean()
     errors["end-to-end distance"] = _mean(change)
@@ -388,7 +382,7 @@ def _speed_rows(actin, effort, say, missing):
         missing["simulated_seconds_per_second_cytosim_workload"] = "no step that was tried is accurate enough"
     else:
         steps["cytosim_workload"] = (WORKLOAD, "implicit", largest.step)
-    cases = [Case(name, stepper(*arguments)) for name, arguments in steps.items()]
+    cases = [Case(name, system_stepper(*arguments)) for name, arguments in steps.items()]
     beads = simulate_beads("harmonic", WORKLOAD.chains, WORKLOAD.segments, *one_thread_platform())
     cases.append(Case("stock", beads.advance))
     times = time_interleaved(cases, effort.repetitions, 0.3, say)
@@ -415,9 +409,13 @@ def _speed_rows(actin, effort, say, missing):
     return rows
 
 
-def stepper(system, scheme, step):
+def system_stepper(system, scheme, step):
     """What advances a system by a number of steps, for timing."""
-    context = _context(system, system.chains, scheme, step)
+    return stepper(_context(system, system.chains, scheme, step))
+
+
+def stepper(context):
+    """What advances a Context by a number of steps. It keeps the Context."""
 
     def advance(steps):
         context.getIntegrator().step(steps)

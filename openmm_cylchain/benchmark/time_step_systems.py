@@ -6,11 +6,11 @@ from openmm import unit
 
 from .. import DSDNA, F_ACTIN, MICROTUBULE
 from ..filament import FilamentType
-from ..quantities import BOLTZMANN, VISCOSITY
+from ..quantities import BOLTZMANN, VISCOSITY, in_units_of
+from . import systems
 
-_TEMPERATURE = 310.0
-_VISCOSITY = (1.71e-3 * unit.pascal * unit.second * unit.AVOGADRO_CONSTANT_NA).value_in_unit(VISCOSITY)
-_STRETCHING_MODULUS = F_ACTIN.segment_stiffness * F_ACTIN.segment_length
+_VISCOSITY = in_units_of(systems.VISCOSITY, VISCOSITY, "viscosity")
+STRETCHING_MODULUS = F_ACTIN.segment_stiffness * F_ACTIN.segment_length
 
 
 @dataclass(frozen=True)
@@ -34,23 +34,24 @@ class BenchmarkSystem:
     type: FilamentType
     segments: int
     chains: int
-    temperature: float = _TEMPERATURE
+    temperature: float = systems.TEMPERATURE
     viscosity: float = _VISCOSITY
 
 
 def actin(length):
+    """F-actin in segments of a length in nm, with the stretching modulus of the paper's."""
     return FilamentType(
         name=f"A{length:g}",
         diameter=F_ACTIN.diameter,
         segment_length=length,
         bending_rigidity=F_ACTIN.bending_rigidity,
-        stretching_modulus=_STRETCHING_MODULUS,
+        stretching_modulus=STRETCHING_MODULUS,
     )
 
 
 def _freely_jointed():
     length = 100.0
-    stiffness = 400.0 * BOLTZMANN * _TEMPERATURE / length**2
+    stiffness = 400.0 * BOLTZMANN * systems.TEMPERATURE / length**2
     return FilamentType(
         name="FJC", diameter=5.0, segment_length=length, bending_rigidity=0.0, stretching_stiffness=stiffness
     )
