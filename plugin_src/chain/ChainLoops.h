@@ -112,6 +112,19 @@ template <int W> void gather(const ChainPack& pack, const double* values, Vector
         }
 }
 
+/** Write vectors, times a factor, to an array of three doubles for each particle. */
+template <int W> void scatter(const ChainPack& pack, Vector<typename Lanes<W>::Type>* values, double factor, double* result) {
+    for (int node = 0; node < pack.nodes; node++)
+        for (int i = 0; i < W; i++) {
+            const int particle = pack.particles[node*W+i];
+            if (particle >= 0) {
+                result[3*particle] = factor*lane(values[node].x, i);
+                result[3*particle+1] = factor*lane(values[node].y, i);
+                result[3*particle+2] = factor*lane(values[node].z, i);
+            }
+        }
+}
+
 /** Take a displacement to its nearest image. */
 inline void wrap(double* d, const double* box) {
     for (int k = 2; k >= 0; k--) {
@@ -177,11 +190,12 @@ template <class Real> CYLCHAIN_INLINE Vector<Real> crossProduct(const Vector<Rea
 }
 
 /** The vector from a tether's point to its node. */
-template <int W> void tetherVector(const LaneTether& tether, Vector<typename Lanes<W>::Type>* x, const double* box,
+template <int W> void tetherVector(const LaneTether& tether, const Vector<typename Lanes<W>::Type>* x, const double* box,
             double* d) {
-    d[0] = lane(x[tether.node].x, tether.lane)-tether.point[0];
-    d[1] = lane(x[tether.node].y, tether.lane)-tether.point[1];
-    d[2] = lane(x[tether.node].z, tether.lane)-tether.point[2];
+    Vector<typename Lanes<W>::Type> node = x[tether.node];
+    d[0] = lane(node.x, tether.lane)-tether.point[0];
+    d[1] = lane(node.y, tether.lane)-tether.point[1];
+    d[2] = lane(node.z, tether.lane)-tether.point[2];
     if (box != NULL)
         wrap(d, box);
 }
@@ -474,15 +488,7 @@ template <int W> Instability stepPack(const ChainPack& pack, const double* posit
 
     // Write displacements, and look for segments whose ends move apart.
     const double h = settings.stepSize;
-    for (int node = 0; node < n; node++)
-        for (int i = 0; i < W; i++) {
-            const int particle = pack.particles[node*W+i];
-            if (particle >= 0) {
-                displacements[3*particle] = h*lane(v[node].x, i);
-                displacements[3*particle+1] = h*lane(v[node].y, i);
-                displacements[3*particle+2] = h*lane(v[node].z, i);
-            }
-        }
+    scatter<W>(pack, v, h, displacements);
     Instability result;
     for (int s = 0; s < n-1; s++) {
         const Vector<Real> change = v[s+1]-v[s];

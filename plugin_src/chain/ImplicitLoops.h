@@ -88,22 +88,22 @@ public:
         tethers = memory.tethers.template reserve<ImplicitTether>(pack.tethers.size());
         segments = memory.segments.template reserve<ImplicitSegment<Real> >(n);
         nodes = memory.nodes.template reserve<ImplicitNode<Real> >(n);
-        f = memory.vectors.template reserve<Vec>(3*n);
+        f = memory.vectors.template reserve<Vec>(2*n);
         change = f+n;
-        x = change+n;
     }
     /**
      * Take one step.
      *
-     * @param start   the nodes before
+     * @param before  the nodes before
      * @param forces  the forces on them, but for those of the chains
      * @param y       receives the nodes after
      * @param failed  receives true for each lane that has not converged or whose segments change by more than their
      *                length
      */
-    void take(const Vec* start, const Vec* forces, Vec* y, bool* failed) {
+    void take(const Vec* before, const Vec* forces, Vec* y, bool* failed) {
+        x = before;
         for (int node = 0; node < n; node++) {
-            x[node] = y[node] = start[node];
+            y[node] = x[node];
             f[node] = forces[node];
         }
         describe();
@@ -138,7 +138,8 @@ private:
     ImplicitSegment<Real>* segments;
     ImplicitNode<Real>* nodes;
     ImplicitTether* tethers;
-    Vec *f, *change, *x;
+    const Vec* x;
+    Vec *f, *change;
 
     /** Describe the start of a step, without noise. */
     void describe() {
@@ -147,10 +148,10 @@ private:
             segment.difference = x[s+1]-x[s];
             segment.length = root(segment.difference.dot(segment.difference));
             segment.tangent = segment.difference*(1/segment.length);
-            Real slope;
-            stretchCoordinate(pack.stretching, property<Real>(pack, s, ChainPack::InverseExtension),
-                    segment.length-property<Real>(pack, s, ChainPack::RestLength), segment.coordinate, slope);
             const Real l0 = property<Real>(pack, s, ChainPack::RestLength);
+            Real slope;
+            stretchCoordinate(pack.stretching, property<Real>(pack, s, ChainPack::InverseExtension), segment.length-l0,
+                    segment.coordinate, slope);
             const Real stretchRate = h*property<Real>(pack, s, ChainPack::Stiffness)*l0*l0+TINY;
             segment.theta = larger<Real>(0.5+Real{}, 1-property<Real>(pack, s, ChainPack::Extensional)/stretchRate);
             segment.randomCoordinate = segment.randomTension = segment.multiplier = segment.extra = Real{};
@@ -614,14 +615,8 @@ template <int W> Instability stepPackImplicitly(const ChainPack& pack, const dou
     if (result.divided > 0)
         divideStep<W>(pack, x, f, settings, y, box, failed, memory, scratch);
     for (int node = 0; node < n; node++)
-        for (int i = 0; i < W; i++) {
-            const int particle = pack.particles[node*W+i];
-            if (particle >= 0) {
-                displacements[3*particle] = lane(y[node].x, i)-lane(x[node].x, i);
-                displacements[3*particle+1] = lane(y[node].y, i)-lane(x[node].y, i);
-                displacements[3*particle+2] = lane(y[node].z, i)-lane(x[node].z, i);
-            }
-        }
+        y[node] = y[node]-x[node];
+    scatter<W>(pack, y, 1, displacements);
     for (int i = 0; i < W; i++)
         if (failed[i] && result.chain < 0)
             result.chain = pack.chain[i];

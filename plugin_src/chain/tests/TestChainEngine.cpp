@@ -70,15 +70,10 @@ static void testStepsWithoutNoise() {
 static void testPeriodicImages() {
     Array x;
     ChainEngine engine(makeChains(SEGMENTS, BendingModel::InscribedCircle, StretchingModel::Harmonic, x));
-    const double box[] = {60, 0, 0, 10, 50, 0, -5, 8, 70};
-    Array wrapped = x;
-    for (size_t i = 0; i < x.size()/3; i++)
-        for (int vector = 0; vector < 3; vector++)
-            for (int k = 0; k < 3; k++)
-                wrapped[3*i+k] += box[3*vector+k]*((int) (i*(vector+1)%3)-1);
-    const Array f = forcesOf(engine, x), g = forcesOf(engine, wrapped, box);
+    const Array wrapped = acrossBox(x);
+    const Array f = forcesOf(engine, x), g = forcesOf(engine, wrapped, BOX);
     const Array a = stepOf(engine, x, f, {Scheme::Midpoint, 1, 0.001, 1, 1});
-    const Array b = stepOf(engine, wrapped, f, {Scheme::Midpoint, 1, 0.001, 1, 1}, box);
+    const Array b = stepOf(engine, wrapped, f, {Scheme::Midpoint, 1, 0.001, 1, 1}, BOX);
     for (size_t i = 0; i < x.size(); i++) {
         checkClose(f[i], g[i], 100, 1e-10, "force across the box");
         checkClose(a[i], b[i], 1, 1e-10, "step across the box");

@@ -142,6 +142,18 @@ inline Array denseSolution(vector<Array> a, Array b) {
 
 const vector<int> SEGMENTS = {5, 5, 4, 1, 2, 9, 5, 5, 5, 5, 3, 8, 9};
 
+const double BOX[] = {60, 0, 0, 10, 50, 0, -5, 8, 70};
+
+/** Positions with every node moved to one of its periodic images. */
+inline Array acrossBox(const Array& x) {
+    Array wrapped = x;
+    for (size_t i = 0; i < x.size()/3; i++)
+        for (int vector = 0; vector < 3; vector++)
+            for (int k = 0; k < 3; k++)
+                wrapped[3*i+k] += BOX[3*vector+k]*((int) (i*(vector+1)%3)-1);
+    return wrapped;
+}
+
 /** Run all tests, and return the exit code of the program. */
 inline int runTests(const vector<void (*)()>& tests) {
     try {

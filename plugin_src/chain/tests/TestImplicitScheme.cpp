@@ -213,15 +213,10 @@ static void testPeriodicImages() {
     Array x;
     const vector<Chain> chains = tethered(makeChains(SEGMENTS, BendingModel::KratkyPorod, StretchingModel::Harmonic, x), x);
     ChainEngine engine(chains);
-    const double box[] = {60, 0, 0, 10, 50, 0, -5, 8, 70};
-    Array wrapped = x;
-    for (size_t i = 0; i < x.size()/3; i++)
-        for (int vector = 0; vector < 3; vector++)
-            for (int k = 0; k < 3; k++)
-                wrapped[3*i+k] += box[3*vector+k]*((int) (i*(vector+1)%3)-1);
+    const Array wrapped = acrossBox(x);
     const Array f(x.size(), 0.5);
     const Array a = stepOf(engine, x, f, {Scheme::Implicit, 1, 0.1, 1, 1});
-    const Array b = stepOf(engine, wrapped, f, {Scheme::Implicit, 1, 0.1, 1, 1}, box);
+    const Array b = stepOf(engine, wrapped, f, {Scheme::Implicit, 1, 0.1, 1, 1}, BOX);
     for (size_t i = 0; i < x.size(); i++)
         checkClose(a[i], b[i], 1, 1e-8, "step across the box");
 }
