@@ -43,6 +43,8 @@ enum class Scheme {
 struct Segment {
     double restLength, stiffness, maximumExtension;
     double parallel, perpendicular, rotational, extensional;
+    /** A force along the segment, from its minus end to its plus end, that belongs to no energy. */
+    double propulsion = 0;
 };
 
 /** A spring between a node and a point: its energy is (stiffness/2) d^2 for their distance d. */
@@ -51,19 +53,26 @@ struct Tether {
     double point[3], stiffness;
 };
 
-/** A chain of segments that share nodes: segment s joins the nodes s (its minus end) and s+1 (its plus end). */
+/**
+ * A chain of segments that share nodes: segment s joins the nodes s (its minus end) and s+1 (its plus end). The last
+ * segment of a closed chain, a ring, joins the last node and the first.
+ */
 struct Chain {
     /** Particle of each node. */
     std::vector<int> nodes;
-    /** One less than nodes. */
+    /** One less than nodes; as many as nodes if the chain is closed. */
     std::vector<Segment> segments;
-    /** Stiffness a/l0 of each joint: one less than segments. */
+    /** Stiffness a/l0 of each joint: joint j is at node j+1, and at node j if the chain is closed, where every node has one. */
     std::vector<double> joints;
     BendingModel bending;
     StretchingModel stretching;
     /** Nodes that do not move. */
     std::vector<bool> fixed;
     std::vector<Tether> tethers;
+    /** Whether the last node is joined to the first; there must be at least four nodes then. */
+    bool closed = false;
+    /** Whether nodes keep their z, which must be the same for all of them. */
+    bool planar = false;
 };
 
 } // namespace cylchain

@@ -37,6 +37,15 @@ inline double bendSquare(BendingModel model, double c) {
     return std::acos(c)*std::acos(c);
 }
 
+/** The bend of a joint in a plane, for the angle between its segments. */
+inline double bendOfAngle(BendingModel model, double angle) {
+    if (model == BendingModel::InscribedCircle)
+        return 2*std::tan(0.5*angle);
+    if (model == BendingModel::KratkyPorod)
+        return 2*std::sin(0.5*angle);
+    return angle;
+}
+
 /** The density of a bend with the given square in the plane of b over that of a Gaussian. */
 inline double bendMeasure(BendingModel model, double square) {
     if (model == BendingModel::InscribedCircle)

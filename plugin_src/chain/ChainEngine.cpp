@@ -34,25 +34,28 @@ const ChainKernels& kernels() {
 }
 
 bool mayShareLanes(const Chain& longest, const Chain& chain) {
-    return chain.bending == longest.bending && chain.stretching == longest.stretching &&
-            chain.segments.size() >= (1-LARGEST_FILLING)*longest.segments.size();
+    const size_t least = longest.closed ? longest.segments.size() : ceil((1-LARGEST_FILLING)*longest.segments.size());
+    return chain.bending == longest.bending && chain.stretching == longest.stretching && chain.closed == longest.closed &&
+            chain.planar == longest.planar && chain.segments.size() >= least;
 }
 
 void fillLane(ChainPack& pack, int lane, const Chain& chain, int index) {
     const int lanes = pack.lanes;
+    const size_t own = chain.nodes.size(), unrolled = own+(chain.closed ? 2 : 0);
     pack.chain[lane] = index;
-    pack.nodesOfLane[lane] = chain.nodes.size();
-    for (size_t node = 0; node < chain.nodes.size(); node++) {
-        pack.particles[node*lanes+lane] = chain.nodes[node];
-        pack.mobile[node*lanes+lane] = chain.fixed[node] ? 0.0 : 1.0;
+    pack.nodesOfLane[lane] = unrolled;
+    pack.segmentsOfLane[lane] = chain.segments.size();
+    for (size_t node = 0; node < unrolled; node++) {
+        pack.particles[node*lanes+lane] = chain.nodes[node%own];
+        pack.mobile[node*lanes+lane] = chain.fixed[node%own] ? 0.0 : 1.0;
     }
-    for (size_t joint = 0; joint < chain.joints.size(); joint++)
-        pack.joints[(joint+1)*lanes+lane] = chain.joints[joint];
+    for (size_t node = 1; node < unrolled-1; node++)
+        pack.joints[node*lanes+lane] = chain.joints[chain.closed ? node%own : node-1];
     for (const Tether& tether : chain.tethers)
         pack.tethers.push_back({tether, lane});
     for (int s = 0; s < pack.nodes-1; s++) {
-        const bool filling = (s >= (int) chain.segments.size());
-        const Segment segment = filling ? Segment {1, 0, 1, 0, 0, 0, 0} : chain.segments[s];
+        const bool filling = (s >= (int) unrolled-1);
+        const Segment segment = filling ? Segment {1, 0, 1, 0, 0, 0, 0} : chain.segments[s%chain.segments.size()];
         double* properties = &pack.properties[(size_t) s*ChainPack::NumProperties*lanes+lane];
         properties[ChainPack::RestLength*lanes] = segment.restLength;
         properties[ChainPack::Stiffness*lanes] = segment.stiffness;
@@ -65,18 +68,29 @@ void fillLane(ChainPack& pack, int lane, const Chain& chain, int index) {
         properties[ChainPack::RootPerpendicular*lanes] = sqrt(segment.perpendicular);
         properties[ChainPack::RootRotational*lanes] = sqrt(segment.rotational);
         properties[ChainPack::RootExtensional*lanes] = sqrt(segment.extensional);
-        properties[ChainPack::Drift*lanes] = filling ? 0.0 : 2-segment.extensional/segment.rotational;
+        const int dimensions = chain.planar ? 2 : 3;
+        properties[ChainPack::Drift*lanes] = filling ? 0.0 :
+                dimensions+1-(dimensions-1)*segment.extensional/segment.rotational;
+        if (segment.propulsion != 0) {
+            pack.propulsions.resize((size_t) (pack.nodes-1)*lanes);
+            pack.propulsions[(size_t) s*lanes+lane] = 0.5*segment.propulsion;
+        }
     }
 }
 
 ChainPack packed(const vector<Chain>& chains, const vector<int>& members) {
     ChainPack pack;
+    const Chain& longest = chains[members[0]];
     pack.lanes = members.size();
-    pack.nodes = chains[members[0]].nodes.size();
-    pack.bending = chains[members[0]].bending;
-    pack.stretching = chains[members[0]].stretching;
+    pack.nodes = longest.nodes.size()+(longest.closed ? 2 : 0);
+    pack.segments = longest.segments.size();
+    pack.bending = longest.bending;
+    pack.stretching = longest.stretching;
+    pack.closed = longest.closed;
+    pack.planar = longest.planar;
     pack.chain.resize(pack.lanes);
     pack.nodesOfLane.resize(pack.lanes);
+    pack.segmentsOfLane.resize(pack.lanes);
     const size_t places = (size_t) pack.nodes*pack.lanes;
     pack.particles.resize(places, -1);
     pack.mobile.resize(places, 0.0);
@@ -101,8 +115,10 @@ ChainEngine::ChainEngine(const vector<Chain>& chains) : implementation(new Imple
     vector<int> order(chains.size());
     iota(order.begin(), order.end(), 0);
     stable_sort(order.begin(), order.end(), [&] (int a, int b) {
-        return make_tuple(-(int) chains[a].nodes.size(), chains[a].bending, chains[a].stretching) <
-                make_tuple(-(int) chains[b].nodes.size(), chains[b].bending, chains[b].stretching);
+        auto key = [&] (const Chain& chain) {
+            return make_tuple(-(int) chain.nodes.size(), chain.bending, chain.stretching, chain.closed, chain.planar);
+        };
+        return key(chains[a]) < key(chains[b]);
     });
     for (size_t first = 0; first < order.size();) {
         int fitting = 1;
@@ -129,12 +145,13 @@ ChainEnergy ChainEngine::addForces(int pack, const double* positions, double* fo
     return kernels().addForces(implementation->packs[pack], positions, forces, box, includeEnergy);
 }
 
-const vector<int>& ChainEngine::getParticles(int pack) const {
-    return implementation->packs[pack].particles;
+ParticleRange ChainEngine::getParticles(int index) const {
+    const ChainPack& pack = implementation->packs[index];
+    return {pack.particles.data(), pack.particles.data()+(size_t) pack.ownNodes()*pack.lanes};
 }
 
 void ChainEngine::clearForces(int pack, double* forces) const {
-    for (int particle : implementation->packs[pack].particles)
+    for (int particle : getParticles(pack))
         if (particle >= 0)
             forces[3*particle] = forces[3*particle+1] = forces[3*particle+2] = 0;
 }

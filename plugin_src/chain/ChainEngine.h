@@ -22,6 +22,29 @@ struct Instability {
     int divided = 0;
 };
 
+/** A fluid that moves with the velocity velocity+gradient x; friction is relative to it. */
+struct BackgroundFlow {
+    bool present = false;
+    double velocity[3] = {};
+    /** Row by row: the derivatives of the first component of the velocity come first. */
+    double gradient[9] = {};
+};
+
+/** The particles of a pack, each of them once, in no particular order, with -1 for places that are empty. */
+class ParticleRange {
+public:
+    ParticleRange(const int* first, const int* last) : first(first), last(last) {
+    }
+    const int* begin() const {
+        return first;
+    }
+    const int* end() const {
+        return last;
+    }
+private:
+    const int *first, *last;
+};
+
 /** What a step needs besides positions and forces. */
 struct StepSettings {
     Scheme scheme;
@@ -30,6 +53,7 @@ struct StepSettings {
     std::uint64_t seed, step;
     /** Which part of a step, if it is taken in parts. */
     std::uint32_t part = 0;
+    BackgroundFlow flow = {};
 };
 
 /**
@@ -56,9 +80,9 @@ public:
      */
     ChainEnergy addForces(int pack, const double* positions, double* forces, const double* box, bool includeEnergy) const;
     /**
-     * Get the particles of a pack, in no particular order, with -1 for places that are empty.
+     * Get the particles of a pack.
      */
-    const std::vector<int>& getParticles(int pack) const;
+    ParticleRange getParticles(int pack) const;
     /**
      * Set the forces on the nodes of a pack to zero.
      */

@@ -5,6 +5,7 @@
 
 #include "ChainPack.h"
 #include "Gaussian.h"
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -45,6 +46,10 @@ template <class Real> struct Vector {
     CYLCHAIN_INLINE Real dot(const Vector& v) const {return x*v.x+y*v.y+z*v.z;}
 };
 
+template <class Real> CYLCHAIN_INLINE Vector<Real> crossProduct(const Vector<Real>& a, const Vector<Real>& b) {
+    return {a.y*b.z-a.z*b.y, a.z*b.x-a.x*b.z, a.x*b.y-a.y*b.x};
+}
+
 /** A symmetric 3x3 matrix. */
 template <class Real> struct Symmetric {
     Real xx, yx, yy, zx, zy, zz;
@@ -61,12 +66,17 @@ template <class Real> struct Symmetric {
         zy += rt.z*t.y;
         zz += s+rt.z*t.z;
     }
+    Symmetric operator-(const Symmetric& m) const {
+        return {xx-m.xx, yx-m.yx, yy-m.yy, zx-m.zx, zy-m.zy, zz-m.zz};
+    }
     Symmetric inverse(Real scale) const {
         Symmetric c = {yy*zz-zy*zy, zx*zy-yx*zz, xx*zz-zx*zx, yx*zy-yy*zx, yx*zx-xx*zy, xx*yy-yx*yx};
         const Real factor = scale/(xx*c.xx+yx*c.yx+zx*c.zx);
         return {c.xx*factor, c.yx*factor, c.yy*factor, c.zx*factor, c.zy*factor, c.zz*factor};
     }
 };
+
+#include "Matrix.h"
 
 /** Memory that a thread keeps between calls, aligned for vector registers. */
 class Scratch {
@@ -112,9 +122,20 @@ template <int W> void gather(const ChainPack& pack, const double* values, Vector
         }
 }
 
+/** Bring forces into lanes: once for nodes that come twice, and in the plane for chains that stay there. */
+template <int W> void gatherForces(const ChainPack& pack, const double* forces, Vector<typename Lanes<W>::Type>* f) {
+    typedef typename Lanes<W>::Type Real;
+    gather<W>(pack, forces, f);
+    for (int node = pack.ownNodes(); node < pack.nodes; node++)
+        f[node] = Vector<Real> {};
+    if (pack.planar)
+        for (int node = 0; node < pack.nodes; node++)
+            f[node].z = Real{};
+}
+
 /** Write vectors, times a factor, to an array of three doubles for each particle. */
 template <int W> void scatter(const ChainPack& pack, Vector<typename Lanes<W>::Type>* values, double factor, double* result) {
-    for (int node = 0; node < pack.nodes; node++)
+    for (int node = 0; node < pack.ownNodes(); node++)
         for (int i = 0; i < W; i++) {
             const int particle = pack.particles[node*W+i];
             if (particle >= 0) {
@@ -156,6 +177,15 @@ template <int W> void gatherPositions(const ChainPack& pack, const double* posit
     }
 }
 
+/** Bring the positions a step begins with into lanes. Chains that stay in a plane are seen in it. */
+template <int W> void gatherStart(const ChainPack& pack, const double* positions, const double* box,
+            Vector<typename Lanes<W>::Type>* x) {
+    gatherPositions<W>(pack, positions, box, x);
+    if (pack.planar)
+        for (int node = 1; node < pack.nodes; node++)
+            x[node].z = x[0].z;
+}
+
 template <class Real> CYLCHAIN_INLINE Real property(const ChainPack& pack, int segment, int which) {
     return loaded<Real>(pack.properties, (std::size_t) segment*ChainPack::NumProperties+which);
 }
@@ -185,10 +215,6 @@ inline double bendingEnergy(BendingModel model, double stiffness, double c, doub
     return 0.5*stiffness*angle*angle;
 }
 
-template <class Real> CYLCHAIN_INLINE Vector<Real> crossProduct(const Vector<Real>& a, const Vector<Real>& b) {
-    return {a.y*b.z-a.z*b.y, a.z*b.x-a.x*b.z, a.x*b.y-a.y*b.x};
-}
-
 /** The vector from a tether's point to its node. */
 template <int W> void tetherVector(const LaneTether& tether, const Vector<typename Lanes<W>::Type>* x, const double* box,
             double* d) {
@@ -198,6 +224,20 @@ template <int W> void tetherVector(const LaneTether& tether, const Vector<typena
     d[2] = lane(node.z, tether.lane)-tether.point[2];
     if (box != NULL)
         wrap(d, box);
+}
+
+/** Add the propulsion of segments, half of it on each end. */
+template <int W> void addPropulsion(const ChainPack& pack, const Vector<typename Lanes<W>::Type>* x,
+            Vector<typename Lanes<W>::Type>* f) {
+    typedef typename Lanes<W>::Type Real;
+    if (pack.propulsions.empty())
+        return;
+    for (int s = 0; s < pack.segments; s++) {
+        const Vector<Real> difference = x[s+1]-x[s];
+        const Vector<Real> half = difference*(loaded<Real>(pack.propulsions, s)/root(difference.dot(difference)));
+        f[s] = f[s]+half;
+        f[s+1] = f[s+1]+half;
+    }
 }
 
 template <int W> ChainEnergy addForcesTo(const ChainPack& pack, const double* positions, double* forces,
@@ -224,7 +264,9 @@ template <int W> ChainEnergy addForcesTo(const ChainPack& pack, const double* po
             const Real relative = extension*property<Real>(pack, s, ChainPack::InverseExtension);
             tension = tension/(1-relative*relative);
         }
-        Vector<Real> pull = t*tension;
+        // The last segment of an unrolled chain is there for its joint alone.
+        const bool twice = (s >= pack.segments);
+        Vector<Real> pull = twice ? Vector<Real> {} : t*tension;
 
         // Bending at the joint with the segment before.
         if (s > 0) {
@@ -251,7 +293,7 @@ template <int W> ChainEnergy addForcesTo(const ChainPack& pack, const double* po
         push = push-pull;
         if (includeEnergy)
             for (int i = 0; i < W; i++) {
-                if (s >= pack.nodesOfLane[i]-1)
+                if (s >= pack.segmentsOfLane[i])
                     continue;
                 Real k = stiffness, e = extension, d = property<Real>(pack, s, ChainPack::InverseExtension);
                 const double square = lane(e, i)*lane(e, i), relative = lane(d, i)*lane(d, i)*square;
@@ -262,6 +304,7 @@ template <int W> ChainEnergy addForcesTo(const ChainPack& pack, const double* po
         inverseBefore = inverse;
     }
     f[pack.nodes-1] = push;
+    addPropulsion<W>(pack, x, f);
     for (const LaneTether& tether : pack.tethers) {
         double d[3];
         tetherVector<W>(tether, x, box, d);
@@ -298,6 +341,21 @@ template <class Real> inline Symmetric<Real> inverseOfMobile(Symmetric<Real> dia
     return diagonal.inverse(mobile);
 }
 
+/** The friction of a segment on its ends: (s 1 + r tt) on the velocity of the same end, and of the other. */
+template <class Real> struct EndFriction {
+    Real same, sameAxial, other, otherAxial;
+    CYLCHAIN_INLINE EndFriction(const ChainPack& pack, int s, Real inverseSquare) {
+        const Real acrossTrans = 0.25*property<Real>(pack, s, ChainPack::Perpendicular);
+        const Real alongTrans = 0.25*property<Real>(pack, s, ChainPack::Parallel);
+        const Real acrossTurn = property<Real>(pack, s, ChainPack::Rotational)*inverseSquare;
+        const Real alongTurn = property<Real>(pack, s, ChainPack::Extensional)*inverseSquare;
+        same = acrossTrans+acrossTurn;
+        sameAxial = alongTrans+alongTurn-same;
+        other = acrossTrans-acrossTurn;
+        otherAxial = alongTrans-alongTurn-other;
+    }
+};
+
 /** Solve Z(x) v = f for a pack: v = Z^-1 f by block elimination from the first node to the last and back. */
 template <int W> void redistribute(const ChainPack& pack, const Vector<typename Lanes<W>::Type>* x,
             const Vector<typename Lanes<W>::Type>* f, Eliminated<typename Lanes<W>::Type>* nodes,
@@ -310,12 +368,9 @@ template <int W> void redistribute(const ChainPack& pack, const Vector<typename 
         const Vector<Real> difference = x[s+1]-x[s];
         const Real inverseSquare = 1/difference.dot(difference);
         const Vector<Real> t = difference*root(inverseSquare);
-        const Real acrossTrans = 0.25*property<Real>(pack, s, ChainPack::Perpendicular);
-        const Real alongTrans = 0.25*property<Real>(pack, s, ChainPack::Parallel);
-        const Real acrossTurn = property<Real>(pack, s, ChainPack::Rotational)*inverseSquare;
-        const Real alongTurn = property<Real>(pack, s, ChainPack::Extensional)*inverseSquare;
-        const Real same = acrossTrans+acrossTurn, sameAxial = alongTrans+alongTurn-same;
-        const Real other = acrossTrans-acrossTurn, otherAxial = alongTrans-alongTurn-other;
+        const EndFriction<Real> friction(pack, s, inverseSquare);
+        const Real same = friction.same, sameAxial = friction.sameAxial;
+        const Real other = friction.other, otherAxial = friction.otherAxial;
         diagonal.addAxial(same, sameAxial, t);
 
         // Eliminate node s.
@@ -346,6 +401,96 @@ template <int W> void redistribute(const ChainPack& pack, const Vector<typename 
     for (int s = last-1; s >= 0; s--) {
         const Eliminated<Real>& node = nodes[s];
         v[s] = node.inverse*(node.right-v[s+1]*node.coupling-node.tangent*(node.axial*node.tangent.dot(v[s+1])));
+    }
+}
+
+/**
+ * Solve Z(x) v = f for a pack of closed chains: elimination from the second node to the last, each of which is also
+ * coupled to the first one then, which comes last.
+ */
+template <int W> void redistributeClosed(const ChainPack& pack, const Vector<typename Lanes<W>::Type>* x,
+            const Vector<typename Lanes<W>::Type>* f, Eliminated<typename Lanes<W>::Type>* nodes,
+            Matrix<typename Lanes<W>::Type>* toFirst, Vector<typename Lanes<W>::Type>* v) {
+    typedef typename Lanes<W>::Type Real;
+    typedef Matrix<Real> Mat;
+    const int count = pack.segments;
+    Symmetric<Real> diagonal = {}, first = {};
+    Vector<Real> right = {}, rightOfFirst = f[0]+f[count];
+    Mat coupling = {};
+    for (int s = 0; s < count; s++) {
+        const Vector<Real> difference = x[s+1]-x[s];
+        const Real inverseSquare = 1/difference.dot(difference);
+        const Vector<Real> t = difference*root(inverseSquare);
+        const EndFriction<Real> friction(pack, s, inverseSquare);
+        const Mat other = Mat::axial(friction.other, friction.otherAxial, t);
+        if (s == 0)
+            first.addAxial(friction.same, friction.sameAxial, t);
+        else
+            diagonal.addAxial(friction.same, friction.sameAxial, t);
+        Symmetric<Real> next = {};
+        (s == count-1 ? first : next).addAxial(friction.same, friction.sameAxial, t);
+        Vector<Real> nextRight = f[s+1];
+        Mat nextCoupling = {};
+        if (s == 0)
+            nextCoupling = other;
+        else {
+            // Eliminate node s.
+            if (s == count-1)
+                coupling = coupling+other;
+            Eliminated<Real>& node = nodes[s];
+            node.inverse = inverseOfMobile(diagonal, loaded<Real>(pack.mobile, s));
+            node.right = right;
+            node.tangent = t;
+            node.coupling = friction.other;
+            node.axial = friction.otherAxial;
+            toFirst[s] = coupling;
+            const Mat inverse = Mat::of(node.inverse), passed = inverse*coupling;
+            const Vector<Real> moved = node.inverse*right;
+            first = first-(coupling.transposed()*passed).lower();
+            rightOfFirst = rightOfFirst-coupling.transposed()*moved;
+            if (s < count-1) {
+                next = next-(other*(inverse*other)).lower();
+                nextRight = nextRight-other*moved;
+                nextCoupling = other*passed*(-1+Real{});
+            }
+        }
+        diagonal = next;
+        right = nextRight;
+        coupling = nextCoupling;
+    }
+    v[0] = inverseOfMobile(first, loaded<Real>(pack.mobile, 0))*rightOfFirst;
+    for (int s = count-1; s > 0; s--) {
+        const Eliminated<Real>& node = nodes[s];
+        Vector<Real> rest = node.right-toFirst[s]*v[0];
+        if (s < count-1)
+            rest = rest-v[s+1]*node.coupling-node.tangent*(node.axial*node.tangent.dot(v[s+1]));
+        v[s] = node.inverse*rest;
+    }
+    v[count] = v[0];
+    v[count+1] = v[1];
+}
+
+/** The velocity of the fluid at x. */
+template <class Real> CYLCHAIN_INLINE Vector<Real> velocityOf(const BackgroundFlow& flow, bool planar, const Vector<Real>& x) {
+    const double* g = flow.gradient;
+    return {flow.velocity[0]+x.x*g[0]+x.y*g[1]+x.z*g[2], flow.velocity[1]+x.x*g[3]+x.y*g[4]+x.z*g[5],
+            planar ? Real{} : flow.velocity[2]+x.x*g[6]+x.y*g[7]+x.z*g[8]};
+}
+
+/** Add the drag of the fluid on nodes at rest, Z u. It varies linearly, so the velocities of the ends say all of it. */
+template <int W> void addDrag(const ChainPack& pack, const Vector<typename Lanes<W>::Type>* x, const BackgroundFlow& flow,
+            Vector<typename Lanes<W>::Type>* f) {
+    typedef typename Lanes<W>::Type Real;
+    for (int s = 0; s < pack.segments; s++) {
+        const Vector<Real> difference = x[s+1]-x[s];
+        const Real inverseSquare = 1/difference.dot(difference);
+        const Vector<Real> t = difference*root(inverseSquare);
+        const EndFriction<Real> friction(pack, s, inverseSquare);
+        const Vector<Real> first = velocityOf(flow, pack.planar, x[s]), second = velocityOf(flow, pack.planar, x[s+1]);
+        f[s] = f[s]+first*friction.same+second*friction.other+
+                t*(friction.sameAxial*t.dot(first)+friction.otherAxial*t.dot(second));
+        f[s+1] = f[s+1]+second*friction.same+first*friction.other+
+                t*(friction.sameAxial*t.dot(second)+friction.otherAxial*t.dot(first));
     }
 }
 
@@ -440,19 +585,26 @@ private:
     }
 };
 
+/** Three normal numbers, or two for a chain that stays in its plane. */
+template <int W> CYLCHAIN_INLINE Vector<typename Lanes<W>::Type> gaussianVector(GaussianLanes<W>& gaussian, bool planar) {
+    Vector<typename Lanes<W>::Type> result = {gaussian.next(), gaussian.next(), gaussian.next()};
+    if (planar)
+        result.z = typename Lanes<W>::Type {};
+    return result;
+}
+
 /** Add the random forces, step (1) of Section 4, and for Euler's scheme the thermal torques (15), step (2). */
 template <int W> void addRandomForces(const ChainPack& pack, const Vector<typename Lanes<W>::Type>* x,
             const StepSettings& settings, Vector<typename Lanes<W>::Type>* f) {
     typedef typename Lanes<W>::Type Real;
     GaussianLanes<W> gaussian(pack, settings);
     const double amplitude = std::sqrt(2*settings.kT/settings.stepSize);
-    const double thermal = (settings.scheme == Scheme::Euler ? 2*settings.kT : 0.0);
-    for (int s = 0; s < pack.nodes-1; s++) {
+    const double thermal = (settings.scheme == Scheme::Euler ? settings.kT : 0.0);
+    for (int s = 0; s < pack.segments; s++) {
         const Vector<Real> difference = x[s+1]-x[s];
         const Real inverse = 1/root(difference.dot(difference));
         const Vector<Real> t = difference*inverse;
-        const Vector<Real> a = {gaussian.next(), gaussian.next(), gaussian.next()};
-        const Vector<Real> b = {gaussian.next(), gaussian.next(), gaussian.next()};
+        const Vector<Real> a = gaussianVector<W>(gaussian, pack.planar), b = gaussianVector<W>(gaussian, pack.planar);
         const Real across = property<Real>(pack, s, ChainPack::RootPerpendicular);
         const Real along = property<Real>(pack, s, ChainPack::RootParallel);
         const Vector<Real> force = (a*across+t*((along-across)*t.dot(a)))*(0.5*amplitude+Real{});
@@ -465,38 +617,55 @@ template <int W> void addRandomForces(const ChainPack& pack, const Vector<typena
     }
 }
 
+/** Velocities of all nodes under the forces f, in the flow. */
+template <int W> void findVelocities(const ChainPack& pack, const Vector<typename Lanes<W>::Type>* x,
+            const Vector<typename Lanes<W>::Type>* f, const BackgroundFlow& flow, Vector<typename Lanes<W>::Type>* v) {
+    typedef typename Lanes<W>::Type Real;
+    static thread_local Scratch scratch, couplings, vectors;
+    Eliminated<Real>* nodes = scratch.reserve<Eliminated<Real>>(pack.nodes);
+    if (flow.present) {
+        Vector<Real>* dragged = vectors.reserve<Vector<Real>>(pack.nodes);
+        std::copy(f, f+pack.nodes, dragged);
+        addDrag<W>(pack, x, flow, dragged);
+        f = dragged;
+    }
+    if (pack.closed)
+        redistributeClosed<W>(pack, x, f, nodes, couplings.reserve<Matrix<Real>>(pack.nodes), v);
+    else
+        redistribute<W>(pack, x, f, nodes, v);
+}
+
 template <int W> Instability stepPack(const ChainPack& pack, const double* positions, const double* forces,
             const double* box, const StepSettings& settings, double* displacements) {
     typedef typename Lanes<W>::Type Real;
-    static thread_local Scratch scratch, vectors;
+    static thread_local Scratch vectors;
     const int n = pack.nodes;
-    Eliminated<Real>* nodes = scratch.reserve<Eliminated<Real>>(n);
     Vector<Real>* x = vectors.reserve<Vector<Real>>(3*n);
     Vector<Real>* f = x+n;
     Vector<Real>* v = f+n;
-    gatherPositions<W>(pack, positions, box, x);
-    gather<W>(pack, forces, f);
+    gatherStart<W>(pack, positions, box, x);
+    gatherForces<W>(pack, forces, f);
     if (settings.kT > 0)
         addRandomForces<W>(pack, x, settings, f);
-    redistribute<W>(pack, x, f, nodes, v);
+    findVelocities<W>(pack, x, f, settings.flow, v);
     if (settings.scheme == Scheme::Midpoint) {
         const Real half = 0.5*settings.stepSize+Real{};
         for (int node = 0; node < n; node++)
             x[node] = x[node]+v[node]*half;
-        redistribute<W>(pack, x, f, nodes, v);
+        findVelocities<W>(pack, x, f, settings.flow, v);
     }
 
     // Write displacements, and look for segments whose ends move apart.
     const double h = settings.stepSize;
     scatter<W>(pack, v, h, displacements);
     Instability result;
-    for (int s = 0; s < n-1; s++) {
+    for (int s = 0; s < pack.segments; s++) {
         const Vector<Real> change = v[s+1]-v[s];
         Real square = change.dot(change)*(h*h), limit = property<Real>(pack, s, ChainPack::RestLength);
         limit = limit*limit;
         for (int i = 0; i < W; i++)
             // Written so that NaN counts as unstable.
-            if (!(lane(square, i) < lane(limit, i)) && s < pack.nodesOfLane[i]-1 && result.chain < 0) {
+            if (!(lane(square, i) < lane(limit, i)) && s < pack.segmentsOfLane[i] && result.chain < 0) {
                 result.chain = pack.chain[i];
                 result.segment = s;
                 result.change = std::sqrt(lane(square, i));
@@ -505,14 +674,14 @@ template <int W> Instability stepPack(const ChainPack& pack, const double* posit
     return result;
 }
 
-#include "Matrix.h"
 #include "ChainCoordinates.h"
 #include "ImplicitLoops.h"
 
 template <int W> Instability stepPackAs(const ChainPack& pack, const double* positions, const double* forces,
             const double* box, const StepSettings& settings, double* displacements) {
     if (settings.scheme == Scheme::Implicit)
-        return stepPackImplicitly<W>(pack, positions, forces, box, settings, displacements);
+        return pack.closed ? stepPackImplicitly<W, true>(pack, positions, forces, box, settings, displacements) :
+                stepPackImplicitly<W, false>(pack, positions, forces, box, settings, displacements);
     return stepPack<W>(pack, positions, forces, box, settings, displacements);
 }
 

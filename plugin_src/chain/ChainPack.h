@@ -14,16 +14,24 @@ struct LaneTether : Tether {
 /**
  * Chains side by side: the numbers of all chains for one segment lie next to each other, one in each lane. Chains that
  * are shorter than the longest one are filled up with segments without friction whose nodes are fixed.
+ *
+ * Closed chains are unrolled: their first two nodes come once more behind the last one, so that the joint of the first
+ * node finds the segment after it there. All closed chains of a pack have the same number of nodes.
  */
 struct ChainPack {
-    /** The properties of a segment, each of them for all lanes. Drift is 2-gamma_def/gamma_rot of (15). */
+    /**
+     * The properties of a segment, each of them for all lanes. Drift is the thermal torque (15) over k_B T, which is
+     * d+1-(d-1)gamma_def/gamma_rot in d dimensions.
+     */
     enum Property {RestLength, Stiffness, InverseExtension, Parallel, Perpendicular, Rotational, Extensional,
             RootParallel, RootPerpendicular, RootRotational, RootExtensional, Drift, NumProperties};
-    int lanes, nodes;
+    /** The number of nodes includes those that come twice; that of segments does not. */
+    int lanes, nodes, segments;
     BendingModel bending;
     StretchingModel stretching;
-    /** Number of each lane's chain and of its nodes. */
-    std::vector<int> chain, nodesOfLane;
+    bool closed, planar;
+    /** Number of each lane's chain, of its nodes and of its segments. */
+    std::vector<int> chain, nodesOfLane, segmentsOfLane;
     /** Particle of each node and lane, [node][lane]; -1 for a node that only fills up. */
     std::vector<int> particles;
     /** Properties of segments, [segment][property][lane]. */
@@ -34,6 +42,12 @@ struct ChainPack {
     std::vector<double> mobile;
     /** The tethers of all lanes, by their nodes. */
     std::vector<LaneTether> tethers;
+    /** Half the propulsion of each segment, [segment][lane], or nothing if there is none. */
+    std::vector<double> propulsions;
+    /** Nodes that do not come twice. */
+    int ownNodes() const {
+        return closed ? nodes-2 : nodes;
+    }
 };
 
 /** The loops over a pack, compiled for one instruction set. */

@@ -19,7 +19,7 @@
  *     f_drift = -k_B T sum_a (k (2 theta-1) + g/h) H_a (Z/h+K)^-1 J_a
  *
  * with the second derivatives H_a of the lengths. It takes the blocks of the inverse next to its diagonal, which follow
- * from those of the elimination. IMPLICIT_SCHEME.md explains all this.
+ * from those of the elimination. In a flow u, friction is relative to u(m). IMPLICIT_SCHEME.md explains all this.
  */
 
 /** The largest change of a segment in the last iteration, over its rest length; a fifth of it remains as an error. */
@@ -75,13 +75,14 @@ template <class Real> struct ImplicitNode {
     Vector<Real> solution;
 };
 
-template <int W> class ImplicitStep {
+/** A step of open chains or, if CLOSED, of rings. */
+template <int W, bool CLOSED> class ImplicitStep {
     typedef typename Lanes<W>::Type Real;
     typedef Vector<Real> Vec;
     typedef Matrix<Real> Mat;
 public:
     struct Memory {
-        Scratch segments, nodes, vectors, tethers;
+        Scratch segments, nodes, vectors, tethers, border;
     };
     ImplicitStep(const ChainPack& pack, const StepSettings& settings, const double* box, Memory& memory) : pack(pack),
             settings(settings), box(box), n(pack.nodes), h(settings.stepSize) {
@@ -90,6 +91,8 @@ public:
         nodes = memory.nodes.template reserve<ImplicitNode<Real> >(n);
         f = memory.vectors.template reserve<Vec>(2*n);
         change = f+n;
+        if (CLOSED)
+            toBorder = memory.border.template reserve<BorderCoupling>(n);
     }
     /**
      * Take one step.
@@ -103,9 +106,10 @@ public:
     void take(const Vec* before, const Vec* forces, Vec* y, bool* failed) {
         x = before;
         for (int node = 0; node < n; node++) {
-            y[node] = x[node];
+            y[node] = settings.flow.present ? carriedAlong(node) : x[node];
             f[node] = forces[node];
         }
+        addPropulsion<W>(pack, x, f);
         describe();
         if (settings.kT > 0)
             addNoise();
@@ -140,7 +144,17 @@ private:
     ImplicitTether* tethers;
     const Vec* x;
     Vec *f, *change;
+    /** The coupling of a node of a ring to its first two nodes. */
+    struct BorderCoupling {
+        Mat node[2];
+    };
+    BorderCoupling* toBorder;
 
+    /** Where the flow alone takes a node that moves. */
+    Vec carriedAlong(int node) const {
+        const Vec halfway = x[node]+velocityOf(settings.flow, pack.planar, x[node])*(0.5*h+Real{});
+        return x[node]+velocityOf(settings.flow, pack.planar, halfway)*(h*loaded<Real>(pack.mobile, node));
+    }
     /** Describe the start of a step, without noise. */
     void describe() {
         for (int s = 0; s < n-1; s++) {
@@ -174,14 +188,18 @@ private:
     }
     void describeTether(const LaneTether& tether, ImplicitTether& result) {
         tetherVector<W>(tether, x, box, result.start);
+        if (pack.planar)
+            result.start[2] = 0;
         double friction = 0;
-        for (int s = tether.node-1; s <= tether.node; s++)
-            if (s >= 0 && s < pack.nodesOfLane[tether.lane]-1) {
+        for (int side = tether.node-1; side <= tether.node; side++) {
+            const int s = CLOSED && side < 0 ? pack.segments-1 : side;
+            if (s >= 0 && s < pack.segmentsOfLane[tether.lane]) {
                 Real parallel = property<Real>(pack, s, ChainPack::Parallel), l0 = property<Real>(pack, s, ChainPack::RestLength);
                 Real extensional = property<Real>(pack, s, ChainPack::Extensional);
                 const double length = lane(l0, tether.lane);
                 friction += 0.25*lane(parallel, tether.lane)+lane(extensional, tether.lane)/(length*length);
             }
+        }
         result.theta = std::fmax(0.5, 1-friction/(h*tether.stiffness+TINY));
         for (double& random : result.random)
             random = 0;
@@ -191,29 +209,38 @@ private:
         GaussianLanes<W> gaussian(pack, settings);
         const double amplitude = std::sqrt(2*settings.kT/h);
         for (int s = 0; s < n-1; s++) {
-            ImplicitSegment<Real>& segment = segments[s];
-            const Vec t = segment.tangent;
-            const Vec a = {gaussian.next(), gaussian.next(), gaussian.next()};
-            const Vec b = {gaussian.next(), gaussian.next(), gaussian.next()};
-            const Real across = property<Real>(pack, s, ChainPack::RootPerpendicular);
-            const Real along = property<Real>(pack, s, ChainPack::RootParallel);
-            const Vec force = (a*across+t*((along-across)*t.dot(a)))*(0.5*amplitude+Real{});
-            const Real perLength = amplitude/segment.length;
-            const Vec pair = (b-t*t.dot(b))*(property<Real>(pack, s, ChainPack::RootRotational)*perLength);
-            f[s] = f[s]+force-pair;
-            f[s+1] = f[s+1]+force+pair;
-            segment.randomPair = pair;
-
-            segment.randomTension = t.dot(b)*(property<Real>(pack, s, ChainPack::RootExtensional)*perLength);
-            drawLength(gaussian, s);
-            if (s > 0)
-                drawBend(gaussian, s);
+            if (!CLOSED || s < pack.segments) {
+                drawForces(gaussian, s, amplitude);
+                drawLength(gaussian, s);
+            }
+            if (s > 0) {
+                if (pack.planar)
+                    drawPlanarBend(gaussian, s);
+                else
+                    drawBend(gaussian, s);
+            }
         }
         for (std::size_t i = 0; i < pack.tethers.size(); i++) {
             const double deviation = std::sqrt(settings.kT/(pack.tethers[i].stiffness+TINY)*(2*tethers[i].theta-1));
             for (double& random : tethers[i].random)
                 random = deviation*gaussian.nextOfLane(pack.tethers[i].lane);
+            if (pack.planar)
+                tethers[i].random[2] = 0;
         }
+    }
+    CYLCHAIN_INLINE void drawForces(GaussianLanes<W>& gaussian, int s, double amplitude) {
+        ImplicitSegment<Real>& segment = segments[s];
+        const Vec t = segment.tangent;
+        const Vec a = gaussianVector<W>(gaussian, pack.planar), b = gaussianVector<W>(gaussian, pack.planar);
+        const Real across = property<Real>(pack, s, ChainPack::RootPerpendicular);
+        const Real along = property<Real>(pack, s, ChainPack::RootParallel);
+        const Vec force = (a*across+t*((along-across)*t.dot(a)))*(0.5*amplitude+Real{});
+        const Real perLength = amplitude/segment.length;
+        const Vec pair = (b-t*t.dot(b))*(property<Real>(pack, s, ChainPack::RootRotational)*perLength);
+        f[s] = f[s]+force-pair;
+        f[s+1] = f[s+1]+force+pair;
+        segment.randomPair = pair;
+        segment.randomTension = t.dot(b)*(property<Real>(pack, s, ChainPack::RootExtensional)*perLength);
     }
     void drawLength(GaussianLanes<W>& gaussian, int s) {
         ImplicitSegment<Real>& segment = segments[s];
@@ -226,7 +253,7 @@ private:
             for (int i = 0; i < W; i++) {
                 double square = lane(random, i)*lane(scale, i)*lane(inverse, i);
                 square *= square;
-                while (square > 1e-8 && s < pack.nodesOfLane[i]-1) {
+                while (square > 1e-8 && s < pack.segmentsOfLane[i]) {
                     const double relative = std::sqrt(-std::expm1(-square));
                     if (gaussian.uniform(i) < std::exp(-square)*std::sqrt(square)/relative)
                         break;
@@ -271,10 +298,40 @@ private:
         orthogonal(segment.bisector, e1, e2);
         segment.randomBend = e1*first+e2*second;
     }
+    /** In a plane, a bend has one component, and its angle a uniform measure. */
+    void drawPlanarBend(GaussianLanes<W>& gaussian, int s) {
+        ImplicitSegment<Real>& segment = segments[s];
+        Real stiffness = loaded<Real>(pack.joints, s)/settings.kT, share = root(2*segment.jointTheta-1), bend = Real{};
+        // The energy is that of a Gaussian or more, in the angle.
+        const double floor = pack.bending == BendingModel::KratkyPorod ? 4/(M_PI*M_PI) : 1;
+        for (int i = 0; i < W; i++) {
+            const double k = lane(stiffness, i);
+            if (k == 0 || lane(share, i) == 0)
+                continue;
+            const bool stiff = k*floor > STIFF_JOINT;
+            double angle, drawn, excess;
+            do {
+                angle = stiff ? gaussian.nextOfLane(i)/std::sqrt(k*floor) : M_PI*(2*gaussian.uniform(i)-1);
+                drawn = bendOfAngle(pack.bending, angle);
+                excess = drawn*drawn-(stiff ? floor*angle*angle : 0);
+            } while (!(std::fabs(angle) < M_PI) || gaussian.uniform(i) > std::exp(-0.5*k*excess));
+            lane(bend, i) = drawn*lane(share, i);
+        }
+        segment.randomBend = Vec {-segment.bisector.y, segment.bisector.x, Real{}}*bend;
+    }
     /** The equations of a node and its coupling to the next two, while they are gathered. */
     struct Row {
         Mat diagonal, lower, upper, second;
         Vec right;
+    };
+    /** In a ring, also the coupling of the node to the first two, and theirs to it. */
+    struct ClosedRow : Row {
+        Mat toBorder[2], fromBorder[2];
+    };
+    /** The equations of the first two nodes of a ring. */
+    struct Border {
+        Mat matrix[2][2];
+        Vec right[2];
     };
     /** The new segment, and the one between the old nodes and the new. */
     struct Geometry {
@@ -283,6 +340,12 @@ private:
     };
     /** Linearise the equations around y, and eliminate the nodes from first to last. */
     void eliminate(const Vec* y) {
+        if (CLOSED)
+            eliminateRing(y);
+        else
+            eliminateChain(y);
+    }
+    void eliminateChain(const Vec* y) {
         Row rows[3];
         Row *before = rows, *here = rows+1, *after = rows+2;
         Geometry previous, current;
@@ -307,6 +370,105 @@ private:
         eliminate<1>(n-2, *before, *here, *after);
         eliminate<0>(n-1, *here, *after, *before);
     }
+    /** The first two nodes of a ring come last: all others are coupled to them as well. */
+    void eliminateRing(const Vec* y) {
+        ClosedRow rows[3];
+        ClosedRow *before = rows, *here = rows+1, *after = rows+2;
+        Border border = {};
+        Geometry previous, current;
+        std::size_t tether = 0;
+        *here = ClosedRow {};
+        here->right = f[0];
+        for (int s = 0; s < n-1; s++) {
+            *after = ClosedRow {};
+            describeNew(y, s, current);
+            if (s < pack.segments)
+                addSegment(y, s, current, *here, *after);
+            else {
+                here->lower = here->upper = Mat {};
+                after->right = f[s+1];
+            }
+            addTethers(y, s, tether, *here);
+            if (s > 0) {
+                addJoint(s, previous, current, *before, *here, *after);
+                eliminateNodeOfRing(s-1, *before, *here, *after, border);
+            }
+            previous = current;
+            ClosedRow* const free = before;
+            before = here;
+            here = after;
+            after = free;
+        }
+
+        // What the rows of the nodes that come twice have gathered belongs to the first two.
+        border.matrix[0][0] = border.matrix[0][0]+before->diagonal;
+        border.matrix[0][1] = border.matrix[0][1]+before->upper;
+        border.matrix[1][0] = border.matrix[1][0]+before->lower;
+        border.matrix[1][1] = border.matrix[1][1]+here->diagonal;
+        border.right[0] = border.right[0]+before->right;
+        border.right[1] = border.right[1]+here->right;
+        eliminateBorder(border);
+    }
+    void eliminateNodeOfRing(int node, ClosedRow& row, ClosedRow& next, ClosedRow& second, Border& border) {
+        if (node < 2) {
+            border.matrix[node][node] = row.diagonal;
+            border.right[node] = row.right;
+            if (node == 0) {
+                border.matrix[0][1] = row.upper;
+                border.matrix[1][0] = row.lower;
+            }
+            else {
+                next.toBorder[1] = row.lower;
+                next.fromBorder[1] = row.upper;
+            }
+            second.toBorder[node] = row.second.transposed();
+            second.fromBorder[node] = row.second;
+            return;
+        }
+        if (node == pack.segments-2)
+            coupleToBorder(row, 0, row.second.transposed(), row.second);
+        if (node == pack.segments-1) {
+            coupleToBorder(row, 0, row.lower, row.upper);
+            coupleToBorder(row, 1, row.second.transposed(), row.second);
+            row.lower = row.upper = Mat {};
+        }
+        if (node >= pack.segments-2)
+            row.second = Mat {};
+        eliminate<2>(node, row, next, second);
+        const ImplicitNode<Real>& eliminated = nodes[node];
+        const Mat secondT = row.second.transposed();
+        for (int k = 0; k < 2; k++) {
+            Mat& coupling = toBorder[node].node[k];
+            coupling = eliminated.inverse*row.toBorder[k];
+            next.toBorder[k] = next.toBorder[k]-row.lower*coupling;
+            second.toBorder[k] = second.toBorder[k]-secondT*coupling;
+            next.fromBorder[k] = next.fromBorder[k]-row.fromBorder[k]*eliminated.next;
+            second.fromBorder[k] = second.fromBorder[k]-row.fromBorder[k]*eliminated.second;
+            border.right[k] = border.right[k]-row.fromBorder[k]*eliminated.solution;
+        }
+        for (int k = 0; k < 2; k++)
+            for (int l = 0; l < 2; l++)
+                border.matrix[k][l] = border.matrix[k][l]-row.fromBorder[k]*toBorder[node].node[l];
+    }
+    static void coupleToBorder(ClosedRow& row, int k, const Mat& from, const Mat& to) {
+        row.fromBorder[k] = row.fromBorder[k]+from;
+        row.toBorder[k] = row.toBorder[k]+to;
+    }
+    void eliminateBorder(const Border& border) {
+        nodes[0].inverse = inverseOf(border.matrix[0][0], 0);
+        nodes[0].solution = nodes[0].inverse*border.right[0];
+        nodes[0].next = nodes[0].inverse*border.matrix[0][1];
+        nodes[1].inverse = inverseOf(border.matrix[1][1]-border.matrix[1][0]*nodes[0].next, 1);
+        nodes[1].solution = nodes[1].inverse*(border.right[1]-border.matrix[1][0]*nodes[0].solution);
+    }
+    /** The inverse for a node that moves, and zero for a fixed one. */
+    CYLCHAIN_INLINE Mat inverseOf(Mat diagonal, int node) const {
+        const Real mobile = loaded<Real>(pack.mobile, node);
+        diagonal.x.x += 1-mobile;
+        diagonal.y.y += 1-mobile;
+        diagonal.z.z += 1-mobile;
+        return diagonal.inverse()*mobile;
+    }
     CYLCHAIN_INLINE void describeNew(const Vec* y, int s, Geometry& geometry) {
         geometry.difference = y[s+1]-y[s];
         geometry.length = root(geometry.difference.dot(geometry.difference));
@@ -329,7 +491,7 @@ private:
      */
     bool stiffenTautSegments() {
         Real greatest = Real{};
-        for (int s = 0; s < n-1; s++) {
+        for (int s = 0; s < pack.segments; s++) {
             Real friction, tension;
             turningRates(s, friction, tension);
             greatest = larger<Real>(greatest, tension/friction);
@@ -343,7 +505,7 @@ private:
             }
         if (!any)
             return false;
-        for (int s = 0; s < n-1; s++) {
+        for (int s = 0; s < pack.segments; s++) {
             Real friction, tension;
             turningRates(s, friction, tension);
             ImplicitSegment<Real>& segment = segments[s];
@@ -379,9 +541,19 @@ private:
         stretchCoordinate(pack.stretching, reciprocal, length-l0, coordinate, slope);
         stretchCoordinate(pack.stretching, reciprocal, 0.5*(segment.length+length)-l0, unused, middleSlope);
         const Real drag = property<Real>(pack, s, ChainPack::Extensional)/(segment.length*length*h);
-        const Real tension = stiffness*middleSlope*(segment.theta*coordinate+(1-segment.theta)*segment.coordinate-
+        Real tension = stiffness*middleSlope*(segment.theta*coordinate+(1-segment.theta)*segment.coordinate-
                 segment.randomCoordinate)+drag*(length-segment.length)-segment.randomTension;
         const Real response = stiffness*middleSlope*segment.theta*slope+drag*segment.length/length;
+        Vec carried = {}, turned = {};
+        if (settings.flow.present) {
+            const Vec u1 = velocityOf(settings.flow, pack.planar, (x[s]+y[s])*(0.5+Real{}));
+            const Vec u2 = velocityOf(settings.flow, pack.planar, (x[s+1]+y[s+1])*(0.5+Real{}));
+            const Vec sum = u1+u2, difference = u2-u1;
+            const Real along = direction.dot(difference);
+            carried = sum*acrossTrans+direction*((alongTrans-acrossTrans)*direction.dot(sum));
+            turned = (difference-direction*along)*(property<Real>(pack, s, ChainPack::Rotational)*inverseSquare);
+            tension -= drag*h*along;
+        }
         const Vec pull = direction*tension;
         const Real turning = 0.5*larger<Real>(segment.multiplier/length, -COMPRESSION*acrossTurn/h);
         const Mat elastic = Mat::axial(turning, -turning, t)+Mat::outer(direction*response, t);
@@ -392,8 +564,8 @@ private:
         after.diagonal = same+elastic;
         here.diagonal = here.diagonal+after.diagonal;
         here.lower = here.upper = other-elastic;
-        here.right = here.right-same*first-other*second+pull;
-        after.right = f[s+1]-same*second-other*first-pull;
+        here.right = here.right-same*first-other*second+pull+carried-turned;
+        after.right = f[s+1]-same*second-other*first-pull+carried+turned;
     }
     /** Add the tethers of a node, the next ones, to its equations. */
     void addTethers(const Vec* y, int node, std::size_t& next, Row& row) {
@@ -458,13 +630,8 @@ private:
     }
     /** Eliminate a node from the equations of those of the next two that exist. Nothing passes through a fixed one. */
     template <int FOLLOWING> CYLCHAIN_INLINE void eliminate(int node, const Row& row, Row& next, Row& second) {
-        const Real mobile = loaded<Real>(pack.mobile, node);
-        Mat diagonal = row.diagonal;
-        diagonal.x.x += 1-mobile;
-        diagonal.y.y += 1-mobile;
-        diagonal.z.z += 1-mobile;
         ImplicitNode<Real>& result = nodes[node];
-        result.inverse = diagonal.inverse()*mobile;
+        result.inverse = inverseOf(row.diagonal, node);
         result.solution = result.inverse*row.right;
         if (FOLLOWING > 0) {
             result.next = result.inverse*row.upper;
@@ -484,6 +651,16 @@ private:
     }
     /** Find the changes of y, and the tensions that come with them. */
     void substitute() {
+        if (CLOSED)
+            substituteRing();
+        else
+            substituteChain();
+        for (int s = 0; s < pack.segments; s++) {
+            ImplicitSegment<Real>& segment = segments[s];
+            segment.multiplier = segment.tension+segment.response*segment.newTangent.dot(change[s+1]-change[s]);
+        }
+    }
+    void substituteChain() {
         for (int node = n-1; node >= 0; node--) {
             change[node] = nodes[node].solution;
             if (node < n-1)
@@ -491,16 +668,28 @@ private:
             if (node < n-2)
                 change[node] = change[node]-nodes[node].second*change[node+2];
         }
-        for (int s = 0; s < n-1; s++) {
-            ImplicitSegment<Real>& segment = segments[s];
-            segment.multiplier = segment.tension+segment.response*segment.newTangent.dot(change[s+1]-change[s]);
-        }
+    }
+    void substituteRing() {
+        const int count = pack.segments;
+        change[1] = nodes[1].solution;
+        change[0] = nodes[0].solution-nodes[0].next*change[1];
+        change[count] = change[0];
+        change[count+1] = change[1];
+        for (int node = count-1; node > 1; node--)
+            change[node] = nodes[node].solution-nodes[node].next*change[node+1]-nodes[node].second*change[node+2]-
+                    toBorder[node].node[0]*change[0]-toBorder[node].node[1]*change[1];
     }
     /**
      * Add the metric forces of the lengths. The matrix is symmetric in the first iteration, so the blocks of its
      * inverse follow from those of its elimination, from last to first.
      */
     void addMetricForces() {
+        if (CLOSED)
+            addMetricForcesOfRing();
+        else
+            addMetricForcesOfChain();
+    }
+    void addMetricForcesOfChain() {
         Mat same = nodes[n-1].inverse, other = {}, sameAfter = {};
         for (int s = n-2; s >= 0; s--) {
             // Blocks of the inverse: (s,s), (s,s+1) and (s,s+2).
@@ -512,24 +701,67 @@ private:
             Mat newSame = node.inverse-node.next*newOther.transposed()-node.second*newSecond.transposed();
             newSame = (newSame+newSame.transposed())*(0.5+Real{});
 
-            const ImplicitSegment<Real>& segment = segments[s];
-            const Vec t = segment.tangent;
-            Vec response = (same+newSame-newOther-newOther.transposed())*t;
-            response = response-t*t.dot(response);
-            const Real drag = property<Real>(pack, s, ChainPack::Extensional)/(segment.length*segment.length*h);
-            const Real noise = property<Real>(pack, s, ChainPack::Stiffness)*(2*segment.theta-1)+drag;
-            const Vec force = response*(settings.kT*noise/segment.length);
-            f[s] = f[s]+force;
-            f[s+1] = f[s+1]-force;
+            addMetricForce(s, newSame, newOther, same);
             sameAfter = same;
             same = newSame;
             other = newOther;
         }
     }
+    /** Add the metric force of a segment, for the blocks of the inverse that belong to its nodes. */
+    CYLCHAIN_INLINE void addMetricForce(int s, const Mat& first, const Mat& other, const Mat& second) {
+        const ImplicitSegment<Real>& segment = segments[s];
+        const Vec t = segment.tangent;
+        Vec response = (second+first-other-other.transposed())*t;
+        response = response-t*t.dot(response);
+        const Real drag = property<Real>(pack, s, ChainPack::Extensional)/(segment.length*segment.length*h);
+        const Real noise = property<Real>(pack, s, ChainPack::Stiffness)*(2*segment.theta-1)+drag;
+        const Vec force = response*(settings.kT*noise/segment.length);
+        f[s] = f[s]+force;
+        f[s+1] = f[s+1]-force;
+    }
+    void addMetricForcesOfRing() {
+        // Blocks of the inverse: those of the first two nodes, and of the next nodes (s+1) and (s+2) with them.
+        Mat border[2][2];
+        border[1][1] = nodes[1].inverse;
+        border[0][1] = nodes[0].next*border[1][1]*(-1+Real{});
+        border[1][0] = border[0][1].transposed();
+        border[0][0] = nodes[0].inverse-nodes[0].next*border[1][0];
+        Mat same = border[0][0], other = border[0][1], sameAfter = border[1][1];
+        Mat next[2] = {border[0][0], border[0][1]}, second[2] = {border[1][0], border[1][1]};
+        for (int s = pack.segments-1; s > 1; s--) {
+            const ImplicitNode<Real>& node = nodes[s];
+            const Mat* coupling = toBorder[s].node;
+            Mat newOther = node.next*same+node.second*other.transposed();
+            Mat newSecond = node.next*other+node.second*sameAfter;
+            Mat newBorder[2];
+            for (int k = 0; k < 2; k++) {
+                newOther = newOther+coupling[k]*next[k].transposed();
+                newSecond = newSecond+coupling[k]*second[k].transposed();
+                newBorder[k] = (node.next*next[k]+node.second*second[k]+coupling[0]*border[0][k]+coupling[1]*border[1][k])*
+                        (-1+Real{});
+            }
+            newOther = newOther*(-1+Real{});
+            newSecond = newSecond*(-1+Real{});
+            Mat newSame = node.inverse-node.next*newOther.transposed()-node.second*newSecond.transposed();
+            for (int k = 0; k < 2; k++)
+                newSame = newSame-coupling[k]*newBorder[k].transposed();
+            newSame = (newSame+newSame.transposed())*(0.5+Real{});
+            addMetricForce(s, newSame, newOther, same);
+            sameAfter = same;
+            same = newSame;
+            other = newOther;
+            for (int k = 0; k < 2; k++) {
+                second[k] = next[k];
+                next[k] = newBorder[k];
+            }
+        }
+        addMetricForce(1, border[1][1], next[1].transposed(), same);
+        addMetricForce(0, border[0][0], border[0][1], border[1][1]);
+    }
     /** Whether any lane has not converged; those that have are taken out. NaN counts as not converged. */
     bool anyUnfinished(Real& active) {
         Real excess = Real{};
-        for (int s = 0; s < n-1; s++) {
+        for (int s = 0; s < pack.segments; s++) {
             const Vec difference = change[s+1]-change[s];
             const Real l0 = property<Real>(pack, s, ChainPack::RestLength)*NEWTON_TOLERANCE;
             const Real ratio = difference.dot(difference)/(l0*l0);
@@ -544,19 +776,19 @@ private:
         return any;
     }
     void findExcessiveChanges(const Vec* y, bool* failed) {
-        for (int s = 0; s < n-1; s++) {
+        for (int s = 0; s < pack.segments; s++) {
             const Vec difference = y[s+1]-y[s]-segments[s].difference;
             Real square = difference.dot(difference), limit = property<Real>(pack, s, ChainPack::RestLength);
             for (int i = 0; i < W; i++)
-                failed[i] |= s < pack.nodesOfLane[i]-1 && !(lane(square, i) < lane(limit, i)*lane(limit, i));
+                failed[i] |= s < pack.segmentsOfLane[i] && !(lane(square, i) < lane(limit, i)*lane(limit, i));
         }
     }
 };
 
 /** Advance the lanes that failed, from the start, by the same time in more and more parts. */
-template <int W> void divideStep(const ChainPack& pack, const Vector<typename Lanes<W>::Type>* x,
+template <int W, bool CLOSED> void divideStep(const ChainPack& pack, const Vector<typename Lanes<W>::Type>* x,
             const Vector<typename Lanes<W>::Type>* f, StepSettings settings, Vector<typename Lanes<W>::Type>* y,
-            const double* box, bool* failed, typename ImplicitStep<W>::Memory& memory, Scratch& scratch) {
+            const double* box, bool* failed, typename ImplicitStep<W, CLOSED>::Memory& memory, Scratch& scratch) {
     typedef typename Lanes<W>::Type Real;
     const double h = settings.stepSize;
     Vector<Real>* from = scratch.reserve<Vector<Real> >(2*pack.nodes);
@@ -572,7 +804,7 @@ template <int W> void divideStep(const ChainPack& pack, const Vector<typename La
             settings.part = parts+part;
             for (int node = 0; node < pack.nodes; node++)
                 from[node] = to[node];
-            ImplicitStep<W>(pack, settings, box, memory).take(from, f, to, failedPart);
+            ImplicitStep<W, CLOSED>(pack, settings, box, memory).take(from, f, to, failedPart);
             hope = false;
             for (int i = 0; i < W; i++) {
                 failedNow[i] |= failedPart[i];
@@ -596,24 +828,24 @@ template <int W> void divideStep(const ChainPack& pack, const Vector<typename La
     }
 }
 
-template <int W> Instability stepPackImplicitly(const ChainPack& pack, const double* positions, const double* forces,
+template <int W, bool CLOSED> Instability stepPackImplicitly(const ChainPack& pack, const double* positions, const double* forces,
             const double* box, const StepSettings& settings, double* displacements) {
     typedef typename Lanes<W>::Type Real;
-    static thread_local typename ImplicitStep<W>::Memory memory;
+    static thread_local typename ImplicitStep<W, CLOSED>::Memory memory;
     static thread_local Scratch vectors, scratch;
     const int n = pack.nodes;
     Vector<Real>* x = vectors.reserve<Vector<Real> >(3*n);
     Vector<Real>* f = x+n;
     Vector<Real>* y = f+n;
-    gatherPositions<W>(pack, positions, box, x);
-    gather<W>(pack, forces, f);
+    gatherStart<W>(pack, positions, box, x);
+    gatherForces<W>(pack, forces, f);
     bool failed[W];
-    ImplicitStep<W>(pack, settings, box, memory).take(x, f, y, failed);
+    ImplicitStep<W, CLOSED>(pack, settings, box, memory).take(x, f, y, failed);
     Instability result;
     for (int i = 0; i < W; i++)
         result.divided += failed[i];
     if (result.divided > 0)
-        divideStep<W>(pack, x, f, settings, y, box, failed, memory, scratch);
+        divideStep<W, CLOSED>(pack, x, f, settings, y, box, failed, memory, scratch);
     for (int node = 0; node < n; node++)
         y[node] = y[node]-x[node];
     scatter<W>(pack, y, 1, displacements);

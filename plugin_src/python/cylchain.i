@@ -103,9 +103,11 @@ static void raiseOpenMMException(const std::exception& e) {
 
 %typemap(argout) const Vec3& point {
 }
+%apply Vec3& point {Vec3& velocity, Vec3& gradientX, Vec3& gradientY, Vec3& gradientZ};
+%apply const Vec3& point {const Vec3& velocity, const Vec3& gradientX, const Vec3& gradientY, const Vec3& gradientZ};
 %apply double& OUTPUT {double& restLength, double& stretchingStiffness, double& maximumExtension,
         double& parallelFriction, double& perpendicularFriction, double& rotationalFriction,
-        double& extensionalFriction, double& stiffness, double& stretching, double& bending};
+        double& extensionalFriction, double& stiffness, double& stretching, double& bending, double& propulsion};
 
 %pythoncode %{
 import openmm
@@ -113,7 +115,9 @@ from openmm import unit
 
 _LENGTH = unit.nanometer
 _ENERGY = unit.kilojoule_per_mole
+_FORCE = unit.kilojoule_per_mole/unit.nanometer
 _STIFFNESS = unit.kilojoule_per_mole/unit.nanometer**2
+_VELOCITY = unit.nanometer/unit.picosecond
 _FRICTION = unit.kilojoule_per_mole*unit.picosecond/unit.nanometer**2
 _ROTATIONAL_FRICTION = unit.kilojoule_per_mole*unit.picosecond
 _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONAL_FRICTION, _ROTATIONAL_FRICTION)
@@ -122,6 +126,9 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %pythonappend OpenMM::CylinderChainForce::getSegmentParameters(int, int, double&, double&, double&, double&, double&,
         double&, double&) const %{
     val = [unit.Quantity(v, u) for v, u in zip(val, _SEGMENT_UNITS)]
+%}
+%pythonappend OpenMM::CylinderChainForce::getSegmentPropulsion(int, int, double&) const %{
+    val = unit.Quantity(val, _FORCE)
 %}
 %pythonappend OpenMM::CylinderChainForce::getJointParameters(int, int, double&) const %{
     val = unit.Quantity(val, _ENERGY)
@@ -141,6 +148,9 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %}
 %pythonappend OpenMM::CylinderChainIntegrator::getFriction() const %{
     val = unit.Quantity(val, 1/unit.picosecond)
+%}
+%pythonappend OpenMM::CylinderChainIntegrator::getFlow(Vec3&, Vec3&, Vec3&, Vec3&) const %{
+    val = [unit.Quantity(val[0], _VELOCITY)] + [unit.Quantity(v, 1/unit.picosecond) for v in val[1:]]
 %}
 %pythonappend OpenMM::CylinderChainIntegrator::getParticleFrictions() const %{
     val = {particle: unit.Quantity(friction, _FRICTION) for particle, friction in val.items()}

@@ -9,7 +9,10 @@ static void testForces() {
     for (int bending = 0; bending < 3; bending++)
         for (int stretching = 0; stretching < 2; stretching++) {
             Array x;
-            ChainEngine engine(makeChains(SEGMENTS, (BendingModel) bending, (StretchingModel) stretching, x));
+            vector<Chain> chains = makeChains(SEGMENTS, (BendingModel) bending, (StretchingModel) stretching, x);
+            for (const Chain& ring : makeRings(RINGS, (BendingModel) bending, (StretchingModel) stretching, false, x))
+                chains.push_back(ring);
+            ChainEngine engine(chains);
             const Array forces = forcesOf(engine, x);
             const double width = 1e-5;
             for (size_t i = 0; i < x.size(); i++) {
@@ -40,36 +43,81 @@ static void testStraightAndFoldedChains() {
         }
 }
 
-static void testStepsWithoutNoise() {
-    Array x;
-    const vector<Chain> chains = makeChains(SEGMENTS, BendingModel::InscribedCircle, StretchingModel::Harmonic, x);
-    ChainEngine engine(chains);
-    Array f = forcesOf(engine, x);
-    for (size_t i = 0; i < f.size(); i++)
-        f[i] += sin(i);
-    const double h = 0.01;
-    Array held = f;
-    for (const Chain& chain : chains)
-        for (size_t node = 0; node < chain.nodes.size(); node++)
-            for (int k = 0; k < 3; k++)
-                if (chain.fixed[node])
-                    held[3*chain.nodes[node]+k] = 0;
-    const Array velocity = denseSolution(denseResistance(chains, x), held);
-    Array halfway = x;
-    for (size_t i = 0; i < x.size(); i++)
-        halfway[i] += 0.5*h*velocity[i];
-    const Array later = denseSolution(denseResistance(chains, halfway), held);
-    const Array euler = stepOf(engine, x, f, {Scheme::Euler, 0, h, 1, 1});
-    const Array midpoint = stepOf(engine, x, f, {Scheme::Midpoint, 0, h, 1, 1});
-    for (size_t i = 0; i < x.size(); i++) {
-        checkClose(h*velocity[i], euler[i], h, 1e-11, "Euler step");
-        checkClose(h*later[i], midpoint[i], h, 1e-11, "midpoint step");
+/** Velocities of all nodes from dense matrices. */
+static Array denseVelocity(const vector<Chain>& chains, const Array& x, Array f, bool flows) {
+    f = withoutHeld(chains, f);
+    if (flows) {
+        const Array drag = denseDrag(chains, x);
+        for (size_t i = 0; i < x.size(); i++)
+            f[i] += drag[i];
     }
+    return denseSolution(denseResistance(chains, x), f);
+}
+
+static void testStepsWithoutNoise() {
+    for (bool flows : {false, true}) {
+        Array x;
+        const vector<Chain> chains = makeAll(BendingModel::InscribedCircle, StretchingModel::Harmonic, x);
+        ChainEngine engine(chains);
+        Array f = forcesOf(engine, x);
+        for (size_t i = 0; i < f.size(); i++)
+            f[i] += sin(i);
+        const double h = 0.005;
+        const BackgroundFlow flow = flows ? FLOW : BackgroundFlow {};
+        const Array velocity = denseVelocity(chains, x, f, flows);
+        Array halfway = x;
+        for (size_t i = 0; i < x.size(); i++)
+            halfway[i] += 0.5*h*velocity[i];
+        const Array later = denseVelocity(chains, halfway, f, flows);
+        const Array euler = stepOf(engine, x, f, {Scheme::Euler, 0, h, 1, 1, 0, flow});
+        const Array midpoint = stepOf(engine, x, f, {Scheme::Midpoint, 0, h, 1, 1, 0, flow});
+        const double scale = flows ? 1000 : 1;
+        for (size_t i = 0; i < x.size(); i++) {
+            checkClose(h*velocity[i], euler[i], h*scale, 1e-11, "Euler step");
+            checkClose(h*later[i], midpoint[i], h*scale, 1e-11, "midpoint step");
+        }
+    }
+}
+
+static void testPropulsion() {
+    Array x;
+    vector<Chain> chains = makeAll(BendingModel::InscribedCircle, StretchingModel::Harmonic, x);
+    const Array passive = forcesOf(ChainEngine(chains), x);
+    Array expected = passive;
+    for (size_t c = 0; c < chains.size(); c += 2)
+        for (size_t s = 0; s < chains[c].segments.size(); s++) {
+            const int first = chains[c].nodes[s], second = chains[c].nodes[(s+1)%chains[c].nodes.size()];
+            const double propulsion = chains[c].segments[s].propulsion = (s%3)-1.3;
+            double square = 0;
+            for (int k = 0; k < 3; k++)
+                square += (x[3*second+k]-x[3*first+k])*(x[3*second+k]-x[3*first+k]);
+            for (int k = 0; k < 3; k++)
+                for (int end : {first, second})
+                    expected[3*end+k] += 0.5*propulsion*(x[3*second+k]-x[3*first+k])/sqrt(square);
+        }
+    const Array found = forcesOf(ChainEngine(chains), x);
+    for (size_t i = 0; i < x.size(); i++)
+        checkClose(expected[i], found[i], 100, 1e-13, "propulsion");
+}
+
+static void testPlanarChainsKeepTheirHeight() {
+    Array x;
+    vector<Chain> chains = makeRings(RINGS, BendingModel::InscribedCircle, StretchingModel::Harmonic, true, x);
+    for (Chain& chain : chains)
+        chain.tethers.push_back({2, {x[3*chain.nodes[2]], x[3*chain.nodes[2]+1], 50}, 3});
+    ChainEngine engine(chains);
+    const Array f(x.size(), 7);
+    for (Scheme scheme : {Scheme::Euler, Scheme::Midpoint, Scheme::Implicit})
+        for (uint64_t step = 0; step < 20; step++) {
+            const Array change = stepOf(engine, x, f, {scheme, 2.5, 1e-3, 5, step, 0, FLOW});
+            for (size_t i = 2; i < x.size(); i += 3)
+                check(change[i] == 0, "height in a plane");
+        }
 }
 
 static void testPeriodicImages() {
     Array x;
-    ChainEngine engine(makeChains(SEGMENTS, BendingModel::InscribedCircle, StretchingModel::Harmonic, x));
+    ChainEngine engine(makeAll(BendingModel::InscribedCircle, StretchingModel::Harmonic, x));
     const Array wrapped = acrossBox(x);
     const Array f = forcesOf(engine, x), g = forcesOf(engine, wrapped, BOX);
     const Array a = stepOf(engine, x, f, {Scheme::Midpoint, 1, 0.001, 1, 1});
@@ -82,7 +130,8 @@ static void testPeriodicImages() {
 
 static void testCovarianceOfNoise() {
     Array x;
-    const vector<Chain> chains = makeChains({3, 2}, BendingModel::KratkyPorod, StretchingModel::Harmonic, x);
+    vector<Chain> chains = makeChains({3, 2}, BendingModel::KratkyPorod, StretchingModel::Harmonic, x);
+    chains.push_back(makeRings({5}, BendingModel::KratkyPorod, StretchingModel::Harmonic, false, x)[0]);
     ChainEngine engine(chains);
     const int n = x.size(), draws = 40000;
     const double kT = 2.5, h = 1e-6;
@@ -167,6 +216,8 @@ int main() {
         testForces,
         testStraightAndFoldedChains,
         testStepsWithoutNoise,
+        testPropulsion,
+        testPlanarChainsKeepTheirHeight,
         testPeriodicImages,
         testCovarianceOfNoise,
         testChainsDoNotDependOnTheirPack,

@@ -65,6 +65,54 @@ inline vector<Chain> makeChains(const vector<int>& segments, BendingModel bendin
     return chains;
 }
 
+/** Rings that are neither regular nor flat, unless they are planar; node positions are appended to x. */
+inline vector<Chain> makeRings(const vector<int>& segments, BendingModel bending, StretchingModel stretching, bool planar,
+            Array& x) {
+    GaussianStream stream(2, 3, 4);
+    vector<Chain> rings;
+    for (int count : segments) {
+        Chain ring;
+        ring.bending = bending;
+        ring.stretching = stretching;
+        ring.closed = true;
+        ring.planar = planar;
+        for (int s = 0; s < count; s++) {
+            Array g(8);
+            stream.fill(g.data(), 8);
+            ring.nodes.push_back(x.size()/3);
+            ring.fixed.push_back((s == 1 && count == 6) || (s == 0 && count == 7));
+            ring.segments.push_back({10+0.3*g[0], 30+g[1], 6, 5+0.2*g[2], 8+0.2*g[3], 70+g[4], 200+g[0]});
+            ring.joints.push_back(20+g[1]);
+            const double angle = 2*M_PI*s/count, radius = 5/sin(M_PI/count)+0.4*g[5];
+            x.insert(x.end(), {100.0*rings.size()+radius*cos(angle), -200+radius*sin(angle), planar ? 3 : 0.7*g[6]});
+        }
+        rings.push_back(ring);
+    }
+    return rings;
+}
+
+const vector<int> RINGS = {6, 4, 6, 5, 6, 7, 4, 4, 6, 12};
+
+/** Open chains and rings together. */
+inline vector<Chain> makeAll(BendingModel bending, StretchingModel stretching, Array& x) {
+    vector<Chain> chains = makeChains({5, 5, 4, 1, 2, 9, 5, 5}, bending, stretching, x);
+    for (const Chain& ring : makeRings(RINGS, bending, stretching, false, x))
+        chains.push_back(ring);
+    for (const Chain& ring : makeRings({6, 5, 6}, bending, stretching, true, x))
+        chains.push_back(ring);
+    return chains;
+}
+
+/** Set what does not act on chains in a plane, and on fixed nodes, to zero. */
+inline Array withoutHeld(const vector<Chain>& chains, Array f) {
+    for (const Chain& chain : chains)
+        for (size_t node = 0; node < chain.nodes.size(); node++)
+            for (int k = 0; k < 3; k++)
+                if (chain.fixed[node] || (chain.planar && k == 2))
+                    f[3*chain.nodes[node]+k] = 0;
+    return f;
+}
+
 inline double energyOf(const ChainEngine& engine, const Array& x) {
     Array forces(x.size());
     double energy = 0;
@@ -90,16 +138,19 @@ inline Array stepOf(const ChainEngine& engine, const Array& x, const Array& f, c
     return displacements;
 }
 
-/** The resistance of all chains as a dense matrix, with the rows and columns of fixed nodes those of the identity. */
-inline vector<Array> denseResistance(const vector<Chain>& chains, const Array& x) {
+/**
+ * The resistance of all chains as a dense matrix, with the rows and columns of fixed nodes those of the identity, or with
+ * the resistance of fixed nodes as well.
+ */
+inline vector<Array> denseResistance(const vector<Chain>& chains, const Array& x, bool ofFixedNodes = false) {
     vector<Array> z(x.size(), Array(x.size()));
     vector<bool> fixed(x.size()/3);
     for (const Chain& chain : chains) {
         for (size_t node = 0; node < chain.nodes.size(); node++)
-            fixed[chain.nodes[node]] = chain.fixed[node];
+            fixed[chain.nodes[node]] = chain.fixed[node] && !ofFixedNodes;
         for (size_t s = 0; s < chain.segments.size(); s++) {
             const Segment& segment = chain.segments[s];
-            const int ends[] = {chain.nodes[s], chain.nodes[s+1]};
+            const int ends[] = {chain.nodes[s], chain.nodes[(s+1)%chain.nodes.size()]};
             double t[3], square = 0;
             for (int k = 0; k < 3; k++) {
                 t[k] = x[3*ends[1]+k]-x[3*ends[0]+k];
@@ -121,6 +172,25 @@ inline vector<Array> denseResistance(const vector<Chain>& chains, const Array& x
             if (fixed[i/3] || fixed[j/3])
                 z[i][j] = (i == j);
     return z;
+}
+
+const BackgroundFlow FLOW = {true, {20, -30, 10}, {0.2, 1, -0.6, 0.8, -0.4, 1.2, 0.4, -1, 0.2}};
+
+/** The drag of the flow on nodes at rest, Z u. */
+inline Array denseDrag(const vector<Chain>& chains, const Array& x) {
+    Array u(x.size()), drag(x.size());
+    for (const Chain& chain : chains)
+        for (int node : chain.nodes)
+            for (int i = 0; i < (chain.planar ? 2 : 3); i++) {
+                u[3*node+i] = FLOW.velocity[i];
+                for (int k = 0; k < 3; k++)
+                    u[3*node+i] += FLOW.gradient[3*i+k]*x[3*node+k];
+            }
+    const vector<Array> z = denseResistance(chains, x, true);
+    for (size_t i = 0; i < x.size(); i++)
+        for (size_t j = 0; j < x.size(); j++)
+            drag[i] += z[i][j]*u[j];
+    return withoutHeld(chains, drag);
 }
 
 inline Array denseSolution(vector<Array> a, Array b) {

@@ -5,6 +5,21 @@
 
 #include "TestChains.h"
 
+/** The positions of nodes, one after the other, that begin with a node of a chain. */
+static Array nodesFrom(const Chain& chain, int first, int count, const Array& x) {
+    Array result;
+    for (int i = first; i < first+count; i++) {
+        const double* node = &x[3*chain.nodes[i%chain.nodes.size()]];
+        result.insert(result.end(), node, node+3);
+    }
+    return result;
+}
+
+/** The index of a component of a node of a chain that is so many components behind another node. */
+static int componentFrom(const Chain& chain, int first, int component) {
+    return 3*chain.nodes[(first+component/3)%chain.nodes.size()]+component%3;
+}
+
 /** A bend b = f (t2-t1), with the energy (stiffness/2) b^2. */
 static Array bendOf(BendingModel model, const double* x) {
     double t1[3], t2[3], square1 = 0, square2 = 0, chordSquare = 0;
@@ -43,7 +58,7 @@ static double stretchOf(StretchingModel model, const Segment& segment, double le
 }
 
 /** The residual of the scheme's equations for new nodes y. */
-static Array residualOf(const vector<Chain>& chains, const Array& x, const Array& y, const Array& f, double h) {
+static Array residualOf(const vector<Chain>& chains, const Array& x, const Array& y, const Array& f, double h, bool flows) {
     Array middle(x.size()), residual = f;
     for (size_t i = 0; i < x.size(); i++)
         middle[i] = 0.5*(x[i]+y[i]);
@@ -55,46 +70,61 @@ static Array residualOf(const vector<Chain>& chains, const Array& x, const Array
     for (size_t i = 0; i < x.size(); i++)
         for (size_t j = 0; j < x.size(); j++)
             residual[i] -= z[i][j]*(y[j]-x[j])/h;
+    if (flows) {
+        const Array drag = denseDrag(chains, middle);
+        for (size_t i = 0; i < x.size(); i++)
+            residual[i] += drag[i];
+        // What flow does to lengths is part of the tension, with the lengths before and after.
+        const Array withoutDrag = denseDrag(withoutExtensional, middle);
+        for (size_t i = 0; i < x.size(); i++)
+            residual[i] += withoutDrag[i]-drag[i];
+    }
     const double width = 1e-6;
     for (const Chain& chain : chains) {
         for (size_t s = 0; s < chain.segments.size(); s++) {
             const Segment& segment = chain.segments[s];
-            const int first = 3*chain.nodes[s];
-            const double before = lengthOf(&x[first]), after = lengthOf(&y[first]);
+            const Array between2 = nodesFrom(chain, s, 2, middle);
+            const double before = lengthOf(nodesFrom(chain, s, 2, x).data()), after = lengthOf(nodesFrom(chain, s, 2, y).data());
+            const double length = lengthOf(between2.data());
+            double stretched = 0;
+            for (int i = 0; i < 3 && flows; i++)
+                for (int k = 0; k < 3; k++)
+                    stretched += (between2[3+i]-between2[i])/length*FLOW.gradient[3*i+k]*(between2[3+k]-between2[k]);
             const double theta = fmax(0.5, 1-segment.extensional/(h*segment.stiffness*segment.restLength*segment.restLength));
             const double between = 0.5*(before+after);
             const double slope = (stretchOf(chain.stretching, segment, between+width)-
                     stretchOf(chain.stretching, segment, between-width))/(2*width);
             const double tension = segment.stiffness*slope*(theta*stretchOf(chain.stretching, segment, after)+
                     (1-theta)*stretchOf(chain.stretching, segment, before))+
-                    segment.extensional/(before*after)*(after-before)/h;
-            const double length = lengthOf(&middle[first]);
+                    segment.extensional/(before*after)*((after-before)/h-stretched);
             for (int k = 0; k < 3; k++) {
-                const double pull = tension*(middle[first+3+k]-middle[first+k])/length;
-                residual[first+k] += pull;
-                residual[first+3+k] -= pull;
+                const double pull = tension*(between2[3+k]-between2[k])/length;
+                residual[componentFrom(chain, s, k)] += pull;
+                residual[componentFrom(chain, s, 3+k)] -= pull;
             }
         }
         for (size_t j = 0; j < chain.joints.size(); j++) {
-            const int first = 3*chain.nodes[j];
-            const double friction = fmin(chain.segments[j].rotational, chain.segments[j+1].rotational);
+            const int count = chain.segments.size(), first = chain.closed ? (j+count-1)%count : j;
+            const double friction = fmin(chain.segments[first].rotational, chain.segments[(first+1)%count].rotational);
             const double theta = fmax(0.5, 1-friction/(4*h*chain.joints[j]));
-            const Array before = bendOf(chain.bending, &x[first]), after = bendOf(chain.bending, &y[first]);
+            const Array before = bendOf(chain.bending, nodesFrom(chain, first, 3, x).data());
+            const Array after = bendOf(chain.bending, nodesFrom(chain, first, 3, y).data());
             for (int i = 0; i < 9; i++) {
-                Array moved(middle.begin()+first, middle.begin()+first+9);
+                Array moved = nodesFrom(chain, first, 3, middle);
                 moved[i] += width;
                 const Array above = bendOf(chain.bending, moved.data());
                 moved[i] -= 2*width;
                 const Array below = bendOf(chain.bending, moved.data());
                 for (int k = 0; k < 3; k++)
-                    residual[first+i] -= chain.joints[j]*(theta*after[k]+(1-theta)*before[k])*(above[k]-below[k])/(2*width);
+                    residual[componentFrom(chain, first, i)] -= chain.joints[j]*(theta*after[k]+(1-theta)*before[k])*(above[k]-below[k])/(2*width);
             }
         }
         for (const Tether& tether : chain.tethers) {
             double friction = 0;
+            const int count = chain.segments.size();
             for (int s = tether.node-1; s <= tether.node; s++)
-                if (s >= 0 && s < (int) chain.segments.size()) {
-                    const Segment& segment = chain.segments[s];
+                if (chain.closed || (s >= 0 && s < count)) {
+                    const Segment& segment = chain.segments[(s+count)%count];
                     friction += 0.25*segment.parallel+segment.extensional/(segment.restLength*segment.restLength);
                 }
             const double theta = fmax(0.5, 1-friction/(h*tether.stiffness));
@@ -113,15 +143,15 @@ static Array residualOf(const vector<Chain>& chains, const Array& x, const Array
 }
 
 /** Solve the equations by Newton's method with differences for derivatives, beginning near the solution. */
-static Array solutionNear(const vector<Chain>& chains, const Array& x, Array y, const Array& f, double h) {
+static Array solutionNear(const vector<Chain>& chains, const Array& x, Array y, const Array& f, double h, bool flows) {
     const int n = x.size();
     for (int iteration = 0; iteration < 6; iteration++) {
-        const Array residual = residualOf(chains, x, y, f, h);
+        const Array residual = residualOf(chains, x, y, f, h, flows);
         vector<Array> jacobian(n, Array(n));
         for (int j = 0; j < n; j++) {
             Array moved = y;
             moved[j] += 1e-6;
-            const Array changed = residualOf(chains, x, moved, f, h);
+            const Array changed = residualOf(chains, x, moved, f, h, flows);
             for (int i = 0; i < n; i++)
                 jacobian[i][j] = (residual[i]-changed[i])/1e-6;
         }
@@ -142,31 +172,43 @@ static vector<Chain> tethered(vector<Chain> chains, const Array& x) {
     return chains;
 }
 
+static void checkSteps(const vector<Chain>& chains, const Array& x, bool flows, const Array& steps) {
+    ChainEngine engine(chains);
+    Array f(x.size());
+    for (size_t i = 0; i < f.size(); i++)
+        f[i] = sin(i);
+    for (double h : steps) {
+        const BackgroundFlow flow = flows ? FLOW : BackgroundFlow {};
+        const Array change = stepOf(engine, x, f, {Scheme::Implicit, 0, h, 1, 1, 0, flow});
+        Array y = x;
+        for (size_t i = 0; i < x.size(); i++)
+            y[i] += change[i];
+        const Array solution = solutionNear(chains, x, y, f, h, flows);
+        const Array residual = residualOf(chains, x, solution, f, h, flows);
+        for (size_t i = 0; i < x.size(); i++) {
+            checkClose(0, residual[i], 1, 1e-4, "residual of the dense solution");
+            checkClose(solution[i], y[i], 10, 3e-3, "implicit step");
+        }
+    }
+}
+
 static void testStepsWithoutNoise() {
     for (int bending = 0; bending < 3; bending++)
         for (int stretching = 0; stretching < 2; stretching++)
-            for (bool tethers : {false, true}) {
-                Array x;
-                vector<Chain> chains = makeChains({3, 5, 1}, (BendingModel) bending, (StretchingModel) stretching, x);
-                if (tethers)
-                    chains = tethered(chains, x);
-                ChainEngine engine(chains);
-                Array f(x.size());
-                for (size_t i = 0; i < f.size(); i++)
-                    f[i] = sin(i);
-                for (double h : {0.001, 0.03, 1.0}) {
-                    const Array change = stepOf(engine, x, f, {Scheme::Implicit, 0, h, 1, 1});
-                    Array y = x;
-                    for (size_t i = 0; i < x.size(); i++)
-                        y[i] += change[i];
-                    const Array solution = solutionNear(chains, x, y, f, h);
-                    const Array residual = residualOf(chains, x, solution, f, h);
-                    for (size_t i = 0; i < x.size(); i++) {
-                        checkClose(0, residual[i], 1, 1e-4, "residual of the dense solution");
-                        checkClose(solution[i], y[i], 10, 3e-3, "implicit step");
-                    }
+            for (bool tethers : {false, true})
+                for (bool flows : {false, true}) {
+                    const Array shortSteps = {0.001, 0.005}, steps = flows ? shortSteps : Array {0.001, 0.03, 1.0};
+                    auto check = [&] (const vector<Chain>& chains, const Array& x, const Array& steps) {
+                        checkSteps(tethers ? tethered(chains, x) : chains, x, flows, steps);
+                    };
+                    Array x, y, z;
+                    const BendingModel b = (BendingModel) bending;
+                    const StretchingModel s = (StretchingModel) stretching;
+                    check(makeChains({3, 5, 1}, b, s, x), x, steps);
+                    check(makeRings({6, 7, 9}, b, s, false, y), y, steps);
+                    // The joints of a square are bent so much that long steps are divided.
+                    check(makeRings({4}, b, s, false, z), z, shortSteps);
                 }
-            }
 }
 
 static void testConvergenceToExplicitSteps() {
@@ -190,22 +232,28 @@ static void testConvergenceToExplicitSteps() {
 }
 
 static void testChainsDoNotDependOnTheirPack() {
-    Array x;
-    const vector<Chain> chains = tethered(makeChains(SEGMENTS, BendingModel::InscribedCircle, StretchingModel::FENE, x), x);
-    ChainEngine together(chains), alone({chains[0]});
-    // Some of its neighbours are taut.
-    Array f(x.size(), 0.5);
-    for (int chain : {1, 7}) {
-        f[3*chains[chain].nodes.front()] -= 600;
-        f[3*chains[chain].nodes.back()] += 600;
-    }
-    for (uint64_t step = 0; step < 500; step++) {
-        const StepSettings settings = {Scheme::Implicit, 2.5, 0.05, 11, step};
-        const Array a = stepOf(together, x, f, settings);
-        Array b(x.size());
-        alone.step(0, x.data(), f.data(), NULL, settings, b.data());
-        for (int i = 0; i < 3*6; i++)
-            checkClose(a[i], b[i], 1, 1e-9, "chain alone");
+    for (bool rings : {false, true}) {
+        Array x;
+        const BendingModel bending = BendingModel::InscribedCircle;
+        const StretchingModel stretching = StretchingModel::FENE;
+        const vector<Chain> chains = tethered(rings ? makeRings(RINGS, bending, stretching, false, x) :
+                makeChains(SEGMENTS, bending, stretching, x), x);
+        ChainEngine together(chains), alone({chains[0]});
+        // Some of its neighbours are taut.
+        Array f(x.size(), 0.5);
+        for (int chain : {2, 7}) {
+            const vector<int>& nodes = chains[chain].nodes;
+            f[3*nodes.front()] -= 600;
+            f[3*nodes[rings ? nodes.size()/2 : nodes.size()-1]] += 600;
+        }
+        for (uint64_t step = 0; step < 500; step++) {
+            const StepSettings settings = {Scheme::Implicit, 2.5, 0.05, 11, step};
+            const Array a = stepOf(together, x, f, settings);
+            Array b(x.size());
+            alone.step(0, x.data(), f.data(), NULL, settings, b.data());
+            for (int i = 0; i < 3*6; i++)
+                checkClose(a[i], b[i], 1, 1e-9, "chain alone");
+        }
     }
 }
 
@@ -221,18 +269,24 @@ static void testPeriodicImages() {
         checkClose(a[i], b[i], 1, 1e-8, "step across the box");
 }
 
-static void testLongChainsOfShortSegments() {
+static void testLongChainsOfShortSegments(bool closed) {
     // Joints that are stiff and a step that is long: the matrix is as ill-conditioned as it gets.
     Chain chain;
     Array x;
     const int count = 300;
-    for (int node = 0; node <= count; node++) {
+    const double radius = 0.5/sin(M_PI/count);
+    for (int node = 0; node < count+(closed ? 0 : 1); node++) {
+        const double angle = 2*M_PI*node/count;
         chain.nodes.push_back(node);
         chain.fixed.push_back(false);
-        x.insert(x.end(), {(double) node, 0, 0});
+        if (closed)
+            x.insert(x.end(), {radius*cos(angle), radius*sin(angle), 0});
+        else
+            x.insert(x.end(), {(double) node, 0, 0});
     }
+    chain.closed = closed;
     chain.segments.assign(count, {1, 1e4, 0, 1, 1.5, 0.1, 0.08});
-    chain.joints.assign(count-1, 5e3);
+    chain.joints.assign(closed ? count : count-1, 5e3);
     chain.bending = BendingModel::InscribedCircle;
     chain.stretching = StretchingModel::Harmonic;
     ChainEngine engine({chain});
@@ -250,7 +304,14 @@ static void testLongChainsOfShortSegments() {
         if (step >= first)
             energy += (now.stretching+now.bending)/(0.5*count+count-1)/(steps-first);
     }
-    checkClose(1, energy, 1, 0.03, "energy of a long chain");
+    // A ring is bent on average, and cannot bend and stretch in the six ways that would open it.
+    const double excess = closed ? 0.5*5e3*count*pow(2*tan(M_PI/count), 2)-0.5*6 : 0;
+    checkClose(1, energy-excess/(0.5*count+count-1), 1, 0.03, "energy of a long chain");
+}
+
+static void testLongChainsOfShortSegments() {
+    testLongChainsOfShortSegments(false);
+    testLongChainsOfShortSegments(true);
 }
 
 static void testDivision() {

@@ -10,9 +10,11 @@ static void copyParameters(const CylinderChainForce& force, int index, cylchain:
         cylchain::Segment& segment = chain.segments[i];
         force.getSegmentParameters(index, i, segment.restLength, segment.stiffness, segment.maximumExtension,
                 segment.parallel, segment.perpendicular, segment.rotational, segment.extensional);
+        force.getSegmentPropulsion(index, i, segment.propulsion);
     }
     for (size_t i = 0; i < chain.joints.size(); i++)
         force.getJointParameters(index, i, chain.joints[i]);
+    chain.planar = force.isChainPlanar(index);
 }
 
 static cylchain::Chain describeTopology(const CylinderChainForce& force, int index) {
@@ -22,6 +24,7 @@ static cylchain::Chain describeTopology(const CylinderChainForce& force, int ind
     chain.bending = (cylchain::BendingModel) bending;
     chain.stretching = (cylchain::StretchingModel) stretching;
     chain.nodes = force.getChainParticles(index);
+    chain.closed = force.isChainClosed(index);
     chain.segments.resize(force.getNumSegments(index));
     chain.joints.resize(force.getNumJoints(index));
     return chain;

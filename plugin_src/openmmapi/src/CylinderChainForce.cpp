@@ -30,9 +30,12 @@ CylinderChainForce::CylinderChainForce() : usePeriodic(false) {
 
 int CylinderChainForce::addChain(const vector<int>& particles, BendingModel bendingModel, StretchingModel stretchingModel,
         double restLength, double stretchingStiffness, double maximumExtension, double jointStiffness,
-        double parallelFriction, double perpendicularFriction, double rotationalFriction, double extensionalFriction) {
+        double parallelFriction, double perpendicularFriction, double rotationalFriction, double extensionalFriction,
+        bool closed) {
     if (particles.size() < 2)
         throw OpenMMException("CylinderChainForce: A chain must have at least two particles");
+    if (closed && particles.size() < 4)
+        throw OpenMMException("CylinderChainForce: A closed chain must have at least four particles");
     set<int> distinct;
     for (int particle : particles) {
         if (particle < 0)
@@ -49,8 +52,10 @@ int CylinderChainForce::addChain(const vector<int>& particles, BendingModel bend
     chain.particles = particles;
     chain.bendingModel = bendingModel;
     chain.stretchingModel = stretchingModel;
-    chain.segments.resize(particles.size()-1);
-    chain.joints.assign(particles.size()-2, jointStiffness);
+    chain.closed = closed;
+    chain.planar = false;
+    chain.segments.resize(closed ? particles.size() : particles.size()-1);
+    chain.joints.assign(closed ? particles.size() : particles.size()-2, jointStiffness);
     chains.push_back(chain);
     const int index = chains.size()-1;
     try {
@@ -82,6 +87,18 @@ const vector<int>& CylinderChainForce::getChainParticles(int chain) const {
 void CylinderChainForce::getChainModels(int chain, int& bendingModel, int& stretchingModel) const {
     bendingModel = getChain(chain).bendingModel;
     stretchingModel = getChain(chain).stretchingModel;
+}
+
+bool CylinderChainForce::isChainClosed(int chain) const {
+    return getChain(chain).closed;
+}
+
+bool CylinderChainForce::isChainPlanar(int chain) const {
+    return getChain(chain).planar;
+}
+
+void CylinderChainForce::setChainPlanar(int chain, bool planar) {
+    getChain(chain).planar = planar;
 }
 
 int CylinderChainForce::getNumSegments(int chain) const {
@@ -121,7 +138,21 @@ void CylinderChainForce::setSegmentParameters(int chain, int segment, double res
     checkPositive(rotationalFriction, "The rotational friction");
     checkPositive(extensionalFriction, "The extensional friction");
     segments[segment] = {restLength, stretchingStiffness, maximumExtension, parallelFriction, perpendicularFriction,
-            rotationalFriction, extensionalFriction};
+            rotationalFriction, extensionalFriction, segments[segment].propulsion};
+}
+
+void CylinderChainForce::getSegmentPropulsion(int chain, int segment, double& propulsion) const {
+    const vector<SegmentInfo>& segments = getChain(chain).segments;
+    ASSERT_VALID_INDEX(segment, segments);
+    propulsion = segments[segment].propulsion;
+}
+
+void CylinderChainForce::setSegmentPropulsion(int chain, int segment, double propulsion) {
+    vector<SegmentInfo>& segments = getChain(chain).segments;
+    ASSERT_VALID_INDEX(segment, segments);
+    if (!isfinite(propulsion))
+        throw OpenMMException("CylinderChainForce: The propulsion of a segment must be finite");
+    segments[segment].propulsion = propulsion;
 }
 
 void CylinderChainForce::getJointParameters(int chain, int joint, double& stiffness) const {

@@ -119,6 +119,25 @@ void CylinderChainIntegrator::setScheme(Scheme scheme) {
     this->scheme = scheme;
 }
 
+void CylinderChainIntegrator::getFlow(Vec3& velocity, Vec3& gradientX, Vec3& gradientY, Vec3& gradientZ) const {
+    velocity = flowVelocity;
+    gradientX = flowGradient[0];
+    gradientY = flowGradient[1];
+    gradientZ = flowGradient[2];
+}
+
+void CylinderChainIntegrator::setFlow(const Vec3& velocity, const Vec3& gradientX, const Vec3& gradientY,
+        const Vec3& gradientZ) {
+    for (const Vec3& vector : {velocity, gradientX, gradientY, gradientZ})
+        for (int i = 0; i < 3; i++)
+            if (!isfinite(vector[i]))
+                throw OpenMMException("CylinderChainIntegrator: The flow must be finite");
+    flowVelocity = velocity;
+    flowGradient[0] = gradientX;
+    flowGradient[1] = gradientY;
+    flowGradient[2] = gradientZ;
+}
+
 void CylinderChainIntegrator::cleanup() {
     kernel = Kernel();
 }

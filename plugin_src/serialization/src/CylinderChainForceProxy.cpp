@@ -11,7 +11,7 @@ CylinderChainForceProxy::CylinderChainForceProxy() : SerializationProxy("Cylinde
 }
 
 void CylinderChainForceProxy::serialize(const void* object, SerializationNode& node) const {
-    node.setIntProperty("version", 2);
+    node.setIntProperty("version", 3);
     const CylinderChainForce& force = *reinterpret_cast<const CylinderChainForce*>(object);
     node.setIntProperty("forceGroup", force.getForceGroup());
     node.setStringProperty("name", force.getName());
@@ -21,19 +21,22 @@ void CylinderChainForceProxy::serialize(const void* object, SerializationNode& n
         int bendingModel, stretchingModel;
         force.getChainModels(i, bendingModel, stretchingModel);
         SerializationNode& chain = chains.createChildNode("Chain");
-        chain.setIntProperty("bendingModel", bendingModel).setIntProperty("stretchingModel", stretchingModel);
+        chain.setIntProperty("bendingModel", bendingModel).setIntProperty("stretchingModel", stretchingModel)
+                .setBoolProperty("closed", force.isChainClosed(i)).setBoolProperty("planar", force.isChainPlanar(i));
         SerializationNode& particles = chain.createChildNode("Particles");
         for (int particle : force.getChainParticles(i))
             particles.createChildNode("Particle").setIntProperty("index", particle);
         SerializationNode& segments = chain.createChildNode("Segments");
         for (int j = 0; j < force.getNumSegments(i); j++) {
-            double restLength, stiffness, maximumExtension, parallel, perpendicular, rotational, extensional;
+            double restLength, stiffness, maximumExtension, parallel, perpendicular, rotational, extensional, propulsion;
             force.getSegmentParameters(i, j, restLength, stiffness, maximumExtension, parallel, perpendicular, rotational,
                     extensional);
+            force.getSegmentPropulsion(i, j, propulsion);
             segments.createChildNode("Segment").setDoubleProperty("restLength", restLength)
                     .setDoubleProperty("stiffness", stiffness).setDoubleProperty("maximumExtension", maximumExtension)
                     .setDoubleProperty("parallel", parallel).setDoubleProperty("perpendicular", perpendicular)
-                    .setDoubleProperty("rotational", rotational).setDoubleProperty("extensional", extensional);
+                    .setDoubleProperty("rotational", rotational).setDoubleProperty("extensional", extensional)
+                    .setDoubleProperty("propulsion", propulsion);
         }
         SerializationNode& joints = chain.createChildNode("Joints");
         for (int j = 0; j < force.getNumJoints(i); j++) {
@@ -59,6 +62,7 @@ static void addSegment(CylinderChainForce& force, int chain, int segment, const 
             node.getDoubleProperty("maximumExtension"), node.getDoubleProperty("parallel"),
             node.getDoubleProperty("perpendicular"), node.getDoubleProperty("rotational"),
             node.getDoubleProperty("extensional"));
+    force.setSegmentPropulsion(chain, segment, node.getDoubleProperty("propulsion", 0));
 }
 
 static void addChain(CylinderChainForce& force, const SerializationNode& node) {
@@ -67,13 +71,16 @@ static void addChain(CylinderChainForce& force, const SerializationNode& node) {
         particles.push_back(particle.getIntProperty("index"));
     auto& segments = node.getChildNode("Segments").getChildren();
     auto& joints = node.getChildNode("Joints").getChildren();
-    if (particles.size() < 2 || segments.size()+1 != particles.size() || joints.size()+2 != particles.size())
+    const bool closed = node.getBoolProperty("closed", false);
+    if (particles.size() < 2 || segments.size()+(closed ? 0 : 1) != particles.size() ||
+            joints.size()+(closed ? 0 : 2) != particles.size())
         throw OpenMMException("CylinderChainForce: A chain has the wrong number of segments or joints");
 
     // Add a chain of placeholders, and then set the parameters.
 
     const int chain = force.addChain(particles, (CylinderChainForce::BendingModel) node.getIntProperty("bendingModel"),
-            (CylinderChainForce::StretchingModel) node.getIntProperty("stretchingModel"), 1, 1, 1, 0, 1, 1, 1, 1);
+            (CylinderChainForce::StretchingModel) node.getIntProperty("stretchingModel"), 1, 1, 1, 0, 1, 1, 1, 1, closed);
+    force.setChainPlanar(chain, node.getBoolProperty("planar", false));
     for (size_t j = 0; j < segments.size(); j++)
         addSegment(force, chain, j, segments[j]);
     for (size_t j = 0; j < joints.size(); j++)
@@ -82,7 +89,7 @@ static void addChain(CylinderChainForce& force, const SerializationNode& node) {
 
 void* CylinderChainForceProxy::deserialize(const SerializationNode& node) const {
     const int version = node.getIntProperty("version");
-    if (version < 1 || version > 2)
+    if (version < 1 || version > 3)
         throw OpenMMException("Unsupported version number");
     unique_ptr<CylinderChainForce> force(new CylinderChainForce());
     force->setForceGroup(node.getIntProperty("forceGroup"));

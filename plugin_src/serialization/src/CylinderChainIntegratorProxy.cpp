@@ -3,15 +3,26 @@
 #include "openmm/OpenMMException.h"
 #include "openmm/serialization/SerializationNode.h"
 #include <memory>
+#include <string>
 
 using namespace OpenMM;
 using namespace std;
+
+static void writeVector(SerializationNode& node, const string& name, const Vec3& vector) {
+    node.createChildNode(name).setDoubleProperty("x", vector[0]).setDoubleProperty("y", vector[1])
+            .setDoubleProperty("z", vector[2]);
+}
+
+static Vec3 readVector(const SerializationNode& node, const string& name) {
+    const SerializationNode& child = node.getChildNode(name);
+    return {child.getDoubleProperty("x"), child.getDoubleProperty("y"), child.getDoubleProperty("z")};
+}
 
 CylinderChainIntegratorProxy::CylinderChainIntegratorProxy() : SerializationProxy("CylinderChainIntegrator") {
 }
 
 void CylinderChainIntegratorProxy::serialize(const void* object, SerializationNode& node) const {
-    node.setIntProperty("version", 1);
+    node.setIntProperty("version", 2);
     const CylinderChainIntegrator& integrator = *reinterpret_cast<const CylinderChainIntegrator*>(object);
     node.setDoubleProperty("stepSize", integrator.getStepSize());
     node.setDoubleProperty("constraintTolerance", integrator.getConstraintTolerance());
@@ -20,6 +31,13 @@ void CylinderChainIntegratorProxy::serialize(const void* object, SerializationNo
     node.setIntProperty("scheme", integrator.getScheme());
     node.setIntProperty("randomSeed", integrator.getRandomNumberSeed());
     node.setIntProperty("integrationForceGroups", integrator.getIntegrationForceGroups());
+    Vec3 velocity, gradientX, gradientY, gradientZ;
+    integrator.getFlow(velocity, gradientX, gradientY, gradientZ);
+    SerializationNode& flow = node.createChildNode("Flow");
+    writeVector(flow, "Velocity", velocity);
+    writeVector(flow, "GradientX", gradientX);
+    writeVector(flow, "GradientY", gradientY);
+    writeVector(flow, "GradientZ", gradientZ);
     SerializationNode& frictions = node.createChildNode("ParticleFrictions");
     for (auto& entry : integrator.getParticleFrictions())
         frictions.createChildNode("Particle").setIntProperty("index", entry.first)
@@ -27,7 +45,8 @@ void CylinderChainIntegratorProxy::serialize(const void* object, SerializationNo
 }
 
 void* CylinderChainIntegratorProxy::deserialize(const SerializationNode& node) const {
-    if (node.getIntProperty("version") != 1)
+    const int version = node.getIntProperty("version");
+    if (version < 1 || version > 2)
         throw OpenMMException("Unsupported version number");
     unique_ptr<CylinderChainIntegrator> integrator(new CylinderChainIntegrator(node.getDoubleProperty("temperature"),
             node.getDoubleProperty("friction"), node.getDoubleProperty("stepSize")));
@@ -35,6 +54,11 @@ void* CylinderChainIntegratorProxy::deserialize(const SerializationNode& node) c
     integrator->setScheme((CylinderChainIntegrator::Scheme) node.getIntProperty("scheme"));
     integrator->setRandomNumberSeed(node.getIntProperty("randomSeed"));
     integrator->setIntegrationForceGroups(node.getIntProperty("integrationForceGroups"));
+    if (version > 1) {
+        const SerializationNode& flow = node.getChildNode("Flow");
+        integrator->setFlow(readVector(flow, "Velocity"), readVector(flow, "GradientX"), readVector(flow, "GradientY"),
+                readVector(flow, "GradientZ"));
+    }
     for (auto& particle : node.getChildNode("ParticleFrictions").getChildren())
         integrator->setParticleFriction(particle.getIntProperty("index"), particle.getDoubleProperty("friction"));
     return integrator.release();

@@ -20,13 +20,15 @@ namespace OpenMM {
  * addChain() once for each chain.  All segments and joints of a chain begin with the same parameters; call
  * setSegmentParameters() and setJointParameters() for chains that are not uniform.
  *
- * Nodes may be tethered to points, for instance to those of optical traps: see addTether().
+ * A chain may be closed: a ring, whose last segment joins its last node and its first.  Segments may propel themselves: see
+ * setSegmentPropulsion().  A chain may be confined to a plane: see setChainPlanar().  Nodes may be tethered to points, for
+ * instance to those of optical traps: see addTether().
  *
  * The friction coefficients have no influence on forces and energies.  CylinderChainIntegrator reads them here, and
  * moves the chains accordingly.  Every other Integrator takes this class for an ordinary Force.
  *
- * After a Context has been created, parameters of segments, joints and tethers may be changed: call
- * updateParametersInContext() to copy them over.
+ * After a Context has been created, parameters of segments, joints and tethers, propulsion and which chains are planar may
+ * be changed: call updateParametersInContext() to copy them over.
  */
 class CylinderChainForce : public Force {
 public:
@@ -89,12 +91,14 @@ public:
      *                               kJ ps/mol/nm^2
      * @param rotationalFriction     the friction of each segment against rotation, measured in kJ ps/mol
      * @param extensionalFriction    the friction of each segment against a change of its length, measured in kJ ps/mol
+     * @param closed                 whether the last particle is joined to the first by a segment more; there must be at
+     *                               least four particles then
      * @return the index of the chain that was added
      */
     int addChain(const std::vector<int>& particles, BendingModel bendingModel, StretchingModel stretchingModel,
             double restLength, double stretchingStiffness, double maximumExtension, double jointStiffness,
             double parallelFriction, double perpendicularFriction, double rotationalFriction,
-            double extensionalFriction);
+            double extensionalFriction, bool closed = false);
     /**
      * Get the particles that are the nodes of a chain.
      *
@@ -111,13 +115,33 @@ public:
      */
     void getChainModels(int chain, int& bendingModel, int& stretchingModel) const;
     /**
-     * Get the number of segments of a chain: one less than it has nodes.
+     * Get whether a chain is closed.
+     *
+     * @param chain  the index of the chain
+     */
+    bool isChainClosed(int chain) const;
+    /**
+     * Get whether the nodes of a chain keep their z.
+     *
+     * @param chain  the index of the chain
+     */
+    bool isChainPlanar(int chain) const;
+    /**
+     * Set whether the nodes of a chain keep their z, which must be the same for all of them.  CylinderChainIntegrator then
+     * moves the chain in two dimensions: forces, noise and flow along z do not act on it.
+     *
+     * @param chain   the index of the chain
+     * @param planar  whether its nodes keep their z
+     */
+    void setChainPlanar(int chain, bool planar);
+    /**
+     * Get the number of segments of a chain: one less than it has nodes, or as many if it is closed.
      *
      * @param chain  the index of the chain
      */
     int getNumSegments(int chain) const;
     /**
-     * Get the number of joints of a chain: one less than it has segments.
+     * Get the number of joints of a chain: one less than it has segments, or as many if it is closed.
      *
      * @param chain  the index of the chain
      */
@@ -155,10 +179,28 @@ public:
             double maximumExtension, double parallelFriction, double perpendicularFriction,
             double rotationalFriction, double extensionalFriction);
     /**
+     * Get the propulsion of a segment.
+     *
+     * @param chain            the index of the chain
+     * @param segment          the index of the segment in the chain
+     * @param[out] propulsion  the force along the segment, measured in kJ/mol/nm
+     */
+    void getSegmentPropulsion(int chain, int segment, double& propulsion) const;
+    /**
+     * Let a segment propel itself: a force along it, from its first node to its second, half of it on each.  It belongs to
+     * no energy.  It is zero unless this is called.
+     *
+     * @param chain       the index of the chain
+     * @param segment     the index of the segment in the chain
+     * @param propulsion  the force along the segment, measured in kJ/mol/nm; negative if it acts the other way
+     */
+    void setSegmentPropulsion(int chain, int segment, double propulsion);
+    /**
      * Get the parameters of a joint.
      *
      * @param chain           the index of the chain
-     * @param joint           the index of the joint in the chain: joint j is where segments j and j+1 meet
+     * @param joint           the index of the joint in the chain: joint j is where segments j and j+1 meet, and at node j
+     *                        if the chain is closed
      * @param[out] stiffness  the bending stiffness b, measured in kJ/mol
      */
     void getJointParameters(int chain, int joint, double& stiffness) const;
@@ -166,7 +208,8 @@ public:
      * Set the parameters of a joint.
      *
      * @param chain      the index of the chain
-     * @param joint      the index of the joint in the chain: joint j is where segments j and j+1 meet
+     * @param joint      the index of the joint in the chain: joint j is where segments j and j+1 meet, and at node j if
+     *                   the chain is closed
      * @param stiffness  the bending stiffness b, measured in kJ/mol
      */
     void setJointParameters(int chain, int joint, double stiffness);
@@ -212,8 +255,8 @@ public:
     void setTetherParameters(int index, int chain, int node, const Vec3& point, double stiffness);
     /**
      * Copy the parameters of segments, joints and tethers to a Context, so that changes made by setSegmentParameters(),
-     * setJointParameters() and setTetherParameters() take effect in it.  Models and particles cannot be changed in this
-     * way, and neither can chains be added; tethers can.
+     * setSegmentPropulsion(), setJointParameters(), setTetherParameters() and setChainPlanar() take effect in it.  Models
+     * and particles cannot be changed in this way, and neither can chains be added; tethers can.
      */
     void updateParametersInContext(Context& context);
     /**
@@ -255,6 +298,7 @@ class CylinderChainForce::SegmentInfo {
 public:
     double restLength, stretchingStiffness, maximumExtension;
     double parallelFriction, perpendicularFriction, rotationalFriction, extensionalFriction;
+    double propulsion;
 };
 
 /**
@@ -277,6 +321,7 @@ public:
     StretchingModel stretchingModel;
     std::vector<SegmentInfo> segments;
     std::vector<double> joints;
+    bool closed, planar;
 };
 
 } // namespace OpenMM

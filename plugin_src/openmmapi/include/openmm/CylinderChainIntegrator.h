@@ -3,6 +3,7 @@
 
 #include "openmm/Integrator.h"
 #include "openmm/Kernel.h"
+#include "openmm/Vec3.h"
 #include <cstdint>
 #include <iosfwd>
 #include <map>
@@ -23,6 +24,8 @@ class CylinderChainForceImpl;
  *
  * All other particles move independently of each other.  The friction coefficient of a particle outside chains is its
  * mass times getFriction(), as BrownianIntegrator has it, unless setParticleFriction() gives it one of its own.
+ *
+ * The fluid may flow: see setFlow().  Friction is then relative to the fluid where each segment or particle is.
  *
  * Particles whose mass is zero do not move; this includes nodes of chains, but not all nodes of the same chain.
  * Virtual sites follow the particles they depend on, but cannot be nodes.  Constraints are not supported.
@@ -116,6 +119,26 @@ public:
      */
     void setScheme(Scheme scheme);
     /**
+     * Get the flow of the fluid.  See setFlow() for details.
+     *
+     * @param[out] velocity   the velocity at the origin, measured in nm/ps
+     * @param[out] gradientX  the derivatives of the x component of the velocity by x, y and z, measured in 1/ps
+     * @param[out] gradientY  those of its y component
+     * @param[out] gradientZ  those of its z component
+     */
+    void getFlow(Vec3& velocity, Vec3& gradientX, Vec3& gradientY, Vec3& gradientZ) const;
+    /**
+     * Set the flow of the fluid: its velocity at x is velocity+(gradientX.x, gradientY.x, gradientZ.x).  It carries segments
+     * along, turns them and stretches them, as far as forces let it.  In a periodic box, it should not vary along a direction
+     * in which particles leave the box.
+     *
+     * @param velocity   the velocity at the origin, measured in nm/ps
+     * @param gradientX  the derivatives of the x component of the velocity by x, y and z, measured in 1/ps
+     * @param gradientY  those of its y component
+     * @param gradientZ  those of its z component
+     */
+    void setFlow(const Vec3& velocity, const Vec3& gradientX, const Vec3& gradientY, const Vec3& gradientZ);
+    /**
      * Get how many times a step of a chain was taken in parts since the Context was created, because the equations of
      * the implicit scheme could not be solved, or a segment would have moved by more than its length.  The parts have
      * fresh noise.  If this is more than a few in a thousand steps, the step is too large.
@@ -196,6 +219,7 @@ private:
     double temperature, friction;
     std::map<int, double> particleFrictions;
     Scheme scheme;
+    Vec3 flowVelocity, flowGradient[3];
     int randomNumberSeed;
     std::uint64_t noiseSeed, stepsTaken;
     long long dividedSteps;

@@ -25,7 +25,8 @@ private:
     void displaceChains(ContextImpl& context, const cylchain::StepSettings& settings, long long& divided);
     int advancePack(ContextImpl& context, int pack, cylchain::StepSettings settings, int count, long long& divided);
     void displaceOthers(ContextImpl& context, const cylchain::StepSettings& settings, double friction);
-    void displaceBlock(int block, const std::vector<Vec3>& forces, const cylchain::StepSettings& settings, double friction);
+    void displaceBlock(int block, const std::vector<Vec3>& positions, const std::vector<Vec3>& forces,
+            const cylchain::StepSettings& settings, double friction);
     void reportInstability(ContextImpl& context, int chain, const cylchain::StepSettings& settings) const;
     void checkOthers(std::uint64_t step) const;
     ParallelLoop loop;

@@ -77,6 +77,14 @@ StepSettings ReferenceIntegrateCylinderChainStepKernel::settingsOf(const Cylinde
     settings.stepSize = integrator.getStepSize();
     settings.seed = seed;
     settings.step = step;
+    Vec3 rows[4];
+    integrator.getFlow(rows[0], rows[1], rows[2], rows[3]);
+    for (int i = 0; i < 3; i++) {
+        settings.flow.velocity[i] = rows[0][i];
+        for (int k = 0; k < 3; k++)
+            settings.flow.gradient[3*i+k] = rows[i+1][k];
+        settings.flow.present |= (rows[0][i] != 0 || rows[i+1] != Vec3());
+    }
     return settings;
 }
 
@@ -136,7 +144,7 @@ int ReferenceIntegrateCylinderChainStepKernel::advancePack(ContextImpl& context,
     const ChainEngine& engine = chainKernel->getEngine();
     const double* box = chainKernel->getBox(context);
     double* forces = &(*data.forces)[0][0];
-    const vector<int>& particles = engine.getParticles(pack);
+    const ParticleRange particles = engine.getParticles(pack);
     for (int particle : particles)
         if (particle >= 0)
             newPositions[particle] = (*data.positions)[particle];
@@ -211,8 +219,9 @@ void ReferenceIntegrateCylinderChainStepKernel::reportInstability(ContextImpl& c
 
         double greatest = -1, change = 0;
         for (int i = 0; i < (int) culprit.segments.size(); i++) {
-            const double length = norm(displacements[nodes[i+1]]-displacements[nodes[i]]);
-            const double force = norm(forces[nodes[i]])+norm(forces[nodes[i+1]]);
+            const int first = nodes[i], second = nodes[(i+1)%nodes.size()];
+            const double length = norm(displacements[second]-displacements[first]);
+            const double force = norm(forces[first])+norm(forces[second]);
             if (!(length < culprit.segments[i].restLength) && force > greatest) {
                 greatest = force;
                 segment = i;
@@ -234,13 +243,20 @@ void ReferenceIntegrateCylinderChainStepKernel::displaceOthers(ContextImpl& cont
     const vector<Vec3>& forces = *extractData(context).forces;
     const int numBlocks = (others.size()+BLOCK_SIZE-1)/BLOCK_SIZE;
     loop.run(numBlocks, [&] (int block) {
-        displaceBlock(block, forces, settings, friction);
+        displaceBlock(block, *extractData(context).positions, forces, settings, friction);
     });
     checkOthers(settings.step);
 }
 
-void ReferenceIntegrateCylinderChainStepKernel::displaceBlock(int block, const vector<Vec3>& forces,
-        const StepSettings& settings, double friction) {
+static Vec3 velocityOf(const BackgroundFlow& flow, const Vec3& x) {
+    Vec3 result;
+    for (int i = 0; i < 3; i++)
+        result[i] = flow.velocity[i]+flow.gradient[3*i]*x[0]+flow.gradient[3*i+1]*x[1]+flow.gradient[3*i+2]*x[2];
+    return result;
+}
+
+void ReferenceIntegrateCylinderChainStepKernel::displaceBlock(int block, const vector<Vec3>& positions,
+        const vector<Vec3>& forces, const StepSettings& settings, double friction) {
     // Chains use the streams up to their number.
 
     GaussianStream stream(settings.seed, settings.step, chainKernel->getChains().size()+block);
@@ -255,6 +271,11 @@ void ReferenceIntegrateCylinderChainStepKernel::displaceBlock(int block, const v
         const double noise = sqrt(2*settings.kT*settings.stepSize*mobility);
         const double* g = &gaussian[3*(i-start)];
         displacements[particle] = forces[particle]*(settings.stepSize*mobility)+Vec3(g[0], g[1], g[2])*noise;
+        if (settings.flow.present) {
+            // The velocity half-way, so that particles keep to closed streamlines.
+            const Vec3 halfway = positions[particle]+velocityOf(settings.flow, positions[particle])*(0.5*settings.stepSize);
+            displacements[particle] += velocityOf(settings.flow, halfway)*settings.stepSize;
+        }
     }
 }
 
