@@ -6,8 +6,8 @@ lengths and joint angles are independent,
     rho(l) ~ l^2 exp(-V_el(l)/k_B T)        eq. (19) of Pesek et al., Soft Matter 2016, 12, 3360
     rho(c) ~ exp(-V_b(c)/k_B T)             c = t1.t2 in [-1, 1]
 
-and the azimuth of every joint is uniform, so every average below is exact at any stiffness. For filaments that move in a
-plane,
+and the azimuth of every joint is uniform, so every average below is exact at any stiffness. For filaments that move
+in a plane,
 
     rho(l) ~ l exp(-V_el(l)/k_B T)
     rho(theta) ~ exp(-V_b(cos theta)/k_B T)         theta in (-pi, pi)

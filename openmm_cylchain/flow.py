@@ -19,9 +19,9 @@ class Flow:
     Filaments and other particles are dragged along: friction acts on their velocity relative to u. A segment feels u at
     its middle, and is turned and stretched by the gradient. Flows can be added.
 
-    In a periodic box, u must not vary along a direction in which particles leave the box: it is taken where OpenMM holds
-    a particle to be, which may be any of its images. (A shear flow may be periodic along its direction and along the
-    vorticity.)
+    In a periodic box, u must not vary along a direction in which particles leave the box: it is taken where OpenMM
+    holds a particle to be, which may be any of its images. Shear flow may be periodic in all directions but that of its
+    gradient.
 
     Parameters
     ----------
@@ -54,8 +54,8 @@ class Flow:
         trace = np.trace(gradient)
         if abs(trace) > _TRACE_TOLERANCE * np.abs(gradient).max():
             raise InputError(
-                f"The gradient of the flow has the trace {trace:g}, but the solvent is incompressible: du_x/dx + du_y/dy "
-                "+ du_z/dz must be zero."
+                f"The gradient of the flow has the trace {trace:g}, but the solvent is incompressible: "
+                "du_x/dx + du_y/dy + du_z/dz must be zero."
             )
         object.__setattr__(self, "gradient", tuple(tuple(float(rate) for rate in row) for row in gradient))
         for name, dimension in (("velocity", VELOCITY), ("origin", LENGTH)):
@@ -81,7 +81,8 @@ class Flow:
             A point at which the solvent is at rest.
         """
         along, across = _perpendicular(direction, gradient_direction, "direction", "gradient_direction", "shear")
-        return cls(gradient=finite_number(rate, RATE, "rate of the flow") * np.outer(along, across), origin=origin)
+        rate = finite_number(rate, RATE, "rate of the flow")
+        return cls(gradient=rate * np.outer(along, across), origin=origin)
 
     @classmethod
     def extension(cls, rate, direction=(1, 0, 0), compression=(0, 1, 0), origin=_REST):
@@ -95,11 +96,9 @@ class Flow:
         origin : (3,) length
             The stagnation point.
         """
-        out, in_ = _perpendicular(direction, compression, "direction", "compression", "extension")
-        return cls(
-            gradient=finite_number(rate, RATE, "rate of the flow") * (np.outer(out, out) - np.outer(in_, in_)),
-            origin=origin,
-        )
+        stretched, squeezed = _perpendicular(direction, compression, "direction", "compression", "extension")
+        rate = finite_number(rate, RATE, "rate of the flow")
+        return cls(gradient=rate * (np.outer(stretched, stretched) - np.outer(squeezed, squeezed)), origin=origin)
 
     @property
     def is_at_rest(self):

@@ -89,7 +89,7 @@ class FilamentReporter(_TableReporter):
     """Reports energies, end-to-end distance and contour length of every filament.
 
     Columns: ``stretching_energy`` and ``bending_energy`` in kJ/mol, ``end_to_end_distance`` and ``contour_length`` in
-    nm. ``reporter["contour_length"]`` is an array (reports, filaments). The ends of a ring are one: their distance is 0.
+    nm. ``reporter["contour_length"]`` is an array (reports, filaments). The ends of a ring are one, at distance 0.
 
     Parameters
     ----------

@@ -56,12 +56,10 @@ class ChainSet:
         # Nodes of rings have their places in the banded resistance in the order 0, n - 1, 1, n - 2, ...
         place = slice(None)
         if closed.any():
-            number, from_end = (
-                np.arange(len(chain)) - starts[chain],
-                (starts + counts - 1)[chain] - np.arange(len(chain)),
-            )
-            folded = starts[chain] + np.minimum(2 * number, 2 * from_end + 1)
-            place = np.where(closed[chain], folded, np.arange(len(chain)))
+            node = np.arange(len(chain))
+            from_start, from_end = node - starts[chain], (starts + counts - 1)[chain] - node
+            folded = starts[chain] + np.minimum(2 * from_start, 2 * from_end + 1)
+            place = np.where(closed[chain], folded, node)
         for name, value in (
             ("closed", closed),
             ("planar", planar),
@@ -109,8 +107,8 @@ def resistance_bands(chains, nodes):
                 [g_trans/4 - g_dr/l^2, g_trans/4 + g_dr/l^2]]
 
     which is what eliminating the virtual forces from (22)-(24) leaves. Rows and columns of fixed
-    nodes are those of the identity. Nodes are in the order of their ``place``: next to each other along open chains, and
-    two places apart in rings.
+    nodes are those of the identity. Nodes are in the order of their ``place``: neighbours in open chains are one place
+    apart, in rings two.
 
     Returns
     -------
@@ -167,8 +165,8 @@ def redistribute(chains, nodes, forces, flow=None):
     """Velocities of all nodes under nodal forces (nodes, 3), in O(nodes): Z v = f, or Z (v - u) = f in a flow u.
 
     For a flow that is linear in space, Z u holds all of the drag on resting segments: that of u at their middles, and
-    what its gradient does to turn and stretch them. Fixed nodes stay and are dragged at all the same; the plane of planar
-    chains keeps them from moving along z.
+    what its gradient does to turn and stretch them. Fixed nodes stay, but the flow drags at their segments all the same.
+    Planar chains do not move along z.
 
     Raises
     ------
@@ -176,9 +174,8 @@ def redistribute(chains, nodes, forces, flow=None):
         If the resistance is singular: a segment has collapsed or a position is not finite.
     """
     if flow is not None:
-        velocities = flow.at(nodes)
-        velocities[chains.planar_node, 2] = 0.0
-        forces = forces + segment_forces_to_nodes(chains, *drag_forces(chains, nodes, velocities))
+        drag = drag_forces(chains, nodes, _flow_at_nodes(chains, nodes, flow))
+        forces = forces + segment_forces_to_nodes(chains, *drag)
     right = np.where(chains.fixed[:, None], 0.0, forces)
     right[chains.planar_node, 2] = 0.0
     places = np.empty_like(right)
@@ -190,6 +187,12 @@ def redistribute(chains, nodes, forces, flow=None):
     except LinAlgError:
         raise InstabilityError("The resistance of a chain is singular.") from None
     return velocities.reshape(-1, 3)[chains.place]
+
+
+def _flow_at_nodes(chains, nodes, flow):
+    velocities = flow.at(nodes)
+    velocities[chains.planar_node, 2] = 0.0
+    return velocities
 
 
 def drag_forces(chains, nodes, velocities):
@@ -306,5 +309,7 @@ def joint_tensions(chains, nodes, minus, plus, flow=None):
     """
     velocities = redistribute(chains, nodes, segment_forces_to_nodes(chains, minus, plus), flow)
     if flow is not None:
-        velocities -= flow.at(nodes)
-    return drag_forces(chains, nodes, velocities)[1] - plus
+        velocities -= _flow_at_nodes(chains, nodes, flow)
+    tensions = drag_forces(chains, nodes, velocities)[1] - plus
+    tensions[chains.planar_node[chains.first_node], 2] = 0.0
+    return tensions
