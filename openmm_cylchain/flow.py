@@ -110,7 +110,7 @@ class Flow:
         positions = np.asarray(in_units_of(positions, LENGTH, "positions"))
         if positions.ndim == 0 or positions.shape[-1] != 3:
             raise InputError(f"positions must have the shape (..., 3), but have {positions.shape}.")
-        return self.velocity + (positions - self.origin) @ np.transpose(self.gradient)
+        return flow_velocities(self, positions)
 
     def __add__(self, other):
         """Both flows at once."""
@@ -118,6 +118,11 @@ class Flow:
             return NotImplemented
         velocity = self.velocity + other.at(self.origin)
         return Flow(velocity, np.add(self.gradient, other.gradient), self.origin)
+
+
+def flow_velocities(flow, positions):
+    """Velocities (n, 3) of the solvent at positions (n, 3), as ``Flow.at`` but without its checks."""
+    return flow.velocity + (positions - flow.origin) @ np.transpose(flow.gradient)
 
 
 def as_flow(flow):

@@ -17,7 +17,7 @@ import openmm
 from openmm import unit
 
 from ..errors import InputError, InstabilityError
-from ..flow import Flow, as_flow
+from ..flow import Flow, as_flow, flow_velocities
 from ..geometry import joined
 from ..potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
 from ..quantities import BOLTZMANN, TEMPERATURE, TIME, non_negative, positive, whole_number
@@ -320,7 +320,7 @@ class ChainDisplacements:
         friction = self._frictions[:, None]
         result[self._others] = step / friction * forces[self._others] + np.sqrt(2.0 * kT * step / friction) * other
         if flow is not None:
-            result[self._others] += step * flow.at(positions[self._others])
+            result[self._others] += step * flow_velocities(flow, positions[self._others])
         self._check_others(result, steps_taken)
 
     def _check_chains(self, displacements, nodes, forces, steps_taken):
@@ -452,8 +452,8 @@ class PortableIntegrator(openmm.CustomIntegrator):
     random_seed : int
         0 draws a fresh seed from the operating system for this integrator.
     flow : Flow, optional
-        Of the solvent; at rest if not given. Like the temperature, it is a variable of the integrator, which checkpoints
-        and saved States carry along.
+        Of the solvent; at rest if not given. Like the temperature, it is a variable of the integrator, which
+        checkpoints and saved States carry along.
 
     Notes
     -----

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, solveh_banded
 
 from ..errors import InstabilityError
+from ..flow import flow_velocities
 
 _ROW, _COLUMN = np.tril_indices(3)
 
@@ -165,8 +166,8 @@ def redistribute(chains, nodes, forces, flow=None):
     """Velocities of all nodes under nodal forces (nodes, 3), in O(nodes): Z v = f, or Z (v - u) = f in a flow u.
 
     For a flow that is linear in space, Z u holds all of the drag on resting segments: that of u at their middles, and
-    what its gradient does to turn and stretch them. Fixed nodes stay, but the flow drags at their segments all the same.
-    Planar chains do not move along z.
+    what its gradient does to turn and stretch them. Fixed nodes stay, but the flow drags at their segments, too. Planar
+    chains do not move along z.
 
     Raises
     ------
@@ -190,7 +191,7 @@ def redistribute(chains, nodes, forces, flow=None):
 
 
 def _flow_at_nodes(chains, nodes, flow):
-    velocities = flow.at(nodes)
+    velocities = flow_velocities(flow, nodes)
     velocities[chains.planar_node, 2] = 0.0
     return velocities
 
