@@ -41,7 +41,9 @@ _STEPS_TAKEN = "cylinder_chain_steps_taken"
 _INTEGRATOR_KT = "cylinder_chain_integrator_kT"
 _INTEGRATOR_SEED = "cylinder_chain_integrator_seed"
 _START = "cylinder_chain_start"
-# Context parameters of the flow; the integrator's variables have names of their own.
+# Context parameters of the flow, which hold only while it flows; the integrator's variables have names of their own.
+_FLOWS = "cylinder_chain_flows"
+_INTEGRATOR_FLOWS = "cylinder_chain_integrator_flows"
 _FLOW = tuple(
     f"cylinder_chain_flow_{name}"
     for name in (
@@ -303,8 +305,7 @@ class ChainDisplacements:
         kT, step = parameters[_KT], parameters[_STEP_SIZE]
         steps_taken = int(parameters[_STEPS_TAKEN])
         chains = self._chains
-        flow = _flow_from_values(tuple(parameters[name] for name in _FLOW))
-        flow = None if flow.is_at_rest else flow
+        flow = _flow_from_values(tuple(parameters[name] for name in _FLOW)) if parameters[_FLOWS] else None
         gaussian = _gaussian_vectors(int(parameters[_SEED]), steps_taken, 2 * chains.segment_count + len(self._others))
         translational, rotational, other = np.split(gaussian, [chains.segment_count, 2 * chains.segment_count])
         advance = STEPS[EXPLICIT_SCHEMES[int(parameters[_SCHEME])]]
@@ -397,7 +398,7 @@ def add_redistribution(system, computation):
     force = openmm.PythonForce(
         computation,
         {
-            **{_PHASE: _IDLE, _SCHEME: 0.0, _KT: 0.0, _STEP_SIZE: 0.0, _SEED: 0.0, _STEPS_TAKEN: 0.0},
+            **{_PHASE: _IDLE, _SCHEME: 0.0, _KT: 0.0, _STEP_SIZE: 0.0, _SEED: 0.0, _STEPS_TAKEN: 0.0, _FLOWS: 0.0},
             **dict.fromkeys(_FLOW, 0.0),
         },
     )
@@ -484,7 +485,7 @@ class PortableIntegrator(openmm.CustomIntegrator):
         _check_redistribution(system, force_group)
         self.addGlobalVariable(_INTEGRATOR_KT, 0.0)
         self.addGlobalVariable(_INTEGRATOR_SEED, 0.0)
-        for name in _INTEGRATOR_FLOW:
+        for name in (_INTEGRATOR_FLOWS, *_INTEGRATOR_FLOW):
             self.addGlobalVariable(name, 0.0)
         self.addPerDofVariable(_START, 0.0)
         self._add_program(f"f{force_group}", EXPLICIT_SCHEMES.index(scheme))
@@ -502,9 +503,13 @@ class PortableIntegrator(openmm.CustomIntegrator):
             (_STEP_SIZE, "dt"),
             (_SEED, _INTEGRATOR_SEED),
             (_STEPS_TAKEN, f"{_STEPS_TAKEN}+1"),
-            *zip(_FLOW, _INTEGRATOR_FLOW),
+            (_FLOWS, _INTEGRATOR_FLOWS),
         ):
             self.addComputeGlobal(parameter, value)
+        self.beginIfBlock(f"{_INTEGRATOR_FLOWS} > 0")
+        for parameter, value in zip(_FLOW, _INTEGRATOR_FLOW):
+            self.addComputeGlobal(parameter, value)
+        self.endBlock()
         self.addComputePerDof(_START, "x")
 
         # Hand over the forces. The PythonForce answers zero.
@@ -578,5 +583,6 @@ class PortableIntegrator(openmm.CustomIntegrator):
     def setFlow(self, flow):
         """Set the Flow of the solvent; None brings it to rest."""
         flow = as_flow(flow)
-        for name, value in zip(_INTEGRATOR_FLOW, (*flow.velocity, *flow.origin, *np.ravel(flow.gradient))):
-            self.setGlobalVariableByName(name, float(value))
+        for name, value in zip(_INTEGRATOR_FLOW, (*flow.velocity, *flow.origin, *np.ravel(flow.gradient).tolist())):
+            self.setGlobalVariableByName(name, value)
+        self.setGlobalVariableByName(_INTEGRATOR_FLOWS, float(not flow.is_at_rest))
