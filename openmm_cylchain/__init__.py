@@ -3,6 +3,7 @@
 from .build import Filament, Filaments
 from .errors import InputError, InstabilityError, TimeStepWarning
 from .filament import DSDNA, F_ACTIN, MICROTUBULE, FilamentType
+from .flow import Flow
 from .friction import EndCorrections, SegmentFriction, stokes_friction
 from .timestep import TimeStep, recommended_time_step
 from .version import __version__
@@ -14,6 +15,7 @@ __all__ = [
     "Filament",
     "FilamentType",
     "Filaments",
+    "Flow",
     "InputError",
     "InstabilityError",
     "MICROTUBULE",

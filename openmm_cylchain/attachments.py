@@ -91,7 +91,7 @@ def _fraction(fraction, label):
 def add_virtual_site(system, attachment, nodes):
     """Add the particle of an attachment point to a System that holds the nodes of its filament; return its index."""
     particle = system.addParticle(0.0)
-    minus, plus = int(nodes[attachment.segment]), int(nodes[attachment.segment + 1])
+    minus, plus = int(nodes[attachment.segment]), int(nodes[(attachment.segment + 1) % len(nodes)])
     site = openmm.TwoParticleAverageSite(minus, plus, 1.0 - attachment.fraction, attachment.fraction)
     system.setVirtualSite(particle, site)
     return particle
@@ -113,7 +113,8 @@ def neighbors(attachments, particles, nodes):
         on_segment[attachment.segment].append(int(particle))
     for segment, points in on_segment.items():
         # Those at the end of a segment may meet those at the beginning of the next.
-        others = [int(nodes[segment]), int(nodes[segment + 1]), *on_segment.get(segment + 1, ())]
+        following = (segment + 1) % len(nodes)
+        others = [int(nodes[segment]), int(nodes[following]), *on_segment.get(following, ())]
         yield from combinations(points, 2)
         yield from ((point, other) for point in points for other in others)
 
@@ -122,4 +123,4 @@ def attachment_positions(attachments, positions):
     """Where attachment points are on a filament with node positions (n, 3): an array (attachments, 3)."""
     segments = np.array([one.segment for one in attachments], dtype=int)
     fractions = np.array([one.fraction for one in attachments], dtype=float)[:, None]
-    return (1.0 - fractions) * positions[segments] + fractions * positions[segments + 1]
+    return (1.0 - fractions) * positions[segments] + fractions * positions[(segments + 1) % len(positions)]

@@ -14,13 +14,25 @@ from .engines.redistribution import joint_tensions
 from .equilibrium import draw_chain
 from .errors import InputError
 from .filament import FilamentType
-from .placement import check_shape, clamped_nodes, named_nodes, unit_vector, vector
+from .flow import as_flow
+from .geometry import regular_polygon
+from .placement import (
+    check_shape,
+    clamped_nodes,
+    in_one_plane,
+    joint_stiffnesses,
+    named_nodes,
+    planar_direction,
+    unit_vector,
+    vector,
+)
 from .quantities import (
     FORCE,
     LENGTH,
     STIFFNESS,
     TEMPERATURE,
     VISCOSITY,
+    finite_number,
     in_units_of,
     non_negative,
     positive,
@@ -32,19 +44,49 @@ from .timestep import check_scheme, recommended_time_step, warn_if_unstable
 NODE_NAME = "NOD"
 """Atom name of a filament node in topologies."""
 
+MINIMUM_RING = 4
+"""Segments that a ring has at least."""
+
 
 @dataclass(frozen=True)
 class Filament:
-    """One filament: its type, initial node positions (n, 3) in nm and clamped nodes."""
+    """One filament.
+
+    Attributes
+    ----------
+    type : FilamentType
+    positions : (n, 3) array
+        Initial node positions in nm.
+    clamped : tuple of int
+        Nodes that do not move.
+    closed : bool
+        A ring, whose last node is joined to the first.
+    planar : bool
+        The nodes keep their z.
+    propulsion : float
+        F0 in kJ/(mol nm): the force F0 t on every segment, half on either end, with its tangent t.
+    """
 
     type: FilamentType
     positions: np.ndarray
     clamped: tuple
+    closed: bool = False
+    planar: bool = False
+    propulsion: float = 0.0
 
     @property
     def segments(self):
         """Number of segments."""
-        return len(self.positions) - 1
+        return len(self.positions) - (0 if self.closed else 1)
+
+    @property
+    def joint_stiffnesses(self):
+        """Bending stiffness of every joint in kJ/mol, see ``placement.joint_stiffnesses``."""
+        return joint_stiffnesses(self.type, len(self.positions), self.clamped, self.closed)
+
+    def energies(self, nodes):
+        """Stretching and bending energy, in kJ/mol, with node positions (n, 3) in nm."""
+        return self.type.chain_energies(nodes, self.joint_stiffnesses, self.closed)
 
 
 @dataclass(frozen=True)
@@ -148,8 +190,12 @@ class Filaments:
         self._refuse_unless_built()
         return self._attachment_indices
 
-    def add_straight(self, filament_type, segments, start, direction, clamped=()):
+    def add_straight(self, filament_type, segments, start, direction, clamped=(), *, planar=False, propulsion=0.0):
         """Add a straight filament with segments of rest length.
+
+        A clamped node alone is a hinge. Two neighbouring ones fix the direction there, too: the joint between a segment
+        with both nodes clamped and one that is free is twice as stiff as others, because only the half segment of
+        material on its free side can bend. The filament is then clamped exactly at that node.
 
         Parameters
         ----------
@@ -161,6 +207,13 @@ class Filaments:
             Direction from the first node to the last; need not be normalised.
         clamped : sequence of int
             Nodes that do not move; negative numbers count from the end.
+        planar : bool
+            The filament moves in a plane of constant z, as under a cover slip: its nodes keep their z, and no force or
+            noise acts along z.
+        propulsion : force
+            F0 of self-propelled filaments: a force F0 t acts on every segment, half on either end, where t is its
+            tangent, away from the first node. With a negative F0 the filament moves with its first node in front. It is
+            not conservative and has no energy.
 
         Returns
         -------
@@ -172,9 +225,10 @@ class Filaments:
         start = vector(start, LENGTH, f"{label}: start")
         direction = unit_vector(direction, label)
         distance = np.arange(segments + 1) * filament_type.segment_length
-        return self._add(filament_type, start + distance[:, None] * direction, clamped, label)
+        positions = start + distance[:, None] * direction
+        return self._add(filament_type, positions, clamped, label, planar=planar, propulsion=propulsion)
 
-    def add_nodes(self, filament_type, positions, clamped=()):
+    def add_nodes(self, filament_type, positions, clamped=(), *, closed=False, planar=False, propulsion=0.0):
         """Add a filament with given node positions.
 
         Rest lengths are the type's segment length, whatever the distances between the nodes are.
@@ -183,9 +237,13 @@ class Filaments:
         ----------
         filament_type : FilamentType
         positions : (n, 3) length
-            At least two nodes.
+            At least two nodes, four for a ring.
         clamped : sequence of int
             Nodes that do not move; negative numbers count from the end.
+        closed : bool
+            Make a ring: a last segment leads from the last node back to the first.
+        planar, propulsion
+            See ``add_straight``.
 
         Returns
         -------
@@ -198,12 +256,53 @@ class Filaments:
             raise InputError(f"{label}: positions must have the shape (n, 3), but have {positions.shape}.")
         if len(positions) < 2:
             raise InputError(f"{label} needs at least two nodes (one segment), but has {len(positions)}.")
-        return self._add(filament_type, positions.copy(), clamped, label)
+        return self._add(filament_type, positions.copy(), clamped, label, closed, planar, propulsion)
 
-    def add_equilibrium(self, filament_type, segments, seed, start=(0.0, 0.0, 0.0), direction=None, clamped=()):
+    def add_ring(
+        self, filament_type, segments, center, normal=(0.0, 0.0, 1.0), *, clamped=(), planar=False, propulsion=0.0
+    ):
+        """Add a ring: a regular polygon with segments of rest length.
+
+        Parameters
+        ----------
+        filament_type : FilamentType
+        segments : int
+            At least four.
+        center : (3,) length
+        normal : (3,) array
+            Of the polygon's plane; nodes go counter-clockwise around it. It need not be normalised.
+        clamped, planar, propulsion
+            See ``add_straight``.
+
+        Returns
+        -------
+        int
+            The filament's number.
+        """
+        label = self._label(filament_type)
+        segments = whole_number(segments, 1, f"{label}: segments")
+        center = vector(center, LENGTH, f"{label}: center")
+        positions = regular_polygon(
+            segments, filament_type.segment_length, center, unit_vector(normal, label, "normal")
+        )
+        return self._add(filament_type, positions, clamped, label, True, planar, propulsion)
+
+    def add_equilibrium(
+        self,
+        filament_type,
+        segments,
+        seed,
+        start=(0.0, 0.0, 0.0),
+        direction=None,
+        clamped=(),
+        *,
+        planar=False,
+        propulsion=0.0,
+    ):
         """Add a filament drawn from the exact equilibrium of the free discrete chain.
 
-        Segment lengths come from rho(l), joint angles from rho(c) (see ``openmm_cylchain.equilibrium``).
+        Segment lengths come from rho(l), joint angles from rho(c) (see ``openmm_cylchain.equilibrium``), or, if the
+        filament is planar, from those of two dimensions.
 
         Parameters
         ----------
@@ -214,9 +313,11 @@ class Filaments:
         start : (3,) length
             Position of the first node.
         direction : (3,) array, optional
-            Direction of the first segment; drawn from the sphere if not given.
+            Direction of the first segment; drawn from the sphere, or from the plane's directions, if not given.
         clamped : sequence of int
             Nodes that do not move; negative numbers count from the end.
+        planar, propulsion
+            See ``add_straight``.
 
         Returns
         -------
@@ -226,13 +327,18 @@ class Filaments:
         label = self._label(filament_type)
         segments = whole_number(segments, 1, f"{label}: segments")
         start = vector(start, LENGTH, f"{label}: start")
+        planar = _flag(planar, f"{label}: planar")
         if direction is not None:
             direction = unit_vector(direction, label)
+            direction = planar_direction(direction, label) if planar else direction
         if self._temperature == 0:
             raise InputError(f"{label}: an equilibrium draw needs a temperature above zero.")
         generator = np.random.default_rng(whole_number(seed, 0, f"{label}: seed"))
-        positions = draw_chain(filament_type, segments, self._temperature, generator, start, direction)
-        return self._add(filament_type, positions, clamped, label)
+        stiffnesses = joint_stiffnesses(filament_type, segments + 1, clamped_nodes(clamped, segments + 1, label))
+        positions = draw_chain(
+            filament_type, segments, self._temperature, generator, start, direction, planar, stiffnesses
+        )
+        return self._add(filament_type, positions, clamped, label, planar=planar, propulsion=propulsion)
 
     def add_tether(self, filament, node, point, stiffness):
         """Tether a node to a point by a harmonic spring, such as an optical trap: energy (k/2) |x - point|^2.
@@ -359,16 +465,28 @@ class Filaments:
             )
         return f"Filament {len(self)} ({filament_type.name})"
 
-    def _add(self, filament_type, positions, clamped, label):
+    def _add(self, filament_type, positions, clamped, label, closed=False, planar=False, propulsion=0.0):
         self._refuse_if_built(label)
-        check_shape(filament_type, positions, label)
-        clamped = clamped_nodes(clamped, len(positions), label)
+        closed, planar = _flag(closed, f"{label}: closed"), _flag(planar, f"{label}: planar")
+        if closed and len(positions) < MINIMUM_RING:
+            raise InputError(f"{label}: a ring needs at least {MINIMUM_RING} segments, but has {len(positions)}.")
+        check_shape(filament_type, positions, label, closed)
+        if planar:
+            positions = in_one_plane(positions, filament_type.segment_length, label)
+        filament = Filament(
+            filament_type,
+            positions,
+            clamped_nodes(clamped, len(positions), label),
+            closed,
+            planar,
+            finite_number(propulsion, FORCE, f"{label}: propulsion"),
+        )
         # Friction is computed now, so that a filament that has none is refused here.
         try:
-            filament_type.segment_friction(self._viscosity, self._temperature, len(positions) - 1)
+            filament_type.segment_friction(self._viscosity, self._temperature, filament.segments)
         except InputError as error:
             raise InputError(f"{label}: {error}") from None
-        self._filaments.append(Filament(filament_type, positions, clamped))
+        self._filaments.append(filament)
         return len(self) - 1
 
     def build(self, box_vectors=None, stretching_force_group=0, bending_force_group=0):
@@ -489,12 +607,17 @@ class Filaments:
             if 0 < particle < nodes:
                 topology.addBond(previous, atom)
             previous = atom
+            if particle == 0:
+                first = atom
+            if filament.closed and particle == nodes - 1:
+                topology.addBond(atom, first)
 
     @staticmethod
     def _add_particles(system, filament):
         # Each segment's mass goes to its two ends in equal parts.
         masses = np.full(len(filament.positions), filament.type.segment_mass)
-        masses[[0, -1]] *= 0.5
+        if not filament.closed:
+            masses[[0, -1]] *= 0.5
         masses[list(filament.clamped)] = 0.0
         for mass in masses:
             system.addParticle(mass)
@@ -531,7 +654,7 @@ class Filaments:
         return min(steps, key=lambda step: step.step)
 
     def create_integrator(
-        self, system, step_size, scheme=None, temperature=None, particle_friction=None, random_seed=0
+        self, system, step_size, scheme=None, temperature=None, particle_friction=None, random_seed=0, flow=None
     ):
         """Create the integrator that moves the filaments and everything else in the System.
 
@@ -555,6 +678,8 @@ class Filaments:
             ``stokes_friction`` computes one.
         random_seed : int
             0 draws a fresh seed from the operating system.
+        flow : Flow, optional
+            Flow of the solvent. ``integrator.setFlow(flow)`` changes it during a run.
 
         Returns
         -------
@@ -571,6 +696,7 @@ class Filaments:
             raise InputError("This is not the System that the filaments were put into: it has too few particles.")
         scheme = default_scheme(self._engine_name) if scheme is None else scheme
         check_scheme(scheme)
+        flow = as_flow(flow)
         for filament in {(f.type, f.segments): f for f in self._filaments}.values():
             warn_if_unstable(filament.type, self._viscosity, self._temperature, step_size, filament.segments, scheme)
         return self._engine.create_integrator(
@@ -584,6 +710,7 @@ class Filaments:
             scheme,
             particle_friction,
             random_seed,
+            flow,
         )
 
     def chain_set(self, system):
@@ -591,11 +718,11 @@ class Filaments:
         return describe_chains(system, self._filaments, self.node_indices, self._viscosity, self._temperature)
 
     def joint_tensions(self, context):
-        """Virtual forces Phi at the joints, eqs. (22)-(24), in the context's present configuration.
+        """Virtual forces Phi at the joints, eqs. (22)-(24), in the context's present configuration and flow.
 
         Phi of joint i is the force that segment i + 1 exerts on segment i; its component along the chain is
         positive under tension. Random forces are left out: this is the mean over the noise of a step.
-        Stretching and bending belong to their segments; any other force on a shared node is given to the
+        Stretching, bending and propulsion belong to their segments; any other force on a shared node is given to the
         two segments in equal parts.
 
         Parameters
@@ -605,20 +732,29 @@ class Filaments:
 
         Returns
         -------
-        list of (segments - 1, 3) Quantity in kJ/(mol nm), one for each filament
+        list of (joints, 3) Quantity in kJ/(mol nm), one for each filament
+            An open filament has segments - 1 joints. A ring has as many as segments: the last is node 0, where the
+            force is that of segment 0 on the last one.
         """
         state = context.getState(positions=True, forces=True)
         positions = state.getPositions(asNumpy=True)._value
         forces = state.getForces(asNumpy=True)._value
         chains = self.chain_set(context.getSystem())
-        ends = [segment_end_forces(f.type, positions[nodes]) for f, nodes in zip(self._filaments, self._nodes)]
+        ends = [segment_end_forces(filament, positions[nodes]) for filament, nodes in zip(self, self._nodes)]
         minus = np.concatenate([minus for minus, plus in ends])
         plus = np.concatenate([plus for minus, plus in ends])
         nodes = np.concatenate(self._nodes)
         minus, plus = split_external_forces(chains, forces[nodes], minus, plus)
-        tensions = joint_tensions(chains, positions[nodes], minus, plus)
+        tensions = joint_tensions(chains, positions[nodes], minus, plus, self._engine.flow_of(context))
         boundaries = np.cumsum([filament.segments for filament in self._filaments])[:-1]
-        return [part[:-1] * FORCE for part in np.split(tensions, boundaries)]
+        parts = np.split(tensions, boundaries)
+        return [(part if filament.closed else part[:-1]) * FORCE for filament, part in zip(self, parts)]
+
+
+def _flag(value, name):
+    if not isinstance(value, (bool, np.bool_)):
+        raise InputError(f"{name} must be True or False, but is {value!r}.")
+    return bool(value)
 
 
 def _exclude_from_custom_nonbonded(force, existing, missing):

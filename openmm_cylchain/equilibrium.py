@@ -6,7 +6,11 @@ lengths and joint angles are independent,
     rho(l) ~ l^2 exp(-V_el(l)/k_B T)        eq. (19) of Pesek et al., Soft Matter 2016, 12, 3360
     rho(c) ~ exp(-V_b(c)/k_B T)             c = t1.t2 in [-1, 1]
 
-and the azimuth of every joint is uniform, so every average below is exact at any stiffness.
+and the azimuth of every joint is uniform, so every average below is exact at any stiffness. For filaments that move
+in a plane,
+
+    rho(l) ~ l exp(-V_el(l)/k_B T)
+    rho(theta) ~ exp(-V_b(cos theta)/k_B T)         theta in (-pi, pi)
 """
 
 from functools import lru_cache
@@ -37,7 +41,11 @@ class _Marginal:
 
     def sample(self, generator, size):
         """Independent draws by inversion of the cumulative distribution."""
-        return np.interp(generator.random(size), self._cumulative, self._coordinate)
+        return self.quantile(generator.random(size))
+
+    def quantile(self, probability):
+        """Where the cumulative distribution has the given values."""
+        return np.interp(probability, self._cumulative, self._coordinate)
 
 
 def _grid(low, high):
@@ -52,9 +60,11 @@ class SegmentLengthDistribution(_Marginal):
     ----------
     filament_type : FilamentType
     temperature : temperature, above zero
+    planar : bool
+        In a plane: rho(l) ~ l exp(-V_el/k_B T).
     """
 
-    def __init__(self, filament_type, temperature):
+    def __init__(self, filament_type, temperature, planar=False):
         kT = thermal_energy(positive(temperature, TEMPERATURE, "temperature"))
         rest, stiffness = filament_type.segment_length, filament_type.segment_stiffness
         if filament_type.stretching_model == "fene":
@@ -64,10 +74,11 @@ class SegmentLengthDistribution(_Marginal):
             low, high = 0.0, np.inf
         # Twelve standard deviations about the most probable length leave out less than 1e-30.
         width = np.sqrt(kT / stiffness)
-        mode = 0.5 * (rest + np.sqrt(rest**2 + 8.0 * width**2))
+        power = 1.0 if planar else 2.0
+        mode = 0.5 * (rest + np.sqrt(rest**2 + 4.0 * power * width**2))
         length = _grid(max(low, mode - 12.0 * width), min(high, mode + 12.0 * width))
         with np.errstate(divide="ignore"):
-            super().__init__(length, 2.0 * np.log(length) - filament_type.stretching_energy(length) / kT)
+            super().__init__(length, power * np.log(length) - filament_type.stretching_energy(length) / kT)
 
 
 class JointAngleDistribution(_Marginal):
@@ -77,24 +88,75 @@ class JointAngleDistribution(_Marginal):
     ----------
     filament_type : FilamentType
     temperature : temperature, above zero
+    joint_stiffness : float, optional
+        In kJ/mol; the type's if not given.
     """
 
-    def __init__(self, filament_type, temperature):
+    def __init__(self, filament_type, temperature, joint_stiffness=None):
         kT = thermal_energy(positive(temperature, TEMPERATURE, "temperature"))
-        # V_b is at least (a/l0)(1-c)*0.8, so a grid in 1-c up to 60 k_B T l0/a holds all of a stiff joint.
-        stiffness = filament_type.joint_stiffness / kT
-        widest = 2.0 if stiffness < 50.0 else min(2.0, 100.0 / stiffness)
-        cosine = _grid(1.0 - widest, 1.0)
+        joint_stiffness = filament_type.joint_stiffness if joint_stiffness is None else joint_stiffness
+        cosine = _grid(1.0 - _widest_bend(joint_stiffness / kT), 1.0)
         with np.errstate(divide="ignore", over="ignore"):
-            super().__init__(cosine, -filament_type.bending_energy(cosine) / kT)
+            super().__init__(cosine, -filament_type.bending_energy(cosine, joint_stiffness) / kT)
+
+
+class PlanarJointAngleDistribution(_Marginal):
+    """Equilibrium distribution of the angle of a joint in a plane: rho(theta) ~ exp(-V_b/k_B T) on [-pi, pi].
+
+    Parameters
+    ----------
+    filament_type : FilamentType
+    temperature : temperature, above zero
+    joint_stiffness : float, optional
+        In kJ/mol; the type's if not given.
+    """
+
+    def __init__(self, filament_type, temperature, joint_stiffness=None):
+        kT = thermal_energy(positive(temperature, TEMPERATURE, "temperature"))
+        joint_stiffness = filament_type.joint_stiffness if joint_stiffness is None else joint_stiffness
+        widest = np.arccos(1.0 - _widest_bend(joint_stiffness / kT))
+        angle = _grid(-widest, widest)
+        with np.errstate(divide="ignore", over="ignore"):
+            super().__init__(angle, -filament_type.bending_energy(np.cos(angle), joint_stiffness) / kT)
+
+
+def _widest_bend(stiffness):
+    # V_b is at least (a/l0)(1-c)*0.8, so 1-c up to 60 k_B T l0/a holds all of a stiff joint.
+    return 2.0 if stiffness < 50.0 else min(2.0, 100.0 / stiffness)
 
 
 @lru_cache(maxsize=32)
-def _distributions(filament_type, temperature):
-    return SegmentLengthDistribution(filament_type, temperature), JointAngleDistribution(filament_type, temperature)
+def _length_distribution(filament_type, temperature, planar):
+    return SegmentLengthDistribution(filament_type, temperature, planar)
 
 
-def draw_chain(filament_type, segments, temperature, generator, start=(0.0, 0.0, 0.0), direction=None):
+@lru_cache(maxsize=32)
+def _angle_distribution(filament_type, temperature, planar, joint_stiffness):
+    kind = PlanarJointAngleDistribution if planar else JointAngleDistribution
+    return kind(filament_type, temperature, joint_stiffness)
+
+
+def _draw_joints(filament_type, temperature, generator, planar, stiffnesses):
+    # Angles of all joints in a plane, cosines in space.
+    probability = generator.random(len(stiffnesses))
+    drawn = np.empty(len(stiffnesses))
+    for stiffness in np.unique(stiffnesses):
+        chosen = stiffnesses == stiffness
+        distribution = _angle_distribution(filament_type, temperature, planar, float(stiffness))
+        drawn[chosen] = distribution.quantile(probability[chosen])
+    return drawn
+
+
+def draw_chain(
+    filament_type,
+    segments,
+    temperature,
+    generator,
+    start=(0.0, 0.0, 0.0),
+    direction=None,
+    planar=False,
+    stiffnesses=None,
+):
     """Node positions of a chain drawn from the equilibrium of the free discrete chain.
 
     Parameters
@@ -106,16 +168,33 @@ def draw_chain(filament_type, segments, temperature, generator, start=(0.0, 0.0,
     start : (3,) array, nm
         Position of the first node.
     direction : (3,) array, optional
-        Unit vector of the first segment; drawn from the sphere if not given.
+        Unit vector of the first segment; drawn from the sphere, or the circle, if not given.
+    planar : bool
+        Draw from the equilibrium in the plane z = start[2].
+    stiffnesses : (segments - 1,) array, optional
+        Bending stiffnesses of the joints in kJ/mol; the type's if not given.
 
     Returns
     -------
     (segments + 1, 3) array in nm
     """
-    length_distribution, angle_distribution = _distributions(filament_type, temperature)
-    lengths = length_distribution.sample(generator, segments)
-    cosines = angle_distribution.sample(generator, segments - 1)
-    azimuths = generator.uniform(0.0, 2.0 * np.pi, segments - 1)
+    lengths = _length_distribution(filament_type, temperature, planar).sample(generator, segments)
+    if stiffnesses is None:
+        stiffnesses = np.full(segments - 1, filament_type.joint_stiffness)
+    joints = _draw_joints(filament_type, temperature, generator, planar, stiffnesses)
+    draw = _tangents_in_plane if planar else _tangents_in_space
+    steps = lengths[:, None] * draw(joints, generator, direction)
+    return np.asarray(start, dtype=float) + np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+
+
+def _tangents_in_plane(angles, generator, direction):
+    first = generator.uniform(-np.pi, np.pi) if direction is None else np.arctan2(direction[1], direction[0])
+    angle = first + np.concatenate([[0.0], np.cumsum(angles)])
+    return np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
+
+
+def _tangents_in_space(cosines, generator, direction):
+    azimuths = generator.uniform(0.0, 2.0 * np.pi, len(cosines))
     if direction is None:
         direction = generator.normal(size=3)
     tangent = np.asarray(direction, dtype=float) / np.linalg.norm(direction)
@@ -131,5 +210,4 @@ def draw_chain(filament_type, segments, temperature, generator, start=(0.0, 0.0,
         normal -= tangent * (tangent @ normal)
         normal /= np.linalg.norm(normal)
         tangents.append(tangent)
-    steps = lengths[:, None] * np.array(tangents)
-    return np.asarray(start, dtype=float) + np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+    return np.array(tangents)

@@ -15,6 +15,7 @@ from .friction import (
     translational_friction_parallel,
     translational_friction_perpendicular,
 )
+from .geometry import joint_cosines, segment_vectors
 from .potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
 from .quantities import (
     BENDING_RIGIDITY,
@@ -230,25 +231,34 @@ class FilamentType:
             self.segment_stiffness, self.segment_length, self.maximum_extension, length
         )
 
-    def bending_energy(self, cosine):
-        """Energy of joints with the given cosines t1.t2 in kJ/mol."""
+    def bending_energy(self, cosine, stiffness=None):
+        """Energy of joints with the given cosines t1.t2 in kJ/mol; ``joint_stiffness`` if no stiffness is given."""
         if self.bending_rigidity == 0.0:
             return np.zeros_like(cosine, dtype=float)
-        return self.bending_potential.energy(self.joint_stiffness, cosine)
+        return self.bending_potential.energy(self.joint_stiffness if stiffness is None else stiffness, cosine)
 
-    def bending_derivative(self, cosine):
-        """Derivative dV_b/dc at the given cosines t1.t2 in kJ/mol."""
+    def bending_derivative(self, cosine, stiffness=None):
+        """Derivative dV_b/dc at the given cosines t1.t2 in kJ/mol; ``joint_stiffness`` if no stiffness is given."""
         if self.bending_rigidity == 0.0:
             return np.zeros_like(cosine, dtype=float)
-        return self.bending_potential.derivative(self.joint_stiffness, cosine)
+        return self.bending_potential.derivative(self.joint_stiffness if stiffness is None else stiffness, cosine)
 
-    def chain_energies(self, nodes):
-        """Stretching and bending energy, in kJ/mol, of a chain with node positions (n, 3) in nm."""
-        segments = np.diff(nodes, axis=0)
+    def chain_energies(self, nodes, joint_stiffnesses=None, closed=False):
+        """Stretching and bending energy, in kJ/mol, of a chain with node positions (n, 3) in nm.
+
+        Parameters
+        ----------
+        nodes : (n, 3) array
+        joint_stiffnesses : (joints,) array, optional
+            As ``Filament.joint_stiffnesses``; those of a free chain if not given.
+        closed : bool
+            Whether the last node is joined to the first.
+        """
+        segments = segment_vectors(nodes, closed)
         lengths = np.linalg.norm(segments, axis=1)
-        tangents = segments / lengths[:, None]
-        cosines = np.sum(tangents[1:] * tangents[:-1], axis=1)
-        return float(np.sum(self.stretching_energy(lengths))), float(np.sum(self.bending_energy(cosines)))
+        cosines = joint_cosines(segments / lengths[:, None], closed)
+        bending = self.bending_energy(cosines, joint_stiffnesses)
+        return float(np.sum(self.stretching_energy(lengths))), float(np.sum(bending))
 
     def persistence_length_at(self, temperature):
         """Persistence length a/(k_B T) in nm at a temperature."""

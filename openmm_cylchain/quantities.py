@@ -13,6 +13,8 @@ BOLTZMANN = unit.MOLAR_GAS_CONSTANT_R.value_in_unit(unit.kilojoule_per_mole / un
 LENGTH = unit.nanometer
 TIME = unit.picosecond
 TEMPERATURE = unit.kelvin
+VELOCITY = unit.nanometer / unit.picosecond
+RATE = unit.picosecond**-1
 ENERGY = unit.kilojoule_per_mole
 FORCE = unit.kilojoule_per_mole / unit.nanometer
 STIFFNESS = unit.kilojoule_per_mole / unit.nanometer**2
@@ -46,10 +48,10 @@ def in_units_of(value, target, name):
         array = np.asarray(None)
     if array.dtype.kind not in "iuf" and array.size and value is not None:
         raise InputError(f"{name} must be a number or an array of numbers, but is {value!r}.")
-    number = array.astype(float)
-    if not np.all(np.isfinite(number)):
+    array = array.astype(float)
+    if not np.all(np.isfinite(array)):
         raise InputError(f"{name} must be finite, but contains NaN or infinity.")
-    return float(number) if number.ndim == 0 else number
+    return float(array) if array.ndim == 0 else array
 
 
 def _converted(quantity, target, name):
@@ -62,24 +64,28 @@ def _converted(quantity, target, name):
     raise InputError(f"{name} has the unit {quantity.unit}, which cannot be converted to {target}.")
 
 
+def finite_number(value, target, name):
+    """Return ``value`` as a float in ``target``; raise InputError unless it is one number."""
+    converted = in_units_of(value, target, name)
+    if not isinstance(converted, float):
+        raise InputError(f"{name} must be a single number, but has the shape {converted.shape}.")
+    return converted
+
+
 def positive(value, target, name):
     """Return ``value`` as a float in ``target``; raise InputError unless it is one number above zero."""
-    number = in_units_of(value, target, name)
-    if not isinstance(number, float):
-        raise InputError(f"{name} must be a single number, but has the shape {number.shape}.")
-    if number <= 0:
-        raise InputError(f"{name} must be positive, but is {number:g}.")
-    return number
+    converted = finite_number(value, target, name)
+    if converted <= 0:
+        raise InputError(f"{name} must be positive, but is {converted:g}.")
+    return converted
 
 
 def non_negative(value, target, name):
     """Return ``value`` as a float in ``target``; raise InputError if it is negative or not one number."""
-    number = in_units_of(value, target, name)
-    if not isinstance(number, float):
-        raise InputError(f"{name} must be a single number, but has the shape {number.shape}.")
-    if number < 0:
-        raise InputError(f"{name} cannot be negative, but is {number:g}.")
-    return number
+    converted = finite_number(value, target, name)
+    if converted < 0:
+        raise InputError(f"{name} cannot be negative, but is {converted:g}.")
+    return converted
 
 
 def whole_number(value, minimum, name):

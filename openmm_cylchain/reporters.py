@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from .errors import InputError
+from .geometry import segment_vectors
 from .quantities import whole_number
 
 
@@ -88,7 +89,7 @@ class FilamentReporter(_TableReporter):
     """Reports energies, end-to-end distance and contour length of every filament.
 
     Columns: ``stretching_energy`` and ``bending_energy`` in kJ/mol, ``end_to_end_distance`` and ``contour_length`` in
-    nm. ``reporter["contour_length"]`` is an array (reports, filaments).
+    nm. ``reporter["contour_length"]`` is an array (reports, filaments). The ends of a ring are one, at distance 0.
 
     Parameters
     ----------
@@ -109,12 +110,14 @@ class FilamentReporter(_TableReporter):
     _thing = "filament"
 
     def _values(self, positions):
-        return [_describe(filament.type, positions[nodes]) for filament, nodes in zip(self._filaments, self._nodes)]
+        return [_describe(filament, positions[nodes]) for filament, nodes in zip(self._filaments, self._nodes)]
 
 
-def _describe(filament_type, nodes):
-    contour_length = np.linalg.norm(np.diff(nodes, axis=0), axis=1).sum()
-    return *filament_type.chain_energies(nodes), np.linalg.norm(nodes[-1] - nodes[0]), contour_length
+def _describe(filament, nodes):
+    segments = segment_vectors(nodes, filament.closed)
+    contour_length = np.linalg.norm(segments, axis=1).sum()
+    end_to_end_distance = 0.0 if filament.closed else np.linalg.norm(nodes[-1] - nodes[0])
+    return *filament.energies(nodes), end_to_end_distance, contour_length
 
 
 class TetherReporter(_TableReporter):

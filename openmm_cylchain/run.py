@@ -15,6 +15,7 @@ from .build import Filaments
 from .equilibrium import draw_chain
 from .errors import InputError, InstabilityError, TimeStepWarning
 from .physical_units import format_time
+from .placement import joint_stiffnesses
 from .progress import Progress
 from .quantities import thermal_energy
 from .run_directory import Checkpoint, EnergyTable, RunDirectory, TrajectoryFile, write_atomically
@@ -130,7 +131,12 @@ def _shape(group, configuration, number):
         return distance[:, None] * direction / np.linalg.norm(direction)
     generator = np.random.default_rng([configuration.simulation.seed, number])
     return draw_chain(
-        group.type, group.segments, configuration.solvent.temperature, generator, direction=group.direction
+        group.type,
+        group.segments,
+        configuration.solvent.temperature,
+        generator,
+        direction=group.direction,
+        stiffnesses=joint_stiffnesses(group.type, group.segments + 1, group.clamped),
     )
 
 
@@ -292,7 +298,7 @@ class _Recorder:
         stretching = bending = 0.0
         for filament, nodes in zip(self._filaments, self._filaments.node_indices):
             with np.errstate(all="ignore"):
-                energies = filament.type.chain_energies(positions[nodes])
+                energies = filament.energies(positions[nodes])
             stretching += energies[0]
             bending += energies[1]
         return stretching, bending

@@ -7,10 +7,11 @@ on the segment before the joint and how much on the one behind it.
 import numpy as np
 
 from .engines.redistribution import segment_forces_to_nodes
+from .geometry import joined, segment_vectors
 
 
-def segment_end_forces(filament_type, nodes):
-    """Forces of stretching (8) and bending (28) on the ends of all segments of one filament.
+def segment_end_forces(filament, nodes):
+    """Forces of stretching (8), bending (28) and propulsion on the ends of all segments of one filament.
 
     A bending torque T on a segment is the pair of forces -T/l and T/l on its ends, with
     T_i = -dV_b/dc (t_j - c t_i) for each joint with a neighbour j (the print of (28) lacks brackets and
@@ -18,23 +19,32 @@ def segment_end_forces(filament_type, nodes):
 
     Parameters
     ----------
-    filament_type : FilamentType
+    filament : Filament
     nodes : (n, 3) array in nm
 
     Returns
     -------
-    (minus, plus) : two (n - 1, 3) arrays in kJ/(mol nm)
+    (minus, plus) : two (segments, 3) arrays in kJ/(mol nm)
     """
-    difference = np.diff(nodes, axis=0)
+    difference = segment_vectors(nodes, filament.closed)
     length = np.linalg.norm(difference, axis=1)
     tangent = difference / length[:, None]
-    plus = -filament_type.stretching_derivative(length)[:, None] * tangent
-    if filament_type.bending_rigidity > 0.0 and len(length) > 1:
-        cosine = np.einsum("ij,ij->i", tangent[:-1], tangent[1:])[:, None]
-        slope = filament_type.bending_derivative(cosine)
-        plus[:-1] -= slope * (tangent[1:] - cosine * tangent[:-1]) / length[:-1, None]
-        plus[1:] -= slope * (tangent[:-1] - cosine * tangent[1:]) / length[1:, None]
-    return -plus, plus
+    plus = -filament.type.stretching_derivative(length)[:, None] * tangent
+    if filament.type.bending_rigidity > 0.0 and len(length) > 1:
+        plus += _bending_end_forces(filament, length, tangent)
+    propulsion = 0.5 * filament.propulsion * tangent
+    return propulsion - plus, propulsion + plus
+
+
+def _bending_end_forces(filament, length, tangent):
+    before, behind = joined(np.arange(len(length)), filament.closed)
+    cosine = np.einsum("ij,ij->i", tangent[before], tangent[behind])
+    slope = filament.type.bending_derivative(cosine, filament.joint_stiffnesses)[:, None]
+    cosine = cosine[:, None]
+    plus = np.zeros_like(tangent)
+    plus[before] -= slope * (tangent[behind] - cosine * tangent[before]) / length[before, None]
+    plus[behind] -= slope * (tangent[before] - cosine * tangent[behind]) / length[behind, None]
+    return plus
 
 
 def split_external_forces(chains, forces, minus, plus):
@@ -49,6 +59,6 @@ def split_external_forces(chains, forces, minus, plus):
     external = forces - segment_forces_to_nodes(chains, minus, plus)
     neighbours = np.zeros(chains.node_count)
     np.add.at(neighbours, chains.first_node, 1.0)
-    np.add.at(neighbours, chains.first_node + 1, 1.0)
+    np.add.at(neighbours, chains.second_node, 1.0)
     share = external / neighbours[:, None]
-    return minus + share[chains.first_node], plus + share[chains.first_node + 1]
+    return minus + share[chains.first_node], plus + share[chains.second_node]

@@ -11,6 +11,7 @@ from openmm import unit
 from scipy.spatial.transform import Rotation
 
 from openmm_cylchain import Filaments, FilamentType, InputError
+from openmm_cylchain.build import Filament
 from openmm_cylchain.potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
 from openmm_cylchain.tension import segment_end_forces
 
@@ -317,7 +318,7 @@ def test_forces_on_the_ends_of_segments_add_up_to_nodal_forces(models):
     scale = 100 / np.linalg.norm(np.diff(nodes, axis=0), axis=1).mean()
     nodes *= scale
     filament_type = rod(*models, maximum_extension=60.0) if models[1] == "fene" else TYPES[models]
-    minus, plus = segment_end_forces(filament_type, nodes)
+    minus, plus = segment_end_forces(Filament(filament_type, nodes, ()), nodes)
     total = np.zeros_like(nodes)
     total[:-1] += minus
     total[1:] += plus

@@ -9,6 +9,7 @@ from conftest import ENGINES
 from physics_cases import TEMPERATURE, VISCOSITY
 
 from openmm_cylchain import DSDNA, F_ACTIN, Filaments
+from openmm_cylchain.build import Filament
 from openmm_cylchain.engines import redistribution
 from openmm_cylchain.tension import segment_end_forces
 
@@ -145,7 +146,7 @@ def test_both_forms_agree_and_give_the_joint_tensions(mixed_system):
         nodal = _dense_velocity(nodes, friction, forces[indices])
 
         # Stretching and bending belong to segments; the rest of a node's force goes to its segments in equal parts.
-        minus, plus = segment_end_forces(kind, nodes)
+        minus, plus = segment_end_forces(Filament(kind, nodes, ()), nodes)
         external = forces[indices].copy()
         external[:-1] -= minus
         external[1:] -= plus

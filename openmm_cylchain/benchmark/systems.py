@@ -96,7 +96,7 @@ def simulate_beads(angle_force, chains, segments, platform, properties):
     if angle_force == "harmonic":
         system.addForce(harmonic_angles(F_ACTIN, chains, segments))
     else:
-        joints = ((F_ACTIN, *triple) for triple in _successive(chains, segments, 3))
+        joints = ((F_ACTIN, *triple, F_ACTIN.joint_stiffness) for triple in _successive(chains, segments, 3))
         add_bending_forces(system, joints, 0)
     friction = F_ACTIN.segment_friction(VISCOSITY, TEMPERATURE, segments)
     rate = (friction.parallel + 2.0 * friction.perpendicular) / 3.0

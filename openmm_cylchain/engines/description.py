@@ -52,8 +52,10 @@ def describe_chains(system, filaments, node_indices, viscosity, temperature):
     frictions = [filament.type.segment_friction(viscosity, temperature, filament.segments) for filament in filaments]
     segments = [filament.segments for filament in filaments]
     return ChainSet(
-        node_counts=np.array(segments) + 1,
+        node_counts=np.array([len(filament.positions) for filament in filaments]),
         fixed=np.array(fixed),
+        closed=np.array([filament.closed for filament in filaments]),
+        planar=np.array([filament.planar for filament in filaments]),
         **{
             name: np.repeat([getattr(friction, name) for friction in frictions], segments)
             for name in ("parallel", "perpendicular", "rotational", "extensional")

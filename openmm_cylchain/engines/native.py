@@ -10,6 +10,7 @@ from pathlib import Path
 import openmm
 
 from ..errors import InputError, InstabilityError
+from ..flow import Flow, as_flow
 from ..quantities import TEMPERATURE, TIME, non_negative, positive, whole_number
 from ..timestep import check_scheme
 from .description import describe_chains, describe_other_particles, filament_label, refuse_constraints
@@ -90,11 +91,29 @@ def add_forces(
         )
     force = CylinderChainForce()
     force.setForceGroup(int(stretching_force_group))
-    for filament, nodes in zip(filaments, node_indices):
+    for number, (filament, nodes) in enumerate(zip(filaments, node_indices)):
+        _refuse_what_is_missing(filament, filament_label(number, filament))
         _add_chain(force, filament, nodes, viscosity, temperature)
     for tether in tethers:
         force.addTether(tether.filament, tether.node, openmm.Vec3(*tether.point), tether.stiffness)
     system.addForce(force)
+
+
+def _refuse_what_is_missing(filament, label):
+    stiffnesses = filament.joint_stiffnesses
+    for missing, what in (
+        (filament.closed, "rings"),
+        (filament.planar, "motion in a plane"),
+        (filament.propulsion != 0.0, "self-propelled filaments"),
+        ((stiffnesses != filament.type.joint_stiffness).any(), "clamped directions"),
+    ):
+        if missing:
+            raise InputError(f'{label}: The compiled engine does not have {what} yet: use engine="portable".')
+
+
+def flow_of(context):
+    """The flow of the solvent in a Context."""
+    return Flow()
 
 
 def move_tether(context, index, tether, node_indices):
@@ -135,8 +154,11 @@ def create_integrator(
     scheme,
     particle_friction,
     seed,
+    flow=None,
 ):
     """Create the integrator of a System with filaments; see ``Filaments.create_integrator``."""
+    if not as_flow(flow).is_at_rest:
+        raise InputError('The compiled engine does not have flow yet: use engine="portable".')
     refuse_constraints(system, filaments, node_indices)
     describe_chains(system, filaments, node_indices, viscosity, temperature)
     nodes = [node for nodes in node_indices for node in nodes]

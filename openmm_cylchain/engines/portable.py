@@ -10,12 +10,15 @@ are the physical ones.
 import hashlib
 import pickle
 import threading
+from functools import lru_cache
 
 import numpy as np
 import openmm
 from openmm import unit
 
 from ..errors import InputError, InstabilityError
+from ..flow import Flow, as_flow, flow_velocities
+from ..geometry import joined
 from ..potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
 from ..quantities import BOLTZMANN, TEMPERATURE, TIME, non_negative, positive, whole_number
 from ..timestep import EXPLICIT_SCHEMES, check_scheme
@@ -26,6 +29,7 @@ REDISTRIBUTION_NAME = "CylinderChainRedistribution"
 STRETCHING_NAME = "CylinderChainStretching"
 BENDING_NAME = "CylinderChainBending"
 TETHER_NAME = "CylinderChainTethers"
+PROPULSION_NAME = "CylinderChainPropulsion"
 
 _IDLE, _FORCES, _CONFIGURATION = 0.0, 1.0, 2.0
 _PHASE = "cylinder_chain_phase"
@@ -37,6 +41,17 @@ _STEPS_TAKEN = "cylinder_chain_steps_taken"
 _INTEGRATOR_KT = "cylinder_chain_integrator_kT"
 _INTEGRATOR_SEED = "cylinder_chain_integrator_seed"
 _START = "cylinder_chain_start"
+# Context parameters of the flow, which hold only while it flows; the integrator's variables have names of their own.
+_FLOWS = "cylinder_chain_flows"
+_INTEGRATOR_FLOWS = "cylinder_chain_integrator_flows"
+_FLOW = tuple(
+    f"cylinder_chain_flow_{name}"
+    for name in (
+        *("velocity_x", "velocity_y", "velocity_z", "origin_x", "origin_y", "origin_z"),
+        *(f"gradient_{row}{column}" for row in "xyz" for column in "xyz"),
+    )
+)
+_INTEGRATOR_FLOW = tuple(name.replace("chain_", "chain_integrator_") for name in _FLOW)
 
 # CustomIntegrator draws from one random generator per process, which is not safe in two threads at once.
 _STEPPING = threading.Lock()
@@ -61,11 +76,16 @@ def add_forces(
     """
     segments, joints = [], []
     for filament, indices in zip(filaments, node_indices):
-        nodes = [int(index) for index in indices]
-        segments += [(filament.type, *ends) for ends in zip(nodes, nodes[1:])]
-        joints += [(filament.type, *triple) for triple in zip(nodes, nodes[1:], nodes[2:])]
+        ends = [(int(indices[node - 1]), int(indices[node])) for node in range(1, len(indices))]
+        ends += [(int(indices[-1]), int(indices[0]))] if filament.closed else []
+        segments += [(filament.type, *pair) for pair in ends]
+        pairs = zip(*joined(np.array(ends), filament.closed))
+        for stiffness, (before, behind) in zip(filament.joint_stiffnesses, pairs):
+            joints.append((filament.type, *map(int, (before[0], *behind)), stiffness))
     add_stretching_forces(system, segments, stretching_force_group)
     add_bending_forces(system, joints, bending_force_group)
+    if any(filament.propulsion for filament in filaments):
+        add_propulsion(system, filaments, node_indices, stretching_force_group)
     if tethers:
         add_tethers(system, tethers, node_indices, stretching_force_group)
 
@@ -102,6 +122,7 @@ def create_integrator(
     scheme,
     particle_friction,
     seed,
+    flow=None,
 ):
     """Create the integrator of a System with filaments; see ``Filaments.create_integrator``."""
     refuse_constraints(system, filaments, node_indices)
@@ -112,7 +133,25 @@ def create_integrator(
     labels = [filament_label(number, filament) for number, filament in enumerate(filaments)]
     computation = ChainDisplacements(chains, nodes, rest_lengths, labels, others, frictions)
     group = add_redistribution(system, computation)
-    return PortableIntegrator(system, group, bath_temperature, step_size, scheme, seed)
+    return PortableIntegrator(system, group, bath_temperature, step_size, scheme, seed, flow)
+
+
+def flow_of(context):
+    """The flow of the solvent in a Context, at rest where its integrator knows of none."""
+    integrator = context.getIntegrator()
+    if not isinstance(integrator, openmm.CustomIntegrator):
+        return Flow()
+    names = {integrator.getGlobalVariableName(index) for index in range(integrator.getNumGlobalVariables())}
+    return _flow_from_variables(integrator) if names.issuperset(_INTEGRATOR_FLOW) else Flow()
+
+
+def _flow_from_variables(integrator):
+    return _flow_from_values(tuple(integrator.getGlobalVariableByName(name) for name in _INTEGRATOR_FLOW))
+
+
+@lru_cache(maxsize=32)
+def _flow_from_values(values):
+    return Flow(values[:3], np.reshape(values[6:], (3, 3)), values[3:6])
 
 
 def add_stretching_forces(system, segments, force_group):
@@ -149,11 +188,11 @@ def add_bending_forces(system, joints, force_group):
     Parameters
     ----------
     system : openmm.System
-    joints : iterable of (FilamentType, particle, particle, particle)
+    joints : iterable of (FilamentType, particle, particle, particle, stiffness)
     force_group : int
     """
     forces = {}
-    for filament_type, before, joint, after in joints:
+    for filament_type, before, joint, after, stiffness in joints:
         if filament_type.bending_rigidity == 0.0:
             continue
         model = filament_type.bending_model
@@ -162,9 +201,50 @@ def add_bending_forces(system, joints, force_group):
                 openmm.CustomAngleForce(BENDING_POTENTIALS[model].expression), BENDING_NAME, model, force_group
             )
             forces[model].addPerAngleParameter("bending_stiffness")
-        forces[model].addAngle(before, joint, after, [filament_type.joint_stiffness])
+        forces[model].addAngle(before, joint, after, [stiffness])
     for force in forces.values():
         system.addForce(force)
+
+
+def add_propulsion(system, filaments, node_indices, force_group):
+    """Add one PythonForce for all self-propelled filaments: no other kind of force may lack an energy."""
+    minus, plus, propulsion = [], [], []
+    for filament, indices in zip(filaments, node_indices):
+        if filament.propulsion:
+            minus.append(indices[: filament.segments])
+            plus.append(np.roll(indices, -1)[: filament.segments])
+            propulsion.append(np.full(filament.segments, filament.propulsion))
+    force = openmm.PythonForce(Propulsion(*map(np.concatenate, (minus, plus, propulsion))))
+    force.setName(PROPULSION_NAME)
+    force.setForceGroup(force_group)
+    system.addForce(force)
+
+
+class Propulsion:
+    """The computation of a PythonForce: a force F0 t on every segment of self-propelled filaments.
+
+    Parameters
+    ----------
+    minus, plus : (segments,) int arrays
+        Particle indices of the ends of the segments.
+    propulsion : (segments,) array
+        F0 in kJ/(mol nm).
+    """
+
+    def __init__(self, minus, plus, propulsion):
+        self._minus = minus
+        self._plus = plus
+        self._propulsion = propulsion
+
+    def __call__(self, state):
+        positions = state.getPositions(asNumpy=True)._value
+        vectors = positions[self._plus] - positions[self._minus]
+        half = (0.5 * self._propulsion / np.linalg.norm(vectors, axis=1))[:, None] * vectors
+        forces = np.zeros_like(positions)
+        # A node is the minus end of one segment at most, and the plus end of one.
+        forces[self._minus] += half
+        forces[self._plus] += half
+        return 0.0, forces
 
 
 def _named_force(force, name, model, force_group):
@@ -225,13 +305,14 @@ class ChainDisplacements:
         kT, step = parameters[_KT], parameters[_STEP_SIZE]
         steps_taken = int(parameters[_STEPS_TAKEN])
         chains = self._chains
+        flow = _flow_from_values(tuple(parameters[name] for name in _FLOW)) if parameters[_FLOWS] else None
         gaussian = _gaussian_vectors(int(parameters[_SEED]), steps_taken, 2 * chains.segment_count + len(self._others))
         translational, rotational, other = np.split(gaussian, [chains.segment_count, 2 * chains.segment_count])
         advance = STEPS[EXPLICIT_SCHEMES[int(parameters[_SCHEME])]]
         with np.errstate(all="ignore"):
             try:
                 displacements = advance(
-                    chains, positions[self._nodes], forces[self._nodes], kT, step, translational, rotational
+                    chains, positions[self._nodes], forces[self._nodes], kT, step, translational, rotational, flow
                 )
             except InstabilityError:
                 displacements = np.full((chains.node_count, 3), np.nan)
@@ -239,26 +320,28 @@ class ChainDisplacements:
         result[self._nodes] = displacements
         friction = self._frictions[:, None]
         result[self._others] = step / friction * forces[self._others] + np.sqrt(2.0 * kT * step / friction) * other
+        if flow is not None:
+            result[self._others] += step * flow_velocities(flow, positions[self._others])
         self._check_others(result, steps_taken)
 
     def _check_chains(self, displacements, nodes, forces, steps_taken):
-        first = self._chains.first_node
+        first, second = self._chains.first_node, self._chains.second_node
         with np.errstate(all="ignore"):
-            change = np.linalg.norm(displacements[first + 1] - displacements[first], axis=1)
+            change = np.linalg.norm(displacements[second] - displacements[first], axis=1)
             # Written so that NaN counts as unstable.
             unstable = ~(change < self._rest_lengths)
         if not unstable.any():
             return
         # A singular resistance spoils every chain, so the culprit is looked for in what went in.
         finite = np.isfinite(nodes).all(axis=1) & np.isfinite(forces).all(axis=1)
-        culprits = np.flatnonzero(~(finite[first] & finite[first + 1]))
+        culprits = np.flatnonzero(~(finite[first] & finite[second]))
         if not len(culprits):
             culprits = np.flatnonzero(unstable)
-            scale = np.linalg.norm(forces[first], axis=1) + np.linalg.norm(forces[first + 1], axis=1)
+            scale = np.linalg.norm(forces[first], axis=1) + np.linalg.norm(forces[second], axis=1)
             culprits = culprits[np.argsort(-scale[culprits], kind="stable")]
         segment = culprits[0]
         chain, number = self._chains.locate_segment(segment)
-        if not (finite[first[segment]] and finite[first[segment] + 1]):
+        if not (finite[first[segment]] and finite[second[segment]]):
             what = "the force on it, or its position, is not finite"
         else:
             what = f"its ends would move by {change[segment]:.3g} nm against each other in one step"
@@ -314,7 +397,10 @@ def add_redistribution(system, computation):
         raise InputError("The portable engine needs a force group of its own, but all 32 are in use: free one.")
     force = openmm.PythonForce(
         computation,
-        {_PHASE: _IDLE, _SCHEME: 0.0, _KT: 0.0, _STEP_SIZE: 0.0, _SEED: 0.0, _STEPS_TAKEN: 0.0},
+        {
+            **{_PHASE: _IDLE, _SCHEME: 0.0, _KT: 0.0, _STEP_SIZE: 0.0, _SEED: 0.0, _STEPS_TAKEN: 0.0, _FLOWS: 0.0},
+            **dict.fromkeys(_FLOW, 0.0),
+        },
     )
     force.setName(fingerprint)
     force.setForceGroup(free[0])
@@ -366,6 +452,9 @@ class PortableIntegrator(openmm.CustomIntegrator):
     scheme : {"midpoint", "euler"}
     random_seed : int
         0 draws a fresh seed from the operating system for this integrator.
+    flow : Flow, optional
+        Of the solvent; at rest if not given. Like the temperature, it is a variable of the integrator, which
+        checkpoints and saved States carry along.
 
     Notes
     -----
@@ -381,7 +470,7 @@ class PortableIntegrator(openmm.CustomIntegrator):
         without filaments.
     """
 
-    def __init__(self, system, force_group, temperature, step_size, scheme="midpoint", random_seed=0):
+    def __init__(self, system, force_group, temperature, step_size, scheme="midpoint", random_seed=0, flow=None):
         super().__init__(positive(step_size, TIME, "step_size"))
         check_scheme(scheme)
         if scheme not in EXPLICIT_SCHEMES:
@@ -396,12 +485,15 @@ class PortableIntegrator(openmm.CustomIntegrator):
         _check_redistribution(system, force_group)
         self.addGlobalVariable(_INTEGRATOR_KT, 0.0)
         self.addGlobalVariable(_INTEGRATOR_SEED, 0.0)
+        for name in (_INTEGRATOR_FLOWS, *_INTEGRATOR_FLOW):
+            self.addGlobalVariable(name, 0.0)
         self.addPerDofVariable(_START, 0.0)
         self._add_program(f"f{force_group}", EXPLICIT_SCHEMES.index(scheme))
         self.setKineticEnergyExpression("0")
         self.setIntegrationForceGroups(set(range(32)) - {force_group})
         self.setTemperature(temperature)
         self.setRandomNumberSeed(random_seed)
+        self.setFlow(flow)
 
     def _add_program(self, redistribution, scheme):
         self.addUpdateContextState()
@@ -411,8 +503,13 @@ class PortableIntegrator(openmm.CustomIntegrator):
             (_STEP_SIZE, "dt"),
             (_SEED, _INTEGRATOR_SEED),
             (_STEPS_TAKEN, f"{_STEPS_TAKEN}+1"),
+            (_FLOWS, _INTEGRATOR_FLOWS),
         ):
             self.addComputeGlobal(parameter, value)
+        self.beginIfBlock(f"{_INTEGRATOR_FLOWS} > 0")
+        for parameter, value in zip(_FLOW, _INTEGRATOR_FLOW):
+            self.addComputeGlobal(parameter, value)
+        self.endBlock()
         self.addComputePerDof(_START, "x")
 
         # Hand over the forces. The PythonForce answers zero.
@@ -478,3 +575,14 @@ class PortableIntegrator(openmm.CustomIntegrator):
         super().setRandomNumberSeed(seed)
         self._key = float(seed if seed else np.random.SeedSequence().generate_state(1)[0])
         self.setGlobalVariableByName(_INTEGRATOR_SEED, self._key)
+
+    def getFlow(self):
+        """The Flow of the solvent."""
+        return _flow_from_variables(self)
+
+    def setFlow(self, flow):
+        """Set the Flow of the solvent; None brings it to rest."""
+        flow = as_flow(flow)
+        for name, value in zip(_INTEGRATOR_FLOW, (*flow.velocity, *flow.origin, *np.ravel(flow.gradient).tolist())):
+            self.setGlobalVariableByName(name, value)
+        self.setGlobalVariableByName(_INTEGRATOR_FLOWS, float(not flow.is_at_rest))

@@ -1,0 +1,34 @@
+"""Vectors along the segments of a chain and cosines of its joints, for open chains and rings.
+
+Segment s of a chain with n nodes joins the nodes s and s + 1. An open chain has n - 1 segments, and its joint j is at
+node j + 1. A ring has n: its last segment leads back to node 0, and its joint j is at node j, between the segments
+j - 1 and j.
+"""
+
+import numpy as np
+
+
+def segment_vectors(nodes, closed=False):
+    """Vectors from the minus to the plus end of all segments of a chain with node positions (n, 3)."""
+    return np.diff(nodes, axis=0, append=nodes[:1]) if closed else np.diff(nodes, axis=0)
+
+
+def joined(segments, closed=False):
+    """An array of one entry per segment as a pair: the segments before and behind every joint."""
+    return (np.roll(segments, 1, axis=0), segments) if closed else (segments[:-1], segments[1:])
+
+
+def joint_cosines(tangents, closed=False):
+    """Cosines of the angles at all joints, from the unit vectors (segments, 3) along the segments."""
+    before, behind = joined(tangents, closed)
+    return np.einsum("ij,ij->i", before, behind)
+
+
+def regular_polygon(segments, segment_length, center, normal):
+    """Nodes (segments, 3) of a regular polygon, counter-clockwise around the unit vector ``normal``."""
+    angles = 2.0 * np.pi * np.arange(segments) / segments
+    first = np.cross(np.eye(3)[np.argmin(np.abs(normal))], normal)
+    first /= np.linalg.norm(first)
+    second = np.cross(normal, first)
+    radius = 0.5 * segment_length / np.sin(np.pi / segments)
+    return center + radius * (np.cos(angles)[:, None] * first + np.sin(angles)[:, None] * second)
