@@ -91,29 +91,24 @@ def add_forces(
         )
     force = CylinderChainForce()
     force.setForceGroup(int(stretching_force_group))
-    for number, (filament, nodes) in enumerate(zip(filaments, node_indices)):
-        _refuse_what_is_missing(filament, filament_label(number, filament))
+    for filament, nodes in zip(filaments, node_indices):
         _add_chain(force, filament, nodes, viscosity, temperature)
     for tether in tethers:
         force.addTether(tether.filament, tether.node, openmm.Vec3(*tether.point), tether.stiffness)
     system.addForce(force)
 
 
-def _refuse_what_is_missing(filament, label):
-    stiffnesses = filament.joint_stiffnesses
-    for missing, what in (
-        (filament.closed, "rings"),
-        (filament.planar, "motion in a plane"),
-        (filament.propulsion != 0.0, "self-propelled filaments"),
-        ((stiffnesses != filament.type.joint_stiffness).any(), "clamped directions"),
-    ):
-        if missing:
-            raise InputError(f'{label}: The compiled engine does not have {what} yet: use engine="portable".')
-
-
 def flow_of(context):
-    """The flow of the solvent in a Context."""
-    return Flow()
+    """The flow of the solvent in a Context, at rest where its integrator knows of none."""
+    integrator = context.getIntegrator()
+    if not CylinderChainIntegrator.isinstance(integrator):
+        return Flow()
+    return _flow_of_integrator(CylinderChainIntegrator.cast(integrator))
+
+
+def _flow_of_integrator(integrator):
+    velocity, *gradient = (vector._value for vector in CylinderChainIntegrator.getFlow(integrator))
+    return Flow(tuple(velocity), [tuple(row) for row in gradient])
 
 
 def move_tether(context, index, tether, node_indices):
@@ -128,7 +123,7 @@ def move_tether(context, index, tether, node_indices):
 def _add_chain(force, filament, nodes, viscosity, temperature):
     kind = filament.type
     friction = kind.segment_friction(viscosity, temperature, filament.segments)
-    force.addChain(
+    chain = force.addChain(
         [int(node) for node in nodes],
         BENDING_MODELS[kind.bending_model],
         STRETCHING_MODELS[kind.stretching_model],
@@ -140,7 +135,13 @@ def _add_chain(force, filament, nodes, viscosity, temperature):
         friction.perpendicular,
         friction.rotational,
         friction.extensional,
+        filament.closed,
     )
+    force.setChainPlanar(chain, filament.planar)
+    for segment in range(filament.segments if filament.propulsion else 0):
+        force.setSegmentPropulsion(chain, segment, filament.propulsion)
+    for joint, stiffness in enumerate(filament.joint_stiffnesses):
+        force.setJointParameters(chain, joint, float(stiffness))
 
 
 def create_integrator(
@@ -157,14 +158,12 @@ def create_integrator(
     flow=None,
 ):
     """Create the integrator of a System with filaments; see ``Filaments.create_integrator``."""
-    if not as_flow(flow).is_at_rest:
-        raise InputError('The compiled engine does not have flow yet: use engine="portable".')
     refuse_constraints(system, filaments, node_indices)
     describe_chains(system, filaments, node_indices, viscosity, temperature)
     nodes = [node for nodes in node_indices for node in nodes]
     others, frictions = describe_other_particles(system, nodes, particle_friction)
     labels = [filament_label(number, filament) for number, filament in enumerate(filaments)]
-    integrator = NativeIntegrator(bath_temperature, step_size, scheme, seed, labels)
+    integrator = NativeIntegrator(bath_temperature, step_size, scheme, seed, labels, flow)
     for particle, friction in zip(others, frictions):
         integrator.setParticleFriction(int(particle), float(friction))
     return integrator
@@ -183,6 +182,8 @@ class NativeIntegrator(CylinderChainIntegrator):
         0 draws a fresh seed for each Context.
     labels : sequence of str
         What to call each chain in messages.
+    flow : Flow, optional
+        Of the solvent; at rest if not given.
 
     Raises
     ------
@@ -190,13 +191,14 @@ class NativeIntegrator(CylinderChainIntegrator):
         For an unknown scheme, a negative temperature or a step size that is not positive.
     """
 
-    def __init__(self, temperature, step_size, scheme="implicit", random_seed=0, labels=()):
+    def __init__(self, temperature, step_size, scheme="implicit", random_seed=0, labels=(), flow=None):
         temperature = non_negative(temperature, TEMPERATURE, "temperature")
         super().__init__(temperature, _OTHER_FRICTION, positive(step_size, TIME, "step_size"))
         check_scheme(scheme)
         self._labels = list(labels)
         self.setScheme(SCHEMES[scheme])
         self.setRandomNumberSeed(random_seed)
+        self.setFlow(flow)
 
     def step(self, steps):
         """Advance by a number of steps.
@@ -226,3 +228,13 @@ class NativeIntegrator(CylinderChainIntegrator):
         if seed >= 2**31:
             raise InputError(f"random_seed must be below 2^31, but is {seed}.")
         super().setRandomNumberSeed(seed)
+
+    def getFlow(self):
+        """The Flow of the solvent; its origin is that of coordinates."""
+        return _flow_of_integrator(self)
+
+    def setFlow(self, flow):
+        """Set the Flow of the solvent; None brings it to rest."""
+        flow = as_flow(flow)
+        velocity = flow.at([0.0, 0.0, 0.0])
+        super().setFlow(openmm.Vec3(*velocity.tolist()), *(openmm.Vec3(*row) for row in flow.gradient))

@@ -321,7 +321,9 @@ class ChainDisplacements:
         friction = self._frictions[:, None]
         result[self._others] = step / friction * forces[self._others] + np.sqrt(2.0 * kT * step / friction) * other
         if flow is not None:
-            result[self._others] += step * flow_velocities(flow, positions[self._others])
+            # The velocity half-way, so that particles keep to closed streamlines.
+            halfway = positions[self._others] + 0.5 * step * flow_velocities(flow, positions[self._others])
+            result[self._others] += step * flow_velocities(flow, halfway)
         self._check_others(result, steps_taken)
 
     def _check_chains(self, displacements, nodes, forces, steps_taken):

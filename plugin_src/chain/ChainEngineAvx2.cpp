@@ -1,9 +1,10 @@
 #ifdef CYLCHAIN_X86_64
 #define CYLCHAIN_LOOPS avx2
+#define CYLCHAIN_LANES 4
 #include "ChainLoops.h"
 
 const cylchain::ChainKernels& cylchain::avx2Kernels() {
-    static const ChainKernels kernels = {"avx2", 4, avx2::addForcesOfPack, avx2::stepOfPack};
+    static const ChainKernels kernels = {"avx2", CYLCHAIN_LANES, avx2::addForcesOfPack, avx2::stepOfPack};
     return kernels;
 }
 #endif

@@ -1,7 +1,8 @@
 #define CYLCHAIN_LOOPS baseline
+#define CYLCHAIN_LANES 2
 #include "ChainLoops.h"
 
 const cylchain::ChainKernels& cylchain::baselineKernels() {
-    static const ChainKernels kernels = {"baseline", 2, baseline::addForcesOfPack, baseline::stepOfPack};
+    static const ChainKernels kernels = {"baseline", CYLCHAIN_LANES, baseline::addForcesOfPack, baseline::stepOfPack};
     return kernels;
 }

@@ -1,6 +1,6 @@
 /**
  * The loops over the segments of a pack. This file is compiled once for each instruction set, into a namespace of its
- * own, CYLCHAIN_LOOPS, so that no function of one is used by another.
+ * own, CYLCHAIN_LOOPS, so that no function of one is used by another, and for up to CYLCHAIN_LANES lanes.
  */
 
 #include "ChainPack.h"
@@ -11,6 +11,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <new>
+#include <type_traits>
 
 namespace cylchain {
 namespace CYLCHAIN_LOOPS {
@@ -685,24 +686,26 @@ template <int W> Instability stepPackAs(const ChainPack& pack, const double* pos
     return stepPack<W>(pack, positions, forces, box, settings, displacements);
 }
 
+/** Call a function with as many lanes as a pack has. Those that the instruction set has not are not compiled. */
+template <int W = CYLCHAIN_LANES, class Function> auto withLanesOf(const ChainPack& pack, Function function) {
+    if constexpr (W > 1)
+        if (pack.lanes < W)
+            return withLanesOf<W/2>(pack, function);
+    return function(std::integral_constant<int, W>());
+}
+
 ChainEnergy addForcesOfPack(const ChainPack& pack, const double* positions, double* forces, const double* box,
             bool includeEnergy) {
-    switch (pack.lanes) {
-        case 8: return addForcesTo<8>(pack, positions, forces, box, includeEnergy);
-        case 4: return addForcesTo<4>(pack, positions, forces, box, includeEnergy);
-        case 2: return addForcesTo<2>(pack, positions, forces, box, includeEnergy);
-        default: return addForcesTo<1>(pack, positions, forces, box, includeEnergy);
-    }
+    return withLanesOf(pack, [&] (auto lanes) {
+        return addForcesTo<lanes>(pack, positions, forces, box, includeEnergy);
+    });
 }
 
 Instability stepOfPack(const ChainPack& pack, const double* positions, const double* forces, const double* box,
             const StepSettings& settings, double* displacements) {
-    switch (pack.lanes) {
-        case 8: return stepPackAs<8>(pack, positions, forces, box, settings, displacements);
-        case 4: return stepPackAs<4>(pack, positions, forces, box, settings, displacements);
-        case 2: return stepPackAs<2>(pack, positions, forces, box, settings, displacements);
-        default: return stepPackAs<1>(pack, positions, forces, box, settings, displacements);
-    }
+    return withLanesOf(pack, [&] (auto lanes) {
+        return stepPackAs<lanes>(pack, positions, forces, box, settings, displacements);
+    });
 }
 
 } // namespace CYLCHAIN_LOOPS
