@@ -61,7 +61,7 @@ template <class Real> struct ImplicitSegment {
     // Of the last iteration: the direction of the new segment, its tension and how the tension changes.
     Vector<Real> newTangent;
     Real tension, response;
-    Real multiplier, extra;
+    Real multiplier, extra, tensionOfFlow;
 };
 
 /** What a step keeps of a tether: the vector from its point to its node at the start, its noise and how implicit it is. */
@@ -89,8 +89,9 @@ public:
         tethers = memory.tethers.template reserve<ImplicitTether>(pack.tethers.size());
         segments = memory.segments.template reserve<ImplicitSegment<Real> >(n);
         nodes = memory.nodes.template reserve<ImplicitNode<Real> >(n);
-        f = memory.vectors.template reserve<Vec>(2*n);
+        f = memory.vectors.template reserve<Vec>(3*n);
         change = f+n;
+        loads = settings.flow.present ? f+2*n : f;
         if (CLOSED)
             toBorder = memory.border.template reserve<BorderCoupling>(n);
     }
@@ -143,7 +144,8 @@ private:
     ImplicitNode<Real>* nodes;
     ImplicitTether* tethers;
     const Vec* x;
-    Vec *f, *change;
+    // The forces, the same with the drag of the flow, and the changes of an iteration.
+    Vec *f, *loads, *change;
     /** The coupling of a node of a ring to its first two nodes. */
     struct BorderCoupling {
         Mat node[2];
@@ -340,10 +342,37 @@ private:
     };
     /** Linearise the equations around y, and eliminate the nodes from first to last. */
     void eliminate(const Vec* y) {
+        if (settings.flow.present)
+            addDragOfFlow(y);
         if (CLOSED)
             eliminateRing(y);
         else
             eliminateChain(y);
+        if (settings.flow.present)
+            for (int s = 0; s < pack.segments; s++)
+                segments[s].tension = segments[s].tension-segments[s].tensionOfFlow;
+    }
+    /** Add the drag of the flow, at the middle of the step, on segments at rest. Its part along a segment is a tension. */
+    void addDragOfFlow(const Vec* y) {
+        for (int node = 0; node < n; node++)
+            loads[node] = f[node];
+        for (int s = 0; s < pack.segments; s++) {
+            Geometry geometry;
+            describeNew(y, s, geometry);
+            const Vec direction = geometry.middleTangent;
+            const Vec u1 = velocityOf(settings.flow, pack.planar, (x[s]+y[s])*(0.5+Real{}));
+            const Vec u2 = velocityOf(settings.flow, pack.planar, (x[s+1]+y[s+1])*(0.5+Real{}));
+            const Vec sum = u1+u2, difference = u2-u1;
+            const Real across = 0.25*property<Real>(pack, s, ChainPack::Perpendicular);
+            const Real along = 0.25*property<Real>(pack, s, ChainPack::Parallel);
+            const Vec carried = sum*across+direction*((along-across)*direction.dot(sum));
+            const Real turn = property<Real>(pack, s, ChainPack::Rotational)*geometry.middleInverse*geometry.middleInverse;
+            const Real stretch = property<Real>(pack, s, ChainPack::Extensional)/(segments[s].length*geometry.length);
+            const Vec pair = difference*turn+direction*((stretch-turn)*direction.dot(difference));
+            segments[s].tensionOfFlow = stretch*direction.dot(difference);
+            loads[s] = loads[s]+carried-pair;
+            loads[s+1] = loads[s+1]+carried+pair;
+        }
     }
     void eliminateChain(const Vec* y) {
         Row rows[3];
@@ -351,7 +380,7 @@ private:
         Geometry previous, current;
         std::size_t tether = 0;
         here->diagonal = Mat {};
-        here->right = f[0];
+        here->right = loads[0];
         for (int s = 0; s < n-1; s++) {
             describeNew(y, s, current);
             addSegment(y, s, current, *here, *after);
@@ -378,7 +407,7 @@ private:
         Geometry previous, current;
         std::size_t tether = 0;
         *here = ClosedRow {};
-        here->right = f[0];
+        here->right = loads[0];
         for (int s = 0; s < n-1; s++) {
             *after = ClosedRow {};
             describeNew(y, s, current);
@@ -386,7 +415,7 @@ private:
                 addSegment(y, s, current, *here, *after);
             else {
                 here->lower = here->upper = Mat {};
-                after->right = f[s+1];
+                after->right = loads[s+1];
             }
             addTethers(y, s, tether, *here);
             if (s > 0) {
@@ -541,19 +570,9 @@ private:
         stretchCoordinate(pack.stretching, reciprocal, length-l0, coordinate, slope);
         stretchCoordinate(pack.stretching, reciprocal, 0.5*(segment.length+length)-l0, unused, middleSlope);
         const Real drag = property<Real>(pack, s, ChainPack::Extensional)/(segment.length*length*h);
-        Real tension = stiffness*middleSlope*(segment.theta*coordinate+(1-segment.theta)*segment.coordinate-
+        const Real tension = stiffness*middleSlope*(segment.theta*coordinate+(1-segment.theta)*segment.coordinate-
                 segment.randomCoordinate)+drag*(length-segment.length)-segment.randomTension;
         const Real response = stiffness*middleSlope*segment.theta*slope+drag*segment.length/length;
-        Vec carried = {}, turned = {};
-        if (settings.flow.present) {
-            const Vec u1 = velocityOf(settings.flow, pack.planar, (x[s]+y[s])*(0.5+Real{}));
-            const Vec u2 = velocityOf(settings.flow, pack.planar, (x[s+1]+y[s+1])*(0.5+Real{}));
-            const Vec sum = u1+u2, difference = u2-u1;
-            const Real along = direction.dot(difference);
-            carried = sum*acrossTrans+direction*((alongTrans-acrossTrans)*direction.dot(sum));
-            turned = (difference-direction*along)*(property<Real>(pack, s, ChainPack::Rotational)*inverseSquare);
-            tension -= drag*h*along;
-        }
         const Vec pull = direction*tension;
         const Real turning = 0.5*larger<Real>(segment.multiplier/length, -COMPRESSION*acrossTurn/h);
         const Mat elastic = Mat::axial(turning, -turning, t)+Mat::outer(direction*response, t);
@@ -564,8 +583,8 @@ private:
         after.diagonal = same+elastic;
         here.diagonal = here.diagonal+after.diagonal;
         here.lower = here.upper = other-elastic;
-        here.right = here.right-same*first-other*second+pull+carried-turned;
-        after.right = f[s+1]-same*second-other*first-pull+carried+turned;
+        here.right = here.right-same*first-other*second+pull;
+        after.right = loads[s+1]-same*second-other*first-pull;
     }
     /** Add the tethers of a node, the next ones, to its equations. */
     void addTethers(const Vec* y, int node, std::size_t& next, Row& row) {
