@@ -124,12 +124,14 @@ class CrosslinkTable:
         )
 
     def without(self, numbers):
-        """This table without crosslinks of some numbers; raises InputError for one that does not exist."""
+        """This table without some crosslinks; raises InputError for a number that is not there or named twice."""
         rows = np.searchsorted(self.numbers, numbers)
         known = rows < len(self)
         known[known] = self.numbers[rows[known]] == numbers[known]
         if not known.all():
             raise InputError(f"Crosslink {numbers[~known][0]} does not exist.")
+        if len(np.unique(numbers)) < len(numbers):
+            raise InputError("A crosslink to be removed is named twice.")
         rest = np.delete(np.arange(len(self)), rows)
         return replace(self, **{name: getattr(self, name)[rest] for name in _COLUMNS})
 

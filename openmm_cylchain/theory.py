@@ -242,8 +242,8 @@ def chain_extension(filament_type, segments, force, temperature):
 
     By transfer: with ``g(c) = int l^2 exp(-V_el/k_B T + F l c/k_B T) dl`` for a segment at the cosine c to e, and the
     bending weight ``exp(-V_b/k_B T)`` of two neighbours averaged over their azimuth, Z is a product of N - 1 integrals
-    over c and ``<R.e> = k_B T d ln Z/dF``. A freely jointed chain has N times the mean of l (coth u - 1/u), u = F l/k_B T,
-    with the weight ``l^2 exp(-V_el/k_B T) sinh(u)/u``.
+    over c and ``<R.e> = k_B T d ln Z/dF``. A freely jointed chain has N times the mean of l (coth u - 1/u) with the
+    weight ``l^2 exp(-V_el/k_B T) sinh(u)/u``, u = F l/k_B T.
 
     Parameters
     ----------
@@ -256,7 +256,9 @@ def chain_extension(filament_type, segments, force, temperature):
     kT = _thermal_energy_above_zero(temperature)
     forces = np.asarray(_not_negative(force, FORCE, "force")) / kT
     bending = _bending_transfer(filament_type, temperature)
-    return np.vectorize(lambda each: _extension(filament_type, segments, each, kT, *bending), otypes=[float])(forces)[()]
+    return np.vectorize(lambda each: _extension(filament_type, segments, each, kT, *bending), otypes=[float])(forces)[
+        ()
+    ]
 
 
 def _bending_transfer(filament_type, temperature):
