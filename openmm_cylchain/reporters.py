@@ -76,20 +76,12 @@ class _TableReporter(ABC):
 
 
 class FilamentsReporter(_TableReporter):
-    # What reporters of things that do not change in number have in common: arrays (reports, things).
+    """What reporters of things whose number does not change have in common: arrays (reports, things)."""
 
     def __init__(self, file, reportInterval, filaments, append=False):  # noqa: N803 - OpenMM's name
         self._filaments = filaments
         self._nodes = filaments.node_indices
         super().__init__(file, reportInterval, append)
-
-    def _table(self, simulation, state):
-        values = self._values(state.getPositions(asNumpy=True)._value)
-        return range(len(values)), values
-
-    @abstractmethod
-    def _values(self, positions):
-        """A row of numbers for each thing."""
 
     def __getitem__(self, column):
         """An array (reports, filaments or tethers) of a column."""
@@ -123,8 +115,10 @@ class FilamentReporter(FilamentsReporter):
     _columns = ("stretching_energy", "bending_energy", "end_to_end_distance", "contour_length")
     _thing = "filament"
 
-    def _values(self, positions):
-        return [_describe(filament.type, positions[nodes]) for filament, nodes in zip(self._filaments, self._nodes)]
+    def _table(self, simulation, state):
+        positions = state.getPositions(asNumpy=True)._value
+        rows = [_describe(filament.type, positions[nodes]) for filament, nodes in zip(self._filaments, self._nodes)]
+        return range(len(rows)), rows
 
 
 def _describe(filament_type, nodes):
@@ -157,12 +151,13 @@ class TetherReporter(FilamentsReporter):
             raise InputError("There are no tethers to report: call add_tether first.")
         super().__init__(file, reportInterval, filaments, append)
 
-    def _values(self, positions):
+    def _table(self, simulation, state):
+        positions = state.getPositions(asNumpy=True)._value
         rows = []
         for tether in self._filaments.tethers:
             extension = positions[self._nodes[tether.filament][tether.node]] - tether.point
             rows.append((*tether.point, *extension, *(-tether.stiffness * extension)))
-        return rows
+        return range(len(rows)), rows
 
 
 class CrosslinkReporter(_TableReporter):

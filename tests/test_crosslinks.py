@@ -439,7 +439,7 @@ def test_a_hundred_thousand_changes_and_steps_take_no_memory():
     assert sizes[-1] - sizes[1] < 2000, sizes
 
 
-BY_DEFAULT = [("portable", "midpoint", "particle"), ("compiled", "implicit", "filament")]
+BY_DEFAULT = [("compiled", "implicit", "filament"), ("compiled", "midpoint", "particle")]
 OTHERS = [(*which, partner) for which in ENGINE_SCHEMES for partner in ("particle", "filament")]
 OTHERS = [pytest.param(*which, marks=pytest.mark.slow) for which in OTHERS if which not in BY_DEFAULT]
 
