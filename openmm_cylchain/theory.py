@@ -237,6 +237,73 @@ def marko_siggia_extension(force, persistence_length, temperature):
     return np.where(reduced <= 1.0, extension, 1.0 - slack)[()]
 
 
+def chain_extension(filament_type, segments, force, temperature):
+    """Mean extension <R.e> in nm of the discrete chain whose ends are pulled apart by a constant force F e; exact.
+
+    By transfer: with ``g(c) = int l^2 exp(-V_el/k_B T + F l c/k_B T) dl`` for a segment at the cosine c to e, and the
+    bending weight ``exp(-V_b/k_B T)`` of two neighbours averaged over their azimuth, Z is a product of N - 1 integrals
+    over c and ``<R.e> = k_B T d ln Z/dF``. A freely jointed chain has N times the mean of l (coth u - 1/u) with the
+    weight ``l^2 exp(-V_el/k_B T) sinh(u)/u``, u = F l/k_B T.
+
+    Parameters
+    ----------
+    filament_type : FilamentType
+    segments : int
+    force : force, number or array, not negative
+    temperature : temperature, above zero
+    """
+    segments = whole_number(segments, 1, "segments")
+    kT = _thermal_energy_above_zero(temperature)
+    forces = np.asarray(_not_negative(force, FORCE, "force")) / kT
+    bending = _bending_transfer(filament_type, temperature)
+    return np.vectorize(lambda each: _extension(filament_type, segments, each, kT, *bending), otypes=[float])(forces)[
+        ()
+    ]
+
+
+def _bending_transfer(filament_type, temperature):
+    # Nodes and weights in c, and the azimuthal average of exp(-V_b/k_B T) between them by Legendre's addition theorem.
+    order = 48
+    cosines = JointAngleDistribution(filament_type, temperature)
+    if filament_type.joint_stiffness > 0.0:
+        # The n-th coefficient falls off as exp(-n^2/2s) for a joint of stiffness s k_B T.
+        bend = cosines.mean(lambda cosine: 1.0 - cosine)
+        order = max(order, int(9.0 / math.sqrt(bend)))
+    node, weight = np.polynomial.legendre.leggauss(2 * order)
+    if filament_type.joint_stiffness == 0.0:
+        return node, weight, np.full((len(node), len(node)), 0.5)
+    coefficients = [
+        cosines.mean(lambda cosine, n=n: np.polynomial.legendre.legval(cosine, np.eye(1, n + 1, n)[0]))
+        for n in range(order)
+    ]
+    polynomials = np.polynomial.legendre.legvander(node, order - 1)
+    scale = (np.arange(order) + 0.5) * np.array(coefficients)
+    return node, weight, (polynomials * scale) @ polynomials.T
+
+
+def _extension(filament_type, segments, force, kT, node, weight, bending):
+    width = math.sqrt(kT / filament_type.segment_stiffness)
+    rest = filament_type.segment_length
+    low, high = rest - 12.0 * width, rest + 12.0 * width + force * width**2 + 2.0 * width**2 / rest
+    if filament_type.maximum_extension is not None:
+        low, high = (rest + sign * filament_type.maximum_extension * (1.0 - 1e-12) for sign in (-1.0, 1.0))
+    gauss, gauss_weight = np.polynomial.legendre.leggauss(200)
+    low = max(low, 0.0)
+    length = low + 0.5 * (high - low) * (gauss + 1.0)
+    with np.errstate(divide="ignore"):
+        exponent = 2.0 * np.log(length) - filament_type.stretching_energy(length) / kT + np.outer(node, force * length)
+    density = gauss_weight * np.exp(exponent - exponent.max())
+    # Z and its derivative by F/k_B T together: one vector each, over the cosine of the segment reached.
+    pull, slope = density.sum(axis=1), node * (density @ length)
+    partition, derivative = pull, slope
+    for _ in range(segments - 1):
+        partition, derivative = bending @ (weight * partition), bending @ (weight * derivative)
+        partition, derivative = pull * partition, pull * derivative + slope * partition
+        scale = partition.max()
+        partition, derivative = partition / scale, derivative / scale
+    return (weight @ derivative) / (weight @ partition)
+
+
 def linear_force(extension, contour_length, segment_stiffness, segments):
     """Force of a straight chain of springs, eq. (35): ``F = (k/N)(<R.e> - L)``, in kJ/(mol nm).
 

@@ -111,12 +111,14 @@ def _flow_of_integrator(integrator):
     return Flow(tuple(velocity), [tuple(row) for row in gradient])
 
 
-def move_tether(context, index, tether, node_indices):
-    """Change a tether in a Context; see ``Filaments.move_tether``."""
+def move_tethers(context, tethers, node_indices):
+    """Change tethers, pairs of a number and a Tether, in a Context; see ``Filaments.move_tethers``."""
     for force in context.getSystem().getForces():
         if CylinderChainForce.isinstance(force):
             force = CylinderChainForce.cast(force)
-            force.setTetherParameters(index, tether.filament, tether.node, openmm.Vec3(*tether.point), tether.stiffness)
+            for index, tether in tethers:
+                point = openmm.Vec3(*tether.point)
+                force.setTetherParameters(index, tether.filament, tether.node, point, tether.stiffness)
             force.updateParametersInContext(context)
 
 

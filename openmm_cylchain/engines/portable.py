@@ -102,12 +102,13 @@ def add_tethers(system, tethers, node_indices, force_group):
     system.addForce(force)
 
 
-def move_tether(context, index, tether, node_indices):
-    """Change a tether in a Context; see ``Filaments.move_tether``."""
+def move_tethers(context, tethers, node_indices):
+    """Change tethers, pairs of a number and a Tether, in a Context; see ``Filaments.move_tethers``."""
     for force in context.getSystem().getForces():
         if force.getName() == TETHER_NAME:
-            node = int(node_indices[tether.filament][tether.node])
-            force.setParticleParameters(index, node, [*tether.point, tether.stiffness])
+            for index, tether in tethers:
+                node = int(node_indices[tether.filament][tether.node])
+                force.setParticleParameters(index, node, [*tether.point, tether.stiffness])
             force.updateParametersInContext(context)
 
 
