@@ -107,8 +107,8 @@ def remove_jumps(trajectory):
     """A copy of an mdtraj trajectory in which filaments are whole and go on from frame to frame without jumps.
 
     A filament's middle is taken to the image that is nearest to where it was in the frame before, so that it may leave
-    the box and mean-square displacements are those of its motion. Frames must be so close that no filament moves by half
-    a box between two of them.
+    the box and mean-square displacements are those of its motion. Frames must be so close that no filament moves by
+    half a box between two of them.
 
     Parameters
     ----------

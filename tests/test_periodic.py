@@ -1,4 +1,4 @@
-"""Filaments longer than their periodic box: whole after wrapping, restarts without jumps, and chains made whole again."""
+"""Filaments longer than their periodic box: wrapping, restarts without jumps, and chains made whole again."""
 
 import mdtraj
 import numpy as np

@@ -8,7 +8,7 @@ from .redistribution import ChainSet
 
 
 def advice_after_blow_up(system):
-    """What else to say of a chain that has blown up in a System: in a periodic one it may have been torn by wrapping."""
+    """What else to say of a chain that has blown up: in a periodic System it may have been torn by wrapping."""
     if not system.usesPeriodicBoundaryConditions():
         return ""
     return (
