@@ -10,7 +10,6 @@ from openmm import app, unit
 from .attachments import ATTACHMENT_NAME, add_virtual_site, attachment_positions, locate, neighbors
 from .engines import choose_engine, default_scheme, load_engine
 from .engines.description import describe_chains
-from .engines.redistribution import joint_tensions
 from .equilibrium import draw_chain
 from .errors import InputError
 from .filament import FilamentType
@@ -38,7 +37,7 @@ from .quantities import (
     positive,
     whole_number,
 )
-from .tension import segment_end_forces, split_external_forces
+from .tension import filament_tensions
 from .timestep import check_scheme, recommended_time_step, warn_if_unstable
 
 NODE_NAME = "NOD"
@@ -761,15 +760,13 @@ class Filaments:
         positions = state.getPositions(asNumpy=True)._value
         forces = state.getForces(asNumpy=True)._value
         chains = self.chain_set(context.getSystem())
-        ends = [segment_end_forces(filament, positions[nodes]) for filament, nodes in zip(self, self._nodes)]
-        minus = np.concatenate([minus for minus, plus in ends])
-        plus = np.concatenate([plus for minus, plus in ends])
-        nodes = np.concatenate(self._nodes)
-        minus, plus = split_external_forces(chains, forces[nodes], minus, plus)
-        tensions = joint_tensions(chains, positions[nodes], minus, plus, self._engine.flow_of(context))
-        boundaries = np.cumsum([filament.segments for filament in self._filaments])[:-1]
-        parts = np.split(tensions, boundaries)
-        return [(part if filament.closed else part[:-1]) * FORCE for filament, part in zip(self, parts)]
+        flow = self._engine.flow_of(context)
+        parts = filament_tensions(self._filaments, self._nodes, chains, positions, forces, flow)
+        return [part * FORCE for part in parts]
+
+    def flow(self, context):
+        """The Flow of the solvent in a Context, at rest where its integrator knows of none."""
+        return self._engine.flow_of(context)
 
 
 def _flag(value, name):

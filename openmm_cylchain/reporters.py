@@ -1,7 +1,11 @@
-"""Reporters of filaments, tethers and crosslinks, for ``simulation.reporters`` of OpenMM's app layer.
+"""Reporters of filaments, their tension, tethers and crosslinks, for ``simulation.reporters`` of OpenMM's app layer.
 
-They write CSV with a line for each filament, tether or crosslink and report, which tables and spreadsheets read as it
-is, and keep what they wrote as NumPy arrays.
+They write CSV with a line for each filament, joint, tether or crosslink and report, which tables and spreadsheets read
+as it is, and keep what they wrote as NumPy arrays. Positions are taken as they are, not wrapped into a periodic box.
+
+With ``append=True`` they go on with a file that exists; a line that a killed run has left unfinished is cut off. A run
+that goes on from a checkpoint older than its last report writes the reports in between once more, as OpenMM's reporters
+do: of lines with the same step, the last holds.
 """
 
 from abc import ABC, abstractmethod
@@ -12,6 +16,7 @@ import numpy as np
 from .errors import InputError
 from .geometry import segment_vectors
 from .quantities import whole_number
+from .tension import axial_tensions, filament_tensions
 
 
 class _TableReporter(ABC):
@@ -19,24 +24,29 @@ class _TableReporter(ABC):
 
     _columns = ()
     _thing = ""
+    _include = ("positions",)
 
     def __init__(self, file, reportInterval, append=False):  # noqa: N803 - OpenMM's name
         self._interval = whole_number(reportInterval, 1, "reportInterval")
         self._rows = []
         self._reports = []
+        self._file = None
         self._owned = isinstance(file, (str, Path))
+        header = ",".join(("step", "time_ps", self._thing, *self._columns))
         if self._owned:
+            if append:
+                _cut_unfinished_line(Path(file), header)
             file = open(file, "a" if append else "w", newline="")  # noqa: SIM115 - closed with the reporter
         elif file is not None and not hasattr(file, "write"):
             raise InputError(f"file must be a path, a file that is open for writing, or None, but is {file!r}.")
         self._file = file
         if file is not None and not (append and self._owned and file.tell() > 0):
-            print(",".join(("step", "time_ps", self._thing, *self._columns)), file=file)
+            print(header, file=file)
 
     def describeNextReport(self, simulation):  # noqa: N802 - OpenMM's name
         """When the next report is due, and that it needs positions; as OpenMM asks for it."""
         steps = self._interval - simulation.currentStep % self._interval
-        return {"steps": steps, "periodic": False, "include": ["positions"]}
+        return {"steps": steps, "periodic": False, "include": list(self._include)}
 
     def report(self, simulation, state):
         """Write a report; OpenMM calls it."""
@@ -53,7 +63,7 @@ class _TableReporter(ABC):
 
     @abstractmethod
     def _table(self, simulation, state):
-        """The numbers of all things, and a row of values for each."""
+        """What the line of each thing says it is, and a row of values for each."""
 
     @property
     def step(self):
@@ -74,6 +84,20 @@ class _TableReporter(ABC):
     def __del__(self):
         if getattr(self, "_owned", False):
             self.close()
+
+
+def _cut_unfinished_line(path, header):
+    if not path.exists():
+        return
+    with open(path, "r+b") as file:
+        end = 0
+        for line in file:
+            if not line.endswith(b"\n"):
+                break
+            if end == 0 and line.decode(errors="replace").strip() != header:
+                raise InputError(f"{path} is not a file of this reporter: its first line is not {header!r}.")
+            end += len(line)
+        file.truncate(end)
 
 
 class FilamentsReporter(_TableReporter):
@@ -127,6 +151,76 @@ def _describe(filament, nodes):
     contour_length = np.linalg.norm(segments, axis=1).sum()
     end_to_end_distance = 0.0 if filament.closed else np.linalg.norm(nodes[-1] - nodes[0])
     return *filament.energies(nodes), end_to_end_distance, contour_length
+
+
+class TensionReporter(FilamentsReporter):
+    """Reports the tension in filaments: the component of the virtual force Phi of a joint along the chain.
+
+    Phi, eqs. (22)-(24), is the force that the segment after a joint exerts on the one before it, of all forces but the
+    random ones; see ``Filaments.joint_tensions``. The direction of the chain at a joint is that of the sum of the unit
+    vectors along its two segments. Tension is positive, compression negative.
+
+    Columns: ``mean_tension``, ``minimum_tension`` and ``maximum_tension`` over the joints of a filament, or with
+    ``joints=True`` a line for each joint with ``tension``, all in kJ/(mol nm); 1 pN is 0.602214 of these. Filaments of
+    one segment have no joints and are left out. ``reporter["mean_tension"]`` is an array (reports, filaments with
+    joints), ``reporter["tension"]`` one of (reports, joints of all filaments), and ``reporter.places`` says which.
+
+    Parameters
+    ----------
+    file : str, Path, file object or None
+        None keeps the arrays alone.
+    reportInterval : int
+        In steps.
+    filaments : Filaments
+    append : bool
+        Go on with a file that exists.
+    joints : bool
+        Report every joint rather than every filament.
+
+    Raises
+    ------
+    InputError
+        If no filament has joints.
+
+    Examples
+    --------
+    >>> simulation.reporters.append(TensionReporter("tension.csv", 100, filaments))  # doctest: +SKIP
+    """
+
+    _include = ("positions", "forces")
+
+    def __init__(self, file, reportInterval, filaments, append=False, joints=False):  # noqa: N803 - OpenMM's name
+        self._joints = bool(joints)
+        if joints:
+            self._thing, self._columns = "filament,joint", ("tension",)
+            self.places = [(f, j) for f, filament in enumerate(filaments) for j in range(_joints(filament))]
+        else:
+            self._thing, self._columns = "filament", ("mean_tension", "minimum_tension", "maximum_tension")
+            self.places = [(number,) for number, filament in enumerate(filaments) if _joints(filament)]
+        if not self.places:
+            raise InputError("There are no tensions to report: filaments of one segment have no joints.")
+        self._chains = None
+        super().__init__(file, reportInterval, filaments, append)
+
+    def _table(self, simulation, state):
+        if self._chains is None:
+            self._chains = self._filaments.chain_set(simulation.system)
+        positions, forces = (values._value for values in (state.getPositions(True), state.getForces(True)))
+        flow = self._filaments.flow(simulation.context)
+        virtual = filament_tensions(self._filaments, self._nodes, self._chains, positions, forces, flow)
+        tensions = [
+            axial_tensions(positions[nodes], phi, filament.closed)
+            for filament, nodes, phi in zip(self._filaments, self._nodes, virtual)
+            if len(phi)
+        ]
+        labels = [",".join(map(str, place)) for place in self.places]
+        if self._joints:
+            return labels, [(tension,) for tension in np.concatenate(tensions)]
+        return labels, [(tension.mean(), tension.min(), tension.max()) for tension in tensions]
+
+
+def _joints(filament):
+    return len(filament.joint_stiffnesses)
 
 
 class TetherReporter(FilamentsReporter):

@@ -6,7 +6,7 @@ on the segment before the joint and how much on the one behind it.
 
 import numpy as np
 
-from .engines.redistribution import segment_forces_to_nodes
+from .engines.redistribution import joint_tensions, segment_forces_to_nodes
 from .geometry import joined, segment_vectors
 
 
@@ -62,3 +62,43 @@ def split_external_forces(chains, forces, minus, plus):
     np.add.at(neighbours, chains.second_node, 1.0)
     share = external / neighbours[:, None]
     return minus + share[chains.first_node], plus + share[chains.second_node]
+
+
+def filament_tensions(filaments, node_indices, chains, positions, forces, flow=None):
+    """Virtual forces Phi at the joints of all filaments, see ``Filaments.joint_tensions``.
+
+    Parameters
+    ----------
+    filaments : sequence of Filament
+    node_indices : sequence of int arrays
+        Particle indices of the nodes of each filament.
+    chains : ChainSet
+        The same filaments.
+    positions, forces : (particles, 3) arrays in nm and kJ/(mol nm)
+    flow : Flow, optional
+
+    Returns
+    -------
+    list of (joints, 3) arrays in kJ/(mol nm), one for each filament
+    """
+    ends = [segment_end_forces(one, positions[nodes]) for one, nodes in zip(filaments, node_indices)]
+    nodes = np.concatenate(node_indices)
+    minus, plus = (np.concatenate(one) for one in zip(*ends))
+    minus, plus = split_external_forces(chains, forces[nodes], minus, plus)
+    tensions = joint_tensions(chains, positions[nodes], minus, plus, flow)
+    boundaries = np.cumsum([filament.segments for filament in filaments])[:-1]
+    parts = np.split(tensions, boundaries)
+    return [part if filament.closed else part[:-1] for filament, part in zip(filaments, parts)]
+
+
+def axial_tensions(nodes, virtual_forces, closed=False):
+    """Components (joints,) of virtual forces (joints, 3) along a chain with nodes (n, 3), positive under tension.
+
+    The direction at a joint is that of the sum of the unit vectors along its two segments. Forces are in the order of
+    ``Filaments.joint_tensions``.
+    """
+    tangents = segment_vectors(nodes, closed)
+    tangents /= np.linalg.norm(tangents, axis=1)[:, None]
+    directions = tangents + np.roll(tangents, -1, axis=0)
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    return np.einsum("ij,ij->i", virtual_forces, directions[: len(virtual_forces)])

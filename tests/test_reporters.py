@@ -87,6 +87,42 @@ def test_files(simulated, tmp_path):
     assert memory["contour_length"].shape == (2, 2)
 
 
+def test_a_killed_run_leaves_no_broken_line(simulated, tmp_path):
+    filaments, simulation = simulated
+    path = tmp_path / "filaments.csv"
+    simulation.reporters.append(FilamentReporter(path, 1, filaments))
+    simulation.step(2)
+    complete = path.read_text()
+    for cut in (len(complete) - 1, len(complete) - 20, 30, 0):
+        path.write_text(complete[:cut])
+        simulation.reporters = [FilamentReporter(path, 1, filaments, append=True)]
+        simulation.step(1)
+        rows = _read(path)
+        assert list(rows[0]) == ["step", "time_ps", "filament", *COLUMNS]
+        assert all(None not in row.values() and None not in row for row in rows)
+        assert [int(row["filament"]) for row in rows[-2:]] == [0, 1]
+        assert int(rows[-1]["step"]) == simulation.currentStep
+        assert len(rows) == 2 + max(0, complete[:cut].count("\n") - 1)
+    with pytest.raises(InputError, match="filaments.csv is not a file of this reporter"):
+        TetherReporter(path, 1, filaments, append=True)
+    assert _read(path) == rows
+
+
+def test_a_run_that_goes_on_from_a_checkpoint_writes_the_same(simulated, tmp_path):
+    filaments, simulation = simulated
+    checkpoint = simulation.context.createCheckpoint()
+    tables = []
+    for parts in ((6,), (3, 3)):
+        simulation.context.loadCheckpoint(checkpoint)
+        path = tmp_path / f"{len(parts)}.csv"
+        for number, steps in enumerate(parts):
+            simulation.reporters = [FilamentReporter(path, 1, filaments, append=number > 0)]
+            simulation.step(steps)
+        tables.append(path.read_text())
+    assert tables[0] == tables[1]
+    assert np.isfinite([[float(value) for value in row.values()] for row in _read(path)]).all()
+
+
 def test_bad_input_is_refused(simulated, tmp_path):
     filaments, _ = simulated
     with pytest.raises(InputError, match="reportInterval must be at least 1"):

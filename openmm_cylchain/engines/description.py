@@ -7,6 +7,16 @@ from ..quantities import FRICTION, in_units_of
 from .redistribution import ChainSet
 
 
+def advice_after_blow_up(system):
+    """What else to say of a chain that has blown up: in a periodic System it may have been torn by wrapping."""
+    if not system.usesPeriodicBoundaryConditions():
+        return ""
+    return (
+        " If positions were wrapped into the periodic box particle by particle, make filaments whole first with "
+        "openmm_cylchain.periodic.make_whole."
+    )
+
+
 def filament_label(number, filament):
     """What to call a filament in messages."""
     return f"Filament {number} ({filament.type.name})"

@@ -13,7 +13,13 @@ from ..errors import InputError, InstabilityError
 from ..flow import Flow, as_flow
 from ..quantities import TEMPERATURE, TIME, non_negative, positive, whole_number
 from ..timestep import check_scheme
-from .description import describe_chains, describe_other_particles, filament_label, refuse_constraints
+from .description import (
+    advice_after_blow_up,
+    describe_chains,
+    describe_other_particles,
+    filament_label,
+    refuse_constraints,
+)
 
 
 def _load_plugin():
@@ -165,7 +171,8 @@ def create_integrator(
     nodes = [node for nodes in node_indices for node in nodes]
     others, frictions = describe_other_particles(system, nodes, particle_friction)
     labels = [filament_label(number, filament) for number, filament in enumerate(filaments)]
-    integrator = NativeIntegrator(bath_temperature, step_size, scheme, seed, labels, flow)
+    advice = advice_after_blow_up(system)
+    integrator = NativeIntegrator(bath_temperature, step_size, scheme, seed, labels, flow, advice)
     for particle, friction in zip(others, frictions):
         integrator.setParticleFriction(int(particle), float(friction))
     return integrator
@@ -186,6 +193,8 @@ class NativeIntegrator(CylinderChainIntegrator):
         What to call each chain in messages.
     flow : Flow, optional
         Of the solvent; at rest if not given.
+    advice : str
+        What else to say of a chain that has blown up.
 
     Raises
     ------
@@ -193,11 +202,12 @@ class NativeIntegrator(CylinderChainIntegrator):
         For an unknown scheme, a negative temperature or a step size that is not positive.
     """
 
-    def __init__(self, temperature, step_size, scheme="implicit", random_seed=0, labels=(), flow=None):
+    def __init__(self, temperature, step_size, scheme="implicit", random_seed=0, labels=(), flow=None, advice=""):
         temperature = non_negative(temperature, TEMPERATURE, "temperature")
         super().__init__(temperature, _OTHER_FRICTION, positive(step_size, TIME, "step_size"))
         check_scheme(scheme)
         self._labels = list(labels)
+        self._advice = advice
         self.setScheme(SCHEMES[scheme])
         self.setRandomNumberSeed(random_seed)
         self.setFlow(flow)
@@ -222,7 +232,7 @@ class NativeIntegrator(CylinderChainIntegrator):
         chain = re.match(r"Chain (\d+)", message)
         if chain is None or int(chain[1]) >= len(self._labels):
             return message
-        return self._labels[int(chain[1])] + message[chain.end() :]
+        return self._labels[int(chain[1])] + message[chain.end() :] + self._advice
 
     def setRandomNumberSeed(self, seed):
         """Set the seed of the noise; 0 draws one for each Context that is created."""

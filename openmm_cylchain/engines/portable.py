@@ -22,7 +22,13 @@ from ..geometry import joined
 from ..potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
 from ..quantities import BOLTZMANN, TEMPERATURE, TIME, non_negative, positive, whole_number
 from ..timestep import EXPLICIT_SCHEMES, check_scheme
-from .description import describe_chains, describe_other_particles, filament_label, refuse_constraints
+from .description import (
+    advice_after_blow_up,
+    describe_chains,
+    describe_other_particles,
+    filament_label,
+    refuse_constraints,
+)
 from .redistribution import STEPS
 
 REDISTRIBUTION_NAME = "CylinderChainRedistribution"
@@ -132,7 +138,8 @@ def create_integrator(
     others, frictions = describe_other_particles(system, nodes, particle_friction)
     rest_lengths = np.concatenate([np.full(one.segments, one.type.segment_length) for one in filaments])
     labels = [filament_label(number, filament) for number, filament in enumerate(filaments)]
-    computation = ChainDisplacements(chains, nodes, rest_lengths, labels, others, frictions)
+    advice = advice_after_blow_up(system)
+    computation = ChainDisplacements(chains, nodes, rest_lengths, labels, others, frictions, advice)
     group = add_redistribution(system, computation)
     return PortableIntegrator(system, group, bath_temperature, step_size, scheme, seed, flow)
 
@@ -271,15 +278,18 @@ class ChainDisplacements:
         Mobile particles outside chains.
     frictions : (others,) array
         Their friction coefficients in kJ ps/(mol nm^2).
+    advice : str
+        What else to say of a chain that has blown up.
     """
 
-    def __init__(self, chains, nodes, rest_lengths, labels, others, frictions):
+    def __init__(self, chains, nodes, rest_lengths, labels, others, frictions, advice=""):
         self._chains = chains
         self._nodes = nodes
         self._rest_lengths = rest_lengths
         self._labels = labels
         self._others = others
         self._frictions = frictions
+        self._advice = advice
         self._forces = {}
 
     def __getstate__(self):
@@ -351,7 +361,7 @@ class ChainDisplacements:
         raise InstabilityError(
             f"{self._labels[chain]} has blown up at segment {number} in step {steps_taken}: {what}. "
             "Positions are those before this step. Use a smaller time step, or look for overlapping particles "
-            "or excessive forces."
+            f"or excessive forces.{self._advice}"
         )
 
     def _check_others(self, result, steps_taken):
