@@ -122,7 +122,7 @@ class Flow:
 
 def flow_velocities(flow, positions):
     """Velocities (n, 3) of the solvent at positions (n, 3), as ``Flow.at`` but without its checks."""
-    return flow.velocity + (positions - flow.origin) @ np.transpose(flow.gradient)
+    return np.asarray(flow.velocity) + (np.asarray(positions) - flow.origin) @ np.transpose(flow.gradient)
 
 
 def as_flow(flow):

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from .equilibrium import JointAngleDistribution, SegmentLengthDistribution
+from .equilibrium import JointAngleDistribution, PlanarJointAngleDistribution, SegmentLengthDistribution
 from .errors import InputError
 from .friction import rotational_relaxation_time
 from .quantities import (
@@ -46,18 +46,23 @@ def _whole_numbers(value, minimum, name):
     return number
 
 
-def wlc_mean_square_end_to_end(contour_length, persistence_length):
+def wlc_mean_square_end_to_end(contour_length, persistence_length, planar=False):
     """Mean square end-to-end distance of the free WLC, eq. (25), in nm^2.
 
-    ``<R^2> = 2 lp^2 (L/lp - 1 + exp(-L/lp))``, accurate to rounding from rods to coils.
+    ``<R^2> = 2 lp^2 (L/lp - 1 + exp(-L/lp))``, accurate to rounding from rods to coils. In a plane, where tangents
+    decorrelate over 2 lp, ``8 lp^2 (L/2lp - 1 + exp(-L/2lp))``: eq. (44) of Chandran and Mofrad, Phys. Rev. E 2009, 79,
+    011906.
 
     Parameters
     ----------
     contour_length : length, number or array, not negative
     persistence_length : length, above zero
+        a/(k_B T), in space and in a plane.
+    planar : bool
+        In a plane.
     """
     length = _not_negative(contour_length, LENGTH, "contour_length")
-    ratio = np.asarray(length / positive(persistence_length, LENGTH, "persistence_length"))
+    ratio = np.asarray(length / _correlation_length(persistence_length, planar))
     # The closed form loses digits to cancellation for rods: 1 - x/3 + x^2/12 - ... there.
     series = sum(2.0 * (-1.0) ** n * np.minimum(ratio, 1.0) ** n / math.factorial(n + 2) for n in range(12))
     large = np.maximum(ratio, 0.1)
@@ -65,24 +70,33 @@ def wlc_mean_square_end_to_end(contour_length, persistence_length):
     return length**2 * np.where(ratio < 0.1, series, closed)[()]
 
 
-def wlc_tangent_correlation(contour_distance, persistence_length):
-    """Correlation of tangents of the WLC, ``<t(0).t(s)> = exp(-s/lp)``.
+def _correlation_length(persistence_length, planar):
+    # A tangent has one direction to turn to in a plane, two in space.
+    return (2.0 if planar else 1.0) * positive(persistence_length, LENGTH, "persistence_length")
+
+
+def wlc_tangent_correlation(contour_distance, persistence_length, planar=False):
+    """Correlation of tangents of the WLC, ``<t(0).t(s)> = exp(-s/lp)``, in a plane ``exp(-s/2lp)``.
 
     Parameters
     ----------
     contour_distance : length, number or array, not negative
     persistence_length : length, above zero
+    planar : bool
+        In a plane.
     """
     distance = _not_negative(contour_distance, LENGTH, "contour_distance")
-    return np.exp(-distance / positive(persistence_length, LENGTH, "persistence_length"))
+    return np.exp(-distance / _correlation_length(persistence_length, planar))
 
 
-def mean_joint_cosine(filament_type, temperature):
-    """Mean cosine <t1.t2> between neighbouring segments of the free discrete chain, exact."""
+def mean_joint_cosine(filament_type, temperature, planar=False):
+    """Mean cosine <t1.t2> between neighbouring segments of the free discrete chain, in space or in a plane; exact."""
+    if planar:
+        return float(PlanarJointAngleDistribution(filament_type, temperature).mean(np.cos))
     return float(JointAngleDistribution(filament_type, temperature).mean(lambda cosine: cosine))
 
 
-def chain_tangent_correlation(filament_type, lag, temperature):
+def chain_tangent_correlation(filament_type, lag, temperature, planar=False):
     """Correlation of tangents of the free discrete chain, ``<t(i).t(i+k)> = <c>^k``, exact.
 
     Parameters
@@ -91,8 +105,10 @@ def chain_tangent_correlation(filament_type, lag, temperature):
     lag : int or array of int, not negative
         The distance k along the chain in segments.
     temperature : temperature, above zero
+    planar : bool
+        In a plane.
     """
-    return mean_joint_cosine(filament_type, temperature) ** _whole_numbers(lag, 0, "lag")
+    return mean_joint_cosine(filament_type, temperature, planar) ** _whole_numbers(lag, 0, "lag")
 
 
 def chain_persistence_length(filament_type, temperature):
@@ -108,37 +124,40 @@ def chain_persistence_length(filament_type, temperature):
     return float(-length / np.log1p(-bend))
 
 
-def _subchain_mean_square(filament_type, segments, temperature):
+def _subchain_mean_square(filament_type, segments, temperature, planar):
     # <R^2> of every run of 1 to N segments: n<l^2> + 2<l>^2 sum_k (n-k) <c>^k.
-    distribution = SegmentLengthDistribution(filament_type, temperature)
+    distribution = SegmentLengthDistribution(filament_type, temperature, planar)
     mean, square = distribution.mean(lambda length: length), distribution.mean(lambda length: length**2)
-    powers = mean_joint_cosine(filament_type, temperature) ** np.arange(1, segments)
+    powers = mean_joint_cosine(filament_type, temperature, planar) ** np.arange(1, segments)
     pairs = np.concatenate([[0.0], np.cumsum(np.cumsum(powers))])
     return np.arange(1, segments + 1) * square + 2.0 * mean**2 * pairs
 
 
-def chain_mean_square_end_to_end(filament_type, segments, temperature):
+def chain_mean_square_end_to_end(filament_type, segments, temperature, planar=False):
     """Mean square end-to-end distance of the free discrete chain in nm^2, exact at any stiffness.
 
-    ``<R^2> = N <l^2> + 2 <l>^2 sum_k (N-k) <c>^k``, the averages over (19) and exp(-V_b/k_B T).
+    ``<R^2> = N <l^2> + 2 <l>^2 sum_k (N-k) <c>^k``, the averages over (19) and exp(-V_b/k_B T), or over what
+    they are in a plane.
 
     Parameters
     ----------
     filament_type : FilamentType
     segments : int
     temperature : temperature, above zero
+    planar : bool
+        In a plane.
     """
     segments = whole_number(segments, 1, "segments")
-    return float(_subchain_mean_square(filament_type, segments, temperature)[-1])
+    return float(_subchain_mean_square(filament_type, segments, temperature, planar)[-1])
 
 
-def chain_mean_square_radius_of_gyration(filament_type, segments, temperature):
+def chain_mean_square_radius_of_gyration(filament_type, segments, temperature, planar=False):
     """Mean square radius of gyration of the N+1 nodes of the free discrete chain in nm^2, exact.
 
     Every node has the same weight: ``<R_g^2> = sum over pairs <R_ij^2> / (N+1)^2``.
     """
     segments = whole_number(segments, 1, "segments")
-    distances = _subchain_mean_square(filament_type, segments, temperature)
+    distances = _subchain_mean_square(filament_type, segments, temperature, planar)
     return float(np.arange(segments, 0, -1) @ distances) / (segments + 1) ** 2
 
 
@@ -175,10 +194,7 @@ def chain_bending_mode_variance(filament_type, segments, mode, temperature):
     mode : int or array of int, from 1 to segments - 1
     temperature : temperature, above zero
     """
-    segments = whole_number(segments, 2, "segments")
-    modes = _whole_numbers(mode, 1, "mode")
-    if np.any(np.asarray(modes) >= segments):
-        raise InputError(f"mode must be below the number of segments, {segments}, but is {mode!r}.")
+    segments, modes = _bending_modes(segments, mode)
     cosines = np.cos(np.multiply.outer(modes, np.pi * (np.arange(segments) + 0.5) / segments))
     lag = np.abs(np.subtract.outer(np.arange(segments), np.arange(segments)))
     bend = JointAngleDistribution(filament_type, temperature).mean(lambda cosine: 1.0 - cosine)
@@ -187,6 +203,67 @@ def chain_bending_mode_variance(filament_type, segments, mode, temperature):
     np.fill_diagonal(decorrelation, 0.0)
     length = SegmentLengthDistribution(filament_type, temperature).mean(lambda length: length)
     return np.einsum("...i,ij,...j->...", cosines, decorrelation, cosines)[()] * length / segments
+
+
+def chain_planar_bending_mode_variance(filament_type, segments, mode, temperature):
+    """Variance of the amplitude of a bending mode of the free discrete chain in a plane, in nm; exact.
+
+    For the amplitude ``a_n = sqrt(2/L) l0 sum_i theta_i cos(n pi (i + 1/2)/N)`` of the tangent angles theta_i (i =
+    0..N-1, L = N l0), which are sums of independent joint angles theta,
+
+        <a_n^2> = l0 <theta^2>/(4 sin^2(n pi/(2N)))
+
+    For n << N and stiff joints it is the ``bending_mode_variance`` of the WLC.
+
+    Parameters
+    ----------
+    filament_type : FilamentType
+    segments : int
+    mode : int or array of int, from 1 to segments - 1
+    temperature : temperature, above zero
+    """
+    segments, modes = _bending_modes(segments, mode)
+    square = PlanarJointAngleDistribution(filament_type, temperature).mean(lambda angle: angle**2)
+    return filament_type.segment_length * square / (4.0 * np.sin(0.5 * np.pi * modes / segments) ** 2)
+
+
+def _bending_modes(segments, mode):
+    segments = whole_number(segments, 2, "segments")
+    modes = _whole_numbers(mode, 1, "mode")
+    if np.any(np.asarray(modes) >= segments):
+        raise InputError(f"mode must be below the number of segments, {segments}, but is {mode!r}.")
+    return segments, modes
+
+
+def clamped_angle_variance(contour_distance, persistence_length):
+    """Variance of the tangent angle of a WLC that is clamped at one end: ``s/lp`` at the distance s from there.
+
+    Eq. (42) of Chandran and Mofrad, Phys. Rev. E 2009, 79, 011906. In space it holds for small angles, in either
+    transverse plane; for motion in a plane it is exact.
+
+    Parameters
+    ----------
+    contour_distance : length, number or array, not negative
+    persistence_length : length, above zero
+    """
+    distance = _not_negative(contour_distance, LENGTH, "contour_distance")
+    return distance / positive(persistence_length, LENGTH, "persistence_length")
+
+
+def clamped_deflection_variance(contour_distance, persistence_length):
+    """Variance of the deflection of a WLC that is clamped at one end, ``s^3/(3 lp)``, in nm^2.
+
+    It holds for small angles, in either transverse plane. Eq. (43) of Chandran and Mofrad, Phys. Rev. E 2009, 79,
+    011906, has the factor 32/pi^4 for 1/3.
+
+    Parameters
+    ----------
+    contour_distance : length, number or array, not negative
+        s, from the clamp.
+    persistence_length : length, above zero
+    """
+    distance = _not_negative(contour_distance, LENGTH, "contour_distance")
+    return distance**3 / (3.0 * positive(persistence_length, LENGTH, "persistence_length"))
 
 
 def marko_siggia_force(relative_extension, persistence_length, temperature):
@@ -368,20 +445,25 @@ def crossover_force(contour_length, persistence_length, segment_stiffness, segme
     return (0.5 * spring * length) ** (2.0 / 3.0) * scale ** (1.0 / 3.0)
 
 
-def bending_energy_mean(filament_type, temperature):
+def bending_energy_mean(filament_type, temperature, planar=False):
     """Mean bending energy of one joint at equilibrium, in kJ/mol; exact for every bending model.
 
     Inscribed circle: eq. (40), ``x k_B T (E_1(x)/E_2(x) - 1)`` with x = 2 lp/l0. Kratky-Porod:
     ``k_B T (1 - 2u/(exp(2u) - 1))`` with u = lp/l0. Quadratic: by quadrature. A freely jointed chain has 0;
     stiff chains tend to k_B T, and the inscribed circle to ``k_B T (1 - l0/lp)``: the limit printed below
-    (41), k_B T/(1 - l0/lp), has the wrong sign before l0/lp.
+    (41), k_B T/(1 - l0/lp), has the wrong sign before l0/lp. In a plane: by quadrature; it tends to k_B T/2.
 
     Parameters
     ----------
     filament_type : FilamentType
     temperature : temperature, above zero
+    planar : bool
+        In a plane.
     """
     kT = _thermal_energy_above_zero(temperature)
+    if planar:
+        distribution = PlanarJointAngleDistribution(filament_type, temperature)
+        return float(distribution.mean(lambda angle: filament_type.bending_energy(np.cos(angle))))
     return kT * _reduced_bending_moments(filament_type, kT)[0]
 
 
@@ -441,20 +523,26 @@ def _moments(values, weights):
     return mean, weights @ (values - mean) ** 2 / weights.sum()
 
 
-def stretching_energy_mean(filament_type, temperature):
+def stretching_energy_mean(filament_type, temperature, planar=False):
     """Mean stretching energy of one segment at equilibrium, in kJ/mol; exact.
 
     Averages over (19), rho(l) ~ l^2 exp(-V_el/k_B T). Harmonic: ``(k_B T/2)(1 + 2/(s^2 + 1))`` with
     s^2 = k l0^2/k_B T, up to terms in exp(-s^2/2) that are included. The printed (42) and its variance weigh
     with l where (19) has l^2, and so miss the term 2/(s^2 + 1); the printed expansion of (42) also has the
-    wrong sign before its exponential, and the printed variance lacks a sqrt(pi) in the denominator. FENE: by
-    quadrature.
+    wrong sign before its exponential, and the printed variance lacks a sqrt(pi) in the denominator. FENE, and all
+    filaments in a plane, with rho(l) ~ l exp(-V_el/k_B T): by quadrature.
 
     Parameters
     ----------
     filament_type : FilamentType
     temperature : temperature, above zero
+    planar : bool
+        In a plane.
     """
+    if planar:
+        return float(
+            SegmentLengthDistribution(filament_type, temperature, planar).mean(filament_type.stretching_energy)
+        )
     return _stretching_moments(filament_type, temperature)[0]
 
 

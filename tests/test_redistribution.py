@@ -27,19 +27,20 @@ def _bent_chain(kind, segments, seed):
     return np.concatenate([np.zeros((1, 3)), np.cumsum(lengths * tangents, axis=0)]) + generator.normal(size=3) * 50
 
 
-def _dense_resistance(nodes, friction):
+def _dense_resistance(nodes, friction, closed=False):
     """Z assembled segment by segment from the four friction coefficients."""
     count = len(nodes)
     resistance = np.zeros((3 * count, 3 * count))
-    for segment in range(count - 1):
-        difference = nodes[segment + 1] - nodes[segment]
+    for segment in range(count if closed else count - 1):
+        following = (segment + 1) % count
+        difference = nodes[following] - nodes[segment]
         length = np.linalg.norm(difference)
         tangent = difference / length
         trans = _project(tangent, friction.parallel, friction.perpendicular)
         dr = _project(tangent, friction.extensional, friction.rotational) / length**2
         same, other = trans / 4 + dr, trans / 4 - dr
-        block = slice(3 * segment, 3 * segment + 6)
-        resistance[block, block] += np.block([[same, other], [other, same]])
+        block = np.concatenate([3 * segment + np.arange(3), 3 * following + np.arange(3)])
+        resistance[np.ix_(block, block)] += np.block([[same, other], [other, same]])
     return resistance
 
 
