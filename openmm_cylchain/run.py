@@ -18,6 +18,7 @@ from .physical_units import format_time
 from .progress import Progress
 from .quantities import thermal_energy
 from .run_directory import Checkpoint, EnergyTable, RunDirectory, TrajectoryFile, write_atomically
+from .structure_files import write_lammps_data, write_psf
 from .theory import chain_mean_square_end_to_end
 from .timestep import LARGEST_DIVIDED_SHARE
 
@@ -35,9 +36,10 @@ class RunInterrupted(Exception):  # noqa: N818 - not an error
 def run(configuration, output, resume=False):
     """Run a configuration, or continue it, until its end.
 
-    Files in the output directory: ``configuration.toml``, ``topology.cif``, ``trajectory.dcd`` (the initial
-    configuration and one frame per report interval), ``energies.csv`` and ``checkpoint.chk``. A resumed run
-    ends with the same frames, to the bit, as one that was never interrupted.
+    Files in the output directory: ``configuration.toml``, ``topology.cif``, the same for VMD (``topology.psf``) and
+    OVITO (``topology.data``), ``trajectory.dcd`` (the initial configuration and one frame per report interval),
+    ``energies.csv`` and ``checkpoint.chk``. A resumed run ends with the same frames, to the bit, as one that was never
+    interrupted.
 
     Parameters
     ----------
@@ -66,7 +68,7 @@ def run(configuration, output, resume=False):
         if checkpoint is None:
             if resume:
                 print("No checkpoint yet: starting from the beginning.")
-            _write_topology(directory, simulation.topology, positions)
+            _write_topology(directory, simulation, positions)
             simulation.context.setPositions(positions)
         else:
             _restore(simulation.context, checkpoint, filaments.engine)
@@ -187,10 +189,15 @@ def _platform(settings):
     return platform, properties
 
 
-def _write_topology(directory, topology, positions):
-    text = io.StringIO()
-    app.PDBxFile.writeFile(topology, positions, text, keepIds=True)
-    write_atomically(directory.topology, text.getvalue().encode())
+def _write_topology(directory, simulation, positions):
+    topology, system = simulation.topology, simulation.system
+    mmcif, psf, data = io.StringIO(), io.StringIO(), io.StringIO()
+    app.PDBxFile.writeFile(topology, positions, mmcif, keepIds=True)
+    write_psf(topology, psf, system)
+    write_lammps_data(topology, positions, data, system)
+    paths = (directory.topology, directory.topology_psf, directory.topology_data)
+    for path, text in zip(paths, (mmcif, psf, data)):
+        write_atomically(path, text.getvalue().encode())
 
 
 def _restore(context, checkpoint, engine):

@@ -71,6 +71,8 @@ class RunDirectory:
         self.path = Path(path)
         self.configuration = self.path / "configuration.toml"
         self.topology = self.path / "topology.cif"
+        self.topology_psf = self.path / "topology.psf"
+        self.topology_data = self.path / "topology.data"
         self.trajectory = self.path / "trajectory.dcd"
         self.energies = self.path / "energies.csv"
         self.checkpoint = self.path / "checkpoint.chk"

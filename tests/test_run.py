@@ -111,6 +111,8 @@ def test_files_of_a_run(unbroken):
         "summary.json",
         "summary.png",
         "topology.cif",
+        "topology.data",
+        "topology.psf",
         "trajectory.dcd",
     }
     assert (unbroken / "configuration.toml").read_text() == SHORT
