@@ -2,7 +2,8 @@
 
 Filaments may be longer than the box and cross it. Forces along a chain take its positions as they are, and what OpenMM
 wraps (``enforcePeriodicBox``) it shifts as a whole, so nothing has to be done. Other programs wrap every particle or
-residue by itself. Such positions must be made whole before a simulation starts from them and before they are analysed.
+residue by itself. Such positions must be made whole before a simulation starts from them, which pulls torn filaments
+together otherwise, or stops, and before they are analysed.
 
 Images of a node differ by lattice vectors, and no lattice vector is shorter than the narrowest width of the box, the
 least of the diagonal elements of its vectors. So there is one image at most that is nearer to the node before it than

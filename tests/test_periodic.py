@@ -117,7 +117,7 @@ def test_wrapping_shifts_whole_filaments_and_restarts_do_not_jump(engine, platfo
 
 
 @pytest.mark.parametrize("scheme", ["euler", "midpoint"])
-def test_filaments_that_were_torn_are_refused_at_the_first_step(engine, scheme):
+def test_torn_filaments_blow_up_with_advice(engine, scheme):
     filaments, _, system, positions = crossing(engine, CUBIC)
     integrator = filaments.create_integrator(system, 5e3, scheme=scheme, particle_friction=1e4)
     context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
