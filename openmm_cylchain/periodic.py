@@ -62,7 +62,7 @@ def make_whole(positions, filaments, box_vectors):
     vectors = _lattice(box_vectors, len(frames))
     for number, (filament, nodes) in enumerate(zip(filaments, filaments.node_indices)):
         label = filament_label(number, filament)
-        _refuse_ambiguous(np.full((1, 1), filament.type.segment_length), vectors[:1], f"{label} at rest:")
+        _refuse_ambiguous(np.full((len(frames), 1), filament.type.segment_length), vectors, f"{label} at rest")
         frames[:, nodes] = _whole_chains(frames[:, nodes], vectors, label)
     for attachment, particle in zip(filaments.attachments, filaments.attachment_indices):
         nodes = filaments.node_indices[attachment.filament]
@@ -185,7 +185,7 @@ def _whole_chains(nodes, vectors, label):
     counts = np.cumsum(_images_between(np.diff(nodes, axis=1), vectors), axis=1)
     whole = nodes.copy()
     whole[:, 1:] -= _lattice_sums(counts, vectors)
-    _refuse_ambiguous(np.linalg.norm(np.diff(whole, axis=1), axis=2), vectors, f"{label}:")
+    _refuse_ambiguous(np.linalg.norm(np.diff(whole, axis=1), axis=2), vectors, label)
     return whole
 
 
@@ -194,8 +194,9 @@ def _refuse_ambiguous(lengths, vectors, label):
     too_long = lengths >= 0.5 * widths[:, None]
     if np.any(too_long):
         frame, segment = np.argwhere(too_long)[0]
+        where = f" in frame {frame}" if len(vectors) > 1 else ""
         raise InputError(
-            f"{label} segment {segment} is {lengths[frame, segment]:.4g} nm long, and the box {widths[frame]:.4g} nm "
+            f"{label}{where}: segment {segment} is {lengths[frame, segment]:.4g} nm long, and the box {widths[frame]:.4g} nm "
             "wide. Only segments shorter than half the box can be made whole: check the box vectors, or take shorter "
             "segments."
         )

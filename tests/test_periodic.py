@@ -151,6 +151,9 @@ def test_make_whole_takes_frames_with_boxes_of_their_own():
     whole = make_whole(torn, filaments, boxes)._value
     for frame, box, result in zip(torn, boxes, whole):
         assert np.array_equal(result, make_whole(frame, filaments, box)._value)
+    boxes[1] = 700 * np.eye(3)
+    with pytest.raises(InputError, match=r"Filament 0 \(ACT\) at rest in frame 1: segment 0 is 360 nm long"):
+        make_whole(torn, filaments, boxes)
 
 
 def _trajectory(vectors, frames):
