@@ -2,7 +2,7 @@
 
 A filament is a chain of the topology; its nodes are the atoms of that chain with the name "NOD", in order.
 Anything else in the trajectory is left alone. Positions have to be those of whole filaments, not wrapped
-into a periodic box. Results are plain numbers in OpenMM's units (nm, ps).
+into a periodic box (``periodic`` makes them whole). Results are plain numbers in OpenMM's units (nm, ps).
 
 Every function takes ``filaments``: one index or a list of indices into ``filament_nodes``, all filaments if
 not given. Data per filament come as an array with the axes (frames, filaments); data per segment, joint or

@@ -2,7 +2,8 @@
 
 Filaments may be longer than the box and cross it. Forces along a chain take its positions as they are, and what OpenMM
 wraps (``enforcePeriodicBox``) it shifts as a whole, so nothing has to be done. Other programs wrap every particle or
-residue by itself. Such positions must be made whole before a simulation starts from them and before they are analysed.
+residue by itself. Such positions must be made whole before a simulation starts from them, which pulls torn filaments
+together otherwise, or stops, and before they are analysed.
 
 Images of a node differ by lattice vectors, and no lattice vector is shorter than the narrowest width of the box, the
 least of the diagonal elements of its vectors. So there is one image at most that is nearer to the node before it than
@@ -61,7 +62,7 @@ def make_whole(positions, filaments, box_vectors):
     vectors = _lattice(box_vectors, len(frames))
     for number, (filament, nodes) in enumerate(zip(filaments, filaments.node_indices)):
         label = filament_label(number, filament)
-        _refuse_ambiguous(np.full((1, 1), filament.type.segment_length), vectors[:1], f"{label} at rest:")
+        _refuse_ambiguous(np.full((len(frames), 1), filament.type.segment_length), vectors, f"{label} at rest")
         frames[:, nodes] = _whole_chains(frames[:, nodes], vectors, label)
     for attachment, particle in zip(filaments.attachments, filaments.attachment_indices):
         nodes = filaments.node_indices[attachment.filament]
@@ -184,7 +185,7 @@ def _whole_chains(nodes, vectors, label):
     counts = np.cumsum(_images_between(np.diff(nodes, axis=1), vectors), axis=1)
     whole = nodes.copy()
     whole[:, 1:] -= _lattice_sums(counts, vectors)
-    _refuse_ambiguous(np.linalg.norm(np.diff(whole, axis=1), axis=2), vectors, f"{label}:")
+    _refuse_ambiguous(np.linalg.norm(np.diff(whole, axis=1), axis=2), vectors, label)
     return whole
 
 
@@ -193,8 +194,9 @@ def _refuse_ambiguous(lengths, vectors, label):
     too_long = lengths >= 0.5 * widths[:, None]
     if np.any(too_long):
         frame, segment = np.argwhere(too_long)[0]
+        where = f" in frame {frame}" if len(vectors) > 1 else ""
         raise InputError(
-            f"{label} segment {segment} is {lengths[frame, segment]:.4g} nm long, and the box {widths[frame]:.4g} nm "
+            f"{label}{where}: segment {segment} is {lengths[frame, segment]:.4g} nm long, and the box {widths[frame]:.4g} nm "
             "wide. Only segments shorter than half the box can be made whole: check the box vectors, or take shorter "
             "segments."
         )

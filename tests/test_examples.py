@@ -1,5 +1,6 @@
 """The Python examples run, in a process of their own, and write what they say."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -16,8 +17,11 @@ CASES = [
     ("lennard_jones_box", "box", 40, 40, 150 + 8, 7),
     ("two_filament_types", "filaments", 50, 50, 16 * (49 + 17), 16 * (48 + 16)),
     ("clamped_filament", "filaments", 200, 100, 4 * 8, 4 * 7),
+    ("periodic_box", "periodic", 40, 40, 60 + 8 * 17, 8 * 16),
     ("filaments_in_a_vesicle", "vesicle", 40, 40, 24 + 24 * (13 + 1), 24 * 12),
 ]
+# What an example writes beside the files that all of them write.
+MORE_FILES = {"periodic_box": ["periodic.psf"]}
 
 
 def run(name, folder, steps):
@@ -43,7 +47,8 @@ def test_example(name, stem, steps, frames, particles, bonds, tmp_path):
     assert 3 <= len(process.stdout.splitlines()) <= 12
     assert str(folder) in process.stdout
     assert "nan" not in process.stdout
-    assert sorted(path.name for path in folder.iterdir()) == [f"{stem}.cif", f"{stem}.dcd", f"{stem}.png"]
+    files = [f"{stem}.cif", f"{stem}.dcd", f"{stem}.png", *MORE_FILES.get(name, [])]
+    assert sorted(path.name for path in folder.iterdir()) == sorted(files)
 
     structure = mdtraj.load(str(folder / f"{stem}.cif"))
     assert (structure.n_atoms, structure.topology.n_bonds) == (particles, bonds)
@@ -66,3 +71,15 @@ def test_clamped_nodes_stay_and_tips_rise_with_the_force(tmp_path):
     tips = nodes[:, -1, 2]
     assert (np.diff(tips) > 0).all()
     assert tips[0] > 0
+
+
+def test_wrapped_filaments_are_whole_and_a_psf_has_their_bonds(tmp_path):
+    folder = tmp_path / "results"
+    process = run("periodic_box", folder, 40)
+    assert process.returncode == 0
+    wrapped, torn, whole = (float(number) for number in re.findall(r"(\d+\.\d) nm", process.stdout)[:3])
+    assert wrapped == whole < 380 and torn > 1000
+    trajectory = mdtraj.load(str(folder / "periodic.dcd"), top=str(folder / "periodic.psf"))
+    bonds = np.array([(first.index, second.index) for first, second in trajectory.topology.bonds])
+    lengths = np.linalg.norm(trajectory.xyz[:, bonds[:, 1]] - trajectory.xyz[:, bonds[:, 0]], axis=2)
+    assert lengths.shape == (40, 128) and lengths.max() < 380

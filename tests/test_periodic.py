@@ -117,7 +117,7 @@ def test_wrapping_shifts_whole_filaments_and_restarts_do_not_jump(engine, platfo
 
 
 @pytest.mark.parametrize("scheme", ["euler", "midpoint"])
-def test_filaments_that_were_torn_are_refused_at_the_first_step(engine, scheme):
+def test_torn_filaments_blow_up_with_advice(engine, scheme):
     filaments, _, system, positions = crossing(engine, CUBIC)
     integrator = filaments.create_integrator(system, 5e3, scheme=scheme, particle_friction=1e4)
     context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
@@ -151,6 +151,9 @@ def test_make_whole_takes_frames_with_boxes_of_their_own():
     whole = make_whole(torn, filaments, boxes)._value
     for frame, box, result in zip(torn, boxes, whole):
         assert np.array_equal(result, make_whole(frame, filaments, box)._value)
+    boxes[1] = 700 * np.eye(3)
+    with pytest.raises(InputError, match=r"Filament 0 \(ACT\) at rest in frame 1: segment 0 is 360 nm long"):
+        make_whole(torn, filaments, boxes)
 
 
 def _trajectory(vectors, frames):
