@@ -25,6 +25,7 @@ import numpy as np
 import openmm
 
 from .errors import InputError
+from .geometry import to_nearest_images
 from .potentials import STRETCHING_POTENTIALS
 from .quantities import LENGTH, STIFFNESS, non_negative, positive, whole_number
 
@@ -152,10 +153,7 @@ class CrosslinkTable:
         """Vectors (n, 3) from first to second particles, to nearest images in a box (3, 3) if one is given."""
         ends = positions[self.particles]
         vectors = ends[len(self) :] - ends[: len(self)]
-        if box is not None:
-            for axis in (2, 1, 0):
-                vectors -= np.round(vectors[:, axis] / box[axis, axis])[:, None] * box[axis]
-        return vectors
+        return vectors if box is None else to_nearest_images(vectors, box)
 
 
 class _TableRegistry:

@@ -1,4 +1,4 @@
-"""Vectors along the segments of a chain and cosines of its joints, for open chains and rings.
+"""Vectors along the segments of a chain and cosines of its joints, for open chains and rings; nearest images.
 
 Segment s of a chain with n nodes joins the nodes s and s + 1. An open chain has n - 1 segments, and its joint j is at
 node j + 1. A ring has n: its last segment leads back to node 0, and its joint j is at node j, between the segments
@@ -11,6 +11,14 @@ import numpy as np
 def segment_vectors(nodes, closed=False):
     """Vectors from the minus to the plus end of all segments of a chain with node positions (n, 3)."""
     return np.diff(nodes, axis=0, append=nodes[:1]) if closed else np.diff(nodes, axis=0)
+
+
+def to_nearest_images(vectors, box):
+    """Vectors (n, 3) between the nearest images of points in a box with the reduced vectors (3, 3)."""
+    nearest = np.array(vectors)
+    for axis in (2, 1, 0):
+        nearest -= np.round(nearest[:, axis] / box[axis, axis])[:, None] * box[axis]
+    return nearest
 
 
 def joined(segments, closed=False):

@@ -15,6 +15,7 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 # Name, stem of the files, steps of a short run and its frames, particles and bonds.
 CASES = [
     ("lennard_jones_box", "box", 40, 40, 150 + 8, 7),
+    ("mixed_system", "mixed", 40, 40, 60 + 8 * (11 + 5) + 3 * 6, 8 * 10 + 3 * 5),
     ("two_filament_types", "filaments", 50, 50, 16 * (49 + 17), 16 * (48 + 16)),
     ("clamped_filament", "filaments", 200, 100, 4 * 8, 4 * 7),
     ("periodic_box", "periodic", 40, 40, 60 + 8 * 17, 8 * 16),

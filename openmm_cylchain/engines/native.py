@@ -113,8 +113,8 @@ def flow_of(context):
 
 
 def _flow_of_integrator(integrator):
-    velocity, *gradient = (vector._value for vector in CylinderChainIntegrator.getFlow(integrator))
-    return Flow(tuple(velocity), [tuple(row) for row in gradient])
+    velocity, *gradient, origin = (tuple(vector._value) for vector in CylinderChainIntegrator.getFlow(integrator))
+    return Flow(velocity, gradient, origin)
 
 
 def move_tethers(context, tethers, node_indices):
@@ -242,11 +242,10 @@ class NativeIntegrator(CylinderChainIntegrator):
         super().setRandomNumberSeed(seed)
 
     def getFlow(self):
-        """The Flow of the solvent; its origin is that of coordinates."""
+        """The Flow of the solvent."""
         return _flow_of_integrator(self)
 
     def setFlow(self, flow):
         """Set the Flow of the solvent; None brings it to rest."""
         flow = as_flow(flow)
-        velocity = flow.at([0.0, 0.0, 0.0])
-        super().setFlow(openmm.Vec3(*velocity.tolist()), *(openmm.Vec3(*row) for row in flow.gradient))
+        super().setFlow(*(openmm.Vec3(*vector) for vector in (flow.velocity, *flow.gradient, flow.origin)))

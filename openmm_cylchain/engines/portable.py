@@ -18,7 +18,7 @@ from openmm import unit
 
 from ..errors import InputError, InstabilityError
 from ..flow import Flow, as_flow, flow_velocities
-from ..geometry import joined
+from ..geometry import joined, to_nearest_images
 from ..potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
 from ..quantities import BOLTZMANN, TEMPERATURE, TIME, non_negative, positive, whole_number
 from ..timestep import EXPLICIT_SCHEMES, check_scheme
@@ -139,7 +139,8 @@ def create_integrator(
     rest_lengths = np.concatenate([np.full(one.segments, one.type.segment_length) for one in filaments])
     labels = [filament_label(number, filament) for number, filament in enumerate(filaments)]
     advice = advice_after_blow_up(system)
-    computation = ChainDisplacements(chains, nodes, rest_lengths, labels, others, frictions, advice)
+    periodic = system.usesPeriodicBoundaryConditions()
+    computation = ChainDisplacements(chains, nodes, rest_lengths, labels, others, frictions, advice, periodic)
     group = add_redistribution(system, computation)
     return PortableIntegrator(system, group, bath_temperature, step_size, scheme, seed, flow)
 
@@ -280,9 +281,11 @@ class ChainDisplacements:
         Their friction coefficients in kJ ps/(mol nm^2).
     advice : str
         What else to say of a chain that has blown up.
+    periodic : bool
+        Whether a flow is that at the images nearest to its origin.
     """
 
-    def __init__(self, chains, nodes, rest_lengths, labels, others, frictions, advice=""):
+    def __init__(self, chains, nodes, rest_lengths, labels, others, frictions, advice="", periodic=False):
         self._chains = chains
         self._nodes = nodes
         self._rest_lengths = rest_lengths
@@ -290,6 +293,7 @@ class ChainDisplacements:
         self._others = others
         self._frictions = frictions
         self._advice = advice
+        self._periodic = periodic
         self._forces = {}
 
     def __getstate__(self):
@@ -309,14 +313,24 @@ class ChainDisplacements:
         if phase == _FORCES:
             self._forces[thread] = np.array(vectors)
         elif phase == _CONFIGURATION and thread in self._forces:
-            self._displace(result, vectors, self._forces.pop(thread), parameters)
+            flow = _flow_from_values(tuple(parameters[name] for name in _FLOW)) if parameters[_FLOWS] else None
+            if flow is not None and self._periodic:
+                vectors = self._near_origin(vectors, flow, state.getPeriodicBoxVectors(asNumpy=True)._value)
+            self._displace(result, vectors, self._forces.pop(thread), parameters, flow)
         return 0.0, result
 
-    def _displace(self, result, positions, forces, parameters):
+    def _near_origin(self, positions, flow, box):
+        # Images of chains, as a whole, and of other particles that are nearest to the origin of a flow.
+        first, images = self._nodes[self._chains.start_of_chain], np.array(positions)
+        shifts = to_nearest_images(positions[first] - flow.origin, box) + flow.origin - positions[first]
+        images[self._nodes] += np.repeat(shifts, self._chains.node_counts, axis=0)
+        images[self._others] = to_nearest_images(positions[self._others] - flow.origin, box) + flow.origin
+        return images
+
+    def _displace(self, result, positions, forces, parameters, flow):
         kT, step = parameters[_KT], parameters[_STEP_SIZE]
         steps_taken = int(parameters[_STEPS_TAKEN])
         chains = self._chains
-        flow = _flow_from_values(tuple(parameters[name] for name in _FLOW)) if parameters[_FLOWS] else None
         gaussian = _gaussian_vectors(int(parameters[_SEED]), steps_taken, 2 * chains.segment_count + len(self._others))
         translational, rotational, other = np.split(gaussian, [chains.segment_count, 2 * chains.segment_count])
         advance = STEPS[EXPLICIT_SCHEMES[int(parameters[_SCHEME])]]
@@ -333,7 +347,8 @@ class ChainDisplacements:
         result[self._others] = step / friction * forces[self._others] + np.sqrt(2.0 * kT * step / friction) * other
         if flow is not None:
             # The velocity half-way, so that particles keep to closed streamlines.
-            halfway = positions[self._others] + 0.5 * step * flow_velocities(flow, positions[self._others])
+            start = positions[self._others]
+            halfway = start + 0.5 * step * flow_velocities(flow, start)
             result[self._others] += step * flow_velocities(flow, halfway)
         self._check_others(result, steps_taken)
 

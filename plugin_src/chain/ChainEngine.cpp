@@ -106,6 +106,22 @@ ChainPack packed(const vector<Chain>& chains, const vector<int>& members) {
 
 } // namespace
 
+void cylchain::takeToNearestImage(double* displacement, const double* box) {
+    for (int k = 2; k >= 0; k--) {
+        const double images = floor(displacement[k]/box[4*k]+0.5);
+        for (int j = 0; j < 3; j++)
+            displacement[j] -= images*box[3*k+j];
+    }
+}
+
+void BackgroundFlow::getVelocity(const double* x, double* result) const {
+    double r[] = {x[0]-origin[0], x[1]-origin[1], x[2]-origin[2]};
+    if (box != NULL)
+        takeToNearestImage(r, box);
+    for (int i = 0; i < 3; i++)
+        result[i] = velocity[i]+gradient[3*i]*r[0]+gradient[3*i+1]*r[1]+gradient[3*i+2]*r[2];
+}
+
 struct ChainEngine::Implementation {
     vector<ChainPack> packs;
 };

@@ -2,6 +2,7 @@
 #define CYLCHAIN_CHAIN_ENGINE_H_
 
 #include "Chain.h"
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -22,13 +23,21 @@ struct Instability {
     int divided = 0;
 };
 
-/** A fluid that moves with the velocity velocity+gradient x; friction is relative to it. */
+/** A fluid that moves with the velocity velocity+gradient (x-origin); friction is relative to it. */
 struct BackgroundFlow {
     bool present = false;
     double velocity[3] = {};
     /** Row by row: the derivatives of the first component of the velocity come first. */
     double gradient[9] = {};
+    double origin[3] = {};
+    /** The three vectors of a periodic box (nine doubles), to take the image that is nearest to the origin, or NULL. */
+    const double* box = NULL;
+    /** The velocity at x. */
+    void getVelocity(const double* x, double* velocity) const;
 };
+
+/** Take a displacement to its nearest image in a box. */
+void takeToNearestImage(double* displacement, const double* box);
 
 /** The particles of a pack, each of them once, in no particular order, with -1 for places that are empty. */
 class ParticleRange {

@@ -147,15 +147,6 @@ template <int W> void scatter(const ChainPack& pack, Vector<typename Lanes<W>::T
         }
 }
 
-/** Take a displacement to its nearest image. */
-inline void wrap(double* d, const double* box) {
-    for (int k = 2; k >= 0; k--) {
-        const double images = std::floor(d[k]/box[4*k]+0.5);
-        for (int j = 0; j < 3; j++)
-            d[j] -= images*box[3*k+j];
-    }
-}
-
 /** Bring positions into lanes. Each node is the image that is nearest to the one before it if there is a box. */
 template <int W> void gatherPositions(const ChainPack& pack, const double* positions, const double* box,
             Vector<typename Lanes<W>::Type>* x) {
@@ -170,7 +161,7 @@ template <int W> void gatherPositions(const ChainPack& pack, const double* posit
             for (int node = 1; node < pack.nodesOfLane[i]; node++) {
                 double d[] = {lane(x[node].x, i)-lane(x[node-1].x, i), lane(x[node].y, i)-lane(x[node-1].y, i),
                         lane(x[node].z, i)-lane(x[node-1].z, i)};
-                wrap(d, box);
+                takeToNearestImage(d, box);
                 lane(x[node].x, i) = lane(x[node-1].x, i)+d[0];
                 lane(x[node].y, i) = lane(x[node-1].y, i)+d[1];
                 lane(x[node].z, i) = lane(x[node-1].z, i)+d[2];
@@ -224,7 +215,7 @@ template <int W> void tetherVector(const LaneTether& tether, const Vector<typena
     d[1] = lane(node.y, tether.lane)-tether.point[1];
     d[2] = lane(node.z, tether.lane)-tether.point[2];
     if (box != NULL)
-        wrap(d, box);
+        takeToNearestImage(d, box);
 }
 
 /** Add the propulsion of segments, half of it on each end. */
@@ -471,15 +462,38 @@ template <int W> void redistributeClosed(const ChainPack& pack, const Vector<typ
     v[count+1] = v[1];
 }
 
-/** The velocity of the fluid at x. */
-template <class Real> CYLCHAIN_INLINE Vector<Real> velocityOf(const BackgroundFlow& flow, bool planar, const Vector<Real>& x) {
-    const double* g = flow.gradient;
-    return {flow.velocity[0]+x.x*g[0]+x.y*g[1]+x.z*g[2], flow.velocity[1]+x.x*g[3]+x.y*g[4]+x.z*g[5],
-            planar ? Real{} : flow.velocity[2]+x.x*g[6]+x.y*g[7]+x.z*g[8]};
-}
+/** The flow for each lane: in a periodic box, with the image of the lane's chain whose first node is nearest to the origin. */
+template <int W> class LaneFlow {
+    typedef typename Lanes<W>::Type Real;
+public:
+    LaneFlow(const BackgroundFlow& flow, const ChainPack& pack, Vector<Real> first) : gradient(flow.gradient),
+            planar(pack.planar) {
+        for (int i = 0; i < W; i++) {
+            // What a node at zero would have to be carried along with.
+            const double x[] = {lane(first.x, i), lane(first.y, i), lane(first.z, i)};
+            double u[3];
+            flow.getVelocity(x, u);
+            for (int k = 0; k < 3; k++)
+                for (int j = 0; j < 3; j++)
+                    u[k] -= gradient[3*k+j]*x[j];
+            lane(velocity.x, i) = u[0];
+            lane(velocity.y, i) = u[1];
+            lane(velocity.z, i) = u[2];
+        }
+    }
+    CYLCHAIN_INLINE Vector<Real> at(const Vector<Real>& x) const {
+        const double* g = gradient;
+        return {velocity.x+x.x*g[0]+x.y*g[1]+x.z*g[2], velocity.y+x.x*g[3]+x.y*g[4]+x.z*g[5],
+                planar ? Real{} : velocity.z+x.x*g[6]+x.y*g[7]+x.z*g[8]};
+    }
+private:
+    Vector<Real> velocity;
+    const double* gradient;
+    bool planar;
+};
 
 /** Add the drag of the fluid on nodes at rest, Z u. It varies linearly, so the velocities of the ends say all of it. */
-template <int W> void addDrag(const ChainPack& pack, const Vector<typename Lanes<W>::Type>* x, const BackgroundFlow& flow,
+template <int W> void addDrag(const ChainPack& pack, const Vector<typename Lanes<W>::Type>* x, const LaneFlow<W>& flow,
             Vector<typename Lanes<W>::Type>* f) {
     typedef typename Lanes<W>::Type Real;
     for (int s = 0; s < pack.segments; s++) {
@@ -487,7 +501,7 @@ template <int W> void addDrag(const ChainPack& pack, const Vector<typename Lanes
         const Real inverseSquare = 1/difference.dot(difference);
         const Vector<Real> t = difference*root(inverseSquare);
         const EndFriction<Real> friction(pack, s, inverseSquare);
-        const Vector<Real> first = velocityOf(flow, pack.planar, x[s]), second = velocityOf(flow, pack.planar, x[s+1]);
+        const Vector<Real> first = flow.at(x[s]), second = flow.at(x[s+1]);
         f[s] = f[s]+first*friction.same+second*friction.other+
                 t*(friction.sameAxial*t.dot(first)+friction.otherAxial*t.dot(second));
         f[s+1] = f[s+1]+second*friction.same+first*friction.other+
@@ -627,7 +641,7 @@ template <int W> void findVelocities(const ChainPack& pack, const Vector<typenam
     if (flow.present) {
         Vector<Real>* dragged = vectors.reserve<Vector<Real>>(pack.nodes);
         std::copy(f, f+pack.nodes, dragged);
-        addDrag<W>(pack, x, flow, dragged);
+        addDrag<W>(pack, x, LaneFlow<W>(flow, pack, x[0]), dragged);
         f = dragged;
     }
     if (pack.closed)

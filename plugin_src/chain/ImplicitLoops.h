@@ -154,8 +154,9 @@ private:
 
     /** Where the flow alone takes a node that moves. */
     Vec carriedAlong(int node) const {
-        const Vec halfway = x[node]+velocityOf(settings.flow, pack.planar, x[node])*(0.5*h+Real{});
-        return x[node]+velocityOf(settings.flow, pack.planar, halfway)*(h*loaded<Real>(pack.mobile, node));
+        const LaneFlow<W> flow(settings.flow, pack, x[0]);
+        const Vec halfway = x[node]+flow.at(x[node])*(0.5*h+Real{});
+        return x[node]+flow.at(halfway)*(h*loaded<Real>(pack.mobile, node));
     }
     /** Describe the start of a step, without noise. */
     void describe() {
@@ -354,14 +355,14 @@ private:
     }
     /** Add the drag of the flow, at the middle of the step, on segments at rest. Its part along a segment is a tension. */
     void addDragOfFlow(const Vec* y) {
+        const LaneFlow<W> flow(settings.flow, pack, x[0]);
         for (int node = 0; node < n; node++)
             loads[node] = f[node];
         for (int s = 0; s < pack.segments; s++) {
             Geometry geometry;
             describeNew(y, s, geometry);
             const Vec direction = geometry.middleTangent;
-            const Vec u1 = velocityOf(settings.flow, pack.planar, (x[s]+y[s])*(0.5+Real{}));
-            const Vec u2 = velocityOf(settings.flow, pack.planar, (x[s+1]+y[s+1])*(0.5+Real{}));
+            const Vec u1 = flow.at((x[s]+y[s])*(0.5+Real{})), u2 = flow.at((x[s+1]+y[s+1])*(0.5+Real{}));
             const Vec sum = u1+u2, difference = u2-u1;
             const Real across = 0.25*property<Real>(pack, s, ChainPack::Perpendicular);
             const Real along = 0.25*property<Real>(pack, s, ChainPack::Parallel);

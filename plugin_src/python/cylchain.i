@@ -103,8 +103,9 @@ static void raiseOpenMMException(const std::exception& e) {
 
 %typemap(argout) const Vec3& point {
 }
-%apply Vec3& point {Vec3& velocity, Vec3& gradientX, Vec3& gradientY, Vec3& gradientZ};
-%apply const Vec3& point {const Vec3& velocity, const Vec3& gradientX, const Vec3& gradientY, const Vec3& gradientZ};
+%apply Vec3& point {Vec3& velocity, Vec3& gradientX, Vec3& gradientY, Vec3& gradientZ, Vec3& origin};
+%apply const Vec3& point {const Vec3& velocity, const Vec3& gradientX, const Vec3& gradientY, const Vec3& gradientZ,
+        const Vec3& origin};
 %apply double& OUTPUT {double& restLength, double& stretchingStiffness, double& maximumExtension,
         double& parallelFriction, double& perpendicularFriction, double& rotationalFriction,
         double& extensionalFriction, double& stiffness, double& stretching, double& bending, double& propulsion};
@@ -149,8 +150,9 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %pythonappend OpenMM::CylinderChainIntegrator::getFriction() const %{
     val = unit.Quantity(val, 1/unit.picosecond)
 %}
-%pythonappend OpenMM::CylinderChainIntegrator::getFlow(Vec3&, Vec3&, Vec3&, Vec3&) const %{
-    val = [unit.Quantity(val[0], _VELOCITY)] + [unit.Quantity(v, 1/unit.picosecond) for v in val[1:]]
+%pythonappend OpenMM::CylinderChainIntegrator::getFlow(Vec3&, Vec3&, Vec3&, Vec3&, Vec3&) const %{
+    units = (_VELOCITY, 1/unit.picosecond, 1/unit.picosecond, 1/unit.picosecond, _LENGTH)
+    val = [unit.Quantity(v, u) for v, u in zip(val, units)]
 %}
 %pythonappend OpenMM::CylinderChainIntegrator::getParticleFrictions() const %{
     val = {particle: unit.Quantity(friction, _FRICTION) for particle, friction in val.items()}

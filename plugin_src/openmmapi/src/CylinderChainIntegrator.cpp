@@ -119,16 +119,17 @@ void CylinderChainIntegrator::setScheme(Scheme scheme) {
     this->scheme = scheme;
 }
 
-void CylinderChainIntegrator::getFlow(Vec3& velocity, Vec3& gradientX, Vec3& gradientY, Vec3& gradientZ) const {
+void CylinderChainIntegrator::getFlow(Vec3& velocity, Vec3& gradientX, Vec3& gradientY, Vec3& gradientZ, Vec3& origin) const {
     velocity = flowVelocity;
     gradientX = flowGradient[0];
     gradientY = flowGradient[1];
     gradientZ = flowGradient[2];
+    origin = flowOrigin;
 }
 
 void CylinderChainIntegrator::setFlow(const Vec3& velocity, const Vec3& gradientX, const Vec3& gradientY,
-        const Vec3& gradientZ) {
-    for (const Vec3& vector : {velocity, gradientX, gradientY, gradientZ})
+        const Vec3& gradientZ, const Vec3& origin) {
+    for (const Vec3& vector : {velocity, gradientX, gradientY, gradientZ, origin})
         for (int i = 0; i < 3; i++)
             if (!isfinite(vector[i]))
                 throw OpenMMException("CylinderChainIntegrator: The flow must be finite");
@@ -136,6 +137,7 @@ void CylinderChainIntegrator::setFlow(const Vec3& velocity, const Vec3& gradient
     flowGradient[0] = gradientX;
     flowGradient[1] = gradientY;
     flowGradient[2] = gradientZ;
+    flowOrigin = origin;
 }
 
 void CylinderChainIntegrator::cleanup() {

@@ -31,13 +31,14 @@ void CylinderChainIntegratorProxy::serialize(const void* object, SerializationNo
     node.setIntProperty("scheme", integrator.getScheme());
     node.setIntProperty("randomSeed", integrator.getRandomNumberSeed());
     node.setIntProperty("integrationForceGroups", integrator.getIntegrationForceGroups());
-    Vec3 velocity, gradientX, gradientY, gradientZ;
-    integrator.getFlow(velocity, gradientX, gradientY, gradientZ);
+    Vec3 velocity, gradientX, gradientY, gradientZ, origin;
+    integrator.getFlow(velocity, gradientX, gradientY, gradientZ, origin);
     SerializationNode& flow = node.createChildNode("Flow");
     writeVector(flow, "Velocity", velocity);
     writeVector(flow, "GradientX", gradientX);
     writeVector(flow, "GradientY", gradientY);
     writeVector(flow, "GradientZ", gradientZ);
+    writeVector(flow, "Origin", origin);
     SerializationNode& frictions = node.createChildNode("ParticleFrictions");
     for (auto& entry : integrator.getParticleFrictions())
         frictions.createChildNode("Particle").setIntProperty("index", entry.first)
@@ -57,7 +58,7 @@ void* CylinderChainIntegratorProxy::deserialize(const SerializationNode& node) c
     if (version > 1) {
         const SerializationNode& flow = node.getChildNode("Flow");
         integrator->setFlow(readVector(flow, "Velocity"), readVector(flow, "GradientX"), readVector(flow, "GradientY"),
-                readVector(flow, "GradientZ"));
+                readVector(flow, "GradientZ"), readVector(flow, "Origin"));
     }
     for (auto& particle : node.getChildNode("ParticleFrictions").getChildren())
         integrator->setParticleFriction(particle.getIntProperty("index"), particle.getDoubleProperty("friction"));

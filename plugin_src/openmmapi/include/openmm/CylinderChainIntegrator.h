@@ -121,23 +121,27 @@ public:
     /**
      * Get the flow of the fluid.  See setFlow() for details.
      *
-     * @param[out] velocity   the velocity at the origin, measured in nm/ps
+     * @param[out] velocity   the velocity at the origin of the flow, measured in nm/ps
      * @param[out] gradientX  the derivatives of the x component of the velocity by x, y and z, measured in 1/ps
      * @param[out] gradientY  those of its y component
      * @param[out] gradientZ  those of its z component
+     * @param[out] origin     the origin of the flow, measured in nm
      */
-    void getFlow(Vec3& velocity, Vec3& gradientX, Vec3& gradientY, Vec3& gradientZ) const;
+    void getFlow(Vec3& velocity, Vec3& gradientX, Vec3& gradientY, Vec3& gradientZ, Vec3& origin) const;
     /**
-     * Set the flow of the fluid: its velocity at x is velocity+(gradientX.x, gradientY.x, gradientZ.x).  It carries segments
-     * along, turns them and stretches them, as far as forces let it.  In a periodic box, it should not vary along a direction
-     * in which particles leave the box.
+     * Set the flow of the fluid: its velocity at origin+r is velocity+(gradientX.r, gradientY.r, gradientZ.r).  It carries
+     * segments along, turns them and stretches them, as far as forces let it.  If the System uses periodic boundary
+     * conditions, the velocity is that at the image of a particle which is nearest to the origin; for a chain, the image of
+     * its first node.
      *
-     * @param velocity   the velocity at the origin, measured in nm/ps
+     * @param velocity   the velocity at the origin of the flow, measured in nm/ps
      * @param gradientX  the derivatives of the x component of the velocity by x, y and z, measured in 1/ps
      * @param gradientY  those of its y component
      * @param gradientZ  those of its z component
+     * @param origin     the origin of the flow, measured in nm
      */
-    void setFlow(const Vec3& velocity, const Vec3& gradientX, const Vec3& gradientY, const Vec3& gradientZ);
+    void setFlow(const Vec3& velocity, const Vec3& gradientX, const Vec3& gradientY, const Vec3& gradientZ,
+            const Vec3& origin);
     /**
      * Get how many times a step of a chain was taken in parts since the Context was created, because the equations of
      * the implicit scheme could not be solved, or a segment would have moved by more than its length.  The parts have
@@ -219,7 +223,7 @@ private:
     double temperature, friction;
     std::map<int, double> particleFrictions;
     Scheme scheme;
-    Vec3 flowVelocity, flowGradient[3];
+    Vec3 flowVelocity, flowGradient[3], flowOrigin;
     int randomNumberSeed;
     std::uint64_t noiseSeed, stepsTaken;
     long long dividedSteps;

@@ -21,7 +21,9 @@ public:
     int executeTogether(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed, std::uint64_t step,
             int count, long long& divided);
 private:
-    cylchain::StepSettings settingsOf(const CylinderChainIntegrator& integrator, std::uint64_t seed, std::uint64_t step) const;
+    cylchain::BackgroundFlow flowOf(ContextImpl& context, const CylinderChainIntegrator& integrator) const;
+    cylchain::StepSettings settingsOf(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed,
+            std::uint64_t step) const;
     void displaceChains(ContextImpl& context, const cylchain::StepSettings& settings, long long& divided);
     int advancePack(ContextImpl& context, int pack, cylchain::StepSettings settings, int count, long long& divided);
     void displaceOthers(ContextImpl& context, const cylchain::StepSettings& settings, double friction);
@@ -31,6 +33,7 @@ private:
     void checkOthers(std::uint64_t step) const;
     ParallelLoop loop;
     ReferenceCalcCylinderChainForceKernel* chainKernel;
+    bool periodic;
     // Particles outside chains, and those of them that can move.
 
     std::vector<int> outside, others;

@@ -31,12 +31,13 @@ static bool isFinite(const Vec3& v) {
 }
 
 ReferenceIntegrateCylinderChainStepKernel::ReferenceIntegrateCylinderChainStepKernel(string name, const Platform& platform,
-        ContextImpl& context) : IntegrateCylinderChainStepKernel(name, platform), loop(context), chainKernel(NULL) {
+        ContextImpl& context) : IntegrateCylinderChainStepKernel(name, platform), loop(context), chainKernel(NULL), periodic(false) {
 }
 
 void ReferenceIntegrateCylinderChainStepKernel::initialize(const System& system, const CylinderChainIntegrator& integrator,
         CalcCylinderChainForceKernel& forceKernel) {
     chainKernel = &dynamic_cast<ReferenceCalcCylinderChainForceKernel&>(forceKernel);
+    periodic = system.usesPeriodicBoundaryConditions();
     const int numParticles = system.getNumParticles();
     vector<bool> isNode(numParticles, false);
     for (const Chain& chain : chainKernel->getChains())
@@ -63,8 +64,25 @@ void ReferenceIntegrateCylinderChainStepKernel::initialize(const System& system,
     newPositions.assign(numParticles, Vec3());
 }
 
-StepSettings ReferenceIntegrateCylinderChainStepKernel::settingsOf(const CylinderChainIntegrator& integrator, uint64_t seed,
-        uint64_t step) const {
+BackgroundFlow ReferenceIntegrateCylinderChainStepKernel::flowOf(ContextImpl& context,
+        const CylinderChainIntegrator& integrator) const {
+    BackgroundFlow flow;
+    Vec3 velocity, rows[3], origin;
+    integrator.getFlow(velocity, rows[0], rows[1], rows[2], origin);
+    for (int i = 0; i < 3; i++) {
+        flow.velocity[i] = velocity[i];
+        flow.origin[i] = origin[i];
+        for (int k = 0; k < 3; k++)
+            flow.gradient[3*i+k] = rows[i][k];
+        flow.present |= (velocity[i] != 0 || rows[i] != Vec3());
+    }
+    if (periodic)
+        flow.box = &extractData(context).periodicBoxVectors[0][0];
+    return flow;
+}
+
+StepSettings ReferenceIntegrateCylinderChainStepKernel::settingsOf(ContextImpl& context,
+        const CylinderChainIntegrator& integrator, uint64_t seed, uint64_t step) const {
     StepSettings settings;
     if (integrator.getScheme() == CylinderChainIntegrator::Euler)
         settings.scheme = Scheme::Euler;
@@ -77,20 +95,13 @@ StepSettings ReferenceIntegrateCylinderChainStepKernel::settingsOf(const Cylinde
     settings.stepSize = integrator.getStepSize();
     settings.seed = seed;
     settings.step = step;
-    Vec3 rows[4];
-    integrator.getFlow(rows[0], rows[1], rows[2], rows[3]);
-    for (int i = 0; i < 3; i++) {
-        settings.flow.velocity[i] = rows[0][i];
-        for (int k = 0; k < 3; k++)
-            settings.flow.gradient[3*i+k] = rows[i+1][k];
-        settings.flow.present |= (rows[0][i] != 0 || rows[i+1] != Vec3());
-    }
+    settings.flow = flowOf(context, integrator);
     return settings;
 }
 
 void ReferenceIntegrateCylinderChainStepKernel::execute(ContextImpl& context, const CylinderChainIntegrator& integrator,
         uint64_t seed, uint64_t step, long long& divided) {
-    const StepSettings settings = settingsOf(integrator, seed, step);
+    const StepSettings settings = settingsOf(context, integrator, seed, step);
     displaceChains(context, settings, divided);
     displaceOthers(context, settings, integrator.getFriction());
 
@@ -111,7 +122,7 @@ int ReferenceIntegrateCylinderChainStepKernel::executeTogether(ContextImpl& cont
         uint64_t seed, uint64_t step, int count, long long& divided) {
     if (!others.empty())
         return 0;
-    const StepSettings settings = settingsOf(integrator, seed, step);
+    const StepSettings settings = settingsOf(context, integrator, seed, step);
     ReferencePlatform::PlatformData& data = extractData(context);
     vector<int> taken(chainKernel->getEngine().getNumPacks());
     vector<long long> dividedInPack(taken.size());
@@ -249,10 +260,10 @@ void ReferenceIntegrateCylinderChainStepKernel::displaceOthers(ContextImpl& cont
 }
 
 static Vec3 velocityOf(const BackgroundFlow& flow, const Vec3& x) {
-    Vec3 result;
-    for (int i = 0; i < 3; i++)
-        result[i] = flow.velocity[i]+flow.gradient[3*i]*x[0]+flow.gradient[3*i+1]*x[1]+flow.gradient[3*i+2]*x[2];
-    return result;
+    const double position[] = {x[0], x[1], x[2]};
+    double velocity[3];
+    flow.getVelocity(position, velocity);
+    return {velocity[0], velocity[1], velocity[2]};
 }
 
 void ReferenceIntegrateCylinderChainStepKernel::displaceBlock(int block, const vector<Vec3>& positions,
