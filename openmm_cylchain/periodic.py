@@ -196,9 +196,9 @@ def _refuse_ambiguous(lengths, vectors, label):
         frame, segment = np.argwhere(too_long)[0]
         where = f" in frame {frame}" if len(vectors) > 1 else ""
         raise InputError(
-            f"{label}{where}: segment {segment} is {lengths[frame, segment]:.4g} nm long, and the box {widths[frame]:.4g} nm "
-            "wide. Only segments shorter than half the box can be made whole: check the box vectors, or take shorter "
-            "segments."
+            f"{label}{where}: segment {segment} is {lengths[frame, segment]:.4g} nm long, and the box "
+            f"{widths[frame]:.4g} nm wide. Only segments shorter than half the box can be made whole: check the box "
+            "vectors, or take shorter segments."
         )
 
 
