@@ -179,7 +179,7 @@ def test_small_deflection_of_a_cantilever(engine, segments):
 @pytest.mark.parametrize("kind_of_load", ["end", "distributed"])
 @pytest.mark.parametrize("engine", NEW_ENGINES)
 def test_large_deflection_tends_to_the_elastica(engine, kind_of_load):
-    """The tip of a filament bent by half its length, with an error that falls at least with the square of the segments."""
+    """The tip of a filament bent by half its length; the error falls at least with the square of the segments."""
     errors = []
     for segments in (6, 12):
         rigidity = F_ACTIN.bending_rigidity
