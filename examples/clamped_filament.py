@@ -1,9 +1,10 @@
-"""Actin filaments clamped at one end and bent by a force at the other: simulation against elastica theory.
+"""Actin filaments clamped at one end and bent by a force at the other, or all along, against Euler's elastica.
 
-Four filaments of 2.1 um stand side by side. The first two nodes of each are clamped, which fixes position and
-direction, and a constant force pulls the last node sideways. At zero temperature they relax to the shape in which
-the force is balanced by bending: the elastica, a theta'' = -F cos(theta). For small forces its tip is deflected by
-F L^3/(3 a).
+Eight filaments stand side by side. The first two nodes of each are clamped, which fixes position and direction, and
+2.1 um are free. A constant force pulls the last node of four of them sideways, and a constant weight per length, in
+parts that act on the nodes, all of the other four. At zero temperature they relax to the shape in which bending
+balances the load, the elastica: a theta'' = -(F + w (L - s)) cos(theta). For small loads its tip is deflected by
+F L^3/(3 a) or w L^4/(8 a).
 
     python clamped_filament.py [folder] [steps]
 """
@@ -20,13 +21,14 @@ import numpy as np
 import openmm
 from openmm import app, unit
 from scipy.integrate import solve_bvp
-from scipy.optimize import minimize
 
 from openmm_cylchain import F_ACTIN, Filaments
 
-FORCES = (0.01, 0.02, 0.05, 0.1)  # pN
-SEGMENTS = 7
+FORCES = (0.01, 0.02, 0.05, 0.1)  # pN at the end
+WEIGHTS = (0.03, 0.06, 0.15, 0.3)  # pN in all
+FREE_SEGMENTS = 7
 SEGMENT_LENGTH = 300  # nm
+LENGTH = FREE_SEGMENTS * SEGMENT_LENGTH
 STEPS = 10000
 FRAMES = 100
 PICONEWTON = 0.602214076  # kJ/(mol nm)
@@ -35,16 +37,23 @@ folder = Path(sys.argv[1] if len(sys.argv) > 1 else "output_clamped_filament")
 steps = int(sys.argv[2]) if len(sys.argv) > 2 else STEPS
 folder.mkdir(parents=True, exist_ok=True)
 
+# The held segment lies before the clamp at x = 0.
 actin = F_ACTIN.with_segment_length(SEGMENT_LENGTH * unit.nanometer)
 filaments = Filaments(viscosity=1e-3 * unit.pascal * unit.second, temperature=0 * unit.kelvin)
-for number in range(len(FORCES)):
-    filaments.add_straight(actin, SEGMENTS, start=[0, 300 * number, 0], direction=[1, 0, 0], clamped=[0, 1])
+loads = [(force, 0.0) for force in FORCES] + [(0.0, weight) for weight in WEIGHTS]
+for number in range(len(loads)):
+    start = [-SEGMENT_LENGTH, 300 * number, 0]
+    filaments.add_straight(actin, FREE_SEGMENTS + 1, start, direction=[1, 0, 0], clamped=[0, 1])
 topology, system, positions = filaments.build()
 
 pull = openmm.CustomExternalForce("-force*z")
 pull.addPerParticleParameter("force")
-for nodes, force in zip(filaments.node_indices, FORCES):
-    pull.addParticle(int(nodes[-1]), [force * PICONEWTON])
+for nodes, (force, weight) in zip(filaments.node_indices, loads):
+    # Half of a segment's weight acts on each of its ends.
+    shares = np.full(FREE_SEGMENTS, weight / FREE_SEGMENTS)
+    shares[-1] = force + 0.5 * weight / FREE_SEGMENTS
+    for node, share in zip(nodes[2:], shares):
+        pull.addParticle(int(node), [share * PICONEWTON])
 system.addForce(pull)
 
 step = filaments.recommended_time_step().step * unit.picosecond
@@ -60,70 +69,65 @@ final = state.getPositions(asNumpy=True).value_in_unit(unit.nanometer)
 shapes = [final[nodes][:, [0, 2]] for nodes in filaments.node_indices]
 
 
-def elastica(force, rigidity, length, points=200):
-    """Shape (x, z) of a clamped rod under a force across its clamp, and constant in direction."""
+def elastica(force, weight, rigidity, points=200):
+    """Shape (x, z) of a clamped rod under a force at its end and a weight in all, both along z and in kJ/(mol nm)."""
 
     def slope(s, y):
         angle, curvature = y[0], y[1]
-        return np.array([curvature, -force / rigidity * np.cos(angle), np.cos(angle), np.sin(angle)])
+        beyond = force + weight * (1.0 - s / LENGTH)
+        return np.array([curvature, -beyond / rigidity * np.cos(angle), np.cos(angle), np.sin(angle)])
 
     def ends(start, end):
         return np.array([start[0], end[1], start[2], start[3]])
 
-    s = np.linspace(0, length, points)
+    s = np.linspace(0, LENGTH, points)
     return solve_bvp(slope, ends, s, np.vstack([0 * s, 0 * s, s, 0 * s]), tol=1e-8).sol(s)[2:].T
 
 
-def discrete_deflection(force, filament_type, joints):
-    """Deflection of the tip of a chain of rigid segments: the minimum of its energy over their angles."""
-
-    def energy(angles):
-        bends = np.diff(angles, prepend=0.0)
-        height = filament_type.segment_length * np.sum(np.sin(angles))
-        return np.sum(filament_type.bending_energy(np.cos(bends))) - force * height
-
-    angles = minimize(energy, np.zeros(joints), options={"gtol": 1e-8}).x
-    return filament_type.segment_length * np.sum(np.sin(angles))
-
-
-# A joint bends by (moment) l0/a. With n = SEGMENTS - 1 joints at 1, 2, ... n segments from the tip, a small force
-# deflects the tip by F l0^3/a sum m^2 = F l0^3/a n (n + 1)(2 n + 1)/6, as if the rod were clamped in the middle of
-# the first segment, L = (n + 1/2) l0, to one part in 4 n^2.
-rigidity, l0, joints = actin.bending_rigidity, actin.segment_length, SEGMENTS - 1
-length = (joints + 0.5) * l0
+rigidity = actin.bending_rigidity
 simulated_time = (steps * step).value_in_unit(unit.millisecond)
 print(f"{steps} steps of {step.value_in_unit(unit.microsecond):.2f} us, {simulated_time:.0f} ms in all.")
-print("Deflection (nm):  simulation   discrete chain   elastica   F L^3/(3 a)")
+print("Deflection (nm):       simulation   elastica   small loads")
 theories = []
-for force, shape in zip(FORCES, shapes):
-    pulled = force * PICONEWTON
-    theories.append(elastica(pulled, rigidity, length))
-    small = pulled * length**3 / (3 * rigidity)
-    expected = discrete_deflection(pulled, actin, joints)
-    print(f"{force:13.2f} pN {shape[-1, 1]:13.1f} {expected:16.1f} {theories[-1][-1, 1]:10.1f} {small:13.1f}")
+for (force, weight), shape in zip(loads, shapes):
+    theories.append(elastica(force * PICONEWTON, weight * PICONEWTON, rigidity))
+    small = (force / 3 + weight / 8) * PICONEWTON * LENGTH**3 / rigidity
+    label = f"{force:.2f} pN at the end" if force else f"{weight:.2f} pN all along"
+    print(f"{label:22} {shape[-1, 1]:10.1f} {theories[-1][-1, 1]:10.1f} {small:13.1f}")
 
-figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.6), gridspec_kw={"width_ratios": [1.25, 1]})
+figure, panels = plt.subplots(1, 3, figsize=(13.5, 4.6), gridspec_kw={"width_ratios": [1.2, 1.2, 1]})
 colours = plt.cm.viridis(np.linspace(0.05, 0.8, len(FORCES)))
-for force, shape, theory, colour in zip(FORCES, shapes, theories, colours):
-    left.plot((theory[:, 0] + l0 / 2) / 1000, theory[:, 1] / 1000, color=colour, linewidth=5, alpha=0.35)
-    left.plot(*(shape / 1000).T, "o-", color=colour, markersize=4, linewidth=1, label=f"{force:g} pN")
-left.plot([], [], color="grey", linewidth=5, alpha=0.35, label="elastica")
-left.axvspan(-0.1, SEGMENT_LENGTH / 1000, color="0.9", zorder=0)
-left.text(0.1, 1.3, "clamped", ha="center", color="0.35")
-left.set(xlabel="x (µm)", ylabel="z (µm)", aspect="equal", xlim=(-0.1, 2.25), ylim=(-0.15, 1.45))
-left.legend(frameon=False, loc="upper center", bbox_to_anchor=(0.42, 0.98))
-left.set_title("Shapes of an actin filament pulled at its tip")
+for axes, first, title, values in (
+    (panels[0], 0, "A force at the end", FORCES),
+    (panels[1], len(FORCES), "A weight all along", WEIGHTS),
+):
+    for number, (value, colour) in enumerate(zip(values, colours), start=first):
+        axes.plot(*(theories[number] / 1000).T, color=colour, linewidth=5, alpha=0.35)
+        axes.plot(*(shapes[number] / 1000).T, "o-", color=colour, markersize=4, linewidth=1, label=f"{value:g} pN")
+    axes.plot([], [], color="grey", linewidth=5, alpha=0.35, label="elastica")
+    axes.axvspan(-0.4, 0, color="0.9", zorder=0)
+    axes.text(-0.2, 1.2, "clamped", ha="center", color="0.35", rotation=90)
+    axes.set(xlabel="x (µm)", ylabel="z (µm)", aspect="equal", xlim=(-0.4, 2.2), ylim=(-0.15, 1.8))
+    axes.legend(frameon=False, loc="upper left", bbox_to_anchor=(0.17, 1.0))
+    axes.set_title(title)
 
-grid = np.geomspace(0.003, 0.2, 25)
-right.plot(grid, grid * PICONEWTON * length**3 / (3 * rigidity), "--", color="0.5", label="$FL^3/3a$")
-right.plot(grid, [elastica(f * PICONEWTON, rigidity, length)[-1, 1] for f in grid], color="0.2", label="elastica")
-for force, shape, colour in zip(FORCES, shapes, colours):
-    right.plot(force, shape[-1, 1], "o", color=colour, markersize=8)
-right.plot([], [], "o", color=colours[1], markersize=8, label="simulation")
-right.set(xscale="log", yscale="log", xlabel="force (pN)", ylabel="deflection of the tip (nm)")
-right.legend(frameon=False)
-right.set_title("Deflection")
-for axes in (left, right):
+grid = np.geomspace(0.2, 20, 25)
+for scale, marker, colour, label, values, first, part in (
+    (3, "o", "#1f6f8b", "force at the end", FORCES, 0, (1, 0)),
+    (8, "s", "#c0392b", "weight all along", WEIGHTS, len(FORCES), (0, 1)),
+):
+    unit_load = rigidity / LENGTH**2
+    curve = [elastica(part[0] * load * unit_load, part[1] * load * unit_load, rigidity)[-1, 1] for load in grid]
+    panels[2].plot(grid, np.array(curve) / LENGTH, color=colour, label=f"elastica, {label}")
+    panels[2].plot(grid, grid / scale, "--", color=colour, linewidth=0.8)
+    tips = [shapes[first + number][-1, 1] / LENGTH for number in range(len(values))]
+    panels[2].plot(np.array(values) * PICONEWTON / unit_load, tips, marker, color=colour, markersize=8)
+panels[2].set(
+    xscale="log", yscale="log", ylim=(0.02, 1.5), xlabel="load  ($a/L^2$)", ylabel="deflection of the tip  ($L$)"
+)
+panels[2].legend(frameon=False, loc="lower right")
+panels[2].set_title("Deflection; dashed: small loads")
+for axes in panels:
     axes.spines[["top", "right"]].set_visible(False)
 figure.tight_layout()
 figure.savefig(folder / "filaments.png", dpi=150)

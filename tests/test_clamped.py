@@ -34,7 +34,7 @@ def _context(system, integrator, positions):
         ((0, 1, -2, -1), [2, 1, 1, 1, 2]),
         ((2, 3), [1, 2, 2, 1, 1]),
         ((0, 2, 4), [1, 1, 1, 1, 1]),
-        ((1, 2, 4, 5), [2, 2, 2, 2, 1]),
+        ((1, 2, 4, 5), [2, 2, 1, 2, 2]),
     ],
 )
 def test_stiffness_of_joints(clamped, factors):
@@ -179,7 +179,7 @@ def test_small_deflection_of_a_cantilever(engine, segments):
 @pytest.mark.parametrize("kind_of_load", ["end", "distributed"])
 @pytest.mark.parametrize("engine", NEW_ENGINES)
 def test_large_deflection_tends_to_the_elastica(engine, kind_of_load):
-    """The tip of a filament bent by half its length, with an error that falls with the square of the segments."""
+    """The tip of a filament bent by half its length; the error falls at least with the square of the segments."""
     errors = []
     for segments in (6, 12):
         rigidity = F_ACTIN.bending_rigidity
@@ -190,15 +190,18 @@ def test_large_deflection_tends_to_the_elastica(engine, kind_of_load):
         tip = _elastica(rigidity, force, weight)
         assert tip[1] > 0.5 * LENGTH
         errors.append(np.abs(nodes[-1, [0, 2]] - tip).max())
-    assert errors[1] < 0.004 * LENGTH
-    assert 3.4 < errors[0] / errors[1] < 4.6
+    assert errors[1] < 0.0015 * LENGTH
+    assert errors[0] / errors[1] > 3.8
 
 
 # Thermal fluctuations
 
 
 def _exact_fluctuations(kind, segments, planar):
-    """<y^2> of the tip and <t_y^2> of the last segment, clamped along x: products of averages over single joints."""
+    """<y^2> of the tip, <t_y^2> of the last segment and <1 - c> of the joint at the clamp, which points along x.
+
+    The joints are independent, so the first two are products of averages over single ones.
+    """
     if planar:
         joints = [PlanarJointAngleDistribution(kind, TEMPERATURE, f * kind.joint_stiffness) for f in (2, 1)]
         cosines = [one.mean(np.cos) for one in joints]
@@ -217,7 +220,7 @@ def _exact_fluctuations(kind, segments, planar):
     for i in range(segments):
         for j in range(i + 1, segments):
             tip += 2 * mean**2 * cosines[1] ** (j - i) * squares[i]
-    return {"tip": tip, "tangent": squares[-1]}
+    return {"tip": tip, "tangent": squares[-1], "bend": 1.0 - cosines[0]}
 
 
 def _drawn(engine, kind, segments, planar, count):
@@ -228,10 +231,11 @@ def _drawn(engine, kind, segments, planar, count):
 
 
 def _fluctuations(nodes):
-    last = nodes[:, -1] - nodes[:, -2]
+    first, last = nodes[:, 2] - nodes[:, 1], nodes[:, -1] - nodes[:, -2]
     return {
         "tip": nodes[:, -1, 1] ** 2,
         "tangent": (last[:, 1] / np.linalg.norm(last, axis=1)) ** 2,
+        "bend": 1.0 - first[:, 0] / np.linalg.norm(first, axis=1),
     }
 
 
@@ -240,8 +244,8 @@ def _assert_means(samples, exact):
         values = np.mean([one[name] for one in samples], axis=0)
         error = values.std(ddof=1) / np.sqrt(len(values))
         assert abs(values.mean() - expected) < SIGMAS * error, name
-        # A joint that is not twice as stiff is worth 8 % of <y^2>.
-        assert SIGMAS * error < 0.08 * expected, name
+        # Were it not twice as stiff, the joint at the clamp would bend by twice as much, and <y^2> be larger by 16 %.
+        assert SIGMAS * error < 0.1 * expected, name
 
 
 STIFF = soft_chain("CLAMP", bending_rigidity=6 * KT * 100)
@@ -258,7 +262,7 @@ def test_draws_of_clamped_filaments(planar):
 @pytest.mark.parametrize("planar", [False, True])
 @pytest.mark.parametrize("engine", NEW_ENGINES)
 def test_dynamics_keep_the_fluctuations_of_clamped_filaments(engine, planar):
-    filaments = _drawn(engine, STIFF, 3, planar, 2400)
+    filaments = _drawn(engine, STIFF, 3, planar, 2500)
     _, system, positions = filaments.build()
     step = time_step(Case(STIFF, 4, 1, 1, 0.02))
     integrator = filaments.create_integrator(system, step, scheme="midpoint", random_seed=2)
@@ -267,7 +271,7 @@ def test_dynamics_keep_the_fluctuations_of_clamped_filaments(engine, planar):
     samples = []
     for _ in range(20):
         integrator.step(15)
-        nodes = context.getState(positions=True).getPositions(asNumpy=True)._value.reshape(2400, 5, 3)
+        nodes = context.getState(positions=True).getPositions(asNumpy=True)._value.reshape(2500, 5, 3)
         samples.append(_fluctuations(nodes))
     _assert_means(samples, _exact_fluctuations(STIFF, 3, planar))
 
@@ -277,7 +281,7 @@ def test_stiff_clamped_filaments_have_gaussian_angles():
     segments, length = 25, 5000.0
     persistence_length = 100 * length
     kind = replace(F_ACTIN.with_segment_length(length / segments), bending_rigidity=persistence_length * KT)
-    nodes = np.array([filament.positions for filament in _drawn("portable", kind, segments, False, 6000)])
+    nodes = np.array([filament.positions for filament in _drawn("portable", kind, segments, False, 3000)])
     last = nodes[:, -1] - nodes[:, -2]
     angles = np.concatenate([last[:, 1], last[:, 2]]) / (length / segments)
     # The last segment's angle is that of its middle, half a segment before the end.

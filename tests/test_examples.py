@@ -17,7 +17,9 @@ CASES = [
     ("lennard_jones_box", "box", 40, 40, 150 + 8, 7),
     ("mixed_system", "mixed", 40, 40, 60 + 8 * (11 + 5) + 3 * 6, 8 * 10 + 3 * 5),
     ("two_filament_types", "filaments", 50, 50, 16 * (49 + 17), 16 * (48 + 16)),
-    ("clamped_filament", "filaments", 200, 100, 4 * 8, 4 * 7),
+    ("clamped_filament", "filaments", 200, 100, 8 * 9, 8 * 8),
+    ("gliding_filaments", "gliding", 60, 60, 40 * 7, 40 * 6),
+    ("tumbling_in_shear", "shear", 60, 60, 24 * 13 + 6 * 12, 24 * 12 + 6 * 12),
     ("periodic_box", "periodic", 40, 40, 60 + 8 * 17, 8 * 16),
     ("filaments_in_a_vesicle", "vesicle", 40, 40, 24 + 24 * (13 + 1), 24 * 12),
 ]
@@ -67,11 +69,22 @@ def test_clamped_nodes_stay_and_tips_rise_with_the_force(tmp_path):
     folder = tmp_path / "results"
     assert run("clamped_filament", folder, 200).returncode == 0
     trajectory = mdtraj.load(str(folder / "filaments.dcd"), top=str(folder / "filaments.cif"))
-    nodes = trajectory.xyz[-1].reshape(4, 8, 3)
-    np.testing.assert_allclose(nodes[:, 1], nodes[:, 0] + [300, 0, 0], atol=1e-3)
-    tips = nodes[:, -1, 2]
-    assert (np.diff(tips) > 0).all()
-    assert tips[0] > 0
+    nodes = trajectory.xyz[-1].reshape(8, 9, 3)
+    np.testing.assert_allclose(nodes[:, 0, [0, 2]], np.tile([-300, 0], (8, 1)), atol=1e-3)
+    np.testing.assert_allclose(nodes[:, 1, [0, 2]], np.zeros((8, 2)), atol=1e-3)
+    for tips in (nodes[:4, -1, 2], nodes[4:, -1, 2]):
+        assert (np.diff(tips) > 0).all()
+        assert tips[0] > 0
+
+
+def test_gliding_filaments_stay_in_their_plane(tmp_path):
+    folder = tmp_path / "results"
+    assert run("gliding_filaments", folder, 60).returncode == 0
+    trajectory = mdtraj.load(str(folder / "gliding.dcd"), top=str(folder / "gliding.cif"))
+    assert np.all(trajectory.xyz[..., 2] == 0)
+    nodes = trajectory.xyz.reshape(60, 40, 7, 3)
+    along = np.einsum("ij,ij->i", (nodes[-1] - nodes[0]).mean(axis=1), nodes[0, :, -1] - nodes[0, :, 0])
+    assert along[:20].mean() > 0 > along[20:].mean()
 
 
 def test_wrapped_filaments_are_whole_and_a_psf_has_their_bonds(tmp_path):
