@@ -17,6 +17,8 @@ CASES = [
     ("two_filament_types", "filaments", 50, 50, 16 * (49 + 17), 16 * (48 + 16)),
     ("clamped_filament", "filaments", 200, 100, 4 * 8, 4 * 7),
     ("filaments_in_a_vesicle", "vesicle", 40, 40, 24 + 24 * (13 + 1), 24 * 12),
+    ("crosslinked_bundle", "bundle", 40, 40, 6 * (31 + 30), 6 * 30),
+    ("force_extension", "dna", 200, 100, 24 * 21, 24 * 20),
 ]
 
 
