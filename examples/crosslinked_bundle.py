@@ -159,7 +159,7 @@ time = report.step * milliseconds
 panels[2].plot(time, report.count, color="0.25", linewidth=1.6)
 panels[2].set(xlabel="time (ms)", ylabel="crosslinks", xlim=(0, steps * milliseconds), ylim=(0, None))
 panels[2].axvspan(loaded_at * milliseconds, steps * milliseconds, color="0.93", zorder=0)
-panels[2].text(BOUND + 0.01, 0.9, f"load {LOAD / PICONEWTON:g} pN", color="0.4", transform=panels[2].transAxes)
+panels[2].text(BOUND + 0.01, 0.5, f"load {LOAD / PICONEWTON:g} pN", color="0.4", transform=panels[2].transAxes)
 right = panels[2].twinx()
 right.plot(slid[:, 0] * milliseconds, slid[:, 1] / 1000, color="#c0392b", linewidth=1.6)
 right.set_ylabel("slid apart (µm)", color="#c0392b")
