@@ -279,8 +279,8 @@ class Crosslinks:
     """Crosslinks of one potential, that are added and removed while simulations run.
 
     The methods that take a Context change or describe the crosslinks of that Context alone; with None they mean those
-    that every new Context begins with, which can change until ``add_to``. A crosslink has a number that no other one of
-    its Context gets later on.
+    that every new Context begins with, which can change until ``add_to``. No other crosslink of a Context gets the
+    number of one that is removed, unless ``set_pairs`` numbers all of them anew.
 
     Crosslinks are explicit in every scheme: the step must stay well below 2 gamma/k, where gamma is the friction of
     what the spring moves, at least a quarter of a segment's parallel friction for each segment that meets in a node.

@@ -22,6 +22,8 @@ CASES = [
     ("tumbling_in_shear", "shear", 60, 60, 24 * 13 + 6 * 12, 24 * 12 + 6 * 12),
     ("periodic_box", "periodic", 40, 40, 60 + 8 * 17, 8 * 16),
     ("filaments_in_a_vesicle", "vesicle", 40, 40, 24 + 24 * (13 + 1), 24 * 12),
+    ("crosslinked_bundle", "bundle", 40, 40, 6 * (31 + 30), 6 * 30),
+    ("force_extension", "dna", 200, 100, 24 * 21, 24 * 20),
 ]
 # What an example writes beside the files that all of them write.
 MORE_FILES = {"periodic_box": ["periodic.psf"]}

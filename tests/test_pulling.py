@@ -159,7 +159,7 @@ def test_tension_pulls_at_the_ends_of_the_filaments_that_are_named():
 def test_extension_of_freely_jointed_chains_under_constant_tension(engine, platform, force):
     """Every segment is independent; the chains begin with segments drawn at that tension."""
     force *= KT / 100
-    chains, segments = 1500, 3
+    chains, segments = (1500 if engine == "compiled" else 700), 3
     vectors = _draw_pulled_segments(FREELY_JOINTED, force, (chains, segments), np.random.default_rng(5))
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine=engine)
     for nodes in np.concatenate([np.zeros((chains, 1, 3)), np.cumsum(vectors, axis=1)], axis=1):
@@ -324,7 +324,7 @@ def test_work_obeys_the_equality_of_jarzynski():
     topology, system, positions = filaments.build()
     friction = FREELY_JOINTED.segment_friction(VISCOSITY, TEMPERATURE)
     step = 0.02 * friction.parallel / stiffness
-    distance, steps = 15.0, 60
+    distance, steps = 11.0, 60
     simulation = _simulation(topology, system, positions, filaments.create_integrator(system, step, random_seed=2))
     pulling = ConstantVelocityPulling(None, 3, filaments, range(chains), [distance / (steps * step), 0, 0])
     simulation.reporters.append(pulling)
