@@ -1,8 +1,8 @@
 """Two kinds of filaments, crosslinks, particles and an optical trap in a periodic box, at rest and in shear flow.
 
 Actin filaments in crosslinked pairs and microtubules share a slit between two walls, periodic along x and y, with
-Lennard-Jones particles that OpenMM's NonbondedForce knows. A trap holds one microtubule at its middle. In the second half
-of the run the solvent flows along x, faster the higher it is.
+Lennard-Jones particles in OpenMM's NonbondedForce. A trap holds one microtubule at its middle. In the second half of
+the run the solvent flows along x, faster the higher it is.
 
     python mixed_system.py [folder] [steps]
 """

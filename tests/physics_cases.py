@@ -24,7 +24,7 @@ ENGINE_PLATFORMS += [("compiled", platform) for platform in PLATFORMS if platfor
 
 
 # Engines with rings, motion in a plane, self-propelled segments, flow and clamped directions.
-NEW_ENGINES = ("portable",)
+NEW_ENGINES = ("portable", "compiled")
 NEW_ENGINE_PLATFORMS = [pair for pair in ENGINE_PLATFORMS if pair[0] in NEW_ENGINES]
 
 

@@ -1,5 +1,6 @@
-"""Everything in one System: two kinds of filaments, crosslinks, Lennard-Jones particles, walls and a trap, at rest and in
-shear, for every engine and platform. The System is that of ``examples/mixed_system.py``."""
+"""Everything in one System, for every engine and platform: two kinds of filaments, crosslinks, Lennard-Jones particles,
+walls and a trap, at rest and in shear. The System is that of ``examples/mixed_system.py``.
+"""
 
 import importlib.util
 from pathlib import Path
