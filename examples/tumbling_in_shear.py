@@ -79,8 +79,8 @@ print(f"rings turn {ring_turns.mean() / time[-1]:.2f} times per second; with the
 print(f"share of the end-to-end vectors along the flow: {aligned:.2f}; 0.33 at rest")
 
 figure, (film, panel) = plt.subplots(2, 1, figsize=(11, 7), gridspec_kw={"height_ratios": [0.55, 1]})
-# The filament that turns over by about half a turn, as much as any in the plane of the picture, and the flattest ring.
-span = max(1, len(angles) // 20)
+# The filament that makes half a turn within a shear of 4, best in the plane of the picture, and the flattest ring.
+span = max(1, min(len(angles) // 2, round(4 / (rate * time[0]))))
 forward = (angles[:-span] - angles[span:]) / np.pi
 in_plane = np.hypot(ends[..., 0], ends[..., 2])[span // 2 :][: len(forward)]
 first, chosen = np.unravel_index(np.argmax(in_plane * np.exp(-(((forward - 1.0) / 0.1) ** 2))), forward.shape)
