@@ -30,6 +30,7 @@ STEP = 0.5 * unit.millisecond
 STEPS = 40000
 FRAMES = 1000
 POSES = 9
+SPACING = 7.0  # um between them in the picture
 VISCOSITY = 1.71e-3 * unit.pascal * unit.second
 TEMPERATURE = 310 * unit.kelvin
 
@@ -77,31 +78,29 @@ print(
 print(f"rings turn {ring_turns.mean() / time[-1]:.2f} times per second; with the vorticity {rate / (4 * np.pi):.2f}")
 print(f"share of the end-to-end vectors along the flow: {aligned:.2f}; 0.33 at rest")
 
-figure, (film, panel) = plt.subplots(2, 1, figsize=(11, 8), gridspec_kw={"height_ratios": [1, 1.1]})
-# The filament and the time at which one turns over in the middle of the strip.
-change = np.abs(angles[len(angles) // 20 :] - angles[: len(angles) - len(angles) // 20])
-first, chosen = np.unravel_index(np.argmax(change), change.shape)
-span = len(angles) // 20
-poses = np.linspace(max(0, first - span // 2), min(len(chains) - 1, first + 3 * span // 2), POSES).astype(int)
+figure, (film, panel) = plt.subplots(2, 1, figsize=(11, 7), gridspec_kw={"height_ratios": [0.55, 1]})
+# The filament that makes half a turn within a shear of 4, best in the plane of the picture, and the flattest ring.
+span = max(1, min(len(angles) // 2, round(4 / (rate * time[0]))))
+forward = (angles[:-span] - angles[span:]) / np.pi
+in_plane = np.hypot(ends[..., 0], ends[..., 2])[span // 2 :][: len(forward)]
+first, chosen = np.unravel_index(np.argmax(in_plane * np.exp(-(((forward - 1.0) / 0.1) ** 2))), forward.shape)
+loop_chosen = np.argmax(np.hypot(spokes[..., 0], spokes[..., 2])[first : first + span].mean(axis=0))
+poses = np.linspace(max(0, first - span // 4), min(len(chains) - 1, first + 5 * span // 4), POSES).astype(int)
 for place, pose in enumerate(poses):
     colour = plt.cm.plasma(0.05 + 0.8 * place / (POSES - 1))
-    shape = chains[pose, chosen] - chains[pose, chosen].mean(axis=0)
-    film.plot(
-        shape[:, 0] / 1000 + 5 * place, shape[:, 2] / 1000 + 3.4, color=colour, linewidth=3, solid_capstyle="round"
-    )
-    film.plot(shape[0, 0] / 1000 + 5 * place, shape[0, 2] / 1000 + 3.4, "o", color=colour, markersize=7)
-    loop = rings[pose, 0] - rings[pose, 0].mean(axis=0)
-    loop = np.concatenate([loop, loop[:1]]) / 1000
-    film.plot(loop[:, 0] + 5 * place, loop[:, 2] - 1.6, color=colour, linewidth=3)
-    film.plot(loop[0, 0] + 5 * place, loop[0, 2] - 1.6, "o", color=colour, markersize=7)
-    film.text(5 * place, 6.3, f"{time[pose]:.2f} s", ha="center", color="0.4")
-for height in np.linspace(-2, 2, 5):
-    film.annotate(
-        "", (-5.5 + 0.6 * height, 1 + height), (-5.5, 1 + height), arrowprops={"arrowstyle": "->", "color": "#7f8c8d"}
-    )
-film.plot([-5.5, -5.5], [-1.2, 3.2], color="#7f8c8d", linewidth=1)
-film.text(-5.5, 3.6, "flow", ha="center", color="#7f8c8d")
-film.set(aspect="equal", xlim=(-7.2, 5 * POSES - 2), ylim=(-3.4, 6.8), title="A filament and a ring in shear flow")
+    shape = (chains[pose, chosen] - chains[pose, chosen].mean(axis=0)) / 1000
+    loop = (rings[pose, loop_chosen] - rings[pose, loop_chosen].mean(axis=0)) / 1000
+    for outline, height in ((shape, 4.0), (np.concatenate([loop, loop[:1]]), -1.0)):
+        x, z = outline[:, 0] + SPACING * place, outline[:, 2] + height
+        film.plot(x, z, color=colour, linewidth=2.6, solid_capstyle="round")
+        film.plot(x[0], z[0], "o", color=colour, markersize=6)
+    film.text(SPACING * place, 7.4, f"{time[pose]:.2f} s", ha="center", color="0.4")
+for height in (-2, -1, 1, 2):
+    arrow = {"arrowstyle": "->", "color": "#7f8c8d"}
+    film.annotate("", (-6 + 1.2 * height, 1.5 + height), (-6, 1.5 + height), arrowprops=arrow)
+film.plot([-6, -6], [-1, 4], color="#7f8c8d", linewidth=1)
+film.text(-6, 4.6, "flow", ha="center", color="#7f8c8d")
+film.set(aspect="equal", xlim=(-9, SPACING * POSES - 3), ylim=(-3, 8.4))
 film.set_axis_off()
 for number in range(FILAMENTS):
     style = {"color": "#1f6f8b", "linewidth": 0.8, "alpha": 0.6}

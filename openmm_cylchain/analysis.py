@@ -1,6 +1,7 @@
 """Observables of filaments from an ``mdtraj.Trajectory``: shape, bending and diffusion.
 
-A filament is a chain of the topology; its nodes are the atoms of that chain with the name "NOD", in order.
+A filament is a chain of the topology; its nodes are the atoms of that chain with the name "NOD", in order. It is a ring
+if a bond joins the last one to the first.
 Anything else in the trajectory is left alone. Positions have to be those of whole filaments, not wrapped
 into a periodic box (``periodic`` makes them whole). Results are plain numbers in OpenMM's units (nm, ps).
 
@@ -69,12 +70,33 @@ def _selection(filaments, count):
     return selected
 
 
+def ring_filaments(trajectory_or_topology):
+    """Whether each filament is a ring: (filaments,) bool array."""
+    topology = getattr(trajectory_or_topology, "topology", trajectory_or_topology)
+    bonds = {frozenset((bond.atom1.index, bond.atom2.index)) for bond in topology.bonds}
+    nodes = filament_nodes(topology)
+    return np.array([len(one) > 2 and frozenset((int(one[0]), int(one[-1]))) in bonds for one in nodes])
+
+
+def _refuse_rings(trajectory, filaments, what):
+    rings = ring_filaments(trajectory)
+    for index in _selection(filaments, len(rings)):
+        if rings[index]:
+            raise InputError(f"Filament {index} is a ring, which has no {what}: select the others.")
+
+
 def _segment_vectors(trajectory, filaments):
-    return [np.diff(positions, axis=1) for positions in node_positions(trajectory, filaments)]
+    rings = ring_filaments(trajectory)
+    selected = _selection(filaments, len(rings))
+    return [
+        np.diff(positions, axis=1, append=positions[:, :1]) if rings[index] else np.diff(positions, axis=1)
+        for index, positions in zip(selected, node_positions(trajectory, filaments))
+    ]
 
 
 def end_to_end_vectors(trajectory, filaments=None):
-    """Vectors from the first to the last node: (frames, filaments, 3) array in nm."""
+    """Vectors from the first to the last node: (frames, filaments, 3) array in nm. Raises InputError for rings."""
+    _refuse_rings(trajectory, filaments, "end-to-end vector")
     return np.stack([p[:, -1] - p[:, 0] for p in node_positions(trajectory, filaments)], axis=1)
 
 
@@ -86,11 +108,15 @@ def radii_of_gyration(trajectory, filaments=None):
 
 def centers_of_mass(trajectory, filaments=None):
     """Mean of the segments' midpoints, all of one weight: (frames, filaments, 3) array in nm."""
-    return np.stack([_center(p) for p in node_positions(trajectory, filaments)], axis=1)
+    rings = ring_filaments(trajectory)
+    selected = _selection(filaments, len(rings))
+    nodes = node_positions(trajectory, filaments)
+    return np.stack([_center(p, rings[index]) for index, p in zip(selected, nodes)], axis=1)
 
 
-def _center(positions):
-    return 0.5 * (positions[:, 1:] + positions[:, :-1]).mean(axis=1)
+def _center(positions, ring):
+    # Every node of a ring belongs to two segments.
+    return positions.mean(axis=1) if ring else 0.5 * (positions[:, 1:] + positions[:, :-1]).mean(axis=1)
 
 
 def segment_lengths(trajectory, filaments=None):
@@ -119,8 +145,16 @@ def _normalized(vectors):
 
 
 def joint_cosines(trajectory, filaments=None):
-    """Cosines t1.t2 between neighbouring segments: a list of (frames, segments - 1) arrays."""
-    return [np.sum(t[:, 1:] * t[:, :-1], axis=-1) for t in tangents(trajectory, filaments)]
+    """Cosines t1.t2 between neighbouring segments: a list of (frames, joints) arrays.
+
+    A ring has as many joints as segments, with the one at its first node first.
+    """
+    rings = ring_filaments(trajectory)
+    cosines = []
+    for index, t in zip(_selection(filaments, len(rings)), tangents(trajectory, filaments)):
+        before, behind = (np.roll(t, 1, axis=1), t) if rings[index] else (t[:, :-1], t[:, 1:])
+        cosines.append(np.sum(before * behind, axis=-1))
+    return cosines
 
 
 @dataclass(frozen=True)
@@ -163,8 +197,9 @@ def tangent_correlation(trajectory, filaments=None, maximum_lag=None):
     Raises
     ------
     InputError
-        For filaments of different lengths, a maximum_lag beyond the filament, or a single sample.
+        For filaments of different lengths, a maximum_lag beyond the filament, a single sample, or rings.
     """
+    _refuse_rings(trajectory, filaments, "free correlation of tangents")
     directions = _stacked(tangents(trajectory, filaments))
     segments = directions.shape[2]
     maximum_lag = segments - 1 if maximum_lag is None else whole_number(maximum_lag, 0, "maximum_lag")
@@ -208,9 +243,10 @@ def persistence_length(trajectory, filaments=None):
     Raises
     ------
     InputError
-        For filaments of a single segment or of different lengths, for a single sample, and if the mean cosine
-        is not between 0 and 1.
+        For filaments of a single segment or of different lengths, for rings, for a single sample, and if the mean
+        cosine is not between 0 and 1.
     """
+    _refuse_rings(trajectory, filaments, "independent joints")
     directions = _stacked(tangents(trajectory, filaments))
     if directions.shape[2] < 2:
         raise InputError("A persistence length needs filaments of at least two segments.")
@@ -247,6 +283,7 @@ def bending_mode_amplitudes(trajectory, filament, modes, contour_length=None):
     (frames, modes, 3) array in nm^(1/2)
     """
     filament = whole_number(filament, 0, "filament")
+    _refuse_rings(trajectory, filament, "bending modes of free ends")
     directions = tangents(trajectory, filament)[0]
     segments = directions.shape[1]
     numbers = np.atleast_1d(in_units_of(modes, DIMENSIONLESS, "modes"))
@@ -287,7 +324,7 @@ class MeanSquareDisplacement:
 
 
 def mean_square_displacement(trajectory, filaments=None, lags=None, window_average=True, time_step=None):
-    """Mean square displacement of nodes and centres of mass, also along and across the initial axis.
+    """Mean square displacement of nodes and centres of mass, also along and across the initial axis, of open filaments.
 
     Parameters
     ----------
@@ -305,6 +342,7 @@ def mean_square_displacement(trajectory, filaments=None, lags=None, window_avera
     -------
     MeanSquareDisplacement
     """
+    _refuse_rings(trajectory, filaments, "axis")
     lags = _checked_lags(lags, trajectory.n_frames)
     step = _frame_spacing(trajectory) if time_step is None else positive(time_step, TIME, "time_step")
     results = np.stack(
@@ -336,7 +374,7 @@ def _frame_spacing(trajectory):
 
 
 def _filament_displacements(positions, lags, window_average):
-    centers = _center(positions)
+    centers = _center(positions, ring=False)
     axes = _normalized(positions[:, -1] - positions[:, 0])
     result = np.zeros((4, len(lags)))
     for column, lag in enumerate(lags):

@@ -11,7 +11,7 @@ from scipy.integrate import simpson
 from scipy.spatial.transform import Rotation
 from test_redistribution import _bent_chain, _dense_resistance
 
-from openmm_cylchain import F_ACTIN, Filaments, InputError
+from openmm_cylchain import F_ACTIN, Filaments, InputError, analysis
 from openmm_cylchain.engines import redistribution
 from openmm_cylchain.equilibrium import SegmentLengthDistribution
 from openmm_cylchain.reporters import FilamentReporter
@@ -82,6 +82,35 @@ def test_particles_bonds_and_points_of_a_ring(engine, tmp_path):
     with open(tmp_path / "ring.cif", "w") as file:
         app.PDBxFile.writeFile(topology, positions, file, keepIds=True)
     assert mdtraj.load(str(tmp_path / "ring.cif")).topology.n_bonds == 7
+
+
+def test_analysis_knows_rings_by_their_bonds(tmp_path):
+    filaments = Filaments(VISCOSITY, TEMPERATURE, engine="portable")
+    nodes = _polygon(6, np.random.default_rng(1))
+    filaments.add_straight(F_ACTIN, 3, [0, 0, 0], [1, 0, 0])
+    filaments.add_nodes(F_ACTIN, nodes, closed=True)
+    topology, _, positions = filaments.build()
+    with open(tmp_path / "ring.cif", "w") as file:
+        app.PDBxFile.writeFile(topology, positions, file, keepIds=True)
+    trajectory = mdtraj.load(str(tmp_path / "ring.cif"))
+    assert analysis.ring_filaments(trajectory).tolist() == [False, True]
+    vectors = np.roll(nodes, -1, axis=0) - nodes
+    lengths = np.linalg.norm(vectors, axis=1)
+    tangents = vectors / lengths[:, None]
+    assert analysis.segment_lengths(trajectory)[1][0] == pytest.approx(lengths, rel=1e-4)
+    assert analysis.segment_lengths(trajectory)[0][0] == pytest.approx([360] * 3, rel=1e-4)
+    assert analysis.contour_lengths(trajectory)[0] == pytest.approx([1080, lengths.sum()], rel=1e-4)
+    cosines = np.einsum("ij,ij->i", np.roll(tangents, 1, axis=0), tangents)
+    assert analysis.joint_cosines(trajectory, 1)[0][0] == pytest.approx(cosines, abs=1e-4)
+    assert analysis.centers_of_mass(trajectory, [1, 0])[0] == pytest.approx(
+        np.array([nodes.mean(axis=0), [540, 0, 0]]), abs=0.01
+    )
+    assert analysis.end_to_end_vectors(trajectory, 0)[0, 0] == pytest.approx([1080, 0, 0], abs=0.01)
+    for function in (analysis.end_to_end_vectors, analysis.tangent_correlation, analysis.persistence_length):
+        with pytest.raises(InputError, match="Filament 1 is a ring"):
+            function(trajectory)
+    with pytest.raises(InputError, match="Filament 1 is a ring, which has no bending modes"):
+        analysis.bending_mode_amplitudes(trajectory, 1, [1])
 
 
 @pytest.mark.parametrize("engine", NEW_ENGINES)
