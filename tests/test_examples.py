@@ -16,6 +16,7 @@ CASES = [
     ("lennard_jones_box", "box", 40, 40, 150 + 8, 7),
     ("two_filament_types", "filaments", 50, 50, 16 * (49 + 17), 16 * (48 + 16)),
     ("clamped_filament", "filaments", 200, 100, 4 * 8, 4 * 7),
+    ("dense_network", "network", 40, 40, 120 * (11 + 57), 120 * 10),
     ("filaments_in_a_vesicle", "vesicle", 40, 40, 24 + 24 * (13 + 1), 24 * 12),
 ]
 
