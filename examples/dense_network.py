@@ -2,8 +2,8 @@
 
 A hundred and twenty filaments of 1 um are put at random into a periodic box of 1 um, where their mesh is 0.16 um wide.
 Beads along them repel those of other filaments where two axes come closer than 30 nm. The program counts in every step
-how often filaments pass through each other, which must be never, and how often they do in a network without contacts that
-takes the same steps.
+how often filaments pass through each other. That must be never; a network without contacts takes the same steps for
+comparison.
 
     python dense_network.py [folder] [steps]
 """
@@ -33,7 +33,7 @@ BEAD_SPACING = 18.0  # nm
 STEPS = 1500
 FRAMES = 100
 # Filaments are drawn on top of each other, and come apart in these steps, which are not looked at.
-RELAXATION_STEPS = 300
+RELAXATION_STEPS = 100
 VISCOSITY = 1.71e-3 * unit.pascal * unit.second
 TEMPERATURE = 310 * unit.kelvin
 
