@@ -30,11 +30,14 @@ class Attachment:
     filament, segment : int
     fraction : float
         Of the segment's length, from its minus end: 0 to 1.
+    name : str
+        Of its atom in topologies.
     """
 
     filament: int
     segment: int
     fraction: float
+    name: str = ATTACHMENT_NAME
 
 
 def locate(filament, number, label, arc_length=None, segment=None, fraction=None):

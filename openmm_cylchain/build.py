@@ -7,7 +7,8 @@ import numpy as np
 import openmm
 from openmm import app, unit
 
-from .attachments import ATTACHMENT_NAME, add_virtual_site, attachment_positions, locate, neighbors
+from .attachments import add_virtual_site, attachment_positions, locate, neighbors
+from .contacts import default_stiffness, distribute_beads, filament_diameters
 from .engines import choose_engine, default_scheme, load_engine
 from .engines.description import describe_chains
 from .equilibrium import draw_chain
@@ -38,7 +39,7 @@ from .quantities import (
     whole_number,
 )
 from .tension import filament_tensions
-from .timestep import check_scheme, recommended_time_step, warn_if_unstable
+from .timestep import check_scheme, contact_time_step, recommended_time_step, warn_if_unstable
 
 NODE_NAME = "NOD"
 """Atom name of a filament node in topologies."""
@@ -144,6 +145,7 @@ class Filaments:
         self._attachments = []
         self._attachments_of = defaultdict(list)
         self._attachment_indices = None
+        self._beads = {}
         self._nodes = None
 
     def __len__(self):
@@ -188,6 +190,12 @@ class Filaments:
         """Particle indices of the attachment points, in the order of their numbers, once they are in a System."""
         self._refuse_unless_built()
         return self._attachment_indices
+
+    @property
+    def bead_indices(self):
+        """List of arrays: the particle indices of the beads of every filament, once they are in a System."""
+        self._refuse_unless_built()
+        return [self._attachment_indices[self._beads.get(number, [])] for number in range(len(self))]
 
     def add_straight(self, filament_type, segments, start, direction, clamped=(), *, planar=False, propulsion=0.0):
         """Add a straight filament with segments of rest length.
@@ -410,8 +418,44 @@ class Filaments:
         label = f"Attachment point {len(self._attachments)}"
         self._refuse_if_built(label)
         filament = self._filament_number(filament, label)
-        self._attachments.append(locate(self[filament], filament, label, arc_length, segment, fraction))
-        self._attachments_of[filament].append(len(self._attachments) - 1)
+        return self._attach(locate(self[filament], filament, label, arc_length, segment, fraction))
+
+    def add_beads(self, filament, spacing):
+        """Cover a filament evenly with beads, on which contact forces act (see ``openmm_cylchain.contacts``).
+
+        Beads are attachment points, from the first node to the last at equal distances along the contour, in the
+        Topology with the name "BED". ``bead_indices`` says which particles they are.
+
+        Parameters
+        ----------
+        filament : int
+            The filament's number.
+        spacing : length
+            The largest distance of two neighbours along segments of rest length. Half a contact diameter closes
+            all gaps.
+
+        Returns
+        -------
+        list of int
+            The beads' numbers among the attachment points.
+
+        Raises
+        ------
+        InputError
+            For a filament that does not exist or has beads already, or a spacing that is not positive.
+        """
+        label = f"Beads of filament {filament}"
+        self._refuse_if_built(label)
+        filament = self._filament_number(filament, label)
+        if filament in self._beads:
+            raise InputError(f"{label}: it has beads already.")
+        beads = distribute_beads(self[filament], filament, positive(spacing, LENGTH, f"{label}: spacing"))
+        self._beads[filament] = [self._attach(bead) for bead in beads]
+        return list(self._beads[filament])
+
+    def _attach(self, attachment):
+        self._attachments.append(attachment)
+        self._attachments_of[attachment.filament].append(len(self._attachments) - 1)
         return len(self._attachments) - 1
 
     def move_tether(self, context, tether, point, stiffness=None):
@@ -571,7 +615,7 @@ class Filaments:
             self._nodes.append(np.arange(first, first + len(filament.positions)))
             self._add_particles(system, filament)
             everything += [filament.positions, self._add_attachments(system, number)]
-            self._add_to_topology(topology, filament, number, system.getNumParticles() - first)
+            self._add_to_topology(topology, filament, number)
         self._add_noninteracting_entries(system, positions)
         self._engine.add_forces(
             system,
@@ -616,14 +660,14 @@ class Filaments:
             if whole_number(group, 0, "force group") > 31:
                 raise InputError(f"A force group must be between 0 and 31, but is {group}.")
 
-    @staticmethod
-    def _add_to_topology(topology, filament, number, particles):
+    def _add_to_topology(self, topology, filament, number):
         chain = topology.addChain(f"F{number}")
         nodes = len(filament.positions)
+        names = [NODE_NAME] * nodes + [self._attachments[index].name for index in self._attachments_of[number]]
         previous = None
-        for particle in range(particles):
+        for particle, name in enumerate(names):
             residue = topology.addResidue(filament.type.name, chain, str(particle + 1))
-            atom = topology.addAtom(NODE_NAME if particle < nodes else ATTACHMENT_NAME, None, residue)
+            atom = topology.addAtom(name, None, residue)
             if 0 < particle < nodes:
                 topology.addBond(previous, atom)
             previous = atom
@@ -659,10 +703,22 @@ class Filaments:
             mine = self._attachments_of[number]
             yield from neighbors([self._attachments[index] for index in mine], self._attachment_indices[mine], nodes)
 
-    def recommended_time_step(self, scheme=None):
+    def recommended_time_step(self, scheme=None, contact_diameter=None, contact_stiffness=None, confidence=3.0):
         """The recommended step for the filament that allows the least: a TimeStep (see ``timestep``).
 
-        The scheme is the engine's default if not given. Other forces in the System may need a smaller step.
+        Other forces in the System, and particles outside filaments, may need a smaller step.
+
+        Parameters
+        ----------
+        scheme : {"implicit", "midpoint", "euler"}, optional
+            The engine's default if not given.
+        contact_diameter : length, or (filaments,) array of lengths, optional
+            Filaments that touch at this distance must not jump through each other, eq. (56), nor be thrown apart by
+            the contact force: see ``timestep.contact_time_step``.
+        contact_stiffness : energy/length^2, optional
+            Of the contact force; that of ``contacts.default_stiffness`` if not given.
+        confidence : float
+            c_sigma of eq. (53): how many standard deviations of a displacement must stay below half the diameter.
         """
         scheme = default_scheme(self._engine_name) if scheme is None else scheme
         steps = [
@@ -671,6 +727,27 @@ class Filaments:
         ]
         if not steps:
             raise InputError("There are no filaments to recommend a time step for.")
+        least = min(steps, key=lambda step: step.step)
+        if contact_diameter is None:
+            if contact_stiffness is not None:
+                raise InputError("A contact_stiffness needs a contact_diameter.")
+            return least
+        contact = self._contact_time_step(contact_diameter, contact_stiffness, confidence)
+        return replace(min(least, contact, key=lambda step: step.step), bounds={**least.bounds, **contact.bounds})
+
+    def _contact_time_step(self, diameter, stiffness, confidence):
+        diameters = filament_diameters(diameter, len(self))
+        if stiffness is None:
+            if self._temperature == 0.0:
+                raise InputError("At a temperature of zero, contacts need a contact_stiffness.")
+            stiffness = default_stiffness(diameters.min(), self._temperature)
+        solvent = (self._viscosity, self._temperature)
+        steps = []
+        for number, (filament, d) in enumerate(zip(self._filaments, diameters)):
+            density = max(1.0, len(self._beads.get(number, ())) / filament.segments)
+            steps.append(
+                contact_time_step(filament.type, *solvent, d, stiffness, filament.segments, density, confidence)
+            )
         return min(steps, key=lambda step: step.step)
 
     def create_integrator(

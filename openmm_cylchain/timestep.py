@@ -11,7 +11,17 @@ from dataclasses import dataclass
 
 from .engines import default_scheme
 from .errors import InputError, TimeStepWarning
-from .quantities import BENDING_RIGIDITY, LENGTH, STIFFNESS, TIME, VISCOSITY, in_units_of, positive, thermal_energy
+from .quantities import (
+    BENDING_RIGIDITY,
+    DIMENSIONLESS,
+    LENGTH,
+    STIFFNESS,
+    TIME,
+    VISCOSITY,
+    in_units_of,
+    positive,
+    thermal_energy,
+)
 
 EXPLICIT_SCHEMES = ("euler", "midpoint")
 SCHEMES = (*EXPLICIT_SCHEMES, "implicit")
@@ -45,10 +55,17 @@ def diffusion_bound(friction, diameter, length, temperature, confidence=3.0):
     The printed second denominator carries gamma_par where (16) gives gamma_perp; Table 3 was computed
     with gamma_perp, and so is this.
     """
-    quarter = positive(length, LENGTH, "length") ** 2 / 4.0
+    return _diffusion_bound(
+        _end_friction(friction, positive(length, LENGTH, "length")), diameter, temperature, confidence
+    )
+
+
+def _end_friction(friction, length):
+    # Of one end of a free segment, in the direction in which it is lower.
+    quarter = length**2 / 4.0
     along = 1.0 / (1.0 / friction.parallel + quarter / friction.extensional)
     across = 1.0 / (1.0 / friction.perpendicular + quarter / friction.rotational)
-    return _diffusion_bound(min(along, across), diameter, temperature, confidence)
+    return min(along, across)
 
 
 def _diffusion_bound(friction, diameter, temperature, confidence):
@@ -121,6 +138,27 @@ def bead_spring_bounds(diameter, viscosity, stiffness, bending_rigidity, tempera
     }
 
 
+def contact_stiffness_bound(friction, length, stiffness, beads_per_segment=1.0):
+    """Step, in ps, above which contacts of stiffness k, which are explicit in every scheme, overshoot and blow up.
+
+    ``dt < 2/lambda``, lambda the fastest relaxation of two equal segments that touch. One pair of beads at their ends
+    relaxes with 2 k/gamma*, where gamma* is the friction of an end as in (56), and n pairs along both of them with
+    2 n k/gamma_perp where they move, and 2 n k (l0^2/12)/gamma_rot where they turn, so
+
+        dt < min(gamma*, gamma_perp/n, 12 gamma_rot/(n l0^2)) / k.
+
+    Segments in a chain move less, which leaves the bound on the safe side.
+    """
+    length = positive(length, LENGTH, "length")
+    pairs = max(1.0, positive(beads_per_segment, DIMENSIONLESS, "beads_per_segment"))
+    softest = min(
+        _end_friction(friction, length),
+        friction.perpendicular / pairs,
+        12.0 * friction.rotational / (pairs * length**2),
+    )
+    return softest / positive(stiffness, STIFFNESS, "stiffness")
+
+
 def time_step_bounds(filament_type, viscosity, temperature, confidence=3.0, segments=1):
     """The five bounds of Table 1 for a filament type in a solvent, in ps.
 
@@ -180,6 +218,9 @@ _REASONS = {
     "extensional friction is large",
     "rotation": "rotation of segments: they may turn by {angle:g} rad in a step",
     "relaxation": "relaxation of the whole filament, which takes {relaxation_steps:g} steps",
+    "contact diffusion": "diffusion of a segment's ends, eq. (56) with the contact diameter: filaments must not jump "
+    "through each other",
+    "contact stiffness": "stiffness of contacts, which are explicit, with a margin of {contact_margin:g}",
 }
 LARGEST_DIVIDED_SHARE = 1e-3
 """Scheme "implicit" divides steps whose equations it cannot solve: a larger share of them may bias averages."""
@@ -189,6 +230,7 @@ _ACCURACY_MARGIN = 20.0
 _TURNING_ANGLE = 0.1
 _IMPLICIT_TURNING_ANGLE = 0.15
 _NOISE_LEAK = 0.1
+_CONTACT_MARGIN = 4.0
 
 
 def stability_bounds(filament_type, viscosity, temperature, segments=1):
@@ -281,6 +323,45 @@ def implicit_time_step(filament_type, viscosity, temperature, segments=2):
     binding = min(allowed, key=allowed.get)
     reason = _REASONS[binding].format(angle=_IMPLICIT_TURNING_ANGLE, relaxation_steps=_RELAXATION_STEPS)
     return TimeStep(step=allowed[binding], reason=reason, bounds=bounds)
+
+
+def contact_time_step(
+    filament_type, viscosity, temperature, diameter, stiffness, segments=2, beads_per_segment=1.0, confidence=3.0
+):
+    """The step at which filaments of one type with contacts do not pass through each other.
+
+    It is the lesser of two bounds: (56) with the contact diameter, which keeps ends from diffusing by more than half of
+    it in a step, and a quarter of ``contact_stiffness_bound``. The fluctuations of a contact are then too large by a
+    third at most, and a filament in a bundle, which six others touch, is stable, too.
+
+    Parameters
+    ----------
+    filament_type : FilamentType
+    viscosity : pressure*time
+    temperature : temperature
+    diameter : length
+        Contact diameter.
+    stiffness : energy/length^2
+        Of a contact between two beads, as of ``contacts.contact_force``.
+    segments : int
+    beads_per_segment : float
+    confidence : float
+        c_sigma of eq. (53): how many standard deviations of a displacement must stay below half the diameter.
+
+    Returns
+    -------
+    TimeStep
+    """
+    friction = filament_type.segment_friction(viscosity, temperature, segments)
+    length = filament_type.segment_length
+    confidence = positive(confidence, DIMENSIONLESS, "confidence")
+    bounds = {
+        "contact diffusion": diffusion_bound(friction, diameter, length, temperature, confidence),
+        "contact stiffness": contact_stiffness_bound(friction, length, stiffness, beads_per_segment),
+    }
+    allowed = {**bounds, "contact stiffness": bounds["contact stiffness"] / _CONTACT_MARGIN}
+    binding = min(allowed, key=allowed.get)
+    return TimeStep(allowed[binding], _REASONS[binding].format(contact_margin=_CONTACT_MARGIN), bounds)
 
 
 def check_scheme(scheme):

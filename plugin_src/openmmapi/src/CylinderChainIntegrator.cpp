@@ -188,10 +188,12 @@ void CylinderChainIntegrator::step(int steps) {
 }
 
 void CylinderChainIntegrator::createCheckpoint(ostream& stream) const {
-    const int version = 1;
+    const int version = 2;
     stream.write((const char*) &version, sizeof(version));
     stream.write((const char*) &noiseSeed, sizeof(noiseSeed));
     stream.write((const char*) &stepsTaken, sizeof(stepsTaken));
+    const Vec3 flow[] = {flowVelocity, flowGradient[0], flowGradient[1], flowGradient[2], flowOrigin};
+    stream.write((const char*) flow, sizeof(flow));
 }
 
 void CylinderChainIntegrator::loadCheckpoint(istream& stream) {
@@ -200,19 +202,34 @@ void CylinderChainIntegrator::loadCheckpoint(istream& stream) {
     stream.read((char*) &version, sizeof(version));
     stream.read((char*) &seed, sizeof(seed));
     stream.read((char*) &steps, sizeof(steps));
-    if (!stream || version != 1)
+    Vec3 flow[5];
+    if (version == 2)
+        stream.read((char*) flow, sizeof(flow));
+    if (!stream || version < 1 || version > 2)
         throw OpenMMException("loadCheckpoint: Checkpoint was not created with a CylinderChainIntegrator");
+    if (version == 2)
+        setFlow(flow[0], flow[1], flow[2], flow[3], flow[4]);
     noiseSeed = seed;
     stepsTaken = steps;
 }
 
 void CylinderChainIntegrator::serializeParameters(SerializationNode& node) const {
-    node.setIntProperty("version", 1);
+    node.setIntProperty("version", 2);
     node.setLongProperty("stepsTaken", stepsTaken);
+    const Vec3 flow[] = {flowVelocity, flowGradient[0], flowGradient[1], flowGradient[2], flowOrigin};
+    for (const Vec3& vector : flow)
+        node.createChildNode("Flow").setDoubleProperty("x", vector[0]).setDoubleProperty("y", vector[1])
+                .setDoubleProperty("z", vector[2]);
 }
 
 void CylinderChainIntegrator::deserializeParameters(const SerializationNode& node) {
-    if (node.getIntProperty("version") != 1)
+    const int version = node.getIntProperty("version");
+    if (version < 1 || version > 2)
         throw OpenMMException("Unsupported version number");
     stepsTaken = node.getLongProperty("stepsTaken");
+    vector<Vec3> flow;
+    for (const SerializationNode& child : node.getChildren())
+        flow.push_back(Vec3(child.getDoubleProperty("x"), child.getDoubleProperty("y"), child.getDoubleProperty("z")));
+    if (flow.size() == 5)
+        setFlow(flow[0], flow[1], flow[2], flow[3], flow[4]);
 }

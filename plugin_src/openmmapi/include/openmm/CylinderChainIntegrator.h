@@ -33,8 +33,8 @@ class CylinderChainForceImpl;
  * Motion is overdamped: there is no kinetic energy.  Velocities are displacements divided by the step size.
  *
  * The noise of a step depends only on the random number seed and on the number of steps taken since the Context was
- * created.  Checkpoints contain both, so a simulation that goes on from a checkpoint is identical to one that was
- * not interrupted.  A State contains the number of steps taken only.
+ * created.  Checkpoints contain both and the flow, so a simulation that goes on from a checkpoint is identical to one
+ * that was not interrupted.  A State contains the number of steps taken and the flow.
  *
  * A chain or a particle may become unstable: because the step is too large, or because a force is.  step() then throws
  * an exception that tells where and when, and leaves the positions as they were before the step that failed.
@@ -203,19 +203,19 @@ protected:
      */
     bool kineticEnergyRequiresForce() const;
     /**
-     * Write the seed and the number of steps taken to a checkpoint.
+     * Write the seed, the number of steps taken and the flow to a checkpoint.
      */
     void createCheckpoint(std::ostream& stream) const;
     /**
-     * Read the seed and the number of steps taken from a checkpoint.
+     * Read the seed, the number of steps taken and the flow from a checkpoint.
      */
     void loadCheckpoint(std::istream& stream);
     /**
-     * Write the number of steps taken to a State.
+     * Write the number of steps taken and the flow to a State.
      */
     void serializeParameters(SerializationNode& node) const;
     /**
-     * Read the number of steps taken from a State.
+     * Read the number of steps taken and the flow from a State.
      */
     void deserializeParameters(const SerializationNode& node);
 private:
