@@ -6,10 +6,14 @@ import numpy as np
 import openmm
 from openmm import unit
 from physics_cases import TEMPERATURE, VISCOSITY
+from scipy.spatial import cKDTree
 
 from openmm_cylchain import F_ACTIN, Filaments
+from openmm_cylchain.confinement import Sphere, wall_force
 from openmm_cylchain.contacts import contact_force
+from openmm_cylchain.crosslinks import Crosslinks
 from openmm_cylchain.crossings import CrossingCounter
+from openmm_cylchain.equilibrium import draw_chain
 
 DIAMETER = 30 * unit.nanometer
 SPACING = 18 * unit.nanometer
@@ -22,7 +26,7 @@ class Network:
 
     filaments: Filaments
     context: openmm.Context
-    box: np.ndarray
+    box: np.ndarray | None
     step: float
 
     def positions(self):
@@ -38,28 +42,58 @@ class Network:
         return counter.count
 
 
-def dense_network(
-    count, segments, edge, contacts=True, engine="compiled", platform="CPU", seed=1, relaxation=1000, connect=None
-):
-    """Filaments in equilibrium, at random in a periodic box, after some steps of the recommended length.
-
-    ``connect``, if given, is called with the Filaments, the System and the positions when contacts are in it: to add
-    what else there should be, such as crosslinks.
-    """
+def dense_network(count, segments, edge, contacts=True, seed=1, relaxation=1000):
+    """Filaments in equilibrium, at random in a periodic box, after some steps of the recommended length."""
     generator = np.random.default_rng(seed)
-    box = edge * np.eye(3)
-    filaments = Filaments(VISCOSITY, TEMPERATURE, engine=engine)
+    filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
     for number in range(count):
         filaments.add_equilibrium(ACTIN, segments, seed=number, start=generator.uniform(0, edge, 3))
         filaments.add_beads(number, SPACING)
+    box = edge * np.eye(3)
     _, system, positions = filaments.build(box_vectors=box)
     if contacts:
         system.addForce(contact_force(filaments, system, DIAMETER))
-    if connect is not None:
-        connect(filaments, system, positions)
+    return _relaxed(filaments, system, positions, box, seed, relaxation)
+
+
+def crosslinked_network(count, segments, radius, links, seed=1, relaxation=1000):
+    """Filaments in a sphere with contacts, and crosslinks between neighbours, after some steps of the recommended length.
+
+    Returns
+    -------
+    (Network, Crosslinks)
+    """
+    generator = np.random.default_rng(seed)
+    short = F_ACTIN.with_segment_length(50)
+    filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
+    while len(filaments) < count:
+        start = generator.uniform(-radius, radius, 3)
+        nodes = draw_chain(short, segments, TEMPERATURE, generator, start)
+        if np.linalg.norm(nodes, axis=1).max() < radius:
+            filaments.add_beads(filaments.add_nodes(short, nodes), 25)
+    _, system, positions = filaments.build()
+    system.addForce(contact_force(filaments, system, DIAMETER))
+    system.addForce(wall_force(Sphere([0, 0, 0], radius), 0.05, np.concatenate(filaments.node_indices)))
+    crosslinks = Crosslinks(stiffness=0.05, rest_length=35)
+    for first, second in _neighbouring_beads(filaments, positions._value, 50)[:links]:
+        crosslinks.add(None, int(first), int(second))
+    crosslinks.add_to(system)
+    return _relaxed(filaments, system, positions, None, seed, relaxation), crosslinks
+
+
+def _neighbouring_beads(filaments, positions, distance):
+    # Pairs of beads of different filaments, in no order.
+    beads = np.concatenate(filaments.bead_indices)
+    owner = np.repeat(np.arange(len(filaments)), [len(own) for own in filaments.bead_indices])
+    pairs = cKDTree(positions[beads]).query_pairs(distance, output_type="ndarray")
+    pairs = pairs[owner[pairs[:, 0]] != owner[pairs[:, 1]]]
+    return beads[np.random.default_rng(0).permutation(pairs)]
+
+
+def _relaxed(filaments, system, positions, box, seed, relaxation):
     step = filaments.recommended_time_step(contact_diameter=DIAMETER).step
     integrator = filaments.create_integrator(system, step, random_seed=seed)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform(platform))
+    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("CPU"))
     context.setPositions(positions)
     integrator.step(relaxation)
     return Network(filaments, context, box, step)
