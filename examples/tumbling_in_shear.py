@@ -79,10 +79,11 @@ print(f"rings turn {ring_turns.mean() / time[-1]:.2f} times per second; with the
 print(f"share of the end-to-end vectors along the flow: {aligned:.2f}; 0.33 at rest")
 
 figure, (film, panel) = plt.subplots(2, 1, figsize=(11, 7), gridspec_kw={"height_ratios": [0.55, 1]})
-# The filament that makes half a turn within a shear of 4, best in the plane of the picture, and the flattest ring.
+# The filament that makes half a turn within a shear of 4 and stays best in the plane of the picture, and such a ring.
 span = max(1, min(len(angles) // 2, round(4 / (rate * time[0]))))
 forward = (angles[:-span] - angles[span:]) / np.pi
-in_plane = np.hypot(ends[..., 0], ends[..., 2])[span // 2 :][: len(forward)]
+windows = np.lib.stride_tricks.sliding_window_view(np.hypot(ends[..., 0], ends[..., 2]), span + 1, axis=0)
+in_plane = windows.min(axis=-1)
 first, chosen = np.unravel_index(np.argmax(in_plane * np.exp(-(((forward - 1.0) / 0.1) ** 2))), forward.shape)
 loop_chosen = np.argmax(np.hypot(spokes[..., 0], spokes[..., 2])[first : first + span].mean(axis=0))
 poses = np.linspace(max(0, first - span // 4), min(len(chains) - 1, first + 5 * span // 4), POSES).astype(int)
