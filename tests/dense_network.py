@@ -56,7 +56,7 @@ def dense_network(count, segments, edge, contacts=True, seed=1, relaxation=1000)
     return _relaxed(filaments, system, positions, box, seed, relaxation)
 
 
-def crosslinked_network(count, segments, radius, links, seed=1, relaxation=1000):
+def crosslinked_network(count, segments, radius, links, contacts=True, seed=1, relaxation=1000):
     """Filaments in a sphere with contacts, and crosslinks between neighbours, after some steps of the recommended length.
 
     Returns
@@ -72,7 +72,8 @@ def crosslinked_network(count, segments, radius, links, seed=1, relaxation=1000)
         if np.linalg.norm(nodes, axis=1).max() < radius:
             filaments.add_beads(filaments.add_nodes(short, nodes), 25)
     _, system, positions = filaments.build()
-    system.addForce(contact_force(filaments, system, DIAMETER))
+    if contacts:
+        system.addForce(contact_force(filaments, system, DIAMETER))
     system.addForce(wall_force(Sphere([0, 0, 0], radius), 0.05, np.concatenate(filaments.node_indices)))
     crosslinks = Crosslinks(stiffness=0.05, rest_length=35)
     for first, second in _neighbouring_beads(filaments, positions._value, 50)[:links]:

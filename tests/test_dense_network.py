@@ -25,8 +25,10 @@ def test_filaments_cross_only_without_contacts():
 
 @pytest.mark.slow
 def test_a_dense_crosslinked_network_for_long():
-    """Two hundred filaments of 0.5 um, crosslinked, in a sphere of 0.9 um: no crossing in 1e5 steps, no growing memory."""
-    network, crosslinks = crosslinked_network(200, 10, 450.0, links=200)
+    """Two hundred filaments of 0.5 um, crosslinked, in a sphere of 1.2 um: no crossing in 1e5 steps, no growing memory."""
+    without, _ = crosslinked_network(200, 10, 600.0, links=200, contacts=False)
+    assert without.count_crossings(steps=1000, interval=20) > 300
+    network, crosslinks = crosslinked_network(200, 10, 600.0, links=200)
     crossings = network.count_crossings(steps=10000, interval=20)
     memory = _resident_megabytes()
     crossings += network.count_crossings(steps=90000, interval=20)
@@ -36,7 +38,7 @@ def test_a_dense_crosslinked_network_for_long():
     assert np.isfinite(positions).all()
     assert _resident_megabytes() < memory + 20
     # Twice as far as the soft wall lets a node go with a few k_B T.
-    assert np.linalg.norm(positions[np.concatenate(network.filaments.node_indices)], axis=1).max() < 450 + 60
+    assert np.linalg.norm(positions[np.concatenate(network.filaments.node_indices)], axis=1).max() < 600 + 60
     extensions = crosslinks.extensions(network.context)
     assert len(extensions) == 200
     assert np.abs(extensions).max() < 60

@@ -232,8 +232,8 @@ def test_a_step_equals_the_dense_solution(engine, name, scheme, planar):
         assert np.all(moved[indices][list(filament.clamped)] == 0)
         assert not planar or np.all(moved[indices, 2] == 0)
     for bead, friction in ((0, 1e5), (2, 3e5)):
-        halfway = start[bead] + 0.5 * step * _velocity(flow, start[bead])
-        expected = step * (_velocity(flow, halfway) + forces[bead] / friction)
+        halfway = start[[bead]] + 0.5 * step * _velocity(flow, start[[bead]])
+        expected = step * (_velocity(flow, halfway)[0] + forces[bead] / friction)
         assert moved[bead] == pytest.approx(expected, rel=1e-10)
     assert np.all(moved[1] == 0)
 
