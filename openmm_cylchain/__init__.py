@@ -1,6 +1,7 @@
 """Filaments for OpenMM: Brownian dynamics of extensible cylinder chains."""
 
-from .build import Filament, Filaments
+from .build import Filaments
+from .collection import Filament
 from .errors import InputError, InstabilityError, TimeStepWarning
 from .filament import DSDNA, F_ACTIN, MICROTUBULE, FilamentType
 from .flow import Flow

@@ -11,8 +11,8 @@ from scipy.spatial import cKDTree
 from openmm_cylchain import F_ACTIN, Filaments
 from openmm_cylchain.confinement import Sphere, wall_force
 from openmm_cylchain.contacts import contact_force
-from openmm_cylchain.crosslinks import Crosslinks
 from openmm_cylchain.crossings import CrossingCounter
+from openmm_cylchain.crosslinks import Crosslinks
 from openmm_cylchain.equilibrium import draw_chain
 
 DIAMETER = 30 * unit.nanometer
@@ -57,7 +57,7 @@ def dense_network(count, segments, edge, contacts=True, seed=1, relaxation=1000)
 
 
 def crosslinked_network(count, segments, radius, links, contacts=True, seed=1, relaxation=1000):
-    """Filaments in a sphere with contacts, and crosslinks between neighbours, after some steps of the recommended length.
+    """Filaments in a sphere with contacts, and crosslinks between neighbours, after some steps of recommended length.
 
     Returns
     -------

@@ -11,7 +11,7 @@ from openmm import unit
 from scipy.spatial.transform import Rotation
 
 from openmm_cylchain import Filaments, FilamentType, InputError
-from openmm_cylchain.build import Filament
+from openmm_cylchain.collection import Filament
 from openmm_cylchain.potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
 from openmm_cylchain.tension import segment_end_forces
 

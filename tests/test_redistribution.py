@@ -9,7 +9,7 @@ from conftest import ENGINES
 from physics_cases import TEMPERATURE, VISCOSITY
 
 from openmm_cylchain import DSDNA, F_ACTIN, Filaments
-from openmm_cylchain.build import Filament
+from openmm_cylchain.collection import Filament
 from openmm_cylchain.engines import redistribution
 from openmm_cylchain.tension import segment_end_forces
 
