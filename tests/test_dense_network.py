@@ -25,7 +25,7 @@ def test_filaments_cross_only_without_contacts():
 
 @pytest.mark.slow
 def test_a_dense_crosslinked_network_for_long():
-    """Two hundred filaments of 0.5 um, crosslinked, in a sphere of 1.2 um: no crossing in 1e5 steps, no memory grown."""
+    """Two hundred crosslinked filaments of 0.5 um in a sphere of 1.2 um: 1e5 steps without a crossing."""
     without, _ = crosslinked_network(200, 10, 600.0, links=200, contacts=False)
     assert without.count_crossings(steps=1000, interval=20) > 300
     network, crosslinks = crosslinked_network(200, 10, 600.0, links=200)

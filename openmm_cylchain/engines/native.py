@@ -219,12 +219,16 @@ class NativeIntegrator(CylinderChainIntegrator):
         ------
         InstabilityError
             If a chain or a particle blows up; positions are then those before the failing step.
+        InputError
+            If a filament was torn because positions were wrapped into a periodic box.
         """
         try:
             super().step(steps)
         except openmm.OpenMMException as error:
+            if "is torn" in str(error):
+                raise InputError(f"{self._with_labels(str(error))} (openmm_cylchain.periodic.make_whole).") from None
             if "has blown up" in str(error):
-                raise InstabilityError(self._with_labels(str(error))) from None
+                raise InstabilityError(self._with_labels(str(error)) + self._advice) from None
             raise
 
     def _with_labels(self, message):
@@ -232,7 +236,7 @@ class NativeIntegrator(CylinderChainIntegrator):
         chain = re.match(r"Chain (\d+)", message)
         if chain is None or int(chain[1]) >= len(self._labels):
             return message
-        return self._labels[int(chain[1])] + message[chain.end() :] + self._advice
+        return self._labels[int(chain[1])] + message[chain.end() :]
 
     def setRandomNumberSeed(self, seed):
         """Set the seed of the noise; 0 draws one for each Context that is created."""

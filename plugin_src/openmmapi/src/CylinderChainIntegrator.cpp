@@ -35,7 +35,7 @@ static CylinderChainForceImpl& findChains(ContextImpl& context) {
 }
 
 CylinderChainIntegrator::CylinderChainIntegrator(double temperature, double frictionCoeff, double stepSize) :
-        scheme(Implicit), noiseSeed(0), stepsTaken(0), dividedSteps(0), chains(NULL) {
+        scheme(Implicit), noiseSeed(0), stepsTaken(0), dividedSteps(0), positionsHaveChanged(true), chains(NULL) {
     setTemperature(temperature);
     setFriction(frictionCoeff);
     setStepSize(stepSize);
@@ -140,6 +140,11 @@ void CylinderChainIntegrator::setFlow(const Vec3& velocity, const Vec3& gradient
     flowOrigin = origin;
 }
 
+void CylinderChainIntegrator::stateChanged(State::DataType changed) {
+    if (changed == State::Positions)
+        positionsHaveChanged = true;
+}
+
 void CylinderChainIntegrator::cleanup() {
     kernel = Kernel();
 }
@@ -160,6 +165,10 @@ void CylinderChainIntegrator::step(int steps) {
     if (context == NULL)
         throw OpenMMException("This Integrator is not bound to a context!");
     IntegrateCylinderChainStepKernel& stepKernel = kernel.getAs<IntegrateCylinderChainStepKernel>();
+    if (positionsHaveChanged) {
+        stepKernel.refuseTornChains(*context);
+        positionsHaveChanged = false;
+    }
     const bool includesChains = (getIntegrationForceGroups()&(1<<chains->getOwner().getForceGroup())) != 0;
     for (int done = 0; done < steps;) {
         context->updateContextState();

@@ -36,6 +36,9 @@ class CylinderChainForceImpl;
  * created.  Checkpoints contain both and the flow, so a simulation that goes on from a checkpoint is identical to one
  * that was not interrupted.  A State contains the number of steps taken and the flow.
  *
+ * In a periodic box, positions may have been wrapped particle by particle, which tears chains that cross its faces.  If the
+ * CylinderChainForce does not use periodic boundary conditions, step() throws an exception that tells which chain is torn.
+ *
  * A chain or a particle may become unstable: because the step is too large, or because a force is.  step() then throws
  * an exception that tells where and when, and leaves the positions as they were before the step that failed.
  */
@@ -195,6 +198,10 @@ protected:
      */
     std::vector<std::string> getKernelNames();
     /**
+     * Note that positions have changed: chains may have been torn.
+     */
+    void stateChanged(State::DataType changed);
+    /**
      * There is no kinetic energy.
      */
     double computeKineticEnergy();
@@ -227,7 +234,7 @@ private:
     int randomNumberSeed;
     std::uint64_t noiseSeed, stepsTaken;
     long long dividedSteps;
-    bool chainsAreAlone;
+    bool chainsAreAlone, positionsHaveChanged;
     CylinderChainForceImpl* chains;
     Kernel kernel;
 };

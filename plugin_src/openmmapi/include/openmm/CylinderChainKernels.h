@@ -76,6 +76,13 @@ public:
     virtual void initialize(const System& system, const CylinderChainIntegrator& integrator,
             CalcCylinderChainForceKernel& forceKernel) = 0;
     /**
+     * Throw an exception if positions were wrapped into a periodic box so that a chain is torn: a segment is longer than
+     * half the box and than twice its rest length, while its ends have images that are nearer.
+     *
+     * @param context  the context whose positions to look at
+     */
+    virtual void refuseTornChains(ContextImpl& context) const = 0;
+    /**
      * Execute the kernel.  If a chain or a particle blows up, an exception is thrown and nothing has moved.
      *
      * @param context     the context in which to execute this kernel

@@ -18,6 +18,7 @@ public:
             CalcCylinderChainForceKernel& forceKernel);
     void execute(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed, std::uint64_t step,
             long long& divided);
+    void refuseTornChains(ContextImpl& context) const;
     int executeTogether(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed, std::uint64_t step,
             int count, long long& divided);
 private:

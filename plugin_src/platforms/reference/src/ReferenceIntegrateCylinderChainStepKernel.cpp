@@ -99,6 +99,33 @@ StepSettings ReferenceIntegrateCylinderChainStepKernel::settingsOf(ContextImpl& 
     return settings;
 }
 
+void ReferenceIntegrateCylinderChainStepKernel::refuseTornChains(ContextImpl& context) const {
+    if (!periodic || chainKernel->getBox(context) != NULL)
+        return;
+    const vector<Vec3>& positions = *extractData(context).positions;
+    Vec3* box = extractData(context).periodicBoxVectors;
+    const double half = 0.5*min({box[0][0], box[1][1], box[2][2]});
+    const vector<Chain>& chains = chainKernel->getChains();
+    for (size_t chain = 0; chain < chains.size(); chain++)
+        for (size_t s = 0; s < chains[chain].segments.size(); s++) {
+            const vector<int>& nodes = chains[chain].nodes;
+            const Vec3 between = positions[nodes[(s+1)%nodes.size()]]-positions[nodes[s]];
+            const double length = norm(between);
+            if (length <= max(half, 2*chains[chain].segments[s].restLength))
+                continue;
+            double nearest[] = {between[0], between[1], between[2]};
+            takeToNearestImage(nearest, &box[0][0]);
+            const double shorter = norm(Vec3(nearest[0], nearest[1], nearest[2]));
+            if (shorter < 0.999*length) {
+                stringstream message;
+                message << "Chain " << chain << " is torn at segment " << s << ": its ends are " << length <<
+                        " nm apart, and " << shorter << " nm as nearest images. Positions were wrapped into the periodic box "
+                        "particle by particle: make chains whole before setting them";
+                throw OpenMMException(message.str());
+            }
+        }
+}
+
 void ReferenceIntegrateCylinderChainStepKernel::execute(ContextImpl& context, const CylinderChainIntegrator& integrator,
         uint64_t seed, uint64_t step, long long& divided) {
     const StepSettings settings = settingsOf(context, integrator, seed, step);
