@@ -23,7 +23,13 @@ from .insertion import (
 from .placement import vector
 from .quantities import FORCE, LENGTH, STIFFNESS, in_units_of, positive, whole_number
 from .tension import filament_tensions
-from .timestep import check_scheme, contact_time_step, recommended_time_step, warn_if_unstable
+from .timestep import (
+    check_scheme,
+    contact_time_step,
+    recommended_time_step,
+    warn_if_driven_far,
+    warn_if_unstable,
+)
 
 
 class Filaments(FilamentCollection):
@@ -172,8 +178,8 @@ class Filaments(FilamentCollection):
         """
         scheme = default_scheme(self._engine_name) if scheme is None else scheme
         steps = [
-            recommended_time_step(filament.type, self._viscosity, self._temperature, scheme, filament.segments)
-            for filament in self._filaments
+            recommended_time_step(f.type, self._viscosity, self._temperature, scheme, f.segments, f.closed)
+            for f in self._filaments
         ]
         if not steps:
             raise InputError("There are no filaments to recommend a time step for.")
@@ -236,7 +242,7 @@ class Filaments(FilamentCollection):
         Warns
         -----
         TimeStepWarning
-            If the step exceeds a bound of stability.
+            If the step exceeds a bound of stability, or is too long for the flow or for self-propelled filaments.
         """
         step_size = positive(step_size, unit.picosecond, "step_size")
         if system.getNumParticles() <= max(nodes.max() for nodes in self.node_indices):
@@ -244,8 +250,10 @@ class Filaments(FilamentCollection):
         scheme = default_scheme(self._engine_name) if scheme is None else scheme
         check_scheme(scheme)
         flow = as_flow(flow)
-        for filament in {(f.type, f.segments): f for f in self._filaments}.values():
-            warn_if_unstable(filament.type, self._viscosity, self._temperature, step_size, filament.segments, scheme)
+        for f in {(f.type, f.segments, f.propulsion): f for f in self._filaments}.values():
+            solvent = (self._viscosity, self._temperature)
+            warn_if_unstable(f.type, *solvent, step_size, f.segments, scheme)
+            warn_if_driven_far(f.type, *solvent, step_size, f.segments, f.propulsion, flow)
         return self._engine.create_integrator(
             system,
             self._filaments,

@@ -9,6 +9,8 @@ import math
 import warnings
 from dataclasses import dataclass
 
+import numpy as np
+
 from .engines import default_scheme
 from .errors import InputError, TimeStepWarning
 from .quantities import (
@@ -226,6 +228,9 @@ LARGEST_DIVIDED_SHARE = 1e-3
 """Scheme "implicit" divides steps whose equations it cannot solve: a larger share of them may bias averages."""
 
 _RELAXATION_STEPS = 20.0
+_OVAL_MODE = 4.0 * math.pi * math.sqrt(0.75)
+_LARGEST_STRAIN = 0.1
+_LARGEST_ADVANCE = 0.5
 _ACCURACY_MARGIN = 20.0
 _TURNING_ANGLE = 0.1
 _IMPLICIT_TURNING_ANGLE = 0.15
@@ -243,7 +248,7 @@ def stability_bounds(filament_type, viscosity, temperature, segments=1):
     return bounds
 
 
-def recommended_time_step(filament_type, viscosity, temperature, scheme=None, segments=2):
+def recommended_time_step(filament_type, viscosity, temperature, scheme=None, segments=2, closed=False):
     """The step at which equilibrium energies of a chain are good to about 5 %.
 
     Explicit schemes of weak order one leave a harmonic mode of rate lambda with a variance too large by
@@ -264,6 +269,8 @@ def recommended_time_step(filament_type, viscosity, temperature, scheme=None, se
         same bounds; "euler" has a bias on chains that no step removes. "implicit" is not bound by stretching and
         bending, see ``implicit_time_step``.
     segments : int
+    closed : bool
+        A ring; matters only to "implicit".
 
     Returns
     -------
@@ -272,7 +279,7 @@ def recommended_time_step(filament_type, viscosity, temperature, scheme=None, se
     scheme = default_scheme() if scheme is None else scheme
     check_scheme(scheme)
     if scheme == "implicit":
-        return implicit_time_step(filament_type, viscosity, temperature, segments)
+        return implicit_time_step(filament_type, viscosity, temperature, segments, closed)
     friction = filament_type.segment_friction(viscosity, temperature, segments)
     bounds = stability_bounds(filament_type, viscosity, temperature, segments)
     allowed = {name: bound / _ACCURACY_MARGIN for name, bound in bounds.items()}
@@ -287,7 +294,7 @@ def recommended_time_step(filament_type, viscosity, temperature, scheme=None, se
     return TimeStep(step=allowed[binding], reason=reason, bounds=bounds)
 
 
-def implicit_time_step(filament_type, viscosity, temperature, segments=2):
+def implicit_time_step(filament_type, viscosity, temperature, segments=2, closed=False):
     """The step of scheme "implicit" at which equilibrium energies of a chain are good to 2 %, and dynamics to 5 %.
 
     Its equilibrium is exact for linear forces at any step; what is left comes from segments that turn within one.
@@ -296,7 +303,9 @@ def implicit_time_step(filament_type, viscosity, temperature, segments=2):
     it by k_B T xi/a, and the filament turns as a whole by 24 k_B T dt l0/(gamma_perp L^3). Either must stay below
     0.15^2. Measured with ``openmm-cylchain benchmark time-step``, F-actin, microtubules, DNA and chains with free
     joints keep equilibrium within 5 % and dynamics within 10 % at that step and at several times as much. A step must
-    also resolve the slowest relaxation of the filament, gamma_perp/(l0 a) (L/4.73)^4, by 20 steps.
+    also resolve the slowest relaxation of the filament by 20 steps: gamma_perp/(l0 a) (L/4.73)^4, or that of the mode
+    in which a ring of radius R becomes oval, gamma_perp/(l0 a) R^4/9 = gamma_perp/(l0 a) (L/10.9)^4. (With the friction
+    along the ring it is (gamma_perp + gamma_par/4)/(l0 a) R^4/9.)
 
     Returns
     -------
@@ -318,7 +327,8 @@ def implicit_time_step(filament_type, viscosity, temperature, segments=2):
     bounds = {"rotation": turning}
     allowed = dict(bounds)
     if bends:
-        bounds["relaxation"] = friction_per_length * (segments * length / 4.73) ** 4 / rigidity
+        wave_number = _OVAL_MODE if closed else 4.73
+        bounds["relaxation"] = friction_per_length * (segments * length / wave_number) ** 4 / rigidity
         allowed["relaxation"] = bounds["relaxation"] / _RELAXATION_STEPS
     binding = min(allowed, key=allowed.get)
     reason = _REASONS[binding].format(angle=_IMPLICIT_TURNING_ANGLE, relaxation_steps=_RELAXATION_STEPS)
@@ -384,3 +394,29 @@ def warn_if_unstable(filament_type, viscosity, temperature, step, segments=1, sc
                 TimeStepWarning,
                 stacklevel=3,
             )
+
+
+def warn_if_driven_far(filament_type, viscosity, temperature, step, segments=1, propulsion=0.0, flow=None):
+    """Issue a TimeStepWarning if a flow or self-propulsion takes segments farther in a step than it resolves.
+
+    The strain of a step, ``dt |gradient u|``, should stay below 0.1, and a segment should not advance by more than half
+    its length, ``dt F0/gamma_par < l0/2``, or a bent filament cuts its corners.
+    """
+    strain = step * float(np.linalg.norm(flow.gradient, 2)) if flow is not None else 0.0
+    if strain > _LARGEST_STRAIN:
+        warnings.warn(
+            f"In a time step of {step:.4g} ps the flow strains the solvent by {strain:.3g}: it is not resolved. Use a "
+            f"step of at most {_LARGEST_STRAIN * step / strain:.4g} ps.",
+            TimeStepWarning,
+            stacklevel=3,
+        )
+    friction = filament_type.segment_friction(viscosity, temperature, segments)
+    advance = step * abs(propulsion) / friction.parallel / filament_type.segment_length
+    if advance > _LARGEST_ADVANCE:
+        warnings.warn(
+            f"In a time step of {step:.4g} ps a propelled segment of filament type {filament_type.name!r} advances by "
+            f"{advance:.3g} of its length: it is not resolved. Use a step of at most "
+            f"{_LARGEST_ADVANCE * step / advance:.4g} ps.",
+            TimeStepWarning,
+            stacklevel=3,
+        )

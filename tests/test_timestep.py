@@ -24,6 +24,7 @@ from openmm_cylchain import (
     timestep,
 )
 from openmm_cylchain.engines.redistribution import STEPS, ChainSet, resistance_bands
+from openmm_cylchain.flow import Flow
 
 MICROSECOND = 1e6  # ps
 VISCOSITY = 1.71e-3 * unit.pascal * unit.second
@@ -403,3 +404,51 @@ def test_no_warning_below_the_bounds():
 def test_steps_that_are_none(step):
     with pytest.raises(InputError, match="time step"):
         timestep.warn_if_unstable(F_ACTIN, VISCOSITY, TEMPERATURE, step)
+
+
+def test_recommended_step_of_a_ring_resolves_how_it_becomes_round():
+    kind, segments = F_ACTIN.with_segment_length(50), 48
+    friction = kind.segment_friction(VISCOSITY, TEMPERATURE)
+    radius = 0.5 * 50 / np.sin(np.pi / segments)
+    density = (friction.perpendicular + friction.parallel / 4) / 50
+    relaxation = density * radius**4 / (9 * kind.bending_rigidity)
+    recommended = recommended_time_step(kind, VISCOSITY, TEMPERATURE, "implicit", segments, closed=True)
+    assert recommended.bounds["relaxation"] == pytest.approx(relaxation, rel=0.2)
+    assert recommended.step <= relaxation / 16
+
+    # Without noise, an oval of small amplitude relaxes exponentially.
+    angles = 2 * np.pi * np.arange(segments) / segments
+    outwards = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
+    around = np.stack([-np.sin(angles), np.cos(angles), 0 * angles], axis=1)
+    oval = outwards * (radius + np.cos(2 * angles))[:, None] - 0.5 * around * np.sin(2 * angles)[:, None]
+    filaments = Filaments(VISCOSITY, 0, engine="compiled")
+    filaments.add_nodes(kind, oval, closed=True)
+    _, system, positions = filaments.build()
+    integrator = filaments.create_integrator(system, relaxation / 400, scheme="implicit")
+    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
+    context.setPositions(positions)
+    amplitudes = []
+    for steps in (100, 400):
+        integrator.step(steps)
+        nodes = context.getState(positions=True).getPositions(asNumpy=True)._value
+        amplitudes.append(np.mean(np.sum(nodes * outwards, axis=1) * np.cos(2 * angles)))
+    assert np.log(amplitudes[0] / amplitudes[1]) == pytest.approx(1.0, rel=0.03)
+
+
+@pytest.mark.parametrize("engine", ["compiled", "portable"])
+def test_warnings_where_drive_is_not_resolved(engine):
+    filaments = Filaments(VISCOSITY, TEMPERATURE, engine=engine)
+    filaments.add_straight(F_ACTIN, 4, [0, 0, 0], [1, 0, 0], propulsion=1 * unit.piconewton)
+    _, system, _ = filaments.build()
+    friction = F_ACTIN.segment_friction(VISCOSITY, TEMPERATURE).parallel
+    bound = 0.5 * 360 * friction / 0.602214076
+    for step, flow, what in ((1.01 * bound, None, "advances by 0.505"), (1e3, 1.01e-4, "strains the solvent by 0.101")):
+        with pytest.warns(TimeStepWarning, match=what) as record:
+            filaments.create_integrator(system, step, flow=None if flow is None else Flow.shear(flow))
+        advice = [str(one.message) for one in record if what in str(one.message)]
+        assert len(advice) == 1
+        assert float(re.search(r"at most (\S+) ps", advice[0])[1]) == pytest.approx(step / 1.01, rel=1e-3)
+    if engine == "compiled":
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            filaments.create_integrator(system, 0.99 * bound, flow=Flow.shear(0.09 / bound))
