@@ -208,120 +208,12 @@ private:
             random = 0;
     }
     /** Draw the random forces, lengths and bends, and those of tethers. */
-    void addNoise() {
-        GaussianLanes<W> gaussian(pack, settings);
-        const double amplitude = std::sqrt(2*settings.kT/h);
-        for (int s = 0; s < n-1; s++) {
-            if (!CLOSED || s < pack.segments) {
-                drawForces(gaussian, s, amplitude);
-                drawLength(gaussian, s);
-            }
-            if (s > 0) {
-                if (pack.planar)
-                    drawPlanarBend(gaussian, s);
-                else
-                    drawBend(gaussian, s);
-            }
-        }
-        for (std::size_t i = 0; i < pack.tethers.size(); i++) {
-            const double deviation = std::sqrt(settings.kT/(pack.tethers[i].stiffness+TINY)*(2*tethers[i].theta-1));
-            for (double& random : tethers[i].random)
-                random = deviation*gaussian.nextOfLane(pack.tethers[i].lane);
-            if (pack.planar)
-                tethers[i].random[2] = 0;
-        }
-    }
-    CYLCHAIN_INLINE void drawForces(GaussianLanes<W>& gaussian, int s, double amplitude) {
-        ImplicitSegment<Real>& segment = segments[s];
-        const Vec t = segment.tangent;
-        const Vec a = gaussianVector<W>(gaussian, pack.planar), b = gaussianVector<W>(gaussian, pack.planar);
-        const Real across = property<Real>(pack, s, ChainPack::RootPerpendicular);
-        const Real along = property<Real>(pack, s, ChainPack::RootParallel);
-        const Vec force = (a*across+t*((along-across)*t.dot(a)))*(0.5*amplitude+Real{});
-        const Real perLength = amplitude/segment.length;
-        const Vec pair = (b-t*t.dot(b))*(property<Real>(pack, s, ChainPack::RootRotational)*perLength);
-        f[s] = f[s]+force-pair;
-        f[s+1] = f[s+1]+force+pair;
-        segment.randomPair = pair;
-        segment.randomTension = t.dot(b)*(property<Real>(pack, s, ChainPack::RootExtensional)*perLength);
-    }
-    void drawLength(GaussianLanes<W>& gaussian, int s) {
-        ImplicitSegment<Real>& segment = segments[s];
-        const Real stiffness = property<Real>(pack, s, ChainPack::Stiffness);
-        const Real deviation = root(settings.kT/(stiffness+TINY));
-        Real random = gaussian.next();
-        if (pack.stretching == StretchingModel::FENE) {
-            // The density of lengths, seen as one of coordinates.
-            Real inverse = property<Real>(pack, s, ChainPack::InverseExtension), scale = deviation;
-            for (int i = 0; i < W; i++) {
-                double square = lane(random, i)*lane(scale, i)*lane(inverse, i);
-                square *= square;
-                while (square > 1e-8 && s < pack.segmentsOfLane[i]) {
-                    const double relative = std::sqrt(-std::expm1(-square));
-                    if (gaussian.uniform(i) < std::exp(-square)*std::sqrt(square)/relative)
-                        break;
-                    lane(random, i) = gaussian.nextOfLane(i);
-                    square = lane(random, i)*lane(scale, i)*lane(inverse, i);
-                    square *= square;
-                }
-            }
-        }
-        segment.randomCoordinate = random*deviation*root(2*segment.theta-1);
-    }
-    void drawBend(GaussianLanes<W>& gaussian, int s) {
-        ImplicitSegment<Real>& segment = segments[s];
-        Real stiffness = loaded<Real>(pack.joints, s)/settings.kT, share = root(2*segment.jointTheta-1);
-        Real first = gaussian.next(), second = gaussian.next();
-        for (int i = 0; i < W; i++) {
-            const double k = lane(stiffness, i);
-            double a = lane(first, i), b = lane(second, i);
-            if (k == 0 || lane(share, i) == 0)
-                a = b = 0;
-            else if (k > STIFF_JOINT) {
-                while (gaussian.uniform(i) > bendMeasure(pack.bending, (a*a+b*b)/k)) {
-                    a = gaussian.nextOfLane(i);
-                    b = gaussian.nextOfLane(i);
-                }
-                a /= std::sqrt(k);
-                b /= std::sqrt(k);
-            }
-            else {
-                double square;
-                do
-                    square = bendSquare(pack.bending, 2*gaussian.uniform(i)-1);
-                while (gaussian.uniform(i) > std::exp(-0.5*k*square));
-                const double scale = std::sqrt(square/(a*a+b*b));
-                a *= scale;
-                b *= scale;
-            }
-            lane(first, i) = a*lane(share, i);
-            lane(second, i) = b*lane(share, i);
-        }
-        Vec e1, e2;
-        orthogonal(segment.bisector, e1, e2);
-        segment.randomBend = e1*first+e2*second;
-    }
+    void addNoise();
+    void drawForces(GaussianLanes<W>& gaussian, int s, double amplitude);
+    void drawLength(GaussianLanes<W>& gaussian, int s);
+    void drawBend(GaussianLanes<W>& gaussian, int s);
     /** In a plane, a bend has one component, and its angle a uniform measure. */
-    void drawPlanarBend(GaussianLanes<W>& gaussian, int s) {
-        ImplicitSegment<Real>& segment = segments[s];
-        Real stiffness = loaded<Real>(pack.joints, s)/settings.kT, share = root(2*segment.jointTheta-1), bend = Real{};
-        // The energy is that of a Gaussian or more, in the angle.
-        const double floor = pack.bending == BendingModel::KratkyPorod ? 4/(M_PI*M_PI) : 1;
-        for (int i = 0; i < W; i++) {
-            const double k = lane(stiffness, i);
-            if (k == 0 || lane(share, i) == 0)
-                continue;
-            const bool stiff = k*floor > STIFF_JOINT;
-            double angle, drawn, excess;
-            do {
-                angle = stiff ? gaussian.nextOfLane(i)/std::sqrt(k*floor) : M_PI*(2*gaussian.uniform(i)-1);
-                drawn = bendOfAngle(pack.bending, angle);
-                excess = drawn*drawn-(stiff ? floor*angle*angle : 0);
-            } while (!(std::fabs(angle) < M_PI) || gaussian.uniform(i) > std::exp(-0.5*k*excess));
-            lane(bend, i) = drawn*lane(share, i);
-        }
-        segment.randomBend = Vec {-segment.bisector.y, segment.bisector.x, Real{}}*bend;
-    }
+    void drawPlanarBend(GaussianLanes<W>& gaussian, int s);
     /** The equations of a node and its coupling to the next two, while they are gathered. */
     struct Row {
         Mat diagonal, lower, upper, second;
@@ -401,96 +293,10 @@ private:
         eliminate<0>(n-1, *here, *after, *before);
     }
     /** The first two nodes of a ring come last: all others are coupled to them as well. */
-    void eliminateRing(const Vec* y) {
-        ClosedRow rows[3];
-        ClosedRow *before = rows, *here = rows+1, *after = rows+2;
-        Border border = {};
-        Geometry previous, current;
-        std::size_t tether = 0;
-        *here = ClosedRow {};
-        here->right = loads[0];
-        for (int s = 0; s < n-1; s++) {
-            *after = ClosedRow {};
-            describeNew(y, s, current);
-            if (s < pack.segments)
-                addSegment(y, s, current, *here, *after);
-            else {
-                here->lower = here->upper = Mat {};
-                after->right = loads[s+1];
-            }
-            addTethers(y, s, tether, *here);
-            if (s > 0) {
-                addJoint(s, previous, current, *before, *here, *after);
-                eliminateNodeOfRing(s-1, *before, *here, *after, border);
-            }
-            previous = current;
-            ClosedRow* const free = before;
-            before = here;
-            here = after;
-            after = free;
-        }
-
-        // What the rows of the nodes that come twice have gathered belongs to the first two.
-        border.matrix[0][0] = border.matrix[0][0]+before->diagonal;
-        border.matrix[0][1] = border.matrix[0][1]+before->upper;
-        border.matrix[1][0] = border.matrix[1][0]+before->lower;
-        border.matrix[1][1] = border.matrix[1][1]+here->diagonal;
-        border.right[0] = border.right[0]+before->right;
-        border.right[1] = border.right[1]+here->right;
-        eliminateBorder(border);
-    }
-    void eliminateNodeOfRing(int node, ClosedRow& row, ClosedRow& next, ClosedRow& second, Border& border) {
-        if (node < 2) {
-            border.matrix[node][node] = row.diagonal;
-            border.right[node] = row.right;
-            if (node == 0) {
-                border.matrix[0][1] = row.upper;
-                border.matrix[1][0] = row.lower;
-            }
-            else {
-                next.toBorder[1] = row.lower;
-                next.fromBorder[1] = row.upper;
-            }
-            second.toBorder[node] = row.second.transposed();
-            second.fromBorder[node] = row.second;
-            return;
-        }
-        if (node == pack.segments-2)
-            coupleToBorder(row, 0, row.second.transposed(), row.second);
-        if (node == pack.segments-1) {
-            coupleToBorder(row, 0, row.lower, row.upper);
-            coupleToBorder(row, 1, row.second.transposed(), row.second);
-            row.lower = row.upper = Mat {};
-        }
-        if (node >= pack.segments-2)
-            row.second = Mat {};
-        eliminate<2>(node, row, next, second);
-        const ImplicitNode<Real>& eliminated = nodes[node];
-        const Mat secondT = row.second.transposed();
-        for (int k = 0; k < 2; k++) {
-            Mat& coupling = toBorder[node].node[k];
-            coupling = eliminated.inverse*row.toBorder[k];
-            next.toBorder[k] = next.toBorder[k]-row.lower*coupling;
-            second.toBorder[k] = second.toBorder[k]-secondT*coupling;
-            next.fromBorder[k] = next.fromBorder[k]-row.fromBorder[k]*eliminated.next;
-            second.fromBorder[k] = second.fromBorder[k]-row.fromBorder[k]*eliminated.second;
-            border.right[k] = border.right[k]-row.fromBorder[k]*eliminated.solution;
-        }
-        for (int k = 0; k < 2; k++)
-            for (int l = 0; l < 2; l++)
-                border.matrix[k][l] = border.matrix[k][l]-row.fromBorder[k]*toBorder[node].node[l];
-    }
-    static void coupleToBorder(ClosedRow& row, int k, const Mat& from, const Mat& to) {
-        row.fromBorder[k] = row.fromBorder[k]+from;
-        row.toBorder[k] = row.toBorder[k]+to;
-    }
-    void eliminateBorder(const Border& border) {
-        nodes[0].inverse = inverseOf(border.matrix[0][0], 0);
-        nodes[0].solution = nodes[0].inverse*border.right[0];
-        nodes[0].next = nodes[0].inverse*border.matrix[0][1];
-        nodes[1].inverse = inverseOf(border.matrix[1][1]-border.matrix[1][0]*nodes[0].next, 1);
-        nodes[1].solution = nodes[1].inverse*(border.right[1]-border.matrix[1][0]*nodes[0].solution);
-    }
+    void eliminateRing(const Vec* y);
+    void eliminateNodeOfRing(int node, ClosedRow& row, ClosedRow& next, ClosedRow& second, Border& border);
+    static void coupleToBorder(ClosedRow& row, int k, const Mat& from, const Mat& to);
+    void eliminateBorder(const Border& border);
     /** The inverse for a node that moves, and zero for a fixed one. */
     CYLCHAIN_INLINE Mat inverseOf(Mat diagonal, int node) const {
         const Real mobile = loaded<Real>(pack.mobile, node);
@@ -689,16 +495,7 @@ private:
                 change[node] = change[node]-nodes[node].second*change[node+2];
         }
     }
-    void substituteRing() {
-        const int count = pack.segments;
-        change[1] = nodes[1].solution;
-        change[0] = nodes[0].solution-nodes[0].next*change[1];
-        change[count] = change[0];
-        change[count+1] = change[1];
-        for (int node = count-1; node > 1; node--)
-            change[node] = nodes[node].solution-nodes[node].next*change[node+1]-nodes[node].second*change[node+2]-
-                    toBorder[node].node[0]*change[0]-toBorder[node].node[1]*change[1];
-    }
+    void substituteRing();
     /**
      * Add the metric forces of the lengths. The matrix is symmetric in the first iteration, so the blocks of its
      * inverse follow from those of its elimination, from last to first.
@@ -739,45 +536,7 @@ private:
         f[s] = f[s]+force;
         f[s+1] = f[s+1]-force;
     }
-    void addMetricForcesOfRing() {
-        // Blocks of the inverse: those of the first two nodes, and of the next nodes (s+1) and (s+2) with them.
-        Mat border[2][2];
-        border[1][1] = nodes[1].inverse;
-        border[0][1] = nodes[0].next*border[1][1]*(-1+Real{});
-        border[1][0] = border[0][1].transposed();
-        border[0][0] = nodes[0].inverse-nodes[0].next*border[1][0];
-        Mat same = border[0][0], other = border[0][1], sameAfter = border[1][1];
-        Mat next[2] = {border[0][0], border[0][1]}, second[2] = {border[1][0], border[1][1]};
-        for (int s = pack.segments-1; s > 1; s--) {
-            const ImplicitNode<Real>& node = nodes[s];
-            const Mat* coupling = toBorder[s].node;
-            Mat newOther = node.next*same+node.second*other.transposed();
-            Mat newSecond = node.next*other+node.second*sameAfter;
-            Mat newBorder[2];
-            for (int k = 0; k < 2; k++) {
-                newOther = newOther+coupling[k]*next[k].transposed();
-                newSecond = newSecond+coupling[k]*second[k].transposed();
-                newBorder[k] = (node.next*next[k]+node.second*second[k]+coupling[0]*border[0][k]+coupling[1]*border[1][k])*
-                        (-1+Real{});
-            }
-            newOther = newOther*(-1+Real{});
-            newSecond = newSecond*(-1+Real{});
-            Mat newSame = node.inverse-node.next*newOther.transposed()-node.second*newSecond.transposed();
-            for (int k = 0; k < 2; k++)
-                newSame = newSame-coupling[k]*newBorder[k].transposed();
-            newSame = (newSame+newSame.transposed())*(0.5+Real{});
-            addMetricForce(s, newSame, newOther, same);
-            sameAfter = same;
-            same = newSame;
-            other = newOther;
-            for (int k = 0; k < 2; k++) {
-                second[k] = next[k];
-                next[k] = newBorder[k];
-            }
-        }
-        addMetricForce(1, border[1][1], next[1].transposed(), same);
-        addMetricForce(0, border[0][0], border[0][1], border[1][1]);
-    }
+    void addMetricForcesOfRing();
     /** Whether any lane has not converged; those that have are taken out. NaN counts as not converged. */
     bool anyUnfinished(Real& active) {
         Real excess = Real{};
@@ -804,6 +563,9 @@ private:
         }
     }
 };
+
+#include "ImplicitNoise.h"
+#include "ImplicitRing.h"
 
 /** Advance the lanes that failed, from the start, by the same time in more and more parts. */
 template <int W, bool CLOSED> void divideStep(const ChainPack& pack, const Vector<typename Lanes<W>::Type>* x,
