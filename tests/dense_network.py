@@ -70,7 +70,7 @@ def crosslinked_network(count, segments, radius, links, contacts=True, seed=1, r
         start = generator.uniform(-radius, radius, 3)
         nodes = draw_chain(short, segments, TEMPERATURE, generator, start)
         if np.linalg.norm(nodes, axis=1).max() < radius:
-            filaments.add_beads(filaments.add_nodes(short, nodes), 25)
+            filaments.add_beads(filaments.add_nodes(short, nodes), SPACING)
     _, system, positions = filaments.build()
     if contacts:
         system.addForce(contact_force(filaments, system, DIAMETER))
