@@ -69,7 +69,7 @@ def current(simulation):
 
 def crossings(filaments, simulation):
     """How often filaments have passed through each other after every step."""
-    counter = CrossingCounter(filaments.node_indices, current(simulation), box)
+    counter = CrossingCounter(filaments, current(simulation), box)
     counts = []
     for _ in range(steps):
         simulation.step(1)

@@ -2,7 +2,7 @@
 
 from .build import Filaments
 from .collection import Filament
-from .errors import InputError, InstabilityError, TimeStepWarning
+from .errors import ContactWarning, InputError, InstabilityError, TimeStepWarning
 from .filament import DSDNA, F_ACTIN, MICROTUBULE, FilamentType
 from .flow import Flow
 from .friction import EndCorrections, SegmentFriction, stokes_friction
@@ -10,6 +10,7 @@ from .timestep import TimeStep, recommended_time_step
 from .version import __version__
 
 __all__ = [
+    "ContactWarning",
     "DSDNA",
     "EndCorrections",
     "F_ACTIN",

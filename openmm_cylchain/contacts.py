@@ -6,12 +6,13 @@ move accordingly.
 """
 
 import math
+import warnings
 
 import numpy as np
 import openmm
 
 from .attachments import Attachment
-from .errors import InputError
+from .errors import ContactWarning, InputError
 from .quantities import LENGTH, STIFFNESS, in_units_of, non_negative, positive, thermal_energy, whole_number
 
 BEAD_NAME = "BED"
@@ -23,6 +24,9 @@ CONTACT_STIFFNESS = "contact_stiffness"
 
 BARRIER = 20.0
 """Energy of two coinciding beads in k_B T, with the stiffness that ``default_stiffness`` gives."""
+
+SAFE_BARRIER = 25.0
+"""In k_B T: a network pays it in fewer than one of 1e10 encounters."""
 
 # The box that OpenMM gives to every System until another is set, in nm.
 _OPENMM_BOX = 2.0 * np.eye(3)
@@ -38,7 +42,7 @@ _SAME_PLACE = 1e-9
 
 
 def distribute_beads(filament, number, spacing):
-    """Attachments at equal distances along segments of rest length, the first and the last node included.
+    """Attachments at equal distances along segments of rest length, the first and the last node of a chain included.
 
     Parameters
     ----------
@@ -54,7 +58,9 @@ def distribute_beads(filament, number, spacing):
     """
     contour = filament.segments * filament.type.segment_length
     intervals = max(1, math.ceil(contour / spacing * (1.0 - 1e-12)))
-    places = filament.segments * np.arange(intervals + 1) / intervals
+    # In a ring, the last place would be the first once more.
+    count = intervals if filament.closed else intervals + 1
+    places = filament.segments * np.arange(count) / intervals
     nearest = np.rint(places)
     places = np.where(np.abs(places - nearest) < _SAME_PLACE, nearest, places)
     segments = np.minimum(np.floor(places).astype(int), filament.segments - 1)
@@ -100,16 +106,24 @@ def _excluded_in(filament, nodes, points, distance):
     is_node = np.arange(len(place)) < len(nodes)
     order = np.argsort(place, kind="stable")
     particles, place, is_node = particles[order], place[order], is_node[order]
-    first = np.maximum(np.ceil(place - _SAME_PLACE).astype(int) - 1, 0)
-    last = np.minimum(np.floor(place + _SAME_PLACE).astype(int), filament.segments - 1)
+    total = len(place)
+    if filament.closed:
+        # What lies behind the last place of a ring comes once more.
+        place = np.concatenate([place, place + filament.segments])
+    first = np.ceil(place - _SAME_PLACE).astype(int) - 1
+    last = np.floor(place + _SAME_PLACE).astype(int)
+    if not filament.closed:
+        first, last = np.maximum(first, 0), np.minimum(last, filament.segments - 1)
     # Both grow with the place, so those that a place does not see follow it without a gap.
     reach = place + distance / filament.type.segment_length + _SAME_PLACE
     end = np.maximum(np.searchsorted(first, last + 1, side="right"), np.searchsorted(place, reach, side="right"))
-    counts = end - np.arange(len(place)) - 1
-    one = np.repeat(np.arange(len(place)), counts)
-    other = one + 1 + np.arange(len(one)) - np.repeat(np.cumsum(counts) - counts, counts)
+    counts = np.minimum(end - np.arange(len(place)) - 1, total - 1)[:total]
+    one = np.repeat(np.arange(total), counts)
+    other = (one + 1 + np.arange(len(one)) - np.repeat(np.cumsum(counts) - counts, counts)) % total
     wanted = ~(is_node[one] & is_node[other])
-    return np.sort(np.stack([particles[one[wanted]], particles[other[wanted]]], axis=1), axis=1)
+    pairs = np.sort(np.stack([particles[one[wanted]], particles[other[wanted]]], axis=1), axis=1)
+    # In a small ring, two places may be in reach of each other both ways around.
+    return np.unique(pairs, axis=0) if filament.closed else pairs
 
 
 def add_exclusions(force, pairs):
@@ -254,6 +268,12 @@ def contact_force(filaments, system, diameter, stiffness=None, particles=(), par
     InputError
         If there are no beads, a particle does not exist or is one of the filaments', a diameter or stiffness is not
         positive, or the box is smaller than two diameters.
+
+    Warns
+    -----
+    ContactWarning
+        If beads are so far apart, or so soft, that filaments can pass through each other: if ``crossing_barrier`` is
+        below 25 k_B T.
     """
     beads = filaments.bead_indices
     if not any(len(one) for one in beads):
@@ -266,6 +286,7 @@ def contact_force(filaments, system, diameter, stiffness=None, particles=(), par
         if filaments.temperature == 0.0:
             raise InputError("At a temperature of zero, a contact needs a stiffness.")
         stiffness = default_stiffness(diameters[np.concatenate(beads)].min(), filaments.temperature)
+    _warn_of_gaps(filaments, diameters, positive(stiffness, STIFFNESS, "stiffness"))
     force = openmm.CustomNonbondedForce(
         f"0.5*{CONTACT_STIFFNESS}*max(0, touching-r)^2;"
         "touching=select(diameter1*diameter2, 0.5*(diameter1+diameter2), 0)"
@@ -278,6 +299,28 @@ def contact_force(filaments, system, diameter, stiffness=None, particles=(), par
     _set_cutoff(force, system, float(diameters.max()), _is_periodic(system) if periodic is None else bool(periodic))
     add_exclusions(force, excluded_pairs(filaments, 2.0 * diameters[np.concatenate(beads)].max()))
     return force
+
+
+def _warn_of_gaps(filaments, diameters, stiffness):
+    # The filament whose gaps are widest, crossed by another one of its kind.
+    barriers = []
+    for number, beads in enumerate(filaments.bead_indices):
+        if len(beads):
+            filament = filaments[number]
+            intervals = len(beads) if filament.closed else len(beads) - 1
+            spacing = filament.segments * filament.type.segment_length / intervals
+            diameter = diameters[beads[0]]
+            barriers.append((crossing_barrier(diameter, spacing, stiffness), number, spacing, diameter))
+    barrier, number, spacing, diameter = min(barriers)
+    kT = thermal_energy(filaments.temperature)
+    if barrier < SAFE_BARRIER * kT:
+        warnings.warn(
+            f"Filament {number} has beads every {spacing:.3g} nm with a contact diameter of {diameter:.3g} nm: "
+            f"others can pass through it for {barrier / kT:.3g} k_B T. Use a spacing of half the diameter, or a larger "
+            "stiffness.",
+            ContactWarning,
+            stacklevel=3,
+        )
 
 
 def filament_diameters(diameter, count):

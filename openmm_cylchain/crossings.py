@@ -49,8 +49,8 @@ def find_crossings(chains, start, end, box_vectors=None):
 
     Parameters
     ----------
-    chains : sequence of int arrays
-        Particle indices of the nodes of every chain, such as ``Filaments.node_indices``.
+    chains : Filaments, or sequence of int arrays
+        Particle indices of the nodes of every chain. Those of a ring end with its first node once more.
     start, end : (particles, 3) length
         Configurations between which each node moves on a straight line: not wrapped into a periodic box.
     box_vectors : three (3,) lengths, optional
@@ -78,8 +78,8 @@ class CrossingCounter:
 
     Parameters
     ----------
-    chains : sequence of int arrays
-        Particle indices of the nodes of every chain, such as ``Filaments.node_indices``.
+    chains : Filaments, or sequence of int arrays
+        Particle indices of the nodes of every chain. Those of a ring end with its first node once more.
     positions : (particles, 3) length
         The first configuration.
     box_vectors : three (3,) lengths, optional
@@ -89,7 +89,7 @@ class CrossingCounter:
 
     Examples
     --------
-    >>> counter = CrossingCounter(filaments.node_indices, positions)  # doctest: +SKIP
+    >>> counter = CrossingCounter(filaments, positions)  # doctest: +SKIP
     >>> simulation.step(1)  # doctest: +SKIP
     >>> crossings = counter.update(context.getState(positions=True).getPositions(asNumpy=True))  # doctest: +SKIP
     """
@@ -140,13 +140,15 @@ class _Segments:
     # The segments of all chains, one after another.
 
     def __init__(self, chains):
-        chains = [np.asarray(chain) for chain in chains]
+        chains = [np.asarray(chain) for chain in (_chains_of(chains) if hasattr(chains, "node_indices") else chains)]
         if not chains or any(c.ndim != 1 or len(c) < 2 or c.dtype.kind not in "iu" for c in chains):
             raise InputError("chains must be int arrays, one for each chain, with the indices of two nodes or more.")
         self._minus = np.concatenate([chain[:-1] for chain in chains])
         self._plus = np.concatenate([chain[1:] for chain in chains])
         self._chain = np.repeat(np.arange(len(chains)), [len(chain) - 1 for chain in chains])
         self._number = np.concatenate([np.arange(len(chain) - 1) for chain in chains])
+        # In a ring, the first segment and the last are neighbours, too.
+        self._around = np.array([len(chain) - 2 if chain[0] == chain[-1] else -1 for chain in chains])
 
     def check(self, positions, name):
         positions = np.asarray(in_units_of(positions, LENGTH, name))
@@ -170,7 +172,8 @@ class _Segments:
         # Rounding must not lose a pair at the very end of the radius.
         pairs = _pairs_of_points(starts + 0.5 * vectors, radius * (1.0 + 1e-9), box)
         same_chain = self._chain[pairs.first] == self._chain[pairs.second]
-        close = np.abs(self._number[pairs.first] - self._number[pairs.second]) <= 1
+        apart = np.abs(self._number[pairs.first] - self._number[pairs.second])
+        close = (apart <= 1) | (apart == self._around[self._chain[pairs.first]])
         pairs = pairs.where(~(same_chain & close & np.all(pairs.shift == 0.0, axis=1)))
         between = starts[pairs.second] + pairs.shift - starts[pairs.first]
         distances = segment_distances(vectors[pairs.first], vectors[pairs.second], between)
@@ -189,6 +192,11 @@ class _Segments:
     def _geometry(self, pairs, positions):
         vectors, starts = self.vectors(positions), positions[self._minus]
         return vectors[pairs.first], vectors[pairs.second], starts[pairs.second] + pairs.shift - starts[pairs.first]
+
+
+def _chains_of(filaments):
+    pairs = zip(filaments, filaments.node_indices)
+    return [np.append(nodes, nodes[0]) if filament.closed else nodes for filament, nodes in pairs]
 
 
 def _box(box_vectors):

@@ -9,5 +9,9 @@ class InstabilityError(RuntimeError):
     """A simulation that has blown up: the message names the filament, the segment and the step."""
 
 
+class ContactWarning(UserWarning):
+    """Beads that are too far apart or too soft to keep filaments from passing through each other."""
+
+
 class TimeStepWarning(UserWarning):
     """A time step above a stability bound: the message names the bound."""

@@ -35,7 +35,7 @@ class Network:
 
     def count_crossings(self, steps, interval):
         """Number of crossings in a number of steps, looked for in intervals of them."""
-        counter = CrossingCounter(self.filaments.node_indices, self.positions(), self.box)
+        counter = CrossingCounter(self.filaments, self.positions(), self.box)
         for _ in range(steps // interval):
             self.context.getIntegrator().step(interval)
             counter.update(self.positions())

@@ -1,5 +1,7 @@
 """Beads, what they do not see, and the force between them, on every platform and beside other forces."""
 
+import warnings
+
 import numpy as np
 import openmm
 import pytest
@@ -7,7 +9,7 @@ from conftest import PLATFORMS
 from openmm import app, unit
 from physics_cases import ENGINE_PLATFORMS, KT, TEMPERATURE, VISCOSITY
 
-from openmm_cylchain import DSDNA, F_ACTIN, Filaments, InputError
+from openmm_cylchain import DSDNA, F_ACTIN, ContactWarning, Filaments, InputError
 from openmm_cylchain.contacts import (
     add_exclusions,
     contact_force,
@@ -438,3 +440,50 @@ def test_bad_input_is_refused():
         contact_force(free, system, 30, particles=[0])
     with pytest.raises(InputError, match="particle_diameter must be a number or have 1 entries"):
         contact_force(free, system, 30, particles=[0], particle_diameter=[30, 30])
+
+
+def test_beads_of_a_ring_are_all_alike():
+    filaments = Filaments(VISCOSITY, TEMPERATURE)
+    filaments.add_ring(ACTIN, 9, [0, 0, 0])
+    numbers = filaments.add_beads(0, 20)
+    _, system, positions = filaments.build()
+    beads = filaments.bead_indices[0]
+    assert len(beads) == len(numbers) == 45
+    places = positions._value[beads]
+    np.testing.assert_allclose(np.linalg.norm(np.roll(places, -1, axis=0) - places, axis=1), 20, rtol=1e-9)
+    pairs = excluded_pairs(filaments)
+    assert len(np.unique(pairs, axis=0)) == len(pairs)
+    assert np.all(pairs[:, 0] < pairs[:, 1])
+    # Every node has the same neighbours but for where it is, and so have the beads in the same place of a segment.
+    counts = np.bincount(pairs.ravel(), minlength=system.getNumParticles())
+    assert np.ptp(counts[filaments.node_indices[0]]) == 0
+    assert np.all(np.ptp(counts[beads].reshape(9, 5), axis=0) == 0)
+    # A bead on a joint sees neither of the two segments before it nor of the two behind it: 20 beads and 5 nodes.
+    assert counts[beads[0]] == 20 + 5
+    # A force between beads is finite where the ring closes.
+    system.addForce(contact_force(filaments, system, 40))
+    context = _context(system, positions, "Reference")
+    assert np.isfinite(context.getState(forces=True).getForces(asNumpy=True)._value).all()
+
+
+def test_small_rings_exclude_everything_once():
+    filaments = Filaments(VISCOSITY, TEMPERATURE)
+    filaments.add_ring(ACTIN, 4, [0, 0, 0])
+    filaments.add_beads(0, 50)
+    filaments.build()
+    pairs = excluded_pairs(filaments, 1000)
+    assert len(np.unique(pairs, axis=0)) == len(pairs) == 12 * 11 // 2 - 4 * 3 // 2
+
+
+@pytest.mark.parametrize("spacing, stiffness, warns", [(12.5, None, False), (25, None, True), (12.5, 0.03, True)])
+def test_gaps_between_beads_are_warned_of(spacing, stiffness, warns):
+    filaments = Filaments(VISCOSITY, TEMPERATURE)
+    for height in (0, 50):
+        filaments.add_straight(ACTIN, 5, [0, 0, height], [1, 0, 0])
+        filaments.add_beads(height // 50, spacing)
+    _, system, _ = filaments.build()
+    with warnings.catch_warnings(record=True) as record:
+        warnings.simplefilter("always")
+        contact_force(filaments, system, 30, stiffness)
+    assert [issubclass(one.category, ContactWarning) for one in record] == [True] * warns
+    assert not warns or f"Filament 0 has beads every {spacing} nm" in str(record[0].message)

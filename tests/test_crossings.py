@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from openmm import unit
 
-from openmm_cylchain import InputError
+from openmm_cylchain import F_ACTIN, Filaments, InputError
 from openmm_cylchain.crossings import CrossingCounter, find_crossings, segment_distances
 
 TWO = [np.array([0, 1]), np.array([2, 3])]
@@ -177,6 +177,27 @@ def test_distances_of_segments():
     distances = segment_distances(p, q, w)
     assert np.all(distances <= np.array(sampled) + 1e-12)
     assert distances == pytest.approx(sampled, abs=2e-3)
+
+
+def test_rings_are_crossed_in_their_last_segment_too():
+    filaments = Filaments(1.0, 300.0)
+    filaments.add_ring(F_ACTIN, 6, [0, 0, 0])
+    filaments.add_straight(F_ACTIN, 1, [0, 0, 0], [1, 0, 0])
+    _, system, positions = filaments.build()
+    nodes = np.array(positions._value)
+    middle = 0.5 * (nodes[5] + nodes[0])
+    # The rod leans over the last segment, from its inside to its outside, and sinks through it.
+    rod = np.array([0.8 * middle, 1.2 * middle])
+    start, end = nodes.copy(), nodes.copy()
+    start[6:], end[6:] = rod + [0, 0, 10], rod - [0, 0, 10]
+    crossings = find_crossings(filaments, start, end)
+    assert (crossings.filaments.tolist(), crossings.segments.tolist()) == ([[0, 1]], [[5, 0]])
+    assert len(find_crossings(filaments.node_indices, start, end)) == 0
+    # The ring alone may shake as it likes: neighbours do not cross, nor do the last segment and the first.
+    generator = np.random.default_rng(2)
+    for _ in range(20):
+        shaken = nodes[:6] + generator.normal(scale=20, size=(6, 3))
+        assert len(find_crossings([[0, 1, 2, 3, 4, 5, 0]], nodes[:6], shaken)) == 0
 
 
 def test_bad_input_is_refused():
