@@ -374,3 +374,28 @@ def test_copied_integrator_keeps_the_flow(engine):
         one.step(3)
         ends.append(_positions(context))
     assert np.array_equal(*ends)
+
+
+@pytest.mark.parametrize("fraction", [1.0, 0.1])
+def test_noise_does_not_turn_stiff_filaments_faster_in_long_steps(fraction):
+    """Forty filaments of 6 um turn over in a shear at the recommended step: cot(phi) of a rod grows with the strain."""
+    kind, start, strain = F_ACTIN.with_segment_length(500), np.radians(100), 0.8
+    rate = 8 / unit.second
+    filaments = Filaments(1e-3 * unit.pascal * unit.second, TEMPERATURE, engine="compiled")
+    for number in range(40):
+        filaments.add_straight(kind, 12, [0, 1e5 * number, 0], [np.cos(start), 0, np.sin(start)])
+    _, system, positions = filaments.build()
+    step = fraction * filaments.recommended_time_step("implicit").step
+    steps = round((strain / rate).value_in_unit(unit.picosecond) / step)
+    integrator = filaments.create_integrator(
+        system, strain / rate / steps, scheme="implicit", random_seed=2, flow=Flow.shear(rate)
+    )
+    context = _context(system, integrator, positions, "CPU")
+    integrator.step(steps)
+    ends = np.array([_positions(context)[[nodes[0], nodes[-1]]] for nodes in filaments.node_indices])
+    angles = np.arctan2(*np.diff(ends, axis=1)[:, 0, [2, 0]].T)
+    expected = np.arctan2(1.0, 1.0 / np.tan(start) + strain)
+    error = angles.std() / np.sqrt(len(angles))
+    assert error < np.radians(2)
+    assert abs(angles.mean() - expected) < 4 * error
+    assert integrator.getNumDividedSteps() == 0

@@ -107,13 +107,15 @@ public:
     void take(const Vec* before, const Vec* forces, Vec* y, bool* failed) {
         x = before;
         for (int node = 0; node < n; node++) {
-            y[node] = settings.flow.present ? carriedAlong(node) : x[node];
+            y[node] = x[node];
             f[node] = forces[node];
         }
         addPropulsion<W>(pack, x, f);
         describe();
         if (settings.kT > 0)
             addNoise();
+        // What a flow does to a chain as a whole does not show in the changes of its segments.
+        const int least = settings.flow.present ? 2 : 0;
         Real active = 1+Real{};
         for (int iteration = 0; iteration < NEWTON_ITERATIONS; iteration++) {
             eliminate(y);
@@ -127,7 +129,7 @@ public:
             }
             for (int node = 0; node < n; node++)
                 y[node] = y[node]+change[node]*active;
-            if (!anyUnfinished(active))
+            if (iteration >= least && !anyUnfinished(active))
                 break;
         }
         for (int i = 0; i < W; i++)
@@ -152,12 +154,6 @@ private:
     };
     BorderCoupling* toBorder;
 
-    /** Where the flow alone takes a node that moves. */
-    Vec carriedAlong(int node) const {
-        const LaneFlow<W> flow(settings.flow, pack, x[0]);
-        const Vec halfway = x[node]+flow.at(x[node])*(0.5*h+Real{});
-        return x[node]+flow.at(halfway)*(h*loaded<Real>(pack.mobile, node));
-    }
     /** Describe the start of a step, without noise. */
     void describe() {
         for (int s = 0; s < n-1; s++) {
