@@ -114,6 +114,10 @@ void cylchain::takeToNearestImage(double* displacement, const double* box) {
     }
 }
 
+bool BackgroundFlow::varies() const {
+    return any_of(gradient, gradient+9, [] (double derivative) {return derivative != 0;});
+}
+
 void BackgroundFlow::getVelocity(const double* x, double* result) const {
     double r[] = {x[0]-origin[0], x[1]-origin[1], x[2]-origin[2]};
     if (box != NULL)

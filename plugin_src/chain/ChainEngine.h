@@ -32,6 +32,8 @@ struct BackgroundFlow {
     double origin[3] = {};
     /** The three vectors of a periodic box (nine doubles), to take the image that is nearest to the origin, or NULL. */
     const double* box = NULL;
+    /** Whether the velocity is not the same everywhere. */
+    bool varies() const;
     /** The velocity at x. */
     void getVelocity(const double* x, double* velocity) const;
 };

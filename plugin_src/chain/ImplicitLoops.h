@@ -110,12 +110,14 @@ public:
             y[node] = x[node];
             f[node] = forces[node];
         }
+        if (settings.flow.present)
+            carryAlong(y);
         addPropulsion<W>(pack, x, f);
         describe();
         if (settings.kT > 0)
             addNoise();
-        // What a flow does to a chain as a whole does not show in the changes of its segments.
-        const int least = settings.flow.present ? 2 : 0;
+        // How a gradient turns a chain in a step takes more accuracy than the changes of segments ask for.
+        const int least = settings.flow.present && settings.flow.varies() ? 2 : 0;
         Real active = 1+Real{};
         for (int iteration = 0; iteration < NEWTON_ITERATIONS; iteration++) {
             eliminate(y);
@@ -154,6 +156,24 @@ private:
     };
     BorderCoupling* toBorder;
 
+    /**
+     * Begin the iteration where the flow carries chains as a whole, if no node of them is fixed. Segments stay what they
+     * are, and the matrix symmetric.
+     */
+    void carryAlong(Vec* y) const {
+        const LaneFlow<W> flow(settings.flow, pack, x[0]);
+        const Vec halfway = x[0]+flow.at(x[0])*(0.5*h+Real{});
+        Real free;
+        for (int i = 0; i < W; i++) {
+            lane(free, i) = 1;
+            for (int node = 0; node < pack.nodesOfLane[i]; node++)
+                if (pack.mobile[node*W+i] == 0)
+                    lane(free, i) = 0;
+        }
+        const Vec carried = flow.at(halfway)*(free*h);
+        for (int node = 0; node < n; node++)
+            y[node] = y[node]+carried;
+    }
     /** Describe the start of a step, without noise. */
     void describe() {
         for (int s = 0; s < n-1; s++) {
