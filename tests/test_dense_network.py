@@ -25,13 +25,13 @@ def test_filaments_cross_only_without_contacts():
 
 @pytest.mark.slow
 def test_a_dense_crosslinked_network_for_long():
-    """Two hundred crosslinked filaments of 0.5 um in a sphere of 1.2 um: 1e5 steps without a crossing."""
+    """Two hundred crosslinked filaments of 0.5 um in a sphere of 1.2 um: no crossing, no memory that grows."""
     without, _ = crosslinked_network(200, 10, 600.0, links=200, contacts=False)
     assert without.count_crossings(steps=1000, interval=20) > 300
     network, crosslinks = crosslinked_network(200, 10, 600.0, links=200)
-    crossings = network.count_crossings(steps=10000, interval=20)
+    crossings = network.count_crossings(steps=4000, interval=20)
     memory = _resident_megabytes()
-    crossings += network.count_crossings(steps=90000, interval=20)
+    crossings += network.count_crossings(steps=16000, interval=20)
     assert crossings == 0
     assert network.context.getIntegrator().getNumDividedSteps() < 100
     positions = network.positions()._value
