@@ -332,13 +332,13 @@ def chain_extension(filament_type, segments, force, temperature):
     segments = whole_number(segments, 1, "segments")
     kT = _thermal_energy_above_zero(temperature)
     forces = np.asarray(_not_negative(force, FORCE, "force")) / kT
-    bending = _bending_transfer(filament_type, temperature)
+    bending = _bending_transfer(filament_type, temperature, float(np.max(forces, initial=0.0)))
     return np.vectorize(lambda each: _extension(filament_type, segments, each, kT, *bending), otypes=[float])(forces)[
         ()
     ]
 
 
-def _bending_transfer(filament_type, temperature):
+def _bending_transfer(filament_type, temperature, force):
     # Nodes and weights in c, and the azimuthal average of exp(-V_b/k_B T) between them by Legendre's addition theorem.
     order = 48
     cosines = JointAngleDistribution(filament_type, temperature)
@@ -346,7 +346,7 @@ def _bending_transfer(filament_type, temperature):
         # The n-th coefficient falls off as exp(-n^2/2s) for a joint of stiffness s k_B T.
         bend = cosines.mean(lambda cosine: 1.0 - cosine)
         order = max(order, int(9.0 / math.sqrt(bend)))
-    node, weight = np.polynomial.legendre.leggauss(2 * order)
+    node, weight = _cosine_nodes(2 * order, force * filament_type.segment_length)
     if filament_type.joint_stiffness == 0.0:
         return node, weight, np.full((len(node), len(node)), 0.5)
     coefficients = [
@@ -356,6 +356,15 @@ def _bending_transfer(filament_type, temperature):
     polynomials = np.polynomial.legendre.legvander(node, order - 1)
     scale = (np.arange(order) + 0.5) * np.array(coefficients)
     return node, weight, (polynomials * scale) @ polynomials.T
+
+
+def _cosine_nodes(least, alignment):
+    # For exp(u c) with u up to ``alignment``: in s of c = 1 - 2 s^2 it is a Gaussian of the width (4 u)^-1/2, which the
+    # nodes, the denser the nearer to s = 0, divide into several parts.
+    points = max(least, int(30.0 * (1.0 + alignment) ** 0.25))
+    gauss, gauss_weight = np.polynomial.legendre.leggauss(points)
+    root = 0.5 * (gauss + 1.0)
+    return 1.0 - 2.0 * root**2, 2.0 * root * gauss_weight
 
 
 def _extension(filament_type, segments, force, kT, node, weight, bending):

@@ -86,6 +86,17 @@ def test_theory_at_small_forces_is_the_linear_response(kind, segments):
     assert theory.chain_extension(kind, segments, force, TEMPERATURE) / force == pytest.approx(expected, rel=1e-6)
 
 
+@pytest.mark.parametrize("force", [30, 100, 1000])
+def test_theory_at_large_forces_is_that_of_small_angles(force):
+    """Tangents across the force have the energy (F l/2) t^2 each and (a/2 l0) (t1 - t2)^2 for neighbours."""
+    force, segments = force * PICONEWTON, 64
+    length = F_ACTIN.segment_length + force / F_ACTIN.segment_stiffness
+    neighbours = np.diff(np.eye(segments), axis=0)
+    stiffness = force * length * np.eye(segments) + F_ACTIN.joint_stiffness * neighbours.T @ neighbours
+    expected = segments * length - length * KT * np.trace(np.linalg.inv(stiffness))
+    assert theory.chain_extension(F_ACTIN, segments, force, TEMPERATURE) == pytest.approx(expected, abs=0.03)
+
+
 def _draw_ends(kind, segments, count, generator):
     """End-to-end vectors (count, 3) of free chains in equilibrium."""
     lengths = SegmentLengthDistribution(kind, TEMPERATURE).sample(generator, (count, segments))
