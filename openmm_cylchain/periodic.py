@@ -14,7 +14,6 @@ import numpy as np
 from openmm import unit
 
 from .analysis import filament_nodes
-from .attachments import ATTACHMENT_NAME
 from .build import Filaments
 from .engines.description import filament_label
 from .errors import InputError
@@ -97,10 +96,8 @@ def make_trajectory_whole(trajectory):
     positions = trajectory.xyz.astype(float)
     for number, nodes in enumerate(nodes_of):
         positions[:, nodes] = _whole_chains(positions[:, nodes], vectors, f"Filament {number}")
-        chain = trajectory.topology.atom(int(nodes[0])).residue.chain
-        for atom in chain.atoms:
-            if atom.name == ATTACHMENT_NAME:
-                positions[:, atom.index] = _onto_chains(positions[:, atom.index], positions[:, nodes], vectors)
+        for point in np.setdiff1d(_particles_of_chain(trajectory, nodes), nodes):
+            positions[:, point] = _onto_chains(positions[:, point], positions[:, nodes], vectors)
     return _with_positions(trajectory, positions)
 
 
@@ -131,10 +128,13 @@ def remove_jumps(trajectory):
     for nodes in filament_nodes(whole):
         middles = positions[:, nodes].mean(axis=1)
         jumps = _lattice_sums(_images_between(np.diff(middles, axis=0), vectors), vectors)
-        chain = whole.topology.atom(int(nodes[0])).residue.chain
-        particles = [atom.index for atom in chain.atoms if atom.index in nodes or atom.name == ATTACHMENT_NAME]
-        positions[1:, particles] -= np.cumsum(jumps, axis=0)[:, None]
+        positions[1:, _particles_of_chain(whole, nodes)] -= np.cumsum(jumps, axis=0)[:, None]
     return _with_positions(whole, positions)
+
+
+def _particles_of_chain(trajectory, nodes):
+    # A filament is a chain of the topology: its nodes, and attachment points and beads of whatever name.
+    return [atom.index for atom in trajectory.topology.atom(int(nodes[0])).residue.chain.atoms]
 
 
 def _with_positions(trajectory, positions):

@@ -225,3 +225,20 @@ def test_bad_input_is_refused():
     trajectory = mdtraj.Trajectory(positions._value[None], mdtraj.Topology.from_openmm(topology))
     with pytest.raises(InputError, match="has no periodic box"):
         make_trajectory_whole(trajectory)
+
+
+def test_beads_go_with_their_filament():
+    filaments = Filaments(VISCOSITY, 310)
+    filaments.add_straight(F_ACTIN, 6, [0, 700, 700], [1, 0.3, 0.2])
+    filaments.add_beads(0, 100)
+    topology, _, positions = filaments.build(box_vectors=CUBIC)
+    torn = wrapped_one_by_one(
+        np.tile(positions._value, (3, 1, 1)) + [[[0, 0, 0]], [[600, 0, 0]], [[1200, 0, 0]]], CUBIC
+    )
+    trajectory = mdtraj.Trajectory(torn, mdtraj.Topology.from_openmm(topology))
+    trajectory.unitcell_vectors = np.tile(CUBIC, (3, 1, 1))
+    whole, continuous = make_trajectory_whole(trajectory), remove_jumps(trajectory)
+    for result in (whole, continuous):
+        shape = result.xyz - result.xyz[:, :1]
+        np.testing.assert_allclose(shape, np.tile(positions._value - positions._value[0], (3, 1, 1)), atol=1e-3)
+    np.testing.assert_allclose(np.diff(continuous.xyz[:, :, 0], axis=0), 600, atol=1e-3)
