@@ -16,10 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from .errors import InputError
+from .insertion import NODE_NAME
 from .quantities import DIMENSIONLESS, LENGTH, TIME, in_units_of, positive, whole_number
 from .statistics import mean_with_error
-
-NODE_NAME = "NOD"
 
 
 def filament_nodes(trajectory_or_topology):

@@ -28,6 +28,7 @@ from .timestep import (
     contact_time_step,
     recommended_time_step,
     warn_if_driven_far,
+    warn_if_strained,
     warn_if_unstable,
 )
 
@@ -250,10 +251,11 @@ class Filaments(FilamentCollection):
         scheme = default_scheme(self._engine_name) if scheme is None else scheme
         check_scheme(scheme)
         flow = as_flow(flow)
+        warn_if_strained(step_size, flow)
         for f in {(f.type, f.segments, f.propulsion): f for f in self._filaments}.values():
             solvent = (self._viscosity, self._temperature)
             warn_if_unstable(f.type, *solvent, step_size, f.segments, scheme)
-            warn_if_driven_far(f.type, *solvent, step_size, f.segments, f.propulsion, flow)
+            warn_if_driven_far(f.type, *solvent, step_size, f.segments, f.propulsion)
         return self._engine.create_integrator(
             system,
             self._filaments,

@@ -5,11 +5,10 @@ import openmm
 
 from .errors import InputError
 from .placement import unit_vector
-from .quantities import FORCE, LENGTH, TIME, in_units_of, whole_number
+from .quantities import FORCE, LENGTH, TIME, VELOCITY, in_units_of, whole_number
 from .reporters import FilamentsReporter
 
 CONSTANT_FORCE_NAME = "ConstantForce"
-VELOCITY = LENGTH / TIME
 
 _COMPONENTS = ("force_x", "force_y", "force_z")
 

@@ -396,13 +396,9 @@ def warn_if_unstable(filament_type, viscosity, temperature, step, segments=1, sc
             )
 
 
-def warn_if_driven_far(filament_type, viscosity, temperature, step, segments=1, propulsion=0.0, flow=None):
-    """Issue a TimeStepWarning if a flow or self-propulsion takes segments farther in a step than it resolves.
-
-    The strain of a step, ``dt |gradient u|``, should stay below 0.1, and a segment should not advance by more than half
-    its length, ``dt F0/gamma_par < l0/2``, or a bent filament cuts its corners.
-    """
-    strain = step * float(np.linalg.norm(flow.gradient, 2)) if flow is not None else 0.0
+def warn_if_strained(step, flow):
+    """Issue a TimeStepWarning if a flow strains the solvent in a step by more than 0.1: by ``dt |gradient u|``."""
+    strain = step * float(np.linalg.norm(flow.gradient, 2))
     if strain > _LARGEST_STRAIN:
         warnings.warn(
             f"In a time step of {step:.4g} ps the flow strains the solvent by {strain:.3g}: it is not resolved. Use a "
@@ -410,6 +406,13 @@ def warn_if_driven_far(filament_type, viscosity, temperature, step, segments=1, 
             TimeStepWarning,
             stacklevel=3,
         )
+
+
+def warn_if_driven_far(filament_type, viscosity, temperature, step, segments=1, propulsion=0.0):
+    """Issue a TimeStepWarning if self-propulsion takes a segment farther in a step than by half its length.
+
+    Beyond ``dt F0/gamma_par = l0/2`` a bent filament cuts its corners.
+    """
     friction = filament_type.segment_friction(viscosity, temperature, segments)
     advance = step * abs(propulsion) / friction.parallel / filament_type.segment_length
     if advance > _LARGEST_ADVANCE:

@@ -23,11 +23,6 @@ ENGINE_PLATFORMS = [("portable", platform) for platform in PLATFORMS]
 ENGINE_PLATFORMS += [("compiled", platform) for platform in PLATFORMS if platform in ("Reference", "CPU")]
 
 
-# Engines with rings, motion in a plane, self-propelled segments, flow and clamped directions.
-NEW_ENGINES = ("portable", "compiled")
-NEW_ENGINE_PLATFORMS = [pair for pair in ENGINE_PLATFORMS if pair[0] in NEW_ENGINES]
-
-
 def soft_chain(name, **bending):
     """Segments of 100 nm that stretch by a tenth; slow extension, so that few steps reach far."""
     base = FilamentType(name=name, diameter=6, segment_length=100, stretching_stiffness=100 * KT / 100**2, **bending)

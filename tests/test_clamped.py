@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import openmm
 import pytest
+from conftest import ENGINES
 from openmm import app
-from physics_cases import KT, NEW_ENGINES, TEMPERATURE, VISCOSITY, Case, soft_chain, time_step
+from physics_cases import KT, TEMPERATURE, VISCOSITY, Case, soft_chain, time_step
 from scipy.integrate import solve_bvp
 
 from openmm_cylchain import F_ACTIN, Filaments, theory
@@ -63,7 +64,7 @@ def test_stiffness_of_the_joints_of_a_ring(clamped, factors):
 
 
 @pytest.mark.parametrize("model", ["inscribed-circle", "kratky-porod", "quadratic"])
-@pytest.mark.parametrize("engine", NEW_ENGINES)
+@pytest.mark.parametrize("engine", ENGINES)
 def test_reporter_and_state_have_the_stiffness_of_the_joints(engine, model):
     kind = replace(F_ACTIN, bending_model=model)
     angles = np.cumsum([0, 0.3, -0.2, 0.4, 0.1])
@@ -160,7 +161,7 @@ def _elastica(rigidity, force, weight):
 
 
 @pytest.mark.parametrize("segments", [1, 2, 5, 12])
-@pytest.mark.parametrize("engine", NEW_ENGINES)
+@pytest.mark.parametrize("engine", ENGINES)
 def test_small_deflection_of_a_cantilever(engine, segments):
     """F L^3/(3 a) (1 + 1/(2 n^2)), for any number n of free segments."""
     force = 1e-5
@@ -177,7 +178,7 @@ def test_small_deflection_of_a_cantilever(engine, segments):
 
 
 @pytest.mark.parametrize("kind_of_load", ["end", "distributed"])
-@pytest.mark.parametrize("engine", NEW_ENGINES)
+@pytest.mark.parametrize("engine", ENGINES)
 def test_large_deflection_tends_to_the_elastica(engine, kind_of_load):
     """The tip of a filament bent by half its length; the error falls at least with the square of the segments."""
     errors = []
@@ -260,7 +261,7 @@ def test_draws_of_clamped_filaments(planar):
 
 
 @pytest.mark.parametrize("planar", [False, True])
-@pytest.mark.parametrize("engine", NEW_ENGINES)
+@pytest.mark.parametrize("engine", ENGINES)
 def test_dynamics_keep_the_fluctuations_of_clamped_filaments(engine, planar):
     filaments = _drawn(engine, STIFF, 3, planar, 2500)
     _, system, positions = filaments.build()

@@ -1,15 +1,10 @@
 """Filaments with contacts do not pass through each other at the recommended step; without contacts, they do."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from dense_network import crosslinked_network, dense_network
 
-
-def _resident_megabytes():
-    status = Path("/proc/self/status").read_text()
-    return int(next(line for line in status.splitlines() if line.startswith("VmRSS")).split()[1]) / 1024
+from openmm_cylchain.benchmark.memory import resident_and_peak
 
 
 def test_filaments_cross_only_without_contacts():
@@ -30,13 +25,13 @@ def test_a_dense_crosslinked_network_for_long():
     assert without.count_crossings(steps=1000, interval=20) > 300
     network, crosslinks = crosslinked_network(200, 10, 600.0, links=200)
     crossings = network.count_crossings(steps=4000, interval=20)
-    memory = _resident_megabytes()
+    memory, _ = resident_and_peak()
     crossings += network.count_crossings(steps=16000, interval=20)
     assert crossings == 0
     assert network.context.getIntegrator().getNumDividedSteps() < 100
     positions = network.positions()._value
     assert np.isfinite(positions).all()
-    assert _resident_megabytes() < memory + 20
+    assert resident_and_peak()[0] < memory + 20e6
     # Twice as far as the soft wall lets a node go with a few k_B T.
     assert np.linalg.norm(positions[np.concatenate(network.filaments.node_indices)], axis=1).max() < 600 + 60
     extensions = crosslinks.extensions(network.context)

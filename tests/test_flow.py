@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 import openmm
 import pytest
+from conftest import ENGINES
 from openmm import app, unit
-from physics_cases import NEW_ENGINE_PLATFORMS, NEW_ENGINES, TEMPERATURE, VISCOSITY
+from physics_cases import ENGINE_PLATFORMS, TEMPERATURE, VISCOSITY
 from scipy.integrate import solve_ivp
 from test_redistribution import _bent_chain, _dense_resistance, _virtual_forces
 
@@ -102,7 +103,7 @@ def test_bad_flows_are_refused(make, message):
         make()
 
 
-@pytest.mark.parametrize("engine", NEW_ENGINES)
+@pytest.mark.parametrize("engine", ENGINES)
 def test_what_is_no_flow_is_refused(engine):
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine=engine)
     filaments.add_straight(F_ACTIN, 2, [0, 0, 0], [1, 0, 0])
@@ -119,7 +120,7 @@ def test_what_is_no_flow_is_refused(engine):
 
 
 # All flows on the Reference platform, one of them on the others.
-RUNS = [(*pair, name) for pair in NEW_ENGINE_PLATFORMS for name in FLOWS if "Reference" in pair or name == "general"]
+RUNS = [(*pair, name) for pair in ENGINE_PLATFORMS for name in FLOWS if "Reference" in pair or name == "general"]
 
 
 def _segment_in_flow(engine, platform, kind, flow, step, steps):
@@ -208,7 +209,7 @@ def _dense_velocities(filament, nodes, forces, flow):
 @pytest.mark.parametrize("planar", [False, True])
 @pytest.mark.parametrize("scheme", ["euler", "midpoint"])
 @pytest.mark.parametrize("name", FLOWS)
-@pytest.mark.parametrize("engine", NEW_ENGINES)
+@pytest.mark.parametrize("engine", ENGINES)
 def test_a_step_equals_the_dense_solution(engine, name, scheme, planar):
     flow = FLOWS[name]
     filaments, system, positions = _chains_and_particles(engine, planar)
@@ -239,7 +240,7 @@ def test_a_step_equals_the_dense_solution(engine, name, scheme, planar):
 
 
 @pytest.mark.parametrize("name", ["shear", "extension"])
-@pytest.mark.parametrize("engine", NEW_ENGINES)
+@pytest.mark.parametrize("engine", ENGINES)
 def test_chains_follow_the_equation_of_motion(engine, name):
     """A long run against dx/dt = u + Z^-1 f, integrated with a dense Z and forces by differences of the energy."""
     flow = FLOWS[name]
@@ -271,7 +272,7 @@ def test_chains_follow_the_equation_of_motion(engine, name):
     assert np.abs(_positions(context).reshape(-1) - exact).max() < 2e-3 * moved
 
 
-@pytest.mark.parametrize("engine", NEW_ENGINES)
+@pytest.mark.parametrize("engine", ENGINES)
 def test_joint_tensions_are_those_in_the_flow(engine):
     """A linear flow changes none of free chains, which it carries along; clamped chains have to hold against it."""
     filaments, system, positions = _chains_and_particles(engine)
@@ -313,7 +314,7 @@ def test_joint_tensions_are_those_in_the_flow(engine):
 # Noise and the life of an integrator
 
 
-@pytest.mark.parametrize("engine", NEW_ENGINES)
+@pytest.mark.parametrize("engine", ENGINES)
 def test_noise_is_that_of_a_resting_solvent(engine):
     """In a uniform flow, a trajectory is the one at rest, carried along."""
     ends = []
@@ -331,7 +332,7 @@ def test_noise_is_that_of_a_resting_solvent(engine):
     assert np.abs(ends[0] - positions._value).max() > 1.0
 
 
-@pytest.mark.parametrize(("engine", "platform"), NEW_ENGINE_PLATFORMS)
+@pytest.mark.parametrize(("engine", "platform"), ENGINE_PLATFORMS)
 def test_flow_can_change_and_survives_restarts(engine, platform):
     filaments, system, positions = _chains_and_particles(engine)
     options = {"particle_friction": 1e5, "random_seed": 4}
@@ -364,7 +365,7 @@ def test_flow_can_change_and_survives_restarts(engine, platform):
     assert integrator.getFlow() == FLOWS["shear"]
 
 
-@pytest.mark.parametrize("engine", NEW_ENGINES)
+@pytest.mark.parametrize("engine", ENGINES)
 def test_copied_integrator_keeps_the_flow(engine):
     filaments, system, positions = _chains_and_particles(engine)
     integrator = filaments.create_integrator(system, 5e3, particle_friction=1e5, random_seed=4, flow=GENERAL)

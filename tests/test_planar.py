@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import openmm
 import pytest
+from conftest import ENGINES
 from openmm import unit
-from physics_cases import CASES, KT, NEW_ENGINE_PLATFORMS, NEW_ENGINES, TEMPERATURE, VISCOSITY, time_step
+from physics_cases import CASES, ENGINE_PLATFORMS, KT, TEMPERATURE, VISCOSITY, time_step
 from scipy.integrate import quad
 from test_redistribution import _bent_chain, _dense_resistance
 
@@ -179,7 +180,7 @@ def test_direction_of_a_draw():
 # Dynamics
 
 
-@pytest.mark.parametrize(("engine", "platform"), NEW_ENGINE_PLATFORMS)
+@pytest.mark.parametrize(("engine", "platform"), ENGINE_PLATFORMS)
 def test_nodes_keep_their_height_to_the_bit(engine, platform):
     """Whatever pulls along z, and beside a filament that moves in space."""
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine=engine)
@@ -203,7 +204,7 @@ def test_nodes_keep_their_height_to_the_bit(engine, platform):
         assert np.all(end[filaments.node_indices[2], 2] != start[filaments.node_indices[2], 2])
 
 
-@pytest.mark.parametrize("engine", NEW_ENGINES)
+@pytest.mark.parametrize("engine", ENGINES)
 def test_noise_covariance_and_drift_of_a_step(engine):
     """Cov(dx) = 2 k_B T dt M in the plane, with M the inverse of the xy part of Z."""
     nodes = _bent_chain(F_ACTIN, 2, 3) * [1, 1, 0]
@@ -253,7 +254,7 @@ QUICK = ("freely-jointed", "inscribed-circle")
 
 
 @pytest.mark.parametrize("name", QUICK)
-@pytest.mark.parametrize("engine", NEW_ENGINES)
+@pytest.mark.parametrize("engine", ENGINES)
 def test_dynamics_keep_the_equilibrium_of_the_plane(engine, name):
     _check_dynamics(engine, "Reference", name)
 
@@ -261,7 +262,7 @@ def test_dynamics_keep_the_equilibrium_of_the_plane(engine, name):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("engine", "platform", "name"),
-    [(*pair, name) for pair in NEW_ENGINE_PLATFORMS for name in NAMES if pair[1] != "Reference" or name not in QUICK],
+    [(*pair, name) for pair in ENGINE_PLATFORMS for name in NAMES if pair[1] != "Reference" or name not in QUICK],
 )
 def test_dynamics_keep_the_equilibrium_of_the_plane_elsewhere(engine, platform, name):
     _check_dynamics(engine, platform, name)
@@ -292,7 +293,7 @@ def _check_dynamics(engine, platform, name):
     _assert_mean(ends, _mean_square_end_to_end(kind, segments))
 
 
-@pytest.mark.parametrize("engine", NEW_ENGINES)
+@pytest.mark.parametrize("engine", ENGINES)
 def test_free_segment_has_the_right_drift_with_the_printed_scheme(engine):
     """Scheme "euler" is right for one free segment, with the thermal torque of two dimensions."""
     kind = CASES["kratky-porod"].type

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import openmm
 import pytest
+from conftest import ENGINES
 from openmm import unit
-from physics_cases import KT, NEW_ENGINE_PLATFORMS, NEW_ENGINES, TEMPERATURE, VISCOSITY
+from physics_cases import ENGINE_PLATFORMS, KT, TEMPERATURE, VISCOSITY
 from test_redistribution import _bent_chain, _dense_resistance
 
 from openmm_cylchain import F_ACTIN, Filaments, FilamentType, InputError
@@ -30,7 +31,7 @@ def _tangents(nodes, closed):
 
 
 @pytest.mark.parametrize("propulsion", [5.0, -2.0, 8 * unit.piconewton])
-@pytest.mark.parametrize(("engine", "platform"), NEW_ENGINE_PLATFORMS)
+@pytest.mark.parametrize(("engine", "platform"), ENGINE_PLATFORMS)
 def test_straight_filament_glides(engine, platform, propulsion):
     """v = F0 t/gamma_par, with any number of segments."""
     filaments = Filaments(VISCOSITY, 0, engine=engine)
@@ -64,7 +65,7 @@ def _propelled_shapes(engine, factor=1.0):
     return filaments, system, positions
 
 
-@pytest.mark.parametrize(("engine", "platform"), NEW_ENGINE_PLATFORMS)
+@pytest.mark.parametrize(("engine", "platform"), ENGINE_PLATFORMS)
 def test_state_holds_the_forces_but_no_energy(engine, platform):
     states = []
     for factor in (1.0, 0.0):
@@ -84,7 +85,7 @@ def test_state_holds_the_forces_but_no_energy(engine, platform):
         assert forces[indices] == pytest.approx(expected, abs=1e-3 if platform != "Reference" else 1e-9)
 
 
-@pytest.mark.parametrize("engine", NEW_ENGINES)
+@pytest.mark.parametrize("engine", ENGINES)
 def test_a_step_equals_the_dense_solution(engine):
     filaments, system, positions = _propelled_shapes(engine)
     step = 100.0
@@ -99,7 +100,7 @@ def test_a_step_equals_the_dense_solution(engine):
         assert np.abs(moved[indices] - expected).max() < 1e-10 * np.abs(expected).max()
 
 
-@pytest.mark.parametrize("engine", NEW_ENGINES)
+@pytest.mark.parametrize("engine", ENGINES)
 def test_joints_carry_what_the_segments_beyond_push(engine):
     """Free, straight and propelled evenly, no segment pushes another; held at an end, each carries those beyond."""
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine=engine)
@@ -119,7 +120,7 @@ def test_joints_carry_what_the_segments_beyond_push(engine):
     assert pushed[:, 1] == pytest.approx(-0.3 * np.arange(4, 0, -1), rel=1e-6)
 
 
-@pytest.mark.parametrize("engine", NEW_ENGINES)
+@pytest.mark.parametrize("engine", ENGINES)
 def test_gliding_rod_turns_and_diffuses(engine):
     """In a plane: <x> = v tau (1 - exp(-t/tau)) along the first direction, v = F0/gamma_par, tau = gamma_rot/k_B T."""
     count, steps = 2500, 150
@@ -154,7 +155,7 @@ def test_gliding_rod_turns_and_diffuses(engine):
     assert 0.1 * (active + passive) > 4 * error
 
 
-@pytest.mark.parametrize(("engine", "platform"), NEW_ENGINE_PLATFORMS)
+@pytest.mark.parametrize(("engine", "platform"), ENGINE_PLATFORMS)
 def test_system_survives_xml(engine, platform):
     filaments, system, positions = _propelled_shapes(engine)
     restored = openmm.XmlSerializer.deserialize(openmm.XmlSerializer.serialize(system))

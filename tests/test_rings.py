@@ -4,8 +4,9 @@ import mdtraj
 import numpy as np
 import openmm
 import pytest
+from conftest import ENGINES
 from openmm import app, unit
-from physics_cases import KT, NEW_ENGINE_PLATFORMS, NEW_ENGINES, TEMPERATURE, VISCOSITY, soft_chain, time_step
+from physics_cases import ENGINE_PLATFORMS, KT, TEMPERATURE, VISCOSITY, soft_chain, time_step
 from physics_cases import Case as EquilibriumCase
 from scipy.integrate import simpson
 from scipy.spatial.transform import Rotation
@@ -58,7 +59,7 @@ def test_ring_is_a_regular_polygon(segments):
     )
 
 
-@pytest.mark.parametrize("engine", NEW_ENGINES)
+@pytest.mark.parametrize("engine", ENGINES)
 def test_particles_bonds_and_points_of_a_ring(engine, tmp_path):
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine=engine)
     filaments.add_ring(F_ACTIN, 5, [0, 0, 0])
@@ -113,7 +114,7 @@ def test_analysis_knows_rings_by_their_bonds(tmp_path):
         analysis.bending_mode_amplitudes(trajectory, 1, [1])
 
 
-@pytest.mark.parametrize("engine", NEW_ENGINES)
+@pytest.mark.parametrize("engine", ENGINES)
 def test_reporter_and_forces_know_the_last_segment(engine):
     """Energies against a sum over all segments and joints, forces against their differences."""
     generator = np.random.default_rng(8)
@@ -223,7 +224,7 @@ def test_open_chains_have_the_narrow_band():
     assert redistribution.resistance_bands(_chain_set((6,), (True,)), ring).shape == (9, 18)
 
 
-@pytest.fixture(scope="module", params=NEW_ENGINES)
+@pytest.fixture(scope="module", params=ENGINES)
 def mixed_system(request):
     """Rings and an open chain in one System, with forces on all nodes."""
     generator = np.random.default_rng(4)
@@ -309,7 +310,7 @@ def _own_forces(filament, nodes):
     return np.concatenate([-plus, plus], axis=1)
 
 
-@pytest.mark.parametrize("engine", NEW_ENGINES)
+@pytest.mark.parametrize("engine", ENGINES)
 def test_noise_covariance(engine):
     """Cov(dx) = 2 k_B T dt Z^-1 between all nodes of a ring."""
     nodes = _polygon(4, np.random.default_rng(2))
@@ -415,7 +416,7 @@ def _mean(values):
     return values.mean(), values.std(ddof=1) / np.sqrt(len(values))
 
 
-@pytest.mark.parametrize("engine", NEW_ENGINES)
+@pytest.mark.parametrize("engine", ENGINES)
 def test_equilibrium_of_stiff_rings_equals_monte_carlo(engine):
     kind = soft_chain("RING", bending_rigidity=2 * KT * 100)
     shapes, expected = _metropolis(kind, 6, 800, 80, seed=7)
@@ -464,18 +465,18 @@ def _check_freely_jointed_rings(engine, segments, copies, steps):
             assert 0.05 * exact > SIGMAS * error, name
 
 
-@pytest.mark.parametrize("engine", NEW_ENGINES)
+@pytest.mark.parametrize("engine", ENGINES)
 def test_equilibrium_of_freely_jointed_rings_is_exact(engine):
     _check_freely_jointed_rings(engine, 4, 1200, 600)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("engine", NEW_ENGINES)
+@pytest.mark.parametrize("engine", ENGINES)
 def test_equilibrium_of_longer_freely_jointed_rings_is_exact(engine):
     _check_freely_jointed_rings(engine, 9, 1500, 2000)
 
 
-@pytest.mark.parametrize(("engine", "platform"), NEW_ENGINE_PLATFORMS)
+@pytest.mark.parametrize(("engine", "platform"), ENGINE_PLATFORMS)
 def test_rings_run_on_every_platform(engine, platform):
     """A few steps with noise: the same on all platforms, to their precision."""
     ends = []

@@ -69,7 +69,7 @@ def grow(kind, chains, segments):
     -------
     Growth
     """
-    before, _ = _memory()
+    before, _ = resident_and_peak()
     place = one_thread_platform()
     if kind == STOCK:
         simulated = simulate_beads("harmonic", chains, segments, *place)
@@ -77,11 +77,12 @@ def grow(kind, chains, segments):
         simulated = simulate_filaments(kind, chains, segments, *place)
     simulated.advance(_STEPS)
     gc.collect()
-    resident, peak = _memory()
+    resident, peak = resident_and_peak()
     return Growth(resident - before, peak - before)
 
 
-def _memory():
+def resident_and_peak():
+    """Resident memory of this process and its peak, in bytes; raises MeasurementError where they are not known."""
     try:
         lines = _STATUS.read_text().splitlines()
     except OSError:

@@ -117,7 +117,7 @@ public:
         if (settings.kT > 0)
             addNoise();
         // How a gradient turns a chain in a step takes more accuracy than the changes of segments ask for.
-        const int least = settings.flow.present && settings.flow.varies() ? 2 : 0;
+        const int least = settings.flow.varies() ? 2 : 0;
         Real active = 1+Real{};
         for (int iteration = 0; iteration < NEWTON_ITERATIONS; iteration++) {
             eliminate(y);
