@@ -1,4 +1,6 @@
-"""Relaxation of a straight filament whose first node is trapped: Figs. 15 and 16 of Pesek et al. 2016."""
+"""Relaxation of a straight filament whose first node is trapped: Figs. 15 to 18 of Pesek et al. 2016."""
+
+from dataclasses import replace
 
 import numpy as np
 import openmm
@@ -7,19 +9,17 @@ from physics_cases import KT, TEMPERATURE, VISCOSITY
 
 from openmm_cylchain import F_ACTIN, Filaments
 
-pytestmark = pytest.mark.slow
-
 CHAINS, SEGMENTS = 1600, 64
 TIMES = (10, 20, 50, 100, 200)
 MICROSECOND = 1e6
 
 
-def _relax(scheme, step, times, seed):
+def _relax(scheme, step, times, seed, chains=CHAINS, kind=F_ACTIN):
     """{time: (mean, error) of the shortening, and of the stretching energy of a segment over k_B T}."""
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
-    for chain in range(CHAINS):
-        filaments.add_straight(F_ACTIN, SEGMENTS, [0, 0, 0], [1, 0, 0])
-        filaments.add_tether(chain, 0, [0, 0, 0], F_ACTIN.segment_stiffness)
+    for chain in range(chains):
+        filaments.add_straight(kind, SEGMENTS, [0, 0, 0], [1, 0, 0])
+        filaments.add_tether(chain, 0, [0, 0, 0], kind.segment_stiffness)
     _, system, positions = filaments.build()
     integrator = filaments.create_integrator(system, step * MICROSECOND, scheme=scheme, random_seed=seed)
     context = openmm.Context(system, integrator, openmm.Platform.getPlatform("CPU"))
@@ -28,11 +28,11 @@ def _relax(scheme, step, times, seed):
     for moment in times:
         integrator.step(round(moment / step) - taken)
         taken = round(moment / step)
-        nodes = context.getState(positions=True).getPositions(asNumpy=True)._value.reshape(CHAINS, SEGMENTS + 1, 3)
+        nodes = context.getState(positions=True).getPositions(asNumpy=True)._value.reshape(chains, SEGMENTS + 1, 3)
         lengths = np.linalg.norm(np.diff(nodes, axis=1), axis=2)
         shortening = SEGMENTS * F_ACTIN.segment_length - (nodes[:, -1, 0] - nodes[:, 0, 0])
         stretching = F_ACTIN.stretching_energy(lengths).mean(axis=1) / KT
-        result[moment] = [(values.mean(), values.std(ddof=1) / np.sqrt(CHAINS)) for values in (shortening, stretching)]
+        result[moment] = [(values.mean(), values.std(ddof=1) / np.sqrt(chains)) for values in (shortening, stretching)]
     return result
 
 
@@ -41,6 +41,7 @@ def reference():
     return _relax("midpoint", 0.02, TIMES[1:], seed=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", [1, 5, 10])
 def test_shortening_is_that_of_fine_steps(reference, step):
     relaxation = _relax("implicit", step, [moment for moment in TIMES if moment >= step], seed=2)
@@ -55,3 +56,14 @@ def test_shortening_is_that_of_fine_steps(reference, step):
         overshoot, error = relaxation[10][1]
         assert overshoot - 4 * error > 1.2 * 0.5
         assert relaxation[200][1][0] + 4 * relaxation[200][1][1] < 1.1 * 0.5
+
+
+def test_lengths_with_much_friction():
+    """Their tension is that of friction alone: a step must turn it with the segments, however short the step is."""
+    kind = replace(F_ACTIN, extension_relaxation_time=10 * MICROSECOND)
+    expected = _relax("midpoint", 0.01, [3], 1, 400, kind)[3]
+    for step in (0.01, 0.1, 1):
+        for (mean, error), (exact, exact_error) in zip(_relax("implicit", step, [3], 2, 400, kind)[3], expected):
+            assert abs(mean - exact) < 4 * np.hypot(error, exact_error), (step, mean, exact)
+        # Of the energy, a bias of 5 % would be seen.
+        assert 4 * np.hypot(error, exact_error) < 0.05 * exact

@@ -24,6 +24,8 @@
 
 /** The largest change of a segment in the last iteration, over its rest length; a fifth of it remains as an error. */
 const double NEWTON_TOLERANCE = 1e-2;
+/** The largest error of a length that an iteration leaves, over its thermal fluctuation against what resists in a step. */
+const double LENGTH_TOLERANCE = 0.07;
 const int NEWTON_ITERATIONS = 14;
 /** A step that does not converge is cut into at most two to this power. */
 const int LARGEST_DIVISION = 10;
@@ -116,8 +118,9 @@ public:
         describe();
         if (settings.kT > 0)
             addNoise();
-        // How a gradient turns a chain in a step takes more accuracy than the changes of segments ask for.
-        const int least = settings.flow.varies() ? 2 : 0;
+        // The first iteration has neither metric forces nor tensions along the mean segment, however short the step is. How
+        // a gradient turns a chain takes one more.
+        const int least = settings.flow.varies() ? 3 : 2;
         Real active = 1+Real{};
         for (int iteration = 0; iteration < NEWTON_ITERATIONS; iteration++) {
             eliminate(y);
@@ -131,7 +134,7 @@ public:
             }
             for (int node = 0; node < n; node++)
                 y[node] = y[node]+change[node]*active;
-            if (iteration >= least && !anyUnfinished(active))
+            if (iteration+1 >= least && !anyUnfinished(active))
                 break;
         }
         for (int i = 0; i < W; i++)
@@ -558,9 +561,13 @@ private:
         Real excess = Real{};
         for (int s = 0; s < pack.segments; s++) {
             const Vec difference = change[s+1]-change[s];
-            const Real l0 = property<Real>(pack, s, ChainPack::RestLength)*NEWTON_TOLERANCE;
-            const Real ratio = difference.dot(difference)/(l0*l0);
+            const Real l0 = property<Real>(pack, s, ChainPack::RestLength), square = difference.dot(difference);
+            const Real ratio = square/(NEWTON_TOLERANCE*NEWTON_TOLERANCE*l0*l0);
+            // An iteration takes a length to first order in the change, so that an error of square/(2 l0) is left.
+            const Real error = square/(2*LENGTH_TOLERANCE*l0);
             excess = ratio < excess ? excess : ratio;
+            if (settings.kT > 0)
+                excess = larger(excess, error*error*segments[s].response/settings.kT);
         }
         bool any = false;
         for (int i = 0; i < W; i++) {
