@@ -91,7 +91,7 @@ print("force (pN)       extension/L     expected")
 for row in range(1, WINDOWS, 3):
     print(f"{force[row]:9.2f} {extension[row]:12.4f} +- {extension_error[row]:6.4f} {expected[row]:9.4f}")
 work = pulling["work"].sum(axis=0)
-print(f"work of the trap: {work.mean():.0f} +- {work.std(ddof=1) / np.sqrt(MOLECULES):.0f} kJ/mol for a molecule")
+print(f"work of the trap: {work.mean():.1f} +- {work.std(ddof=1) / np.sqrt(MOLECULES):.1f} kJ/mol for a molecule")
 
 figure, (left, right) = plt.subplots(1, 2, figsize=(11.5, 4.8), gridspec_kw={"width_ratios": [1.1, 1]})
 colours = plt.cm.viridis(np.linspace(0.1, 0.8, len(shapes)))
