@@ -31,6 +31,8 @@ const int NEWTON_ITERATIONS = 14;
 const int LARGEST_DIVISION = 10;
 /** The part of the friction against turning that compression may take away in the iteration's matrix. */
 const double COMPRESSION = 0.9;
+/** In the first iteration, a length resists at most this many times as much as turning. */
+const double STIFFEST_LENGTH = 1e4;
 /** A bend is drawn as a Gaussian with rejection if the joint is stiffer than this many k_B T, or else from the sphere. */
 const double STIFF_JOINT = 2;
 /** The tension of a segment turns it back by this much of what resists, in a step. */
@@ -64,6 +66,8 @@ template <class Real> struct ImplicitSegment {
     Vector<Real> newTangent;
     Real tension, response;
     Real multiplier, extra, tensionOfFlow;
+    // What the first iteration takes of tension and response.
+    Real softening;
 };
 
 /** What a step keeps of a tether: the vector from its point to its node at the start, its noise and how implicit it is. */
@@ -123,6 +127,7 @@ public:
         const int least = settings.flow.varies() ? 3 : 2;
         Real active = 1+Real{};
         for (int iteration = 0; iteration < NEWTON_ITERATIONS; iteration++) {
+            stiffest = iteration == 0 ? STIFFEST_LENGTH : HUGE_VAL;
             eliminate(y);
             substitute();
             if (iteration == 0 && settings.kT > 0) {
@@ -150,6 +155,7 @@ private:
     ImplicitSegment<Real>* segments;
     ImplicitNode<Real>* nodes;
     ImplicitTether* tethers;
+    double stiffest;
     const Vec* x;
     // The forces, the same with the drag of the flow, and the changes of an iteration.
     Vec *f, *loads, *change;
@@ -396,9 +402,14 @@ private:
         stretchCoordinate(pack.stretching, reciprocal, length-l0, coordinate, slope);
         stretchCoordinate(pack.stretching, reciprocal, 0.5*(segment.length+length)-l0, unused, middleSlope);
         const Real drag = property<Real>(pack, s, ChainPack::Extensional)/(segment.length*length*h);
-        const Real tension = stiffness*middleSlope*(segment.theta*coordinate+(1-segment.theta)*segment.coordinate-
+        Real tension = stiffness*middleSlope*(segment.theta*coordinate+(1-segment.theta)*segment.coordinate-
                 segment.randomCoordinate)+drag*(length-segment.length)-segment.randomTension;
-        const Real response = stiffness*middleSlope*segment.theta*slope+drag*segment.length/length;
+        Real response = stiffness*middleSlope*segment.theta*slope+drag*segment.length/length;
+        // Metric forces are those of constraints then, and rounding the blocks of the inverse does not reach them.
+        const Real softening = stiffest*(acrossTrans+acrossTurn)/(h*response);
+        segment.softening = softening < 1 ? softening : 1+Real{};
+        tension = tension*segment.softening;
+        response = response*segment.softening;
         const Vec pull = direction*tension;
         const Real turning = 0.5*larger<Real>(segment.multiplier/length, -COMPRESSION*acrossTurn/h);
         const Mat elastic = Mat::axial(turning, -turning, t)+Mat::outer(direction*response, t);
@@ -550,7 +561,7 @@ private:
         Vec response = (second+first-other-other.transposed())*t;
         response = response-t*t.dot(response);
         const Real drag = property<Real>(pack, s, ChainPack::Extensional)/(segment.length*segment.length*h);
-        const Real noise = property<Real>(pack, s, ChainPack::Stiffness)*(2*segment.theta-1)+drag;
+        const Real noise = segment.softening*(property<Real>(pack, s, ChainPack::Stiffness)*(2*segment.theta-1)+drag);
         const Vec force = response*(settings.kT*noise/segment.length);
         f[s] = f[s]+force;
         f[s+1] = f[s+1]-force;
