@@ -1,7 +1,7 @@
-"""The console script ``openmm-cylchain``: runs a configuration, explains its time step, measures, informs.
+"""The console script ``openmm-cylchain``: runs a configuration, explains its time step, measures, reproduces, informs.
 
-Exit codes: 0 done, 1 the simulation blew up or a file could not be written, 2 wrong input, 130 and 143
-interrupted by SIGINT and SIGTERM.
+Exit codes: 0 done, 1 the simulation blew up, a file could not be written or results are not reproduced, 2 wrong input,
+130 and 143 interrupted by SIGINT and SIGTERM.
 """
 
 import argparse
@@ -80,6 +80,7 @@ def _parser():
     timestep.set_defaults(command=_time_step)
 
     _add_benchmarks(commands.add_parser("benchmark", help="measure speed and memory on this machine"))
+    _add_reproductions(commands.add_parser("reproduce", help="compute the results of a paper again"))
     information = commands.add_parser("info", help="print versions, engines and platforms, and why one is missing")
     information.set_defaults(command=_information)
     return parser
@@ -108,6 +109,15 @@ def _add_benchmarks(parser):
     for benchmark in (engines, scaling, time_step, bead_spring):
         benchmark.add_argument("--quick", action="store_true", help="a rough measurement within a minute")
         benchmark.add_argument("--json", metavar="FILE", help="write machine, settings and results to FILE as well")
+
+
+def _add_reproductions(parser):
+    parser.add_argument("paper", metavar="PAPER", help="pesek2016: Pesek et al., Soft Matter 2016, 12, 3360")
+    parser.add_argument("--figure", type=int, metavar="N", help="only this figure of the paper")
+    parser.add_argument("--quick", action="store_true", help="reduced statistics, five minutes at most")
+    parser.add_argument("--force", action="store_true", help="measure anew what DIR holds already")
+    parser.add_argument("--output", metavar="DIR", required=True, help="directory for results, pictures and the page")
+    parser.set_defaults(command=_reproduce)
 
 
 def _run(options):
@@ -167,6 +177,26 @@ def _information(options):
     from .information import format_information
 
     print(format_information())
+
+
+def _reproduce(options):
+    from .benchmark.report import Progress
+    from .reproduce.reproduction import reproduce, unexplained
+
+    progress = Progress()
+    try:
+        content = reproduce(options.paper, options.output, options.figure, options.quick, options.force, say=progress)
+    finally:
+        progress.finish()
+    results = [result for case in content["cases"] for result in case["results"]]
+    for result in results:
+        if result["reason"]:
+            print(f"{result['name']} differs. {result['reason']}")
+    agreeing = sum(result["verdict"] == "agrees" for result in results)
+    print(f"{agreeing} of {len(results)} results agree. Written to {options.output}: results.json, {options.paper}.md")
+    if unexplained(content):
+        _say("error", f"without a stated cause differ: {', '.join(unexplained(content))}")
+        raise SystemExit(_FAILED)
 
 
 def _benchmark_engines(options):
