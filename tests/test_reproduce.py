@@ -1,12 +1,21 @@
 """Reproduction of a paper: rules and verdicts, records, results and pages, and that faults turn verdicts."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from openmm_cylchain import InputError, cli
-from openmm_cylchain.reproduce import free_segments, pesek2016, simulation, tables
+from openmm_cylchain import F_ACTIN, InputError, cli, theory
+from openmm_cylchain.reproduce import (
+    end_to_end,
+    force_extension,
+    free_segments,
+    pesek2016,
+    relaxation,
+    simulation,
+    tables,
+)
 from openmm_cylchain.reproduce.case import Case, Outcome
 from openmm_cylchain.reproduce.page import format_number, format_page
 from openmm_cylchain.reproduce.records import Records
@@ -228,7 +237,7 @@ def verdicts(case, folder):
     return {each.name: each.verdict for each in case.evaluate(Records(folder), True).results}
 
 
-def test_bending_potentials(tmp_path, monkeypatch):
+def test_bending_potentials(tmp_path):
     (case,) = pesek2016.bending_potentials.CASES
     assert set(verdicts(case, tmp_path).values()) == {"agrees"}
 
@@ -244,3 +253,78 @@ def test_free_segments_and_planted_faults(tmp_path, monkeypatch):
         assert "differs" in verdicts(displacement, tmp_path / "viscous").values()
     monkeypatch.setattr(simulation, "TEMPERATURE", 1.1 * simulation.TEMPERATURE)
     assert verdicts(orientation, tmp_path / "hot")["rotational_relaxation_time"] == "differs"
+
+
+def test_bending_stiffness_of_actin_and_a_planted_fault(tmp_path, monkeypatch):
+    monkeypatch.setattr(end_to_end, "_ACTIN_SEGMENTS", {True: (4, 8)})
+    case = end_to_end.CASES[0]
+    assert set(verdicts(case, tmp_path / "right").values()) == {"agrees"}
+    stiff = replace(F_ACTIN, bending_rigidity=1.1 * F_ACTIN.bending_rigidity)
+    monkeypatch.setattr(simulation, "ACTIN", stiff)
+    assert "differs" in verdicts(case, tmp_path / "stiff").values()
+
+
+def test_slowest_relaxation_of_rods_and_coils():
+    """That of a rod grows with the fourth power of its length, that of a coil with the second."""
+    rod = end_to_end._slowest_relaxation("actin", 4) / end_to_end._slowest_relaxation("actin", 2)
+    coil = end_to_end._slowest_relaxation("actin", 2000) / end_to_end._slowest_relaxation("actin", 1000)
+    assert rod == pytest.approx(16, rel=0.01)
+    assert coil == pytest.approx(4, rel=0.1)
+
+
+def test_fitted_relaxation_time():
+    generator = np.random.default_rng(1)
+    time = np.linspace(0.0, 2.0, 41)
+    values = np.exp(-time / 0.8)[:, None] + 0.05 * generator.normal(size=(41, 24))
+    estimate = end_to_end.fitted_relaxation_time(time, values)
+    assert abs(estimate.value - 0.8) < 4 * estimate.error < 0.08
+
+
+def test_fits_of_force_and_extension():
+    length, kT = force_extension._CONTOUR, 310.0
+    forces = np.array([0.01, 0.03, 0.1, 0.3, 0.9]) * 0.602214076
+    extensions = length * theory.marko_siggia_extension(forces, 12345.0, kT)
+    assert force_extension.fitted_persistence_length(extensions, forces) == pytest.approx(12345.0, rel=1e-5)
+    power = length - forces / (3.0 * forces**1.4)
+    assert force_extension.fitted_power_law(power, forces) == pytest.approx((1.4, 3.0))
+    strong = np.array([120.0, 500.0, 900.0]) * 0.602214076
+    springs = length + strong / 0.5
+    assert force_extension.fitted_limit(springs, strong) == pytest.approx(0.5)
+    both = np.concatenate([power, springs]), np.concatenate([forces, strong])
+    assert force_extension.fitted_crossover(*both) == pytest.approx((0.5 / 3.0) ** (1 / 1.4))
+
+
+def test_pulled_filaments_have_the_exact_extension():
+    settings = {**force_extension._settings(40.0, True), "stride": 5, "frames": 60, "discarded": 100}
+    copies = force_extension.pulled_filaments(**settings)["extension"]
+    expected = theory.chain_extension(F_ACTIN, 64, 40.0 * 0.602214076, 310.0)
+    error = copies.std(ddof=1) / np.sqrt(len(copies))
+    assert error < 0.5
+    assert abs(copies.mean() - expected) < 4 * error
+
+
+def test_relaxing_filaments():
+    settings = {"extension_time_microseconds": 0.1, "chains": 80, "groups": 8, "seed": 1}
+    data = relaxation.relaxing_filaments(step_microseconds=1.0, steps=[0, 10, 300], **settings)
+    assert data["time"] == pytest.approx([0, 10e6, 300e6])
+    assert all(data[name].shape == (3, 8) for name in ("shortening", "stretching", "bending"))
+    assert np.abs([data[name][0] for name in ("shortening", "stretching", "bending")]).max() < 1e-6
+    # Bends stretch the straight filament until its ends have come nearer.
+    stretching = data["stretching"].mean(axis=1)
+    assert stretching[1] > 1.15 * 0.5 > 0.9 * stretching[2]
+    assert np.all(np.diff(data["bending"].mean(axis=1)) > 0)
+
+
+def test_exponents_and_stages():
+    generator = np.random.default_rng(1)
+    time = np.geomspace(1e-3, 1e5, 200)
+    values = 2.0 * time[:, None] ** 0.37 * (1 + 0.02 * generator.normal(size=(200, 20)))
+    estimate = relaxation._exponent(time, values, (1.0, 1e3))
+    assert abs(estimate.value - 0.37) < 4 * estimate.error < 0.01
+    stages = [
+        {"time": np.array([1.0, 2.0, 3.0]), "shortening": np.ones((3, 2))},
+        {"time": np.array([2.0, 3.0, 4.0]), "shortening": 2 * np.ones((3, 2))},
+    ]
+    times, joined = relaxation._joined(stages, "shortening")
+    assert times * 1e6 == pytest.approx([1, 2, 3, 4])
+    assert joined[:, 0] == pytest.approx([1, 1, 1, 2])

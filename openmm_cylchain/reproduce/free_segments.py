@@ -20,8 +20,8 @@ from .result import Estimate, Result, Rule, printed
 from .table_2 import MICROSECOND, MILLISECOND, SOLVENT_TEMPERATURE, actin_friction
 
 _PRINTED_SEGMENTS = 728
-_STEP_MICROSECONDS = 5.0
-_STEPS = 3000
+_STEP_MICROSECONDS = 10.0
+_STEPS = 1500
 _GROUPS = 40
 _COMPARED_MILLISECONDS = (0.05, 2.5, 15.0)
 _ORIENTATION_RULE = Rule(3.0, 0.005, 0.015)
@@ -60,7 +60,7 @@ def free_segments(segments, step_microseconds, steps, groups, seed):
 def _measured(records, quick):
     logarithmic = np.unique(np.geomspace(1, _STEPS, 24).round().astype(int))
     compared = [round(1e3 * time / _STEP_MICROSECONDS) for time in _COMPARED_MILLISECONDS]
-    steps = sorted({0, *range(0, _STEPS + 1, 50), *logarithmic.tolist(), *compared})
+    steps = sorted({0, *range(0, _STEPS + 1, 25), *logarithmic.tolist(), *compared})
     factor = 8 if quick else 32
     return records.measure(
         "figure-07-08",
