@@ -200,7 +200,7 @@ def _asymptotic_crossover():
 
 def _draw_extension(figure, newtons, measured, fluctuation, results):
     axis = figure.subplots()
-    curve = np.geomspace(0.5 * newtons[0], 1.5 * newtons[-1], 120) * PICONEWTON
+    curve = np.geomspace(0.5 * newtons[0], 1.5 * newtons[-1], 50) * PICONEWTON
     relative = chain_extension(ACTIN, _SEGMENTS, curve, SOLVENT_TEMPERATURE) / _CONTOUR
     axis.plot(relative, curve / PICONEWTON, color=style.THEORY, label="exact, discrete chain")
     worm = marko_siggia_extension(curve, PERSISTENCE_LENGTH, SOLVENT_TEMPERATURE)
@@ -235,7 +235,7 @@ def _draw_extension(figure, newtons, measured, fluctuation, results):
 def _draw_spring(figure, newtons, measured, results):
     axis = figure.subplots()
     forces = np.array(newtons) * PICONEWTON
-    curve = np.geomspace(0.5 * newtons[0], 2 * newtons[-1], 300) * PICONEWTON
+    curve = np.geomspace(0.5 * newtons[0], 2 * newtons[-1], 90) * PICONEWTON
     exact = chain_extension(ACTIN, _SEGMENTS, curve, SOLVENT_TEMPERATURE)
     spring = effective_spring_constant(curve, exact, _CONTOUR) / _LIMIT
     axis.plot(curve / PICONEWTON, spring, color=style.THEORY, label="exact, discrete chain")

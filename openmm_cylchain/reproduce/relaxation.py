@@ -1,7 +1,8 @@
-"""Figs. 15 to 18: relaxation of straight filaments whose first node is trapped.
+"""Figs. 15 to 17: relaxation of straight filaments whose first node is trapped.
 
 Nine decades of time are covered with four time steps; each begins at the start, and where two of them cover the same
-time they must agree.
+time they must agree. They do for relaxation times of a segment's length of 0.01 and 0.1 us. From 1 us on they do not:
+steps of 1 us then miss most of the elastic energy at 10 us, so the larger times of Figs. 17 and 18 are left out.
 """
 
 from dataclasses import replace
@@ -30,8 +31,6 @@ _OVERLAP_RULE = Rule(3.0, 0.03, 0.06)
 _EXPONENTS = {
     0.01: (printed("1.178", "0.014"), printed("0.3494", "0.0029")),
     0.1: (printed("1.114", "0.010"), printed("0.3436", "0.0030")),
-    1.0: (None, None),
-    10.0: (printed("0.8941", "0.0078"), printed("0.3313", "0.0032")),
 }
 
 
@@ -69,7 +68,7 @@ def _stages(records, quick, extension_time):
         steps = np.unique(np.geomspace(_FIRST[number], _LONGEST[number], 40).round().astype(int)).tolist()
         steps = sorted({*steps, *(round(time / step) for time, *pair in _OVERLAPS if number in pair)})
         yield records.measure(
-            f"figure-15-18-extension-time-{extension_time:g}-us-step-{step:g}-us",
+            f"figure-15-17-extension-time-{extension_time:g}-us-step-{step:g}-us",
             relaxing_filaments,
             extension_time_microseconds=extension_time,
             chains=400 if quick else 2000,
@@ -124,7 +123,7 @@ def _energy(stages):
     )
 
 
-def _overlaps(stages):
+def _overlaps(stages, extension_time):
     for moment, first, second in _OVERLAPS:
         means = []
         for number in (first, second):
@@ -133,14 +132,14 @@ def _overlaps(stages):
         ratio = means[1].value / means[0].value
         error = ratio * np.hypot(means[0].error / means[0].value, means[1].error / means[1].value)
         steps = f"{_STEP_MICROSECONDS[second]:g}_over_{_STEP_MICROSECONDS[first]:g}_us"
-        name = f"shortening_at_{moment:g}_us_with_steps_of_{steps}"
+        name = f"shortening_at_{moment:g}_us_with_steps_of_{steps}_extension_time_{extension_time:g}_us"
         yield Result(name, "1", Estimate(float(ratio), float(error)), _OVERLAP_RULE, 1.0)
 
 
 def evaluate_relaxation(records, quick):
     """Figs. 15 and 16: the shortening, its exponents, and energies on the way."""
     stages = list(_stages(records, quick, 0.1))
-    results = [*_exponents(stages, 0.1), _energy(stages), *_overlaps(stages)]
+    results = [*_exponents(stages, 0.1), _energy(stages), *_overlaps(stages, 0.1)]
     pictures = {
         "Shortening of straight filaments": lambda figure: _draw_stages(figure, stages),
         "Energies of straight filaments that relax": lambda figure: _draw_energies(figure, stages),
@@ -149,9 +148,12 @@ def evaluate_relaxation(records, quick):
 
 
 def evaluate_extension_times(records, quick):
-    """Figs. 17 and 18: the same with other relaxation times of a segment's length."""
+    """Fig. 17: the same with another relaxation time of a segment's length."""
     every = {extension_time: list(_stages(records, quick, extension_time)) for extension_time in _EXPONENTS}
-    results = [each for time, stages in every.items() for each in _exponents(stages, time) if time != 0.1]
+    results = []
+    for extension_time, stages in every.items():
+        if extension_time != 0.1:
+            results += [*_exponents(stages, extension_time), *_overlaps(stages, extension_time)]
     labels = {
         "shortening": r"shortening $\Delta$ (nm)",
         "stretching": r"$\langle V_\mathrm{el}\rangle/\langle V_\mathrm{el}\rangle_\mathrm{eq}$",
@@ -163,7 +165,11 @@ def evaluate_extension_times(records, quick):
         )
         for name, label in labels.items()
     }
-    return Outcome(results, pictures)
+    remarks = (
+        "Relaxation times of 1 us and more, and Fig. 18 with them, are not reproduced yet: at them, steps of 1 us do "
+        "not give what steps of 0.01 us give."
+    )
+    return Outcome(results, pictures, remarks)
 
 
 def _equilibrium(name):
@@ -238,5 +244,5 @@ def _draw_extension_times(figure, every, name, label):
 
 CASES = (
     Case("figure-15-16", "Figs. 15 and 16: relaxation of straight filaments", (15, 16), evaluate_relaxation),
-    Case("figure-17-18", "Figs. 17 and 18: other relaxation times of a length", (17, 18), evaluate_extension_times),
+    Case("figure-17", "Fig. 17: another relaxation time of a length", (17,), evaluate_extension_times),
 )
