@@ -14,13 +14,14 @@ from openmm_cylchain.reproduce import (
     pesek2016,
     relaxation,
     simulation,
+    speed,
     tables,
 )
 from openmm_cylchain.reproduce.case import Case, Outcome
 from openmm_cylchain.reproduce.page import format_number, format_page
 from openmm_cylchain.reproduce.records import Records
 from openmm_cylchain.reproduce.reproduction import reproduce, unexplained
-from openmm_cylchain.reproduce.result import ROUNDING, Estimate, Printed, Result, Rule, printed
+from openmm_cylchain.reproduce.result import ROUNDING, Estimate, LowerBound, Printed, Result, Rule, printed
 
 RULE = Rule(standard_errors=3.0, tolerance=0.01, resolution=0.02)
 
@@ -79,6 +80,20 @@ def test_a_result_that_is_too_uncertain_does_not_agree():
     uncertain = result(1.0, error=0.021)
     assert uncertain.verdict == "differs" and uncertain.unexplained
     assert "too large" in uncertain.reason
+
+
+def test_a_lower_bound_is_surely_exceeded():
+    rule = LowerBound(3.0)
+
+    def bounded(ours, error, paper_error=0.0):
+        return result(ours, error, theory=None, paper=Printed(10.0, paper_error), rule=rule)
+
+    assert bounded(11.0, 0.33).verdict == bounded(1e6, 1.0).verdict == "agrees"
+    assert bounded(11.0, 0.34).verdict == bounded(9.9, 0.0).verdict == "differs"
+    assert bounded(11.0, 0.3, 0.2).verdict == "differs"
+    assert bounded(2.0, 0.1).unexplained
+    assert "paper: 0.2 times as much" in bounded(2.0, 0.1).reason
+    assert bounded(11.0, 0.1).as_dict()["paper"] == {"value": 10.0, "error": None, "relation": "> "}
 
 
 @pytest.mark.parametrize("arguments", [{"ours": 1.0, "theory": None}, {"ours": np.nan}, {"ours": 1.0, "error": np.inf}])
@@ -213,7 +228,7 @@ def test_output_that_is_no_directory_of_this_paper(two_cases, tmp_path, capsys):
 
 def test_numbers_for_people():
     assert format_number(2.68451, 0.0283) == "2.685 ± 0.028"
-    assert format_number(16380.0, 770.0) == "1.638e+04 ± 7.7e+02"
+    assert format_number(16380.0, 770.0) == "(1.638 ± 0.077)·10⁴"
     assert format_number(0.5, None) == "0.5"
 
 
@@ -253,6 +268,77 @@ def test_free_segments_and_planted_faults(tmp_path, monkeypatch):
         assert "differs" in verdicts(displacement, tmp_path / "viscous").values()
     monkeypatch.setattr(simulation, "TEMPERATURE", 1.1 * simulation.TEMPERATURE)
     assert verdicts(orientation, tmp_path / "hot")["rotational_relaxation_time"] == "differs"
+
+
+class Given:
+    """Records of times that are given: 1 ms for a step of one filament of beads, as long for so many segments."""
+
+    def __init__(self, segments=201, own=1.0, energy=1.0, noise=0.01):
+        self.segments, self.own, self.energy = segments, own, energy
+        self.generator, self.noise = np.random.default_rng(1), noise
+
+    def measure(self, name, function, filaments, lengths, steps, **settings):
+        if function is speed.energies_of_filaments:
+            return {"energy": np.array([1.0, self.energy]), "error": np.array([0.01, 0.01])}
+        segment = 1e-3 / self.segments
+        times = {
+            curve: segment * np.array([1200 / length * np.ones(9) for length in lengths])
+            for curve in ("equal", "own", "implicit")
+        }
+        times = {"beads": 1e-3 * np.ones(9), **times, "own": self.own * times["own"]}
+        noisy = {name: time * np.exp(self.noise * self.generator.normal(size=time.shape)) for name, time in times.items()}
+        return {"processor": "abacus", **noisy}
+
+
+def speed_verdicts(**given):
+    return {each.name: each for each in speed.evaluate(Given(**given), True).results[:5]}
+
+
+def test_speed_up_of_given_times():
+    results = speed_verdicts(segments=150)
+    assert {each.verdict for each in results.values()} == {"agrees"}
+    expected = {
+        "speed_of_1_segment_over_beads": 150.0,
+        "speed_of_120_segments_over_beads": 150.0 / 120.0,
+        "largest_speed_up_at_own_bounds": 150.0 * 255.5,
+        "cost_of_a_step_at_own_bounds": 1.0,
+        "smallest_speed_up_of_scheme_implicit": 150.0 / 120.0 * speed.steps_of_segments(10)["implicit"] / 10.0,
+    }
+    for name, value in expected.items():
+        assert results[name].ours.value == pytest.approx(value, rel=0.02)
+    outcome = speed.evaluate(Given(), True)
+    assert "processor named abacus" in outcome.remarks
+    assert [each.name for each in outcome.results[5:]][-1] == "worst_energy_over_exact_of_scheme_implicit"
+
+
+def test_speed_up_that_differs():
+    faster = speed_verdicts(segments=800, noise=0.0)["speed_of_120_segments_over_beads"]
+    assert faster.verdict == "differs" and not faster.unexplained
+    assert "1250 ns for a step here and a bead 4975 ns" in faster.reason
+    slower = speed_verdicts(segments=9)
+    assert slower["speed_of_120_segments_over_beads"].unexplained
+    assert slower["speed_of_1_segment_over_beads"].unexplained
+    assert slower["largest_speed_up_at_own_bounds"].verdict == "agrees"
+    assert speed_verdicts(segments=7)["largest_speed_up_at_own_bounds"].unexplained
+    assert speed_verdicts(own=1.1)["cost_of_a_step_at_own_bounds"].unexplained
+    assert speed_verdicts(noise=0.5)["cost_of_a_step_at_own_bounds"].unexplained
+    assert speed.evaluate(Given(energy=1.1), True).results[-1].unexplained
+    assert not speed.evaluate(Given(energy=0.95), True).results[-1].unexplained
+
+
+def test_speed_of_filaments_that_are_timed():
+    lengths = [30, 1200]
+    steps = {curve: [speed.steps_of_segments(length)[curve] for length in lengths] for curve in speed._CURVES}
+    assert steps["equal"] == [10.0, 10.0]
+    assert steps["own"] == pytest.approx([221.0, 2555.0], rel=5e-3)
+    times = speed.timed_filaments(2, lengths, steps, bead_step=10.0, repetitions=3, seconds=2e-3)
+    assert times["beads"].shape == (3,) and np.shape(times["implicit"]) == (2, 3)
+    assert times["beads"].min() > np.max(times["equal"][1]) > 0.0
+    energies = speed.energies_of_filaments(8, lengths, steps["implicit"], sampled_segments=20000)
+    assert len(energies["energy"]) == 3
+    for energy, error in zip(energies["energy"], energies["error"]):
+        assert error < 0.025
+        assert abs(energy - 1.0) < 4 * error + 0.02
 
 
 def test_bending_stiffness_of_actin_and_a_planted_fault(tmp_path, monkeypatch):

@@ -102,6 +102,22 @@ def benchmark_bead_spring(effort=FULL, say=lambda message: None):
     return Report(title, machine, settings, rows, missing)
 
 
+def bead_stepper(chains, step, stretching_modulus=STRETCHING_MODULUS, platform=None):
+    """What advances filaments of touching beads by a number of steps, for timing.
+
+    Parameters
+    ----------
+    chains : int
+    step : float
+        In ps.
+    stretching_modulus : float
+        In kJ/(mol nm).
+    platform : tuple of str and dict, optional
+        A name and properties, if it is not that on which one thread computes.
+    """
+    return stepper(_Beads(chains, stretching_modulus).context(step, platform))
+
+
 def _segments_system(count, chains):
     length = CONTOUR_LENGTH / count
     return BenchmarkSystem(f"segments_{length:g}nm", f"{count} × {length:g} nm", actin(length), count, chains)
@@ -110,7 +126,7 @@ def _segments_system(count, chains):
 class _Beads:
     """Chains of touching beads of stock OpenMM."""
 
-    def __init__(self, chains):
+    def __init__(self, chains, stretching_modulus=STRETCHING_MODULUS):
         diameter = F_ACTIN.diameter
         self._chains = chains
         self.count = round(CONTOUR_LENGTH / diameter) + 1
@@ -121,7 +137,7 @@ class _Beads:
             segment_length=diameter,
             bending_rigidity=F_ACTIN.bending_rigidity,
             bending_model="quadratic",
-            stretching_modulus=STRETCHING_MODULUS,
+            stretching_modulus=stretching_modulus,
         )
         self._temperature = F_ACTIN_SYSTEM.temperature
         self._friction = 3.0 * math.pi * F_ACTIN_SYSTEM.viscosity * diameter
@@ -130,7 +146,7 @@ class _Beads:
             [draw_chain(self._type, self.count - 1, self._temperature, generator) for _ in range(chains)]
         )
 
-    def context(self, step):
+    def context(self, step, platform=None):
         system = openmm.System()
         for _ in range(self._chains * self.count):
             system.addParticle(1.0)
@@ -140,7 +156,7 @@ class _Beads:
         system.addForce(angles)
         integrator = openmm.BrownianIntegrator(self._temperature, self._friction, step)
         integrator.setRandomNumberSeed(1)
-        return one_thread_context(system, integrator, self._positions)
+        return one_thread_context(system, integrator, self._positions, platform)
 
     def largest_step(self, steps, say):
         """The largest step that keeps the energies, together with all smaller ones."""

@@ -35,7 +35,7 @@ class Estimate:
     error: float | None
 
 
-def time_interleaved(cases, repetitions, seconds, say=lambda message: None, minimum_steps=1):
+def time_interleaved(cases, repetitions, seconds, say=lambda message: None, minimum_steps=1, clock=None):
     """Time cases in turn, over and over.
 
     Parameters
@@ -49,33 +49,37 @@ def time_interleaved(cases, repetitions, seconds, say=lambda message: None, mini
         Told how far it is.
     minimum_steps : int
         How many steps a case advances in each repetition at least.
+    clock : callable, optional
+        Tells the time in seconds; that on the wall if not given. ``time.process_time`` tells that of processors, which
+        for one thread is the same but for waiting while other processes run.
 
     Returns
     -------
     dict
         The seconds per step of every case, one for each repetition.
     """
+    clock = time.perf_counter if clock is None else clock
     say("warming up")
-    steps = {case.name: max(minimum_steps, _steps_within(case, seconds)) for case in cases}
+    steps = {case.name: max(minimum_steps, _steps_within(case, seconds, clock)) for case in cases}
     times = {case.name: [] for case in cases}
     for repetition in range(repetitions):
         say(f"timing, repetition {repetition + 1} of {repetitions}")
         for case in cases:
-            times[case.name].append(_seconds_per_step(case, steps[case.name]))
+            times[case.name].append(_seconds_per_step(case, steps[case.name], clock))
     return {name: np.array(values) for name, values in times.items()}
 
 
-def _seconds_per_step(case, steps):
-    start = time.perf_counter()
+def _seconds_per_step(case, steps, clock):
+    start = clock()
     case.advance(steps)
-    return (time.perf_counter() - start) / steps
+    return (clock() - start) / steps
 
 
-def _steps_within(case, seconds):
+def _steps_within(case, seconds, clock):
     case.advance(1)
     steps = 1
     while True:
-        elapsed = steps * _seconds_per_step(case, steps)
+        elapsed = steps * _seconds_per_step(case, steps, clock)
         if elapsed > 0.2 * seconds:
             return max(1, round(steps * seconds / elapsed))
         steps *= 4

@@ -18,6 +18,7 @@ SCHEME = "euler"
 """That which is most like what stock OpenMM does: one evaluation of forces and one solution a step."""
 
 ONE_THREAD = ("CPU", {"Threads": "1"})
+REFERENCE = ("Reference", {})
 _SHAPES = 64
 
 
@@ -39,12 +40,12 @@ class Simulated:
 def one_thread_platform():
     """The platform on which one thread computes, with its properties: CPU, or Reference where there is none."""
     names = [openmm.Platform.getPlatform(index).getName() for index in range(openmm.Platform.getNumPlatforms())]
-    return ONE_THREAD if ONE_THREAD[0] in names else ("Reference", {})
+    return ONE_THREAD if ONE_THREAD[0] in names else REFERENCE
 
 
-def one_thread_context(system, integrator, positions):
-    """A Context on the platform on which one thread computes."""
-    platform, properties = one_thread_platform()
+def one_thread_context(system, integrator, positions, platform=None):
+    """A Context on the platform on which one thread computes, or on one that is given: a name and its properties."""
+    platform, properties = one_thread_platform() if platform is None else platform
     return _started(None, None, system, integrator, positions, platform, properties).context
 
 

@@ -263,14 +263,14 @@ def _simulate(system, chains, scheme, step, frames):
     return _reduce(system, np.array(nodes), seconds, divided)
 
 
-def _context(system, chains, scheme, step):
-    """A Context of chains in equilibrium, on one thread."""
+def _context(system, chains, scheme, step, platform=None):
+    """A Context of chains in equilibrium, on one thread or on a platform that is given."""
     filaments = Filaments(system.viscosity, system.temperature, engine="compiled")
     for seed in range(chains):
         filaments.add_equilibrium(system.type, system.segments, seed)
     _, openmm_system, positions = filaments.build()
     integrator = filaments.create_integrator(openmm_system, step, scheme=scheme, random_seed=1)
-    return one_thread_context(openmm_system, integrator, positions)
+    return one_thread_context(openmm_system, integrator, positions, platform)
 
 
 def _positions(context):
@@ -409,9 +409,32 @@ def _speed_rows(actin, effort, say, missing):
     return rows
 
 
-def system_stepper(system, scheme, step):
-    """What advances a system by a number of steps, for timing."""
-    return stepper(_context(system, system.chains, scheme, step))
+def equilibrium_errors(system, scheme, step, frames):
+    """What a step does to the equilibrium of a system: relative errors by observable, as Estimates.
+
+    Parameters
+    ----------
+    system : BenchmarkSystem
+    scheme : str
+    step : float
+        In ps.
+    frames : int
+        Of ten steps each.
+
+    Raises
+    ------
+    InstabilityError
+        If the run has blown up.
+    """
+    run = _simulate(system, system.chains, scheme, step, frames)
+    if run is None:
+        raise InstabilityError(f"{system.label} blows up with a step of {step:g} ps of scheme {scheme}.")
+    return _equilibrium_errors(system, run)
+
+
+def system_stepper(system, scheme, step, platform=None):
+    """What advances a system by a number of steps, for timing; see ``one_thread_context`` for the platform."""
+    return stepper(_context(system, system.chains, scheme, step, platform))
 
 
 def stepper(context):

@@ -2,6 +2,8 @@
 
 import math
 
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
 
 def format_page(content):
     """The page: a summary, and for every case its pictures and a table.
@@ -43,7 +45,7 @@ def _table(results):
         cells = (
             result["name"].replace("_", " "),
             "" if result["unit"] == "1" else result["unit"],
-            "" if paper is None else format_number(paper["value"], paper["error"]),
+            "" if paper is None else paper["relation"] + format_number(paper["value"], paper["error"]),
             "" if result["theory"] is None else format_number(result["theory"]),
             format_number(ours["value"], ours["error"]),
             result["rule"],
@@ -63,8 +65,15 @@ def _reasons(results):
 def format_number(value, error=None):
     """A number for people, with two digits of its error if it has one."""
     if not error:
-        return f"{value:.4g}"
-    decimals = 1 - math.floor(math.log10(error))
-    if decimals < 0 or abs(value) >= 1e6:
-        return f"{value:.4g} ± {error:.2g}"
+        return _with_power(f"{value:.4g}")
+    exponent = 0 if value == 0 else math.floor(math.log10(abs(value)))
+    if exponent >= 4 or exponent < -3:
+        scale = 10.0**exponent
+        return f"({format_number(value / scale, error / scale)})·10{str(exponent).translate(_SUPERSCRIPTS)}"
+    decimals = max(0, 1 - math.floor(math.log10(error)))
     return f"{value:.{decimals}f} ± {error:.{decimals}f}"
+
+
+def _with_power(text):
+    mantissa, _, exponent = text.partition("e")
+    return f"{mantissa}·10{str(int(exponent)).translate(_SUPERSCRIPTS)}" if exponent else mantissa

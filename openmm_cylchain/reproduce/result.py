@@ -75,6 +75,24 @@ class Rule:
     tolerance: float = 0.0
     resolution: float | None = None
 
+    relation = ""
+    """What stands before the number of the paper."""
+
+    def allows(self, difference, error, value, rounding):
+        """Whether ours may differ so much from a value of the paper or the theory.
+
+        Parameters
+        ----------
+        difference : float
+            Ours less the value.
+        error : float
+            The standard error of the difference.
+        value : float
+        rounding : float
+            Of the value.
+        """
+        return abs(difference) <= self.standard_errors * error + self.tolerance * abs(value) + rounding
+
     def __str__(self):
         if self.standard_errors == 0:
             return f"the theory within a share of {self.tolerance:g}, and the print as it is rounded"
@@ -91,6 +109,31 @@ ROUNDING = Rule(0.0, 1e-7)
 
 
 @dataclass(frozen=True)
+class LowerBound:
+    """When a result agrees with a paper, or a theory, that says "more than".
+
+    ours - value >= n s, with the standard error s of the difference.
+
+    Attributes
+    ----------
+    standard_errors : float
+        n.
+    """
+
+    standard_errors: float = 3.0
+
+    resolution = None
+    relation = "> "
+
+    def allows(self, difference, error, value, rounding):
+        """Whether ours surely lies above a value; see ``Rule.allows``."""
+        return difference >= self.standard_errors * error
+
+    def __str__(self):
+        return f"above by at least {self.standard_errors:g} standard errors"
+
+
+@dataclass(frozen=True)
 class Result:
     """One number.
 
@@ -101,7 +144,7 @@ class Result:
     unit : str
         "1" for a number without a unit.
     ours : Estimate
-    rule : Rule
+    rule : Rule or LowerBound
     theory : float, optional
     paper : Printed, optional
     cause : str
@@ -117,7 +160,7 @@ class Result:
     name: str
     unit: str
     ours: Estimate
-    rule: Rule
+    rule: Rule | LowerBound
     theory: float | None = None
     paper: Printed | None = None
     cause: str = ""
@@ -142,15 +185,15 @@ class Result:
         """Whether ours is as close to the theory as the rule says; true if there is none."""
         if self.theory is None:
             return True
-        return abs(self.ours.value - self.theory) <= self._allowed(self.theory, 0.0, 0.0)
+        return self.rule.allows(self.ours.value - self.theory, self._error, self.theory, 0.0)
 
     @property
     def agrees_with_paper(self):
         """Whether ours is as close to the paper's number as the rule says; true if there is none."""
         if self.paper is None:
             return True
-        allowed = self._allowed(self.paper.value, self.paper.error, 1.001 * self.paper.rounding)
-        return abs(self.ours.value - self.paper.value) <= allowed
+        difference, error = self.ours.value - self.paper.value, math.hypot(self._error, self.paper.error)
+        return self.rule.allows(difference, error, self.paper.value, 1.001 * self.paper.rounding)
 
     @property
     def verdict(self):
@@ -183,20 +226,24 @@ class Result:
     def _error(self):
         return self.ours.error or 0.0
 
-    def _allowed(self, value, error, rounding):
-        return self.rule.standard_errors * math.hypot(self._error, error) + self.rule.tolerance * abs(value) + rounding
-
     def _deviation(self, what, value, error):
         text = f"{what}: "
-        text += f"{100 * (self.ours.value / value - 1):+.2g} %" if value else f"{self.ours.value - value:+.2g}"
+        if value and not 0.5 < self.ours.value / value < 2.0:
+            text += f"{self.ours.value / value:.2g} times as much"
+        else:
+            text += f"{100 * (self.ours.value / value - 1):+.2g} %" if value else f"{self.ours.value - value:+.2g}"
         return text + (f", {abs(self.ours.value - value) / error:.1f} standard errors" if error else "")
+
+    def _paper_as_dict(self):
+        error = self.paper.error or None
+        return {"value": self.paper.value, "error": error, "relation": self.rule.relation}
 
     def as_dict(self):
         """What results.json says of it."""
         return {
             "name": self.name,
             "unit": self.unit,
-            "paper": None if self.paper is None else {"value": self.paper.value, "error": self.paper.error or None},
+            "paper": None if self.paper is None else self._paper_as_dict(),
             "theory": self.theory,
             "ours": {"value": self.ours.value, "error": self.ours.error},
             "rule": str(self.rule),

@@ -20,7 +20,8 @@ _TABLE_3 = {
     "stretching": "0.1993 0.200 0.200 0.200 0.200 0.200 0.200 0.200 0.20 0.20",
     "bending": "0.0076 0.010 0.034 0.086 0.932 8.903 113.952 1.5e3 20.8e3 0.29e6",
 }
-_SPEED_UP = "13.4 18.1 22.1 24.8 35.7 53.3 87.2 147.5 255.5 351.8"
+SPEED_UP = dict(zip(LENGTHS, "13.4 18.1 22.1 24.8 35.7 53.3 87.2 147.5 255.5 351.8".split()))
+"""As printed, by length in nm."""
 _BEAD_SPRING = {"translation": "0.01130", "stretching": "0.00199", "bending": "0.00057"}
 _MOMENTA = {
     "perpendicular": ("2.15", "the print has the labels of translation along and across the segment swapped"),
@@ -69,33 +70,47 @@ def _in_microseconds(bounds):
     return {name: bound / MICROSECOND for name, bound in bounds.items()}
 
 
+def _beads():
+    return _in_microseconds(
+        bead_spring_bounds(
+            ACTIN.diameter, SOLVENT_VISCOSITY, ACTIN.segment_stiffness, ACTIN.bending_rigidity, SOLVENT_TEMPERATURE
+        )
+    )
+
+
+def _segments(length):
+    kind = ACTIN.with_segment_length(float(length))
+    return _in_microseconds(time_step_bounds(kind, SOLVENT_VISCOSITY, SOLVENT_TEMPERATURE, _CONFIDENCE))
+
+
+def speed_up(length):
+    """The smallest bound on the step of segments of a length in nm over that of touching beads."""
+    return min(_segments(length).values()) / min(_beads().values())
+
+
 def _closed(name, unit, ours, theory, text, cause=""):
     return Result(name, unit, Estimate(float(ours), None), ROUNDING, theory, printed(text), cause)
 
 
 def evaluate_table_3(records, quick):
     """Bounds on the time step by the formulas of Table 1, for the segments of Table 3."""
-    beads = _in_microseconds(
-        bead_spring_bounds(
-            ACTIN.diameter, SOLVENT_VISCOSITY, ACTIN.segment_stiffness, ACTIN.bending_rigidity, SOLVENT_TEMPERATURE
-        )
-    )
+    beads = _beads()
     bead_theory = _bead_formulas()
     results = [
         _closed(f"{name}_bead_spring", "us", beads[name], bead_theory[name], text, _RIGIDITY_CAUSE)
         for name, text in _BEAD_SPRING.items()
     ]
     texts = {name: row.split() for name, row in _TABLE_3.items()}
-    for column, (length, speed_up) in enumerate(zip(LENGTHS, _SPEED_UP.split())):
-        kind = ACTIN.with_segment_length(float(length))
-        bounds = _in_microseconds(time_step_bounds(kind, SOLVENT_VISCOSITY, SOLVENT_TEMPERATURE, _CONFIDENCE))
+    for column, length in enumerate(LENGTHS):
+        bounds = _segments(length)
         theory = _formulas(float(length))
         for name, bound in bounds.items():
             cause = _RIGIDITY_CAUSE if name == "bending" else ""
             results.append(_closed(f"{name}_{length}_nm", "us", bound, theory[name], texts[name][column], cause))
-        ours = min(bounds.values()) / min(beads.values())
         expected = min(theory.values()) / min(bead_theory.values())
-        results.append(_closed(f"speed_up_{length}_nm", "1", ours, expected, speed_up, _RIGIDITY_CAUSE))
+        results.append(
+            _closed(f"speed_up_{length}_nm", "1", speed_up(length), expected, SPEED_UP[length], _RIGIDITY_CAUSE)
+        )
     return Outcome(results)
 
 
