@@ -230,11 +230,45 @@ def test_numbers_for_people():
     assert format_number(2.68451, 0.0283) == "2.685 ± 0.028"
     assert format_number(16380.0, 770.0) == "(1.638 ± 0.077)·10⁴"
     assert format_number(0.5, None) == "0.5"
+    assert format_number(-0.00002, 0.000003) == "(-2.00 ± 0.30)·10⁻⁵"
+    assert format_number(0.0, 0.02) == "0.000 ± 0.020"
+    assert format_number(3.0, 250.0) == "3 ± 250"
+    assert format_number(2.5e11) == "2.5·10¹¹"
+    assert format_number(1234.5, digits=2) == "1.2·10³"
 
 
 def test_page_of_nothing():
     content = {"title": "T", "citation": "C", "cases": []}
     assert format_page(content).startswith("# T\n\nC\n\n0 of 0 results")
+
+
+def page_of(results):
+    case = {"title": "C", "seconds": 90.0, "quick": False, "remarks": "", "pictures": {}}
+    cases = [{**case, "results": [each.as_dict() for each in results]}]
+    return format_page({"title": "T", "citation": "C", "cases": cases})
+
+
+def test_page_begins_with_what_differs():
+    misprinted = [
+        replace(result(1.0, paper=Printed(value), cause="it is misprinted"), name=f"number_{value:g}")
+        for value in (2.0, 3.0)
+    ]
+    page = page_of([result(1.0), *misprinted, replace(result(1.3), name="wrong", unit="um")])
+    assert "| C | 1 | 2 | **1** | 1.5 |" in page
+    assert "- Differing: wrong (theory: +30 %, 30.0 standard errors)." in page
+    assert "- Differing for a stated cause: number 2 (paper: " in page and "It is misprinted." in page
+    assert page.count("misprinted") == 1
+    rows = [line.split(" | ")[0] for line in page.splitlines() if line.endswith(("agrees |", "** |", "above |"))]
+    assert rows == ["| wrong", "| number 2", "| number 3", "| number"]
+    assert "| wrong | µm |" in page
+    assert page.count(f"Rule: {RULE}.") == 1
+
+
+def test_page_gives_each_rule_where_there_are_several():
+    bounded = result(12.0, theory=None, paper=Printed(10.0), rule=LowerBound(2.0))
+    page = page_of([bounded, result(1.0)])
+    assert "| number |  | > 10 |  | 12.000 ± 0.010 | above by at least 2 standard errors | agrees |" in page
+    assert "Rule: " not in page and f"| {RULE} |" in page
 
 
 # Cases
@@ -286,7 +320,9 @@ class Given:
             for curve in ("equal", "own", "implicit")
         }
         times = {"beads": 1e-3 * np.ones(9), **times, "own": self.own * times["own"]}
-        noisy = {name: time * np.exp(self.noise * self.generator.normal(size=time.shape)) for name, time in times.items()}
+        noisy = {
+            name: time * np.exp(self.noise * self.generator.normal(size=time.shape)) for name, time in times.items()
+        }
         return {"processor": "abacus", **noisy}
 
 

@@ -204,12 +204,12 @@ def _draw_extension(figure, newtons, measured, fluctuation, results):
     relative = chain_extension(ACTIN, _SEGMENTS, curve, SOLVENT_TEMPERATURE) / _CONTOUR
     axis.plot(relative, curve / PICONEWTON, color=style.THEORY, label="exact, discrete chain")
     worm = marko_siggia_extension(curve, PERSISTENCE_LENGTH, SOLVENT_TEMPERATURE)
-    axis.plot(worm, curve / PICONEWTON, "--", color="gray", label=r"(34), $\ell_\mathrm{p}$ = 17.2 µm")
+    axis.plot(worm, curve / PICONEWTON, "--", color="gray", label=r"eq. (34), $\ell_\mathrm{p}$ = 17.2 µm")
     worm = marko_siggia_extension(curve, 16380.0, SOLVENT_TEMPERATURE)
-    axis.plot(worm, curve / PICONEWTON, ":", color=style.PAPER, label=r"(34), fit of the paper, 16.38 µm")
+    axis.plot(worm, curve / PICONEWTON, ":", color=style.PAPER, label=r"eq. (34), fit of the paper, 16.38 µm")
     spring = np.linspace(1.0001, 1.08, 400) * _CONTOUR
     force = linear_force(spring, _CONTOUR, ACTIN.segment_stiffness, _SEGMENTS)
-    axis.plot(spring / _CONTOUR, force / PICONEWTON, "-.", color=style.COLOURS[1], label="(35)")
+    axis.plot(spring / _CONTOUR, force / PICONEWTON, "-.", color=style.COLOURS[1], label="eq. (35), springs")
     axis.errorbar(
         measured.value / _CONTOUR,
         newtons,
@@ -221,7 +221,7 @@ def _draw_extension(figure, newtons, measured, fluctuation, results):
         label="ours, bars: fluctuations",
     )
     axis.axvline(1.0, color="black", linewidth=0.8)
-    axis.axvline(_LARGEST_FITTED_EXTENSION, color="black", linewidth=0.8, linestyle=":")
+    axis.axvline(_LARGEST_FITTED_EXTENSION, color="black", linewidth=0.8, linestyle=":", label="fitted to the left")
     style.finish(
         axis,
         r"relative extension $\langle R\cdot e\rangle/L$",
@@ -235,19 +235,19 @@ def _draw_extension(figure, newtons, measured, fluctuation, results):
 def _draw_spring(figure, newtons, measured, results):
     axis = figure.subplots()
     forces = np.array(newtons) * PICONEWTON
-    curve = np.geomspace(0.5 * newtons[0], 2 * newtons[-1], 90) * PICONEWTON
+    curve = np.geomspace(0.5 * newtons[0], 2 * newtons[-1], 400) * PICONEWTON
     exact = chain_extension(ACTIN, _SEGMENTS, curve, SOLVENT_TEMPERATURE)
     spring = effective_spring_constant(curve, exact, _CONTOUR) / _LIMIT
     axis.plot(curve / PICONEWTON, spring, color=style.THEORY, label="exact, discrete chain")
     weak = marko_siggia_spring_constant(curve, _CONTOUR, PERSISTENCE_LENGTH, SOLVENT_TEMPERATURE) / _LIMIT
-    axis.plot(curve / PICONEWTON, weak, "--", color="gray", label="(38)")
-    axis.axhline(1.0, color="gray", linestyle="-.", label="(37)")
+    axis.plot(curve / PICONEWTON, weak, "--", color="gray", label="eq. (38), weak forces")
+    axis.axhline(1.0, color="gray", linestyle="-.", label="eq. (37), springs")
     values = effective_spring_constant(forces, measured.value, _CONTOUR) / _LIMIT
     errors = values * measured.error / np.abs(measured.value - _CONTOUR)
     axis.errorbar(newtons, values, errors, fmt="o", markersize=3.5, capsize=2, color=style.OURS, label="ours")
     axis.axvline(23.93, color=style.PAPER, linestyle=":", label="crossover of the paper")
     crossover = next(result for result in results if result.name == "crossover_force").ours.value
-    axis.axvline(crossover, color=style.OURS, linestyle=":", label="our crossover")
+    axis.axvline(crossover, color=style.OURS, linestyle=":", label="ours, crossover")
     style.finish(
         axis,
         "force (pN)",

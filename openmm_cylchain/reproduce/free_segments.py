@@ -94,27 +94,19 @@ def evaluate_orientation(records, quick):
 
     def draw(figure):
         axis = figure.subplots()
-        mean = simulation.mean(data["orientation_x"])
-        axis.errorbar(
-            time, mean.value, mean.error, fmt="o", markersize=3, color=style.OURS, label=r"ours, $\langle t_x\rangle$"
-        )
-        axis.plot(time, mean_orientation(data["time"], friction, SOLVENT_TEMPERATURE), color=style.THEORY, label="(29)")
-        axis.plot(time, np.exp(-time / 2.685), "--", color=style.PAPER, label="fit of the paper")
-        axis.plot(
-            time,
-            data["orientation_y"].mean(axis=-1),
-            "s",
-            markersize=3,
-            color=style.COLOURS[1],
-            label=r"ours, $\langle t_y\rangle$",
-        )
-        for name, marker in (("x", "^"), ("y", "v")):
-            axis.plot(
-                time, spread[name], marker, markersize=3, color=style.COLOURS[2], label=rf"ours, $\sigma(t_{name})$"
-            )
+        for name, marker, colour in (("x", "o", style.OURS), ("y", "s", style.COLOURS[1])):
+            mean = simulation.mean(data[f"orientation_{name}"])
+            label = rf"ours, $\langle t_{name}\rangle$"
+            axis.errorbar(time, mean.value, mean.error, fmt=marker, markersize=3, color=colour, label=label)
+        for name, marker, colour in (("x", "^", style.COLOURS[2]), ("y", "v", style.COLOURS[3])):
+            label = rf"ours, $\sigma(t_{name})$"
+            axis.plot(time, spread[name], marker, markersize=3, color=colour, label=label)
             axis.plot(time, np.sqrt(variance[name]), color=style.THEORY, linewidth=0.8)
+        theory = mean_orientation(data["time"], friction, SOLVENT_TEMPERATURE)
+        axis.plot(time, theory, color=style.THEORY, linewidth=0.8, label="eq. (29); exact spread")
+        axis.plot(time, np.exp(-time / 2.685), "--", color=style.PAPER, label="fit of the paper")
         axis.axhline(1 / np.sqrt(3), color="gray", linewidth=0.8, linestyle=":", label=r"$1/\sqrt{3}$")
-        style.finish(axis, "time (ms)", "orientation", xlim=(0, time[-1]))
+        style.finish(axis, "time (ms)", "mean and standard deviation of orientation", xlim=(0, time[-1]))
 
     return Outcome(results, {"Rotational diffusion of free segments": draw})
 
@@ -134,25 +126,22 @@ def evaluate_displacement(records, quick):
             results.append(Result(name, "nm^2", ours, _DISPLACEMENT_RULE, float(theory[axis][index])))
 
     def draw(figure):
-        axis = figure.subplots()
+        upper, lower = figure.subplots(2, sharex=True, height_ratios=(3, 2))
         later = slice(1, None)
+        times = time[later]
         short = dict(zip("xy", short_time_mean_square_displacement(data["time"], friction, SOLVENT_TEMPERATURE)))
-        late = long_time_mean_square_displacement(data["time"], friction, SOLVENT_TEMPERATURE)
-        for name, label, colour in (("x", "parallel", style.COLOURS[0]), ("y", "perpendicular", style.COLOURS[1])):
-            mean = simulation.mean(data[f"displacement_{name}_square"][later])
-            axis.errorbar(
-                time[later],
-                mean.value / 1e6,
-                mean.error / 1e6,
-                fmt="o",
-                markersize=3,
-                color=colour,
-                label=f"ours, {label}",
-            )
-            axis.plot(time[later], theory[name][later] / 1e6, color=colour, label=f"(32), {label}")
-            axis.plot(time[later], short[name][later] / 1e6, ":", color=colour, label=f"(30), {label}")
-        axis.plot(time[later], late[later] / 1e6, "--", color=style.THEORY, label="(31)")
-        style.finish(axis, "time (ms)", "mean square displacement (µm²)", xscale="log", yscale="log")
+        late = long_time_mean_square_displacement(data["time"], friction, SOLVENT_TEMPERATURE)[later]
+        for axis, unit in ((upper, 1e6), (lower, late)):
+            for name, label, colour in (("x", "parallel", style.COLOURS[0]), ("y", "perpendicular", style.COLOURS[1])):
+                mean = simulation.mean(data[f"displacement_{name}_square"][later])
+                line = {"color": colour, "linewidth": 1}
+                bars = {"fmt": "o", "markersize": 3, "color": colour, "label": f"ours, {label}"}
+                axis.errorbar(times, mean.value / unit, mean.error / unit, **bars)
+                axis.plot(times, theory[name][later] / unit, **line, label=f"eq. (32), {label}")
+                axis.plot(times, short[name][later] / unit, ":", **line, label=f"eq. (30), {label}")
+            axis.plot(times, late / unit, "--", color=style.THEORY, linewidth=1, label="eq. (31)")
+        style.finish(upper, "", "mean square displacement (µm²)", xscale="log", yscale="log")
+        style.finish(lower, "time (ms)", "over eq. (31)", legend=False, xscale="log")
 
     return Outcome(results, {"Mean square displacement of free segments": draw})
 

@@ -95,7 +95,7 @@ class Rule:
 
     def __str__(self):
         if self.standard_errors == 0:
-            return f"the theory within a share of {self.tolerance:g}, and the print as it is rounded"
+            return f"the theory to {self.tolerance:g}, and the print as it is rounded"
         text = f"within {self.standard_errors:g} standard errors"
         if self.tolerance:
             text += f" and {100 * self.tolerance:g} %"

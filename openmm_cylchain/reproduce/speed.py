@@ -18,6 +18,7 @@ from ..benchmark.time_step_systems import BenchmarkSystem, actin
 from ..timestep import recommended_time_step
 from . import style
 from .case import Case, Outcome
+from .page import format_number
 from .result import Estimate, LowerBound, Result, Rule, printed
 from .table_2 import ACTIN, SOLVENT_TEMPERATURE, SOLVENT_VISCOSITY
 from .tables import LENGTHS, speed_up
@@ -214,18 +215,20 @@ def evaluate(records, quick):
 
 def _remarks(measured, processor):
     one, many = measured
-    longest = many.lengths[-1]
-    gain = _largest(one.simulated_time("implicit")).value / _largest(one.simulated_time("own")).value
+    explicit, implicit = one.simulated_time("own"), one.simulated_time("implicit")
+    gains = [after.value / before.value for before, after in zip(explicit, implicit)]
+    smallest, largest, rod = (format_number(gain, digits=2) for gain in (min(gains[:-1]), max(gains[:-1]), gains[-1]))
+    alone, together = (speeds.element_nanoseconds()[1] for speeds in measured)
+    step = f"{_STEP_PICOSECONDS:g} ps"
     return (
-        f"Measured on one thread of a processor named {processor}; speeds depend on the machine and on what else it "
-        f"does, their ratios less. Beads are those of OpenMM's `BrownianIntegrator` on the Reference platform, which "
-        f"is the faster one for a single filament, with {_STEP_PICOSECONDS:g} ps and bonds of 48.7 pN/nm as in the "
-        f"paper. A single filament, as in the paper, fills one of the eight lanes in which the compiled engine moves "
-        f"filaments; {many.filaments} fill all: a segment of {many.lengths[0]} nm then takes "
-        f"{many.element_nanoseconds()[1]:.0f} instead of {one.element_nanoseconds()[1]:.0f} ns. Scheme implicit takes "
-        f"its recommended step, with segments as stiff as actin and no artificial extension time, and gains another "
-        f"factor of {gain:.2g} over the largest speed-up of the explicit scheme; the segment of {longest} nm, which "
-        f"cannot bend, takes the longest step."
+        f"Processor time of one thread, measured in turn on a processor named {processor}; times depend on the "
+        f"machine, their ratios less. Beads are moved by OpenMM's `BrownianIntegrator` on the Reference platform, the "
+        f"fastest for one filament, with {step} and bonds of 48.7 pN/nm as in the paper. Explicit steps at their own "
+        f"bounds are the same share of them as {step} for beads. A single filament, as in the paper, fills one of the "
+        f"eight lanes in which the compiled engine moves filaments; {many.filaments} fill all, and a segment of "
+        f"{many.lengths[0]} nm takes {together:.0f} instead of {alone:.0f} ns. Scheme implicit, here with segments as "
+        f"stiff as actin and no artificial extension time, advances {smallest} to {largest} times as far in a second "
+        f"as the explicit scheme with these steps; a single segment, which cannot bend, {rod} times."
     )
 
 

@@ -8,10 +8,12 @@ _FONT_SIZE = 10
 
 
 def finish(axis, xlabel, ylabel, legend=True, **settings):
-    """Label an axis, set its scales and limits, and add a legend."""
+    """Label an axis, set its scales and limits, and add a legend, ours first."""
     axis.set(**settings)
     axis.set_xlabel(xlabel, fontsize=_FONT_SIZE)
     axis.set_ylabel(ylabel, fontsize=_FONT_SIZE)
     axis.tick_params(labelsize=_FONT_SIZE - 1, which="both", direction="in", top=True, right=True)
     if legend:
-        axis.legend(fontsize=_FONT_SIZE - 2, framealpha=0.9, edgecolor="none")
+        entries = zip(*axis.get_legend_handles_labels())
+        handles, labels = zip(*sorted(entries, key=lambda entry: not entry[1].startswith("ours")))
+        axis.legend(handles, labels, fontsize=_FONT_SIZE - 2, framealpha=0.9, edgecolor="none")
