@@ -53,7 +53,7 @@ def _summary(cases):
             f"; {explained} differ from the print for a stated cause and {unexplained} without one or from the theory"
         )
     quick = " Some of it has the reduced statistics of a quick run." if any(case["quick"] for case in cases) else ""
-    notes = "Every verdict follows from the rule given with it; errors are standard errors, and deviations those of ours."
+    notes = "Every verdict follows from the rule given with it. Errors are standard errors, deviations those of ours."
     return f"{text}.{quick} {notes}"
 
 
