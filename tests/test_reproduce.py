@@ -12,7 +12,7 @@ from openmm_cylchain.reproduce import (
     force_extension,
     free_segments,
     pesek2016,
-    relaxation,
+    relaxing_filaments,
     simulation,
     speed,
     tables,
@@ -426,10 +426,10 @@ def test_pulled_filaments_have_the_exact_extension():
 
 
 def test_relaxing_filaments():
-    settings = {"extension_time_microseconds": 0.1, "chains": 80, "groups": 8, "seed": 1}
-    data = relaxation.relaxing_filaments(step_microseconds=1.0, steps=[0, 10, 300], **settings)
-    assert data["time"] == pytest.approx([0, 10e6, 300e6])
-    assert all(data[name].shape == (3, 8) for name in ("shortening", "stretching", "bending"))
+    settings = {"extension_time_microseconds": 0.1, "chains": 80, "seed": 1}
+    data = relaxing_filaments.relaxing_filaments(step_microseconds=1.0, steps=[0, 10, 300], **settings)
+    assert data["time"] == pytest.approx([0, 10, 300])
+    assert all(data[name].shape == (3, 40) for name in ("shortening", "stretching", "bending"))
     assert np.abs([data[name][0] for name in ("shortening", "stretching", "bending")]).max() < 1e-6
     # Bends stretch the straight filament until its ends have come nearer.
     stretching = data["stretching"].mean(axis=1)
@@ -437,16 +437,31 @@ def test_relaxing_filaments():
     assert np.all(np.diff(data["bending"].mean(axis=1)) > 0)
 
 
-def test_exponents_and_stages():
+def test_linear_relaxation():
+    """Each joint has k_B T in the end; energies and shortening grow linearly in the beginning."""
+    bending, shortening = relaxing_filaments.linear_relaxation([1e-6, 2e-6, 1e13])
+    assert bending[2] == pytest.approx(1.0)
+    assert bending[1] / bending[0] == pytest.approx(2.0, rel=1e-4)
+    assert shortening[1] / shortening[0] == pytest.approx(2.0, rel=1e-4)
+
+
+def test_stages_of_a_relaxation():
     generator = np.random.default_rng(1)
     time = np.geomspace(1e-3, 1e5, 200)
     values = 2.0 * time[:, None] ** 0.37 * (1 + 0.02 * generator.normal(size=(200, 20)))
-    estimate = relaxation._exponent(time, values, (1.0, 1e3))
+    whole = relaxing_filaments.Relaxation(0.1, [{"time": time, "shortening": values}])
+    estimate = whole.exponent("shortening", (1.0, 1e3))
     assert abs(estimate.value - 0.37) < 4 * estimate.error < 0.01
+    assert whole.at("shortening", 1.0).value == pytest.approx(2.0, rel=0.05)
+    names = ("shortening", "stretching", "bending")
     stages = [
-        {"time": np.array([1.0, 2.0, 3.0]), "shortening": np.ones((3, 2))},
-        {"time": np.array([2.0, 3.0, 4.0]), "shortening": 2 * np.ones((3, 2))},
+        {"time": np.array([1.0, 2.0, 3.0]), **dict.fromkeys(names, np.ones((3, 2)))},
+        {"time": np.array([2.0, 3.0, 4.0]), **dict.fromkeys(names, 2 * np.ones((3, 2)))},
     ]
-    times, joined = relaxation._joined(stages, "shortening")
-    assert times * 1e6 == pytest.approx([1, 2, 3, 4])
+    relaxation = relaxing_filaments.Relaxation(0.1, stages)
+    times, joined = relaxation.joined("shortening")
+    assert times == pytest.approx([1, 2, 3, 4])
     assert joined[:, 0] == pytest.approx([1, 1, 1, 2])
+    (overlap,) = relaxation.overlaps()
+    assert overlap.ours.value == pytest.approx(2.0)
+    assert overlap.verdict == "differs"

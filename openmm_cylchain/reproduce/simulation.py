@@ -15,15 +15,13 @@ ACTIN = F_ACTIN
 VISCOSITY = 1.71e-3 * unit.pascal * unit.second
 TEMPERATURE = 310.0
 
-_SCHEME = "implicit"
-
 
 def solvent(viscosity_factor=1.0):
     """Filaments in the solvent of Table 2, or one with another viscosity."""
     return Filaments(viscosity_factor * VISCOSITY, TEMPERATURE, engine="compiled")
 
 
-def start(filaments, step, seed, system=None, positions=None):
+def start(filaments, step, seed, system=None, positions=None, scheme="implicit"):
     """A Context, ready to step.
 
     Parameters
@@ -34,10 +32,11 @@ def start(filaments, step, seed, system=None, positions=None):
     seed : int
     system, positions : optional
         Of the filaments, if they are built; without them they are built here.
+    scheme : str
     """
     if system is None:
         _, system, positions = filaments.build()
-    integrator = filaments.create_integrator(system, step, scheme=_SCHEME, random_seed=seed)
+    integrator = filaments.create_integrator(system, step, scheme=scheme, random_seed=seed)
     context = openmm.Context(system, integrator, openmm.Platform.getPlatform("CPU"))
     context.setPositions(positions)
     return context
