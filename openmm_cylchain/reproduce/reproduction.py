@@ -10,11 +10,11 @@ from matplotlib.figure import Figure
 from ..errors import InputError
 from ..run_directory import write_atomically
 from ..version import __version__
-from . import pesek2016, style
+from . import chandran2009, pesek2016, style
 from .page import format_page
 from .records import Records
 
-PAPERS = {"pesek2016": pesek2016}
+PAPERS = {"pesek2016": pesek2016, "diffusion": chandran2009}
 _RESULTS, _MEASUREMENTS = "results.json", "measurements"
 
 
