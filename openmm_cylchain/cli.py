@@ -112,7 +112,12 @@ def _add_benchmarks(parser):
 
 
 def _add_reproductions(parser):
-    parser.add_argument("paper", metavar="PAPER", help="pesek2016: Pesek et al., Soft Matter 2016, 12, 3360")
+    parser.add_argument(
+        "paper",
+        metavar="PAPER",
+        help="pesek2016: Pesek et al., Soft Matter 2016, 12, 3360; "
+        "diffusion: Chandran and Mofrad, Phys. Rev. E 2009, 79, 011906",
+    )
     parser.add_argument("--figure", type=int, metavar="N", help="only this figure of the paper")
     parser.add_argument("--quick", action="store_true", help="reduced statistics, five minutes at most")
     parser.add_argument("--force", action="store_true", help="measure anew what DIR holds already")

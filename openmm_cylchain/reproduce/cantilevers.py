@@ -24,7 +24,7 @@ _RULER_LOADS = {"text": (3.92, 0.554), "caption": (0.394, 0.224)}
 _RELAXATION_TIMES = 25.0
 _STEPS_PER_RELAXATION = 40.0
 _TOLERANCE = {True: 0.006, False: 0.0015}
-"""The deflection of a chain of n segments is off by a share of 1/(2 n^2) for small loads, and by more for large ones."""
+"""The deflection of a chain of n segments is off by a share of 1/(2 n^2) for small loads, by more for large."""
 
 
 def bent_cantilevers(end_loads, weights, length_micrometers, segments, steps, step):
@@ -136,7 +136,9 @@ def evaluate(records, quick):
             results.append(Result(f"{quantity}_{name}", unit, Estimate(ours, None), rule, expected))
     for name, load, shape in zip(_RULER_LOADS, loads[len(names) :], data["shapes"][len(names) :]):
         exact, _ = elastica(*load, 2)
-        for quantity, ours, expected in zip(("shortening", "deflection"), _tip(shape), (1.0 - exact[-1, 0], exact[-1, 1])):
+        for quantity, ours, expected in zip(
+            ("shortening", "deflection"), _tip(shape), (1.0 - exact[-1, 0], exact[-1, 1])
+        ):
             centimeters = 100.0 * _RULER["length"]
             estimate = Estimate(ours * centimeters, None)
             results.append(
@@ -153,14 +155,14 @@ def _remarks(data, quick):
     text, caption = _RULER_LOADS["text"], _RULER_LOADS["caption"]
     millimeters = 1e3 * caption[0] * (0.1 * _RULER["length"]) ** 3 / (3.0 * _RULER["rigidity"])
     return (
-        f"Filaments of {_LENGTH / MICROMETER:g} µm in {_SEGMENTS[quick]} segments without noise, with loads in units of "
-        f"EI/L² and EI/L³, which alone matter, until no node moves by more than {data['unrest']:.1g} L. The theory is "
+        f"Filaments of {_LENGTH / MICROMETER:g} µm in {_SEGMENTS[quick]} segments without noise, with loads in units "
+        f"of EI/L² and EI/L³, which alone matter, until no node moves by more than {data['unrest']:.1g} L. The theory is "
         "Euler's elastica, solved numerically: the published tables that the paper compares with are solutions of it. "
         "The shape of the chain tends to it with the square of the number of segments.\n\n"
         f"The ruler of {100 * _RULER['length']:g} cm and {_RULER['rigidity']} N m² carries {text[0]} N at its end and "
         f"weighs {text[1]} N in the text of the paper; in the caption of its figure it carries {caption[0]} N, weighs "
-        f"{caption[1]} N and is 3 cm long, which must be misprinted: its end would move by {millimeters:.2g} mm. Ours are both "
-        f"pairs of loads on {100 * _RULER['length']:g} cm."
+        f"{caption[1]} N and is 3 cm long, which must be misprinted: its end would move by {millimeters:.2g} mm. "
+        f"Ours are both pairs of loads on {100 * _RULER['length']:g} cm."
     )
 
 
@@ -186,6 +188,7 @@ def _draw_tips(figure, shapes):
 
 
 def _draw_ruler(figure, shapes):
+    figure.set_size_inches(6.4, 3.8)
     axis = figure.subplots()
     scale = 100.0 * _RULER["length"]
     for name, shape, colour, marker in zip(_RULER_LOADS, shapes, style.COLOURS, "os"):

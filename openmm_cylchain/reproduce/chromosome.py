@@ -23,6 +23,7 @@ _DISCARDED, _AVERAGED = 4, 12
 """In relaxation times of the slowest mode."""
 _LAGS = 26
 _GROUPS = 30
+_COPIES = {True: 600, False: 3000}
 _NODES = (5, 10, 15, 20, 25)
 _BINS = np.linspace(-4.0, 4.0, 33)
 """Of the angle over its standard deviation in theory."""
@@ -39,8 +40,8 @@ def fluctuating_chromosome(viscosity_factor, copies, step_seconds, seed):
     -------
     dict of arrays
         ``angle_square`` and ``angle_fourth`` (groups,) of the last segment; ``deflection_square`` (segments, groups) of
-        the nodes beyond the clamp in nm^2; ``correlation`` (lags, groups) of the slowest mode; ``counts`` of the angle in
-        bins; ``trace`` of the angle of one filament, and ``time`` in ps from frame to frame.
+        the nodes beyond the clamp in nm^2; ``correlation`` (lags, groups) of the slowest mode; ``counts`` of the angle
+        in bins; ``trace`` of the angle of one filament, and ``time`` in ps from frame to frame.
     """
     column = rods_on_string.SIMULATED_CHROMOSOME
     filaments = column.solvent(viscosity_factor)
@@ -131,8 +132,10 @@ def _cause():
 def _persistence_result():
     ratio = CHROMOSOME.persistence_length / _LENGTH
     temperature = CHROMOSOME.temperature * ratio / 2694.1
-    energy = thermal_energy(temperature) / in_units_of(unit.piconewton * unit.nanometer, FORCE * LENGTH, "energy")
-    cause = f"the printed one follows from EI and L of Table II at {temperature:.1f} K, where k_B T = {energy:.3f} pN nm"
+    energy = thermal_energy(temperature) / in_units_of(1.0 * unit.piconewton * unit.nanometer, FORCE * LENGTH, "energy")
+    cause = (
+        f"the printed one follows from EI and L of Table II at {temperature:.1f} K, where k_B T = {energy:.3f} pN nm"
+    )
     return Result("persistence_length_over_length", "1", Estimate(ratio, None), _RATIO, ratio, printed("2694.1"), cause)
 
 
@@ -144,7 +147,7 @@ def evaluate(records, quick):
             f"figure-09-{medium}",
             fluctuating_chromosome,
             viscosity_factor=factor,
-            copies=600 if quick else 3000,
+            copies=_COPIES[quick],
             step_seconds=_relaxation_time(factor) / _STEPS_PER_RELAXATION / SECOND,
             seed=9 + int(factor),
         )
@@ -181,15 +184,26 @@ def _draw_fluctuations(figure, measured):
     deviation = math.sqrt(_angle_variance())
     angle = np.linspace(-4.0, 4.0, 200)
     right.plot(
-        1e3 * angle * deviation, np.exp(-0.5 * angle**2) / math.sqrt(2.0 * math.pi), color=style.THEORY, label="(41), (42)"
+        1e3 * angle * deviation,
+        np.exp(-0.5 * angle**2) / math.sqrt(2.0 * math.pi),
+        color=style.THEORY,
+        label="(41), (42)",
     )
     for (medium, data), colour, marker in zip(measured.items(), style.COLOURS, "os"):
         mean = simulation.mean(data["deflection_square"] / MICROMETER**2)
-        left.errorbar(place / MICROMETER, mean.value, mean.error, fmt=marker, markersize=4, color=colour, label=f"ours, {medium}")
+        left.errorbar(
+            place / MICROMETER, mean.value, mean.error, fmt=marker, markersize=3, color=colour, label=f"ours, {medium}"
+        )
         density = data["counts"] / data["counts"].sum() / (2.0 * width)
-        right.plot(1e3 * deviation * (_BINS[:-1] + width), density, marker, markersize=4, color=colour, label=f"ours, {medium}")
+        right.plot(
+            1e3 * deviation * (_BINS[:-1] + width), density, marker, markersize=4, color=colour, label=f"ours, {medium}"
+        )
     style.finish(left, "distance from the clamp (µm)", r"$\langle\Delta y^2\rangle$ (µm²)", xscale="log", yscale="log")
-    style.finish(right, "angle of the end (mrad)", r"density times $\langle\Delta\theta^2\rangle^{1/2}$", ylim=(0, None))
+    left.set_xticks([0.2, 0.5, 1, 2, 5], ["0.2", "0.5", "1", "2", "5"])
+    left.set_xticks([], minor=True)
+    style.finish(
+        right, "angle of the end (mrad)", r"density times $\langle\Delta\theta^2\rangle^{1/2}$", ylim=(0, None)
+    )
 
 
 def _draw_relaxation(figure, measured):
@@ -199,7 +213,7 @@ def _draw_relaxation(figure, measured):
         tau = _relaxation_time(_VISCOSITIES[medium])
         time = data["time"] * np.arange(len(data["trace"])) / tau
         shift = 80.0 if medium == "cell" else 0.0
-        label = f"{medium}, τ = {1e3 * tau / SECOND:.3g} ms"
+        label = f"{medium}, τ = {1e3 * tau / SECOND:.3g} ms" + (f", shifted by {shift:g} mrad" if shift else "")
         left.plot(time, 1e3 * data["trace"] + shift, color=colour, linewidth=0.8, label=label)
         left.axhline(shift, color="gray", linewidth=0.5)
         copies = data["correlation"] / data["correlation"][0].mean()
@@ -207,8 +221,8 @@ def _draw_relaxation(figure, measured):
         lags = data["time"] * np.arange(_LAGS) / tau
         right.errorbar(lags, mean.value, mean.error, fmt=marker, markersize=4, color=colour, label=f"ours, {medium}")
     right.plot(lags, np.exp(-lags), color=style.THEORY, label=r"$\exp(-t/\tau)$, slowest mode")
-    style.finish(left, "time / τ", "angle of the end (mrad)", xlim=(0, _AVERAGED), ylim=(-70, 190))
-    style.finish(right, "time / τ", "correlation of the slowest mode", xlim=(0, None))
+    style.finish(left, "time / τ", "angle of the end (mrad)", xlim=(0, _AVERAGED), ylim=(-80, 200))
+    style.finish(right, "time / τ", "correlation of the slowest mode", xlim=(0, None), ylim=(0, None))
 
 
 CASES = (Case("figure-09", "Fig. 9: fluctuations of a clamped chromosome", (9,), evaluate),)

@@ -25,6 +25,7 @@ _TURN = 0.02
 Steps in which it turns by 0.07 rad leave the rotational diffusion of 20 segments 4 % too small, these 0.1 %.
 """
 _INTERVALS = 100
+_COPIES = {True: 150, False: 1000}
 _GROUPS = 20
 _RULE = Rule(3.0, 0.003, 0.02)
 _UNITS = {"parallel": "um^2/s", "normal": "um^2/s", "rotational": "1/s"}
@@ -92,8 +93,8 @@ def rod_diffusion(length):
 def cut_rod_diffusion(length, segments, friction="filament"):
     """Diffusion coefficients of a straight rigid chain of segments, from the friction of a segment; exact.
 
-    ``D_p = k_B T/(N gamma_par)``, ``D_n = k_B T/(N gamma_perp)``, ``D_r = k_B T/(N gamma_rot + gamma_perp sum s^2)`` with
-    the places s of the middles of the segments, ``sum s^2 = l0^2 N (N^2-1)/12``.
+    ``D_p = k_B T/(N gamma_par)``, ``D_n = k_B T/(N gamma_perp)``, ``D_r = k_B T/(N gamma_rot + gamma_perp sum s^2)``
+    with the places s of the middles of the segments, ``sum s^2 = l0^2 N (N^2-1)/12``.
     """
     one = length / segments
     own = ROD.friction(one, segments, **_friction_options(friction))
@@ -116,7 +117,7 @@ def _measured(records, quick, length, segments, planar=True, friction="filament"
         segments=segments,
         planar=planar,
         friction=friction,
-        copies=150 if quick else 1000,
+        copies=_COPIES[quick],
         intervals=_INTERVALS,
         interval_seconds=_TURN**2 / (2.0 * exact["rotational"]) / SECOND,
         seed=7 + 100 * length + segments + (0 if planar else 1000) + (0 if friction == "filament" else 2000),
@@ -173,11 +174,11 @@ def _remarks():
         numbers = ", ".join(f"{100 * (1 - share):.0f} % ({direction})" for direction, share in shares.items())
         cuts.append(f"{numbers} in {segments} segments")
     return (
-        f"Ours is (14) in intervals in which a rod turns by {_TURN} rad, the theory (11) to (13) for the whole rod, without "
-        "end corrections, as Section IV has it. The paper gives the logarithm of the whole rod to all segments "
+        f"Ours is (14) in intervals in which a rod turns by {_TURN} rad, the theory (11) to (13) for the whole rod, "
+        "without end corrections, as Section IV has it. The paper gives the logarithm of the whole rod to all segments "
         '(`friction_length="filament"`). Then the friction of segments adds up to that of the rod, the rotational one '
-        "by (A3), and a cut rod diffuses exactly as the whole, in closed form as in the simulation. The paper simulates "
-        "in a plane; rods in space have the same coefficients.\n\n"
+        "by (A3), and a cut rod diffuses exactly as the whole, in closed form as in the simulation. The paper "
+        "simulates in a plane; rods in space have the same coefficients.\n\n"
         'With `friction_length="segment"`, as in Pešek et al. 2016 and by default, each segment has the logarithm of '
         f"its own length. A cut rod of {_OWN_LENGTH} µm then diffuses more slowly than one segment: by "
         f"{'; '.join(cuts)}. The cause is in the model, which neglects the flow that one segment makes at another, "
@@ -191,15 +192,16 @@ def _draw_rods(figure, points):
     fine = np.linspace(0.9, 5.1, 100)
     for axis, direction, label in zip(figure.subplots(1, 3), _SCALES, ("D_p", "D_n", "D_r")):
         curve = np.array([rod_diffusion(length * MICROMETER)[direction] for length in fine]) / _SCALES[direction]
-        axis.plot(fine, curve, "--", color=style.THEORY, label="(11) to (13)")
-        for number, (segments, colour, marker) in enumerate(zip(_SEGMENTS, style.COLOURS, "os^")):
+        axis.plot(fine, curve, "--", color=style.THEORY, linewidth=1, label="(11) to (13)")
+        for segments, colour, marker, size in zip(_SEGMENTS, style.COLOURS, "os^", (10, 7, 4)):
             means = [simulation.mean(points[length, segments][direction] / _SCALES[direction]) for length in _LENGTHS]
             axis.errorbar(
-                np.array(_LENGTHS) + 0.1 * (number - 1),
+                _LENGTHS,
                 [mean.value for mean in means],
                 [mean.error for mean in means],
                 fmt=marker,
-                markersize=4,
+                markersize=size,
+                markerfacecolor="none",
                 color=colour,
                 label="1 segment" if segments == 1 else f"{segments} segments",
             )
@@ -222,7 +224,7 @@ def _draw_shares(figure, own):
     axis.axhline(1.0, color=style.THEORY, linestyle="--", linewidth=1, label="logarithm of the whole rod")
     axis.plot([], [], "o", color="gray", label="ours; lines: sum of the friction")
     ylabel = f"D of a cut rod of {_OWN_LENGTH} µm / D of the whole"
-    style.finish(axis, "segments", ylabel, ylim=(0, 1.1), xlim=(0, _SEGMENTS[-1] + 1))
+    style.finish(axis, "segments", ylabel, ylim=(0, 1.15), xlim=(0, 21), xticks=(1, 5, 10, 15, 20))
 
 
 CASES = (Case("figure-07", "Fig. 7: diffusion of rods cut into segments", (7,), evaluate),)

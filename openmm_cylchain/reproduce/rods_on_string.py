@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from openmm import unit
 
-from .. import EndCorrections, FilamentType, Filaments
+from .. import EndCorrections, Filaments, FilamentType
 from ..quantities import BENDING_RIGIDITY, VISCOSITY, in_units_of, thermal_energy
 
 SECOND = 1e12

@@ -1,4 +1,4 @@
-"""Fig. 10 of Chandran and Mofrad 2009: F-actin that moves freely in a plane, and the relaxation of its bending modes."""
+"""Fig. 10 of Chandran and Mofrad 2009: F-actin that moves freely in a plane, and how its bending modes relax."""
 
 import math
 
@@ -28,7 +28,9 @@ _DISCARDED = 120
 _COPIES = {True: 96, False: 256}
 _GROUPS = 16
 _MODES = np.arange(1, 16)
-_LAGS = {1: np.arange(0, 200, 8), 2: np.arange(0, 46)}
+_SHAPES, _SHAPE_STRIDE = 6, 75
+"""Frames 1.5 s apart, as in the paper."""
+_LAGS = {1: np.arange(0, 200, 8), 2: np.arange(0, 46, 2)}
 _COMPARED_MODES = (1, 2, 3, 5, 10)
 _COMPARED_SEGMENTS = (10, 20, 40)
 _SQUARE_RULE = Rule(3.0, 0.002, 0.02)
@@ -45,8 +47,9 @@ def filaments_in_a_thin_film(copies, step_microseconds, stride, discarded, frame
     -------
     dict of arrays
         ``square``, the squared end-to-end distance in nm^2 (groups,); ``correlation`` of tangents (segments, groups);
-        ``modes``, the squared amplitudes of ``_MODES`` in nm (modes, groups); ``correlation_1`` and ``correlation_2`` of
-        the amplitudes of modes 1 and 2 at ``_LAGS`` (lags, groups); ``shapes`` (shapes, nodes, 2) of one filament in nm.
+        ``modes``, the squared amplitudes of ``_MODES`` in nm (modes, groups); ``correlation_1`` and ``correlation_2``
+        of the amplitudes of modes 1 and 2 at ``_LAGS`` (lags, groups); ``shapes`` (shapes, nodes, 2) of one filament in
+        nm.
     """
     column = rods_on_string.SIMULATED_ACTIN
     filaments = column.solvent()
@@ -68,7 +71,7 @@ def filaments_in_a_thin_film(copies, step_microseconds, stride, discarded, frame
         "modes": simulation.groups(np.mean(amplitudes**2, axis=0).T, _GROUPS),
         "correlation_1": simulation.groups(_lagged(amplitudes[..., 0], _LAGS[1]), _GROUPS),
         "correlation_2": simulation.groups(_lagged(amplitudes[..., 1], _LAGS[2]), _GROUPS),
-        "shapes": shapes[:: max(1, frames // 8)][:8],
+        "shapes": shapes[::_SHAPE_STRIDE][:_SHAPES],
     }
 
 
@@ -188,20 +191,25 @@ def _remarks(quick):
         "discrete chain, exact for ⟨R²⟩, the correlation of tangents and the variances of bending modes, whatever the "
         f"angles (mode 10 has {share:.3f} times the variance (46) of the continuous filament). Relaxation times are "
         "fits to the correlation of the amplitudes of (45), the theory the same fit to the correlation that the chain "
-        "has for small deflections: its modes are not quite the cosines of (45). This theory is not exact for a filament "
-        "as long as its persistence length, and its rule allows for that."
+        "has for small deflections: its modes are not quite the cosines of (45). This theory is not exact for a "
+        "filament as long as its persistence length, and its rule allows for that."
     )
 
 
 def _draw_shapes(figure, shapes):
+    figure.set_size_inches(6.4, 3.6)
     axis = figure.subplots()
-    for number, (shape, colour) in enumerate(zip(shapes, 2 * style.COLOURS)):
+    for number, shape in enumerate(shapes):
         middle = shape - shape.mean(axis=0)
         turned = middle @ np.linalg.svd(middle, full_matrices=False)[2].T / MICROMETER
-        axis.plot(turned[:, 0], turned[:, 1] - 4.0 * number, color=colour, linewidth=2)
-    axis.plot([-8, -3], [-4.0 * len(shapes) + 1, -4.0 * len(shapes) + 1], color="black", linewidth=3)
-    axis.text(-5.5, -4.0 * len(shapes) - 0.2, "5 µm", ha="center", va="top")
-    axis.set(aspect="equal", ylim=(-4.0 * len(shapes) - 3, 3))
+        row, column = divmod(number, 2)
+        x, y = 19.0 * column, -5.5 * row
+        axis.plot(turned[:, 0] + x, turned[:, 1] + y, color=style.OURS, linewidth=2)
+        seconds = number * _SHAPE_STRIDE * _FRAME_SECONDS
+        axis.text(x - 8.5, y + 2.0, f"{seconds:g} s", fontsize=9, color="0.35")
+    axis.plot([22, 27], [-14.5, -14.5], color="black", linewidth=3)
+    axis.text(24.5, -14.9, "5 µm", ha="center", va="top", fontsize=9)
+    axis.set(aspect="equal", xlim=(-9.5, 28), ylim=(-16.5, 4))
     axis.set_axis_off()
 
 
@@ -212,7 +220,13 @@ def _draw_statics(figure, data):
     mean = simulation.mean(data["correlation"])
     every = slice(0, None, 4)
     left.errorbar(
-        distance[every] / MICROMETER, mean.value[every], mean.error[every], fmt="o", markersize=4, color=style.OURS, label="ours"
+        distance[every] / MICROMETER,
+        mean.value[every],
+        mean.error[every],
+        fmt="o",
+        markersize=4,
+        color=style.OURS,
+        label="ours",
     )
     theory = wlc_tangent_correlation(distance, ACTIN.persistence_length, planar=True)
     left.plot(distance / MICROMETER, theory, color=style.THEORY, label="(4)")
@@ -224,6 +238,8 @@ def _draw_statics(figure, data):
     right.plot(_MODES, wormlike / MICROMETER, color=style.THEORY, linewidth=1, label="(46)")
     style.finish(left, "distance along the filament (µm)", r"$\langle\cos\Delta\theta\rangle$", ylim=(0.6, 1.02))
     style.finish(right, "mode n", r"$\langle a_n^2\rangle$ (µm)", xscale="log", yscale="log")
+    right.set_xticks([1, 2, 5, 10, 15], ["1", "2", "5", "10", "15"])
+    right.set_xticks([], minor=True)
 
 
 def _draw_relaxation(figure, data):
@@ -233,8 +249,9 @@ def _draw_relaxation(figure, data):
         correlation = data[f"correlation_{mode}"]
         mean = simulation.mean(correlation / correlation[0].mean())
         axis.errorbar(time, mean.value, mean.error, fmt=marker, markersize=4, color=colour, label=f"ours, mode {mode}")
-        theory = _mode_correlation(mode, time * SECOND)
-        axis.plot(time, theory, color=colour, linewidth=1, label=f"small deflections, mode {mode}")
+        fine = np.linspace(0.0, time[-1], 200)
+        theory = _mode_correlation(mode, fine * SECOND)
+        axis.plot(fine, theory, color=colour, linewidth=1, label=f"small deflections, mode {mode}")
     style.finish(axis, "time (s)", "correlation of the amplitude", xlim=(0, None))
 
 
