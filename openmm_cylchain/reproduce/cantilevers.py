@@ -156,9 +156,9 @@ def _remarks(data, quick):
     millimeters = 1e3 * caption[0] * (0.1 * _RULER["length"]) ** 3 / (3.0 * _RULER["rigidity"])
     return (
         f"Filaments of {_LENGTH / MICROMETER:g} µm in {_SEGMENTS[quick]} segments without noise, with loads in units "
-        f"of EI/L² and EI/L³, which alone matter, until no node moves by more than {data['unrest']:.1g} L. The theory is "
-        "Euler's elastica, solved numerically: the published tables that the paper compares with are solutions of it. "
-        "The shape of the chain tends to it with the square of the number of segments.\n\n"
+        f"of EI/L² and EI/L³, which alone matter, until no node moves by more than {data['unrest']:.1g} L. The theory "
+        "is Euler's elastica, solved numerically: the published tables that the paper compares with are solutions of "
+        "it. The shape of the chain tends to it with the square of the number of segments.\n\n"
         f"The ruler of {100 * _RULER['length']:g} cm and {_RULER['rigidity']} N m² carries {text[0]} N at its end and "
         f"weighs {text[1]} N in the text of the paper; in the caption of its figure it carries {caption[0]} N, weighs "
         f"{caption[1]} N and is 3 cm long, which must be misprinted: its end would move by {millimeters:.2g} mm. "

@@ -24,8 +24,8 @@ _LENGTH, _SEGMENTS = 15.5 * MICROMETER, 62
 _ONE = _LENGTH / _SEGMENTS
 _FRAME_SECONDS = 0.02
 _FRAMES = {True: 400, False: 800}
-_DISCARDED = 120
-_COPIES = {True: 96, False: 256}
+_DISCARDED = {True: 60, False: 120}
+_COPIES = {True: 128, False: 256}
 _GROUPS = 16
 _MODES = np.arange(1, 16)
 _SHAPES, _SHAPE_STRIDE = 6, 75
@@ -116,7 +116,7 @@ def _measured(records, quick):
         copies=_COPIES[quick],
         step_microseconds=1e6 * _FRAME_SECONDS / stride,
         stride=stride,
-        discarded=_DISCARDED,
+        discarded=_DISCARDED[quick],
         frames=_FRAMES[quick],
         seed=10,
     )
@@ -186,7 +186,7 @@ def _remarks(quick):
     share = discrete / bending_mode_variance(10, _LENGTH, ACTIN.persistence_length)
     return (
         f"{_COPIES[quick]} filaments in a plane start from equilibrium and move for "
-        f"{_FRAME_SECONDS * (_DISCARDED + _FRAMES[quick]):.3g} s each, of which the last "
+        f"{_FRAME_SECONDS * (_DISCARDED[quick] + _FRAMES[quick]):.3g} s each, of which the last "
         f"{_FRAME_SECONDS * _FRAMES[quick]:.3g} s are averaged; the paper has one for 80 s. The theory is that of the "
         "discrete chain, exact for ⟨R²⟩, the correlation of tangents and the variances of bending modes, whatever the "
         f"angles (mode 10 has {share:.3f} times the variance (46) of the continuous filament). Relaxation times are "
