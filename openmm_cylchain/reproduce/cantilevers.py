@@ -173,7 +173,7 @@ def _draw_tips(figure, shapes):
         (panels[0], _END_LOADS, 0, r"end load $PL^2/EI$"),
         (panels[1], _WEIGHTS, len(_END_LOADS), r"weight $wL^3/EI$"),
     ):
-        fine = np.linspace(0.0, 1.05 * loads[-1], 60)
+        fine = np.linspace(0.0, 1.05 * loads[-1], 40)
         curves = []
         for load in fine:
             shape, angle = elastica(*((load, 0.0) if first == 0 else (0.0, load)), 2)
