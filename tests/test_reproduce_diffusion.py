@@ -31,10 +31,10 @@ def test_cut_rods_diffuse_as_the_whole_with_its_logarithm(segments):
 @pytest.mark.parametrize("segments", [2, 5])
 def test_diffusion_of_cut_rods_is_the_inverse_of_the_summed_resistance(segments):
     one = 5000.0 / segments
-    own = ROD.friction(one, segments, **rod_diffusion._OWN_LOGARITHM)
+    own = ROD.friction(one, segments, **rod_diffusion._FRICTIONS["own"])
     places = one * (np.arange(segments) - 0.5 * (segments - 1))
     turning = segments * own.rotational + own.perpendicular * np.sum(places**2)
-    cut = rod_diffusion.cut_rod_diffusion(5000.0, segments, "segment")
+    cut = rod_diffusion.cut_rod_diffusion(5000.0, segments, "own")
     assert cut["rotational"] == pytest.approx(ROD.thermal_energy / turning)
     assert cut["normal"] == pytest.approx(ROD.thermal_energy / (segments * own.perpendicular))
 

@@ -30,11 +30,13 @@ _GROUPS = 20
 _RULE = Rule(3.0, 0.003, 0.02)
 _UNITS = {"parallel": "um^2/s", "normal": "um^2/s", "rotational": "1/s"}
 _SCALES = {"parallel": MICROMETER**2 / SECOND, "normal": MICROMETER**2 / SECOND, "rotational": 1.0 / SECOND}
-_OWN_LOGARITHM = {"friction_length": "segment", "end_corrections": EndCorrections()}
-
-
-def _friction_options(friction):
-    return {"filament": {}, "segment": _OWN_LOGARITHM}[friction]
+_FRICTIONS = {
+    "whole": {},
+    "corrected": {"end_corrections": EndCorrections()},
+    "own": {"end_corrections": EndCorrections(), "friction_length": "segment"},
+}
+"""The paper's, with the logarithm of the whole rod; with end corrections; with the logarithm of a segment's length."""
+_LABELS = {"corrected": "end_corrections", "own": "their_own_logarithm"}
 
 
 def diffusing_rods(length_micrometers, segments, planar, friction, copies, intervals, interval_seconds, seed):
@@ -43,8 +45,8 @@ def diffusing_rods(length_micrometers, segments, planar, friction, copies, inter
     Parameters
     ----------
     planar : bool
-    friction : {"filament", "segment"}
-        That of the paper, or that of Pesek et al. 2016: with the logarithm of a segment's own length.
+    friction : {"whole", "corrected", "own"}
+        See ``_FRICTIONS``.
 
     Returns
     -------
@@ -54,7 +56,7 @@ def diffusing_rods(length_micrometers, segments, planar, friction, copies, inter
     """
     column = rods_on_string.SIMULATED_ROD
     filaments = column.solvent()
-    kind = column.filament_type(length_micrometers * MICROMETER / segments, **_friction_options(friction))
+    kind = column.filament_type(length_micrometers * MICROMETER / segments, **_FRICTIONS[friction])
     for angle in np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, copies):
         filaments.add_straight(kind, segments, [0, 0, 0], [math.cos(angle), math.sin(angle), 0], planar=planar)
     interval = interval_seconds * SECOND
@@ -90,14 +92,14 @@ def rod_diffusion(length):
     return {"parallel": mobility / 2.0, "normal": mobility / 4.0, "rotational": 3.0 * mobility / length**2}
 
 
-def cut_rod_diffusion(length, segments, friction="filament"):
+def cut_rod_diffusion(length, segments, friction="whole"):
     """Diffusion coefficients of a straight rigid chain of segments, from the friction of a segment; exact.
 
     ``D_p = k_B T/(N gamma_par)``, ``D_n = k_B T/(N gamma_perp)``, ``D_r = k_B T/(N gamma_rot + gamma_perp sum s^2)``
     with the places s of the middles of the segments, ``sum s^2 = l0^2 N (N^2-1)/12``.
     """
     one = length / segments
-    own = ROD.friction(one, segments, **_friction_options(friction))
+    own = ROD.friction(one, segments, **_FRICTIONS[friction])
     squares = one**2 * segments * (segments**2 - 1) / 12.0
     return {
         "parallel": ROD.thermal_energy / (segments * own.parallel),
@@ -106,10 +108,10 @@ def cut_rod_diffusion(length, segments, friction="filament"):
     }
 
 
-def _measured(records, quick, length, segments, planar=True, friction="filament"):
+def _measured(records, quick, length, segments, planar=True, friction="whole"):
     exact = cut_rod_diffusion(length * MICROMETER, segments, friction)
     name = f"figure-07-{length}-um-{segments}-segments"
-    name += ("" if planar else "-space") + ("" if friction == "filament" else "-own-logarithm")
+    name += ("" if planar else "-space") + ("" if friction == "whole" else f"-{friction}")
     return records.measure(
         name,
         diffusing_rods,
@@ -120,7 +122,7 @@ def _measured(records, quick, length, segments, planar=True, friction="filament"
         copies=_COPIES[quick],
         intervals=_INTERVALS,
         interval_seconds=_TURN**2 / (2.0 * exact["rotational"]) / SECOND,
-        seed=7 + 100 * length + segments + (0 if planar else 1000) + (0 if friction == "filament" else 2000),
+        seed=7 + 100 * length + segments + (0 if planar else 1000) + 2000 * list(_FRICTIONS).index(friction),
     )
 
 
@@ -132,15 +134,15 @@ def _results(data, exact, suffix):
 
 
 def evaluate(records, quick):
-    """Fig. 7, and rods whose segments have the friction of their own length."""
-    results, points, own = [], {}, {}
+    """Fig. 7, and rods whose segments have end corrections, or the friction of their own length."""
+    results, points, cut = [], {}, {}
     for length in _LENGTHS:
         whole = rod_diffusion(length * MICROMETER)
         for segments in _SEGMENTS:
             points[length, segments] = _measured(records, quick, length, segments)
             results += _results(points[length, segments], whole, f"{length}_um_{segments}_segments")
     for length in _LENGTHS:
-        ratios = _shares(length, _SEGMENTS[-1], "filament")
+        ratios = _shares(length, _SEGMENTS[-1], "whole")
         for direction in _SCALES:
             ours = Estimate(ratios[direction], None)
             name = f"{direction}_friction_of_the_rod_over_{_SEGMENTS[-1]}_segments_{length}_um"
@@ -149,13 +151,15 @@ def evaluate(records, quick):
         data = _measured(records, quick, _SPACE_LENGTH, segments, planar=False)
         suffix = f"{_SPACE_LENGTH}_um_{segments}_segments_in_space"
         results += _results(data, rod_diffusion(_SPACE_LENGTH * MICROMETER), suffix)
-    for segments in _SEGMENTS:
-        own[segments] = _measured(records, quick, _OWN_LENGTH, segments, friction="segment")
-        exact = cut_rod_diffusion(_OWN_LENGTH * MICROMETER, segments, "segment")
-        results += _results(own[segments], exact, f"{_OWN_LENGTH}_um_{segments}_segments_with_their_own_logarithm")
+    for friction, label in _LABELS.items():
+        for segments in _SEGMENTS:
+            data = _measured(records, quick, _OWN_LENGTH, segments, friction=friction)
+            cut[friction, segments] = data
+            exact = cut_rod_diffusion(_OWN_LENGTH * MICROMETER, segments, friction)
+            results += _results(data, exact, f"{_OWN_LENGTH}_um_{segments}_segments_with_{label}")
     pictures = {
         "Diffusion of rods cut into segments": lambda figure: _draw_rods(figure, points),
-        "Diffusion of a cut rod over that of the whole": lambda figure: _draw_shares(figure, own),
+        "Diffusion of a cut rod over that of the whole": lambda figure: _draw_shares(figure, cut),
     }
     return Outcome(results, pictures, _remarks())
 
@@ -170,20 +174,26 @@ def _shares(length, segments, friction):
 def _remarks():
     cuts = []
     for segments in _SEGMENTS[1:]:
-        shares = _shares(_OWN_LENGTH, segments, "segment")
+        shares = _shares(_OWN_LENGTH, segments, "own")
         numbers = ", ".join(f"{100 * (1 - share):.0f} % ({direction})" for direction, share in shares.items())
         cuts.append(f"{numbers} in {segments} segments")
+    turning = _shares(_OWN_LENGTH, _SEGMENTS[-1], "corrected")["rotational"]
+    corrections = EndCorrections()
     return (
         f"Ours is (14) in intervals in which a rod turns by {_TURN} rad, the theory (11) to (13) for the whole rod, "
         "without end corrections, as Section IV has it. The paper gives the logarithm of the whole rod to all segments "
         '(`friction_length="filament"`). Then the friction of segments adds up to that of the rod, the rotational one '
         "by (A3), and a cut rod diffuses exactly as the whole, in closed form as in the simulation. The paper "
         "simulates in a plane; rods in space have the same coefficients.\n\n"
+        f"With the end corrections that are the default, a cut rod of {_OWN_LENGTH} µm still moves along and across as "
+        f"the whole, but turns {100 * (turning - 1):.0f} % faster in {_SEGMENTS[-1]} segments: what turns it is their "
+        f"friction across, with the correction {corrections.perpendicular}, and not the friction of rotation, with "
+        f"{corrections.rotational}.\n\n"
         'With `friction_length="segment"`, as in Pešek et al. 2016 and by default, each segment has the logarithm of '
         f"its own length. A cut rod of {_OWN_LENGTH} µm then diffuses more slowly than one segment: by "
         f"{'; '.join(cuts)}. The cause is in the model, which neglects the flow that one segment makes at another, "
-        "not in the scheme: the simulation agrees with the closed form of the sum of the friction. Segments no longer "
-        "than about their diameter have no such friction at all, and those of the shorter rods are refused."
+        "not in the scheme: the simulation agrees with the closed form of the sum of the friction. Segments shorter "
+        f"than {math.exp(-corrections.rotational):.2f} diameters have no such friction at all and are refused."
     )
 
 
@@ -210,21 +220,31 @@ def _draw_rods(figure, points):
         style.finish(axis, "length of the rod (µm)", rf"${label}$ ({unit})", direction == "parallel", **scales)
 
 
-def _draw_shares(figure, own):
-    axis = figure.subplots()
-    whole = cut_rod_diffusion(_OWN_LENGTH * MICROMETER, 1, "segment")
+def _draw_shares(figure, cut):
+    figure.set_size_inches(9.6, 4.0)
     numbers = range(1, _SEGMENTS[-1] + 1)
-    curves = [_shares(_OWN_LENGTH, number, "segment") for number in numbers]
-    for direction, colour, marker in zip(_SCALES, style.COLOURS, "os^"):
-        axis.plot(numbers, [curve[direction] for curve in curves], color=colour, linewidth=1, label=direction)
-        means = [simulation.mean(own[segments][direction] / whole[direction]) for segments in own]
-        axis.errorbar(
-            list(own), [m.value for m in means], [m.error for m in means], fmt=marker, markersize=5, color=colour
-        )
-    axis.axhline(1.0, color=style.THEORY, linestyle="--", linewidth=1, label="logarithm of the whole rod")
-    axis.plot([], [], "o", color="gray", label="ours; lines: sum of the friction")
-    ylabel = f"D of a cut rod of {_OWN_LENGTH} µm / D of the whole"
-    style.finish(axis, "segments", ylabel, ylim=(0, 1.15), xlim=(0, 21), xticks=(1, 5, 10, 15, 20))
+    titles = {"corrected": "logarithm of the whole rod, end corrections", "own": "logarithm of a segment"}
+    for axis, (friction, title) in zip(figure.subplots(1, 2, sharey=True), titles.items()):
+        whole = cut_rod_diffusion(_OWN_LENGTH * MICROMETER, 1, friction)
+        curves = [_shares(_OWN_LENGTH, number, friction) for number in numbers]
+        for direction, colour, marker in zip(_SCALES, style.COLOURS, "os^"):
+            means = [simulation.mean(cut[friction, segments][direction] / whole[direction]) for segments in _SEGMENTS]
+            axis.errorbar(
+                _SEGMENTS,
+                [mean.value for mean in means],
+                [mean.error for mean in means],
+                fmt=marker,
+                markersize=5,
+                color=colour,
+                label=f"ours, {direction}",
+            )
+            axis.plot(numbers, [curve[direction] for curve in curves], color=colour, linewidth=1)
+        axis.plot([], [], color="gray", linewidth=1, label="sum of the friction")
+        axis.axhline(1.0, color=style.THEORY, linestyle="--", linewidth=1, label="(11) to (13), as the paper")
+        axis.set_title(title, fontsize=10)
+        ylabel = f"D of a cut rod of {_OWN_LENGTH} µm / D of the whole" if friction == "corrected" else ""
+        legend = friction == "corrected"
+        style.finish(axis, "segments", ylabel, legend, ylim=(0, 1.5), xlim=(0, 21), xticks=(1, 5, 10, 15, 20))
 
 
 CASES = (Case("figure-07", "Fig. 7: diffusion of rods cut into segments", (7,), evaluate),)

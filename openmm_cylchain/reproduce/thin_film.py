@@ -163,8 +163,9 @@ def _time_cause():
     friction = ACTIN.friction(_ONE, _SEGMENTS)
     sine = friction.perpendicular / _ONE * (_LENGTH / math.pi) ** 4 / ACTIN.rigidity / SECOND
     return (
-        "the paper says about, and not where it comes from; the wave of half a length between held ends would have "
-        f"{sine:.0f} s, the first mode of free ends has (pi/4.730)^4 = {(math.pi / 4.730) ** 4:.3f} of that"
+        "the paper says about 15 s, and not where it comes from; with cos(pi l/L) for the shape of the first mode it "
+        f"would be gamma (L/pi)^4/EI = {sine:.0f} s, but free ends make it (pi/4.730)^4 = "
+        f"{(math.pi / 4.730) ** 4:.3f} of that"
     )
 
 
