@@ -23,7 +23,7 @@ _DISCARDED, _AVERAGED = 4, 12
 """In relaxation times of the slowest mode."""
 _LAGS = 26
 _GROUPS = 30
-_COPIES = {True: 600, False: 3000}
+_COPIES = {True: 1000, False: 3000}
 _NODES = (5, 10, 15, 20, 25)
 _BINS = np.linspace(-4.0, 4.0, 33)
 """Of the angle over its standard deviation in theory."""

@@ -253,7 +253,7 @@ def _draw_relaxation(figure, data):
         fine = np.linspace(0.0, time[-1], 200)
         theory = _mode_correlation(mode, fine * SECOND)
         axis.plot(fine, theory, color=colour, linewidth=1, label=f"small deflections, mode {mode}")
-    style.finish(axis, "time (s)", "correlation of the amplitude", xlim=(0, None))
+    style.finish(axis, "time (s)", "correlation of the amplitude", xlim=(0, None), ylim=(0, None))
 
 
 CASES = (Case("figure-10", "Fig. 10: F-actin that moves freely in a plane", (10,), evaluate),)
