@@ -13,6 +13,7 @@ from ..theory import bending_energy_mean, stretching_energy_mean
 from . import simulation
 from .result import Estimate, Result, Rule
 from .table_2 import ACTIN, MICROSECOND, SOLVENT_TEMPERATURE, THERMAL_ENERGY, actin_friction
+from .transverse_modes import transverse_matrices
 
 SEGMENTS = 64
 CONTOUR_LENGTH = SEGMENTS * ACTIN.segment_length
@@ -173,20 +174,15 @@ def linear_relaxation(time):
     -------
     (bending, shortening) : (times,) arrays
     """
-    friction, length = actin_friction(), ACTIN.segment_length
-    same = friction.perpendicular / 4 + friction.rotational / length**2
-    other = friction.perpendicular / 4 - friction.rotational / length**2
-    resistance = np.diag([same, *[2 * same] * (SEGMENTS - 1), same])
-    resistance += other * (np.eye(SEGMENTS + 1, k=1) + np.eye(SEGMENTS + 1, k=-1))
-    slopes = np.diff(np.eye(SEGMENTS + 1), axis=0) / length
-    bends = np.diff(slopes, axis=0)
-    stiffness = ACTIN.joint_stiffness * bends.T @ bends
+    length = ACTIN.segment_length
+    resistance, stiffness = transverse_matrices(ACTIN.bending_rigidity, actin_friction(), length, SEGMENTS)
     trapped = stiffness.copy()
     trapped[0, 0] += ACTIN.segment_stiffness
     rates, modes = eigh(trapped, resistance)
+    # A chain that is held at one node turns about it freely, at a rate that rounding may make negative.
     rates = np.maximum(rates, 1e-12 * rates[-1])
     bent = np.sum(modes * (stiffness @ modes), axis=0)
-    tilted = np.sum((slopes @ modes) ** 2, axis=0)
+    tilted = np.sum((np.diff(modes, axis=0) / length) ** 2, axis=0)
     # Two transverse directions, each with half of an energy and half of what a tilt takes from the extension.
     variance = -np.expm1(-2.0 * np.outer(np.asarray(time) * MICROSECOND, rates)) / rates
     return variance @ bent / (SEGMENTS - 1), THERMAL_ENERGY * length * (variance @ tilted)

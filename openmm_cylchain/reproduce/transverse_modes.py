@@ -55,17 +55,22 @@ def transverse_modes(rigidity, friction, segment_length, segments, clamped=False
     TransverseModes
     """
     held = 1 if clamped else 0
-    nodes = segments + held + 1
-    ends = np.eye(nodes)
-    middles, angles = 0.5 * (ends[1:] + ends[:-1]), np.diff(ends, axis=0) / segment_length
-    resistance = friction.perpendicular * middles.T @ middles + friction.rotational * angles.T @ angles
-    joints = np.diff(angles, axis=0)
-    stiffness = np.full(len(joints), rigidity / segment_length)
-    stiffness[:held] *= 2.0
-    stiffness = joints.T * stiffness @ joints
+    resistance, stiffness = transverse_matrices(rigidity, friction, segment_length, segments + held, clamped)
     free = slice(2 * held, None)
     resistance = resistance[free, free]
     rates, shapes = eigh(stiffness[free, free], resistance)
     bending = slice(0 if clamped else 2, None)
     rates, shapes = rates[bending], shapes[:, bending]
     return TransverseModes(rates, shapes, shapes.T @ resistance)
+
+
+def transverse_matrices(rigidity, friction, segment_length, segments, clamped=False):
+    """Z and K of all nodes, (nodes, nodes) each; see ``transverse_modes``, but ``segments`` counts a held one, too."""
+    ends = np.eye(segments + 1)
+    middles, angles = 0.5 * (ends[1:] + ends[:-1]), np.diff(ends, axis=0) / segment_length
+    resistance = friction.perpendicular * middles.T @ middles + friction.rotational * angles.T @ angles
+    joints = np.diff(angles, axis=0)
+    stiffness = np.full(len(joints), rigidity / segment_length)
+    if clamped:
+        stiffness[0] *= 2.0
+    return resistance, joints.T * stiffness @ joints
