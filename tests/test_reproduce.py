@@ -402,6 +402,16 @@ def test_fitted_relaxation_time():
     assert abs(estimate.value - 0.8) < 4 * estimate.error < 0.08
 
 
+def test_single_filaments_explain_a_printed_time_that_they_scatter_around():
+    generator = np.random.default_rng(2)
+    time = np.linspace(0.0, 2.0, 41)
+    rates = generator.normal(1.0, 0.5, 400)
+    relative = np.exp(-np.outer(time, rates))
+    assert end_to_end.single_filament_rates(time, relative) == pytest.approx(rates)
+    assert "from 0.0" in end_to_end._cause(time, relative, Printed(3.0))
+    assert end_to_end._cause(time, relative, Printed(0.1)) == ""
+
+
 def test_fits_of_force_and_extension():
     length, kT = force_extension._CONTOUR, 310.0
     forces = np.array([0.01, 0.03, 0.1, 0.3, 0.9]) * 0.602214076
