@@ -81,7 +81,7 @@ def _chains(segments, quick):
     if segments > 32:
         return 48
     few = 480 if segments <= 8 else 60
-    return few if quick else 4 * few
+    return few if quick or segments > 16 else 4 * few
 
 
 def _averaged(records, quick, material, segments):
