@@ -38,7 +38,7 @@ _STATED = ((10, 1, False), (1200, 10, True), (1200, 2000, True))
 
 _MORE_THAN = LowerBound(3.0)
 _AS_FAST_RULE = Rule(3.0, 0.1)
-_SAME_RULE = Rule(3.0, 0.05, 0.1)
+_SAME_RULE = Rule(3.0, 0.05, 0.2)
 _ENERGY_RULE = Rule(3.0, 0.05, 0.03)
 
 
