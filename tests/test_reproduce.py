@@ -357,7 +357,7 @@ def test_speed_up_that_differs():
     assert slower["largest_speed_up_at_own_bounds"].verdict == "agrees"
     assert speed_verdicts(segments=7)["largest_speed_up_at_own_bounds"].unexplained
     assert speed_verdicts(own=1.1)["cost_of_a_step_at_own_bounds"].unexplained
-    assert speed_verdicts(noise=0.5)["cost_of_a_step_at_own_bounds"].unexplained
+    assert speed_verdicts(noise=1.0)["cost_of_a_step_at_own_bounds"].unexplained
     assert speed.evaluate(Given(energy=1.1), True).results[-1].unexplained
     assert not speed.evaluate(Given(energy=0.95), True).results[-1].unexplained
 
