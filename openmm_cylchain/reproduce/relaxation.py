@@ -28,7 +28,7 @@ _EXPONENTS = {
     10.0: (printed("0.8941", "0.0078"), printed("0.3313", "0.0032")),
 }
 _PRINTED_SCHEME = {"extension_time_microseconds": 10.0, "chains": 64, "step_microseconds": 0.01, "scheme": "euler"}
-_PRINTED_SCHEME_END = {True: 10.0, False: 100.0}
+_PRINTED_SCHEME_END = {True: 10.0, False: 1000.0}
 _COOPERATIVE_RULE = Rule(3.0, 0.03, 0.05)
 _UNCOUPLED_RULE = Rule(3.0, 0.03, 0.02)
 _ENERGY_RULE = Rule(3.0, 0.01, 0.01)
