@@ -58,7 +58,10 @@ def reproduce(paper, output, figure=None, quick=False, force=False, say=lambda m
     for number, case in enumerate(cases, 1):
         say(f"{number} of {len(cases)}: {case.title}")
         records = Records(directory / _MEASUREMENTS, force, lambda name: say(f"  measuring {name}"))
-        content["cases"] = _in_order(paper, content["cases"], _evaluated(case, records, quick, directory))
+        evaluated = _evaluated(case, records, quick, directory)
+        # Another process may have written other figures in the meantime.
+        content = _content(paper, directory)
+        content["cases"] = _in_order(paper, content["cases"], evaluated)
         write_atomically(directory / _RESULTS, (json.dumps(content, indent=2, allow_nan=False) + "\n").encode())
         write_atomically(directory / f"{paper}.md", format_page(content).encode())
     return content
