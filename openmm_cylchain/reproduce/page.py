@@ -58,13 +58,12 @@ def _summary(cases):
 
 
 def _counts(cases):
-    yield "| | agree | differ, for a stated cause | differ | minutes |"
-    yield "|---|---|---|---|---|"
+    yield "| | agree | differ, for a stated cause | differ |"
+    yield "|---|---|---|---|"
     for case in cases:
         agreeing, explained, unexplained = (str(number) for number in _count(case["results"]))
         unexplained = f"**{unexplained}**" if unexplained != "0" else unexplained
-        cells = (case["title"], agreeing, explained, unexplained, f"{case['seconds'] / 60:.1f}")
-        yield "| " + " | ".join(cells) + " |"
+        yield f"| {case['title']} | {agreeing} | {explained} | {unexplained} |"
     yield ""
 
 
