@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..benchmark.measurement import scaled
 from . import simulation, style
 from .case import Case, Outcome
 from .relaxing_filaments import (
@@ -21,6 +22,7 @@ _LARGE_TIMES = {True: (10.0,), False: (10.0, 100.0, 1000.0)}
 _COOPERATIVE, _UNCOUPLED = (2.0, 10.0), (1e3, 1e5)
 _REGIMES = ((0.9, "I"), (4.5, "II"), (100.0, "III"), (1e4, "IV"))
 _EDGES = (*_COOPERATIVE, *_UNCOUPLED)
+_MARKERS = "os^vD"
 _EARLY, _PEAK = 0.04, 10.0
 _EXPONENTS = {
     0.01: (printed("1.178", "0.014"), printed("0.3494", "0.0029")),
@@ -61,14 +63,13 @@ def _exponents(relaxation, cause):
 
 def _late_elastic_energy(relaxation, paper=None, cause=""):
     # Of the whole filament, as the paper gives it.
-    mean = relaxation.late("stretching")
-    ours = Estimate(SEGMENTS * mean.value, SEGMENTS * mean.error)
+    ours = scaled(relaxation.late("stretching"), SEGMENTS)
     label = f"late_elastic_energy_extension_time_{relaxation.extension_time:g}_us"
     return Result(label, "k_B T", ours, _ENERGY_RULE, SEGMENTS * equilibrium("stretching"), paper, cause)
 
 
 def _over_equilibrium(estimate, name):
-    return Estimate(float(estimate.value / equilibrium(name)), float(estimate.error / equilibrium(name)))
+    return scaled(Estimate(float(estimate.value), float(estimate.error)), 1.0 / equilibrium(name))
 
 
 def evaluate_relaxation(records, quick):
@@ -154,24 +155,24 @@ def _mark_regimes(axis, height):
         axis.text(position, height, name, ha="center", transform=axis.get_xaxis_transform(), fontsize=9, color="0.3")
 
 
-def _draw_stages(axis, relaxation, name, marker_of_stage, scale=1.0, **settings):
-    for number, stage in enumerate(relaxation.stages):
+def _draw_stages(axis, relaxation, name, scale=1.0, colour=None):
+    # Stages have entries in the legend and colours of their own unless one colour is given for all.
+    for number, (stage, marker) in enumerate(zip(relaxation.stages, _MARKERS)):
         mean = simulation.mean(stage[name] / scale)
-        label = rf"ours, $\Delta t$ = {STEPS[number]:g} µs" if settings.get("labelled", True) else None
         axis.errorbar(
             stage["time"],
             mean.value,
             mean.error,
-            fmt=marker_of_stage[number],
+            fmt=marker,
             markersize=3,
-            color=settings.get("color", style.COLOURS[number]),
-            label=label,
+            color=style.COLOURS[number] if colour is None else colour,
+            label=rf"ours, $\Delta t$ = {STEPS[number]:g} µs" if colour is None else None,
         )
 
 
 def _draw_shortening(figure, relaxation):
     axis = figure.subplots()
-    _draw_stages(axis, relaxation, "shortening", "os^vD")
+    _draw_stages(axis, relaxation, "shortening")
     time, shortening = relaxation.joined("shortening")
     curve = np.geomspace(1e-3, 30.0, 60)
     axis.plot(curve, linear_relaxation(curve)[1], color=style.THEORY, linewidth=0.8, label="linear, without tension")
@@ -190,9 +191,9 @@ def _draw_shortening(figure, relaxation):
 def _draw_energies(figure, relaxation):
     axis = figure.subplots()
     for name, colour, label in (("stretching", style.COLOURS[5], "elastic"), ("bending", style.COLOURS[0], "bending")):
-        _draw_stages(axis, relaxation, name, "os^vD", equilibrium(name), color=colour, labelled=False)
+        _draw_stages(axis, relaxation, name, equilibrium(name), colour)
         axis.plot([], [], "o", markersize=4, color=colour, label=f"ours, {label}")
-    for step, marker in zip(STEPS, "os^vD"):
+    for step, marker in zip(STEPS, _MARKERS):
         axis.plot([], [], marker, markersize=4, color="gray", label=rf"$\Delta t$ = {step:g} µs")
     curve = np.geomspace(1e-4, 1e5, 200)
     linear = linear_relaxation(curve)[0]

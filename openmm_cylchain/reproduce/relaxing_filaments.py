@@ -91,8 +91,7 @@ class Relaxation:
 
     def at(self, name, moment):
         """The mean at a moment in us, an Estimate."""
-        time, values = self.joined(name)
-        return simulation.mean(values[int(np.argmin(np.abs(time - moment)))])
+        return _mean_at(*self.joined(name), moment)
 
     def late(self, name):
         """The mean over the last nine tenths of the time, an Estimate."""
@@ -104,14 +103,15 @@ class Relaxation:
         """Results: where a stage ends, that with longer steps has the same mean."""
         for number, name in enumerate(_COMPARED[: len(self.stages) - 1]):
             moment = self.stages[number]["time"][-1]
-            short, long = (_mean_at(self.stages[number + i], name, moment) for i in (0, 1))
+            pair = self.stages[number : number + 2]
+            short, long = (_mean_at(stage["time"], stage[name], moment) for stage in pair)
             steps = f"{STEPS[number + 1]:g}_over_{STEPS[number]:g}_us"
             label = f"{name}_at_{moment:g}_us_with_steps_of_{steps}_extension_time_{self.extension_time:g}_us"
             yield Result(label, "1", ratio(long, short), _OVERLAP_RULE, 1.0)
 
 
-def _mean_at(stage, name, moment):
-    return simulation.mean(stage[name][int(np.argmin(np.abs(stage["time"] - moment)))])
+def _mean_at(time, values, moment):
+    return simulation.mean(values[int(np.argmin(np.abs(time - moment)))])
 
 
 def ratio(first, second):

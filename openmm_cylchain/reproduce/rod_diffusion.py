@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from ..benchmark.measurement import scaled
 from ..friction import EndCorrections
 from ..quantities import VISCOSITY, in_units_of
 from . import rods_on_string, simulation, style
@@ -128,8 +129,7 @@ def _measured(records, quick, length, segments, planar=True, friction="whole"):
 
 def _results(data, exact, suffix):
     for direction, scale in _SCALES.items():
-        mean = simulation.mean(data[direction])
-        ours = Estimate(mean.value / scale, mean.error / scale)
+        ours = scaled(simulation.mean(data[direction]), 1.0 / scale)
         yield Result(f"{direction}_diffusion_{suffix}", _UNITS[direction], ours, _RULE, exact[direction] / scale)
 
 

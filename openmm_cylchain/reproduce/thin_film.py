@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from ..benchmark.measurement import scaled
 from ..statistics import fit_relaxation_time
 from ..theory import (
     bending_mode_variance,
@@ -123,8 +124,7 @@ def _measured(records, quick):
 
 
 def _scaled(copies, scale=1.0):
-    mean = simulation.mean(copies)
-    return Estimate(mean.value / scale, mean.error / scale)
+    return scaled(simulation.mean(copies), 1.0 / scale)
 
 
 def _shape_results(data):
