@@ -21,6 +21,8 @@ struct Instability {
     double change = 0;
     /** The number of chains for which an implicit step was taken in parts, because its equations were not solved. */
     int divided = 0;
+    /** The number of iterations that the equations of an implicit step took. */
+    int iterations = 0;
 };
 
 /** A fluid that moves with the velocity velocity+gradient (x-origin); friction is relative to it. */

@@ -302,6 +302,7 @@ template <int W> Instability stepPack(const ChainPack& pack, const double* posit
 }
 
 #include "ChainCoordinates.h"
+#include "TensionBand.h"
 #include "ImplicitLoops.h"
 
 template <int W> Instability stepPackAs(const ChainPack& pack, const double* positions, const double* forces,

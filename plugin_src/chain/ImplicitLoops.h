@@ -31,8 +31,6 @@ const int NEWTON_ITERATIONS = 14;
 const int LARGEST_DIVISION = 10;
 /** The part of the friction against turning that compression may take away in the iteration's matrix. */
 const double COMPRESSION = 0.9;
-/** In the first iteration, a length resists at most this many times as much as turning. */
-const double STIFFEST_LENGTH = 1e4;
 /** A bend is drawn as a Gaussian with rejection if the joint is stiffer than this many k_B T, or else from the sphere. */
 const double STIFF_JOINT = 2;
 /** The tension of a segment turns it back by this much of what resists, in a step. */
@@ -41,6 +39,10 @@ const double TINY = 1e-300;
 
 template <class Real> CYLCHAIN_INLINE Real larger(Real a, Real b) {
     return a > b ? a : b;
+}
+
+template <class Real> CYLCHAIN_INLINE Real lesser(Real a, Real b) {
+    return a < b ? a : b;
 }
 
 /** Two vectors that are orthogonal to a unit vector and to each other (Duff et al., J. Comput. Graph. Tech. 2017, 6, 1). */
@@ -64,10 +66,11 @@ template <class Real> struct ImplicitSegment {
     Real randomCoordinate, randomTension, theta, jointTheta;
     // Of the last iteration: the direction of the new segment, its tension and how the tension changes.
     Vector<Real> newTangent;
-    Real tension, response;
-    Real multiplier, extra, tensionOfFlow;
-    // What the first iteration takes of tension and response.
-    Real softening;
+    Real tension, response, multiplier, extra, tensionOfFlow;
+    // The part of the response that stays with the nodes; what the direction of the tension lacks of the mean one; and the
+    // tension that it was given.
+    Real shift, multiplierBefore;
+    Vector<Real> turned;
 };
 
 /** What a step keeps of a tether: the vector from its point to its node at the start, its noise and how implicit it is. */
@@ -75,31 +78,26 @@ struct ImplicitTether {
     double start[3], random[3], theta;
 };
 
-/** What elimination leaves of a node: y = solution - next y(+1) - second y(+2). */
-template <class Real> struct ImplicitNode {
-    Matrix<Real> inverse, next, second;
-    Vector<Real> solution;
-};
-
 /** A step of open chains or, if CLOSED, of rings. */
 template <int W, bool CLOSED> class ImplicitStep {
     typedef typename Lanes<W>::Type Real;
     typedef Vector<Real> Vec;
     typedef Matrix<Real> Mat;
+    typedef TensionBand<W, CLOSED> Band;
+    typedef typename Band::Row Row;
 public:
     struct Memory {
-        Scratch segments, nodes, vectors, tethers, border;
+        Scratch segments, vectors, tethers;
+        typename Band::Memory band;
     };
     ImplicitStep(const ChainPack& pack, const StepSettings& settings, const double* box, Memory& memory) : pack(pack),
-            settings(settings), box(box), n(pack.nodes), h(settings.stepSize) {
+            settings(settings), box(box), n(pack.nodes), h(settings.stepSize), band(pack, memory.band) {
         tethers = memory.tethers.template reserve<ImplicitTether>(pack.tethers.size());
         segments = memory.segments.template reserve<ImplicitSegment<Real> >(n);
-        nodes = memory.nodes.template reserve<ImplicitNode<Real> >(n);
-        f = memory.vectors.template reserve<Vec>(3*n);
+        f = memory.vectors.template reserve<Vec>(4*n);
         change = f+n;
-        loads = settings.flow.present ? f+2*n : f;
-        if (CLOSED)
-            toBorder = memory.border.template reserve<BorderCoupling>(n);
+        rest = f+2*n;
+        loads = settings.flow.present ? f+3*n : f;
     }
     /**
      * Take one step.
@@ -109,8 +107,9 @@ public:
      * @param y       receives the nodes after
      * @param failed  receives true for each lane that has not converged or whose segments change by more than their
      *                length
+     * @return the number of iterations
      */
-    void take(const Vec* before, const Vec* forces, Vec* y, bool* failed) {
+    int take(const Vec* before, const Vec* forces, Vec* y, bool* failed) {
         x = before;
         for (int node = 0; node < n; node++) {
             y[node] = x[node];
@@ -126,25 +125,29 @@ public:
         // a gradient turns a chain takes one more.
         const int least = settings.flow.varies() ? 3 : 2;
         Real active = 1+Real{};
-        for (int iteration = 0; iteration < NEWTON_ITERATIONS; iteration++) {
-            stiffest = iteration == 0 ? STIFFEST_LENGTH : HUGE_VAL;
+        int iterations = 0;
+        while (iterations < NEWTON_ITERATIONS) {
             eliminate(y);
-            substitute();
-            if (iteration == 0 && settings.kT > 0) {
+            substitute(Real{});
+            if (iterations > 0)
+                refine();
+            else if (settings.kT > 0) {
                 if (stiffenTautSegments()) {
                     eliminate(y);
-                    substitute();
+                    substitute(Real{});
                 }
                 addMetricForces();
             }
             for (int node = 0; node < n; node++)
                 y[node] = y[node]+change[node]*active;
-            if (iteration+1 >= least && !anyUnfinished(active))
+            iterations++;
+            if (iterations >= least && !anyUnfinished(active))
                 break;
         }
         for (int i = 0; i < W; i++)
             failed[i] = lane(active, i) != 0;
         findExcessiveChanges(y, failed);
+        return iterations;
     }
 private:
     const ChainPack& pack;
@@ -152,18 +155,12 @@ private:
     const double* const box;
     const int n;
     const double h;
+    Band band;
     ImplicitSegment<Real>* segments;
-    ImplicitNode<Real>* nodes;
     ImplicitTether* tethers;
-    double stiffest;
     const Vec* x;
-    // The forces, the same with the drag of the flow, and the changes of an iteration.
-    Vec *f, *loads, *change;
-    /** The coupling of a node of a ring to its first two nodes. */
-    struct BorderCoupling {
-        Mat node[2];
-    };
-    BorderCoupling* toBorder;
+    // The forces, the same with the drag of the flow, the changes of an iteration, and what is left for its refinement.
+    Vec *f, *loads, *change, *rest;
 
     /**
      * Begin the iteration where the flow carries chains as a whole, if no node of them is fixed. Segments stay what they
@@ -239,20 +236,6 @@ private:
     void drawBend(GaussianLanes<W>& gaussian, int s);
     /** In a plane, a bend has one component, and its angle a uniform measure. */
     void drawPlanarBend(GaussianLanes<W>& gaussian, int s);
-    /** The equations of a node and its coupling to the next two, while they are gathered. */
-    struct Row {
-        Mat diagonal, lower, upper, second;
-        Vec right;
-    };
-    /** In a ring, also the coupling of the node to the first two, and theirs to it. */
-    struct ClosedRow : Row {
-        Mat toBorder[2], fromBorder[2];
-    };
-    /** The equations of the first two nodes of a ring. */
-    struct Border {
-        Mat matrix[2][2];
-        Vec right[2];
-    };
     /** The new segment, and the one between the old nodes and the new. */
     struct Geometry {
         Vec difference, tangent, middleTangent;
@@ -262,13 +245,43 @@ private:
     void eliminate(const Vec* y) {
         if (settings.flow.present)
             addDragOfFlow(y);
-        if (CLOSED)
-            eliminateRing(y);
-        else
-            eliminateChain(y);
-        if (settings.flow.present)
-            for (int s = 0; s < pack.segments; s++)
-                segments[s].tension = segments[s].tension-segments[s].tensionOfFlow;
+        Row rows[3];
+        Row *before = rows, *here = rows+1, *after = rows+2;
+        Geometry previous = {}, current;
+        std::size_t tether = 0;
+        band.begin();
+        *here = Row {};
+        here->right = loads[0];
+        for (int s = 0; s < n-1; s++) {
+            if constexpr (CLOSED)
+                *after = Row {};
+            describeNew(y, s, current);
+            if (!CLOSED || s < pack.segments)
+                addSegment(y, s, current, *here, *after);
+            else {
+                // The last segment of a ring that is unrolled is there for its joint alone.
+                here->upper = Mat {};
+                after->diagonal = Symmetric<Real> {};
+                after->right = loads[s+1];
+            }
+            addTethers(y, s, tether, *here);
+            if (s > 0) {
+                addJoint(s, previous, current, *before, *here, *after);
+                band.template eliminate<2>(s-1, *before, *here, *after);
+            }
+            previous = current;
+            Row* const free = before;
+            before = here;
+            here = after;
+            after = free;
+        }
+        if constexpr (CLOSED)
+            band.close(*before, *here);
+        else {
+            addTethers(y, n-1, tether, *here);
+            band.template eliminate<1>(n-2, *before, *here, *after);
+            band.template eliminate<0>(n-1, *here, *after, *before);
+        }
     }
     /** Add the drag of the flow, at the middle of the step, on segments at rest. Its part along a segment is a tension. */
     void addDragOfFlow(const Vec* y) {
@@ -284,51 +297,13 @@ private:
             const Real across = 0.25*property<Real>(pack, s, ChainPack::Perpendicular);
             const Real along = 0.25*property<Real>(pack, s, ChainPack::Parallel);
             const Vec carried = sum*across+direction*((along-across)*direction.dot(sum));
-            const Real turn = property<Real>(pack, s, ChainPack::Rotational)*geometry.middleInverse*geometry.middleInverse;
+            const Real turn = property<Real>(pack, s, ChainPack::Rotational)*turningFactor(s, geometry);
             const Real stretch = property<Real>(pack, s, ChainPack::Extensional)/(segments[s].length*geometry.length);
-            const Vec pair = difference*turn+direction*((stretch-turn)*direction.dot(difference));
+            const Vec pair = (difference-direction*direction.dot(difference))*turn;
             segments[s].tensionOfFlow = stretch*direction.dot(difference);
             loads[s] = loads[s]+carried-pair;
             loads[s+1] = loads[s+1]+carried+pair;
         }
-    }
-    void eliminateChain(const Vec* y) {
-        Row rows[3];
-        Row *before = rows, *here = rows+1, *after = rows+2;
-        Geometry previous, current;
-        std::size_t tether = 0;
-        here->diagonal = Mat {};
-        here->right = loads[0];
-        for (int s = 0; s < n-1; s++) {
-            describeNew(y, s, current);
-            addSegment(y, s, current, *here, *after);
-            addTethers(y, s, tether, *here);
-            if (s > 0) {
-                addJoint(s, previous, current, *before, *here, *after);
-                eliminate<2>(s-1, *before, *here, *after);
-            }
-            previous = current;
-            Row* const free = before;
-            before = here;
-            here = after;
-            after = free;
-        }
-        addTethers(y, n-1, tether, *here);
-        eliminate<1>(n-2, *before, *here, *after);
-        eliminate<0>(n-1, *here, *after, *before);
-    }
-    /** The first two nodes of a ring come last: all others are coupled to them as well. */
-    void eliminateRing(const Vec* y);
-    void eliminateNodeOfRing(int node, ClosedRow& row, ClosedRow& next, ClosedRow& second, Border& border);
-    static void coupleToBorder(ClosedRow& row, int k, const Mat& from, const Mat& to);
-    void eliminateBorder(const Border& border);
-    /** The inverse for a node that moves, and zero for a fixed one. */
-    CYLCHAIN_INLINE Mat inverseOf(Mat diagonal, int node) const {
-        const Real mobile = loaded<Real>(pack.mobile, node);
-        diagonal.x.x += 1-mobile;
-        diagonal.y.y += 1-mobile;
-        diagonal.z.z += 1-mobile;
-        return diagonal.inverse()*mobile;
     }
     CYLCHAIN_INLINE void describeNew(const Vec* y, int s, Geometry& geometry) {
         geometry.difference = y[s+1]-y[s];
@@ -383,16 +358,17 @@ private:
     /** Add a segment to the equations of its nodes. It is the first to do so for all but the first one's diagonal. */
     CYLCHAIN_INLINE void addSegment(const Vec* y, int s, const Geometry& geometry, Row& here, Row& after) {
         ImplicitSegment<Real>& segment = segments[s];
-        const Real length = geometry.length, inverseSquare = geometry.middleInverse*geometry.middleInverse;
+        const Real length = geometry.length;
         const Vec t = geometry.tangent, direction = geometry.middleTangent;
 
         // Friction.
         const Real acrossTrans = 0.25*property<Real>(pack, s, ChainPack::Perpendicular);
         const Real alongTrans = 0.25*property<Real>(pack, s, ChainPack::Parallel);
-        const Real acrossTurn = (property<Real>(pack, s, ChainPack::Rotational)+segment.extra)*inverseSquare;
-        const Mat same = Mat::axial((acrossTrans+acrossTurn)/h, (alongTrans-acrossTrans-acrossTurn)/h, direction);
-        const Mat other = Mat::axial((acrossTrans-acrossTurn)/h, (alongTrans-acrossTrans+acrossTurn)/h, direction);
+        const Real acrossTurn = (property<Real>(pack, s, ChainPack::Rotational)+segment.extra)*turningFactor(s, geometry);
+        const Real sameAcross = (acrossTrans+acrossTurn)/h, otherAcross = (acrossTrans-acrossTurn)/h, along = alongTrans/h;
         const Vec first = y[s]-x[s], second = y[s+1]-x[s+1];
+        const Vec axial1 = direction*((along-sameAcross)*direction.dot(first)+(along-otherAcross)*direction.dot(second));
+        const Vec axial2 = direction*((along-sameAcross)*direction.dot(second)+(along-otherAcross)*direction.dot(first));
 
         // Tension.
         const Real stiffness = property<Real>(pack, s, ChainPack::Stiffness);
@@ -402,26 +378,35 @@ private:
         stretchCoordinate(pack.stretching, reciprocal, length-l0, coordinate, slope);
         stretchCoordinate(pack.stretching, reciprocal, 0.5*(segment.length+length)-l0, unused, middleSlope);
         const Real drag = property<Real>(pack, s, ChainPack::Extensional)/(segment.length*length*h);
-        Real tension = stiffness*middleSlope*(segment.theta*coordinate+(1-segment.theta)*segment.coordinate-
+        segment.tension = stiffness*middleSlope*(segment.theta*coordinate+(1-segment.theta)*segment.coordinate-
                 segment.randomCoordinate)+drag*(length-segment.length)-segment.randomTension;
-        Real response = stiffness*middleSlope*segment.theta*slope+drag*segment.length/length;
-        // Metric forces are those of constraints then, and rounding the blocks of the inverse does not reach them.
-        const Real softening = stiffest*(acrossTrans+acrossTurn)/(h*response);
-        segment.softening = softening < 1 ? softening : 1+Real{};
-        tension = tension*segment.softening;
-        response = response*segment.softening;
-        const Vec pull = direction*tension;
-        const Real turning = 0.5*larger<Real>(segment.multiplier/length, -COMPRESSION*acrossTurn/h);
-        const Mat elastic = Mat::axial(turning, -turning, t)+Mat::outer(direction*response, t);
+        if (settings.flow.present)
+            segment.tension = segment.tension-segment.tensionOfFlow;
+        segment.response = stiffness*middleSlope*segment.theta*slope+drag*segment.length/length;
         segment.newTangent = t;
-        segment.tension = tension;
-        segment.response = response;
 
-        after.diagonal = same+elastic;
-        here.diagonal = here.diagonal+after.diagonal;
-        here.lower = here.upper = other-elastic;
-        here.right = here.right-same*first-other*second+pull;
-        after.right = loads[s+1]-same*second-other*first-pull;
+        // The tension acts along the mean direction. The matrix has the new one, with which it is symmetric, and what they
+        // differ by goes with the last iteration's tension.
+        segment.turned = direction-t;
+        segment.multiplierBefore = segment.multiplier;
+        const Vec lacking = segment.turned*segment.multiplier;
+        // Without part of the response, nothing in the nodes' own matrix would keep those of a straight chain from moving
+        // apart and together in turn.
+        segment.shift = lesser<Real>(0.5*segment.response, along);
+        band.setTension(s, t, 1/(segment.response-segment.shift+TINY), segment.tension);
+
+        const Real turning = 0.5*larger<Real>(segment.multiplier/length, -COMPRESSION*acrossTurn/h);
+        after.diagonal = Symmetric<Real> {};
+        after.diagonal.addAxial(sameAcross, along-sameAcross, direction);
+        after.diagonal.addAxial(turning, segment.shift-turning, t);
+        here.diagonal.add(after.diagonal);
+        here.upper = Mat::axial(otherAcross, along-otherAcross, direction)-Mat::axial(turning, segment.shift-turning, t);
+        here.right = here.right-first*sameAcross-second*otherAcross-axial1+lacking;
+        after.right = loads[s+1]-second*sameAcross-first*otherAcross-axial2-lacking;
+    }
+    /** The friction of a segment's ends against turning, over its rotational friction. */
+    CYLCHAIN_INLINE Real turningFactor(int, const Geometry& geometry) const {
+        return geometry.middleInverse*geometry.middleInverse;
     }
     /** Add the tethers of a node, the next ones, to its equations. */
     void addTethers(const Vec* y, int node, std::size_t& next, Row& row) {
@@ -433,9 +418,9 @@ private:
             lane(row.right.x, i) -= implicit*lane(moved.x, i)+stiffness*(tether.start[0]-tether.random[0]);
             lane(row.right.y, i) -= implicit*lane(moved.y, i)+stiffness*(tether.start[1]-tether.random[1]);
             lane(row.right.z, i) -= implicit*lane(moved.z, i)+stiffness*(tether.start[2]-tether.random[2]);
-            lane(row.diagonal.x.x, i) += implicit;
-            lane(row.diagonal.y.y, i) += implicit;
-            lane(row.diagonal.z.z, i) += implicit;
+            lane(row.diagonal.xx, i) += implicit;
+            lane(row.diagonal.yy, i) += implicit;
+            lane(row.diagonal.zz, i) += implicit;
         }
     }
     /** Add the joint between two segments to the equations of their nodes. */
@@ -469,104 +454,58 @@ private:
 
         const Real scale = stiffness*segment.jointTheta*factor.f*factor.f;
         const Real scale1 = scale*perLength1*perLength1, scale2 = scale*perLength2*perLength2;
-        const Mat first = Mat::axial(scale1, -scale1, t1), last = Mat::axial(scale2, -scale2, t2);
+        Symmetric<Real> first = {}, last = {};
+        first.addAxial(scale1, -scale1, t1);
+        last.addAxial(scale2, -scale2, t2);
         const Real c = t1.dot(t2);
         const Vec projected = t2-t1*c;
         // -(1-t1 t1)(1-t2 t2)
         const Mat mixed = (Mat::axial(1+Real{}, -1+Real{}, t1)-Mat::outer(projected, t2))*(-scale*perLength1*perLength2);
-        const Mat mixedT = mixed.transposed();
-        before.diagonal = before.diagonal+first;
-        here.diagonal = here.diagonal+first+last-mixed-mixedT;
-        after.diagonal = after.diagonal+last;
-        before.upper = before.upper+mixed-first;
-        before.lower = before.lower+mixedT-first;
-        here.upper = here.upper+mixed-last;
-        here.lower = here.lower+mixedT-last;
         before.second = mixed*(-1+Real{});
+        before.diagonal.add(first);
+        here.diagonal.add(first);
+        here.diagonal.add(last);
+        here.diagonal.addTwice(before.second);
+        after.diagonal.add(last);
+        before.upper = before.upper+mixed-Mat::of(first);
+        here.upper = here.upper+mixed-Mat::of(last);
     }
-    /** Eliminate a node from the equations of those of the next two that exist. Nothing passes through a fixed one. */
-    template <int FOLLOWING> CYLCHAIN_INLINE void eliminate(int node, const Row& row, Row& next, Row& second) {
-        ImplicitNode<Real>& result = nodes[node];
-        result.inverse = inverseOf(row.diagonal, node);
-        result.solution = result.inverse*row.right;
-        if (FOLLOWING > 0) {
-            result.next = result.inverse*row.upper;
-            next.diagonal = next.diagonal-row.lower*result.next;
-            next.right = next.right-row.lower*result.solution;
-        }
-        if (FOLLOWING > 1) {
-            const Mat secondT = row.second.transposed();
-            result.second = result.inverse*row.second;
-            next.upper = next.upper-row.lower*result.second;
-            next.lower = next.lower-secondT*result.next;
-            second.diagonal = second.diagonal-secondT*result.second;
-            second.right = second.right-secondT*result.solution;
-        }
-        else
-            result.second = Mat {};
-    }
-    /** Find the changes of y, and the tensions that come with them. */
-    void substitute() {
-        if (CLOSED)
-            substituteRing();
-        else
-            substituteChain();
+    /** Find the changes of y and the tensions, or add to them. */
+    void substitute(Real before) {
+        band.substitute(change, before);
         for (int s = 0; s < pack.segments; s++) {
             ImplicitSegment<Real>& segment = segments[s];
-            segment.multiplier = segment.tension+segment.response*segment.newTangent.dot(change[s+1]-change[s]);
+            segment.multiplier = band.tension(s)+segment.shift*segment.newTangent.dot(change[s+1]-change[s]);
         }
     }
-    void substituteChain() {
-        for (int node = n-1; node >= 0; node--) {
-            change[node] = nodes[node].solution;
-            if (node < n-1)
-                change[node] = change[node]-nodes[node].next*change[node+1];
-            if (node < n-2)
-                change[node] = change[node]-nodes[node].second*change[node+2];
+    /** Let the change of tensions act along the mean direction as well, with the same elimination. */
+    void refine() {
+        for (int node = 0; node < n; node++)
+            rest[node] = Vec {};
+        for (int s = 0; s < pack.segments; s++) {
+            const ImplicitSegment<Real>& segment = segments[s];
+            const Vec force = segment.turned*(segment.multiplier-segment.multiplierBefore);
+            rest[s] = rest[s]+force;
+            rest[s+1] = rest[s+1]-force;
         }
-    }
-    void substituteRing();
-    /**
-     * Add the metric forces of the lengths. The matrix is symmetric in the first iteration, so the blocks of its
-     * inverse follow from those of its elimination, from last to first.
-     */
-    void addMetricForces() {
         if (CLOSED)
-            addMetricForcesOfRing();
-        else
-            addMetricForcesOfChain();
+            rest[0] = rest[0]+rest[pack.segments];
+        band.setRight(rest);
+        substitute(1+Real{});
     }
-    void addMetricForcesOfChain() {
-        Mat same = nodes[n-1].inverse, other = {}, sameAfter = {};
-        for (int s = n-2; s >= 0; s--) {
-            // Blocks of the inverse: (s,s), (s,s+1) and (s,s+2).
-            const ImplicitNode<Real>& node = nodes[s];
-            Mat newOther = node.next*same, newSecond = node.next*other;
-            newOther = (newOther+node.second*other.transposed())*(-1+Real{});
-            newSecond = (newSecond+node.second*sameAfter)*(-1+Real{});
-            // Errors that are not symmetric would grow from node to node.
-            Mat newSame = node.inverse-node.next*newOther.transposed()-node.second*newSecond.transposed();
-            newSame = (newSame+newSame.transposed())*(0.5+Real{});
-
-            addMetricForce(s, newSame, newOther, same);
-            sameAfter = same;
-            same = newSame;
-            other = newOther;
-        }
+    /** Add the metric forces of the lengths, in the first iteration, where the directions are those of the start. */
+    void addMetricForces() {
+        band.findResponses([&] (int s, Vec response) {
+            const ImplicitSegment<Real>& segment = segments[s];
+            const Vec t = segment.tangent;
+            response = response-t*t.dot(response);
+            const Real drag = property<Real>(pack, s, ChainPack::Extensional)/(segment.length*segment.length*h);
+            const Real noise = property<Real>(pack, s, ChainPack::Stiffness)*(2*segment.theta-1)+drag;
+            const Vec force = response*(settings.kT*noise/segment.length);
+            f[s] = f[s]+force;
+            f[s+1] = f[s+1]-force;
+        });
     }
-    /** Add the metric force of a segment, for the blocks of the inverse that belong to its nodes. */
-    CYLCHAIN_INLINE void addMetricForce(int s, const Mat& first, const Mat& other, const Mat& second) {
-        const ImplicitSegment<Real>& segment = segments[s];
-        const Vec t = segment.tangent;
-        Vec response = (second+first-other-other.transposed())*t;
-        response = response-t*t.dot(response);
-        const Real drag = property<Real>(pack, s, ChainPack::Extensional)/(segment.length*segment.length*h);
-        const Real noise = segment.softening*(property<Real>(pack, s, ChainPack::Stiffness)*(2*segment.theta-1)+drag);
-        const Vec force = response*(settings.kT*noise/segment.length);
-        f[s] = f[s]+force;
-        f[s+1] = f[s+1]-force;
-    }
-    void addMetricForcesOfRing();
     /** Whether any lane has not converged; those that have are taken out. NaN counts as not converged. */
     bool anyUnfinished(Real& active) {
         Real excess = Real{};
@@ -599,7 +538,6 @@ private:
 };
 
 #include "ImplicitNoise.h"
-#include "ImplicitRing.h"
 
 /** Advance the lanes that failed, from the start, by the same time in more and more parts. */
 template <int W, bool CLOSED> void divideStep(const ChainPack& pack, const Vector<typename Lanes<W>::Type>* x,
@@ -656,8 +594,8 @@ template <int W, bool CLOSED> Instability stepPackImplicitly(const ChainPack& pa
     gatherStart<W>(pack, positions, box, x);
     gatherForces<W>(pack, forces, f);
     bool failed[W];
-    ImplicitStep<W, CLOSED>(pack, settings, box, memory).take(x, f, y, failed);
     Instability result;
+    result.iterations = ImplicitStep<W, CLOSED>(pack, settings, box, memory).take(x, f, y, failed);
     for (int i = 0; i < W; i++)
         result.divided += failed[i];
     if (result.divided > 0)

@@ -38,32 +38,6 @@ template <class Real> CYLCHAIN_INLINE Vector<Real> crossProduct(const Vector<Rea
     return {a.y*b.z-a.z*b.y, a.z*b.x-a.x*b.z, a.x*b.y-a.y*b.x};
 }
 
-/** A symmetric 3x3 matrix. */
-template <class Real> struct Symmetric {
-    Real xx, yx, yy, zx, zy, zz;
-    Vector<Real> operator*(const Vector<Real>& v) const {
-        return {xx*v.x+yx*v.y+zx*v.z, yx*v.x+yy*v.y+zy*v.z, zx*v.x+zy*v.y+zz*v.z};
-    }
-    /** Add s 1 + r tt. */
-    void addAxial(Real s, Real r, const Vector<Real>& t) {
-        const Vector<Real> rt = t*r;
-        xx += s+rt.x*t.x;
-        yx += rt.y*t.x;
-        yy += s+rt.y*t.y;
-        zx += rt.z*t.x;
-        zy += rt.z*t.y;
-        zz += s+rt.z*t.z;
-    }
-    Symmetric operator-(const Symmetric& m) const {
-        return {xx-m.xx, yx-m.yx, yy-m.yy, zx-m.zx, zy-m.zy, zz-m.zz};
-    }
-    Symmetric inverse(Real scale) const {
-        Symmetric c = {yy*zz-zy*zy, zx*zy-yx*zz, xx*zz-zx*zx, yx*zy-yy*zx, yx*zx-xx*zy, xx*yy-yx*yx};
-        const Real factor = scale/(xx*c.xx+yx*c.yx+zx*c.zx);
-        return {c.xx*factor, c.yx*factor, c.yy*factor, c.zx*factor, c.zy*factor, c.zz*factor};
-    }
-};
-
 #include "Matrix.h"
 
 /** Memory that a thread keeps between calls, aligned for vector registers. */
