@@ -49,6 +49,7 @@ void fillLane(ChainPack& pack, int lane, const Chain& chain, int index) {
         pack.particles[node*lanes+lane] = chain.nodes[node%own];
         pack.mobile[node*lanes+lane] = chain.fixed[node%own] ? 0.0 : 1.0;
     }
+    pack.free[lane] = any_of(chain.fixed.begin(), chain.fixed.end(), [] (bool fixed) {return fixed;}) ? 0.0 : 1.0;
     for (size_t node = 1; node < unrolled-1; node++)
         pack.joints[node*lanes+lane] = chain.joints[chain.closed ? node%own : node-1];
     for (const Tether& tether : chain.tethers)
@@ -91,6 +92,7 @@ ChainPack packed(const vector<Chain>& chains, const vector<int>& members) {
     pack.chain.resize(pack.lanes);
     pack.nodesOfLane.resize(pack.lanes);
     pack.segmentsOfLane.resize(pack.lanes);
+    pack.free.resize(pack.lanes);
     const size_t places = (size_t) pack.nodes*pack.lanes;
     pack.particles.resize(places, -1);
     pack.mobile.resize(places, 0.0);

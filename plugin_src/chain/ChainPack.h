@@ -40,6 +40,8 @@ struct ChainPack {
     std::vector<double> joints;
     /** One for each node that moves, [node][lane]; zero for others. */
     std::vector<double> mobile;
+    /** One for each lane whose chain has no node that is fixed; zero for others. */
+    std::vector<double> free;
     /** The tethers of all lanes, by their nodes. */
     std::vector<LaneTether> tethers;
     /** Half the propulsion of each segment, [segment][lane], or nothing if there is none. */

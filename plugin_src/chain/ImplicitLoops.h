@@ -140,6 +140,8 @@ public:
             }
             for (int node = 0; node < n; node++)
                 y[node] = y[node]+change[node]*active;
+            if (!CLOSED && iterations == 0)
+                resetLengths(y);
             iterations++;
             if (iterations >= least && !anyUnfinished(active))
                 break;
@@ -169,16 +171,40 @@ private:
     void carryAlong(Vec* y) const {
         const LaneFlow<W> flow(settings.flow, pack, x[0]);
         const Vec halfway = x[0]+flow.at(x[0])*(0.5*h+Real{});
-        Real free;
-        for (int i = 0; i < W; i++) {
-            lane(free, i) = 1;
-            for (int node = 0; node < pack.nodesOfLane[i]; node++)
-                if (pack.mobile[node*W+i] == 0)
-                    lane(free, i) = 0;
-        }
+        const Real free = loaded<Real>(pack.free, 0);
         const Vec carried = flow.at(halfway)*(free*h);
         for (int node = 0; node < n; node++)
             y[node] = y[node]+carried;
+    }
+    /**
+     * Segments that turn far become longer when their ends move along straight lines. Give them the directions that they
+     * have now, and the lengths that the linear equations mean, around the same mean of all nodes. Chains with fixed nodes
+     * stay.
+     */
+    void resetLengths(Vec* y) const {
+        Vec sum = {}, shifted = {}, end = {}, moved = {};
+        Real count = Real{};
+        for (int node = 0; node < n; node++) {
+            const Real mobile = loaded<Real>(pack.mobile, node);
+            if (node > 0) {
+                const ImplicitSegment<Real>& segment = segments[node-1];
+                const Vec difference = y[node]-end;
+                const Real length = larger<Real>(segment.length+segment.newTangent.dot(difference-segment.difference),
+                        0.5*segment.length);
+                moved = moved+difference*(length/root(difference.dot(difference)));
+            }
+            else
+                moved = y[0];
+            end = y[node];
+            sum = sum+end*mobile;
+            shifted = shifted+moved*mobile;
+            count = count+mobile;
+            rest[node] = moved;
+        }
+        const Vec back = (sum-shifted)*(1/larger<Real>(count, 1+Real{}));
+        const Real free = loaded<Real>(pack.free, 0);
+        for (int node = 0; node < n; node++)
+            y[node] = y[node]+(rest[node]+back-y[node])*free;
     }
     /** Describe the start of a step, without noise. */
     void describe() {
@@ -404,9 +430,14 @@ private:
         here.right = here.right-first*sameAcross-second*otherAcross-axial1+lacking;
         after.right = loads[s+1]-second*sameAcross-first*otherAcross-axial2-lacking;
     }
-    /** The friction of a segment's ends against turning, over its rotational friction. */
-    CYLCHAIN_INLINE Real turningFactor(int, const Geometry& geometry) const {
-        return geometry.middleInverse*geometry.middleInverse;
+    /**
+     * The friction of a segment's ends against turning, over its rotational friction. A turn by phi obeys
+     * 2 sin(phi/2) = A cos^(1/2)(phi/2) with Gaussian A then, which diffuses as it should to second order in the step.
+     */
+    CYLCHAIN_INLINE Real turningFactor(int s, const Geometry& geometry) const {
+        const ImplicitSegment<Real>& segment = segments[s];
+        const Real cosine = segment.tangent.dot(geometry.tangent);
+        return root(root(larger<Real>(0.5+0.5*cosine, TINY+Real{})))/(segment.length*segment.length);
     }
     /** Add the tethers of a node, the next ones, to its equations. */
     void addTethers(const Vec* y, int node, std::size_t& next, Row& row) {
