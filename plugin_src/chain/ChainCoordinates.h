@@ -15,7 +15,7 @@ template <class Real> CYLCHAIN_INLINE BendFactor<Real> bendFactor(BendingModel m
     if (model == BendingModel::InscribedCircle) {
         const Real sum = 4-square+1e-12;
         const Real f = 2/root(sum);
-        return {f, -f/sum};
+        return {f, f*f*f*-0.25};
     }
     BendFactor<Real> result;
     for (int i = 0; i < (int) (sizeof(Real)/sizeof(double)); i++) {
@@ -26,6 +26,32 @@ template <class Real> CYLCHAIN_INLINE BendFactor<Real> bendFactor(BendingModel m
         lane(result.slope, i) = small ? -1.0/12 : -(1/chord-half*std::cos(half)*2/(chord*chord))/std::sin(2*half);
     }
     return result;
+}
+
+/**
+ * The factors of two bends, together with the inverses of two other numbers: with one division for all, which take longer
+ * than the rest.
+ */
+template <class Real> CYLCHAIN_INLINE void bendFactors(BendingModel model, const Vector<Real>& difference1,
+            const Vector<Real>& difference2, BendFactor<Real>& factor1, BendFactor<Real>& factor2, Real number1, Real number2,
+            Real& inverse1, Real& inverse2) {
+    const Real numbers = number1*number2;
+    if (model == BendingModel::InscribedCircle) {
+        const Real root1 = root(4-difference1.dot(difference1)+1e-12), root2 = root(4-difference2.dot(difference2)+1e-12);
+        const Real roots = root1*root2, all = 1/(roots*numbers);
+        const Real perRoots = all*numbers, perNumbers = all*roots;
+        const Real f1 = 2*perRoots*root2, f2 = 2*perRoots*root1;
+        factor1 = {f1, f1*f1*f1*-0.25};
+        factor2 = {f2, f2*f2*f2*-0.25};
+        inverse1 = perNumbers*number2;
+        inverse2 = perNumbers*number1;
+        return;
+    }
+    factor1 = bendFactor<Real>(model, difference1);
+    factor2 = bendFactor<Real>(model, difference2);
+    const Real both = 1/numbers;
+    inverse1 = both*number2;
+    inverse2 = both*number1;
 }
 
 /** The square of a bend for the cosine c. */

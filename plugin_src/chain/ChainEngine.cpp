@@ -59,6 +59,7 @@ void fillLane(ChainPack& pack, int lane, const Chain& chain, int index) {
         const Segment segment = filling ? Segment {1, 0, 1, 0, 0, 0, 0} : chain.segments[s%chain.segments.size()];
         double* properties = &pack.properties[(size_t) s*ChainPack::NumProperties*lanes+lane];
         properties[ChainPack::RestLength*lanes] = segment.restLength;
+        properties[ChainPack::InverseRestLength*lanes] = 1/segment.restLength;
         properties[ChainPack::Stiffness*lanes] = segment.stiffness;
         properties[ChainPack::InverseExtension*lanes] = segment.maximumExtension > 0 ? 1/segment.maximumExtension : 0;
         properties[ChainPack::Parallel*lanes] = segment.parallel;

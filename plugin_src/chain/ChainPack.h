@@ -23,8 +23,8 @@ struct ChainPack {
      * The properties of a segment, each of them for all lanes. Drift is the thermal torque (15) over k_B T, which is
      * d+1-(d-1)gamma_def/gamma_rot in d dimensions.
      */
-    enum Property {RestLength, Stiffness, InverseExtension, Parallel, Perpendicular, Rotational, Extensional,
-            RootParallel, RootPerpendicular, RootRotational, RootExtensional, Drift, NumProperties};
+    enum Property {RestLength, InverseRestLength, Stiffness, InverseExtension, Parallel, Perpendicular, Rotational,
+            Extensional, RootParallel, RootPerpendicular, RootRotational, RootExtensional, Drift, NumProperties};
     /** The number of nodes includes those that come twice; that of segments does not. */
     int lanes, nodes, segments;
     BendingModel bending;

@@ -60,7 +60,7 @@ template <class Real> CYLCHAIN_INLINE void orthogonal(const Vector<Real>& n, Vec
 template <class Real> struct ImplicitSegment {
     // At the start: the vector, its direction and length, the coordinate of the length, and the bend.
     Vector<Real> difference, tangent, bend, bisector;
-    Real length, coordinate;
+    Real length, inverse, coordinate;
     // The noise, and how implicit the segment and the joint are.
     Vector<Real> randomBend, randomPair;
     Real randomCoordinate, randomTension, theta, jointTheta;
@@ -140,7 +140,7 @@ public:
             }
             for (int node = 0; node < n; node++)
                 y[node] = y[node]+change[node]*active;
-            if (!CLOSED && iterations == 0)
+            if (!CLOSED)
                 resetLengths(y);
             iterations++;
             if (iterations >= least && !anyUnfinished(active))
@@ -189,8 +189,7 @@ private:
             if (node > 0) {
                 const ImplicitSegment<Real>& segment = segments[node-1];
                 const Vec difference = y[node]-end;
-                const Real length = larger<Real>(segment.length+segment.newTangent.dot(difference-segment.difference),
-                        0.5*segment.length);
+                const Real length = larger<Real>(segment.newTangent.dot(difference), 0.5*segment.length);
                 moved = moved+difference*(length/root(difference.dot(difference)));
             }
             else
@@ -212,7 +211,8 @@ private:
             ImplicitSegment<Real>& segment = segments[s];
             segment.difference = x[s+1]-x[s];
             segment.length = root(segment.difference.dot(segment.difference));
-            segment.tangent = segment.difference*(1/segment.length);
+            segment.inverse = 1/segment.length;
+            segment.tangent = segment.difference*segment.inverse;
             const Real l0 = property<Real>(pack, s, ChainPack::RestLength);
             Real slope;
             stretchCoordinate(pack.stretching, property<Real>(pack, s, ChainPack::InverseExtension), segment.length-l0,
@@ -265,7 +265,7 @@ private:
     /** The new segment, and the one between the old nodes and the new. */
     struct Geometry {
         Vec difference, tangent, middleTangent;
-        Real length, middleInverse;
+        Real length, inverse, middleInverse;
     };
     /** Linearise the equations around y, and eliminate the nodes from first to last. */
     void eliminate(const Vec* y) {
@@ -324,7 +324,7 @@ private:
             const Real along = 0.25*property<Real>(pack, s, ChainPack::Parallel);
             const Vec carried = sum*across+direction*((along-across)*direction.dot(sum));
             const Real turn = property<Real>(pack, s, ChainPack::Rotational)*turningFactor(s, geometry);
-            const Real stretch = property<Real>(pack, s, ChainPack::Extensional)/(segments[s].length*geometry.length);
+            const Real stretch = property<Real>(pack, s, ChainPack::Extensional)*segments[s].inverse*geometry.inverse;
             const Vec pair = (difference-direction*direction.dot(difference))*turn;
             segments[s].tensionOfFlow = stretch*direction.dot(difference);
             loads[s] = loads[s]+carried-pair;
@@ -333,10 +333,14 @@ private:
     }
     CYLCHAIN_INLINE void describeNew(const Vec* y, int s, Geometry& geometry) {
         geometry.difference = y[s+1]-y[s];
-        geometry.length = root(geometry.difference.dot(geometry.difference));
-        geometry.tangent = geometry.difference*(1/geometry.length);
         const Vec middle = (segments[s].difference+geometry.difference)*(0.5+Real{});
-        geometry.middleInverse = 1/root(middle.dot(middle));
+        const Real length = root(geometry.difference.dot(geometry.difference)), middleLength = root(middle.dot(middle));
+        // Divisions take longer than all the rest.
+        const Real both = 1/(length*middleLength);
+        geometry.length = length;
+        geometry.inverse = both*middleLength;
+        geometry.middleInverse = both*length;
+        geometry.tangent = geometry.difference*geometry.inverse;
         geometry.middleTangent = middle*geometry.middleInverse;
     }
     /** The friction of a segment's ends against turning, and the stiffness with which its tension turns it back, in a step. */
@@ -391,7 +395,9 @@ private:
         const Real acrossTrans = 0.25*property<Real>(pack, s, ChainPack::Perpendicular);
         const Real alongTrans = 0.25*property<Real>(pack, s, ChainPack::Parallel);
         const Real acrossTurn = (property<Real>(pack, s, ChainPack::Rotational)+segment.extra)*turningFactor(s, geometry);
-        const Real sameAcross = (acrossTrans+acrossTurn)/h, otherAcross = (acrossTrans-acrossTurn)/h, along = alongTrans/h;
+        const double perStep = 1/h;
+        const Real sameAcross = (acrossTrans+acrossTurn)*perStep, otherAcross = (acrossTrans-acrossTurn)*perStep;
+        const Real along = alongTrans*perStep;
         const Vec first = y[s]-x[s], second = y[s+1]-x[s+1];
         const Vec axial1 = direction*((along-sameAcross)*direction.dot(first)+(along-otherAcross)*direction.dot(second));
         const Vec axial2 = direction*((along-sameAcross)*direction.dot(second)+(along-otherAcross)*direction.dot(first));
@@ -403,12 +409,12 @@ private:
         Real coordinate, slope, unused, middleSlope;
         stretchCoordinate(pack.stretching, reciprocal, length-l0, coordinate, slope);
         stretchCoordinate(pack.stretching, reciprocal, 0.5*(segment.length+length)-l0, unused, middleSlope);
-        const Real drag = property<Real>(pack, s, ChainPack::Extensional)/(segment.length*length*h);
+        const Real drag = property<Real>(pack, s, ChainPack::Extensional)*(segment.inverse*geometry.inverse*perStep);
         segment.tension = stiffness*middleSlope*(segment.theta*coordinate+(1-segment.theta)*segment.coordinate-
                 segment.randomCoordinate)+drag*(length-segment.length)-segment.randomTension;
         if (settings.flow.present)
             segment.tension = segment.tension-segment.tensionOfFlow;
-        segment.response = stiffness*middleSlope*segment.theta*slope+drag*segment.length/length;
+        segment.response = stiffness*middleSlope*segment.theta*slope+drag*segment.length*geometry.inverse;
         segment.newTangent = t;
 
         // The tension acts along the mean direction. The matrix has the new one, with which it is symmetric, and what they
@@ -421,7 +427,7 @@ private:
         segment.shift = lesser<Real>(0.5*segment.response, along);
         band.setTension(s, t, 1/(segment.response-segment.shift+TINY), segment.tension);
 
-        const Real turning = 0.5*larger<Real>(segment.multiplier/length, -COMPRESSION*acrossTurn/h);
+        const Real turning = 0.5*larger<Real>(segment.multiplier*geometry.inverse, acrossTurn*(-COMPRESSION*perStep));
         after.diagonal = Symmetric<Real> {};
         after.diagonal.addAxial(sameAcross, along-sameAcross, direction);
         after.diagonal.addAxial(turning, segment.shift-turning, t);
@@ -432,12 +438,13 @@ private:
     }
     /**
      * The friction of a segment's ends against turning, over its rotational friction. A turn by phi obeys
-     * 2 sin(phi/2) = A cos^(1/2)(phi/2) with Gaussian A then, which diffuses as it should to second order in the step.
+     * 2 sin(phi/2) = A cos^(1/2)(phi/2) with Gaussian A then, which diffuses as it should to second order in the step. Of
+     * cos^(1/2), what is left out is of the sixth order in phi.
      */
     CYLCHAIN_INLINE Real turningFactor(int s, const Geometry& geometry) const {
         const ImplicitSegment<Real>& segment = segments[s];
-        const Real cosine = segment.tangent.dot(geometry.tangent);
-        return root(root(larger<Real>(0.5+0.5*cosine, TINY+Real{})))/(segment.length*segment.length);
+        const Real squareOfSine = 0.5-0.5*segment.tangent.dot(geometry.tangent);
+        return (1-squareOfSine*(0.25+0.09375*squareOfSine))*(segment.inverse*segment.inverse);
     }
     /** Add the tethers of a node, the next ones, to its equations. */
     void addTethers(const Vec* y, int node, std::size_t& next, Row& row) {
@@ -460,21 +467,24 @@ private:
         const ImplicitSegment<Real>& segment = segments[s];
         const Vec t1 = geometry1.middleTangent, t2 = geometry2.middleTangent;
         const Real perLength1 = geometry1.middleInverse, perLength2 = geometry2.middleInverse;
-        const Vec newBent = geometry2.tangent-geometry1.tangent;
-        const Vec newBend = newBent*bendFactor<Real>(pack.bending, newBent).f;
+        const Vec newBent = geometry2.tangent-geometry1.tangent, bent = t2-t1;
+        BendFactor<Real> newFactor, factor;
 
         // The random bend turns with the joint.
         const Vec sum = segments[s-1].tangent+segment.tangent+geometry1.tangent+geometry2.tangent;
-        const Vec bisector = sum*(1/root(sum.dot(sum)+TINY));
+        const Real sumLength = root(sum.dot(sum)+1e-24), projection = segment.bisector.dot(sum);
+        // The inverse of the length, and of one plus the cosine.
+        Real perSum, perOne;
+        bendFactors<Real>(pack.bending, newBent, bent, newFactor, factor, sumLength, sumLength+projection+1e-12, perSum, perOne);
+        const Vec bisector = sum*perSum;
+        const Real cosine = projection*perSum;
         const Vec axis = crossProduct(segment.bisector, bisector);
-        const Real cosine = segment.bisector.dot(bisector);
         const Vec random = segment.randomBend*cosine+crossProduct(axis, segment.randomBend)+
-                axis*(axis.dot(segment.randomBend)/(1+cosine+1e-12));
+                axis*(axis.dot(segment.randomBend)*sumLength*perOne);
+        const Vec newBend = newBent*newFactor.f;
 
         const Real stiffness = loaded<Real>(pack.joints, s);
         const Vec u = newBend*segment.jointTheta+segment.bend*(1-segment.jointTheta)-random;
-        const Vec bent = t2-t1;
-        const BendFactor<Real> factor = bendFactor<Real>(pack.bending, bent);
         const Real twist = factor.slope*u.dot(bent);
         Vec force1 = t2*twist-u*factor.f, force2 = u*factor.f+t1*twist;
         force1 = (force1-t1*t1.dot(force1))*(stiffness*perLength1);
@@ -503,25 +513,16 @@ private:
     }
     /** Find the changes of y and the tensions, or add to them. */
     void substitute(Real before) {
-        band.substitute(change, before);
-        for (int s = 0; s < pack.segments; s++) {
+        band.substitute(change, before, [&] (int s, Real tension) {
             ImplicitSegment<Real>& segment = segments[s];
-            segment.multiplier = band.tension(s)+segment.shift*segment.newTangent.dot(change[s+1]-change[s]);
-        }
+            segment.multiplier = tension+segment.shift*segment.newTangent.dot(change[s+1]-change[s]);
+        });
     }
     /** Let the change of tensions act along the mean direction as well, with the same elimination. */
     void refine() {
-        for (int node = 0; node < n; node++)
-            rest[node] = Vec {};
-        for (int s = 0; s < pack.segments; s++) {
-            const ImplicitSegment<Real>& segment = segments[s];
-            const Vec force = segment.turned*(segment.multiplier-segment.multiplierBefore);
-            rest[s] = rest[s]+force;
-            rest[s+1] = rest[s+1]-force;
-        }
-        if (CLOSED)
-            rest[0] = rest[0]+rest[pack.segments];
-        band.setRight(rest);
+        band.setForces([&] (int s) {
+            return segments[s].turned*(segments[s].multiplier-segments[s].multiplierBefore);
+        });
         substitute(1+Real{});
     }
     /** Add the metric forces of the lengths, in the first iteration, where the directions are those of the start. */
@@ -540,15 +541,17 @@ private:
     /** Whether any lane has not converged; those that have are taken out. NaN counts as not converged. */
     bool anyUnfinished(Real& active) {
         Real excess = Real{};
+        const Real perEnergy = (CLOSED ? 1+Real{} : 1-loaded<Real>(pack.free, 0))*(1/(settings.kT+TINY));
         for (int s = 0; s < pack.segments; s++) {
             const Vec difference = change[s+1]-change[s];
-            const Real l0 = property<Real>(pack, s, ChainPack::RestLength), square = difference.dot(difference);
-            const Real ratio = square/(NEWTON_TOLERANCE*NEWTON_TOLERANCE*l0*l0);
-            // An iteration takes a length to first order in the change, so that an error of square/(2 l0) is left.
-            const Real error = square/(2*LENGTH_TOLERANCE*l0);
+            const Real inverse = property<Real>(pack, s, ChainPack::InverseRestLength), square = difference.dot(difference);
+            const Real ratio = square*(inverse*inverse*(1/(NEWTON_TOLERANCE*NEWTON_TOLERANCE)));
+            // An iteration takes a length to first order in the change, so that an error of square/(2 l0) is left where
+            // lengths are not reset.
+            const Real error = square*inverse*(0.5/LENGTH_TOLERANCE);
             excess = ratio < excess ? excess : ratio;
             if (settings.kT > 0)
-                excess = larger(excess, error*error*segments[s].response/settings.kT);
+                excess = larger(excess, error*error*segments[s].response*perEnergy);
         }
         bool any = false;
         for (int i = 0; i < W; i++) {
@@ -561,7 +564,8 @@ private:
     void findExcessiveChanges(const Vec* y, bool* failed) {
         for (int s = 0; s < pack.segments; s++) {
             const Vec difference = y[s+1]-y[s]-segments[s].difference;
-            Real square = difference.dot(difference), limit = property<Real>(pack, s, ChainPack::RestLength);
+                // A quarter of a turn.
+            Real square = 0.5*difference.dot(difference), limit = property<Real>(pack, s, ChainPack::RestLength);
             for (int i = 0; i < W; i++)
                 failed[i] |= s < pack.segmentsOfLane[i] && !(lane(square, i) < lane(limit, i)*lane(limit, i));
         }

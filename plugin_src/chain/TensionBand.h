@@ -105,10 +105,11 @@ public:
     /**
      * Find nodes and tensions, or add them to what is there.
      *
-     * @param y       those of a ring must have place for the first two nodes once more
-     * @param before  zero, or one to add
+     * @param y        those of a ring must have place for the first two nodes once more
+     * @param before   zero, or one to add
+     * @param use      is called with the number of each segment and its tension, when its nodes have been found
      */
-    void substitute(Vec* y, Real before) {
+    template <class Function> CYLCHAIN_INLINE void substitute(Vec* y, Real before, Function use) {
         Vec next = {}, second = {};
         Real tension = {};
         if constexpr (CLOSED) {
@@ -119,49 +120,66 @@ public:
             tensions[0] = tension0+tensions[0]*before;
             tensions[n-1] = tensionLast+tensions[n-1]*before;
             tension = tensionLast;
-            for (int node = n-1; node > 1; node--)
-                substitutePair(node, found0, found1, next, second, tension, y, before);
             y[0] = found0+y[0]*before;
             y[1] = found1+y[1]*before;
             y[n] = y[0];
             y[n+1] = y[1];
+            for (int node = n-1; node > 1; node--) {
+                substitutePair(node, found0, found1, next, second, tension, y, before);
+                use(node, tensions[node]);
+            }
+            use(1, tensions[1]);
+            use(0, tensions[0]);
         }
-        else
-            for (int node = n-1; node >= 0; node--)
+        else {
+            substitutePair(n-1, next, next, next, second, tension, y, before);
+            for (int node = n-2; node >= 0; node--) {
                 substitutePair(node, next, next, next, second, tension, y, before);
+                use(node, tensions[node]);
+            }
+        }
     }
-    /** Take new right sides of the nodes, and none of tensions, with the same elimination; then substitute. */
-    void setRight(const Vec* right) {
+    /**
+     * Take new right sides, and none of tensions, with the same elimination.
+     *
+     * @param forceOf   returns the force of each segment on its first node; its second node has the opposite one
+     */
+    template <class Function> CYLCHAIN_INLINE void setForces(Function forceOf) {
         Vec here = {}, next = {}, borderRight[2] = {};
         Real start = {};
-        const int begin = CLOSED ? 2 : 0;
-        for (int node = begin; node < n; node++) {
+        Vec forceBefore = {};
+        if constexpr (CLOSED) {
+            const Vec force0 = forceOf(0), force1 = forceOf(1);
+            borderRight[0] = force0-forceOf(n-1);
+            borderRight[1] = force1-force0;
+            forceBefore = force1;
+        }
+        for (int node = CLOSED ? 2 : 0; node < n; node++) {
             EliminatedPair<Real, CLOSED>& own = nodes[node];
-            const Vec force = right[node]+here;
-            own.solution = own.inverse*force-own.give*start;
-            own.tension = own.reciprocal*start+own.give.dot(force);
+            Vec right = here-forceBefore;
+            if (CLOSED || node < n-1) {
+                forceBefore = forceOf(node);
+                right = right+forceBefore;
+            }
+            own.solution = own.inverse*right-own.give*start;
+            own.tension = own.reciprocal*start+own.give.dot(right);
             if constexpr (CLOSED)
                 for (int k = 0; k < 2; k++)
-                    borderRight[k] = borderRight[k]-own.border[k].transposedTimes(force)-own.tensionBorder[k]*start;
+                    borderRight[k] = borderRight[k]-own.border[k].transposedTimes(right)-own.tensionBorder[k]*start;
             else if (node == n-1)
                 return;
-            here = next-own.next.transposedTimes(force)-own.first*start;
-            next = (own.second.transposedTimes(force)+own.last*start)*(-1+Real{});
+            here = next-own.next.transposedTimes(right)-own.first*start;
+            next = (own.second.transposedTimes(right)+own.last*start)*(-1+Real{});
             start = -equations[node].direction.dot(own.solution);
         }
         if constexpr (CLOSED) {
-            const Vec force0 = right[0]+borderRight[0];
-            nodes[0].solution = nodes[0].inverse*force0-nodes[0].give*start;
-            nodes[0].tension = nodes[0].reciprocal*start+nodes[0].give.dot(force0);
-            const Vec force1 = right[1]+borderRight[1]-nodes[0].next.transposedTimes(force0)-nodes[0].first*start;
+            nodes[0].solution = nodes[0].inverse*borderRight[0]-nodes[0].give*start;
+            nodes[0].tension = nodes[0].reciprocal*start+nodes[0].give.dot(borderRight[0]);
+            const Vec right = borderRight[1]-nodes[0].next.transposedTimes(borderRight[0])-nodes[0].first*start;
             start = -equations[0].direction.dot(nodes[0].solution);
-            nodes[1].solution = nodes[1].inverse*force1-nodes[1].give*start;
-            nodes[1].tension = nodes[1].reciprocal*start+nodes[1].give.dot(force1);
+            nodes[1].solution = nodes[1].inverse*right-nodes[1].give*start;
+            nodes[1].tension = nodes[1].reciprocal*start+nodes[1].give.dot(right);
         }
-    }
-    /** The tension of a segment that was found. */
-    CYLCHAIN_INLINE Real tension(int s) const {
-        return tensions[s];
     }
     /**
      * For each segment, call a function with its number and with how far a unit force along the segment, which pushes its

@@ -62,22 +62,27 @@ static Array residualOf(const vector<Chain>& chains, const Array& x, const Array
     Array middle(x.size()), residual = f;
     for (size_t i = 0; i < x.size(); i++)
         middle[i] = 0.5*(x[i]+y[i]);
+    // Friction against turning depends on the segment before and after, and not on the length of the mean one.
     vector<Chain> withoutExtensional = chains;
     for (Chain& chain : withoutExtensional)
-        for (Segment& segment : chain.segments)
-            segment.extensional = 0;
+        for (size_t s = 0; s < chain.segments.size(); s++) {
+            const Array before = nodesFrom(chain, s, 2, x), after = nodesFrom(chain, s, 2, y);
+            const double length = lengthOf(before.data()), mean = lengthOf(nodesFrom(chain, s, 2, middle).data());
+            double cosine = 0;
+            for (int k = 0; k < 3; k++)
+                cosine += (before[3+k]-before[k])*(after[3+k]-after[k])/(length*lengthOf(after.data()));
+            chain.segments[s].extensional = 0;
+            chain.segments[s].rotational *= pow(0.5+0.5*cosine, 0.25)*mean*mean/(length*length);
+        }
     const vector<Array> z = denseResistance(withoutExtensional, middle);
     for (size_t i = 0; i < x.size(); i++)
         for (size_t j = 0; j < x.size(); j++)
             residual[i] -= z[i][j]*(y[j]-x[j])/h;
     if (flows) {
-        const Array drag = denseDrag(chains, middle);
+        // What flow does to lengths is part of the tension, with the lengths before and after.
+        const Array drag = denseDrag(withoutExtensional, middle);
         for (size_t i = 0; i < x.size(); i++)
             residual[i] += drag[i];
-        // What flow does to lengths is part of the tension, with the lengths before and after.
-        const Array withoutDrag = denseDrag(withoutExtensional, middle);
-        for (size_t i = 0; i < x.size(); i++)
-            residual[i] += withoutDrag[i]-drag[i];
     }
     const double width = 1e-6;
     for (const Chain& chain : chains) {
