@@ -91,6 +91,45 @@ inline void feneCoordinate(double inverse, double e, double& q, double& slope) {
     q = std::copysign(root, relative)/inverse+slope*(e-relative/inverse);
 }
 
+/**
+ * The tension of a FENE segment in a step, as a function of its new length: it grows from minus to plus infinity between the
+ * shortest and the longest length, so that for every tension there is a length in between.
+ */
+struct FeneTension {
+    /** 1/D, the rest length, and the length at the start of the step. */
+    double stiffness, inverse, rest, before;
+    /** The tension is the slope at the mean length times (stiffness (theta q+constant)), and (drag/l) (l-before), and less noise. */
+    double theta, constant, drag, noise;
+    /** The tension for a length, and its derivative but for that of the slope. */
+    void evaluate(double length, double& tension, double& response) const {
+        double q, slope, unused, meanSlope;
+        feneCoordinate(inverse, length-rest, q, slope);
+        feneCoordinate(inverse, 0.5*(before+length)-rest, unused, meanSlope);
+        tension = stiffness*meanSlope*(theta*q+constant)+drag*(1-before/length)-noise;
+        response = stiffness*meanSlope*theta*slope+drag*before/(length*length);
+    }
+    /** The length for a tension, beginning at a length, and the response there. */
+    double lengthFor(double tension, double length, double& response) const {
+        const double range = (1-1e-9)/inverse;
+        double low = std::fmax(rest-range, 1e-9*rest), high = rest+range, excess, last = HUGE_VAL;
+        length = std::fmax(low, std::fmin(high, length));
+        for (int i = 0; i < 100; i++) {
+            evaluate(length, excess, response);
+            excess -= tension;
+            (excess > 0 ? high : low) = length;
+            const double next = length-excess/response;
+            const bool halve = !(next > low && next < high) || std::fabs(excess) > 0.5*last;
+            last = std::fabs(excess);
+            const double change = (halve ? 0.5*(low+high) : next)-length;
+            length += change;
+            if (std::fabs(change) < 1e-12*rest)
+                break;
+        }
+        evaluate(length, excess, response);
+        return length;
+    }
+};
+
 /** The length of a segment as a coordinate with the energy (stiffness/2) q^2. */
 template <class Real> CYLCHAIN_INLINE void stretchCoordinate(StretchingModel model, Real inverse, Real e, Real& q, Real& slope) {
     q = e;

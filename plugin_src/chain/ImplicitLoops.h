@@ -58,9 +58,10 @@ template <class Real> CYLCHAIN_INLINE void orthogonal(const Vector<Real>& n, Vec
 
 /** What a step keeps of a segment, and of the joint with the segment before. */
 template <class Real> struct ImplicitSegment {
-    // At the start: the vector, its direction and length, the coordinate of the length, and the bend.
+    // At the start: the vector, its direction and length, the coordinate of the length, and the bend; and what the tension
+    // has of the coordinate that the new length does not change.
     Vector<Real> difference, tangent, bend, bisector;
-    Real length, inverse, coordinate;
+    Real length, inverse, coordinate, constantCoordinate;
     // The noise, and how implicit the segment and the joint are.
     Vector<Real> randomBend, randomPair;
     Real randomCoordinate, randomTension, theta, jointTheta;
@@ -121,6 +122,8 @@ public:
         describe();
         if (settings.kT > 0)
             addNoise();
+        for (int s = 0; s < pack.segments; s++)
+            segments[s].constantCoordinate = (1-segments[s].theta)*segments[s].coordinate-segments[s].randomCoordinate;
         // The first iteration has neither metric forces nor tensions along the mean segment, however short the step is. How
         // a gradient turns a chain takes one more.
         const int least = settings.flow.varies() ? 3 : 2;
@@ -189,7 +192,9 @@ private:
             if (node > 0) {
                 const ImplicitSegment<Real>& segment = segments[node-1];
                 const Vec difference = y[node]-end;
-                const Real length = larger<Real>(segment.newTangent.dot(difference), 0.5*segment.length);
+                Real length = larger<Real>(segment.newTangent.dot(difference), 0.5*segment.length);
+                if (pack.stretching == StretchingModel::FENE)
+                    length = withinRange(node-1, length);
                 moved = moved+difference*(length/root(difference.dot(difference)));
             }
             else
@@ -204,6 +209,12 @@ private:
         const Real free = loaded<Real>(pack.free, 0);
         for (int node = 0; node < n; node++)
             y[node] = y[node]+(rest[node]+back-y[node])*free;
+    }
+    /** A length that a FENE segment can have. */
+    CYLCHAIN_INLINE Real withinRange(int s, Real length) const {
+        const Real rest = property<Real>(pack, s, ChainPack::RestLength);
+        const Real range = (1-1e-9)/(property<Real>(pack, s, ChainPack::InverseExtension)+TINY);
+        return larger<Real>(lesser<Real>(length, rest+range), rest-range);
     }
     /** Describe the start of a step, without noise. */
     void describe() {
@@ -403,18 +414,18 @@ private:
         const Vec axial2 = direction*((along-sameAcross)*direction.dot(second)+(along-otherAcross)*direction.dot(first));
 
         // Tension.
-        const Real stiffness = property<Real>(pack, s, ChainPack::Stiffness);
-        const Real l0 = property<Real>(pack, s, ChainPack::RestLength);
-        const Real reciprocal = property<Real>(pack, s, ChainPack::InverseExtension);
-        Real coordinate, slope, unused, middleSlope;
-        stretchCoordinate(pack.stretching, reciprocal, length-l0, coordinate, slope);
-        stretchCoordinate(pack.stretching, reciprocal, 0.5*(segment.length+length)-l0, unused, middleSlope);
-        const Real drag = property<Real>(pack, s, ChainPack::Extensional)*(segment.inverse*geometry.inverse*perStep);
-        segment.tension = stiffness*middleSlope*(segment.theta*coordinate+(1-segment.theta)*segment.coordinate-
-                segment.randomCoordinate)+drag*(length-segment.length)-segment.randomTension;
+        const Real drag = property<Real>(pack, s, ChainPack::Extensional)*segment.inverse*perStep;
+        if (pack.stretching == StretchingModel::FENE)
+            findFeneTension(s, length, drag);
+        else {
+            const Real stiffness = property<Real>(pack, s, ChainPack::Stiffness);
+            const Real extension = length-property<Real>(pack, s, ChainPack::RestLength);
+            segment.tension = stiffness*(segment.theta*extension+segment.constantCoordinate)+
+                    drag*(length-segment.length)*geometry.inverse-segment.randomTension;
+            segment.response = stiffness*segment.theta+drag*segment.length*geometry.inverse*geometry.inverse;
+        }
         if (settings.flow.present)
             segment.tension = segment.tension-segment.tensionOfFlow;
-        segment.response = stiffness*middleSlope*segment.theta*slope+drag*segment.length*geometry.inverse;
         segment.newTangent = t;
 
         // The tension acts along the mean direction. The matrix has the new one, with which it is symmetric, and what they
@@ -435,6 +446,27 @@ private:
         here.upper = Mat::axial(otherAcross, along-otherAcross, direction)-Mat::axial(turning, segment.shift-turning, t);
         here.right = here.right-first*sameAcross-second*otherAcross-axial1+lacking;
         after.right = loads[s+1]-second*sameAcross-first*otherAcross-axial2-lacking;
+    }
+    /**
+     * The tension of a FENE segment and its response. Where the last iteration has given a tension, they are those at the
+     * length that belongs to it, which is never beyond the range, extended to the length that the segment has.
+     */
+    void findFeneTension(int s, Real length, Real drag) {
+        ImplicitSegment<Real>& segment = segments[s];
+        Real stiffness = property<Real>(pack, s, ChainPack::Stiffness), rest = property<Real>(pack, s, ChainPack::RestLength);
+        Real inverse = property<Real>(pack, s, ChainPack::InverseExtension);
+        Real flow = settings.flow.present ? segment.tensionOfFlow : Real{};
+        for (int i = 0; i < W; i++) {
+            const FeneTension law = {lane(stiffness, i), lane(inverse, i), lane(rest, i), lane(segment.length, i),
+                    lane(segment.theta, i), lane(segment.constantCoordinate, i), lane(drag, i), lane(segment.randomTension, i)};
+            const double given = lane(segment.multiplier, i)+lane(flow, i);
+            double response, own = lane(length, i), tension;
+            if (s < pack.segmentsOfLane[i] && lane(segment.multiplier, i) != 0)
+                own = law.lengthFor(given, own, response);
+            law.evaluate(own, tension, response);
+            lane(segment.tension, i) = tension+response*(lane(length, i)-own);
+            lane(segment.response, i) = response;
+        }
     }
     /**
      * The friction of a segment's ends against turning, over its rotational friction. A turn by phi obeys
@@ -568,6 +600,12 @@ private:
             Real square = 0.5*difference.dot(difference), limit = property<Real>(pack, s, ChainPack::RestLength);
             for (int i = 0; i < W; i++)
                 failed[i] |= s < pack.segmentsOfLane[i] && !(lane(square, i) < lane(limit, i)*lane(limit, i));
+            if (pack.stretching == StretchingModel::FENE) {
+                const Vec after = y[s+1]-y[s];
+                Real relative = (root(after.dot(after))-limit)*property<Real>(pack, s, ChainPack::InverseExtension);
+                for (int i = 0; i < W; i++)
+                    failed[i] |= s < pack.segmentsOfLane[i] && !(std::fabs(lane(relative, i)) < 1);
+            }
         }
     }
 };
