@@ -195,7 +195,7 @@ class FilamentType:
 
     def _check_friction_length(self):
         if isinstance(self.friction_length, str):
-            self._fail(f"friction_length must be one of segment, filament, or a length, but is {self.friction_length!r}.")
+            self._fail(f"friction_length must be one of segment, filament, or a length, but is {self.friction_length}.")
         length = positive(self.friction_length, LENGTH, f"friction_length of filament type {self.name!r}")
         self._set("friction_length", length)
 
@@ -326,11 +326,12 @@ class FilamentType:
         length, diameter = self.segment_length, self.diameter
         logarithm_length = self._logarithm_length(segments)
         corrections = self.end_corrections
+        # The rotational one first: with the usual end corrections it asks for the longest segments.
+        rotational = rotational_friction(length, diameter, viscosity, corrections.rotational, logarithm_length)
         parallel = translational_friction_parallel(length, diameter, viscosity, corrections.parallel, logarithm_length)
         perpendicular = translational_friction_perpendicular(
             length, diameter, viscosity, corrections.perpendicular, logarithm_length
         )
-        rotational = rotational_friction(length, diameter, viscosity, corrections.rotational, logarithm_length)
         if self.extensional_friction is not None:
             extensional = self.extensional_friction
         elif self.extension_relaxation_time is not None:
@@ -344,14 +345,17 @@ class FilamentType:
     def _logarithm_length(self, segments):
         if self.friction_length == "filament":
             return self.segment_length * segments
-        return self.segment_length if self.friction_length == "segment" else max(self.segment_length, self.friction_length)
+        if self.friction_length == "segment":
+            return self.segment_length
+        return max(self.segment_length, self.friction_length)
 
     def with_segment_length(self, segment_length):
         """The same filament cut into segments of another length.
 
         Rescaled: k = EA/l0 if a stretching modulus was given; the stiffness of the joints, so that the persistence
-        length stays, or as a/l0 if a bending rigidity was given; the friction coefficients; maximum_extension, in proportion; extensional_friction, as the friction of
-        length per segment scales, with l0^3. Unchanged: diameter, bending rigidity, a stretching
+        length stays, or as a/l0 if a bending rigidity was given; the friction coefficients; maximum_extension, in
+        proportion; extensional_friction, as the friction of length per segment scales, with l0^3. Unchanged:
+        diameter, persistence length or bending rigidity, a stretching
         stiffness given for one segment (as Pesek et al. do in Table 3, so the filament as a whole
         becomes softer or stiffer), extension_relaxation_time, end corrections, friction_length, mass per length.
 
@@ -385,7 +389,8 @@ F_ACTIN = FilamentType(
 d = 6 nm, l_p = 17.2 um at 310 K, k = 48.7 pN/nm for a segment of 360 nm (unchanged by
 ``with_segment_length``, as in their Table 3), tau_l = 0.1 us, inscribed-circle bending (27); mass
 1.26 MDa per 360 nm (their Section 5). Tangents decorrelate over l_p; the joints of the paper have the stiffness
-l_p k_B T/l0, 3 % more: ``dataclasses.replace(F_ACTIN, temperature=None)``. Their sources: Yogurtcu et al., Biophys. J. 2012, 103, 719 (d);
+l_p k_B T/l0, 3 % more: ``dataclasses.replace(F_ACTIN, temperature=None)``. Their sources: Yogurtcu et al., Biophys. J.
+2012, 103, 719 (d);
 Nagashima and Asakura 1980, Gittes et al. 1993 (l_p); Kojima et al. 1994 (k).
 """
 
@@ -406,7 +411,8 @@ Biophys. J. 1997, 72, 1335). EA = 1100 pN: the middle of what Wang et al. and Sm
 Science 1996, 271, 795 report, 1000 to 1200 pN depending on salt. Affine extensional friction. Mass:
 660 Da per base pair of 0.34 nm. The flexibility holds at 310 K here; the paper does not say.
 
-Tangents decorrelate over 43.3 nm with segments of any length. The friction of a length of DNA is that of the paper's
+Tangents decorrelate over 43.3 nm with segments of any length. A segment lengthens by 2 k_B T/EA = 0.008 nm on average
+as it fluctuates, however short it is: by 1 % with segments of 0.8 nm. The friction of a length of DNA is that of the paper's
 segments of 8 nm, or of longer ones, so that shorter segments, down to 1 nm and less, make up the same filament. It
 leaves out the flow that one segment makes at another. Of a whole rod, up to a persistence length or so,
 ``friction_length="filament"`` is nearer to what is measured.

@@ -38,8 +38,8 @@ def tangent_decorrelation(bending_model, reduced_stiffness):
 def calibrated_stiffness(bending_model, decorrelation):
     """K/(k_B T) of the joint with ``<t1.t2> = exp(-decorrelation)``, the inverse of ``tangent_decorrelation``.
 
-    It tends to 1/decorrelation for stiff joints, and falls to zero for weak ones, without end: every bending model reaches
-    every mean cosine between 0 and 1.
+    It tends to 1/decorrelation for stiff joints, and falls to zero for weak ones, without end: every bending model
+    reaches every mean cosine between 0 and 1.
 
     Parameters
     ----------

@@ -60,7 +60,7 @@ def clamped_nodes(clamped, count, label):
 
 
 def joint_stiffnesses(filament_type, nodes, clamped, closed=False):
-    """Bending stiffness of every joint of a filament in kJ/mol: ``FilamentType.joint_stiffness``, or that next to a clamp.
+    """Bending stiffness of every joint of a filament in kJ/mol; that next to a clamped segment differs.
 
     Half a segment of material on either side of a joint bends. Where a segment is held, because both of its nodes are
     clamped, and its neighbour is not, only the half on the neighbour's side can: the joint has
