@@ -64,7 +64,7 @@ def joint_stiffnesses(filament_type, nodes, clamped, closed=False):
 
     Half a segment of material on either side of a joint bends. Where a segment is held, because both of its nodes are
     clamped, and its neighbour is not, only the half on the neighbour's side can: the joint has
-    ``FilamentType.clamped_joint_stiffness``, some twice as much, and the filament is clamped at that node.
+    ``FilamentType.clamped_joint_stiffness``, about twice as much, and the filament is clamped at that node.
 
     Parameters
     ----------
