@@ -10,6 +10,7 @@ F L^3/(3 a) or w L^4/(8 a).
 """
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib
@@ -38,7 +39,8 @@ steps = int(sys.argv[2]) if len(sys.argv) > 2 else STEPS
 folder.mkdir(parents=True, exist_ok=True)
 
 # The held segment lies before the clamp at x = 0.
-actin = F_ACTIN.with_segment_length(SEGMENT_LENGTH * unit.nanometer)
+# Joints of a/l0, so that loads bend the filament as a rod of the rigidity a.
+actin = replace(F_ACTIN.with_segment_length(SEGMENT_LENGTH * unit.nanometer), temperature=None)
 filaments = Filaments(viscosity=1e-3 * unit.pascal * unit.second, temperature=0 * unit.kelvin)
 loads = [(force, 0.0) for force in FORCES] + [(0.0, weight) for weight in WEIGHTS]
 for number in range(len(loads)):

@@ -2,7 +2,7 @@
 
 from .build import Filaments
 from .collection import Filament
-from .errors import ContactWarning, InputError, InstabilityError, TimeStepWarning
+from .errors import ContactWarning, EquilibrationWarning, InputError, InstabilityError, TimeStepWarning
 from .filament import DSDNA, F_ACTIN, MICROTUBULE, FilamentType
 from .flow import Flow
 from .friction import EndCorrections, SegmentFriction, stokes_friction
@@ -13,6 +13,7 @@ __all__ = [
     "ContactWarning",
     "DSDNA",
     "EndCorrections",
+    "EquilibrationWarning",
     "F_ACTIN",
     "Filament",
     "FilamentType",

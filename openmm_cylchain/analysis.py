@@ -11,14 +11,15 @@ node come as a list with one array per filament, since filaments may differ in l
 InputError for a trajectory without filaments and for indices out of range.
 """
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
 
-from .errors import InputError
+from .errors import EquilibrationWarning, InputError
 from .insertion import NODE_NAME
 from .quantities import DIMENSIONLESS, LENGTH, TIME, in_units_of, positive, whole_number
-from .statistics import mean_with_error
+from .statistics import FEWEST_FRAMES_OF_DRIFT, SIGNIFICANT_DRIFT, drift, mean_with_error
 
 
 def filament_nodes(trajectory_or_topology):
@@ -224,9 +225,9 @@ def persistence_length(trajectory, filaments=None):
     """Persistence length ``-<l>/ln<c>`` from the joint cosines c, with its standard error, in nm.
 
     In the free discrete chain joints are independent, so that neighbouring tangents hold all there is to know
-    and larger distances add nothing. Compare it with ``theory.chain_persistence_length``, from which
-    a/(k_B T) differs by the order of a segment length. External forces or contacts that align or bend the
-    filament change it.
+    and larger distances add nothing. Compare it with ``theory.chain_persistence_length``. That of a FilamentType
+    given by its ``persistence_length`` differs by the mean stretching of a segment, l0 for <l>, alone. External forces
+    or contacts that align or bend the filament change it.
 
     Parameters
     ----------
@@ -244,13 +245,14 @@ def persistence_length(trajectory, filaments=None):
     InputError
         For filaments of a single segment or of different lengths, for rings, for a single sample, and if the mean
         cosine is not between 0 and 1.
+
+    Warns
+    -----
+    EquilibrationWarning
+        If the bends drift, see ``bending_drift``: leave out the frames in which the filaments relax.
     """
-    _refuse_rings(trajectory, filaments, "independent joints")
-    directions = _stacked(tangents(trajectory, filaments))
-    if directions.shape[2] < 2:
-        raise InputError("A persistence length needs filaments of at least two segments.")
-    # 1 - c = |t2 - t1|^2/2 keeps the digits of stiff chains.
-    bends = 0.5 * np.sum(np.diff(directions, axis=2) ** 2, axis=-1).mean(axis=2)
+    bends = _mean_bends(trajectory, filaments)
+    _warn_of_drift(bends)
     bend, bend_error = mean_with_error(bends)
     if not 0.0 < bend < 1.0:
         raise InputError(f"The mean cosine between segments is {1.0 - bend:g}: the persistence length is not defined.")
@@ -259,6 +261,40 @@ def persistence_length(trajectory, filaments=None):
     value = -length / logarithm
     relative_error = np.hypot(length_error / length, bend_error / ((1.0 - bend) * logarithm))
     return float(value), float(value * relative_error)
+
+
+def bending_drift(trajectory, filaments=None):
+    """How far the mean bend 1 - c of the last half of the frames lies above that of the first quarter.
+
+    In standard errors, see ``statistics.drift``: beyond ``statistics.SIGNIFICANT_DRIFT``, 4, the filaments have not
+    been in equilibrium from the first frame on. Raises InputError for rings, for filaments of a single segment or of
+    different lengths, and for fewer than 8 frames.
+    """
+    return drift(_mean_bends(trajectory, filaments))
+
+
+def _mean_bends(trajectory, filaments):
+    # 1 - c = |t2 - t1|^2/2, which keeps the digits of stiff chains, averaged over joints: (frames, filaments).
+    _refuse_rings(trajectory, filaments, "independent joints")
+    directions = _stacked(tangents(trajectory, filaments))
+    if directions.shape[2] < 2:
+        raise InputError("A persistence length needs filaments of at least two segments.")
+    return 0.5 * np.sum(np.diff(directions, axis=2) ** 2, axis=-1).mean(axis=2)
+
+
+def _warn_of_drift(bends):
+    if len(bends) < FEWEST_FRAMES_OF_DRIFT:
+        return
+    found = drift(bends)
+    if abs(found) > SIGNIFICANT_DRIFT:
+        warnings.warn(
+            "The filaments have not been in equilibrium from the first frame on: joints are "
+            f"{'more' if found > 0 else 'less'} bent in the last half of the trajectory than in its first quarter, by "
+            f"{abs(found):.1f} standard errors. The persistence length contains this relaxation, its error does not. "
+            "Leave out the frames in which filaments relax, as in trajectory[100:], or start from equilibrium.",
+            EquilibrationWarning,
+            stacklevel=3,
+        )
 
 
 def bending_mode_amplitudes(trajectory, filament, modes, contour_length=None):

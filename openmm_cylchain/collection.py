@@ -167,7 +167,7 @@ class FilamentCollection:
         """Add a straight filament with segments of rest length.
 
         A clamped node alone is a hinge. Two neighbouring ones fix the direction there, too: the joint between a segment
-        with both nodes clamped and one that is free is twice as stiff as others, because only the half segment of
+        with both nodes clamped and one that is free is about twice as stiff as others, because only the half segment of
         material on its free side can bend. The filament is then clamped exactly at that node.
 
         Parameters

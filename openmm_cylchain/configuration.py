@@ -268,8 +268,8 @@ _TYPE_QUANTITIES = {
     "extensional_friction": units.ROTATIONAL_FRICTION,
     "mass_per_length": units.MASS_PER_LENGTH,
 }
-_TYPE_TEXTS = ("name", "bending_model", "stretching_model", "friction_length")
-_TYPE_KEYS = (*_TYPE_TEXTS, *_TYPE_QUANTITIES, "end_corrections")
+_TYPE_TEXTS = ("name", "bending_model", "stretching_model")
+_TYPE_KEYS = (*_TYPE_TEXTS, *_TYPE_QUANTITIES, "friction_length", "end_corrections")
 _FILAMENT_KEYS = ("type", "segments", "count", "start", "position", "direction", "clamped", *_TYPE_KEYS)
 
 # Setting one of a pair in a preset takes the place of the other.
@@ -330,6 +330,8 @@ def _filament_type(table, solvent):
     properties = _type_properties(table)
     if "persistence_length" in properties:
         properties.setdefault("temperature", solvent.temperature)
+    elif "temperature" in properties:
+        raise InputError(f"{table.label} temperature belongs to persistence_length; give both.")
     try:
         if "type" not in table:
             return _described_type(table, properties)
@@ -350,9 +352,17 @@ def _type_properties(table):
     for key in _TYPE_TEXTS:
         if key in table:
             properties[key] = table.text(key)
+    if "friction_length" in table:
+        properties["friction_length"] = _friction_length(table)
     if "end_corrections" in table:
         properties["end_corrections"] = _end_corrections(table)
     return properties
+
+
+def _friction_length(table):
+    if table.text("friction_length") in ("segment", "filament"):
+        return table.text("friction_length")
+    return table.quantity("friction_length", units.LENGTH)
 
 
 def _end_corrections(table):
@@ -375,6 +385,8 @@ def _described_type(table, properties):
 
 def _without_alternatives(properties):
     changed = dict(properties)
+    if "bending_rigidity" in properties:
+        changed["temperature"] = None
     for pair in _EXCLUSIVE:
         if any(key in properties for key in pair):
             for key in pair:

@@ -121,7 +121,7 @@ class PlanarJointAngleDistribution(_Marginal):
 
 
 def _widest_bend(stiffness):
-    # V_b is at least (a/l0)(1-c)*0.8, so 1-c up to 60 k_B T l0/a holds all of a stiff joint.
+    # V_b is at least K (1-c)*0.8, so 1-c up to 60 k_B T/K holds all of a stiff joint.
     return 2.0 if stiffness < 50.0 else min(2.0, 100.0 / stiffness)
 
 

@@ -13,5 +13,9 @@ class ContactWarning(UserWarning):
     """Beads that are too far apart or too soft to keep filaments from passing through each other."""
 
 
+class EquilibrationWarning(UserWarning):
+    """A trajectory whose start differs from its end by more than chance: averages over it contain the relaxation."""
+
+
 class TimeStepWarning(UserWarning):
     """A time step above a stability bound: the message names the bound."""

@@ -47,7 +47,8 @@ def _logarithm(length, diameter, correction, direction):
         raise InputError(
             f"The {direction} friction of eq. (6) needs a length above {shortest:.4g} nm for a diameter of "
             f"{diameter:g} nm, but the length is {length:.4g} nm. Use longer segments, other end corrections, "
-            "or the filament's length in the logarithm (friction_length='filament')."
+            "or another length in the logarithm: friction_length='filament' for that of the whole filament, or a "
+            f"length over which the filament is straight, above {shortest:.4g} nm."
         )
     return value
 

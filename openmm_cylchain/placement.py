@@ -60,11 +60,11 @@ def clamped_nodes(clamped, count, label):
 
 
 def joint_stiffnesses(filament_type, nodes, clamped, closed=False):
-    """Bending stiffness of every joint of a filament in kJ/mol: a/l0, or twice as much next to a clamped segment.
+    """Bending stiffness of every joint of a filament in kJ/mol; that next to a clamped segment differs.
 
     Half a segment of material on either side of a joint bends. Where a segment is held, because both of its nodes are
-    clamped, and its neighbour is not, only the half on the neighbour's side can: the joint has the stiffness 2a/l0, and
-    the filament is clamped at that node.
+    clamped, and its neighbour is not, only the half on the neighbour's side can: the joint has
+    ``FilamentType.clamped_joint_stiffness``, about twice as much, and the filament is clamped at that node.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def joint_stiffnesses(filament_type, nodes, clamped, closed=False):
     fixed[list(clamped)] = True
     held = fixed & np.roll(fixed, -1)
     before, behind = joined(held if closed else held[:-1], closed)
-    return filament_type.joint_stiffness * np.where(before != behind, 2.0, 1.0)
+    return np.where(before != behind, filament_type.clamped_joint_stiffness, filament_type.joint_stiffness)
 
 
 def planar_direction(direction, label):

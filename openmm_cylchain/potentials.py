@@ -19,7 +19,7 @@ class BendingPotential:
     name : str
         The name by which a FilamentType selects the potential.
     energy : callable (stiffness, cosine) -> energy
-        With ``stiffness = a/l0`` in kJ/mol.
+        With the stiffness K of the joint in kJ/mol: the a/l0 of the paper.
     derivative : callable (stiffness, cosine) -> dV/dc
     expression : str
         The same energy for OpenMM's CustomAngleForce, whose ``theta`` is pi for a straight joint.

@@ -5,6 +5,7 @@ copies (filaments, segments), which are pooled.
 """
 
 import logging
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -102,6 +103,50 @@ def mean_with_error(series):
     if _is_constant(copies):
         return mean, 0.0
     return mean, float(np.sqrt(np.var(copies, ddof=1) * statistical_inefficiency(copies) / copies.size))
+
+
+SIGNIFICANT_DRIFT = 4.0
+"""``drift`` beyond which a series has not been in equilibrium from its start."""
+FEWEST_FRAMES_OF_DRIFT = 8
+_FEWEST_COPIES_OF_DRIFT = 8
+
+
+def drift(series):
+    """How far the last half of a series lies above its first quarter, in standard errors of the difference.
+
+    A test of equilibration in the manner of Geweke, in Bayesian Statistics 4 (Oxford, 1992), p. 169: of a series that
+    is in equilibrium from its start it is about normal with the variance one; ``SIGNIFICANT_DRIFT`` is beyond chance.
+    The error is that of the differences of independent copies; of fewer than 8 copies, from the fluctuations in the
+    last half, accounting for their correlation. A relaxation much longer than the series goes unseen.
+
+    Parameters
+    ----------
+    series : (frames,) or (frames, copies) array
+
+    Returns
+    -------
+    float
+        Infinite for a difference without fluctuations.
+
+    Raises
+    ------
+    InputError
+        For fewer than 8 frames, or values that are not finite.
+    """
+    copies = _copies(series)
+    frames = len(copies)
+    if frames < FEWEST_FRAMES_OF_DRIFT:
+        raise InputError(f"A drift needs at least {FEWEST_FRAMES_OF_DRIFT} frames, but series has {frames}.")
+    first, last = copies[: frames // 4], copies[frames - frames // 2 :]
+    differences = last.mean(axis=0) - first.mean(axis=0)
+    difference = float(differences.mean())
+    if abs(difference) <= 1e-14 * np.max(np.abs(copies)):
+        return 0.0
+    if len(differences) >= _FEWEST_COPIES_OF_DRIFT:
+        error = differences.std(ddof=1) / np.sqrt(len(differences))
+    else:
+        error = mean_with_error(last)[1] * np.sqrt(1.0 + len(last) / len(first))
+    return difference / float(error) if error > 0 else math.copysign(math.inf, difference)
 
 
 def autocorrelation(series, mean=None, maximum_lag=None):

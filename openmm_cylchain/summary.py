@@ -6,6 +6,7 @@ import json
 import math
 import os
 import sys
+import warnings
 from dataclasses import asdict, dataclass
 
 import mdtraj
@@ -13,13 +14,13 @@ import numpy as np
 import openmm
 
 from . import theory
-from .analysis import end_to_end_vectors, joint_cosines, persistence_length, segment_lengths
+from .analysis import bending_drift, end_to_end_vectors, joint_cosines, persistence_length, segment_lengths
 from .equilibrium import SegmentLengthDistribution
-from .errors import InputError
+from .errors import EquilibrationWarning, InputError
 from .physical_units import format_time
 from .quantities import thermal_energy
 from .run_directory import write_atomically
-from .statistics import mean_with_error, statistical_inefficiency
+from .statistics import FEWEST_FRAMES_OF_DRIFT, SIGNIFICANT_DRIFT, mean_with_error, statistical_inefficiency
 from .version import __version__
 
 _WORMLIKE = "the same, theory of the wormlike chain (25)"
@@ -163,7 +164,7 @@ def _summarise_group(configuration, group, members, label, trajectory):
         start=group.start,
         in_equilibrium=comparable,
         observables=tuple(observables),
-        notes=tuple(_notes(configuration, group, trajectory, short)),
+        notes=tuple(_notes(configuration, group, members, trajectory, short)),
     )
 
 
@@ -212,7 +213,10 @@ def _persistence_length(group, temperature, trajectory, members, comparable):
     if group.segments < 2 or group.type.bending_rigidity == 0:
         return []
     try:
-        value, error = persistence_length(trajectory, members)
+        with warnings.catch_warnings():
+            # The notes say it.
+            warnings.simplefilter("ignore", EquilibrationWarning)
+            value, error = persistence_length(trajectory, members)
     except InputError:
         # The mean cosine of a very flexible or unrelaxed chain need not define one.
         return []
@@ -237,11 +241,19 @@ def _compared(name, unit, value, error, exact, comparable):
     return Observable(name, unit, value, error, exact, deviation, relative, verdict)
 
 
-def _notes(configuration, group, trajectory, short):
+def _notes(configuration, group, members, trajectory, short):
     if group.start == "straight":
         yield (
             "Started straight, not in equilibrium: the averages contain the relaxation, so they are not compared "
             "with equilibrium."
+        )
+    bends = group.segments > 1 and trajectory.n_frames >= FEWEST_FRAMES_OF_DRIFT
+    drift = bending_drift(trajectory, members) if bends else 0.0
+    if abs(drift) > SIGNIFICANT_DRIFT:
+        yield (
+            f"Not in equilibrium from the first frame on: joints are {'more' if drift > 0 else 'less'} bent in the last "
+            f"half of the run than in its first quarter, by {abs(drift):.1f} standard errors. Leave out the start, or run "
+            "longer."
         )
     if len(group.clamped) > 1:
         yield "Several nodes are clamped: the exact values are those of free chains, so they are not compared."

@@ -114,8 +114,9 @@ def chain_tangent_correlation(filament_type, lag, temperature, planar=False):
 def chain_persistence_length(filament_type, temperature):
     """Length over which tangents of the discrete chain decorrelate, ``-<l>/ln<c>``, in nm; exact.
 
-    It tends to the a/(k_B T) of ``FilamentType.persistence_length_at`` for segments that are short against
-    it, and is 0 for a freely jointed chain.
+    Of a type given by its ``persistence_length`` it is that length at the temperature given with it, times <l>/l0. Of one
+    given by its ``bending_rigidity`` it tends to the a/(k_B T) of ``FilamentType.persistence_length_at`` for segments
+    that are short against it. A freely jointed chain has 0.
     """
     if filament_type.joint_stiffness == 0:
         return 0.0
@@ -457,8 +458,8 @@ def crossover_force(contour_length, persistence_length, segment_stiffness, segme
 def bending_energy_mean(filament_type, temperature, planar=False):
     """Mean bending energy of one joint at equilibrium, in kJ/mol; exact for every bending model.
 
-    Inscribed circle: eq. (40), ``x k_B T (E_1(x)/E_2(x) - 1)`` with x = 2 lp/l0. Kratky-Porod:
-    ``k_B T (1 - 2u/(exp(2u) - 1))`` with u = lp/l0. Quadratic: by quadrature. A freely jointed chain has 0;
+    Inscribed circle: eq. (40), ``x k_B T (E_1(x)/E_2(x) - 1)`` with x = 2 K/k_B T, the paper's 2 lp/l0. Kratky-Porod:
+    ``k_B T (1 - 2u/(exp(2u) - 1))`` with u = K/k_B T. Quadratic: by quadrature. A freely jointed chain has 0;
     stiff chains tend to k_B T, and the inscribed circle to ``k_B T (1 - l0/lp)``: the limit printed below
     (41), k_B T/(1 - l0/lp), has the wrong sign before l0/lp. In a plane: by quadrature; it tends to k_B T/2.
 
@@ -479,8 +480,8 @@ def bending_energy_mean(filament_type, temperature, planar=False):
 def bending_energy_variance(filament_type, temperature):
     """Variance of the bending energy of one joint, in (kJ/mol)^2; exact for every bending model.
 
-    Inscribed circle: eq. (41), ``(x k_B T)^2 (E_0/E_2 - (E_1/E_2)^2)`` at x = 2 lp/l0. Kratky-Porod:
-    ``(k_B T)^2 (1 - (u/sinh u)^2)`` with u = lp/l0. Quadratic: by quadrature.
+    Inscribed circle: eq. (41), ``(x k_B T)^2 (E_0/E_2 - (E_1/E_2)^2)`` at x = 2 K/k_B T. Kratky-Porod:
+    ``(k_B T)^2 (1 - (u/sinh u)^2)`` with u = K/k_B T. Quadratic: by quadrature.
     """
     kT = _thermal_energy_above_zero(temperature)
     return kT**2 * _reduced_bending_moments(filament_type, kT)[1]

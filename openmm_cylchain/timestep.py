@@ -186,7 +186,7 @@ def time_step_bounds(filament_type, viscosity, temperature, confidence=3.0, segm
         "rotation": rotation_bound(friction, diameter, length, temperature, confidence),
         "diffusion": diffusion_bound(friction, diameter, length, temperature, confidence),
         "stretching": stretching_bound(friction, filament_type.segment_stiffness, length),
-        "bending": bending_bound(friction, filament_type.bending_rigidity, length),
+        "bending": bending_bound(friction, filament_type.joint_stiffness * length, length),
     }
 
 
@@ -244,7 +244,7 @@ def stability_bounds(filament_type, viscosity, temperature, segments=1):
     length = filament_type.segment_length
     bounds = {"stretching": chain_stretching_bound(friction, filament_type.segment_stiffness, length)}
     if segments > 1:
-        bounds["bending"] = chain_bending_bound(friction, filament_type.bending_rigidity, length)
+        bounds["bending"] = chain_bending_bound(friction, filament_type.joint_stiffness * length, length)
     return bounds
 
 

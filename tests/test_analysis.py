@@ -3,6 +3,7 @@
 import math
 import subprocess
 import sys
+import warnings
 
 import mdtraj
 import numpy as np
@@ -12,7 +13,7 @@ from openmm import unit
 
 from openmm_cylchain import analysis, statistics, theory
 from openmm_cylchain.equilibrium import draw_chain
-from openmm_cylchain.errors import InputError
+from openmm_cylchain.errors import EquilibrationWarning, InputError
 from openmm_cylchain.filament import FilamentType
 from openmm_cylchain.quantities import thermal_energy
 
@@ -165,6 +166,56 @@ def test_persistence_length_needs_bends_of_less_than_a_right_angle():
         analysis.persistence_length(make_trajectory([zigzag]))
     with pytest.raises(InputError, match="two segments"):
         analysis.persistence_length(make_trajectory([zigzag[:, :2]]))
+
+
+@pytest.mark.parametrize("copies", [1, 12])
+def test_drift_of_a_stationary_series_is_chance_and_of_a_relaxing_one_is_not(copies):
+    generator = np.random.default_rng(14)
+    stationary = np.array([correlated_series(generator, 600, 0.9, (copies,)) for _ in range(200)])
+    drifts = np.array([statistics.drift(series) for series in stationary])
+    # Of variance one, or somewhat more: the errors themselves are estimates.
+    assert 0.8 < drifts.std() < 1.6
+    assert np.mean(np.abs(drifts) > statistics.SIGNIFICANT_DRIFT) <= 0.02
+    relaxation = 6.0 * np.exp(-np.arange(600) / 100)[:, None]
+    relaxing = np.array([statistics.drift(series - relaxation) for series in stationary])
+    assert np.mean(relaxing > statistics.SIGNIFICANT_DRIFT) > 0.9
+    assert np.mean([statistics.drift(series + relaxation) for series in stationary]) < -statistics.SIGNIFICANT_DRIFT
+
+
+def test_drift_of_series_without_fluctuations_and_refusals():
+    assert statistics.drift(np.full(10, 0.1)) == 0.0
+    assert statistics.drift(np.repeat([0.0, 1.0], 8)) == math.inf
+    assert statistics.drift(np.repeat([1.0, 0.0], 8)) == -math.inf
+    with pytest.raises(InputError, match="at least 8 frames"):
+        statistics.drift(np.arange(7.0))
+    with pytest.raises(InputError):
+        statistics.drift([math.nan] * 20)
+
+
+def _relaxing(flexible, frames, seed):
+    """Filaments that start straight and forget it within some 20 frames, as angles in a plane."""
+    generator = np.random.default_rng(seed)
+    filaments = []
+    for _ in range(10):
+        joints = correlated_series(generator, frames, 0.5, (30,)) * 0.35
+        joints *= 1.0 - np.exp(-np.arange(frames) / 20.0)[:, None]
+        angles = np.concatenate([np.zeros((frames, 1)), np.cumsum(joints, axis=1)], axis=1)
+        steps = 10.0 * np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=2)
+        filaments.append(np.concatenate([np.zeros((frames, 1, 3)), np.cumsum(steps, axis=1)], axis=1))
+    return make_trajectory(filaments)
+
+
+@pytest.mark.parametrize("filaments", [None, 0])
+def test_a_straight_start_is_told(flexible, equilibrium, filaments):
+    relaxing = _relaxing(flexible, 100, 3)
+    assert analysis.bending_drift(relaxing, filaments) > statistics.SIGNIFICANT_DRIFT
+    with pytest.warns(EquilibrationWarning, match="more bent in the last half .*Leave out the frames"):
+        value, _ = analysis.persistence_length(relaxing, filaments)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        relaxed, _ = analysis.persistence_length(_relaxing(flexible, 400, 3)[200:], filaments)
+        analysis.persistence_length(equilibrium, filaments)
+    assert value > 1.3 * relaxed
 
 
 def test_bending_mode_amplitudes_of_single_modes():

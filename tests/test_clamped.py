@@ -16,6 +16,8 @@ from openmm_cylchain.reporters import FilamentReporter
 
 SIGMAS = 4.0
 LENGTH = 2000.0  # nm of the cantilevers
+# Joints of a/l0: rods that bend without thermal noise have the rigidity a.
+ACTIN = replace(F_ACTIN, temperature=None)
 
 
 def _context(system, integrator, positions):
@@ -41,8 +43,8 @@ def _context(system, integrator, positions):
 def test_stiffness_of_joints(clamped, factors):
     """A joint is at each of the nodes 1 to 5; those between a held segment and a free one are twice as stiff."""
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine="portable")
-    filaments.add_straight(F_ACTIN, 6, [0, 0, 0], [1, 0, 0], clamped=clamped)
-    expected = F_ACTIN.bending_rigidity / 360 * np.array(factors)
+    filaments.add_straight(ACTIN, 6, [0, 0, 0], [1, 0, 0], clamped=clamped)
+    expected = ACTIN.bending_rigidity / 360 * np.array(factors)
     assert filaments[0].joint_stiffnesses == pytest.approx(expected)
 
 
@@ -58,15 +60,15 @@ def test_stiffness_of_joints(clamped, factors):
 )
 def test_stiffness_of_the_joints_of_a_ring(clamped, factors):
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine="portable")
-    filaments.add_ring(F_ACTIN, 5, [0, 0, 0], clamped=clamped)
-    expected = F_ACTIN.bending_rigidity / 360 * np.array(factors)
+    filaments.add_ring(ACTIN, 5, [0, 0, 0], clamped=clamped)
+    expected = ACTIN.bending_rigidity / 360 * np.array(factors)
     assert filaments[0].joint_stiffnesses == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("model", ["inscribed-circle", "kratky-porod", "quadratic"])
 @pytest.mark.parametrize("engine", ENGINES)
 def test_reporter_and_state_have_the_stiffness_of_the_joints(engine, model):
-    kind = replace(F_ACTIN, bending_model=model)
+    kind = replace(ACTIN, bending_model=model)
     angles = np.cumsum([0, 0.3, -0.2, 0.4, 0.1])
     nodes = np.zeros((6, 3))
     nodes[1:] = np.cumsum(360 * np.stack([np.cos(angles), 0 * angles, np.sin(angles)], axis=1), axis=0)
@@ -100,7 +102,7 @@ def test_reporter_and_state_have_the_stiffness_of_the_joints(engine, model):
 
 def _cantilever(engine, segments, load):
     """A filament with so many free segments beyond its clamp, and nodal loads (segments,) along z, at rest."""
-    kind = F_ACTIN.with_segment_length(LENGTH / segments)
+    kind = ACTIN.with_segment_length(LENGTH / segments)
     filaments = Filaments(VISCOSITY, 0, engine=engine)
     filaments.add_straight(kind, segments + 1, [-LENGTH / segments, 0, 0], [1, 0, 0], clamped=[0, 1])
     _, system, positions = filaments.build()
@@ -183,7 +185,7 @@ def test_large_deflection_tends_to_the_elastica(engine, kind_of_load):
     """The tip of a filament bent by half its length; the error falls at least with the square of the segments."""
     errors = []
     for segments in (6, 12):
-        rigidity = F_ACTIN.bending_rigidity
+        rigidity = ACTIN.bending_rigidity
         force, weight = (3 * rigidity / LENGTH**2, 0.0) if kind_of_load == "end" else (0.0, 8 * rigidity / LENGTH**3)
         load = np.full(segments, weight * LENGTH / segments)
         load[-1] = force + 0.5 * weight * LENGTH / segments
@@ -281,7 +283,7 @@ def test_stiff_clamped_filaments_have_gaussian_angles():
     """Eqs. (41) to (43) of Chandran and Mofrad, Phys. Rev. E 2009, 79, 011906, for 25 segments."""
     segments, length = 25, 5000.0
     persistence_length = 100 * length
-    kind = replace(F_ACTIN.with_segment_length(length / segments), bending_rigidity=persistence_length * KT)
+    kind = replace(ACTIN.with_segment_length(length / segments), bending_rigidity=persistence_length * KT)
     nodes = np.array([filament.positions for filament in _drawn("portable", kind, segments, False, 3000)])
     last = nodes[:, -1] - nodes[:, -2]
     angles = np.concatenate([last[:, 1], last[:, 2]]) / (length / segments)

@@ -150,7 +150,9 @@ def test_presets(name, preset):
     [
         ('segment_length = "200 nm"', F_ACTIN.with_segment_length(200.0)),
         ('name = "X"\ndiameter = "8 nm"', {"name": "X", "diameter": 8.0}),
-        ('bending_rigidity = "0 pN*nm^2"', {"bending_rigidity": 0.0}),
+        ('bending_rigidity = "0 pN*nm^2"', {"bending_rigidity": 0.0, "temperature": None}),
+        ('friction_length = "filament"', {"friction_length": "filament"}),
+        ('friction_length = "1 um"', {"friction_length": 1000.0}),
         (
             'persistence_length = "10 um"',
             {"bending_rigidity": None, "persistence_length": 1e4, "temperature": 310.0},

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from openmm_cylchain import F_ACTIN, InputError, cli, theory
+from openmm_cylchain import InputError, cli, theory
 from openmm_cylchain.reproduce import (
     end_to_end,
     force_extension,
@@ -382,7 +382,7 @@ def test_bending_stiffness_of_actin_and_a_planted_fault(tmp_path, monkeypatch):
     monkeypatch.setattr(end_to_end, "_ACTIN_SEGMENTS", {True: (4, 8)})
     case = end_to_end.CASES[0]
     assert set(verdicts(case, tmp_path / "right").values()) == {"agrees"}
-    stiff = replace(F_ACTIN, bending_rigidity=1.1 * F_ACTIN.bending_rigidity)
+    stiff = replace(simulation.ACTIN, bending_rigidity=1.1 * simulation.ACTIN.bending_rigidity)
     monkeypatch.setattr(simulation, "ACTIN", stiff)
     assert "differs" in verdicts(case, tmp_path / "stiff").values()
 
@@ -430,7 +430,7 @@ def test_fits_of_force_and_extension():
 def test_pulled_filaments_have_the_exact_extension():
     settings = {**force_extension._settings(40.0, True), "stride": 5, "frames": 60, "discarded": 100}
     copies = force_extension.pulled_filaments(**settings)["extension"]
-    expected = theory.chain_extension(F_ACTIN, 64, 40.0 * 0.602214076, 310.0)
+    expected = theory.chain_extension(simulation.ACTIN, 64, 40.0 * 0.602214076, 310.0)
     error = copies.std(ddof=1) / np.sqrt(len(copies))
     assert error < 0.5
     assert abs(copies.mean() - expected) < 4 * error

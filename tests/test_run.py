@@ -172,9 +172,19 @@ def test_summary_has_both_groups(unbroken):
     assert any("Started straight" in note for note in straight["notes"])
     observables = {o["name"]: o for o in free["observables"]}
     assert observables["stretching energy per segment"]["theory"] == pytest.approx(0.5, rel=1e-3)
-    assert observables["bending energy per joint"]["theory"] == pytest.approx(0.98, rel=1e-3)
+    assert observables["bending energy per joint"]["theory"] == pytest.approx(np.exp(-360 / 17200), rel=1e-6)
     assert observables["segment length"]["value"] == pytest.approx(360, rel=1e-3)
     assert all(o["standard_error"] >= 0 for o in free["observables"])
+
+
+@pytest.mark.parametrize("begin", ["straight", "equilibrium"])
+def test_summary_says_whether_filaments_were_in_equilibrium_from_the_start(tmp_path, begin):
+    filament = f'[[filament]]\ntype = "F_ACTIN"\nsegments = 6\ncount = 12\nstart = "{begin}"\n'
+    config = configured(tmp_path, SHORT[: SHORT.index("[[")] + filament + SHORT[SHORT.index("[simulation]") :])
+    assert finish(start(config, tmp_path / "out"))[0] == 0
+    (group,) = json.loads((tmp_path / "out" / "summary.json").read_text())["groups"]
+    found = [note for note in group["notes"] if "first frame on: joints are more bent" in note]
+    assert len(found) == (begin == "straight")
 
 
 def test_equilibrium_run_agrees_with_theory(tmp_path):

@@ -8,13 +8,12 @@ import math
 
 import numpy as np
 
-from .. import DSDNA
 from ..theory import chain_mean_square_end_to_end, chain_persistence_length, wlc_mean_square_end_to_end
 from ..timestep import recommended_time_step
 from . import simulation, style
 from .case import Case, Outcome
 from .result import Estimate, Result, Rule, printed
-from .table_2 import ACTIN, MICROSECOND, SOLVENT_TEMPERATURE, SOLVENT_VISCOSITY, THERMAL_ENERGY
+from .table_2 import ACTIN, DNA, MICROSECOND, SOLVENT_TEMPERATURE, SOLVENT_VISCOSITY, THERMAL_ENERGY
 
 _VISCOSITY_FACTOR = 0.1
 _FRAMES = 200
@@ -31,12 +30,12 @@ _TIMES = {64: printed("3.03", "0.35"), 128: printed("5.51", "0.81")}
 _LARGEST_ROTATION_STEPS = {128: 4.0}
 """Steps over the recommended one; the slowest mode of the longest filament takes 10^5 steps even so."""
 
-_MATERIALS = {"actin": ACTIN, "dna": DSDNA}
+_MATERIALS = {"actin": ACTIN, "dna": DNA}
 _NAMES = {"actin": "actin", "dna": "DNA"}
 
 
 def _simulated(material):
-    return {"actin": simulation.ACTIN, "dna": DSDNA}[material]
+    return {"actin": simulation.ACTIN, "dna": simulation.DNA}[material]
 
 
 def straight_filaments(material, segments, chains, groups, step_microseconds, steps, seed):

@@ -1,11 +1,16 @@
 """Table 2 of Pesek et al., Soft Matter 2016, 12, 3360: what the theory is evaluated for."""
 
+from dataclasses import replace
+
 from openmm import unit
 
-from .. import F_ACTIN
+from .. import DSDNA, F_ACTIN
 from ..quantities import FORCE, STIFFNESS, VISCOSITY, in_units_of, thermal_energy
 
-ACTIN = F_ACTIN
+ACTIN = replace(F_ACTIN, temperature=None)
+"""With the joints of the paper, l_p k_B T/l0; those of the preset are calibrated to l_p."""
+DNA = replace(DSDNA, temperature=None)
+"""That of the footnote on DNA, with the joints of the paper."""
 SOLVENT_TEMPERATURE = 310.0
 SOLVENT_VISCOSITY = in_units_of(1.71e-3 * unit.pascal * unit.second, VISCOSITY, "viscosity")
 THERMAL_ENERGY = thermal_energy(SOLVENT_TEMPERATURE)
