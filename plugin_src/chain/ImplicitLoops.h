@@ -131,13 +131,13 @@ public:
         int iterations = 0;
         while (iterations < NEWTON_ITERATIONS) {
             eliminate(y);
-            substitute(Real{});
+            substitute<false>();
             if (iterations > 0)
                 refine();
             else if (settings.kT > 0) {
                 if (stiffenTautSegments()) {
                     eliminate(y);
-                    substitute(Real{});
+                    substitute<false>();
                 }
                 addMetricForces();
             }
@@ -544,8 +544,8 @@ private:
         here.upper = here.upper+mixed-Mat::of(last);
     }
     /** Find the changes of y and the tensions, or add to them. */
-    void substitute(Real before) {
-        band.substitute(change, before, [&] (int s, Real tension) {
+    template <bool ADD> void substitute() {
+        band.template substitute<ADD>(change, [&] (int s, Real tension) {
             ImplicitSegment<Real>& segment = segments[s];
             segment.multiplier = tension+segment.shift*segment.newTangent.dot(change[s+1]-change[s]);
         });
@@ -555,7 +555,7 @@ private:
         band.setForces([&] (int s) {
             return segments[s].turned*(segments[s].multiplier-segments[s].multiplierBefore);
         });
-        substitute(1+Real{});
+        substitute<true>();
     }
     /** Add the metric forces of the lengths, in the first iteration, where the directions are those of the start. */
     void addMetricForces() {

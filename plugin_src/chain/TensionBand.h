@@ -106,10 +106,10 @@ public:
      * Find nodes and tensions, or add them to what is there.
      *
      * @param y        those of a ring must have place for the first two nodes once more
-     * @param before   zero, or one to add
+     * @param ADD      whether to add to them
      * @param use      is called with the number of each segment and its tension, when its nodes have been found
      */
-    template <class Function> CYLCHAIN_INLINE void substitute(Vec* y, Real before, Function use) {
+    template <bool ADD, class Function> CYLCHAIN_INLINE void substitute(Vec* y, Function use) {
         Vec next = {}, second = {};
         Real tension = {};
         if constexpr (CLOSED) {
@@ -117,24 +117,24 @@ public:
             const Real tension0 = nodes[1].tension;
             const Vec found0 = nodes[0].solution-nodes[0].next*found1+nodes[0].pull*tension0;
             const Real tensionLast = nodes[0].tension+nodes[0].first.dot(found1)+nodes[0].share*tension0;
-            tensions[0] = tension0+tensions[0]*before;
-            tensions[n-1] = tensionLast+tensions[n-1]*before;
+            tensions[0] = ADD ? tensions[0]+tension0 : tension0;
+            tensions[n-1] = ADD ? tensions[n-1]+tensionLast : tensionLast;
             tension = tensionLast;
-            y[0] = found0+y[0]*before;
-            y[1] = found1+y[1]*before;
+            y[0] = ADD ? y[0]+found0 : found0;
+            y[1] = ADD ? y[1]+found1 : found1;
             y[n] = y[0];
             y[n+1] = y[1];
             for (int node = n-1; node > 1; node--) {
-                substitutePair(node, found0, found1, next, second, tension, y, before);
+                substitutePair<ADD>(node, found0, found1, next, second, tension, y);
                 use(node, tensions[node]);
             }
             use(1, tensions[1]);
             use(0, tensions[0]);
         }
         else {
-            substitutePair(n-1, next, next, next, second, tension, y, before);
+            substitutePair<ADD>(n-1, next, next, next, second, tension, y);
             for (int node = n-2; node >= 0; node--) {
-                substitutePair(node, next, next, next, second, tension, y, before);
+                substitutePair<ADD>(node, next, next, next, second, tension, y);
                 use(node, tensions[node]);
             }
         }
@@ -300,8 +300,8 @@ private:
         border[0].upper = border[0].upper-row.border[0].transposedTimes(result.border[1])+
                 Mat::outer(before.border[0], result.tensionBorder[1]);
     }
-    CYLCHAIN_INLINE void substitutePair(int node, const Vec& found0, const Vec& found1, Vec& next, Vec& second,
-                Real& tension, Vec* y, Real before) {
+    template <bool ADD> CYLCHAIN_INLINE void substitutePair(int node, const Vec& found0, const Vec& found1, Vec& next,
+                Vec& second, Real& tension, Vec* y) {
         const EliminatedPair<Real, CLOSED>& own = nodes[node];
         Vec here = own.solution;
         Real found = own.tension;
@@ -313,9 +313,9 @@ private:
             here = here-own.border[0]*found0-own.border[1]*found1;
             found = found+own.tensionBorder[0].dot(found0)+own.tensionBorder[1].dot(found1);
         }
-        y[node] = here+y[node]*before;
+        y[node] = ADD ? y[node]+here : here;
         if (node > 0)
-            tensions[node-1] = found+tensions[node-1]*before;
+            tensions[node-1] = ADD ? tensions[node-1]+found : found;
         tension = found;
         second = next;
         next = here;
