@@ -163,24 +163,21 @@ class ExplicitForces:
 
     def allowed_step(self, springs, target):
         """The longest step, in ps, in which lambda of some springs does not exceed ``target``."""
+        # The response grows no faster than the step.
         start = 1e-9
-        slowest = target * start / max(self.eigenvalue(springs, start)[0], 1e-300)
-        if slowest > 1e250:
+        shortest = target * start / max(self.eigenvalue(springs, start)[0], 1e-300)
+        if shortest > 1e250:
             return math.inf
-        longest = slowest
-        while self.eigenvalue(springs, longest)[0] < target:
-            longest *= 8.0
-            if longest > 1e12 * slowest:
+
+        def excess(step):
+            return self.eigenvalue(springs, step)[0] - target
+
+        below, above = shortest * (1.0 - 1e-6), shortest * (1.0 + 1e-3)
+        while excess(above) < 0.0:
+            below, above = above, 8.0 * above
+            if above > 1e12 * shortest:
                 return math.inf
-        if longest == slowest:
-            return slowest
-        exponent = brentq(
-            lambda x: self.eigenvalue(springs, math.exp(x))[0] - target,
-            math.log(longest / 8.0),
-            math.log(longest),
-            xtol=1e-3,
-        )
-        return math.exp(exponent)
+        return math.exp(brentq(lambda x: excess(math.exp(x)), math.log(below), math.log(above), xtol=1e-3))
 
     def eigenvalue(self, springs, step):
         """lambda of some springs in a step in ps, and the name of the spring that has most part in it.

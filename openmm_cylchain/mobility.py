@@ -18,13 +18,13 @@ long ones that of as much filament as a force moves within the step. In an expli
 import numpy as np
 from scipy.linalg import eigh, eigvalsh
 
-_LONGEST_PIECE = 256
+_LONGEST_PIECE = 128
 
 
 class FilamentResponse:
     """The response of one filament, taken as straight, to explicit forces in a step.
 
-    Clamped nodes stay. Tethers are left out, and filaments of more than 256 segments are cut into pieces: both make it
+    Clamped nodes stay. Tethers are left out, and filaments of more than 128 segments are cut into pieces: both make it
     more mobile than it is.
 
     Parameters

@@ -510,7 +510,7 @@ def warn_if_unstable(filament_type, viscosity, temperature, step, segments=1, sc
                 f"A time step of {step:.4g} ps exceeds the {name} bound of {bound:.4g} ps of filament type "
                 f"{filament_type.name!r}: the simulation will blow up. Recommended: {recommended}.",
                 TimeStepWarning,
-                stacklevel=3,
+                stacklevel=4,
             )
     return unstable
 
@@ -524,7 +524,7 @@ def warn_if_far_above(filament_type, viscosity, temperature, step, segments=1, s
             f"A time step of {step:.4g} ps is {step / recommended.step:.3g} times as long as the recommended one of "
             f"filament type {filament_type.name!r} with {segments} segments. Recommended: {recommended}.",
             TimeStepWarning,
-            stacklevel=3,
+            stacklevel=4,
         )
 
 
@@ -537,7 +537,7 @@ def warn_if_strained(step, flow):
             f"In a time step of {step:.4g} ps the flow strains the solvent by {strain:.3g}: it is not resolved. Use a "
             f"step of at most {_LARGEST_STRAIN * step / strain:.4g} ps, or better {_RECOMMENDED_STRAIN * step / strain:.4g} ps.",
             TimeStepWarning,
-            stacklevel=3,
+            stacklevel=4,
         )
 
 
@@ -555,5 +555,5 @@ def warn_if_driven_far(filament_type, viscosity, temperature, step, segments=1, 
             f"{advance:.3g} of its length: it is not resolved. Use a step of at most "
             f"{_LARGEST_ADVANCE * step / advance:.4g} ps.",
             TimeStepWarning,
-            stacklevel=3,
+            stacklevel=4,
         )
