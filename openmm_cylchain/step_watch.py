@@ -166,7 +166,7 @@ class ExplicitWork:
                 f"{_work_description(work, particle)}: its fluctuations are more than 10 % too large. Use a smaller "
                 f"time step (see Filaments.recommended_time_step(system=system)). {_TURN_OFF}",
                 TimeStepWarning,
-                stacklevel=4,
+                stacklevel=3,
             )
 
 

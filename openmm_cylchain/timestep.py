@@ -516,10 +516,14 @@ def warn_if_unstable(filament_type, viscosity, temperature, step, segments=1, sc
 
 
 def warn_if_far_above(filament_type, viscosity, temperature, step, segments=1, scheme="midpoint", closed=False):
-    """Issue a TimeStepWarning if ``step`` exceeds the recommended step of a chain by more than a factor of four."""
+    """Issue a TimeStepWarning if ``step`` exceeds the recommended step of a chain by more than a factor of four.
+
+    Not where nothing but the relaxation of lengths is left to resolve (see ``implicit_time_step``): whatever moves such a
+    filament then is not the chain's own.
+    """
     step = as_step(step, "time step")
     recommended = recommended_time_step(filament_type, viscosity, temperature, scheme, segments, closed)
-    if step > _FAR_ABOVE * recommended.step:
+    if step > _FAR_ABOVE * recommended.step and "length" not in recommended.bounds:
         warnings.warn(
             f"A time step of {step:.4g} ps is {step / recommended.step:.3g} times as long as the recommended one of "
             f"filament type {filament_type.name!r} with {segments} segments. Recommended: {recommended}.",

@@ -175,7 +175,7 @@ LINKS = [(DSDNA, 8, 10.0), (MICROTUBULE, 8, 0.03), (MICROTUBULE, 8, 0.1), (F_ACT
 @pytest.mark.slow
 @pytest.mark.parametrize("kind, segments, stiffness", LINKS)
 def test_links_have_their_energy_at_the_recommended_step(kind, segments, stiffness):
-    mean, error, divided = link_energies(kind, segments, stiffness, None, 100, 3000)
+    mean, error, divided = link_energies(kind, segments, stiffness, None, 200, 5000)
     assert SIGMAS * error < 0.05 * 1.5
     assert abs(mean - 1.5) < 0.05 * 1.5 + SIGMAS * error, (mean, error)
     assert divided == 0
@@ -483,7 +483,7 @@ def test_fene_lengths_bind():
 @pytest.mark.slow
 @pytest.mark.parametrize("extension", [36.0, 10.8, 3.6, 1.0, 0.6])
 def test_fene_energies_at_the_recommended_step(extension):
-    kind, segments, chains = fene_actin(extension), 8, 24
+    kind, segments, chains = fene_actin(extension), 8, 64
     filaments = Filaments(VISCOSITY, TEMPERATURE)
     for number in range(chains):
         filaments.add_equilibrium(kind, segments, seed=number + 1)

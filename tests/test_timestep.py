@@ -451,6 +451,6 @@ def test_warnings_where_drive_is_not_resolved(engine):
     if engine == "compiled":
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            slow = Filaments(VISCOSITY, TEMPERATURE, engine=engine)
-            slow.add_straight(F_ACTIN, 16, [0, 0, 0], [1, 0, 0], propulsion=1 * unit.piconewton)
-            slow.create_integrator(slow.build()[1], 0.99 * bound, flow=Flow.shear(0.059 / bound))
+            longer = Filaments(VISCOSITY, TEMPERATURE, engine=engine)
+            longer.add_straight(F_ACTIN, 16, [0, 0, 0], [1, 0, 0], propulsion=1 * unit.piconewton)
+            longer.create_integrator(longer.build()[1], 0.99 * bound, flow=Flow.shear(0.059 / bound))
