@@ -226,7 +226,7 @@ class Filaments(FilamentCollection):
             raise InputError("A contact_stiffness needs a contact_diameter.")
         if system is not None:
             self._refuse_if_not_in(system)
-            steps += self._contact_diffusion(system, confidence)
+            steps += self._contact_diffusion(system, self._bath(temperature), confidence)
             forces = ExplicitForces(system, self, scheme, particle_friction)
             steps.append(forces.recommended_step())
         return shortest(steps)
@@ -239,9 +239,15 @@ class Filaments(FilamentCollection):
         # In the order of the filaments, so that the first of equals is named.
         ordered = sorted(kinds, key=[(f.type, f.segments, f.closed) for f in self._filaments].index)
         return [
-            recommended_time_step(kind, self._viscosity, temperature, scheme, segments, closed, flow)
+            recommended_time_step(
+                kind, self._viscosity, temperature, scheme, segments, closed, flow, self._friction(kind, segments)
+            )
             for kind, segments, closed in ordered
         ]
+
+    def _friction(self, kind, segments):
+        # At the temperature of the filaments, whatever that of the run is.
+        return kind.segment_friction(self._viscosity, self._temperature, segments)
 
     def _refuse_if_not_in(self, system):
         if system.getNumParticles() <= max(nodes.max() for nodes in self.node_indices):
@@ -262,9 +268,8 @@ class Filaments(FilamentCollection):
             )
         return shortest(steps)
 
-    def _contact_diffusion(self, system, confidence):
+    def _contact_diffusion(self, system, temperature, confidence):
         # Of filaments that a contact force of the System keeps apart.
-        solvent = (self._viscosity, self._temperature)
         found = {}
         for force in system.getForces():
             if is_contact_force(force):
@@ -273,7 +278,8 @@ class Filaments(FilamentCollection):
                     if diameter > 0.0:
                         found[filament.type, filament.segments, diameter] = True
         return [
-            contact_diffusion_step(kind, *solvent, diameter, segments, confidence) for kind, segments, diameter in found
+            contact_diffusion_step(kind, self._friction(kind, segments), temperature, diameter, confidence)
+            for kind, segments, diameter in found
         ]
 
     def create_integrator(
@@ -355,7 +361,8 @@ class Filaments(FilamentCollection):
         for f in {(f.type, f.segments, f.propulsion, f.closed): f for f in self._filaments}.values():
             warn_if_driven_far(f.type, self._viscosity, self._temperature, step, f.segments, f.propulsion)
             if not warn_if_unstable(f.type, self._viscosity, self._temperature, step, f.segments, scheme):
-                warn_if_far_above(f.type, self._viscosity, bath, step, f.segments, scheme, f.closed)
+                friction = self._friction(f.type, f.segments)
+                warn_if_far_above(f.type, self._viscosity, bath, step, f.segments, scheme, f.closed, friction)
         ExplicitForces(system, self, scheme, particle_friction).warn_if_too_stiff(step)
 
     def chain_set(self, system):

@@ -177,7 +177,7 @@ def _time_step(options):
         print(f"  {'stability of explicit schemes':<36} {format_time(stability, 4):>12}")
         for name, allowed in recommended.allowed.items():
             time = format_time(allowed, 4) if math.isfinite(allowed) else "any"
-            print(f"  {f'right to 5 %: {name}':<36} {time:>12}")
+            print(f"  {f'allowed by {name}':<36} {time:>12}")
         print(f"  {'recommended':<36} {format_time(recommended.step, 4):>12}  ({recommended.reason})")
         print(f"  {'in this configuration':<36} {format_time(settings.time_step, 4):>12}")
 

@@ -227,6 +227,9 @@ def as_step(step, name="step_size"):
 def shortest(steps):
     """The TimeStep that binds of several, with the bounds of all of them, each at its shortest."""
     steps = list(steps)
+    if any(math.isfinite(one.step) and _IDLE not in one.bounds for one in steps):
+        # The relaxation of lengths counts only where there is nothing else to resolve.
+        steps = [one for one in steps if _IDLE not in one.bounds]
     least = min(steps, key=lambda one: one.step)
     bounds, allowed = {}, {}
     for one in steps:
@@ -237,6 +240,7 @@ def shortest(steps):
     return TimeStep(least.step, least.reason, bounds, allowed, unknown)
 
 
+_IDLE = "length"
 _REASONS = {
     "stretching": "relaxation of a segment's length, eq. (57), with a margin of {margin:g} for accuracy",
     "bending": "relaxation of the sharpest bend of a chain (a quarter of eq. 58), with a margin of {margin:g} "
@@ -250,7 +254,7 @@ _REASONS = {
     "contact stiffness": "stiffness of contacts, which are explicit, with a margin of {contact_margin:g}",
     "range": "FENE lengths must stay well inside their range",
     "flow": "flow, which may strain the solvent by {strain:g} in a step",
-    "length": "relaxation of a segment's length, which takes 20 steps: at a temperature of zero nothing else moves",
+    _IDLE: "relaxation of a segment's length, which takes 20 steps: at a temperature of zero nothing else moves",
 }
 _RELAXATION_STEPS = 20.0
 _OVAL_MODE = 4.0 * math.pi * math.sqrt(0.75)
@@ -273,6 +277,10 @@ _FAR_ABOVE = 4.0
 def stability_bounds(filament_type, viscosity, temperature, segments=1):
     """Steps, in ps, above which the explicit schemes blow up: ``stretching`` and ``bending`` of a chain."""
     friction = filament_type.segment_friction(viscosity, temperature, segments)
+    return _stability_bounds(filament_type, friction, segments)
+
+
+def _stability_bounds(filament_type, friction, segments):
     length = filament_type.segment_length
     bounds = {"stretching": chain_stretching_bound(friction, filament_type.segment_stiffness, length)}
     if segments > 1:
@@ -280,7 +288,9 @@ def stability_bounds(filament_type, viscosity, temperature, segments=1):
     return bounds
 
 
-def recommended_time_step(filament_type, viscosity, temperature, scheme=None, segments=2, closed=False, flow=None):
+def recommended_time_step(
+    filament_type, viscosity, temperature, scheme=None, segments=2, closed=False, flow=None, friction=None
+):
     """The step at which equilibrium energies of a chain are good to about 5 %.
 
     Explicit schemes of weak order one leave a harmonic mode of rate lambda with a variance too large by
@@ -308,6 +318,8 @@ def recommended_time_step(filament_type, viscosity, temperature, scheme=None, se
         A ring; matters only to "implicit".
     flow : Flow, optional
         Of the solvent.
+    friction : SegmentFriction, optional
+        Of a segment; that at the given temperature if not given.
 
     Returns
     -------
@@ -315,10 +327,11 @@ def recommended_time_step(filament_type, viscosity, temperature, scheme=None, se
     """
     scheme = default_scheme() if scheme is None else scheme
     check_scheme(scheme)
+    if friction is None:
+        friction = filament_type.segment_friction(viscosity, temperature, segments)
     if scheme == "implicit":
-        return implicit_time_step(filament_type, viscosity, temperature, segments, closed, flow)
-    friction = filament_type.segment_friction(viscosity, temperature, segments)
-    bounds = stability_bounds(filament_type, viscosity, temperature, segments)
+        return implicit_time_step(filament_type, viscosity, temperature, segments, closed, flow, friction)
+    bounds = _stability_bounds(filament_type, friction, segments)
     allowed = {name: bound / _ACCURACY_MARGIN for name, bound in bounds.items()}
     kT = thermal_energy(temperature)
     turning = min(_TURNING_ANGLE**2, _turning_in_range(filament_type))
@@ -338,7 +351,7 @@ def _binding(filament_type, friction, temperature, scheme, flow, bounds, allowed
         bounds["flow"] = allowed["flow"] = _RECOMMENDED_STRAIN / rate
     if not any(math.isfinite(step) for step in allowed.values()):
         relaxation = friction.extensional / (filament_type.segment_stiffness * filament_type.segment_length**2)
-        bounds["length"], allowed["length"] = relaxation, relaxation / _RELAXATION_STEPS
+        bounds[_IDLE], allowed[_IDLE] = relaxation, relaxation / _RELAXATION_STEPS
     binding = min(allowed, key=allowed.get)
     reason = _REASONS[binding].format(
         margin=_ACCURACY_MARGIN, angle=angle, relaxation_steps=_RELAXATION_STEPS, strain=_RECOMMENDED_STRAIN
@@ -387,7 +400,9 @@ def fene_bound(filament_type, friction, temperature, scheme):
     return min(noise, 0.1 * tau * narrow**2 / (2.0 - narrow))
 
 
-def implicit_time_step(filament_type, viscosity, temperature, segments=2, closed=False, flow=None):
+def implicit_time_step(
+    filament_type, viscosity, temperature, segments=2, closed=False, flow=None, friction=None
+):
     """The step of scheme "implicit" at which equilibrium energies of a chain are good to 2 %, and dynamics to 5 %.
 
     Its equilibrium is exact for linear forces at any step; what is left comes from segments that turn within one.
@@ -410,7 +425,8 @@ def implicit_time_step(filament_type, viscosity, temperature, segments=2, closed
     TimeStep
     """
     kT = thermal_energy(temperature)
-    friction = filament_type.segment_friction(viscosity, temperature, segments)
+    if friction is None:
+        friction = filament_type.segment_friction(viscosity, temperature, segments)
     length, rigidity = filament_type.segment_length, filament_type.bending_rigidity
     friction_per_length = friction.perpendicular / length
     square_angle = min(_IMPLICIT_TURNING_ANGLE**2, _turning_in_range(filament_type))
@@ -473,14 +489,13 @@ def contact_time_step(
     return TimeStep(allowed[binding], _REASONS[binding].format(contact_margin=_CONTACT_MARGIN), bounds, allowed)
 
 
-def contact_diffusion_step(filament_type, viscosity, temperature, diameter, segments=2, confidence=3.0):
-    """The part of ``contact_time_step`` that does not depend on the stiffness of contacts.
+def contact_diffusion_step(filament_type, friction, temperature, diameter, confidence=3.0):
+    """The part of ``contact_time_step`` that does not depend on the stiffness of contacts, for segments of a friction.
 
     Returns
     -------
     TimeStep
     """
-    friction = filament_type.segment_friction(viscosity, temperature, segments)
     confidence = positive(confidence, DIMENSIONLESS, "confidence")
     bound = diffusion_bound(friction, diameter, filament_type.segment_length, temperature, confidence)
     bounds = {"contact diffusion": bound}
@@ -515,15 +530,19 @@ def warn_if_unstable(filament_type, viscosity, temperature, step, segments=1, sc
     return unstable
 
 
-def warn_if_far_above(filament_type, viscosity, temperature, step, segments=1, scheme="midpoint", closed=False):
+def warn_if_far_above(
+    filament_type, viscosity, temperature, step, segments=1, scheme="midpoint", closed=False, friction=None
+):
     """Issue a TimeStepWarning if ``step`` exceeds the recommended step of a chain by more than a factor of four.
 
     Not where nothing but the relaxation of lengths is left to resolve (see ``implicit_time_step``): whatever moves such a
     filament then is not the chain's own.
     """
     step = as_step(step, "time step")
-    recommended = recommended_time_step(filament_type, viscosity, temperature, scheme, segments, closed)
-    if step > _FAR_ABOVE * recommended.step and "length" not in recommended.bounds:
+    recommended = recommended_time_step(
+        filament_type, viscosity, temperature, scheme, segments, closed, friction=friction
+    )
+    if step > _FAR_ABOVE * recommended.step and _IDLE not in recommended.bounds:
         warnings.warn(
             f"A time step of {step:.4g} ps is {step / recommended.step:.3g} times as long as the recommended one of "
             f"filament type {filament_type.name!r} with {segments} segments. Recommended: {recommended}.",

@@ -449,6 +449,44 @@ def test_rods_at_zero_temperature_have_a_finite_step(scheme, segments, rigidity)
     assert "length" in recommended.reason
 
 
+def test_what_else_moves_a_rod_at_zero_temperature_sets_its_step():
+    filaments = Filaments(VISCOSITY, 0)
+    filaments.add_straight(F_ACTIN, 1, [0, 0, 0], [1, 0, 0])
+    _, system, _ = filaments.build()
+    idle = filaments.recommended_time_step("implicit", system=system)
+    system.addForce(external("1e-6*(x^2+y^2+z^2)", particle=0))
+    pulled = filaments.recommended_time_step("implicit", system=system)
+    assert "CustomExternalForce" in pulled.reason and pulled.step > 100 * idle.step
+    sheared = filaments.recommended_time_step("implicit", flow=Flow.shear(1e-9))
+    assert sheared.step == pytest.approx(0.03 * 1e9)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        filaments.create_integrator(system, 100 * idle.step)
+
+
+def test_a_hot_run_keeps_the_friction_of_its_filaments():
+    # Eq. (20) has no friction at this temperature.
+    soft = replace(F_ACTIN, stretching_stiffness=1.0, bending_rigidity=10.0)
+    filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
+    filaments.add_straight(soft, 4, [0, 0, 0], [1, 0, 0])
+    _, system, _ = filaments.build()
+    recommended = filaments.recommended_time_step(temperature=1e7, system=system)
+    assert recommended.step < filaments.recommended_time_step().step
+    filaments.create_integrator(system, recommended, temperature=1e7)
+
+
+@pytest.mark.parametrize("engine", ["compiled", "portable"])
+def test_forces_of_the_engines_are_known(engine):
+    filaments = Filaments(VISCOSITY, TEMPERATURE, engine=engine)
+    filaments.add_straight(F_ACTIN, 4, [0, 0, 0], [1, 0, 0], propulsion=0.1)
+    filaments.add_tether(0, 0, [0, 0, 0], 0.5)
+    _, system, _ = filaments.build()
+    filaments.create_integrator(system, 1.0)
+    recommended = filaments.recommended_time_step(system=system)
+    assert recommended.unknown_forces == ()
+    assert ("Tethers: tether 0" in recommended.bounds) == (engine == "portable")
+
+
 def test_lengths_however_stiff_or_slow_do_not_bind_the_implicit_scheme():
     usual = recommended_time_step(F_ACTIN, VISCOSITY, TEMPERATURE, "implicit", 8).step
     for changed in (
