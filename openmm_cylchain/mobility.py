@@ -4,13 +4,13 @@ In one step of length h a straight filament takes with linear forces and the fri
 
     Z (y - x)/h + K (theta y + (1 - theta) x) = f(x) + noise,
 
-where K are its own stiffnesses, which scheme "implicit" weighs with theta = max(1/2, 1 - 1/z), z being the step over the
-relaxation time of the fastest mode (``plugin_src/IMPLICIT_SCHEME.md``). With A = Z/h + (theta - 1/2) K this is
+where K are its own stiffnesses, which scheme "implicit" weighs with theta = max(1/2, 1 - 1/z), z being the step over
+the relaxation time of the fastest mode (``plugin_src/IMPLICIT_SCHEME.md``). With A = Z/h + (theta - 1/2) K this is
 
     A (y - x) + K (x + y)/2 = f(x) + noise of the covariance 2 k_B T A,
 
-which keeps the covariance k_B T K^-1 exactly. An explicit force f = -S x takes S/2 from A, but leaves the noise. So with
-the largest eigenvalue lambda of A^-1 S no variance is too large by more than the factor 1/(1 - lambda/2), and the
+which keeps the covariance k_B T K^-1 exactly. An explicit force f = -S x takes S/2 from A, but leaves the noise. So
+with the largest eigenvalue lambda of A^-1 S no variance is too large by more than the factor 1/(1 - lambda/2), and the
 filament is thrown apart from lambda = 2 on. A^-1 is the response: in short steps h times the mobility of a segment, in
 long ones that of as much filament as a force moves within the step. In an explicit scheme A = Z/h.
 """

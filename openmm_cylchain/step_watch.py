@@ -76,8 +76,8 @@ class DividedSteps:
 
 def _description(share):
     return (
-        f"{100 * share:.2g} % of the last steps of filaments were divided, because the equations of the implicit scheme "
-        "could not be solved"
+        f"{100 * share:.2g} % of the last steps of filaments were divided, because the equations of the implicit "
+        "scheme could not be solved"
     )
 
 
@@ -116,9 +116,9 @@ ERROR_WORK = 3.0
 class ExplicitWork:
     """Watches the work that explicit forces do because they are those of the start of a step.
 
-    For the forces f_i on a particle before and after a step that moves it by dx_i, w_i = -(f_i(after) - f_i(before)).dx_i
-    is 2 k_B T x/(1 - x/2) on the mean for a harmonic coordinate that relaxes by x = k mu h in a step, summed over the
-    coordinates that the particle has. Its mean over a window of steps is compared with ``WARNING_WORK`` and
+    With the forces f_i on a particle before and after a step that moves it by dx_i,
+    w_i = -(f_i(after) - f_i(before)).dx_i is 2 k_B T x/(1 - x/2) on the mean for a harmonic coordinate that relaxes by
+    x = k mu h in a step, summed over the coordinates that the particle has. Its mean over a window of steps is compared with ``WARNING_WORK`` and
     ``ERROR_WORK``, for the particle where it is largest. Chance makes the largest of n means over s steps larger than
     what is expected of each by a factor of about 1 + sqrt(2/s) sqrt(2 ln n), which is allowed for.
     """

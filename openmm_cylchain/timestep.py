@@ -375,12 +375,12 @@ def _turning_in_range(filament_type):
 def fene_bound(filament_type, friction, temperature, scheme):
     """The step, in ps, in which the length of a segment with a FENE potential stays well inside its range.
 
-    With nu = k D^2/k_B T, u = (l - l0)/D has the distribution (1 - u^2)^(nu/2), and relaxes in tau = gamma_def/(k l0^2).
-    For nu of 30 and more, scheme "implicit" has ever larger steps right to 3 % as far as lengths are concerned (measured
-    with F-actin). Below, the potential is no longer like a harmonic one where lengths are, and the step must resolve
-    their relaxation: ``dt < 0.1 tau min(1, nu/11)^4``. In the explicit schemes neither the noise of a step,
-    sigma^2 = 2 k_B T dt l0^2/gamma_def, nor the force may take a length from u*, which it exceeds once in a million, out
-    of its range: ``5 sigma < D (1 - u*)`` and ``dt < 0.1 tau (1 - u*^2)^2/(1 + u*^2)``, 1 - u*^2 = 10^(-12/nu).
+    With nu = k D^2/k_B T, u = (l - l0)/D has the distribution (1 - u^2)^(nu/2), and relaxes in
+    tau = gamma_def/(k l0^2). For nu of 30 and more, scheme "implicit" keeps the energies of lengths to 3 % at any step
+    in which segments turn little enough (measured with F-actin). Below, the potential is no longer like a harmonic one
+    where lengths are, and the step must resolve their relaxation: ``dt < 0.1 tau min(1, nu/11)^4``. In the explicit
+    schemes neither the noise of a step, sigma^2 = 2 k_B T dt l0^2/gamma_def, nor the force may take a length from u*,
+    which it exceeds once in a million, out of its range: ``5 sigma < D (1 - u*)`` and ``dt < 0.1 tau (1 - u*^2)^2/(1 + u*^2)``, 1 - u*^2 = 10^(-12/nu).
 
     A segment must also turn by less, in every scheme: by a mean square angle of D/(12 l0) at most. Before its length is
     solved for, one that turns by phi is longer by l0 phi^2/2. This is part of the bounds "turning" and "rotation".
@@ -400,9 +400,7 @@ def fene_bound(filament_type, friction, temperature, scheme):
     return min(noise, 0.1 * tau * narrow**2 / (2.0 - narrow))
 
 
-def implicit_time_step(
-    filament_type, viscosity, temperature, segments=2, closed=False, flow=None, friction=None
-):
+def implicit_time_step(filament_type, viscosity, temperature, segments=2, closed=False, flow=None, friction=None):
     """The step of scheme "implicit" at which equilibrium energies of a chain are good to 2 %, and dynamics to 5 %.
 
     Its equilibrium is exact for linear forces at any step; what is left comes from segments that turn within one.
@@ -445,9 +443,7 @@ def implicit_time_step(
         wave_number = _OVAL_MODE if closed else 4.73
         bounds["relaxation"] = friction_per_length * (segments * length / wave_number) ** 4 / rigidity
         allowed["relaxation"] = bounds["relaxation"] / _RELAXATION_STEPS
-    return _binding(
-        filament_type, friction, temperature, "implicit", flow, bounds, allowed, math.sqrt(square_angle)
-    )
+    return _binding(filament_type, friction, temperature, "implicit", flow, bounds, allowed, math.sqrt(square_angle))
 
 
 def contact_time_step(
@@ -535,8 +531,8 @@ def warn_if_far_above(
 ):
     """Issue a TimeStepWarning if ``step`` exceeds the recommended step of a chain by more than a factor of four.
 
-    Not where nothing but the relaxation of lengths is left to resolve (see ``implicit_time_step``): whatever moves such a
-    filament then is not the chain's own.
+    Not where nothing but the relaxation of lengths is left to resolve (see ``implicit_time_step``): whatever moves such
+    a filament then is not the chain's own.
     """
     step = as_step(step, "time step")
     recommended = recommended_time_step(
@@ -558,7 +554,8 @@ def warn_if_strained(step, flow):
     if strain > _LARGEST_STRAIN:
         warnings.warn(
             f"In a time step of {step:.4g} ps the flow strains the solvent by {strain:.3g}: it is not resolved. Use a "
-            f"step of at most {_LARGEST_STRAIN * step / strain:.4g} ps, or better {_RECOMMENDED_STRAIN * step / strain:.4g} ps.",
+            f"step of at most {_LARGEST_STRAIN * step / strain:.4g} ps, or better "
+            f"{_RECOMMENDED_STRAIN * step / strain:.4g} ps.",
             TimeStepWarning,
             stacklevel=4,
         )

@@ -323,6 +323,7 @@ def test_step_beyond_a_stability_bound_warns(filaments):
     assert caught[0].filename == __file__
 
 
+@pytest.mark.filterwarnings("ignore::openmm_cylchain.TimeStepWarning")
 def test_every_type_is_warned_about_once():
     filaments = Filaments(VISCOSITY, TEMPERATURE)
     for _ in range(3):

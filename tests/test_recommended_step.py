@@ -89,7 +89,7 @@ def straight_matrices(kind, segments, step):
 @pytest.mark.parametrize("kind, segments", [(DSDNA, 8), (F_ACTIN, 16), (MICROTUBULE, 8)])
 @pytest.mark.parametrize("place", [0, 0.5])
 def test_no_variance_is_larger_than_the_bound(kind, segments, place):
-    # The linear scheme in full: y = x - A^-1 (K + S) x + noise, A = Z/h + theta K, whose noise leaves k_B T K^-1 without S.
+    # The linear scheme in full: y = x - A^-1 (K + S) x + noise, A = Z/h + theta K. Without S, its noise leaves k_B T K^-1.
     node = round(place * segments)
     step = recommended_time_step(kind, VISCOSITY, TEMPERATURE, "implicit", segments).step
     filaments, *_ = pairs_of_filaments(kind, segments)
@@ -129,7 +129,9 @@ def test_response_to_short_steps_is_the_mobility_of_the_nodes():
     one, *_ = pairs_of_filaments(F_ACTIN, 1)
     rod = FilamentResponse(one[0], friction, implicit=True)
     quarter = 360**2 / 4
-    end = max(1 / friction.perpendicular + quarter / friction.rotational, 1 / friction.parallel + quarter / friction.extensional)
+    end = max(
+        1 / friction.perpendicular + quarter / friction.rotational, 1 / friction.parallel + quarter / friction.extensional
+    )
     assert rod.at(0, [0], [0.0], 7.0)[0] == pytest.approx(7 * end, rel=1e-9)
     middle = 1 / friction.parallel
     assert rod.at(0, [0], [0.5], 7.0)[0] == pytest.approx(7 * middle, rel=1e-9)
@@ -254,7 +256,9 @@ FRICTION = 500.0
         ),
     ],
 )
-@pytest.mark.parametrize("friction", [FRICTION, FRICTION * unit.kilojoule_per_mole * unit.picosecond / unit.nanometer**2])
+@pytest.mark.parametrize(
+    "friction", [FRICTION, FRICTION * unit.kilojoule_per_mole * unit.picosecond / unit.nanometer**2]
+)
 def test_particles_outside_filaments(force, name, rate, friction):
     filaments, system, friction = two_particles_with(force(), friction)
     recommended = filaments.recommended_time_step(system=system, particle_friction=friction)
@@ -346,7 +350,8 @@ def test_places_on_filaments():
     assert steps[2] > 1.5 * steps[0]
     # What a clamped node feels moves nothing.
     system.addForce(external("5e9*(x^2+y^2+z^2)", particle=int(filaments.node_indices[1][0])))
-    assert filaments.recommended_time_step("implicit", system=system).step == filaments.recommended_time_step("implicit").step
+    alone = filaments.recommended_time_step("implicit")
+    assert filaments.recommended_time_step("implicit", system=system).step == alone.step
 
 
 def test_crosslinks():
@@ -427,7 +432,8 @@ def test_flow_may_strain_by_three_per_cent():
     recommended = filaments.recommended_time_step(flow=Flow.shear(rate))
     assert recommended.step == pytest.approx(0.03 * 1e7)
     assert "flow" in recommended.reason
-    assert recommended.step == recommended_time_step(F_ACTIN, VISCOSITY, TEMPERATURE, segments=8, flow=Flow.shear(1e-7)).step
+    of_type = recommended_time_step(F_ACTIN, VISCOSITY, TEMPERATURE, segments=8, flow=Flow.shear(1e-7))
+    assert recommended.step == of_type.step
     assert "flow" not in filaments.recommended_time_step(flow=Flow.uniform([1, 0, 0])).bounds
 
 

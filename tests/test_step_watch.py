@@ -209,7 +209,7 @@ def test_checks_change_nothing():
 
 
 def kicked(stiffness, checks=True, filaments_count=1):
-    """Filaments with the compiled engine whose middles a stiff spring joins at the recommended step of filaments alone."""
+    """Filaments whose middles a stiff spring joins, with the compiled engine, at the recommended step without it."""
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
     force = openmm.HarmonicBondForce()
     for _ in range(filaments_count):
@@ -222,7 +222,8 @@ def kicked(stiffness, checks=True, filaments_count=1):
     system.addForce(force)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", TimeStepWarning)
-        integrator = filaments.create_integrator(system, filaments.recommended_time_step(), random_seed=1, checks=checks)
+        step = filaments.recommended_time_step()
+        integrator = filaments.create_integrator(system, step, random_seed=1, checks=checks)
     context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
     context.setPositions(positions)
     return context, integrator
@@ -232,7 +233,7 @@ def test_a_system_that_is_thrown_apart_stops():
     _, integrator = kicked(0.003 * 0.602214076)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", TimeStepWarning)
-        with pytest.raises(TimeStepError, match=r"% of the last steps of filaments were divided.*recommended_time_step"):
+        with pytest.raises(TimeStepError, match="% of the last steps of filaments were divided.*recommended_time_step"):
             integrator.step(5000)
     # It has stopped long before the end.
     assert 0 < integrator.getNumDividedSteps() < 4000

@@ -435,6 +435,8 @@ def test_recommended_step_of_a_ring_resolves_how_it_becomes_round():
     assert np.log(amplitudes[0] / amplitudes[1]) == pytest.approx(1.0, rel=0.03)
 
 
+# Steps so long are far above the recommended one, too.
+@pytest.mark.filterwarnings("ignore::openmm_cylchain.TimeStepWarning")
 @pytest.mark.parametrize("engine", ["compiled", "portable"])
 def test_warnings_where_drive_is_not_resolved(engine):
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine=engine)
