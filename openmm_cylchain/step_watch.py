@@ -118,14 +118,15 @@ class ExplicitWork:
 
     With the forces f_i on a particle before and after a step that moves it by dx_i,
     w_i = -(f_i(after) - f_i(before)).dx_i is 2 k_B T x/(1 - x/2) on the mean for a harmonic coordinate that relaxes by
-    x = k mu h in a step, summed over the coordinates that the particle has. Its mean over a window of steps is compared with ``WARNING_WORK`` and
-    ``ERROR_WORK``, for the particle where it is largest. Chance makes the largest of n means over s steps larger than
-    what is expected of each by a factor of about 1 + sqrt(2/s) sqrt(2 ln n), which is allowed for.
+    x = k mu h in a step, summed over the coordinates that the particle has. Its mean over a window of steps is
+    compared with ``WARNING_WORK`` and ``ERROR_WORK``, for the particle where it is largest. Chance makes the largest of
+    n means over s steps larger than what is expected of each by a factor of about 1 + sqrt(2/s) sqrt(2 ln n), which is
+    allowed for. Two windows in succession must show it: the relaxation of a start does not count.
     """
 
     def __init__(self):
         self._warned = False
-        self._too_large = 0
+        self._large = self._too_large = 0
 
     def add(self, work, particle, steps, particles):
         """Take note of a window.
@@ -144,7 +145,7 @@ class ExplicitWork:
         Warns
         -----
         TimeStepWarning
-            Once, if it is above ``WARNING_WORK``.
+            Once, if it is above ``WARNING_WORK`` for the second time in succession.
 
         Raises
         ------
@@ -153,6 +154,7 @@ class ExplicitWork:
         """
         chance = 1.0 + math.sqrt(2.0 / steps) * math.sqrt(2.0 * math.log(max(particles, 1)))
         # Written so that NaN is too large.
+        self._large = 0 if work <= WARNING_WORK * chance else self._large + 1
         self._too_large = 0 if work <= ERROR_WORK * chance else self._too_large + 1
         if self._too_large > 1:
             raise TimeStepError(
@@ -160,11 +162,12 @@ class ExplicitWork:
                 "(Filaments.recommended_time_step(system=system) knows the stiffness of most forces), or look for "
                 f"overlapping particles. {_TURN_OFF}"
             )
-        if work > WARNING_WORK * chance and not self._warned:
+        if self._large > 1 and not self._warned:
             self._warned = True
             warnings.warn(
-                f"{_work_description(work, particle)}: its fluctuations are more than 10 % too large. Use a smaller "
-                f"time step (see Filaments.recommended_time_step(system=system)). {_TURN_OFF}",
+                f"{_work_description(work, particle)}: its fluctuations are more than 10 % too large, or "
+                "it is driven too fast. Use a smaller time step (see Filaments.recommended_time_step(system=system)). "
+                f"{_TURN_OFF}",
                 TimeStepWarning,
                 stacklevel=3,
             )
@@ -180,7 +183,9 @@ def _work_description(work, particle):
 class WorkRecorder:
     """Means of the work w_i of all particles over windows of steps, from what the portable engine computes in each.
 
-    Steps that do not follow on from each other, because positions were set or a checkpoint was loaded, are left out.
+    Steps that do not follow on from each other, because positions were set or a checkpoint was loaded, are left out. Of
+    displacements and changes of forces, their means over the window are taken off: a filament that is dragged along
+    steadily, while its tension turns, is no sign of a step that is too long.
 
     Attributes
     ----------
@@ -195,9 +200,12 @@ class WorkRecorder:
 
     def clear(self):
         """Forget everything, as after a pause."""
-        self._number = self._forces = self._arrival = self._moves = self._sums = None
-        self._count = 0
+        self._number = self._forces = self._arrival = self._moves = None
         self._finished = None
+        self._begin()
+
+    def _begin(self):
+        self._count, self._work, self._change, self._way = 0, 0.0, 0.0, 0.0
 
     def record(self, number, positions, forces, moves, kT):
         """Take note of one step.
@@ -217,14 +225,16 @@ class WorkRecorder:
             self.clear()
             return
         if self._number == number - 1 and _agree(positions, self._arrival):
-            work = -np.einsum("ij,ij->i", forces - self._forces, self._moves) / kT
-            self._sums = work if self._sums is None else self._sums + work
+            change = forces - self._forces
+            self._work = self._work + np.einsum("ij,ij->i", change, self._moves)
+            self._change, self._way = self._change + change, self._way + self._moves
             self._count += 1
             if self._count == self.window:
-                self._finished = self._sums / self._count
-                self._sums, self._count = None, 0
+                steady = np.einsum("ij,ij->i", self._change, self._way) / self._count
+                self._finished = (steady - self._work) / (self._count * kT)
+                self._begin()
         else:
-            self._sums, self._count = None, 0
+            self._begin()
         self._number = number
         self._forces = np.array(forces)
         self._moves = np.array(moves)

@@ -380,7 +380,8 @@ def fene_bound(filament_type, friction, temperature, scheme):
     in which segments turn little enough (measured with F-actin). Below, the potential is no longer like a harmonic one
     where lengths are, and the step must resolve their relaxation: ``dt < 0.1 tau min(1, nu/11)^4``. In the explicit
     schemes neither the noise of a step, sigma^2 = 2 k_B T dt l0^2/gamma_def, nor the force may take a length from u*,
-    which it exceeds once in a million, out of its range: ``5 sigma < D (1 - u*)`` and ``dt < 0.1 tau (1 - u*^2)^2/(1 + u*^2)``, 1 - u*^2 = 10^(-12/nu).
+    which it exceeds once in a million, out of its range: ``5 sigma < D (1 - u*)`` and
+    ``dt < 0.1 tau (1 - u*^2)^2/(1 + u*^2)``, 1 - u*^2 = 10^(-12/nu).
 
     A segment must also turn by less, in every scheme: by a mean square angle of D/(12 l0) at most. Before its length is
     solved for, one that turns by phi is longer by l0 phi^2/2. This is part of the bounds "turning" and "rotation".

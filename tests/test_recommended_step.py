@@ -89,7 +89,7 @@ def straight_matrices(kind, segments, step):
 @pytest.mark.parametrize("kind, segments", [(DSDNA, 8), (F_ACTIN, 16), (MICROTUBULE, 8)])
 @pytest.mark.parametrize("place", [0, 0.5])
 def test_no_variance_is_larger_than_the_bound(kind, segments, place):
-    # The linear scheme in full: y = x - A^-1 (K + S) x + noise, A = Z/h + theta K. Without S, its noise leaves k_B T K^-1.
+    # The linear scheme in full: y = x - A^-1 (K + S) x + noise, A = Z/h + theta K, whose noise keeps k_B T K^-1.
     node = round(place * segments)
     step = recommended_time_step(kind, VISCOSITY, TEMPERATURE, "implicit", segments).step
     filaments, *_ = pairs_of_filaments(kind, segments)
@@ -129,9 +129,8 @@ def test_response_to_short_steps_is_the_mobility_of_the_nodes():
     one, *_ = pairs_of_filaments(F_ACTIN, 1)
     rod = FilamentResponse(one[0], friction, implicit=True)
     quarter = 360**2 / 4
-    end = max(
-        1 / friction.perpendicular + quarter / friction.rotational, 1 / friction.parallel + quarter / friction.extensional
-    )
+    across = 1 / friction.perpendicular + quarter / friction.rotational
+    end = max(across, 1 / friction.parallel + quarter / friction.extensional)
     assert rod.at(0, [0], [0.0], 7.0)[0] == pytest.approx(7 * end, rel=1e-9)
     middle = 1 / friction.parallel
     assert rod.at(0, [0], [0.5], 7.0)[0] == pytest.approx(7 * middle, rel=1e-9)

@@ -82,8 +82,10 @@ def test_warning_and_error_of_work():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         watch.add(0.99 * WARNING_WORK, 3, 10**6, 1)
+        watch.add(10.0 * WARNING_WORK, 3, 10**6, 1)
+        watch.add(0.99 * WARNING_WORK, 3, 10**6, 1)
     with pytest.warns(TimeStepWarning, match="forces on particle 3: .* work of 0.36 k_B T") as caught:
-        for _ in range(3):
+        for _ in range(4):
             watch.add(1.02 * WARNING_WORK, 3, 10**6, 1)
     assert len(caught) == 1
     watch.add(1.01 * ERROR_WORK, 3, 10**6, 1)
