@@ -444,7 +444,8 @@ def test_warnings_where_drive_is_not_resolved(engine):
     _, system, _ = filaments.build()
     friction = F_ACTIN.segment_friction(VISCOSITY, TEMPERATURE).parallel
     bound = 0.5 * 360 * friction / 0.602214076
-    for step, flow, what in ((1.01 * bound, None, "advances by 0.505"), (1e3, 6.06e-5, "strains the solvent by 0.0606")):
+    cases = (1.01 * bound, None, "advances by 0.505"), (1e3, 6.06e-5, "strains the solvent by 0.0606")
+    for step, flow, what in cases:
         with pytest.warns(TimeStepWarning, match=what) as record:
             filaments.create_integrator(system, step, flow=None if flow is None else Flow.shear(flow))
         advice = [str(one.message) for one in record if what in str(one.message)]
