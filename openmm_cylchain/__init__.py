@@ -2,7 +2,14 @@
 
 from .build import Filaments
 from .collection import Filament
-from .errors import ContactWarning, EquilibrationWarning, InputError, InstabilityError, TimeStepWarning
+from .errors import (
+    ContactWarning,
+    EquilibrationWarning,
+    InputError,
+    InstabilityError,
+    TimeStepError,
+    TimeStepWarning,
+)
 from .filament import DSDNA, F_ACTIN, MICROTUBULE, FilamentType
 from .flow import Flow
 from .friction import EndCorrections, SegmentFriction, stokes_friction
@@ -24,6 +31,7 @@ __all__ = [
     "MICROTUBULE",
     "SegmentFriction",
     "TimeStep",
+    "TimeStepError",
     "TimeStepWarning",
     "__version__",
     "recommended_time_step",

@@ -8,10 +8,11 @@ from openmm import app, unit
 
 from .attachments import add_virtual_site, attachment_positions, neighbors
 from .collection import FilamentCollection
-from .contacts import default_stiffness, filament_diameters
+from .contacts import default_stiffness, filament_diameters, is_contact_force
 from .engines import choose_engine, default_scheme, load_engine
 from .engines.description import describe_chains
 from .errors import InputError
+from .explicit_forces import ExplicitForces
 from .flow import as_flow
 from .insertion import (
     add_nodes_to_system,
@@ -21,13 +22,17 @@ from .insertion import (
     check_target,
 )
 from .placement import vector
-from .quantities import FORCE, LENGTH, STIFFNESS, in_units_of, positive, whole_number
+from .quantities import FORCE, LENGTH, STIFFNESS, TEMPERATURE, in_units_of, non_negative, positive, whole_number
 from .tension import filament_tensions
 from .timestep import (
+    as_step,
     check_scheme,
+    contact_diffusion_step,
     contact_time_step,
     recommended_time_step,
+    shortest,
     warn_if_driven_far,
+    warn_if_far_above,
     warn_if_strained,
     warn_if_unstable,
 )
@@ -160,10 +165,28 @@ class Filaments(FilamentCollection):
             mine = self._attachments_of[number]
             yield from neighbors([self._attachments[index] for index in mine], self._attachment_indices[mine], nodes)
 
-    def recommended_time_step(self, scheme=None, contact_diameter=None, contact_stiffness=None, confidence=3.0):
-        """The recommended step for the filament that allows the least: a TimeStep (see ``timestep``).
+    def recommended_time_step(
+        self,
+        scheme=None,
+        contact_diameter=None,
+        contact_stiffness=None,
+        confidence=3.0,
+        *,
+        system=None,
+        temperature=None,
+        particle_friction=None,
+        flow=None,
+    ):
+        """The recommended step, and what binds: a TimeStep, which ``create_integrator`` takes.
 
-        Other forces in the System, and particles outside filaments, may need a smaller step.
+        It is that of the filament that allows the least (see ``timestep``), and, if a System is given, of its forces:
+        those that are not part of a filament act from the start of a step, and a spring of the stiffness k on a place
+        of the response mu h to a force in a step h has a variance too large by 1/(1 - k mu h/2). mu h is that of the
+        place on the straight filament (see ``mobility``), or h/gamma of a particle. The step leaves 5 % at most, with
+        all forces at once. Known are HarmonicBondForce, crosslinks, walls, contacts, constant forces, tethers, and
+        CustomBondForce and CustomExternalForce that are harmonic; walls as if all their particles were in contact, and
+        contacts of two filaments as if they crossed at their ends, or touched all along with an error of a third.
+        Other forces are listed in ``unknown_forces``.
 
         Parameters
         ----------
@@ -171,26 +194,64 @@ class Filaments(FilamentCollection):
             The engine's default if not given.
         contact_diameter : length, or (filaments,) array of lengths, optional
             Filaments that touch at this distance must not jump through each other, eq. (56), nor be thrown apart by
-            the contact force: see ``timestep.contact_time_step``.
+            the contact force: see ``timestep.contact_time_step``. With a System, those of its contact force.
         contact_stiffness : energy/length^2, optional
             Of the contact force; that of ``contacts.default_stiffness`` if not given.
         confidence : float
             c_sigma of eq. (53): how many standard deviations of a displacement must stay below half the diameter.
+        system : openmm.System, optional
+            That the filaments were put into, with all of its forces.
+        temperature, particle_friction, flow : optional
+            As for ``create_integrator``.
+
+        Returns
+        -------
+        TimeStep
+            Its ``bounds`` have the bounds of filaments by name, and that of each force with the spring that binds, as
+            in "HarmonicBondForce (force 3): bond 12": the step at which it throws the System apart.
+
+        Raises
+        ------
+        InputError
+            If there are no filaments, they are not in the System, or particles lack a friction.
         """
         scheme = default_scheme(self._engine_name) if scheme is None else scheme
-        steps = [
-            recommended_time_step(f.type, self._viscosity, self._temperature, scheme, f.segments, f.closed)
-            for f in self._filaments
-        ]
-        if not steps:
+        check_scheme(scheme)
+        if not self._filaments:
             raise InputError("There are no filaments to recommend a time step for.")
-        least = min(steps, key=lambda step: step.step)
-        if contact_diameter is None:
-            if contact_stiffness is not None:
-                raise InputError("A contact_stiffness needs a contact_diameter.")
-            return least
-        contact = self._contact_time_step(contact_diameter, contact_stiffness, confidence)
-        return replace(min(least, contact, key=lambda step: step.step), bounds={**least.bounds, **contact.bounds})
+        steps = self._chain_steps(scheme, self._bath(temperature), as_flow(flow))
+        if contact_diameter is not None:
+            steps.append(self._contact_time_step(contact_diameter, contact_stiffness, confidence))
+        elif contact_stiffness is not None:
+            raise InputError("A contact_stiffness needs a contact_diameter.")
+        if system is not None:
+            self._refuse_if_not_in(system)
+            steps += self._contact_diffusion(system, self._bath(temperature), confidence)
+            forces = ExplicitForces(system, self, scheme, particle_friction)
+            steps.append(forces.recommended_step())
+        return shortest(steps)
+
+    def _bath(self, temperature):
+        return self._temperature if temperature is None else non_negative(temperature, TEMPERATURE, "temperature")
+
+    def _chain_steps(self, scheme, temperature, flow):
+        kinds = {(f.type, f.segments, f.closed) for f in self._filaments}
+        # In the order of the filaments, so that the first of equals is named.
+        ordered = sorted(kinds, key=[(f.type, f.segments, f.closed) for f in self._filaments].index)
+        return [
+            recommended_time_step(
+                kind, self._viscosity, temperature, scheme, segments, closed, flow, self._friction(kind, segments)
+            )
+            for kind, segments, closed in ordered
+        ]
+
+    def _friction(self, kind, segments):
+        # At the temperature of the filaments, whatever that of the run is.
+        return kind.segment_friction(self._viscosity, self._temperature, segments)
+
+    def _refuse_if_not_in(self, system):
+        if system.getNumParticles() <= max(nodes.max() for nodes in self.node_indices):
+            raise InputError("This is not the System that the filaments were put into: it has too few particles.")
 
     def _contact_time_step(self, diameter, stiffness, confidence):
         diameters = filament_diameters(diameter, len(self))
@@ -205,10 +266,32 @@ class Filaments(FilamentCollection):
             steps.append(
                 contact_time_step(filament.type, *solvent, d, stiffness, filament.segments, density, confidence)
             )
-        return min(steps, key=lambda step: step.step)
+        return shortest(steps)
+
+    def _contact_diffusion(self, system, temperature, confidence):
+        # Of filaments that a contact force of the System keeps apart.
+        found = {}
+        for force in system.getForces():
+            if is_contact_force(force):
+                for filament, beads in zip(self._filaments, self.bead_indices):
+                    diameter = force.getParticleParameters(int(beads[0]))[0] if len(beads) else 0.0
+                    if diameter > 0.0:
+                        found[filament.type, filament.segments, diameter] = True
+        return [
+            contact_diffusion_step(kind, self._friction(kind, segments), temperature, diameter, confidence)
+            for kind, segments, diameter in found
+        ]
 
     def create_integrator(
-        self, system, step_size, scheme=None, temperature=None, particle_friction=None, random_seed=0, flow=None
+        self,
+        system,
+        step_size,
+        scheme=None,
+        temperature=None,
+        particle_friction=None,
+        random_seed=0,
+        flow=None,
+        checks=True,
     ):
         """Create the integrator that moves the filaments and everything else in the System.
 
@@ -219,7 +302,7 @@ class Filaments(FilamentCollection):
         ----------
         system : openmm.System
             The System that the filaments were put into.
-        step_size : time
+        step_size : time, or TimeStep
         scheme : {"implicit", "midpoint", "euler"}, optional
             "implicit", the compiled engine's default, takes stretching, bending and tethers at the end of the step,
             and steps a thousand times as long as the others. "midpoint", the portable engine's default, is Fixman's
@@ -234,6 +317,9 @@ class Filaments(FilamentCollection):
             0 draws a fresh seed from the operating system.
         flow : Flow, optional
             Flow of the solvent. ``integrator.setFlow(flow)`` changes it during a run.
+        checks : bool
+            Whether to look for a step that is too long, now and while it runs (see ``step_watch``). The attribute
+            ``checks`` of the integrator turns the latter off and on.
 
         Returns
         -------
@@ -243,32 +329,41 @@ class Filaments(FilamentCollection):
         Warns
         -----
         TimeStepWarning
-            If the step exceeds a bound of stability, or is too long for the flow or for self-propelled filaments.
+            If the step exceeds a bound of stability, or the recommended step of a filament more than four times; if
+            forces of the System are so stiff that variances double (k mu h > 1, see ``recommended_time_step``); or if
+            it is too long for the flow or for self-propelled filaments.
         """
-        step_size = positive(step_size, unit.picosecond, "step_size")
-        if system.getNumParticles() <= max(nodes.max() for nodes in self.node_indices):
-            raise InputError("This is not the System that the filaments were put into: it has too few particles.")
+        step_size = as_step(step_size)
+        self._refuse_if_not_in(system)
         scheme = default_scheme(self._engine_name) if scheme is None else scheme
         check_scheme(scheme)
         flow = as_flow(flow)
-        warn_if_strained(step_size, flow)
-        for f in {(f.type, f.segments, f.propulsion): f for f in self._filaments}.values():
-            solvent = (self._viscosity, self._temperature)
-            warn_if_unstable(f.type, *solvent, step_size, f.segments, scheme)
-            warn_if_driven_far(f.type, *solvent, step_size, f.segments, f.propulsion)
+        bath = self._bath(temperature)
+        if checks:
+            self._check_step(system, step_size, scheme, bath, particle_friction, flow)
         return self._engine.create_integrator(
             system,
             self._filaments,
             self._nodes,
             self._viscosity,
             self._temperature,
-            self._temperature if temperature is None else temperature,
+            bath,
             step_size,
             scheme,
             particle_friction,
             random_seed,
             flow,
+            checks,
         )
+
+    def _check_step(self, system, step, scheme, bath, particle_friction, flow):
+        warn_if_strained(step, flow)
+        for f in {(f.type, f.segments, f.propulsion, f.closed): f for f in self._filaments}.values():
+            warn_if_driven_far(f.type, self._viscosity, self._temperature, step, f.segments, f.propulsion)
+            if not warn_if_unstable(f.type, self._viscosity, self._temperature, step, f.segments, scheme):
+                friction = self._friction(f.type, f.segments)
+                warn_if_far_above(f.type, self._viscosity, bath, step, f.segments, scheme, f.closed, friction)
+        ExplicitForces(system, self, scheme, particle_friction).warn_if_too_stiff(step)
 
     def chain_set(self, system):
         """The filaments as an engine sees them (a ``ChainSet``): friction of segments and fixed nodes."""

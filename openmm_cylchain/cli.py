@@ -5,6 +5,7 @@ Exit codes: 0 done, 1 the simulation blew up, a file could not be written or res
 """
 
 import argparse
+import math
 import sys
 import warnings
 
@@ -174,6 +175,9 @@ def _time_step(options):
         for name, bound in time_step_bounds(*arguments, segments=group.segments).items():
             print(f"  {_BOUND_LABELS[name]:<36} {format_time(bound, 4):>12}")
         print(f"  {'stability of explicit schemes':<36} {format_time(stability, 4):>12}")
+        for name, allowed in recommended.allowed.items():
+            time = format_time(allowed, 4) if math.isfinite(allowed) else "any"
+            print(f"  {f'allowed by {name}':<36} {time:>12}")
         print(f"  {'recommended':<36} {format_time(recommended.step, 4):>12}  ({recommended.reason})")
         print(f"  {'in this configuration':<36} {format_time(settings.time_step, 4):>12}")
 

@@ -249,8 +249,7 @@ def _set(instance, name, value):
 def wall_force(shape, stiffness, particles):
     """A CustomExternalForce with the energy (k/2) d^2 of each particle, for its depth d beyond a wall.
 
-    It is explicit in every scheme: the step must stay well below 2 gamma/k, where gamma is the friction of what it
-    pushes, at least a quarter of a segment's parallel friction for each segment that meets in a node.
+    It is explicit in every scheme: ``Filaments.recommended_time_step(system=system)`` says which step it allows.
 
     Parameters
     ----------

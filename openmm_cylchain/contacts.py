@@ -232,8 +232,8 @@ def contact_force(filaments, system, diameter, stiffness=None, particles=(), par
     core. Only in exactly one point would the force have no direction: let no two beads of different filaments start
     there.
 
-    It is explicit in every scheme. ``Filaments.recommended_time_step`` with the same diameter and stiffness says which
-    step it allows.
+    It is explicit in every scheme. ``Filaments.recommended_time_step(system=system)`` says which step it allows, or,
+    before it is in a System, ``recommended_time_step`` with its diameter and stiffness.
 
     Beads, attachment points and nodes do not see those of the same or of neighbouring segments, or within a distance
     of two diameters along the contour. Nodes, and attachment points that are not beads, see nothing at all. With other
@@ -299,6 +299,11 @@ def contact_force(filaments, system, diameter, stiffness=None, particles=(), par
     _set_cutoff(force, system, float(diameters.max()), _is_periodic(system) if periodic is None else bool(periodic))
     add_exclusions(force, excluded_pairs(filaments, 2.0 * diameters[np.concatenate(beads)].max()))
     return force
+
+
+def is_contact_force(force):
+    """Whether a force is one that ``contact_force`` has made."""
+    return isinstance(force, openmm.CustomNonbondedForce) and force.getName() == CONTACT_NAME
 
 
 def _warn_of_gaps(filaments, diameters, stiffness):

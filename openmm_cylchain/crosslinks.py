@@ -27,7 +27,7 @@ import openmm
 from .errors import InputError
 from .geometry import to_nearest_images
 from .potentials import STRETCHING_POTENTIALS
-from .quantities import LENGTH, STIFFNESS, non_negative, positive, whole_number
+from .quantities import LENGTH, STIFFNESS, non_negative, positive, thermal_energy, whole_number
 
 CROSSLINKS_NAME = "Crosslinks"
 
@@ -282,8 +282,8 @@ class Crosslinks:
     that every new Context begins with, which can change until ``add_to``. No other crosslink of a Context gets the
     number of one that is removed, unless ``set_pairs`` numbers all of them anew.
 
-    Crosslinks are explicit in every scheme: the step must stay well below 2 gamma/k, where gamma is the friction of
-    what the spring moves, at least a quarter of a segment's parallel friction for each segment that meets in a node.
+    Crosslinks are explicit in every scheme. ``Filaments.recommended_time_step(system=system)`` knows those that the
+    System begins with, or where there are none, one between ends of filaments.
 
     Parameters
     ----------
@@ -346,12 +346,16 @@ class Crosslinks:
         list of Crosslinks
             In the order in which they were added.
         """
-        found = []
-        for force in system.getForces():
-            if isinstance(force, openmm.PythonForce) and _parameters_of(force):
-                content = ElementTree.fromstring(openmm.XmlSerializer.serialize(force)).get("function")
-                found.append(cls._of(pickle.loads(bytes.fromhex(content))))
-        return found
+        found = (cls.of_force(force) for force in system.getForces())
+        return [links for links in found if links is not None]
+
+    @classmethod
+    def of_force(cls, force):
+        """The Crosslinks of a force of a System, or None if it is no force of crosslinks."""
+        if not _parameters_of(force):
+            return None
+        content = ElementTree.fromstring(openmm.XmlSerializer.serialize(force)).get("function")
+        return cls._of(pickle.loads(bytes.fromhex(content)))
 
     @classmethod
     def _of(cls, computation):
@@ -537,6 +541,31 @@ class Crosslinks:
         table = self.table(context)
         lengths, _ = self._computation.geometry(table, state, state.getPositions(asNumpy=True)._value)
         return table, lengths, self._computation.slopes(table, lengths)
+
+    def thermal_stiffness(self, table, temperature):
+        """Stiffness of crosslinks where thermal motion takes them, in kJ/(mol nm^2).
+
+        k of harmonic ones. The curvature k (1 + u^2)/(1 - u^2)^2 of a FENE potential at u = (d - d0)/D, for twice the
+        standard deviation of u in its own equilibrium, u^2 = 4/(3 + k D^2/k_B T), or 0.9 if that is less.
+
+        Parameters
+        ----------
+        table : CrosslinkTable or None
+            None for a crosslink with the common parameters.
+        temperature : temperature
+
+        Returns
+        -------
+        (n,) array, or a number
+        """
+        stiffness, extension = self._defaults[0], self._defaults[2]
+        if table is not None:
+            stiffness, extension = table.stiffness, table.maximum_extension
+        if self._model != "fene":
+            return stiffness
+        kT = thermal_energy(temperature)
+        square = np.minimum(4.0 * kT / (3.0 * kT + stiffness * extension**2), 0.9)
+        return stiffness * (1.0 + square) / (1.0 - square) ** 2
 
     def _measured(self, context):
         self._computation_in(context)

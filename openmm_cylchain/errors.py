@@ -9,6 +9,10 @@ class InstabilityError(RuntimeError):
     """A simulation that has blown up: the message names the filament, the segment and the step."""
 
 
+class TimeStepError(InstabilityError):
+    """A time step that is far too long for what happens in it: the message says by what it shows and what to do."""
+
+
 class ContactWarning(UserWarning):
     """Beads that are too far apart or too soft to keep filaments from passing through each other."""
 
@@ -18,4 +22,4 @@ class EquilibrationWarning(UserWarning):
 
 
 class TimeStepWarning(UserWarning):
-    """A time step above a stability bound: the message names the bound."""
+    """A time step that is too long: above a bound, which the message names, or by what a run shows of it."""

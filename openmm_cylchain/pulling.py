@@ -11,6 +11,7 @@ from .reporters import FilamentsReporter
 CONSTANT_FORCE_NAME = "ConstantForce"
 
 _COMPONENTS = ("force_x", "force_y", "force_z")
+_ENERGY = "-(force_x*x+force_y*y+force_z*z)"
 
 
 def constant_force(particles, forces):
@@ -37,7 +38,7 @@ def constant_force(particles, forces):
         For forces of the wrong shape or unit, or particle indices that are none.
     """
     particles = [whole_number(particle, 0, "particle") for particle in particles]
-    force = openmm.CustomExternalForce("-(force_x*x+force_y*y+force_z*z)")
+    force = openmm.CustomExternalForce(_ENERGY)
     force.setName(CONSTANT_FORCE_NAME)
     for name in _COMPONENTS:
         force.addPerParticleParameter(name)
@@ -65,11 +66,16 @@ def change_constant_force(force, context, forces):
     force.updateParametersInContext(context)
 
 
+def is_constant_force(force):
+    """Whether a force is one that ``constant_force`` or ``constant_tension`` has made."""
+    if not isinstance(force, openmm.CustomExternalForce) or force.getEnergyFunction() != _ENERGY:
+        return False
+    names = (force.getPerParticleParameterName(i) for i in range(force.getNumPerParticleParameters()))
+    return tuple(names) == _COMPONENTS
+
+
 def _refuse_unless_constant(force):
-    names = ()
-    if isinstance(force, openmm.CustomExternalForce):
-        names = tuple(force.getPerParticleParameterName(i) for i in range(force.getNumPerParticleParameters()))
-    if names != _COMPONENTS:
+    if not is_constant_force(force):
         raise InputError(f"force must be one that constant_force or constant_tension has made, but is {force!r}.")
 
 

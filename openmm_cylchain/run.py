@@ -5,7 +5,6 @@ import io
 import signal
 import threading
 import time
-import warnings
 
 import numpy as np
 import openmm
@@ -13,7 +12,7 @@ from openmm import app, unit
 
 from .build import Filaments
 from .equilibrium import draw_chain
-from .errors import InputError, InstabilityError, TimeStepWarning
+from .errors import InputError, InstabilityError
 from .physical_units import format_time
 from .placement import joint_stiffnesses
 from .progress import Progress
@@ -21,7 +20,6 @@ from .quantities import thermal_energy
 from .run_directory import Checkpoint, EnergyTable, RunDirectory, TrajectoryFile, write_atomically
 from .structure_files import write_lammps_data, write_psf
 from .theory import chain_mean_square_end_to_end
-from .timestep import LARGEST_DIVIDED_SHARE
 
 _SECONDS_BETWEEN_CHECKS = 0.2
 
@@ -76,25 +74,11 @@ def run(configuration, output, resume=False):
             print(f"Resuming at step {checkpoint.step}, {format_time(checkpoint.step * settings.time_step)}.")
         try:
             _Recorder(configuration, filaments, simulation, directory, checkpoint).run_to_end()
-            _warn_of_divided_steps(simulation, len(filaments), settings.steps - (checkpoint.step if checkpoint else 0))
         except InstabilityError as error:
-            raise InstabilityError(
+            raise type(error)(
                 f"{error} What came before is kept in {directory.path}; run the changed configuration in another "
                 "directory."
             ) from None
-
-
-def _warn_of_divided_steps(simulation, filaments, steps):
-    if not hasattr(simulation.integrator, "getNumDividedSteps"):
-        return
-    share = simulation.integrator.getNumDividedSteps() / (filaments * steps)
-    if share > LARGEST_DIVIDED_SHARE:
-        warnings.warn(
-            f"{100 * share:.2g} % of all steps of filaments were divided, because the equations of the implicit scheme "
-            "could not be solved: averages may be biased. Use a smaller time step.",
-            TimeStepWarning,
-            stacklevel=2,
-        )
 
 
 def create_filaments(configuration):

@@ -7,7 +7,7 @@ why ``recommended_time_step`` stays well below them.
 
 import math
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -202,16 +202,45 @@ class TimeStep:
         The bound that binds, in words.
     bounds : dict
         Largest step that each effect allows, in ps, before the margin for accuracy.
+    allowed : dict
+        The same with the margin: the least of them is the recommended step.
+    unknown_forces : tuple of str
+        Forces of the System whose stiffness is not known; they may need a shorter step.
     """
 
     step: float
     reason: str
     bounds: dict
+    allowed: dict = field(default_factory=dict)
+    unknown_forces: tuple = ()
 
     def __str__(self):
-        return f"{self.step:.4g} ps: {self.reason}"
+        unknown = f"; not known: {', '.join(self.unknown_forces)}" if self.unknown_forces else ""
+        return f"{self.step:.4g} ps: {self.reason}{unknown}"
 
 
+def as_step(step, name="step_size"):
+    """A time step in ps: of a TimeStep, or of a quantity or plain number that must be positive."""
+    return step.step if isinstance(step, TimeStep) else positive(step, TIME, name)
+
+
+def shortest(steps):
+    """The TimeStep that binds of several, with the bounds of all of them, each at its shortest."""
+    steps = list(steps)
+    if any(math.isfinite(one.step) and _IDLE not in one.bounds for one in steps):
+        # The relaxation of lengths counts only where there is nothing else to resolve.
+        steps = [one for one in steps if _IDLE not in one.bounds]
+    least = min(steps, key=lambda one: one.step)
+    bounds, allowed = {}, {}
+    for one in steps:
+        for name, value in one.allowed.items():
+            if value < allowed.get(name, math.inf) or name not in allowed:
+                allowed[name], bounds[name] = value, one.bounds[name]
+    unknown = tuple(dict.fromkeys(force for one in steps for force in one.unknown_forces))
+    return TimeStep(least.step, least.reason, bounds, allowed, unknown)
+
+
+_IDLE = "length"
 _REASONS = {
     "stretching": "relaxation of a segment's length, eq. (57), with a margin of {margin:g} for accuracy",
     "bending": "relaxation of the sharpest bend of a chain (a quarter of eq. 58), with a margin of {margin:g} "
@@ -223,24 +252,32 @@ _REASONS = {
     "contact diffusion": "diffusion of a segment's ends, eq. (56) with the contact diameter: filaments must not jump "
     "through each other",
     "contact stiffness": "stiffness of contacts, which are explicit, with a margin of {contact_margin:g}",
+    "range": "FENE lengths must stay well inside their range",
+    "flow": "flow, which may strain the solvent by {strain:g} in a step",
+    _IDLE: "relaxation of a segment's length, which takes 20 steps: at a temperature of zero nothing else moves",
 }
-LARGEST_DIVIDED_SHARE = 1e-3
-"""Scheme "implicit" divides steps whose equations it cannot solve: a larger share of them may bias averages."""
-
 _RELAXATION_STEPS = 20.0
 _OVAL_MODE = 4.0 * math.pi * math.sqrt(0.75)
-_LARGEST_STRAIN = 0.1
+_RECOMMENDED_STRAIN = 0.03
+_LARGEST_STRAIN = 0.06
 _LARGEST_ADVANCE = 0.5
 _ACCURACY_MARGIN = 20.0
 _TURNING_ANGLE = 0.1
 _IMPLICIT_TURNING_ANGLE = 0.15
 _NOISE_LEAK = 0.1
 _CONTACT_MARGIN = 4.0
+_RANGE_OF_TURNING = 12.0
+_HARMONIC_FENE = 30.0
+_FAR_ABOVE = 4.0
 
 
 def stability_bounds(filament_type, viscosity, temperature, segments=1):
     """Steps, in ps, above which the explicit schemes blow up: ``stretching`` and ``bending`` of a chain."""
     friction = filament_type.segment_friction(viscosity, temperature, segments)
+    return _stability_bounds(filament_type, friction, segments)
+
+
+def _stability_bounds(filament_type, friction, segments):
     length = filament_type.segment_length
     bounds = {"stretching": chain_stretching_bound(friction, filament_type.segment_stiffness, length)}
     if segments > 1:
@@ -248,7 +285,9 @@ def stability_bounds(filament_type, viscosity, temperature, segments=1):
     return bounds
 
 
-def recommended_time_step(filament_type, viscosity, temperature, scheme=None, segments=2, closed=False):
+def recommended_time_step(
+    filament_type, viscosity, temperature, scheme=None, segments=2, closed=False, flow=None, friction=None
+):
     """The step at which equilibrium energies of a chain are good to about 5 %.
 
     Explicit schemes of weak order one leave a harmonic mode of rate lambda with a variance too large by
@@ -258,6 +297,9 @@ def recommended_time_step(filament_type, viscosity, temperature, scheme=None, se
     friction is kept fixed within the step. Scheme "midpoint" draws its noise before the segment turns
     half-way, so noise along the segment leaks across it: a large extensional friction tightens the bound
     to ``2 k_B T dt/gamma_rot < 0.1 gamma_rot/gamma_def``, at which free segments turn some 3 % too fast.
+
+    In every scheme, FENE lengths narrow the bounds (``fene_bound``), and a flow may strain the solvent by 0.03 in a
+    step at most.
 
     Parameters
     ----------
@@ -271,6 +313,10 @@ def recommended_time_step(filament_type, viscosity, temperature, scheme=None, se
     segments : int
     closed : bool
         A ring; matters only to "implicit".
+    flow : Flow, optional
+        Of the solvent.
+    friction : SegmentFriction, optional
+        Of a segment; that at the given temperature if not given.
 
     Returns
     -------
@@ -278,23 +324,81 @@ def recommended_time_step(filament_type, viscosity, temperature, scheme=None, se
     """
     scheme = default_scheme() if scheme is None else scheme
     check_scheme(scheme)
+    if friction is None:
+        friction = filament_type.segment_friction(viscosity, temperature, segments)
     if scheme == "implicit":
-        return implicit_time_step(filament_type, viscosity, temperature, segments, closed)
-    friction = filament_type.segment_friction(viscosity, temperature, segments)
-    bounds = stability_bounds(filament_type, viscosity, temperature, segments)
+        return implicit_time_step(filament_type, viscosity, temperature, segments, closed, flow, friction)
+    bounds = _stability_bounds(filament_type, friction, segments)
     allowed = {name: bound / _ACCURACY_MARGIN for name, bound in bounds.items()}
     kT = thermal_energy(temperature)
-    turning = _TURNING_ANGLE**2
+    turning = min(_TURNING_ANGLE**2, _turning_in_range(filament_type))
     if scheme == "midpoint":
         turning = min(turning, _NOISE_LEAK * friction.rotational / friction.extensional)
     bounds["turning"] = math.inf if kT == 0.0 else turning * friction.rotational / (2.0 * kT)
     allowed["turning"] = bounds["turning"]
+    return _binding(filament_type, friction, temperature, scheme, flow, bounds, allowed, math.sqrt(turning))
+
+
+def _binding(filament_type, friction, temperature, scheme, flow, bounds, allowed, angle):
+    # The TimeStep of a chain, with what flow and FENE lengths add to its bounds.
+    if filament_type.maximum_extension is not None:
+        bounds["range"] = allowed["range"] = fene_bound(filament_type, friction, temperature, scheme)
+    rate = 0.0 if flow is None else strain_rate(flow)
+    if rate > 0.0:
+        bounds["flow"] = allowed["flow"] = _RECOMMENDED_STRAIN / rate
+    if not any(math.isfinite(step) for step in allowed.values()):
+        relaxation = friction.extensional / (filament_type.segment_stiffness * filament_type.segment_length**2)
+        bounds[_IDLE], allowed[_IDLE] = relaxation, relaxation / _RELAXATION_STEPS
     binding = min(allowed, key=allowed.get)
-    reason = _REASONS[binding].format(margin=_ACCURACY_MARGIN, angle=_TURNING_ANGLE)
-    return TimeStep(step=allowed[binding], reason=reason, bounds=bounds)
+    reason = _REASONS[binding].format(
+        margin=_ACCURACY_MARGIN, angle=angle, relaxation_steps=_RELAXATION_STEPS, strain=_RECOMMENDED_STRAIN
+    )
+    return TimeStep(allowed[binding], reason, bounds, allowed)
 
 
-def implicit_time_step(filament_type, viscosity, temperature, segments=2, closed=False):
+def strain_rate(flow):
+    """The fastest rate, in 1/ps, at which a flow strains the solvent: the norm of its gradient."""
+    return float(np.linalg.norm(flow.gradient, 2))
+
+
+def _turning_in_range(filament_type):
+    # Mean square angle: a segment that turns by phi is longer by l0 phi^2/2 before its length is solved for, which must
+    # stay inside the range of a FENE length at five standard deviations.
+    if filament_type.maximum_extension is None:
+        return math.inf
+    return filament_type.maximum_extension / (_RANGE_OF_TURNING * filament_type.segment_length)
+
+
+def fene_bound(filament_type, friction, temperature, scheme):
+    """The step, in ps, in which the length of a segment with a FENE potential stays well inside its range.
+
+    With nu = k D^2/k_B T, u = (l - l0)/D has the distribution (1 - u^2)^(nu/2), and relaxes in
+    tau = gamma_def/(k l0^2). For nu of 30 and more, scheme "implicit" keeps the energies of lengths to 3 % at any step
+    in which segments turn little enough (measured with F-actin). Below, the potential is no longer like a harmonic one
+    where lengths are, and the step must resolve their relaxation: ``dt < 0.1 tau min(1, nu/11)^4``. In the explicit
+    schemes neither the noise of a step, sigma^2 = 2 k_B T dt l0^2/gamma_def, nor the force may take a length from u*,
+    which it exceeds once in a million, out of its range: ``5 sigma < D (1 - u*)`` and
+    ``dt < 0.1 tau (1 - u*^2)^2/(1 + u*^2)``, 1 - u*^2 = 10^(-12/nu).
+
+    A segment must also turn by less, in every scheme: by a mean square angle of D/(12 l0) at most. Before its length is
+    solved for, one that turns by phi is longer by l0 phi^2/2. This is part of the bounds "turning" and "rotation".
+    """
+    kT = thermal_energy(temperature)
+    stiffness, extension = filament_type.segment_stiffness, filament_type.maximum_extension
+    length = filament_type.segment_length
+    tau = friction.extensional / (stiffness * length**2)
+    if kT == 0.0:
+        return math.inf if scheme == "implicit" else 0.1 * tau
+    nu = stiffness * extension**2 / kT
+    if scheme == "implicit":
+        return math.inf if nu >= _HARMONIC_FENE else 0.1 * tau * min(1.0, nu / 11.0) ** 4
+    narrow = 10.0 ** (-12.0 / nu)
+    edge = narrow / (1.0 + math.sqrt(1.0 - narrow))
+    noise = (extension * edge / 5.0) ** 2 * friction.extensional / (2.0 * kT * length**2)
+    return min(noise, 0.1 * tau * narrow**2 / (2.0 - narrow))
+
+
+def implicit_time_step(filament_type, viscosity, temperature, segments=2, closed=False, flow=None, friction=None):
     """The step of scheme "implicit" at which equilibrium energies of a chain are good to 2 %, and dynamics to 5 %.
 
     Its equilibrium is exact for linear forces at any step; what is left comes from segments that turn within one.
@@ -307,22 +411,29 @@ def implicit_time_step(filament_type, viscosity, temperature, segments=2, closed
     in which a ring of radius R becomes oval, gamma_perp/(l0 a) R^4/9 = gamma_perp/(l0 a) (L/10.9)^4. (With the friction
     along the ring it is (gamma_perp + gamma_par/4)/(l0 a) R^4/9.)
 
+    The stiffness of lengths does not bound the step, nor does their friction: that acts on true changes of a length, so
+    a segment turns freely however slowly its length relaxes, and the length needs a run that is longer than tau_l, not
+    shorter steps. At a temperature of zero, where nothing else moves (one segment, or free joints), the relaxation of a
+    segment's length is resolved by 20 steps.
+
     Returns
     -------
     TimeStep
     """
     kT = thermal_energy(temperature)
-    friction = filament_type.segment_friction(viscosity, temperature, segments)
+    if friction is None:
+        friction = filament_type.segment_friction(viscosity, temperature, segments)
     length, rigidity = filament_type.segment_length, filament_type.bending_rigidity
     friction_per_length = friction.perpendicular / length
+    square_angle = min(_IMPLICIT_TURNING_ANGLE**2, _turning_in_range(filament_type))
     turning = math.inf
     if kT > 0.0:
-        free = _IMPLICIT_TURNING_ANGLE**2 * friction.rotational / (2.0 * kT)
+        free = square_angle * friction.rotational / (2.0 * kT)
         turning = free
     bends = segments > 1 and rigidity > 0.0
     if bends and kT > 0.0:
-        waves = friction_per_length * (_IMPLICIT_TURNING_ANGLE**2 * rigidity / kT) ** 4 / rigidity
-        whole = _IMPLICIT_TURNING_ANGLE**2 * friction_per_length * (segments * length) ** 3 / (24.0 * kT)
+        waves = friction_per_length * (square_angle * rigidity / kT) ** 4 / rigidity
+        whole = square_angle * friction_per_length * (segments * length) ** 3 / (24.0 * kT)
         turning = max(free, min(waves, whole))
     bounds = {"rotation": turning}
     allowed = dict(bounds)
@@ -330,9 +441,7 @@ def implicit_time_step(filament_type, viscosity, temperature, segments=2, closed
         wave_number = _OVAL_MODE if closed else 4.73
         bounds["relaxation"] = friction_per_length * (segments * length / wave_number) ** 4 / rigidity
         allowed["relaxation"] = bounds["relaxation"] / _RELAXATION_STEPS
-    binding = min(allowed, key=allowed.get)
-    reason = _REASONS[binding].format(angle=_IMPLICIT_TURNING_ANGLE, relaxation_steps=_RELAXATION_STEPS)
-    return TimeStep(step=allowed[binding], reason=reason, bounds=bounds)
+    return _binding(filament_type, friction, temperature, "implicit", flow, bounds, allowed, math.sqrt(square_angle))
 
 
 def contact_time_step(
@@ -371,7 +480,20 @@ def contact_time_step(
     }
     allowed = {**bounds, "contact stiffness": bounds["contact stiffness"] / _CONTACT_MARGIN}
     binding = min(allowed, key=allowed.get)
-    return TimeStep(allowed[binding], _REASONS[binding].format(contact_margin=_CONTACT_MARGIN), bounds)
+    return TimeStep(allowed[binding], _REASONS[binding].format(contact_margin=_CONTACT_MARGIN), bounds, allowed)
+
+
+def contact_diffusion_step(filament_type, friction, temperature, diameter, confidence=3.0):
+    """The part of ``contact_time_step`` that does not depend on the stiffness of contacts, for segments of a friction.
+
+    Returns
+    -------
+    TimeStep
+    """
+    confidence = positive(confidence, DIMENSIONLESS, "confidence")
+    bound = diffusion_bound(friction, diameter, filament_type.segment_length, temperature, confidence)
+    bounds = {"contact diffusion": bound}
+    return TimeStep(bound, _REASONS["contact diffusion"], bounds, dict(bounds))
 
 
 def check_scheme(scheme):
@@ -381,30 +503,59 @@ def check_scheme(scheme):
 
 
 def warn_if_unstable(filament_type, viscosity, temperature, step, segments=1, scheme="midpoint"):
-    """Issue a TimeStepWarning, naming the bound, if ``step`` exceeds a stability bound of an explicit scheme."""
-    step = positive(step, TIME, "time step")
+    """Issue a TimeStepWarning, naming the bound, if ``step`` exceeds a stability bound of an explicit scheme.
+
+    Returns whether it does.
+    """
+    step = as_step(step, "time step")
     if scheme not in EXPLICIT_SCHEMES:
-        return
+        return False
+    unstable = False
     for name, bound in stability_bounds(filament_type, viscosity, temperature, segments).items():
         if step > bound:
+            unstable = True
             recommended = recommended_time_step(filament_type, viscosity, temperature, scheme, segments)
             warnings.warn(
                 f"A time step of {step:.4g} ps exceeds the {name} bound of {bound:.4g} ps of filament type "
                 f"{filament_type.name!r}: the simulation will blow up. Recommended: {recommended}.",
                 TimeStepWarning,
-                stacklevel=3,
+                stacklevel=4,
             )
+    return unstable
+
+
+def warn_if_far_above(
+    filament_type, viscosity, temperature, step, segments=1, scheme="midpoint", closed=False, friction=None
+):
+    """Issue a TimeStepWarning if ``step`` exceeds the recommended step of a chain by more than a factor of four.
+
+    Not where nothing but the relaxation of lengths is left to resolve (see ``implicit_time_step``): whatever moves such
+    a filament then is not the chain's own.
+    """
+    step = as_step(step, "time step")
+    recommended = recommended_time_step(
+        filament_type, viscosity, temperature, scheme, segments, closed, friction=friction
+    )
+    if step > _FAR_ABOVE * recommended.step and _IDLE not in recommended.bounds:
+        warnings.warn(
+            f"A time step of {step:.4g} ps is {step / recommended.step:.3g} times as long as the recommended one of "
+            f"filament type {filament_type.name!r} with {segments} segments. Recommended: {recommended}.",
+            TimeStepWarning,
+            stacklevel=4,
+        )
 
 
 def warn_if_strained(step, flow):
-    """Issue a TimeStepWarning if a flow strains the solvent in a step by more than 0.1: by ``dt |gradient u|``."""
-    strain = step * float(np.linalg.norm(flow.gradient, 2))
+    """Issue a TimeStepWarning if a flow strains the solvent in a step by more than 0.06: by ``dt |gradient u|``."""
+    step = as_step(step, "time step")
+    strain = step * strain_rate(flow)
     if strain > _LARGEST_STRAIN:
         warnings.warn(
             f"In a time step of {step:.4g} ps the flow strains the solvent by {strain:.3g}: it is not resolved. Use a "
-            f"step of at most {_LARGEST_STRAIN * step / strain:.4g} ps.",
+            f"step of at most {_LARGEST_STRAIN * step / strain:.4g} ps, or better "
+            f"{_RECOMMENDED_STRAIN * step / strain:.4g} ps.",
             TimeStepWarning,
-            stacklevel=3,
+            stacklevel=4,
         )
 
 
@@ -413,6 +564,7 @@ def warn_if_driven_far(filament_type, viscosity, temperature, step, segments=1, 
 
     Beyond ``dt F0/gamma_par = l0/2`` a bent filament cuts its corners.
     """
+    step = as_step(step, "time step")
     friction = filament_type.segment_friction(viscosity, temperature, segments)
     advance = step * abs(propulsion) / friction.parallel / filament_type.segment_length
     if advance > _LARGEST_ADVANCE:
@@ -421,5 +573,5 @@ def warn_if_driven_far(filament_type, viscosity, temperature, step, segments=1, 
             f"{advance:.3g} of its length: it is not resolved. Use a step of at most "
             f"{_LARGEST_ADVANCE * step / advance:.4g} ps.",
             TimeStepWarning,
-            stacklevel=3,
+            stacklevel=4,
         )

@@ -310,7 +310,7 @@ def tensions_after(filaments, forces, steps, platform):
     _, system, positions = filaments.build()
     for node, force in forces.items():
         pull(system, int(filaments.node_indices[0][node]), np.asarray(force) * PN)
-    integrator = filaments.create_integrator(system, 0.05 * unit.microsecond, temperature=0)
+    integrator = filaments.create_integrator(system, 0.02 * unit.microsecond, temperature=0)
     context = openmm.Context(system, integrator, platform)
     context.setPositions(positions)
     integrator.step(steps)

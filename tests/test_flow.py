@@ -263,7 +263,8 @@ def test_chains_follow_the_equation_of_motion(engine, name):
     filaments.add_nodes(kind, shape)
     _, system, positions = filaments.build()
     step, steps = 2e6, 500
-    integrator = filaments.create_integrator(system, step, scheme="midpoint", flow=flow)
+    # Without noise, the fastest modes are quiet, and need not be resolved.
+    integrator = filaments.create_integrator(system, step, scheme="midpoint", flow=flow, checks=False)
     context = _context(system, integrator, positions)
     integrator.step(steps)
     exact = solve_ivp(slope, (0, steps * step), shape.reshape(-1), method="LSODA", rtol=1e-7, atol=1e-4).y[:, -1]

@@ -17,9 +17,11 @@ STEP_ERROR = 0.02
 MICROSECOND = 1e6
 
 
-def _context(filaments, step, temperature=None, platform="Reference", seed=1, properties=None):
+def _context(filaments, step, temperature=None, platform="Reference", seed=1, properties=None, checks=True):
     topology, system, positions = filaments.build()
-    integrator = filaments.create_integrator(system, step, scheme="implicit", temperature=temperature, random_seed=seed)
+    integrator = filaments.create_integrator(
+        system, step, scheme="implicit", temperature=temperature, random_seed=seed, checks=checks
+    )
     context = openmm.Context(system, integrator, openmm.Platform.getPlatform(platform), properties or {})
     context.setPositions(positions)
     return context
@@ -93,7 +95,8 @@ def test_rods_turn_as_they_should_however_stiff(micrometers, segments):
         filaments.add_straight(kind, segments, [0, 0, 0], direction)
     whole = MICROTUBULE.with_segment_length(1e3 * micrometers)
     step = recommended_time_step(whole, VISCOSITY, TEMPERATURE, "implicit", 1).step / 4
-    context = _context(filaments, step)
+    # In pieces, they also bend, which is not resolved.
+    context = _context(filaments, step, checks=False)
     ends = np.array(filaments.node_indices)[:, [0, -1]]
     axes = []
     for _ in range(41):
@@ -234,7 +237,10 @@ def test_filaments_that_are_pulled_and_pushed_hard_come_back(direction, nanonewt
         force.addParticle(int(nodes[0]), [-each for each in direction])
         force.addParticle(int(nodes[-1]), direction)
     system.addForce(force)
-    integrator = filaments.create_integrator(system, 5 * MICROSECOND, scheme="implicit", random_seed=1)
+    # Kicked so that steps are divided.
+    integrator = filaments.create_integrator(
+        system, 5 * MICROSECOND, scheme="implicit", random_seed=1, checks=False
+    )
     context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
     context.setPositions(positions)
     try:

@@ -434,6 +434,7 @@ def test_timestep_explains_the_bounds(tmp_path, capsys):
     assert main(["timestep", configured(tmp_path, scheme='"midpoint"')]) == 0
     text = capsys.readouterr().out
     assert "eq. (57)" in text and "200 ns" in text
+    assert re.search(r"allowed by stretching +10 ns", text) and "allowed by turning" in text
     assert re.search(r"recommended +10 ns", text)
     assert main(["timestep", configured(tmp_path, scheme='"implicit"')]) == 0
     text = capsys.readouterr().out

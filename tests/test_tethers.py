@@ -102,7 +102,8 @@ def test_equilibrium_in_traps_as_stiff_as_a_segment(step):
     segments, pull, chains = 3, 5.0, 800
     ends = {0: [-pull, 0, 0], segments: [360 * segments + pull, 0, 0]}
     filaments = _trapped("compiled", ends, chains=chains)
-    context = _context(filaments, step * MICROSECOND, scheme="implicit", random_seed=5)
+    # Steps that do not resolve the relaxation of such short filaments, either.
+    context = _context(filaments, step * MICROSECOND, scheme="implicit", random_seed=5, checks=False)
     nodes = np.array(filaments.node_indices)
     samples = []
     context.getIntegrator().step(max(50, int(20 / step)))

@@ -11,8 +11,9 @@ import openmm
 
 from ..errors import InputError, InstabilityError
 from ..flow import Flow, as_flow
-from ..quantities import TEMPERATURE, TIME, non_negative, positive, whole_number
-from ..timestep import check_scheme
+from ..quantities import TEMPERATURE, non_negative, whole_number
+from ..step_watch import STEPS_BETWEEN_CHECKS, DividedSteps
+from ..timestep import as_step, check_scheme
 from .description import (
     advice_after_blow_up,
     describe_chains,
@@ -164,6 +165,7 @@ def create_integrator(
     particle_friction,
     seed,
     flow=None,
+    checks=True,
 ):
     """Create the integrator of a System with filaments; see ``Filaments.create_integrator``."""
     refuse_constraints(system, filaments, node_indices)
@@ -172,7 +174,7 @@ def create_integrator(
     others, frictions = describe_other_particles(system, nodes, particle_friction)
     labels = [filament_label(number, filament) for number, filament in enumerate(filaments)]
     advice = advice_after_blow_up(system)
-    integrator = NativeIntegrator(bath_temperature, step_size, scheme, seed, labels, flow, advice)
+    integrator = NativeIntegrator(bath_temperature, step_size, scheme, seed, labels, flow, advice, checks)
     for particle, friction in zip(others, frictions):
         integrator.setParticleFriction(int(particle), float(friction))
     return integrator
@@ -185,7 +187,7 @@ class NativeIntegrator(CylinderChainIntegrator):
     ----------
     temperature : temperature
         Zero is allowed: no noise.
-    step_size : time
+    step_size : time, or TimeStep
     scheme : {"implicit", "midpoint", "euler"}
     random_seed : int
         0 draws a fresh seed for each Context.
@@ -195,6 +197,12 @@ class NativeIntegrator(CylinderChainIntegrator):
         Of the solvent; at rest if not given.
     advice : str
         What else to say of a chain that has blown up.
+    checks : bool
+        Whether to look, while it runs, for signs of a step that is too long.
+
+    Attributes
+    ----------
+    checks : bool
 
     Raises
     ------
@@ -202,9 +210,21 @@ class NativeIntegrator(CylinderChainIntegrator):
         For an unknown scheme, a negative temperature or a step size that is not positive.
     """
 
-    def __init__(self, temperature, step_size, scheme="implicit", random_seed=0, labels=(), flow=None, advice=""):
+    def __init__(
+        self,
+        temperature,
+        step_size,
+        scheme="implicit",
+        random_seed=0,
+        labels=(),
+        flow=None,
+        advice="",
+        checks=True,
+    ):
         temperature = non_negative(temperature, TEMPERATURE, "temperature")
-        super().__init__(temperature, _OTHER_FRICTION, positive(step_size, TIME, "step_size"))
+        super().__init__(temperature, _OTHER_FRICTION, as_step(step_size))
+        self.checks = checks
+        self._divided_steps = DividedSteps(len(labels))
         check_scheme(scheme)
         self._labels = list(labels)
         self._advice = advice
@@ -215,13 +235,36 @@ class NativeIntegrator(CylinderChainIntegrator):
     def step(self, steps):
         """Advance by a number of steps.
 
+        Warns
+        -----
+        TimeStepWarning
+            Once, if more than one in a thousand steps of filaments had to be divided; see ``step_watch``.
+
         Raises
         ------
         InstabilityError
             If a chain or a particle blows up; positions are then those before the failing step.
+        TimeStepError
+            If more than one in ten steps of filaments had to be divided.
         InputError
             If a filament was torn because positions were wrapped into a periodic box.
         """
+        steps = whole_number(steps, 0, "steps")
+        if not self.checks:
+            self._advance(steps)
+            return
+        while steps > 0:
+            chunk = min(steps, STEPS_BETWEEN_CHECKS)
+            before = self.getNumDividedSteps()
+            self._advance(chunk)
+            steps -= chunk
+            self._divided_steps.add(chunk, self.getNumDividedSteps() - before)
+
+    def setStepSize(self, size):
+        """Set the time step: a time, or a TimeStep."""
+        super().setStepSize(as_step(size))
+
+    def _advance(self, steps):
         try:
             super().step(steps)
         except openmm.OpenMMException as error:

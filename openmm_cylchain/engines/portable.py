@@ -20,8 +20,9 @@ from ..errors import InputError, InstabilityError
 from ..flow import Flow, as_flow, flow_velocities
 from ..geometry import joined, to_nearest_images
 from ..potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
-from ..quantities import BOLTZMANN, TEMPERATURE, TIME, non_negative, positive, whole_number
-from ..timestep import EXPLICIT_SCHEMES, check_scheme
+from ..quantities import BOLTZMANN, TEMPERATURE, non_negative, whole_number
+from ..step_watch import ExplicitWork, WorkRecorder
+from ..timestep import EXPLICIT_SCHEMES, as_step, check_scheme
 from .description import (
     advice_after_blow_up,
     describe_chains,
@@ -61,6 +62,9 @@ _INTEGRATOR_FLOW = tuple(name.replace("chain_", "chain_integrator_") for name in
 
 # CustomIntegrator draws from one random generator per process, which is not safe in two threads at once.
 _STEPPING = threading.Lock()
+
+# Of the integrator that is stepping, if it looks for steps that are too long.
+_RECORDER = None
 
 
 def add_forces(
@@ -130,6 +134,7 @@ def create_integrator(
     particle_friction,
     seed,
     flow=None,
+    checks=True,
 ):
     """Create the integrator of a System with filaments; see ``Filaments.create_integrator``."""
     refuse_constraints(system, filaments, node_indices)
@@ -142,7 +147,7 @@ def create_integrator(
     periodic = system.usesPeriodicBoundaryConditions()
     computation = ChainDisplacements(chains, nodes, rest_lengths, labels, others, frictions, advice, periodic)
     group = add_redistribution(system, computation)
-    return PortableIntegrator(system, group, bath_temperature, step_size, scheme, seed, flow)
+    return PortableIntegrator(system, group, bath_temperature, step_size, scheme, seed, flow, checks)
 
 
 def flow_of(context):
@@ -316,7 +321,10 @@ class ChainDisplacements:
             flow = _flow_from_values(tuple(parameters[name] for name in _FLOW)) if parameters[_FLOWS] else None
             if flow is not None and self._periodic:
                 vectors = self._near_origin(vectors, flow, state.getPeriodicBoxVectors(asNumpy=True)._value)
-            self._displace(result, vectors, self._forces.pop(thread), parameters, flow)
+            forces, start = self._forces.pop(thread), vectors
+            self._displace(result, vectors, forces, parameters, flow)
+            if _RECORDER is not None:
+                _RECORDER.record(int(parameters[_STEPS_TAKEN]), start, forces, result, parameters[_KT])
         return 0.0, result
 
     def _near_origin(self, positions, flow, box):
@@ -476,13 +484,19 @@ class PortableIntegrator(openmm.CustomIntegrator):
         Group of the redistribution force that ``Filaments.create_integrator`` has added to it.
     temperature : temperature
         Zero is allowed: no noise.
-    step_size : time
+    step_size : time, or TimeStep
     scheme : {"midpoint", "euler"}
     random_seed : int
         0 draws a fresh seed from the operating system for this integrator.
     flow : Flow, optional
         Of the solvent; at rest if not given. Like the temperature, it is a variable of the integrator, which
         checkpoints and saved States carry along.
+    checks : bool
+        Whether to look, while it runs, for signs of a step that is too long.
+
+    Attributes
+    ----------
+    checks : bool
 
     Notes
     -----
@@ -498,8 +512,18 @@ class PortableIntegrator(openmm.CustomIntegrator):
         without filaments.
     """
 
-    def __init__(self, system, force_group, temperature, step_size, scheme="midpoint", random_seed=0, flow=None):
-        super().__init__(positive(step_size, TIME, "step_size"))
+    def __init__(
+        self,
+        system,
+        force_group,
+        temperature,
+        step_size,
+        scheme="midpoint",
+        random_seed=0,
+        flow=None,
+        checks=True,
+    ):
+        super().__init__(as_step(step_size))
         check_scheme(scheme)
         if scheme not in EXPLICIT_SCHEMES:
             raise InputError(
@@ -510,6 +534,9 @@ class PortableIntegrator(openmm.CustomIntegrator):
         self._system = system
         self._force_group = force_group
         self._checked = False
+        self.checks = checks
+        self._recorder = WorkRecorder()
+        self._work = ExplicitWork()
         _check_redistribution(system, force_group)
         self.addGlobalVariable(_INTEGRATOR_KT, 0.0)
         self.addGlobalVariable(_INTEGRATOR_SEED, 0.0)
@@ -557,10 +584,17 @@ class PortableIntegrator(openmm.CustomIntegrator):
 
         Integrators may be stepped from different threads, but take turns: use processes to run in parallel.
 
+        Warns
+        -----
+        TimeStepWarning
+            Once, if the work of forces shows that the step is too long for them; see ``step_watch``.
+
         Raises
         ------
         InstabilityError
             If a chain or a particle blows up; positions are then those before the failing step.
+        TimeStepError
+            If the step is far too long for the forces.
         InputError
             If forces added since the integrator was created stand in its way.
         """
@@ -570,9 +604,34 @@ class PortableIntegrator(openmm.CustomIntegrator):
         # States and checkpoints carry variables of the integrator that wrote them; the seed is this one's own.
         if self.getGlobalVariableByName(_INTEGRATOR_SEED) != self._key:
             self.setGlobalVariableByName(_INTEGRATOR_SEED, self._key)
+        steps = whole_number(steps, 0, "steps")
+        if not self.checks:
+            self._advance(steps, None)
+            return
+        while steps > 0:
+            # A window at most is finished meanwhile.
+            chunk = min(steps, self._recorder.window)
+            self._advance(chunk, self._recorder)
+            steps -= chunk
+            work = self._recorder.take()
+            if work is not None:
+                # Written so that NaN is the largest.
+                worst = int(np.argmax(work))
+                self._work.add(float(work[worst]), worst, self._recorder.window, np.count_nonzero(work))
+
+    def setStepSize(self, size):
+        """Set the time step: a time, or a TimeStep."""
+        super().setStepSize(as_step(size))
+
+    def _advance(self, steps, recorder):
+        global _RECORDER
         try:
             with _STEPPING:
-                super().step(steps)
+                _RECORDER = recorder
+                try:
+                    super().step(steps)
+                finally:
+                    _RECORDER = None
         except openmm.OpenMMException as error:
             if "has blown up" in str(error):
                 raise InstabilityError(str(error)) from None

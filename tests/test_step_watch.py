@@ -1,0 +1,258 @@
+"""What a run shows of a step that is too long: divided steps, and the work of explicit forces."""
+
+import warnings
+
+import numpy as np
+import openmm
+import pytest
+from openmm import unit
+
+from openmm_cylchain import DSDNA, F_ACTIN, Filaments, InstabilityError, TimeStepError, TimeStepWarning
+from openmm_cylchain.step_watch import ERROR_WORK, WARNING_WORK, DividedSteps, ExplicitWork, WorkRecorder
+
+VISCOSITY = 1.71e-3 * unit.pascal * unit.second
+TEMPERATURE = 310.0
+KT = 8.31446262e-3 * TEMPERATURE
+
+
+# Divided steps
+
+
+def test_one_divided_step_in_a_thousand_is_tolerated():
+    watch = DividedSteps(chains=10)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for _ in range(50):
+            watch.add(100, 1)
+
+
+def test_more_than_one_in_a_thousand_warn_once():
+    watch = DividedSteps(chains=1)
+    with pytest.warns(TimeStepWarning, match=r"0.3 % of the last steps of filaments were divided") as caught:
+        for _ in range(10):
+            watch.add(500, 1)
+            watch.add(500, 2)
+    assert len(caught) == 1
+    assert "integrator.checks = False" in str(caught[0].message)
+
+
+def test_the_end_of_a_long_run_counts():
+    watch = DividedSteps(chains=4)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for _ in range(10000):
+            watch.add(500, 0)
+    with pytest.warns(TimeStepWarning):
+        watch.add(500, 20)
+    with pytest.raises(TimeStepError, match="11 % of the last steps.*Use a smaller time step"):
+        watch.add(500, 220)
+
+
+def test_a_bad_start_does_not_condemn_a_run():
+    watch = DividedSteps(chains=200)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        # All filaments in the first step, of those in the window that it begins.
+        watch.add(1, 200)
+        watch.add(49, 0)
+        # The warning's window is longer: it sees 1 in 100.
+    with pytest.warns(TimeStepWarning):
+        for _ in range(1000):
+            watch.add(50, 0)
+
+
+@pytest.mark.parametrize("chains, windows", [(1, 2), (2, 1), (100, 1)])
+def test_more_than_one_in_ten_stop_the_run_within_a_hundred_steps(chains, windows):
+    watch = DividedSteps(chains)
+    for _ in range(windows - 1):
+        watch.add(50, 20 * chains)
+    with pytest.raises(TimeStepError):
+        watch.add(50, 20 * chains)
+
+
+def test_without_chains_nothing_is_watched():
+    DividedSteps(0).add(1000, 1000)
+
+
+# Work
+
+
+def test_warning_and_error_of_work():
+    watch = ExplicitWork()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        watch.add(0.99 * WARNING_WORK, 3, 10**6, 1)
+        watch.add(10.0 * WARNING_WORK, 3, 10**6, 1)
+        watch.add(0.99 * WARNING_WORK, 3, 10**6, 1)
+    with pytest.warns(TimeStepWarning, match="forces on particle 3: .* work of 0.36 k_B T") as caught:
+        for _ in range(4):
+            watch.add(1.02 * WARNING_WORK, 3, 10**6, 1)
+    assert len(caught) == 1
+    watch.add(1.01 * ERROR_WORK, 3, 10**6, 1)
+    watch.add(0.99 * ERROR_WORK, 3, 10**6, 1)
+    watch.add(1.01 * ERROR_WORK, 3, 10**6, 1)
+    with pytest.raises(TimeStepError, match="particle 7"):
+        watch.add(np.nan, 7, 10**6, 1)
+
+
+def test_the_largest_of_many_is_allowed_to_be_larger():
+    # The work of harmonic coordinates in windows: squares of Gaussian displacements.
+    generator = np.random.default_rng(3)
+    steps, particles = 128, 1000
+    mean = 0.8 * WARNING_WORK
+    watch = ExplicitWork()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for _ in range(30):
+            work = mean * np.mean(generator.normal(size=(steps, particles)) ** 2, axis=0)
+            assert work.max() > WARNING_WORK
+            watch.add(work.max(), int(work.argmax()), steps, particles)
+
+
+@pytest.mark.parametrize("x", [0.05, 0.2, 1.0])
+def test_recorder_measures_the_work_of_a_harmonic_coordinate(x):
+    generator = np.random.default_rng(1)
+    stiffness, recorder = 3.0, WorkRecorder()
+    positions = generator.normal(size=(400, 3))
+    noise = np.sqrt(2 * KT * x / stiffness)
+    means = []
+    for number in range(1, 1 + 11 * recorder.window):
+        forces = -stiffness * positions
+        moves = x / stiffness * forces + noise * generator.normal(size=positions.shape)
+        recorder.record(number, positions, forces, moves, KT)
+        positions = positions + moves
+        work = recorder.take()
+        if work is not None and number > 2 * recorder.window:
+            means.append(work)
+    assert len(means) == 9
+    assert np.mean(means) == pytest.approx(3 * 2 * x / (1 - x / 2), rel=0.02)
+
+
+def test_recorder_leaves_out_what_does_not_follow_on():
+    recorder = WorkRecorder()
+    recorder.window = 4
+    still, jump = np.zeros((2, 3)), np.full((2, 3), 1e3)
+    forces = np.ones((2, 3))
+    for number in range(1, 4):
+        recorder.record(number, still, forces, still, KT)
+    # Positions are set; then a step is missing; then all is well.
+    recorder.record(4, jump, -1e9 * forces, still, KT)
+    recorder.record(6, jump, 1e9 * forces, still, KT)
+    for number in range(7, 11):
+        recorder.record(number, jump, 1e9 * forces, still, KT)
+    assert recorder.take() == pytest.approx(np.zeros(2))
+    assert recorder.take() is None
+    recorder.record(11, jump, forces, still, 0.0)
+    recorder.record(12, jump, forces, still, KT)
+    assert recorder._count == 0
+
+
+# In the integrators
+
+
+def portable(factor, kind=F_ACTIN, segments=8, temperature=None, checks=True):
+    """A context of the portable engine with a step ``factor`` times as long as the recommended one."""
+    filaments = Filaments(VISCOSITY, TEMPERATURE, engine="portable")
+    filaments.add_equilibrium(kind, segments, seed=4)
+    _, system, positions = filaments.build()
+    step = factor * filaments.recommended_time_step().step
+    integrator = filaments.create_integrator(system, step, temperature=temperature, random_seed=3, checks=False)
+    integrator.checks = checks
+    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
+    context.setPositions(positions)
+    return context, integrator
+
+
+@pytest.mark.parametrize("kind", [F_ACTIN, DSDNA, F_ACTIN.with_segment_length(30)])
+def test_the_portable_engine_is_silent_at_the_recommended_step(kind):
+    _, integrator = portable(1.0, kind)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        integrator.step(1000)
+
+
+def test_the_portable_engine_warns_of_a_long_step():
+    _, integrator = portable(6.0)
+    with pytest.warns(TimeStepWarning, match="too long for the forces on particle") as caught:
+        integrator.step(1000)
+    assert len(caught) == 1
+    assert caught[0].filename == __file__
+
+
+def test_the_portable_engine_stops_at_far_too_long_a_step():
+    _, integrator = portable(15.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", TimeStepWarning)
+        with pytest.raises(TimeStepError, match="energies are far too high"):
+            integrator.step(2000)
+
+
+def test_checks_are_turned_off_by_name():
+    _, integrator = portable(6.0, checks=False)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        integrator.step(600)
+
+
+def test_no_work_at_zero_temperature():
+    _, integrator = portable(6.0, temperature=0.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        integrator.step(600)
+
+
+def test_checks_change_nothing():
+    positions = []
+    for checks in (True, False):
+        context, integrator = portable(1.0, checks=checks)
+        integrator.step(300)
+        positions.append(context.getState(positions=True).getPositions(asNumpy=True)._value)
+    assert np.array_equal(*positions)
+
+
+def kicked(stiffness, checks=True, filaments_count=1):
+    """Filaments whose middles a stiff spring joins, with the compiled engine, at the recommended step without it."""
+    filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
+    force = openmm.HarmonicBondForce()
+    for _ in range(filaments_count):
+        filaments.add_straight(F_ACTIN, 16, [0, 0, 0], [1, 0, 0])
+        filaments.add_straight(F_ACTIN, 16, [0, 30, 0], [1, 0, 0])
+    _, system, positions = filaments.build()
+    middles = [int(nodes[8]) for nodes in filaments.node_indices]
+    for first, second in zip(middles[::2], middles[1::2]):
+        force.addBond(first, second, 0.0, stiffness)
+    system.addForce(force)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", TimeStepWarning)
+        step = filaments.recommended_time_step()
+        integrator = filaments.create_integrator(system, step, random_seed=1, checks=checks)
+    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
+    context.setPositions(positions)
+    return context, integrator
+
+
+def test_a_system_that_is_thrown_apart_stops():
+    _, integrator = kicked(0.003 * 0.602214076)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", TimeStepWarning)
+        with pytest.raises(TimeStepError, match="% of the last steps of filaments were divided.*recommended_time_step"):
+            integrator.step(5000)
+    # It has stopped long before the end.
+    assert 0 < integrator.getNumDividedSteps() < 4000
+    assert issubclass(TimeStepError, InstabilityError)
+
+
+def test_a_system_that_is_thrown_apart_goes_on_without_checks():
+    _, integrator = kicked(0.003 * 0.602214076, checks=False)
+    integrator.step(1500)
+    assert integrator.getNumDividedSteps() > 500
+
+
+def test_long_calls_are_the_same_as_short_ones():
+    positions = []
+    for calls in ([1300], [500, 500, 300], [1] * 1300):
+        context, integrator = kicked(1e-5)
+        for steps in calls:
+            integrator.step(steps)
+        positions.append(context.getState(positions=True).getPositions(asNumpy=True)._value)
+    assert np.array_equal(positions[0], positions[1]) and np.array_equal(positions[0], positions[2])
