@@ -34,7 +34,8 @@ enum class NoiseKind : std::uint32_t {
  * Two normal numbers come from two words a and b by the method of Box and Muller, Ann. Math. Stat. 1958, 29, 610. Their
  * distance from the origin is r = (-2 ln u)^(1/2) with u = (2 R+1)/2^41, where R is a followed by the upper eight bits of
  * b: up to 7.5. Their direction comes from the other 24 bits of b: the lowest 22, J, make an angle
- * (2 J+1-2^22) pi/2^24, the next one reverses the x axis and the highest one swaps the axes. Draw 0 gives the normal
+ * (2 J+1-2^22) pi/2^24, the next one reverses the x axis and the highest one swaps the axes. The polynomials for all this, in NoiseLoops.h, are
+ * good to 10^-11. Draw 0 gives the normal
  * numbers 0 and 1 from w0 and w1, and 2 and 3 from w2 and w3; draw 1 gives the next four. All this takes integers and
  * operations that IEEE 754 rounds correctly, without fused multiplication and addition, so that all instruction sets give
  * the same bits, and others can.

@@ -68,8 +68,8 @@ static void testNormalsAgainstDescription() {
                 x = -x;
             if (b>>23&1)
                 swap(x, y);
-            checkClose(x, normals[4*i+2*pair], fabs(x), 2e-15, "normal number");
-            checkClose(y, normals[4*i+2*pair+1], fabs(y), 2e-15, "normal number");
+            checkClose(x, normals[4*i+2*pair], fabs(x), 1e-11, "normal number");
+            checkClose(y, normals[4*i+2*pair+1], fabs(y), 1e-11, "normal number");
         }
     }
 }
@@ -97,7 +97,7 @@ static void testBits() {
     }
     char text[20];
     snprintf(text, sizeof(text), "%016llx", (unsigned long long) hash);
-    check(string(text) == "6a38bd2746f1ca14", "bits of normal numbers have changed: "+string(text));
+    check(string(text) == "3560a56ffd6684f9", "bits of normal numbers have changed: "+string(text));
 }
 
 static void testMoments() {
@@ -215,7 +215,7 @@ static void testFeneLengths() {
             const double u = ldexp(2.0*((uint64_t) w[2]<<8 | w[3]>>24)+1, -41);
             const double angle = (2.0*(w[3]&0x3fffff)+1-4194304)*M_PI/16777216;
             const double along = w[3]>>23&1 ? sin(angle) : cos(angle)*(w[3]>>22&1 ? -1 : 1);
-            kept += fabs(sqrt(-2*log(u)/(kappa+1.5))*along-x[i]) < 1e-12*(1/sqrt(kappa+1.5));
+            kept += fabs(sqrt(-2*log(u)/(kappa+1.5))*along-x[i]) < 1e-10/sqrt(kappa+1.5);
         }
         // Gamma(kappa/2+1) (kappa/2+3/4)^(1/2)/Gamma(kappa/2+3/2) of them are accepted.
         const double accepted = kappa > 1e4 ? 1 : exp(lgamma(0.5*kappa+1)-lgamma(0.5*kappa+1.5))*sqrt(0.5*kappa+0.75);
@@ -252,6 +252,59 @@ static void testStepsAtLevels() {
         }
 }
 
+/** A step that is divided is the same as steps at higher levels, for all chains and with noise of all kinds. */
+static void testDividedStepsFollowTheirPath() {
+    for (StretchingModel stretching : {StretchingModel::Harmonic, StretchingModel::FENE}) {
+        Array x;
+        vector<Chain> chains = makeAll(BendingModel::InscribedCircle, stretching, x);
+        for (Chain& chain : chains) {
+            chain.tethers = {{0, {x[3*chain.nodes[0]], 0, 3}, 0.3}};
+            // Close to the greatest extension, rounding would grow.
+            for (Segment& segment : chain.segments)
+                segment.maximumExtension = 9;
+        }
+        int compared = 0;
+        for (int c = 0; c < (int) chains.size(); c++) {
+            // Alone, so that what is divided and what is not can be told apart.
+            Chain chain = chains[c];
+            Array start;
+            for (size_t node = 0; node < chain.nodes.size(); node++) {
+                start.insert(start.end(), &x[3*chain.nodes[node]], &x[3*chain.nodes[node]]+3);
+                chain.nodes[node] = node;
+            }
+            const ChainEngine engine({chain});
+            const Array zero(start.size());
+            for (uint64_t step = 5; step < 45; step++) {
+                Array whole(start.size());
+                const double h = 4, kT = 12;
+                const Instability found = engine.step(0, start.data(), zero.data(), NULL,
+                        {Scheme::Implicit, kT, h, 21, step, 1}, whole.data());
+                if (found.divided == 0 || found.chain != -1)
+                    continue;
+                bool divided = true;
+                for (int division = 1; divided; division++) {
+                    check(division <= 10, "no parts of the step are what it was");
+                    divided = false;
+                    Array parts = start;
+                    for (uint64_t part = 0; part < 1ULL<<division && !divided; part++) {
+                        Array change(start.size());
+                        divided = engine.step(0, parts.data(), zero.data(), NULL, {Scheme::Implicit, kT, h/(1<<division), 21,
+                                (step<<division)+part, 1+division}, change.data()).divided > 0;
+                        for (size_t i = 0; i < start.size(); i++)
+                            parts[i] += change[i];
+                    }
+                    if (divided)
+                        continue;
+                    for (size_t i = 0; i < start.size(); i++)
+                        checkClose(parts[i]-start[i], whole[i], 1, 1e-9, "step in parts");
+                    compared++;
+                }
+            }
+        }
+        check(compared > 20, "too few steps were divided: "+to_string(compared));
+    }
+}
+
 int main() {
     return runTests({
         testKnownAnswers,
@@ -261,6 +314,7 @@ int main() {
         testCorrelations,
         testPaths,
         testFeneLengths,
-        testStepsAtLevels
+        testStepsAtLevels,
+        testDividedStepsFollowTheirPath
     });
 }
