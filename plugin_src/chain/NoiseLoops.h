@@ -55,7 +55,7 @@ template <int W> CYLCHAIN_INLINE typename Lanes<W>::Bits product(typename Lanes<
         return (Bits) _mm512_maskz_mul_epu32(-1, (__m512i) a, (__m512i) ((std::uint64_t) b+Bits{}));
 #endif
 #endif
-    return a*b;
+    return a*(std::uint64_t) b;
 }
 
 /** The words of several draws: each lane holds a word of 32 bits. */

@@ -223,6 +223,20 @@ static void testFeneLengths() {
     }
 }
 
+/** A step of FENE segments that hardly resist, or hardly stretch, ends. */
+static void testStepsOfFeneSegmentsOfAnyStiffness() {
+    for (double kappa : {0.0, 1e-12, 1e-4, 1.0, 1e4, 1e8}) {
+        Array x;
+        vector<Chain> chains = makeChains(SEGMENTS, BendingModel::InscribedCircle, StretchingModel::FENE, x);
+        for (Chain& chain : chains)
+            for (Segment& segment : chain.segments)
+                segment.stiffness = 2.5*kappa/(segment.maximumExtension*segment.maximumExtension);
+        const Array change = stepOf(ChainEngine(chains), x, Array(x.size()), {Scheme::Implicit, 2.5, 1e-3, 3, 4});
+        for (double value : change)
+            check(isfinite(value), "step of FENE segments");
+    }
+}
+
 /** Chains in different places of a pack, and alone, with noise of all kinds and at several levels. */
 static void testStepsAtLevels() {
     Array x;
@@ -314,6 +328,7 @@ int main() {
         testCorrelations,
         testPaths,
         testFeneLengths,
+        testStepsOfFeneSegmentsOfAnyStiffness,
         testStepsAtLevels,
         testDividedStepsFollowTheirPath
     });
