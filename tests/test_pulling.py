@@ -331,7 +331,7 @@ def test_slow_pulling_measures_the_force_in_equilibrium(engine):
 
 def test_work_obeys_the_equality_of_jarzynski():
     """Dragging a free filament through the solvent leaves its free energy: <exp(-W/k_BT)> = 1 however fast it goes."""
-    chains, stiffness = 2500, 50 * KT / 100**2
+    chains, stiffness = 3200, 50 * KT / 100**2
     generator = np.random.default_rng(4)
     filaments = Filaments(VISCOSITY, TEMPERATURE)
     for chain in range(chains):

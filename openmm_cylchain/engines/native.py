@@ -67,6 +67,7 @@ SCHEMES = {
 }
 
 _OTHER_FRICTION = 1.0
+LARGEST_PATH_LEVEL = 20
 
 
 def add_forces(
@@ -287,6 +288,20 @@ class NativeIntegrator(CylinderChainIntegrator):
         if seed >= 2**31:
             raise InputError(f"random_seed must be below 2^31, but is {seed}.")
         super().setRandomNumberSeed(seed)
+
+    def setPathLevel(self, level):
+        """Set the path level of the noise: that of two runs whose steps are h and h/2^level, at level 0 and at another
+        level, is that of the same Brownian path, if their seeds are equal. It holds for Contexts created later.
+
+        Raises
+        ------
+        InputError
+            If it is not a whole number between 0 and 20.
+        """
+        level = whole_number(level, 0, "path level")
+        if level > LARGEST_PATH_LEVEL:
+            raise InputError(f"path level must be at most {LARGEST_PATH_LEVEL}, but is {level}.")
+        super().setPathLevel(level)
 
     def getFlow(self):
         """The Flow of the solvent."""

@@ -322,7 +322,7 @@ class ChainDisplacements:
             if flow is not None and self._periodic:
                 vectors = self._near_origin(vectors, flow, state.getPeriodicBoxVectors(asNumpy=True)._value)
             forces, start = self._forces.pop(thread), vectors
-            self._displace(result, vectors, forces, parameters, flow)
+            self._displace(result, vectors, forces, parameters, state.getStepCount(), flow)
             if _RECORDER is not None:
                 _RECORDER.record(int(parameters[_STEPS_TAKEN]), start, forces, result, parameters[_KT])
         return 0.0, result
@@ -335,11 +335,12 @@ class ChainDisplacements:
         images[self._others] = to_nearest_images(positions[self._others] - flow.origin, box) + flow.origin
         return images
 
-    def _displace(self, result, positions, forces, parameters, flow):
+    def _displace(self, result, positions, forces, parameters, step_count, flow):
         kT, step = parameters[_KT], parameters[_STEP_SIZE]
         steps_taken = int(parameters[_STEPS_TAKEN])
         chains = self._chains
-        gaussian = _gaussian_vectors(int(parameters[_SEED]), steps_taken, 2 * chains.segment_count + len(self._others))
+        count = 2 * chains.segment_count + len(self._others)
+        gaussian = _gaussian_vectors(int(parameters[_SEED]), steps_taken, step_count, count)
         translational, rotational, other = np.split(gaussian, [chains.segment_count, 2 * chains.segment_count])
         advance = STEPS[EXPLICIT_SCHEMES[int(parameters[_SCHEME])]]
         with np.errstate(all="ignore"):
@@ -396,10 +397,11 @@ class ChainDisplacements:
             )
 
 
-def _gaussian_vectors(seed, steps_taken, count):
+def _gaussian_vectors(seed, steps_taken, step_count, count):
     # Counter-based: the noise of a step depends on the seed and the step's number alone, not on the platform, on
-    # other Contexts or on how the run was split.
-    bits = np.random.Philox(key=[seed, 0], counter=[0, 0, steps_taken, 0])
+    # other Contexts or on how the run was split. Steps are counted by a parameter, which a State without parameters
+    # does not bring along, and by the Context, whose count users may set: with both, no noise comes twice.
+    bits = np.random.Philox(key=[seed, 0], counter=[0, 0, steps_taken, step_count % 2**64])
     return np.random.Generator(bits).standard_normal((count, 3))
 
 
@@ -500,8 +502,8 @@ class PortableIntegrator(openmm.CustomIntegrator):
 
     Notes
     -----
-    The noise of a step depends on the seed and on the number of steps taken, which checkpoints and
-    saved States carry along. A restart from a checkpoint with the same seed is therefore
+    The noise of a step depends on the seed, on the number of steps taken and on the step count of the
+    Context, which checkpoints and saved States carry along. A restart from a checkpoint with the same seed is therefore
     bit-identical on the same platform; a restart with another seed is independent. Velocities are
     displacements divided by the step; there is no kinetic energy.
 

@@ -52,8 +52,8 @@ void fillLane(ChainPack& pack, int lane, const Chain& chain, int index) {
     pack.free[lane] = any_of(chain.fixed.begin(), chain.fixed.end(), [] (bool fixed) {return fixed;}) ? 0.0 : 1.0;
     for (size_t node = 1; node < unrolled-1; node++)
         pack.joints[node*lanes+lane] = chain.joints[chain.closed ? node%own : node-1];
-    for (const Tether& tether : chain.tethers)
-        pack.tethers.push_back({tether, lane});
+    for (size_t number = 0; number < chain.tethers.size(); number++)
+        pack.tethers.push_back({chain.tethers[number], lane, (int) number});
     for (int s = 0; s < pack.nodes-1; s++) {
         const bool filling = (s >= (int) unrolled-1);
         const Segment segment = filling ? Segment {1, 0, 1, 0, 0, 0, 0} : chain.segments[s%chain.segments.size()];
@@ -182,6 +182,21 @@ void ChainEngine::clearForces(int pack, double* forces) const {
 Instability ChainEngine::step(int pack, const double* positions, const double* forces, const double* box,
             const StepSettings& settings, double* displacements) const {
     return kernels().step(implementation->packs[pack], positions, forces, box, settings, displacements);
+}
+
+void cylchain::drawWords(const NoiseKey& key, NoiseKind kind, uint32_t draw, const uint32_t* chains, const uint32_t* parts,
+            int count, uint32_t* words) {
+    kernels().drawWords(key, kind, draw, chains, parts, count, words);
+}
+
+void cylchain::drawNormals(const NoiseKey& key, NoiseKind kind, const uint32_t* chains, const uint32_t* parts, int count,
+            double* normals) {
+    kernels().drawNormals(key, kind, chains, parts, count, normals);
+}
+
+void cylchain::drawFeneCoordinates(const NoiseKey& key, const uint32_t* chains, const uint32_t* segments,
+            const double* stiffness, int count, double* coordinates) {
+    kernels().drawFeneCoordinates(key, chains, segments, stiffness, count, coordinates);
 }
 
 string ChainEngine::getInstructionSet() {

@@ -58,14 +58,20 @@ private:
     const int *first, *last;
 };
 
+/** The largest level of a step that may be divided. */
+const int LARGEST_LEVEL = 20;
+
 /** What a step needs besides positions and forces. */
 struct StepSettings {
     Scheme scheme;
     double kT, stepSize;
-    /** The noise of a step is a function of the seed, the step's number and the chain's number alone. */
+    /**
+     * The noise of a step is a function of the seed, of which 32 bits count, the level, the number of the step at that level,
+     * and the chain's number. Steps of the size h/2^level follow the Brownian path of those of the size h at level 0; levels
+     * go from 0 to LARGEST_LEVEL. See Noise.h.
+     */
     std::uint64_t seed, step;
-    /** Which part of a step, if it is taken in parts. */
-    std::uint32_t part = 0;
+    int level = 0;
     BackgroundFlow flow = {};
 };
 

@@ -4,7 +4,8 @@
 #include "ChainLoops.h"
 
 const cylchain::ChainKernels& cylchain::avx2Kernels() {
-    static const ChainKernels kernels = {"avx2", CYLCHAIN_LANES, avx2::addForcesOfPack, avx2::stepOfPack};
+    static const ChainKernels kernels = {"avx2", CYLCHAIN_LANES, avx2::addForcesOfPack, avx2::stepOfPack,
+            avx2::drawWordsOf, avx2::drawNormalsOf, avx2::drawFeneCoordinatesOf};
     return kernels;
 }
 #endif

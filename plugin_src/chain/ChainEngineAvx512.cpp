@@ -4,7 +4,8 @@
 #include "ChainLoops.h"
 
 const cylchain::ChainKernels& cylchain::avx512Kernels() {
-    static const ChainKernels kernels = {"avx512", CYLCHAIN_LANES, avx512::addForcesOfPack, avx512::stepOfPack};
+    static const ChainKernels kernels = {"avx512", CYLCHAIN_LANES, avx512::addForcesOfPack, avx512::stepOfPack,
+            avx512::drawWordsOf, avx512::drawNormalsOf, avx512::drawFeneCoordinatesOf};
     return kernels;
 }
 #endif

@@ -3,6 +3,7 @@
 #include "ChainLoops.h"
 
 const cylchain::ChainKernels& cylchain::baselineKernels() {
-    static const ChainKernels kernels = {"baseline", CYLCHAIN_LANES, baseline::addForcesOfPack, baseline::stepOfPack};
+    static const ChainKernels kernels = {"baseline", CYLCHAIN_LANES, baseline::addForcesOfPack, baseline::stepOfPack,
+            baseline::drawWordsOf, baseline::drawNormalsOf, baseline::drawFeneCoordinatesOf};
     return kernels;
 }

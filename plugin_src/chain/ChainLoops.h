@@ -4,7 +4,7 @@
  */
 
 #include "ChainPack.h"
-#include "Gaussian.h"
+#include "Noise.h"
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -228,28 +228,45 @@ template <int W> ChainEnergy addForcesTo(const ChainPack& pack, const double* po
 }
 
 #include "Redistribution.h"
-#include "GaussianLanes.h"
+#include "NoiseLanes.h"
 
-/** Three normal numbers, or two for a chain that stays in its plane. */
-template <int W> CYLCHAIN_INLINE Vector<typename Lanes<W>::Type> gaussianVector(GaussianLanes<W>& gaussian, bool planar) {
-    Vector<typename Lanes<W>::Type> result = {gaussian.next(), gaussian.next(), gaussian.next()};
-    if (planar)
-        result.z = typename Lanes<W>::Type {};
-    return result;
+inline NoiseKey noiseKey(const StepSettings& settings) {
+    return {(std::uint32_t) settings.seed, (std::uint32_t) settings.level, settings.step};
+}
+
+/** The first part of each chain of a pack. */
+template <int W> inline NoisePlaces<W> noisePlaces(const ChainPack& pack) {
+    NoisePlaces<W> places;
+    for (int i = 0; i < W; i++) {
+        reinterpret_cast<std::uint64_t*>(&places.chain)[i] = pack.chain[i];
+        reinterpret_cast<std::uint64_t*>(&places.part)[i] = 0;
+    }
+    return places;
+}
+
+/** The random forces of a segment: that on its middle and that on its ends, before friction colours them. */
+template <class Real> CYLCHAIN_INLINE void forceNoise(const Real* normals, bool planar, Vector<Real>& a, Vector<Real>& b) {
+    a = {normals[0], normals[1], planar ? Real{} : normals[2]};
+    b = {normals[3], normals[4], planar ? Real{} : normals[5]};
 }
 
 /** Add the random forces, step (1) of Section 4, and for Euler's scheme the thermal torques (15), step (2). */
 template <int W> void addRandomForces(const ChainPack& pack, const Vector<typename Lanes<W>::Type>* x,
             const StepSettings& settings, Vector<typename Lanes<W>::Type>* f) {
     typedef typename Lanes<W>::Type Real;
-    GaussianLanes<W> gaussian(pack, settings);
+    const NoiseKey key = noiseKey(settings);
+    NoisePlaces<W> places = noisePlaces<W>(pack);
     const double amplitude = std::sqrt(2*settings.kT/settings.stepSize);
     const double thermal = (settings.scheme == Scheme::Euler ? settings.kT : 0.0);
     for (int s = 0; s < pack.segments; s++) {
         const Vector<Real> difference = x[s+1]-x[s];
         const Real inverse = 1/root(difference.dot(difference));
         const Vector<Real> t = difference*inverse;
-        const Vector<Real> a = gaussianVector<W>(gaussian, pack.planar), b = gaussianVector<W>(gaussian, pack.planar);
+        Real normals[6];
+        Vector<Real> a, b;
+        drawNormals<W, 3>(key, NoiseKind::Segment, places, normals);
+        places.part += 1;
+        forceNoise<Real>(normals, pack.planar, a, b);
         const Real across = property<Real>(pack, s, ChainPack::RootPerpendicular);
         const Real along = property<Real>(pack, s, ChainPack::RootParallel);
         const Vector<Real> force = (a*across+t*((along-across)*t.dot(a)))*(0.5*amplitude+Real{});

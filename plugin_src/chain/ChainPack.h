@@ -2,13 +2,14 @@
 #define CYLCHAIN_CHAIN_PACK_H_
 
 #include "ChainEngine.h"
+#include "Noise.h"
 #include <vector>
 
 namespace cylchain {
 
-/** A tether of the chain in a lane. */
+/** A tether of the chain in a lane, and its number among those of the chain. */
 struct LaneTether : Tether {
-    int lane;
+    int lane, number;
 };
 
 /**
@@ -61,6 +62,13 @@ struct ChainKernels {
             bool includeEnergy);
     Instability (*step)(const ChainPack& pack, const double* positions, const double* forces, const double* box,
             const StepSettings& settings, double* displacements);
+    /** See Noise.h. */
+    void (*drawWords)(const NoiseKey& key, NoiseKind kind, std::uint32_t draw, const std::uint32_t* chains,
+            const std::uint32_t* parts, int count, std::uint32_t* words);
+    void (*drawNormals)(const NoiseKey& key, NoiseKind kind, const std::uint32_t* chains, const std::uint32_t* parts,
+            int count, double* normals);
+    void (*drawFeneCoordinates)(const NoiseKey& key, const std::uint32_t* chains, const std::uint32_t* segments,
+            const double* stiffness, int count, double* coordinates);
 };
 
 const ChainKernels& baselineKernels();

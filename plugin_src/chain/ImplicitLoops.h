@@ -268,11 +268,11 @@ private:
     }
     /** Draw the random forces, lengths and bends, and those of tethers. */
     void addNoise();
-    void drawForces(GaussianLanes<W>& gaussian, int s, double amplitude);
-    void drawLength(GaussianLanes<W>& gaussian, int s);
-    void drawBend(GaussianLanes<W>& gaussian, int s);
+    void drawForces(const Real* normals, int s, double amplitude);
+    void drawLength(const NoisePlaces<W>& places, int s, Real normal);
+    void drawBend(const NoisePlaces<W>& places, int s);
     /** In a plane, a bend has one component, and its angle a uniform measure. */
-    void drawPlanarBend(GaussianLanes<W>& gaussian, int s);
+    void drawPlanarBend(const NoisePlaces<W>& places, int s);
     /** The new segment, and the one between the old nodes and the new. */
     struct Geometry {
         Vec difference, tangent, middleTangent;
@@ -612,23 +612,29 @@ private:
 
 #include "ImplicitNoise.h"
 
-/** Advance the lanes that failed, from the start, by the same time in more and more parts. */
+/**
+ * Advance the lanes that failed, from the start, by the same time in more and more parts. They follow the Brownian path of
+ * the step, so that what failed is not left out of the noise.
+ */
 template <int W, bool CLOSED> void divideStep(const ChainPack& pack, const Vector<typename Lanes<W>::Type>* x,
             const Vector<typename Lanes<W>::Type>* f, StepSettings settings, Vector<typename Lanes<W>::Type>* y,
             const double* box, bool* failed, typename ImplicitStep<W, CLOSED>::Memory& memory, Scratch& scratch) {
     typedef typename Lanes<W>::Type Real;
     const double h = settings.stepSize;
+    const std::uint64_t step = settings.step;
+    const int level = settings.level;
     Vector<Real>* from = scratch.reserve<Vector<Real> >(2*pack.nodes);
     Vector<Real>* to = from+pack.nodes;
     for (int division = 1; division <= LARGEST_DIVISION; division++) {
         const int parts = 1<<division;
         settings.stepSize = h/parts;
+        settings.level = level+division;
         bool failedNow[W] = {}, failedPart[W];
         for (int node = 0; node < pack.nodes; node++)
             to[node] = x[node];
         bool hope = true;
         for (int part = 0; part < parts && hope; part++) {
-            settings.part = parts+part;
+            settings.step = (step<<division)+part;
             for (int node = 0; node < pack.nodes; node++)
                 from[node] = to[node];
             ImplicitStep<W, CLOSED>(pack, settings, box, memory).take(from, f, to, failedPart);

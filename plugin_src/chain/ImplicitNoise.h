@@ -4,34 +4,40 @@
 
 template <int W, bool CLOSED>
 void ImplicitStep<W, CLOSED>::addNoise() {
-    GaussianLanes<W> gaussian(pack, settings);
+    const NoiseKey key = noiseKey(settings);
+    NoisePlaces<W> places = noisePlaces<W>(pack);
     const double amplitude = std::sqrt(2*settings.kT/h);
-    for (int s = 0; s < n-1; s++) {
+    for (int s = 0; s < n-1; s++, places.part += 1) {
         if (!CLOSED || s < pack.segments) {
-            drawForces(gaussian, s, amplitude);
-            drawLength(gaussian, s);
+            Real normals[8];
+            drawNormals<W, 4>(key, NoiseKind::Segment, places, normals);
+            drawForces(normals, s, amplitude);
+            drawLength(places, s, normals[6]);
         }
         if (s > 0) {
             if (pack.planar)
-                drawPlanarBend(gaussian, s);
+                drawPlanarBend(places, s);
             else
-                drawBend(gaussian, s);
+                drawBend(places, s);
         }
     }
     for (std::size_t i = 0; i < pack.tethers.size(); i++) {
-        const double deviation = std::sqrt(settings.kT/(pack.tethers[i].stiffness+TINY)*(2*tethers[i].theta-1));
-        for (double& random : tethers[i].random)
-            random = deviation*gaussian.nextOfLane(pack.tethers[i].lane);
-        if (pack.planar)
-            tethers[i].random[2] = 0;
+        const LaneTether& tether = pack.tethers[i];
+        const double deviation = std::sqrt(settings.kT/(tether.stiffness+TINY)*(2*tethers[i].theta-1));
+        const NoisePlaces<1> place = {(std::uint64_t) pack.chain[tether.lane], (std::uint64_t) tether.number};
+        double normals[4];
+        drawNormals<1, 2>(key, NoiseKind::Tether, place, normals);
+        for (int k = 0; k < 3; k++)
+            tethers[i].random[k] = pack.planar && k == 2 ? 0 : deviation*normals[k];
     }
 }
 
 template <int W, bool CLOSED>
-CYLCHAIN_INLINE void ImplicitStep<W, CLOSED>::drawForces(GaussianLanes<W>& gaussian, int s, double amplitude) {
+CYLCHAIN_INLINE void ImplicitStep<W, CLOSED>::drawForces(const Real* normals, int s, double amplitude) {
     ImplicitSegment<Real>& segment = segments[s];
     const Vec t = segment.tangent;
-    const Vec a = gaussianVector<W>(gaussian, pack.planar), b = gaussianVector<W>(gaussian, pack.planar);
+    Vec a, b;
+    forceNoise<Real>(normals, pack.planar, a, b);
     const Real across = property<Real>(pack, s, ChainPack::RootPerpendicular);
     const Real along = property<Real>(pack, s, ChainPack::RootParallel);
     const Vec force = (a*across+t*((along-across)*t.dot(a)))*(0.5*amplitude+Real{});
@@ -44,69 +50,65 @@ CYLCHAIN_INLINE void ImplicitStep<W, CLOSED>::drawForces(GaussianLanes<W>& gauss
 }
 
 template <int W, bool CLOSED>
-void ImplicitStep<W, CLOSED>::drawLength(GaussianLanes<W>& gaussian, int s) {
+void ImplicitStep<W, CLOSED>::drawLength(const NoisePlaces<W>& places, int s, Real normal) {
     ImplicitSegment<Real>& segment = segments[s];
-    const Real stiffness = property<Real>(pack, s, ChainPack::Stiffness);
-    const Real deviation = root(settings.kT/(stiffness+TINY));
-    Real random = gaussian.next();
+    const Real stiffness = property<Real>(pack, s, ChainPack::Stiffness), share = root(2*segment.theta-1);
     if (pack.stretching == StretchingModel::FENE) {
-        // The density of lengths, seen as one of coordinates.
-        Real inverse = property<Real>(pack, s, ChainPack::InverseExtension), scale = deviation;
-        for (int i = 0; i < W; i++) {
-            double square = lane(random, i)*lane(scale, i)*lane(inverse, i);
-            square *= square;
-            while (square > 1e-8 && s < pack.segmentsOfLane[i]) {
-                const double relative = std::sqrt(-std::expm1(-square));
-                if (gaussian.uniform(i) < std::exp(-square)*std::sqrt(square)/relative)
-                    break;
-                lane(random, i) = gaussian.nextOfLane(i);
-                square = lane(random, i)*lane(scale, i)*lane(inverse, i);
-                square *= square;
-            }
-        }
+        // Segments that fill up a lane have neither stiffness nor a maximum extension.
+        const Real inverse = property<Real>(pack, s, ChainPack::InverseExtension);
+        drawFeneCoordinates<W>(noiseKey(settings), places, stiffness/(inverse*inverse*settings.kT+TINY), normal);
+        segment.randomCoordinate = normal/(inverse+TINY)*share;
     }
-    segment.randomCoordinate = random*deviation*root(2*segment.theta-1);
+    else
+        segment.randomCoordinate = normal*root(settings.kT/(stiffness+TINY))*share;
 }
 
 template <int W, bool CLOSED>
-void ImplicitStep<W, CLOSED>::drawBend(GaussianLanes<W>& gaussian, int s) {
+void ImplicitStep<W, CLOSED>::drawBend(const NoisePlaces<W>& places, int s) {
     ImplicitSegment<Real>& segment = segments[s];
+    const NoiseKey key = noiseKey(settings);
     Real stiffness = loaded<Real>(pack.joints, s)/settings.kT, share = root(2*segment.jointTheta-1);
-    Real first = gaussian.next(), second = gaussian.next();
+    Real normals[2], acceptance;
+    drawCandidates<W>(key, NoiseKind::Bend, places, normals, acceptance);
     for (int i = 0; i < W; i++) {
         const double k = lane(stiffness, i);
-        double a = lane(first, i), b = lane(second, i);
+        double drawn[2] = {lane(normals[0], i), lane(normals[1], i)};
+        double& a = drawn[0], &b = drawn[1];
         if (k == 0 || lane(share, i) == 0)
             a = b = 0;
         else if (k > STIFF_JOINT) {
-            while (gaussian.uniform(i) > bendMeasure(pack.bending, (a*a+b*b)/k)) {
-                a = gaussian.nextOfLane(i);
-                b = gaussian.nextOfLane(i);
-            }
+            double uniform = lane(acceptance, i);
+            for (std::uint32_t draw = 1; uniform > bendMeasure(pack.bending, (a*a+b*b)/k); draw++)
+                drawCandidate(key, NoiseKind::Bend, pack.chain[i], s, draw, drawn, uniform);
             a /= std::sqrt(k);
             b /= std::sqrt(k);
         }
         else {
-            double square;
-            do
-                square = bendSquare(pack.bending, 2*gaussian.uniform(i)-1);
-            while (gaussian.uniform(i) > std::exp(-0.5*k*square));
+            double square, uniforms[2];
+            std::uint32_t draw = 1;
+            do {
+                drawUniforms(key, NoiseKind::Bend, pack.chain[i], s, draw++, uniforms);
+                square = bendSquare(pack.bending, 2*uniforms[0]-1);
+            } while (uniforms[1] > std::exp(-0.5*k*square));
             const double scale = std::sqrt(square/(a*a+b*b));
             a *= scale;
             b *= scale;
         }
-        lane(first, i) = a*lane(share, i);
-        lane(second, i) = b*lane(share, i);
+        lane(normals[0], i) = a*lane(share, i);
+        lane(normals[1], i) = b*lane(share, i);
     }
     Vec e1, e2;
     orthogonal(segment.bisector, e1, e2);
-    segment.randomBend = e1*first+e2*second;
+    segment.randomBend = e1*normals[0]+e2*normals[1];
 }
 
 template <int W, bool CLOSED>
-void ImplicitStep<W, CLOSED>::drawPlanarBend(GaussianLanes<W>& gaussian, int s) {
+void ImplicitStep<W, CLOSED>::drawPlanarBend(const NoisePlaces<W>& places, int s) {
     ImplicitSegment<Real>& segment = segments[s];
+    const NoiseKey key = noiseKey(settings);
     Real stiffness = loaded<Real>(pack.joints, s)/settings.kT, share = root(2*segment.jointTheta-1), bend = Real{};
+    Real normals[2], acceptance;
+    drawCandidates<W>(key, NoiseKind::Bend, places, normals, acceptance);
     // The energy is that of a Gaussian or more, in the angle.
     const double floor = pack.bending == BendingModel::KratkyPorod ? 4/(M_PI*M_PI) : 1;
     for (int i = 0; i < W; i++) {
@@ -114,13 +116,20 @@ void ImplicitStep<W, CLOSED>::drawPlanarBend(GaussianLanes<W>& gaussian, int s) 
         if (k == 0 || lane(share, i) == 0)
             continue;
         const bool stiff = k*floor > STIFF_JOINT;
-        double angle, drawn, excess;
-        do {
-            angle = stiff ? gaussian.nextOfLane(i)/std::sqrt(k*floor) : M_PI*(2*gaussian.uniform(i)-1);
-            drawn = bendOfAngle(pack.bending, angle);
-            excess = drawn*drawn-(stiff ? floor*angle*angle : 0);
-        } while (!(std::fabs(angle) < M_PI) || gaussian.uniform(i) > std::exp(-0.5*k*excess));
-        lane(bend, i) = drawn*lane(share, i);
+        double candidates[2] = {lane(normals[0], i), 0}, uniforms[2] = {0, lane(acceptance, i)};
+        for (std::uint32_t draw = 1;; draw++) {
+            if (!stiff)
+                drawUniforms(key, NoiseKind::Bend, pack.chain[i], s, draw, uniforms);
+            const double angle = stiff ? candidates[0]/std::sqrt(k*floor) : M_PI*(2*uniforms[0]-1);
+            const double drawn = bendOfAngle(pack.bending, angle);
+            const double excess = drawn*drawn-(stiff ? floor*angle*angle : 0);
+            if (std::fabs(angle) < M_PI && uniforms[1] <= std::exp(-0.5*k*excess)) {
+                lane(bend, i) = drawn*lane(share, i);
+                break;
+            }
+            if (stiff)
+                drawCandidate(key, NoiseKind::Bend, pack.chain[i], s, draw, candidates, uniforms[1]);
+        }
     }
     segment.randomBend = Vec {-segment.bisector.y, segment.bisector.x, Real{}}*bend;
 }

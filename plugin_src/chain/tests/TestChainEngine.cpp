@@ -193,24 +193,6 @@ static void testInstability() {
     throw runtime_error("instability not found");
 }
 
-static void testGaussianMoments() {
-    const int count = 4000000;
-    Array values(count);
-    GaussianStream(3, 4, 5).fill(values.data(), count);
-    double moments[5] = {}, beyond = 0;
-    for (double v : values) {
-        for (int k = 1; k < 5; k++)
-            moments[k] += pow(v, k)/count;
-        beyond += (fabs(v) > 3.6541528853610088);
-    }
-    checkClose(0, moments[1], sqrt(1.0/count), 4, "mean");
-    checkClose(1, moments[2], sqrt(2.0/count), 4, "variance");
-    checkClose(0, moments[3], sqrt(15.0/count), 4, "third moment");
-    checkClose(3, moments[4], sqrt(96.0/count), 4, "fourth moment");
-    const double tail = erfc(3.6541528853610088/sqrt(2.0))*count;
-    checkClose(tail, beyond, sqrt(tail), 4, "tail");
-}
-
 int main() {
     return runTests({
         testForces,
@@ -221,7 +203,6 @@ int main() {
         testPeriodicImages,
         testCovarianceOfNoise,
         testChainsDoNotDependOnTheirPack,
-        testInstability,
-        testGaussianMoments
+        testInstability
     });
 }

@@ -6,10 +6,10 @@
  */
 
 #include "../ChainEngine.h"
-#include "../Gaussian.h"
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <random>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -30,9 +30,25 @@ inline void checkClose(double expected, double found, double scale, double toler
         throw runtime_error(what+": expected "+to_string(expected)+", found "+to_string(found));
 }
 
+/** Normal numbers to make chains with. */
+class NormalNumbers {
+public:
+    explicit NormalNumbers(int seed) : generator(seed) {
+    }
+    Array operator()(int count) {
+        Array values(count);
+        for (double& value : values)
+            value = distribution(generator);
+        return values;
+    }
+private:
+    mt19937_64 generator;
+    normal_distribution<double> distribution;
+};
+
 /** Bent chains of different lengths with different segments; node positions are appended to x. */
 inline vector<Chain> makeChains(const vector<int>& segments, BendingModel bending, StretchingModel stretching, Array& x) {
-    GaussianStream stream(1, 2, 3);
+    NormalNumbers normalNumbers(1);
     vector<Chain> chains;
     int particle = 0;
     for (int count : segments) {
@@ -44,8 +60,7 @@ inline vector<Chain> makeChains(const vector<int>& segments, BendingModel bendin
             chain.nodes.push_back(particle++);
             chain.fixed.push_back(s == 1 && count == 5);
             x.insert(x.end(), node, node+3);
-            Array g(8);
-            stream.fill(g.data(), 8);
+            const Array g = normalNumbers(8);
             if (s < count)
                 chain.segments.push_back({10+0.5*g[0], 30+g[1], 6, 5+0.2*g[2], 8+0.2*g[3], 70+g[4], 200+g[0]});
             if (s > 0 && s < count)
@@ -68,7 +83,7 @@ inline vector<Chain> makeChains(const vector<int>& segments, BendingModel bendin
 /** Rings that are neither regular nor flat, unless they are planar; node positions are appended to x. */
 inline vector<Chain> makeRings(const vector<int>& segments, BendingModel bending, StretchingModel stretching, bool planar,
             Array& x) {
-    GaussianStream stream(2, 3, 4);
+    NormalNumbers normalNumbers(2);
     vector<Chain> rings;
     for (int count : segments) {
         Chain ring;
@@ -77,8 +92,7 @@ inline vector<Chain> makeRings(const vector<int>& segments, BendingModel bending
         ring.closed = true;
         ring.planar = planar;
         for (int s = 0; s < count; s++) {
-            Array g(8);
-            stream.fill(g.data(), 8);
+            const Array g = normalNumbers(8);
             ring.nodes.push_back(x.size()/3);
             ring.fixed.push_back((s == 1 && count == 6) || (s == 0 && count == 7));
             ring.segments.push_back({10+0.3*g[0], 30+g[1], 6, 5+0.2*g[2], 8+0.2*g[3], 70+g[4], 200+g[0]});

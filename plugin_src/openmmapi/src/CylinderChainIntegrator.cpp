@@ -1,4 +1,5 @@
 #include "openmm/CylinderChainIntegrator.h"
+#include "ChainEngine.h"
 #include "openmm/Context.h"
 #include "openmm/CylinderChainKernels.h"
 #include "openmm/OpenMMException.h"
@@ -19,6 +20,11 @@ using namespace std;
  */
 static const int STEPS_TOGETHER = 32;
 
+/**
+ * The mechanics of chains has room for that many levels, and for those of divided steps above.
+ */
+static const int LARGEST_PATH_LEVEL = cylchain::LARGEST_LEVEL;
+
 static CylinderChainForceImpl& findChains(ContextImpl& context) {
     CylinderChainForceImpl* found = NULL;
     for (ForceImpl* impl : context.getForceImpls()) {
@@ -35,7 +41,7 @@ static CylinderChainForceImpl& findChains(ContextImpl& context) {
 }
 
 CylinderChainIntegrator::CylinderChainIntegrator(double temperature, double frictionCoeff, double stepSize) :
-        scheme(Implicit), noiseSeed(0), stepsTaken(0), dividedSteps(0), positionsHaveChanged(true), chains(NULL) {
+        scheme(Implicit), pathLevel(0), noiseLevel(0), noiseSeed(0), stepsTaken(0), countAfterSteps(0), dividedSteps(0), positionsHaveChanged(true), chains(NULL) {
     setTemperature(temperature);
     setFriction(frictionCoeff);
     setStepSize(stepSize);
@@ -56,7 +62,9 @@ void CylinderChainIntegrator::initialize(ContextImpl& contextRef) {
             chains->getKernel().getAs<CalcCylinderChainForceKernel>());
     chainsAreAlone = (contextRef.getForceImpls().size() == 1);
     noiseSeed = (uint32_t) (randomNumberSeed == 0 ? osrngseed() : randomNumberSeed);
+    noiseLevel = pathLevel;
     stepsTaken = 0;
+    countAfterSteps = 0;
     dividedSteps = 0;
 }
 
@@ -119,6 +127,13 @@ void CylinderChainIntegrator::setScheme(Scheme scheme) {
     this->scheme = scheme;
 }
 
+void CylinderChainIntegrator::setPathLevel(int level) {
+    if (level < 0 || level > LARGEST_PATH_LEVEL)
+        throw OpenMMException("CylinderChainIntegrator: The path level must be between 0 and "+
+                to_string(LARGEST_PATH_LEVEL)+", but is "+to_string(level));
+    pathLevel = level;
+}
+
 void CylinderChainIntegrator::getFlow(Vec3& velocity, Vec3& gradientX, Vec3& gradientY, Vec3& gradientZ, Vec3& origin) const {
     velocity = flowVelocity;
     gradientX = flowGradient[0];
@@ -169,6 +184,8 @@ void CylinderChainIntegrator::step(int steps) {
         stepKernel.refuseTornChains(*context);
         positionsHaveChanged = false;
     }
+    stepsTaken = findNextStep();
+    countAfterSteps = context->getStepCount();
     const bool includesChains = (getIntegrationForceGroups()&(1<<chains->getOwner().getForceGroup())) != 0;
     for (int done = 0; done < steps;) {
         context->updateContextState();
@@ -178,8 +195,9 @@ void CylinderChainIntegrator::step(int steps) {
 
         if (done > 0 && chainsAreAlone && includesChains) {
             const int count = min(steps-done, STEPS_TOGETHER);
-            const int taken = stepKernel.executeTogether(*context, *this, noiseSeed, stepsTaken, count, dividedSteps);
+            const int taken = stepKernel.executeTogether(*context, *this, noiseSeed, noiseLevel, stepsTaken, count, dividedSteps);
             stepsTaken += taken;
+            countAfterSteps = context->getStepCount();
             done += taken;
             if (taken == count)
                 continue;
@@ -190,41 +208,55 @@ void CylinderChainIntegrator::step(int steps) {
             CylinderChainForceImpl::Exclusion exclusion(*chains, scheme == Implicit);
             context->calcForcesAndEnergy(true, false, getIntegrationForceGroups());
         }
-        stepKernel.execute(*context, *this, noiseSeed, stepsTaken, dividedSteps);
+        stepKernel.execute(*context, *this, noiseSeed, noiseLevel, stepsTaken, dividedSteps);
         stepsTaken++;
+        countAfterSteps = context->getStepCount();
         done++;
     }
 }
 
+uint64_t CylinderChainIntegrator::findNextStep() const {
+    if (context == NULL || countAfterSteps == -1 || countAfterSteps == context->getStepCount())
+        return stepsTaken;
+
+    // The step count was set, by itself or with a State that has no parameters of an Integrator. No noise may come twice.
+
+    return max(stepsTaken, (uint64_t) max(0LL, context->getStepCount()));
+}
+
 void CylinderChainIntegrator::createCheckpoint(ostream& stream) const {
-    const int version = 2;
+    const int version = 3;
     stream.write((const char*) &version, sizeof(version));
+    stream.write((const char*) &noiseLevel, sizeof(noiseLevel));
     stream.write((const char*) &noiseSeed, sizeof(noiseSeed));
-    stream.write((const char*) &stepsTaken, sizeof(stepsTaken));
+    const uint64_t steps = findNextStep();
+    stream.write((const char*) &steps, sizeof(steps));
     const Vec3 flow[] = {flowVelocity, flowGradient[0], flowGradient[1], flowGradient[2], flowOrigin};
     stream.write((const char*) flow, sizeof(flow));
 }
 
 void CylinderChainIntegrator::loadCheckpoint(istream& stream) {
-    int version = 0;
+    int version = 0, level = 0;
     uint64_t seed = 0, steps = 0;
     stream.read((char*) &version, sizeof(version));
+    stream.read((char*) &level, sizeof(level));
     stream.read((char*) &seed, sizeof(seed));
     stream.read((char*) &steps, sizeof(steps));
     Vec3 flow[5];
-    if (version == 2)
-        stream.read((char*) flow, sizeof(flow));
-    if (!stream || version < 1 || version > 2)
-        throw OpenMMException("loadCheckpoint: Checkpoint was not created with a CylinderChainIntegrator");
-    if (version == 2)
-        setFlow(flow[0], flow[1], flow[2], flow[3], flow[4]);
+    stream.read((char*) flow, sizeof(flow));
+    if (!stream || version != 3 || level < 0 || level > LARGEST_PATH_LEVEL)
+        throw OpenMMException("loadCheckpoint: Checkpoint was not created with this version of CylinderChainIntegrator");
+    setFlow(flow[0], flow[1], flow[2], flow[3], flow[4]);
+    noiseLevel = level;
     noiseSeed = seed;
     stepsTaken = steps;
+    countAfterSteps = -1;
 }
 
 void CylinderChainIntegrator::serializeParameters(SerializationNode& node) const {
-    node.setIntProperty("version", 2);
-    node.setLongProperty("stepsTaken", stepsTaken);
+    node.setIntProperty("version", 3);
+    node.setIntProperty("pathLevel", noiseLevel);
+    node.setLongProperty("stepsTaken", findNextStep());
     const Vec3 flow[] = {flowVelocity, flowGradient[0], flowGradient[1], flowGradient[2], flowOrigin};
     for (const Vec3& vector : flow)
         node.createChildNode("Flow").setDoubleProperty("x", vector[0]).setDoubleProperty("y", vector[1])
@@ -233,9 +265,20 @@ void CylinderChainIntegrator::serializeParameters(SerializationNode& node) const
 
 void CylinderChainIntegrator::deserializeParameters(const SerializationNode& node) {
     const int version = node.getIntProperty("version");
-    if (version < 1 || version > 2)
+    if (version < 1 || version > 3)
         throw OpenMMException("Unsupported version number");
+
+    // The same time on the path, or the next step after it.
+
+    const int level = node.getIntProperty("pathLevel", 0);
+    if (level < 0 || level > LARGEST_PATH_LEVEL)
+        throw OpenMMException("Illegal path level: "+to_string(level));
     stepsTaken = node.getLongProperty("stepsTaken");
+    countAfterSteps = -1;
+    if (noiseLevel >= level)
+        stepsTaken <<= noiseLevel-level;
+    else
+        stepsTaken = (stepsTaken+(1ULL<<(level-noiseLevel))-1)>>(level-noiseLevel);
     vector<Vec3> flow;
     for (const SerializationNode& child : node.getChildren())
         flow.push_back(Vec3(child.getDoubleProperty("x"), child.getDoubleProperty("y"), child.getDoubleProperty("z")));

@@ -22,13 +22,14 @@ CylinderChainIntegratorProxy::CylinderChainIntegratorProxy() : SerializationProx
 }
 
 void CylinderChainIntegratorProxy::serialize(const void* object, SerializationNode& node) const {
-    node.setIntProperty("version", 2);
+    node.setIntProperty("version", 3);
     const CylinderChainIntegrator& integrator = *reinterpret_cast<const CylinderChainIntegrator*>(object);
     node.setDoubleProperty("stepSize", integrator.getStepSize());
     node.setDoubleProperty("constraintTolerance", integrator.getConstraintTolerance());
     node.setDoubleProperty("temperature", integrator.getTemperature());
     node.setDoubleProperty("friction", integrator.getFriction());
     node.setIntProperty("scheme", integrator.getScheme());
+    node.setIntProperty("pathLevel", integrator.getPathLevel());
     node.setIntProperty("randomSeed", integrator.getRandomNumberSeed());
     node.setIntProperty("integrationForceGroups", integrator.getIntegrationForceGroups());
     Vec3 velocity, gradientX, gradientY, gradientZ, origin;
@@ -47,13 +48,14 @@ void CylinderChainIntegratorProxy::serialize(const void* object, SerializationNo
 
 void* CylinderChainIntegratorProxy::deserialize(const SerializationNode& node) const {
     const int version = node.getIntProperty("version");
-    if (version < 1 || version > 2)
+    if (version < 1 || version > 3)
         throw OpenMMException("Unsupported version number");
     unique_ptr<CylinderChainIntegrator> integrator(new CylinderChainIntegrator(node.getDoubleProperty("temperature"),
             node.getDoubleProperty("friction"), node.getDoubleProperty("stepSize")));
     integrator->setConstraintTolerance(node.getDoubleProperty("constraintTolerance"));
     integrator->setScheme((CylinderChainIntegrator::Scheme) node.getIntProperty("scheme"));
     integrator->setRandomNumberSeed(node.getIntProperty("randomSeed"));
+    integrator->setPathLevel(node.getIntProperty("pathLevel", 0));
     integrator->setIntegrationForceGroups(node.getIntProperty("integrationForceGroups"));
     if (version > 1) {
         const SerializationNode& flow = node.getChildNode("Flow");

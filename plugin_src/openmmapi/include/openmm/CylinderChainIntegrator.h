@@ -32,9 +32,11 @@ class CylinderChainForceImpl;
  *
  * Motion is overdamped: there is no kinetic energy.  Velocities are displacements divided by the step size.
  *
- * The noise of a step depends only on the random number seed and on the number of steps taken since the Context was
- * created.  Checkpoints contain both and the flow, so a simulation that goes on from a checkpoint is identical to one
- * that was not interrupted.  A State contains the number of steps taken and the flow.
+ * The noise of a step depends only on the random number seed, on the path level, see setPathLevel(), and on the number of
+ * steps taken since the Context was created, or the step count of the Context if that is greater: no noise comes twice if
+ * the step count is set back, or if a State without parameters of the Integrator is restored.  Checkpoints contain all
+ * this and the flow, so a simulation that goes on from a checkpoint is identical to one that was not interrupted.  A State
+ * contains the number of steps taken, the path level that they were taken at, and the flow.
  *
  * In a periodic box, positions may have been wrapped particle by particle, which tears chains that cross its faces.  If the
  * CylinderChainForce does not use periodic boundary conditions, step() throws an exception that tells which chain is torn.
@@ -147,8 +149,8 @@ public:
             const Vec3& origin);
     /**
      * Get how many times a step of a chain was taken in parts since the Context was created, because the equations of
-     * the implicit scheme could not be solved, or a segment would have moved by more than its length.  The parts have
-     * fresh noise.  If this is more than a few in a thousand steps, the step is too large.
+     * the implicit scheme could not be solved, or a segment would have moved by more than its length.  The parts
+     * follow the Brownian path of the step.  If this is more than a few in a thousand steps, the step is too large.
      */
     long long getNumDividedSteps() const {
         return dividedSteps;
@@ -169,6 +171,21 @@ public:
     void setRandomNumberSeed(int seed) {
         randomNumberSeed = seed;
     }
+    /**
+     * Get the path level.  See setPathLevel() for details.
+     */
+    int getPathLevel() const {
+        return pathLevel;
+    }
+    /**
+     * Set the path level.  The noise of two simulations with the same seed whose step sizes are h at level 0 and h/2^level
+     * at another level is that of the same Brownian path, so that their difference is the error of the longer step.  The
+     * lengths and bends of the implicit scheme that relax within a step are drawn anew in every step at any level.
+     *
+     * The level is between 0, which is the default, and 20.  In a Context that exists already, a new one takes effect when
+     * the Context is reinitialized.  A State from a simulation at another level is continued at the same time on its path.
+     */
+    void setPathLevel(int level);
     /**
      * Get the temperature of the heat bath (in Kelvin): overdamped motion has no temperature of its own.
      */
@@ -210,29 +227,33 @@ protected:
      */
     bool kineticEnergyRequiresForce() const;
     /**
-     * Write the seed, the number of steps taken and the flow to a checkpoint.
+     * Write the seed, the path level, the number of steps taken and the flow to a checkpoint.
      */
     void createCheckpoint(std::ostream& stream) const;
     /**
-     * Read the seed, the number of steps taken and the flow from a checkpoint.
+     * Read the seed, the path level, the number of steps taken and the flow from a checkpoint.
      */
     void loadCheckpoint(std::istream& stream);
     /**
-     * Write the number of steps taken and the flow to a State.
+     * Write the path level, the number of steps taken and the flow to a State.
      */
     void serializeParameters(SerializationNode& node) const;
     /**
-     * Read the number of steps taken and the flow from a State.
+     * Read the number of steps taken, for the path level, and the flow from a State.
      */
     void deserializeParameters(const SerializationNode& node);
 private:
     void checkSystem(const System& system, const CylinderChainForceImpl& chains) const;
+    std::uint64_t findNextStep() const;
     double temperature, friction;
     std::map<int, double> particleFrictions;
     Scheme scheme;
     Vec3 flowVelocity, flowGradient[3], flowOrigin;
-    int randomNumberSeed;
+    int randomNumberSeed, pathLevel, noiseLevel;
     std::uint64_t noiseSeed, stepsTaken;
+    // The step count of the Context after the steps that were taken, or -1 if these were restored.
+
+    long long countAfterSteps;
     long long dividedSteps;
     bool chainsAreAlone, positionsHaveChanged;
     CylinderChainForceImpl* chains;

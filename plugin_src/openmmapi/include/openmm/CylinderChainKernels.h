@@ -88,11 +88,12 @@ public:
      * @param context     the context in which to execute this kernel
      * @param integrator  the CylinderChainIntegrator this kernel is being used for
      * @param seed        the seed of the noise
-     * @param step        the number of the step.  The noise depends on this and on the seed alone.
+     * @param level       the level of the noise, see CylinderChainIntegrator::setPathLevel()
+     * @param step        the number of the step.  The noise depends on this, the seed and the level alone.
      * @param divided     increased by the number of chains whose step was taken in parts
      */
     virtual void execute(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed,
-            std::uint64_t step, long long& divided) = 0;
+            int level, std::uint64_t step, long long& divided) = 0;
     /**
      * Take several steps where there are no other forces than those of the chains, which are computed here.  Chains
      * do not know of each other then, so each can be advanced by all steps at once.
@@ -104,7 +105,7 @@ public:
      *         cannot be done for the context
      */
     virtual int executeTogether(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed,
-            std::uint64_t step, int count, long long& divided) = 0;
+            int level, std::uint64_t step, int count, long long& divided) = 0;
 };
 
 } // namespace OpenMM

@@ -16,15 +16,15 @@ public:
     ReferenceIntegrateCylinderChainStepKernel(std::string name, const Platform& platform, ContextImpl& context);
     void initialize(const System& system, const CylinderChainIntegrator& integrator,
             CalcCylinderChainForceKernel& forceKernel);
-    void execute(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed, std::uint64_t step,
-            long long& divided);
+    void execute(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed, int level,
+            std::uint64_t step, long long& divided);
     void refuseTornChains(ContextImpl& context) const;
-    int executeTogether(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed, std::uint64_t step,
-            int count, long long& divided);
+    int executeTogether(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed, int level,
+            std::uint64_t step, int count, long long& divided);
 private:
     cylchain::BackgroundFlow flowOf(ContextImpl& context, const CylinderChainIntegrator& integrator) const;
     cylchain::StepSettings settingsOf(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed,
-            std::uint64_t step) const;
+            int level, std::uint64_t step) const;
     void displaceChains(ContextImpl& context, const cylchain::StepSettings& settings, long long& divided);
     int advancePack(ContextImpl& context, int pack, cylchain::StepSettings settings, int count, long long& divided);
     void displaceOthers(ContextImpl& context, const cylchain::StepSettings& settings, double friction);

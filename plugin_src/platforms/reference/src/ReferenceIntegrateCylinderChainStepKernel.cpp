@@ -1,5 +1,5 @@
 #include "ReferenceIntegrateCylinderChainStepKernel.h"
-#include "Gaussian.h"
+#include "Noise.h"
 #include "openmm/OpenMMException.h"
 #include "openmm/reference/ReferencePlatform.h"
 #include "openmm/reference/ReferenceVirtualSites.h"
@@ -14,7 +14,7 @@ using namespace cylchain;
 using namespace std;
 
 /**
- * Particles outside chains share a stream of random numbers in blocks of this size.
+ * Particles outside chains are given to threads in blocks of this size.
  */
 static const int BLOCK_SIZE = 64;
 
@@ -82,7 +82,7 @@ BackgroundFlow ReferenceIntegrateCylinderChainStepKernel::flowOf(ContextImpl& co
 }
 
 StepSettings ReferenceIntegrateCylinderChainStepKernel::settingsOf(ContextImpl& context,
-        const CylinderChainIntegrator& integrator, uint64_t seed, uint64_t step) const {
+        const CylinderChainIntegrator& integrator, uint64_t seed, int level, uint64_t step) const {
     StepSettings settings;
     if (integrator.getScheme() == CylinderChainIntegrator::Euler)
         settings.scheme = Scheme::Euler;
@@ -94,6 +94,7 @@ StepSettings ReferenceIntegrateCylinderChainStepKernel::settingsOf(ContextImpl& 
     settings.kT = BOLTZ*integrator.getTemperature();
     settings.stepSize = integrator.getStepSize();
     settings.seed = seed;
+    settings.level = level;
     settings.step = step;
     settings.flow = flowOf(context, integrator);
     return settings;
@@ -127,8 +128,8 @@ void ReferenceIntegrateCylinderChainStepKernel::refuseTornChains(ContextImpl& co
 }
 
 void ReferenceIntegrateCylinderChainStepKernel::execute(ContextImpl& context, const CylinderChainIntegrator& integrator,
-        uint64_t seed, uint64_t step, long long& divided) {
-    const StepSettings settings = settingsOf(context, integrator, seed, step);
+        uint64_t seed, int level, uint64_t step, long long& divided) {
+    const StepSettings settings = settingsOf(context, integrator, seed, level, step);
     displaceChains(context, settings, divided);
     displaceOthers(context, settings, integrator.getFriction());
 
@@ -146,10 +147,10 @@ void ReferenceIntegrateCylinderChainStepKernel::execute(ContextImpl& context, co
 }
 
 int ReferenceIntegrateCylinderChainStepKernel::executeTogether(ContextImpl& context, const CylinderChainIntegrator& integrator,
-        uint64_t seed, uint64_t step, int count, long long& divided) {
+        uint64_t seed, int level, uint64_t step, int count, long long& divided) {
     if (!others.empty())
         return 0;
-    const StepSettings settings = settingsOf(context, integrator, seed, step);
+    const StepSettings settings = settingsOf(context, integrator, seed, level, step);
     ReferencePlatform::PlatformData& data = extractData(context);
     vector<int> taken(chainKernel->getEngine().getNumPacks());
     vector<long long> dividedInPack(taken.size());
@@ -295,19 +296,20 @@ static Vec3 velocityOf(const BackgroundFlow& flow, const Vec3& x) {
 
 void ReferenceIntegrateCylinderChainStepKernel::displaceBlock(int block, const vector<Vec3>& positions,
         const vector<Vec3>& forces, const StepSettings& settings, double friction) {
-    // Chains use the streams up to their number.
-
-    GaussianStream stream(settings.seed, settings.step, chainKernel->getChains().size()+block);
-    double gaussian[3*BLOCK_SIZE];
     const int start = block*BLOCK_SIZE;
     const int end = min((int) others.size(), start+BLOCK_SIZE);
-    stream.fill(gaussian, 3*(end-start));
+    const uint32_t noChains[BLOCK_SIZE] = {};
+    uint32_t particles[BLOCK_SIZE];
+    double gaussian[4*BLOCK_SIZE];
+    copy(others.begin()+start, others.begin()+end, particles);
+    drawNormals({(uint32_t) settings.seed, (uint32_t) settings.level, settings.step}, NoiseKind::Particle, noChains, particles,
+            end-start, gaussian);
     for (int i = start; i < end; i++) {
         const int particle = others[i];
         const double own = particleFrictions[particle];
         const double mobility = 1/(own > 0 ? own : friction*masses[particle]);
         const double noise = sqrt(2*settings.kT*settings.stepSize*mobility);
-        const double* g = &gaussian[3*(i-start)];
+        const double* g = &gaussian[4*(i-start)];
         displacements[particle] = forces[particle]*(settings.stepSize*mobility)+Vec3(g[0], g[1], g[2])*noise;
         if (settings.flow.present) {
             // The velocity half-way, so that particles keep to closed streamlines.
