@@ -26,7 +26,8 @@ from .quantities import (
 )
 
 EXPLICIT_SCHEMES = ("euler", "midpoint")
-SCHEMES = (*EXPLICIT_SCHEMES, "implicit")
+IMPLICIT_SCHEMES = ("implicit", "implicit-second-order")
+SCHEMES = (*EXPLICIT_SCHEMES, *IMPLICIT_SCHEMES)
 
 
 def translation_bound(friction, diameter, temperature, confidence=3.0):
@@ -326,7 +327,7 @@ def recommended_time_step(
     check_scheme(scheme)
     if friction is None:
         friction = filament_type.segment_friction(viscosity, temperature, segments)
-    if scheme == "implicit":
+    if scheme in IMPLICIT_SCHEMES:
         return implicit_time_step(filament_type, viscosity, temperature, segments, closed, flow, friction)
     bounds = _stability_bounds(filament_type, friction, segments)
     allowed = {name: bound / _ACCURACY_MARGIN for name, bound in bounds.items()}

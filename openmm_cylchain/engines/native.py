@@ -64,6 +64,7 @@ SCHEMES = {
     "euler": CylinderChainIntegrator.Euler,
     "midpoint": CylinderChainIntegrator.Midpoint,
     "implicit": CylinderChainIntegrator.Implicit,
+    "implicit-second-order": CylinderChainIntegrator.ImplicitSecondOrder,
 }
 
 _OTHER_FRICTION = 1.0

@@ -36,8 +36,15 @@ enum class Scheme {
     /** Fixman's midpoint: the right drift on chains. */
     Midpoint = 1,
     /** The chain's own forces at the end of the step, so that they do not limit it. */
-    Implicit = 2
+    Implicit = 2,
+    /** The same in two stages, so that the motion of bends is right to second order in the step. */
+    ImplicitSecondOrder = 3
 };
+
+/** Whether a scheme computes the forces of chains itself. */
+inline bool isImplicit(Scheme scheme) {
+    return scheme == Scheme::Implicit || scheme == Scheme::ImplicitSecondOrder;
+}
 
 /** One segment: its potential and its friction (3), kept at the values of the rest length. */
 struct Segment {

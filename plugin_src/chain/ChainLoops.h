@@ -324,7 +324,7 @@ template <int W> Instability stepPack(const ChainPack& pack, const double* posit
 
 template <int W> Instability stepPackAs(const ChainPack& pack, const double* positions, const double* forces,
             const double* box, const StepSettings& settings, double* displacements) {
-    if (settings.scheme == Scheme::Implicit)
+    if (isImplicit(settings.scheme))
         return pack.closed ? stepPackImplicitly<W, true>(pack, positions, forces, box, settings, displacements) :
                 stepPackImplicitly<W, false>(pack, positions, forces, box, settings, displacements);
     return stepPack<W>(pack, positions, forces, box, settings, displacements);

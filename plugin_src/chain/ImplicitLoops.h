@@ -24,6 +24,8 @@
 
 /** The largest change of a segment in the last iteration, over its rest length; a fifth of it remains as an error. */
 const double NEWTON_TOLERANCE = 1e-2;
+/** The largest change of a node in the last iteration, over that length. */
+const double NODE_TOLERANCE = 0.1;
 /** The largest error of a length that an iteration leaves, over its thermal fluctuation against what resists in a step. */
 const double LENGTH_TOLERANCE = 0.07;
 const int NEWTON_ITERATIONS = 14;
@@ -58,13 +60,15 @@ template <class Real> CYLCHAIN_INLINE void orthogonal(const Vector<Real>& n, Vec
 
 /** What a step keeps of a segment, and of the joint with the segment before. */
 template <class Real> struct ImplicitSegment {
-    // At the start: the vector, its direction and length, the coordinate of the length, and the bend; and what the tension
-    // has of the coordinate that the new length does not change.
+    // At the start: the vector, its direction and length, the coordinate of the length, and the bend.
     Vector<Real> difference, tangent, bend, bisector;
-    Real length, inverse, coordinate, constantCoordinate;
-    // The noise, and how implicit the segment and the joint are.
+    Real length, inverse, coordinate;
+    // The noise, and theta of the segment and of the joint.
     Vector<Real> randomBend, randomPair;
     Real randomCoordinate, randomTension, theta, jointTheta;
+    // What a stage makes of these: T = k (implicit q(y)+constant), with a part of the bend that turns with the joint.
+    Vector<Real> constantBend, turningBend;
+    Real implicit, constantCoordinate, constantTension, jointImplicit;
     // Of the last iteration: the direction of the new segment, its tension and how the tension changes.
     Vector<Real> newTangent;
     Real tension, response, multiplier, extra, tensionOfFlow;
@@ -74,10 +78,20 @@ template <class Real> struct ImplicitSegment {
     Vector<Real> turned;
 };
 
-/** What a step keeps of a tether: the vector from its point to its node at the start, its noise and how implicit it is. */
+/** What a step keeps of a tether: the vector from its point to its node at the start, its noise, and the same of a stage. */
 struct ImplicitTether {
     double start[3], random[3], theta;
+    double constant[3], implicit;
 };
+
+/** The stages that steps are made of: the one of scheme "implicit", and the two of second order. */
+enum class Stage {Only, First, Second};
+/** The stages of second order are those of the L-stable singly diagonally implicit method, with this on the diagonal. */
+const double DIAGONAL = 1-M_SQRT1_2;
+/** The first stage has this part of the noise, and its end is where that of the second begins. */
+const double NOISE_OF_FIRST = DIAGONAL/(1-DIAGONAL);
+/** The tolerances of its stages over those of scheme "implicit". */
+const double TOLERANCE_OF_STAGES = 0.3;
 
 /** A step of open chains or, if CLOSED, of rings. */
 template <int W, bool CLOSED> class ImplicitStep {
@@ -95,10 +109,14 @@ public:
             settings(settings), box(box), n(pack.nodes), h(settings.stepSize), band(pack, memory.band) {
         tethers = memory.tethers.template reserve<ImplicitTether>(pack.tethers.size());
         segments = memory.segments.template reserve<ImplicitSegment<Real> >(n);
-        f = memory.vectors.template reserve<Vec>(4*n);
+        f = memory.vectors.template reserve<Vec>(7*n);
         change = f+n;
         rest = f+2*n;
         loads = settings.flow.present ? f+3*n : f;
+        twoStages = settings.scheme == Scheme::ImplicitSecondOrder;
+        external = twoStages ? f+4*n : f;
+        random = twoStages ? f+5*n : f;
+        drift = twoStages ? f+6*n : f;
     }
     /**
      * Take one step.
@@ -114,25 +132,59 @@ public:
         x = before;
         for (int node = 0; node < n; node++) {
             y[node] = x[node];
-            f[node] = forces[node];
+            external[node] = forces[node];
+            if (twoStages)
+                random[node] = drift[node] = Vec {};
         }
-        if (settings.flow.present)
-            carryAlong(y);
-        addPropulsion<W>(pack, x, f);
+        addPropulsion<W>(pack, x, external);
         describe();
         if (settings.kT > 0)
             addNoise();
-        for (int s = 0; s < pack.segments; s++)
-            segments[s].constantCoordinate = (1-segments[s].theta)*segments[s].coordinate-segments[s].randomCoordinate;
+        for (int i = 0; i < W; i++)
+            failed[i] = false;
+        int iterations = 0;
+        if (twoStages) {
+            prepare(Stage::First, y);
+            iterations = solve(y, failed);
+            prepare(Stage::Second, y);
+            extrapolate(y);
+        }
+        else
+            prepare(Stage::Only, y);
+        iterations += solve(y, failed);
+        findExcessiveChanges(y, failed);
+        return iterations;
+    }
+private:
+    const ChainPack& pack;
+    const StepSettings& settings;
+    const double* const box;
+    const int n;
+    const double h;
+    Band band;
+    ImplicitSegment<Real>* segments;
+    ImplicitTether* tethers;
+    const Vec* x;
+    bool twoStages;
+    Stage stage;
+    // All forces of a stage, the same with the drag of the flow, the changes of an iteration, and memory of its own.
+    Vec *f, *loads, *change, *rest;
+    // Forces from outside, of noise and the metric ones; all of them are f if there is one stage alone.
+    Vec *external, *random, *drift;
+
+    /** Solve the equations of a stage by Newton's method; returns the number of iterations, and marks lanes that fail. */
+    int solve(Vec* y, bool* failed) {
+        if (settings.flow.present && stage != Stage::Second)
+            carryAlong(y);
         // The first iteration has neither metric forces nor tensions along the mean segment, however short the step is. How
         // a gradient turns a chain takes one more.
-        const int least = settings.flow.varies() ? 3 : 2;
+        const int least = settings.flow.varies() ? 3 : stage == Stage::Second ? 1 : 2;
         Real active = 1+Real{};
         int iterations = 0;
         while (iterations < NEWTON_ITERATIONS) {
             eliminate(y);
             substitute<false>();
-            if (iterations > 0)
+            if (iterations > 0 || stage == Stage::Second)
                 refine();
             else if (settings.kT > 0) {
                 if (stiffenTautSegments()) {
@@ -150,22 +202,84 @@ public:
                 break;
         }
         for (int i = 0; i < W; i++)
-            failed[i] = lane(active, i) != 0;
-        findExcessiveChanges(y, failed);
+            failed[i] |= lane(active, i) != 0;
         return iterations;
     }
-private:
-    const ChainPack& pack;
-    const StepSettings& settings;
-    const double* const box;
-    const int n;
-    const double h;
-    Band band;
-    ImplicitSegment<Real>* segments;
-    ImplicitTether* tethers;
-    const Vec* x;
-    // The forces, the same with the drag of the flow, the changes of an iteration, and what is left for its refinement.
-    Vec *f, *loads, *change, *rest;
+    /** How much of the forces that last for the whole step a stage has. */
+    double shareOfForces() const {
+        return stage == Stage::First ? DIAGONAL : 1;
+    }
+    /** Describe a stage. The second one begins with the end of the first, y. */
+    void prepare(Stage stage, const Vec* y) {
+        this->stage = stage;
+        Vec before = {};
+        for (int s = 0; s < n-1; s++) {
+            ImplicitSegment<Real>& segment = segments[s];
+            if (stage == Stage::First) {
+                segment.implicit = segment.jointImplicit = DIAGONAL+Real{};
+                segment.constantCoordinate = segment.randomCoordinate*(-DIAGONAL*NOISE_OF_FIRST);
+                segment.constantTension = segment.randomTension*-NOISE_OF_FIRST;
+                segment.constantBend = Vec {};
+                segment.turningBend = segment.randomBend*(DIAGONAL*NOISE_OF_FIRST+Real{});
+                continue;
+            }
+            segment.implicit = segment.theta;
+            segment.constantCoordinate = (1-segment.theta)*segment.coordinate-segment.randomCoordinate*root(2*segment.theta-1);
+            segment.constantTension = Real{}-segment.randomTension;
+            if (stage == Stage::Only) {
+                segment.jointImplicit = segment.jointTheta;
+                segment.constantBend = segment.bend*(1-segment.jointTheta);
+                segment.turningBend = segment.randomBend*root(2*segment.jointTheta-1);
+            }
+            else {
+                const Vec difference = y[s+1]-y[s], tangent = difference*(1/root(difference.dot(difference)));
+                const Vec bent = tangent-before;
+                if (s > 0)
+                    segment.constantBend = bent*(bendFactor<Real>(pack.bending, bent).f*(1-DIAGONAL));
+                before = tangent;
+                segment.jointImplicit = DIAGONAL+Real{};
+                segment.turningBend = segment.randomBend*(2*DIAGONAL+Real{});
+                segment.multiplier = segment.multiplier*(1/NOISE_OF_FIRST);
+            }
+        }
+        for (std::size_t i = 0; i < pack.tethers.size(); i++)
+            prepareTether(pack.tethers[i], tethers[i], y);
+        combineForces();
+    }
+    void prepareTether(const LaneTether& place, ImplicitTether& tether, const Vec* y) const {
+        tether.implicit = stage == Stage::Only ? tether.theta : DIAGONAL;
+        const Vec moved = y[place.node]-x[place.node];
+        Real components[] = {moved.x, moved.y, moved.z};
+        for (int k = 0; k < 3; k++) {
+            if (stage == Stage::Only)
+                tether.constant[k] = tether.start[k]-std::sqrt(2*tether.theta-1)*tether.random[k];
+            else if (stage == Stage::First)
+                tether.constant[k] = DIAGONAL*(tether.start[k]-NOISE_OF_FIRST*tether.random[k]);
+            else
+                tether.constant[k] = tether.start[k]+(1-DIAGONAL)*lane(components[k], place.lane)-2*DIAGONAL*tether.random[k];
+        }
+    }
+    /** Add the forces of a stage. */
+    void combineForces() {
+        if (!twoStages)
+            return;
+        const Real ofForces = shareOfForces()+Real{}, ofNoise = (stage == Stage::First ? NOISE_OF_FIRST : 1)+Real{};
+        for (int node = 0; node < n; node++)
+            f[node] = external[node]*ofForces+random[node]*ofNoise+drift[node]*(ofNoise*ofNoise);
+    }
+    /** Begin the second stage where the noise of the first would have taken chains, had it been that of the whole step. */
+    void extrapolate(Vec* y) const {
+        const Real scale = 1/NOISE_OF_FIRST+Real{}, free = CLOSED ? Real{} : loaded<Real>(pack.free, 0);
+        Vec end = y[0];
+        for (int node = 0; node < n; node++) {
+            const Vec found = y[node];
+            y[node] = found+(x[node]-found)*free+(found-x[node])*(scale*free);
+            rest[node] = found-end;
+            end = found;
+        }
+        if (!CLOSED)
+            rebuild(y, [&] (int s, const Vec&) {return root(rest[s+1].dot(rest[s+1]));});
+    }
 
     /**
      * Begin the iteration where the flow carries chains as a whole, if no node of them is fixed. Segments stay what they
@@ -173,33 +287,34 @@ private:
      */
     void carryAlong(Vec* y) const {
         const LaneFlow<W> flow(settings.flow, pack, x[0]);
-        const Vec halfway = x[0]+flow.at(x[0])*(0.5*h+Real{});
+        const Vec halfway = x[0]+flow.at(x[0])*(0.5*h*shareOfForces()+Real{});
         const Real free = loaded<Real>(pack.free, 0);
-        const Vec carried = flow.at(halfway)*(free*h);
+        const Vec carried = flow.at(halfway)*(free*(h*shareOfForces()));
         for (int node = 0; node < n; node++)
             y[node] = y[node]+carried;
     }
     /**
      * Segments that turn far become longer when their ends move along straight lines. Give them the directions that they
-     * have now, and the lengths that the linear equations mean, around the same mean of all nodes. Chains with fixed nodes
-     * stay.
+     * have now, and the lengths that the linear equations mean.
      */
     void resetLengths(Vec* y) const {
-        Vec sum = {}, shifted = {}, end = {}, moved = {};
+        rebuild(y, [&] (int s, const Vec& difference) {
+            const ImplicitSegment<Real>& segment = segments[s];
+            const Real length = larger<Real>(segment.newTangent.dot(difference), 0.5*segment.length);
+            return pack.stretching == StretchingModel::FENE ? withinRange(s, length) : length;
+        });
+    }
+    /** Give segments other lengths, around the same mean of all nodes. Chains with fixed nodes stay as they are. */
+    template <class Function> CYLCHAIN_INLINE void rebuild(Vec* y, Function lengthOf) const {
+        Vec sum = {}, shifted = {}, end = y[0], moved = y[0];
         Real count = Real{};
         for (int node = 0; node < n; node++) {
             const Real mobile = loaded<Real>(pack.mobile, node);
             if (node > 0) {
-                const ImplicitSegment<Real>& segment = segments[node-1];
                 const Vec difference = y[node]-end;
-                Real length = larger<Real>(segment.newTangent.dot(difference), 0.5*segment.length);
-                if (pack.stretching == StretchingModel::FENE)
-                    length = withinRange(node-1, length);
-                moved = moved+difference*(length/root(difference.dot(difference)));
+                moved = moved+difference*(lengthOf(node-1, difference)/root(difference.dot(difference)));
+                end = y[node];
             }
-            else
-                moved = y[0];
-            end = y[node];
             sum = sum+end*mobile;
             shifted = shifted+moved*mobile;
             count = count+mobile;
@@ -231,7 +346,7 @@ private:
             const Real stretchRate = h*property<Real>(pack, s, ChainPack::Stiffness)*l0*l0+TINY;
             segment.theta = larger<Real>(0.5+Real{}, 1-property<Real>(pack, s, ChainPack::Extensional)/stretchRate);
             segment.randomCoordinate = segment.randomTension = segment.multiplier = segment.extra = Real{};
-            segment.randomBend = Vec {};
+            segment.randomBend = segment.randomPair = Vec {};
             if (s > 0)
                 describeJoint(s);
         }
@@ -323,6 +438,7 @@ private:
     /** Add the drag of the flow, at the middle of the step, on segments at rest. Its part along a segment is a tension. */
     void addDragOfFlow(const Vec* y) {
         const LaneFlow<W> flow(settings.flow, pack, x[0]);
+        const Real share = shareOfForces()+Real{};
         for (int node = 0; node < n; node++)
             loads[node] = f[node];
         for (int s = 0; s < pack.segments; s++) {
@@ -337,9 +453,9 @@ private:
             const Real turn = property<Real>(pack, s, ChainPack::Rotational)*turningFactor(s, geometry);
             const Real stretch = property<Real>(pack, s, ChainPack::Extensional)*segments[s].inverse*geometry.inverse;
             const Vec pair = (difference-direction*direction.dot(difference))*turn;
-            segments[s].tensionOfFlow = stretch*direction.dot(difference);
-            loads[s] = loads[s]+carried-pair;
-            loads[s+1] = loads[s+1]+carried+pair;
+            segments[s].tensionOfFlow = stretch*direction.dot(difference)*share;
+            loads[s] = loads[s]+(carried-pair)*share;
+            loads[s+1] = loads[s+1]+(carried+pair)*share;
         }
     }
     CYLCHAIN_INLINE void describeNew(const Vec* y, int s, Geometry& geometry) {
@@ -359,7 +475,7 @@ private:
         const Real l0 = property<Real>(pack, s, ChainPack::RestLength);
         friction = 0.25*property<Real>(pack, s, ChainPack::Perpendicular)+
                 property<Real>(pack, s, ChainPack::Rotational)/(l0*l0)+TINY;
-        tension = h*segments[s].multiplier/segments[s].length;
+        tension = (h/shareOfForces())*segments[s].multiplier/segments[s].length;
     }
     /**
      * Give friction and its noise to segments that are taut: whose tension turns them back faster than a step resolves.
@@ -391,9 +507,10 @@ private:
             // Chains that are not taut solve the same equations once more.
             segment.multiplier = segment.multiplier*taut;
             const Vec pair = segment.randomPair*(root(1+segment.extra/(rotational+TINY))-1);
-            f[s] = f[s]-pair;
-            f[s+1] = f[s+1]+pair;
+            random[s] = random[s]-pair;
+            random[s+1] = random[s+1]+pair;
         }
+        combineForces();
         return true;
     }
     /** Add a segment to the equations of its nodes. It is the first to do so for all but the first one's diagonal. */
@@ -420,9 +537,9 @@ private:
         else {
             const Real stiffness = property<Real>(pack, s, ChainPack::Stiffness);
             const Real extension = length-property<Real>(pack, s, ChainPack::RestLength);
-            segment.tension = stiffness*(segment.theta*extension+segment.constantCoordinate)+
-                    drag*(length-segment.length)*geometry.inverse-segment.randomTension;
-            segment.response = stiffness*segment.theta+drag*segment.length*geometry.inverse*geometry.inverse;
+            segment.tension = stiffness*(segment.implicit*extension+segment.constantCoordinate)+
+                    drag*(length-segment.length)*geometry.inverse+segment.constantTension;
+            segment.response = stiffness*segment.implicit+drag*segment.length*geometry.inverse*geometry.inverse;
         }
         if (settings.flow.present)
             segment.tension = segment.tension-segment.tensionOfFlow;
@@ -458,7 +575,7 @@ private:
         Real flow = settings.flow.present ? segment.tensionOfFlow : Real{};
         for (int i = 0; i < W; i++) {
             const FeneTension law = {lane(stiffness, i), lane(inverse, i), lane(rest, i), lane(segment.length, i),
-                    lane(segment.theta, i), lane(segment.constantCoordinate, i), lane(drag, i), lane(segment.randomTension, i)};
+                    lane(segment.implicit, i), lane(segment.constantCoordinate, i), lane(drag, i), lane(segment.constantTension, i)};
             const double given = lane(segment.multiplier, i)+lane(flow, i);
             double response, own = lane(length, i), tension;
             if (s < pack.segmentsOfLane[i] && lane(segment.multiplier, i) != 0)
@@ -484,10 +601,10 @@ private:
             const int i = pack.tethers[next].lane;
             const ImplicitTether& tether = tethers[next];
             Vec moved = y[node]-x[node];
-            const double stiffness = pack.tethers[next].stiffness, implicit = stiffness*tether.theta;
-            lane(row.right.x, i) -= implicit*lane(moved.x, i)+stiffness*(tether.start[0]-tether.random[0]);
-            lane(row.right.y, i) -= implicit*lane(moved.y, i)+stiffness*(tether.start[1]-tether.random[1]);
-            lane(row.right.z, i) -= implicit*lane(moved.z, i)+stiffness*(tether.start[2]-tether.random[2]);
+            const double stiffness = pack.tethers[next].stiffness, implicit = stiffness*tether.implicit;
+            lane(row.right.x, i) -= implicit*lane(moved.x, i)+stiffness*tether.constant[0];
+            lane(row.right.y, i) -= implicit*lane(moved.y, i)+stiffness*tether.constant[1];
+            lane(row.right.z, i) -= implicit*lane(moved.z, i)+stiffness*tether.constant[2];
             lane(row.diagonal.xx, i) += implicit;
             lane(row.diagonal.yy, i) += implicit;
             lane(row.diagonal.zz, i) += implicit;
@@ -511,12 +628,12 @@ private:
         const Vec bisector = sum*perSum;
         const Real cosine = projection*perSum;
         const Vec axis = crossProduct(segment.bisector, bisector);
-        const Vec random = segment.randomBend*cosine+crossProduct(axis, segment.randomBend)+
-                axis*(axis.dot(segment.randomBend)*sumLength*perOne);
+        const Vec turned = segment.turningBend*cosine+crossProduct(axis, segment.turningBend)+
+                axis*(axis.dot(segment.turningBend)*sumLength*perOne);
         const Vec newBend = newBent*newFactor.f;
 
         const Real stiffness = loaded<Real>(pack.joints, s);
-        const Vec u = newBend*segment.jointTheta+segment.bend*(1-segment.jointTheta)-random;
+        const Vec u = newBend*segment.jointImplicit+segment.constantBend-turned;
         const Real twist = factor.slope*u.dot(bent);
         Vec force1 = t2*twist-u*factor.f, force2 = u*factor.f+t1*twist;
         force1 = (force1-t1*t1.dot(force1))*(stiffness*perLength1);
@@ -525,7 +642,7 @@ private:
         here.right = here.right-force1+force2;
         after.right = after.right-force2;
 
-        const Real scale = stiffness*segment.jointTheta*factor.f*factor.f;
+        const Real scale = stiffness*segment.jointImplicit*factor.f*factor.f;
         const Real scale1 = scale*perLength1*perLength1, scale2 = scale*perLength2*perLength2;
         Symmetric<Real> first = {}, last = {};
         first.addAxial(scale1, -scale1, t1);
@@ -562,28 +679,35 @@ private:
         band.findResponses([&] (int s, Vec response) {
             const ImplicitSegment<Real>& segment = segments[s];
             const Vec t = segment.tangent;
-            response = response-t*t.dot(response);
+            const Real stiffness = property<Real>(pack, s, ChainPack::Stiffness);
             const Real drag = property<Real>(pack, s, ChainPack::Extensional)/(segment.length*segment.length*h);
-            const Real noise = property<Real>(pack, s, ChainPack::Stiffness)*(2*segment.theta-1)+drag;
+            Real noise = stiffness*(2*segment.theta-1)+drag;
+            // The length resists more in the second stage than in this one.
+            if (twoStages)
+                noise = noise/(1+stiffness*(segment.theta-DIAGONAL)*t.dot(response));
+            response = response-t*t.dot(response);
             const Vec force = response*(settings.kT*noise/segment.length);
-            f[s] = f[s]+force;
-            f[s+1] = f[s+1]-force;
+            drift[s] = drift[s]+force;
+            drift[s+1] = drift[s+1]-force;
         });
+        combineForces();
     }
     /** Whether any lane has not converged; those that have are taken out. NaN counts as not converged. */
     bool anyUnfinished(Real& active) {
         Real excess = Real{};
         const Real perEnergy = (CLOSED ? 1+Real{} : 1-loaded<Real>(pack.free, 0))*(1/(settings.kT+TINY));
+        const double tighter = twoStages ? 1/(TOLERANCE_OF_STAGES*TOLERANCE_OF_STAGES) : 1;
         for (int s = 0; s < pack.segments; s++) {
             const Vec difference = change[s+1]-change[s];
             const Real inverse = property<Real>(pack, s, ChainPack::InverseRestLength), square = difference.dot(difference);
-            const Real ratio = square*(inverse*inverse*(1/(NEWTON_TOLERANCE*NEWTON_TOLERANCE)));
+            const Real moved = change[s].dot(change[s])*(NEWTON_TOLERANCE*NEWTON_TOLERANCE/(NODE_TOLERANCE*NODE_TOLERANCE));
+            const Real ratio = larger<Real>(square, moved)*(inverse*inverse*(tighter/(NEWTON_TOLERANCE*NEWTON_TOLERANCE)));
             // An iteration takes a length to first order in the change, so that an error of square/(2 l0) is left where
             // lengths are not reset.
             const Real error = square*inverse*(0.5/LENGTH_TOLERANCE);
             excess = ratio < excess ? excess : ratio;
             if (settings.kT > 0)
-                excess = larger(excess, error*error*segments[s].response*perEnergy);
+                excess = larger(excess, error*error*segments[s].response*(perEnergy*tighter));
         }
         bool any = false;
         for (int i = 0; i < W; i++) {

@@ -23,7 +23,7 @@ void ImplicitStep<W, CLOSED>::addNoise() {
     }
     for (std::size_t i = 0; i < pack.tethers.size(); i++) {
         const LaneTether& tether = pack.tethers[i];
-        const double deviation = std::sqrt(settings.kT/(tether.stiffness+TINY)*(2*tethers[i].theta-1));
+        const double deviation = std::sqrt(settings.kT/(tether.stiffness+TINY));
         const NoisePlaces<1> place = {(std::uint64_t) pack.chain[tether.lane], (std::uint64_t) tether.number};
         double normals[4];
         drawNormals<1, 2>(key, NoiseKind::Tether, place, normals);
@@ -43,8 +43,8 @@ CYLCHAIN_INLINE void ImplicitStep<W, CLOSED>::drawForces(const Real* normals, in
     const Vec force = (a*across+t*((along-across)*t.dot(a)))*(0.5*amplitude+Real{});
     const Real perLength = amplitude/segment.length;
     const Vec pair = (b-t*t.dot(b))*(property<Real>(pack, s, ChainPack::RootRotational)*perLength);
-    f[s] = f[s]+force-pair;
-    f[s+1] = f[s+1]+force+pair;
+    random[s] = random[s]+force-pair;
+    random[s+1] = random[s+1]+force+pair;
     segment.randomPair = pair;
     segment.randomTension = t.dot(b)*(property<Real>(pack, s, ChainPack::RootExtensional)*perLength);
 }
@@ -52,29 +52,29 @@ CYLCHAIN_INLINE void ImplicitStep<W, CLOSED>::drawForces(const Real* normals, in
 template <int W, bool CLOSED>
 void ImplicitStep<W, CLOSED>::drawLength(const NoisePlaces<W>& places, int s, Real normal) {
     ImplicitSegment<Real>& segment = segments[s];
-    const Real stiffness = property<Real>(pack, s, ChainPack::Stiffness), share = root(2*segment.theta-1);
+    const Real stiffness = property<Real>(pack, s, ChainPack::Stiffness);
     if (pack.stretching == StretchingModel::FENE) {
         // Segments that fill up a lane have neither stiffness nor a maximum extension.
         const Real inverse = property<Real>(pack, s, ChainPack::InverseExtension);
         drawFeneCoordinates<W>(noiseKey(settings), places, stiffness/(inverse*inverse*settings.kT+TINY), normal);
-        segment.randomCoordinate = normal/(inverse+TINY)*share;
+        segment.randomCoordinate = normal/(inverse+TINY);
     }
     else
-        segment.randomCoordinate = normal*root(settings.kT/(stiffness+TINY))*share;
+        segment.randomCoordinate = normal*root(settings.kT/(stiffness+TINY));
 }
 
 template <int W, bool CLOSED>
 void ImplicitStep<W, CLOSED>::drawBend(const NoisePlaces<W>& places, int s) {
     ImplicitSegment<Real>& segment = segments[s];
     const NoiseKey key = noiseKey(settings);
-    Real stiffness = loaded<Real>(pack.joints, s)/settings.kT, share = root(2*segment.jointTheta-1);
+    Real stiffness = loaded<Real>(pack.joints, s)/settings.kT, theta = segment.jointTheta;
     Real normals[2], acceptance;
     drawCandidates<W>(key, NoiseKind::Bend, places, normals, acceptance);
     for (int i = 0; i < W; i++) {
         const double k = lane(stiffness, i);
         double drawn[2] = {lane(normals[0], i), lane(normals[1], i)};
         double& a = drawn[0], &b = drawn[1];
-        if (k == 0 || lane(share, i) == 0)
+        if (k == 0 || (lane(theta, i) == 0.5 && !twoStages))
             a = b = 0;
         else if (k > STIFF_JOINT) {
             double uniform = lane(acceptance, i);
@@ -94,8 +94,8 @@ void ImplicitStep<W, CLOSED>::drawBend(const NoisePlaces<W>& places, int s) {
             a *= scale;
             b *= scale;
         }
-        lane(normals[0], i) = a*lane(share, i);
-        lane(normals[1], i) = b*lane(share, i);
+        lane(normals[0], i) = a;
+        lane(normals[1], i) = b;
     }
     Vec e1, e2;
     orthogonal(segment.bisector, e1, e2);
@@ -106,14 +106,14 @@ template <int W, bool CLOSED>
 void ImplicitStep<W, CLOSED>::drawPlanarBend(const NoisePlaces<W>& places, int s) {
     ImplicitSegment<Real>& segment = segments[s];
     const NoiseKey key = noiseKey(settings);
-    Real stiffness = loaded<Real>(pack.joints, s)/settings.kT, share = root(2*segment.jointTheta-1), bend = Real{};
+    Real stiffness = loaded<Real>(pack.joints, s)/settings.kT, theta = segment.jointTheta, bend = Real{};
     Real normals[2], acceptance;
     drawCandidates<W>(key, NoiseKind::Bend, places, normals, acceptance);
     // The energy is that of a Gaussian or more, in the angle.
     const double floor = pack.bending == BendingModel::KratkyPorod ? 4/(M_PI*M_PI) : 1;
     for (int i = 0; i < W; i++) {
         const double k = lane(stiffness, i);
-        if (k == 0 || lane(share, i) == 0)
+        if (k == 0 || (lane(theta, i) == 0.5 && !twoStages))
             continue;
         const bool stiff = k*floor > STIFF_JOINT;
         double candidates[2] = {lane(normals[0], i), 0}, uniforms[2] = {0, lane(acceptance, i)};
@@ -124,7 +124,7 @@ void ImplicitStep<W, CLOSED>::drawPlanarBend(const NoisePlaces<W>& places, int s
             const double drawn = bendOfAngle(pack.bending, angle);
             const double excess = drawn*drawn-(stiff ? floor*angle*angle : 0);
             if (std::fabs(angle) < M_PI && uniforms[1] <= std::exp(-0.5*k*excess)) {
-                lane(bend, i) = drawn*lane(share, i);
+                lane(bend, i) = drawn;
                 break;
             }
             if (stiff)

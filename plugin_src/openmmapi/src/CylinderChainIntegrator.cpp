@@ -122,7 +122,7 @@ void CylinderChainIntegrator::setParticleFriction(int particle, double coeff) {
 }
 
 void CylinderChainIntegrator::setScheme(Scheme scheme) {
-    if (scheme != Euler && scheme != Midpoint && scheme != Implicit)
+    if (scheme != Euler && scheme != Midpoint && scheme != Implicit && scheme != ImplicitSecondOrder)
         throw OpenMMException("CylinderChainIntegrator: Illegal scheme: "+to_string((int) scheme));
     this->scheme = scheme;
 }
@@ -205,7 +205,7 @@ void CylinderChainIntegrator::step(int steps) {
         {
             // The implicit scheme computes the forces of the chains itself.
 
-            CylinderChainForceImpl::Exclusion exclusion(*chains, scheme == Implicit);
+            CylinderChainForceImpl::Exclusion exclusion(*chains, scheme == Implicit || scheme == ImplicitSecondOrder);
             context->calcForcesAndEnergy(true, false, getIntegrationForceGroups());
         }
         stepKernel.execute(*context, *this, noiseSeed, noiseLevel, stepsTaken, dividedSteps);

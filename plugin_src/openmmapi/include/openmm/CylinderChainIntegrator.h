@@ -64,7 +64,12 @@ public:
          * bending and tethers do not limit the step, and keep their equilibrium.  It is the default.  If the force group
          * of the CylinderChainForce is not among the integration force groups, this is the same as Midpoint.
          */
-        Implicit = 2
+        Implicit = 2,
+        /**
+         * The same in two stages: the motion of bends, which is of first order in the step otherwise, is right to second
+         * order, for half as much again of work.
+         */
+        ImplicitSecondOrder = 3
     };
     /**
      * Create a CylinderChainIntegrator.

@@ -84,13 +84,21 @@ BackgroundFlow ReferenceIntegrateCylinderChainStepKernel::flowOf(ContextImpl& co
 StepSettings ReferenceIntegrateCylinderChainStepKernel::settingsOf(ContextImpl& context,
         const CylinderChainIntegrator& integrator, uint64_t seed, int level, uint64_t step) const {
     StepSettings settings;
-    if (integrator.getScheme() == CylinderChainIntegrator::Euler)
-        settings.scheme = Scheme::Euler;
-    else if (integrator.getScheme() == CylinderChainIntegrator::Implicit &&
-            (integrator.getIntegrationForceGroups()&(1<<chainKernel->getForceGroup())) != 0)
-        settings.scheme = Scheme::Implicit;
-    else
-        settings.scheme = Scheme::Midpoint;
+    const bool includesChains = (integrator.getIntegrationForceGroups()&(1<<chainKernel->getForceGroup())) != 0;
+    switch (integrator.getScheme()) {
+        case CylinderChainIntegrator::Euler:
+            settings.scheme = Scheme::Euler;
+            break;
+        case CylinderChainIntegrator::Midpoint:
+            settings.scheme = Scheme::Midpoint;
+            break;
+        case CylinderChainIntegrator::Implicit:
+            settings.scheme = includesChains ? Scheme::Implicit : Scheme::Midpoint;
+            break;
+        case CylinderChainIntegrator::ImplicitSecondOrder:
+            settings.scheme = includesChains ? Scheme::ImplicitSecondOrder : Scheme::Midpoint;
+            break;
+    }
     settings.kT = BOLTZ*integrator.getTemperature();
     settings.stepSize = integrator.getStepSize();
     settings.seed = seed;
@@ -190,7 +198,7 @@ int ReferenceIntegrateCylinderChainStepKernel::advancePack(ContextImpl& context,
     for (int done = 0; done < count; done++, settings.step++) {
         const double* positions = &newPositions[0][0];
         engine.clearForces(pack, forces);
-        if (settings.scheme != Scheme::Implicit)
+        if (!isImplicit(settings.scheme))
             engine.addForces(pack, positions, forces, box, false);
         const Instability instability = engine.step(pack, positions, forces, box, settings, &displacements[0][0]);
         if (instability.chain != -1)
@@ -268,7 +276,7 @@ void ReferenceIntegrateCylinderChainStepKernel::reportInstability(ContextImpl& c
             }
         }
         message << segment << " in step " << settings.step+1 << ": ";
-        if (settings.scheme == Scheme::Implicit)
+        if (isImplicit(settings.scheme))
             message << "the equations of the implicit scheme cannot be solved";
         else
             message << "its ends would move by " << change << " nm against each other in one step";
