@@ -190,7 +190,7 @@ class Filaments(FilamentCollection):
 
         Parameters
         ----------
-        scheme : {"implicit", "midpoint", "euler"}, optional
+        scheme : {"implicit", "implicit-second-order", "midpoint", "euler"}, optional
             The engine's default if not given.
         contact_diameter : length, or (filaments,) array of lengths, optional
             Filaments that touch at this distance must not jump through each other, eq. (56), nor be thrown apart by
@@ -303,7 +303,7 @@ class Filaments(FilamentCollection):
         system : openmm.System
             The System that the filaments were put into.
         step_size : time, or TimeStep
-        scheme : {"implicit", "midpoint", "euler"}, optional
+        scheme : {"implicit", "implicit-second-order", "midpoint", "euler"}, optional
             "implicit", the compiled engine's default, takes stretching, bending and tethers at the end of the step,
             and steps a thousand times as long as the others. "midpoint", the portable engine's default, is Fixman's
             explicit scheme with the right drift on chains. "euler" is Section 4 of the paper, biased on chains.

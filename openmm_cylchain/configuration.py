@@ -22,7 +22,8 @@ from .errors import InputError
 from .filament import FilamentType
 from .friction import EndCorrections
 from .physical_units import format_time, parse_quantity
-from .timestep import SCHEMES, recommended_time_step
+from .schemes import SCHEMES
+from .timestep import recommended_time_step
 
 if sys.version_info >= (3, 11):
     import tomllib

@@ -23,7 +23,8 @@ from .engines.description import describe_other_particles
 from .errors import TimeStepWarning
 from .mobility import FilamentResponse
 from .pulling import is_constant_force
-from .timestep import EXPLICIT_SCHEMES, TimeStep
+from .schemes import EXPLICIT_SCHEMES
+from .timestep import TimeStep
 
 ACCURATE = 2.0 * (1.0 - 1.0 / 1.05)
 """lambda up to which no variance is more than 5 % too large."""
@@ -91,7 +92,7 @@ class ExplicitForces:
     system : openmm.System
     filaments : Filaments
         In the System.
-    scheme : {"implicit", "midpoint", "euler"}
+    scheme : {"implicit", "implicit-second-order", "midpoint", "euler"}
         Tethers are among these forces where it is explicit.
     particle_friction : energy*time/length^2, or array of them, optional
         As for ``Filaments.create_integrator``.
@@ -106,7 +107,7 @@ class ExplicitForces:
     def __init__(self, system, filaments, scheme, particle_friction=None):
         self._system = system
         self._filaments = filaments
-        self._implicit = scheme not in EXPLICIT_SCHEMES
+        self._scheme = scheme
         self._other_friction = self._frictions(particle_friction)
         self._responses = {}
         self._node = {
@@ -121,7 +122,7 @@ class ExplicitForces:
                 unknown.append(f"{force.getName()} (force {index})")
             else:
                 self.springs += [one for one in found if np.any(one.stiffness > 0.0)]
-        if not self._implicit and filaments.tethers:
+        if scheme in EXPLICIT_SCHEMES and filaments.tethers:
             nodes = [filaments.node_indices[tether.filament][tether.node] for tether in filaments.tethers]
             stiffness = [tether.stiffness for tether in filaments.tethers]
             self.springs.append(Springs.at_points("Tethers", "tether", nodes, stiffness))
@@ -333,7 +334,7 @@ class ExplicitForces:
         if key not in self._responses:
             solvent = (self._filaments.viscosity, self._filaments.temperature)
             friction = filament.type.segment_friction(*solvent, filament.segments)
-            self._responses[key] = FilamentResponse(filament, friction, self._implicit)
+            self._responses[key] = FilamentResponse(filament, friction, self._scheme)
         return self._responses[key]
 
     def _response_of_places(self, step):

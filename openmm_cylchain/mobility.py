@@ -13,10 +13,16 @@ which keeps the covariance k_B T K^-1 exactly. An explicit force f = -S x takes 
 with the largest eigenvalue lambda of A^-1 S no variance is too large by more than the factor 1/(1 - lambda/2), and the
 filament is thrown apart from lambda = 2 on. A^-1 is the response: in short steps h times the mobility of a segment, in
 long ones that of as much filament as a force moves within the step. In an explicit scheme A = Z/h.
+
+A mode of the rate z/h thus responds with h/(1 + (theta - 1/2) z). Any scheme that multiplies it by R(z) in a step and
+keeps its equilibrium and that under a constant force does so with h 2 (1 - R)/(z (1 + R)), by the same argument; for
+scheme "implicit-second-order", R is ``schemes.amplification_of_second_order``.
 """
 
 import numpy as np
 from scipy.linalg import eigh, eigvalsh
+
+from .schemes import IMPLICIT_SCHEMES, amplification_of_second_order
 
 _LONGEST_PIECE = 128
 
@@ -31,15 +37,14 @@ class FilamentResponse:
     ----------
     filament : Filament
     friction : SegmentFriction
-    implicit : bool
-        Whether the filament's own stiffnesses are taken implicitly.
+    scheme : str
     """
 
-    def __init__(self, filament, friction, implicit):
+    def __init__(self, filament, friction, scheme):
         self.segments = filament.segments
         self._filament = filament
         self._friction = friction
-        self._implicit = implicit
+        self._scheme = scheme
         whole_ring = filament.closed and self.segments <= _LONGEST_PIECE
         self._closed = whole_ring
         self._piece = self.segments if whole_ring else min(self.segments, _LONGEST_PIECE)
@@ -80,11 +85,20 @@ class FilamentResponse:
             self._pieces[piece] = list(self._modes(piece))
         minus = np.asarray(segments) - piece * self._piece
         fractions = np.asarray(fractions)[:, None]
-        for modes, rates, fastest in self._pieces[piece]:
+        for direction, (modes, rates, fastest) in enumerate(self._pieces[piece]):
             plus = (minus + 1) % len(modes)
             shapes = (1.0 - fractions) * modes[minus] + fractions * modes[plus]
-            excess = max(0.0, 0.5 - 1.0 / (step * fastest)) if self._implicit and fastest > 0.0 else 0.0
-            yield shapes * np.sqrt(step / (1.0 + step * excess * rates))
+            yield shapes * np.sqrt(self._responses(direction == 0, rates, fastest, step))
+
+    def _responses(self, across, rates, fastest, step):
+        if self._scheme == "implicit-second-order" and across:
+            # Lengths are those of scheme "implicit".
+            z = np.maximum(step * rates, 1e-9)
+            factor = amplification_of_second_order(z)
+            return step * 2.0 * (1.0 - factor) / (z * (1.0 + factor))
+        implicit = self._scheme in IMPLICIT_SCHEMES and fastest > 0.0
+        excess = max(0.0, 0.5 - 1.0 / (step * fastest)) if implicit else 0.0
+        return step / (1.0 + step * excess * rates)
 
     def _modes(self, piece):
         first = piece * self._piece

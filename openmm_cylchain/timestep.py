@@ -24,10 +24,8 @@ from .quantities import (
     positive,
     thermal_energy,
 )
+from .schemes import EXPLICIT_SCHEMES, IMPLICIT_SCHEMES, SCHEMES
 
-EXPLICIT_SCHEMES = ("euler", "midpoint")
-IMPLICIT_SCHEMES = ("implicit", "implicit-second-order")
-SCHEMES = (*EXPLICIT_SCHEMES, *IMPLICIT_SCHEMES)
 
 
 def translation_bound(friction, diameter, temperature, confidence=3.0):
@@ -258,6 +256,7 @@ _REASONS = {
     _IDLE: "relaxation of a segment's length, which takes 20 steps: at a temperature of zero nothing else moves",
 }
 _RELAXATION_STEPS = 20.0
+_RELAXATION_STEPS_OF_SECOND_ORDER = 2.0
 _OVAL_MODE = 4.0 * math.pi * math.sqrt(0.75)
 _RECOMMENDED_STRAIN = 0.03
 _LARGEST_STRAIN = 0.06
@@ -307,7 +306,7 @@ def recommended_time_step(
     filament_type : FilamentType
     viscosity : pressure*time
     temperature : temperature
-    scheme : {"implicit", "midpoint", "euler"}, optional
+    scheme : {"implicit", "implicit-second-order", "midpoint", "euler"}, optional
         That of the fastest engine that is available if not given. "midpoint" and "euler" are explicit and have the
         same bounds; "euler" has a bias on chains that no step removes. "implicit" is not bound by stretching and
         bending, see ``implicit_time_step``.
@@ -328,7 +327,7 @@ def recommended_time_step(
     if friction is None:
         friction = filament_type.segment_friction(viscosity, temperature, segments)
     if scheme in IMPLICIT_SCHEMES:
-        return implicit_time_step(filament_type, viscosity, temperature, segments, closed, flow, friction)
+        return implicit_time_step(filament_type, viscosity, temperature, segments, closed, flow, friction, scheme)
     bounds = _stability_bounds(filament_type, friction, segments)
     allowed = {name: bound / _ACCURACY_MARGIN for name, bound in bounds.items()}
     kT = thermal_energy(temperature)
@@ -352,7 +351,7 @@ def _binding(filament_type, friction, temperature, scheme, flow, bounds, allowed
         bounds[_IDLE], allowed[_IDLE] = relaxation, relaxation / _RELAXATION_STEPS
     binding = min(allowed, key=allowed.get)
     reason = _REASONS[binding].format(
-        margin=_ACCURACY_MARGIN, angle=angle, relaxation_steps=_RELAXATION_STEPS, strain=_RECOMMENDED_STRAIN
+        margin=_ACCURACY_MARGIN, angle=angle, relaxation_steps=_relaxation_steps(scheme), strain=_RECOMMENDED_STRAIN
     )
     return TimeStep(allowed[binding], reason, bounds, allowed)
 
@@ -389,9 +388,9 @@ def fene_bound(filament_type, friction, temperature, scheme):
     length = filament_type.segment_length
     tau = friction.extensional / (stiffness * length**2)
     if kT == 0.0:
-        return math.inf if scheme == "implicit" else 0.1 * tau
+        return math.inf if scheme in IMPLICIT_SCHEMES else 0.1 * tau
     nu = stiffness * extension**2 / kT
-    if scheme == "implicit":
+    if scheme in IMPLICIT_SCHEMES:
         return math.inf if nu >= _HARMONIC_FENE else 0.1 * tau * min(1.0, nu / 11.0) ** 4
     narrow = 10.0 ** (-12.0 / nu)
     edge = narrow / (1.0 + math.sqrt(1.0 - narrow))
@@ -399,8 +398,17 @@ def fene_bound(filament_type, friction, temperature, scheme):
     return min(noise, 0.1 * tau * narrow**2 / (2.0 - narrow))
 
 
-def implicit_time_step(filament_type, viscosity, temperature, segments=2, closed=False, flow=None, friction=None):
-    """The step of scheme "implicit" at which equilibrium energies of a chain are good to 2 %, and dynamics to 5 %.
+def implicit_time_step(
+    filament_type,
+    viscosity,
+    temperature,
+    segments=2,
+    closed=False,
+    flow=None,
+    friction=None,
+    scheme="implicit",
+):
+    """The step of an implicit scheme at which equilibrium energies of a chain are good to 2 %, and dynamics to 5 %.
 
     Its equilibrium is exact for linear forces at any step; what is left comes from segments that turn within one.
     A segment turns by the mean square of what a free segment does, 2 k_B T dt/gamma_rot, or, if that is less, of what
@@ -408,7 +416,8 @@ def implicit_time_step(filament_type, viscosity, temperature, segments=2, closed
     it by k_B T xi/a, and the filament turns as a whole by 24 k_B T dt l0/(gamma_perp L^3). Either must stay below
     0.15^2. Measured with ``openmm-cylchain benchmark time-step``, F-actin, microtubules, DNA and chains with free
     joints keep equilibrium within 5 % and dynamics within 10 % at that step and at several times as much. A step must
-    also resolve the slowest relaxation of the filament by 20 steps: gamma_perp/(l0 a) (L/4.73)^4, or that of the mode
+    also resolve the slowest relaxation of the filament, by 20 steps, or 2 of scheme "implicit-second-order", whose decay
+    is 1 % too fast there: gamma_perp/(l0 a) (L/4.73)^4, or that of the mode
     in which a ring of radius R becomes oval, gamma_perp/(l0 a) R^4/9 = gamma_perp/(l0 a) (L/10.9)^4. (With the friction
     along the ring it is (gamma_perp + gamma_par/4)/(l0 a) R^4/9.)
 
@@ -441,8 +450,12 @@ def implicit_time_step(filament_type, viscosity, temperature, segments=2, closed
     if bends:
         wave_number = _OVAL_MODE if closed else 4.73
         bounds["relaxation"] = friction_per_length * (segments * length / wave_number) ** 4 / rigidity
-        allowed["relaxation"] = bounds["relaxation"] / _RELAXATION_STEPS
-    return _binding(filament_type, friction, temperature, "implicit", flow, bounds, allowed, math.sqrt(square_angle))
+        allowed["relaxation"] = bounds["relaxation"] / _relaxation_steps(scheme)
+    return _binding(filament_type, friction, temperature, scheme, flow, bounds, allowed, math.sqrt(square_angle))
+
+
+def _relaxation_steps(scheme):
+    return _RELAXATION_STEPS_OF_SECOND_ORDER if scheme == "implicit-second-order" else _RELAXATION_STEPS
 
 
 def contact_time_step(

@@ -9,6 +9,7 @@ from openmm import unit
 from physics_cases import CASES, KT, TEMPERATURE, VISCOSITY, Case, exact_means, measured_means
 
 from openmm_cylchain import F_ACTIN, MICROTUBULE, Filaments, InputError, InstabilityError
+from openmm_cylchain.schemes import IMPLICIT_SCHEMES
 from openmm_cylchain.timestep import recommended_time_step
 
 SIGMAS = 4.0
@@ -17,10 +18,17 @@ STEP_ERROR = 0.02
 MICROSECOND = 1e6
 
 
-def _context(filaments, step, temperature=None, platform="Reference", seed=1, properties=None, checks=True):
+@pytest.fixture(params=IMPLICIT_SCHEMES)
+def scheme(request):
+    return request.param
+
+
+def _context(
+    filaments, step, temperature=None, platform="Reference", seed=1, properties=None, checks=True, scheme="implicit"
+):
     topology, system, positions = filaments.build()
     integrator = filaments.create_integrator(
-        system, step, scheme="implicit", temperature=temperature, random_seed=seed, checks=checks
+        system, step, scheme=scheme, temperature=temperature, random_seed=seed, checks=checks
     )
     context = openmm.Context(system, integrator, openmm.Platform.getPlatform(platform), properties or {})
     context.setPositions(positions)
@@ -40,11 +48,11 @@ def _actin(chains=3, segments=8, **options):
 
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("step_over_recommended", [1, 0.05])
-def test_equilibrium_at_the_recommended_step(name, step_over_recommended):
+def test_equilibrium_at_the_recommended_step(name, step_over_recommended, scheme):
     # Samples of short steps are worth less.
     case = replace(CASES[name], chains=CASES[name].chains * (1 if step_over_recommended == 1 else 2))
-    recommended = recommended_time_step(case.type, VISCOSITY, TEMPERATURE, "implicit", case.segments).step
-    measured = measured_means(case, "compiled", "Reference", "implicit", step=step_over_recommended * recommended)
+    recommended = recommended_time_step(case.type, VISCOSITY, TEMPERATURE, scheme, case.segments).step
+    measured = measured_means(case, "compiled", "Reference", scheme, step=step_over_recommended * recommended)
     exact = exact_means(case)
     for name in exact:
         mean, error = measured[name]
@@ -55,9 +63,9 @@ def test_equilibrium_at_the_recommended_step(name, step_over_recommended):
 
 
 @pytest.mark.parametrize("microseconds", [5, 50])
-def test_energies_of_actin_within_three_percent(microseconds):
+def test_energies_of_actin_within_three_percent(microseconds, scheme):
     case = Case(F_ACTIN, 16, 2000, 400, None)
-    measured = measured_means(case, "compiled", "Reference", "implicit", step=microseconds * MICROSECOND)
+    measured = measured_means(case, "compiled", "Reference", scheme, step=microseconds * MICROSECOND)
     exact = exact_means(case)
     for name in ("stretching energy", "bending energy"):
         mean, error = measured[name]
@@ -65,7 +73,7 @@ def test_energies_of_actin_within_three_percent(microseconds):
         assert abs(mean - exact[name]) < 0.03 * exact[name], (name, mean, error, exact[name])
 
 
-def test_equilibrium_of_lengths_much_stiffer_than_the_step_resolves():
+def test_equilibrium_of_lengths_much_stiffer_than_the_step_resolves(scheme):
     """Joints that are free, in chains whose lengths are all but fixed: <cos> = 0 and <cos^2> = 1/3.
 
     A scheme that treats lengths as constraints would give the distribution of rigid rods, <cos^2> = 0.32.
@@ -73,8 +81,8 @@ def test_equilibrium_of_lengths_much_stiffer_than_the_step_resolves():
     base = CASES["freely-jointed"]
     stiff = replace(base.type, stretching_stiffness=1e4 * base.type.segment_stiffness)
     case = replace(base, type=stiff, chains=3000, steps=2400)
-    step = recommended_time_step(case.type, VISCOSITY, TEMPERATURE, "implicit", case.segments).step / 4
-    measured = measured_means(case, "compiled", "Reference", "implicit", step=step)
+    step = recommended_time_step(case.type, VISCOSITY, TEMPERATURE, scheme, case.segments).step / 4
+    measured = measured_means(case, "compiled", "Reference", scheme, step=step)
     mean, error = measured["squared cosine"]
     assert SIGMAS * error < 0.008
     assert abs(mean - 1 / 3) < SIGMAS * error
@@ -83,10 +91,10 @@ def test_equilibrium_of_lengths_much_stiffer_than_the_step_resolves():
 
 
 @pytest.mark.parametrize("micrometers, segments", [(1, 1), (10, 1), (100, 1), (10, 4)])
-def test_rods_turn_as_they_should_however_stiff(micrometers, segments):
+def test_rods_turn_as_they_should_however_stiff(micrometers, segments, scheme):
     """Microtubules, of which 100 um would stretch by 1e-5 of their length with k_B T: <t.t'> = exp(-2 D_r h).
 
-    A quarter of the recommended step leaves D_r within 2 % for the turn of a step.
+    Turning is of weak second order, so that the recommended step leaves D_r within 1 %.
     """
     kind = MICROTUBULE.with_segment_length(1e3 * micrometers / segments)
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
@@ -94,9 +102,9 @@ def test_rods_turn_as_they_should_however_stiff(micrometers, segments):
     for direction in directions:
         filaments.add_straight(kind, segments, [0, 0, 0], direction)
     whole = MICROTUBULE.with_segment_length(1e3 * micrometers)
-    step = recommended_time_step(whole, VISCOSITY, TEMPERATURE, "implicit", 1).step / 4
+    step = recommended_time_step(whole, VISCOSITY, TEMPERATURE, scheme, 1).step
     # In pieces, they also bend, which is not resolved.
-    context = _context(filaments, step, checks=False)
+    context = _context(filaments, step, checks=False, scheme=scheme)
     ends = np.array(filaments.node_indices)[:, [0, -1]]
     axes = []
     for _ in range(41):
@@ -110,7 +118,7 @@ def test_rods_turn_as_they_should_however_stiff(micrometers, segments):
     turning = segments * friction.rotational + friction.perpendicular * np.sum(places**2)
     exact = 1 - np.exp(-2 * KT / turning * step)
     assert SIGMAS * error < 0.04 * exact
-    assert abs(mean - exact) < SIGMAS * error + 0.02 * exact, (mean / exact, error / exact)
+    assert abs(mean - exact) < SIGMAS * error + 0.01 * exact, (mean / exact, error / exact)
 
 
 def test_relaxation_without_noise_converges_with_order_one():
@@ -155,9 +163,9 @@ def test_external_forces_drag_a_filament():
 
 
 @pytest.mark.parametrize("platform", ["Reference", "CPU"])
-def test_steps_at_once_threads_and_restarts_do_not_matter(platform):
+def test_steps_at_once_threads_and_restarts_do_not_matter(platform, scheme):
     def context(**options):
-        return _context(_actin(chains=11, segments=9), 20 * MICROSECOND, platform=platform, **options)
+        return _context(_actin(chains=11, segments=9), 20 * MICROSECOND, platform=platform, scheme=scheme, **options)
 
     contexts = [context() for _ in range(3)]
     if platform == "CPU":
@@ -176,9 +184,9 @@ def test_steps_at_once_threads_and_restarts_do_not_matter(platform):
         assert np.array_equal(_positions(context), _positions(contexts[0]))
 
 
-def test_fixed_nodes_stay_and_pass_nothing_on():
+def test_fixed_nodes_stay_and_pass_nothing_on(scheme):
     filaments = _actin(chains=1, segments=8, clamped=[3])
-    context = _context(filaments, 50 * MICROSECOND)
+    context = _context(filaments, 50 * MICROSECOND, scheme=scheme)
     start = _positions(context)
     context.getIntegrator().step(30)
     assert np.array_equal(_positions(context)[3], start[3])
@@ -199,10 +207,10 @@ def test_shorter_chains_in_a_pack_move_as_they_would_alone():
     assert np.allclose(_positions(context)[:11], _positions(other), rtol=0, atol=1e-6)
 
 
-def test_a_hard_pull_is_taken_in_parts():
+def test_a_hard_pull_is_taken_in_parts(scheme):
     """A node that is moved by two segment lengths between steps: the step is divided, and energy falls."""
     filaments = _actin(chains=1, segments=12)
-    context = _context(filaments, 50 * MICROSECOND, temperature=0)
+    context = _context(filaments, 50 * MICROSECOND, temperature=0, scheme=scheme)
     moved = _positions(context)
     moved[6] += [0, 0, 700]
     context.setPositions(moved)

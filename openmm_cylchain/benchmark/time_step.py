@@ -24,7 +24,8 @@ from ..errors import InstabilityError
 from ..physical_units import format_time
 from ..theory import bending_energy_mean, stretching_energy_mean
 from ..step_watch import LARGEST_DIVIDED_SHARE
-from ..timestep import EXPLICIT_SCHEMES, SCHEMES, recommended_time_step, stability_bounds
+from ..schemes import EXPLICIT_SCHEMES, SCHEMES
+from ..timestep import recommended_time_step, stability_bounds
 from .measurement import Case, Estimate, describe_machine, median, ratio, scaled, time_interleaved
 from .report import Report, row
 from .systems import one_thread_context, one_thread_platform, simulate_beads

@@ -7,7 +7,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from ..errors import InputError
-from ..timestep import SCHEMES
+from ..schemes import SCHEMES
 from .report import check_output_path
 from .time_step import CRITERIA
 

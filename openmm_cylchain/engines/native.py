@@ -190,7 +190,7 @@ class NativeIntegrator(CylinderChainIntegrator):
     temperature : temperature
         Zero is allowed: no noise.
     step_size : time, or TimeStep
-    scheme : {"implicit", "midpoint", "euler"}
+    scheme : {"implicit", "implicit-second-order", "midpoint", "euler"}
     random_seed : int
         0 draws a fresh seed for each Context.
     labels : sequence of str

@@ -57,11 +57,30 @@ static double stretchOf(StretchingModel model, const Segment& segment, double le
     return copysign(d*sqrt(-log1p(-e*e/(d*d))), e);
 }
 
-/** The residual of the scheme's equations for new nodes y. */
-static Array residualOf(const vector<Chain>& chains, const Array& x, const Array& y, const Array& f, double h, bool flows) {
+/** A stage of a step: all of it, or one of the two of second order, the second of which needs where the first has ended. */
+struct Stage {
+    int number = 0;
+    Array first = {};
+};
+
+const double DIAGONAL = 1-sqrt(0.5);
+
+/** The residual of a stage's equations for new nodes y. */
+static Array residualOf(const vector<Chain>& chains, const Array& x, const Array& y, const Array& f, double h, bool flows,
+            const Stage& stage = {}) {
+    const double share = stage.number == 1 ? DIAGONAL : 1;
+    // The weights of what bends and tethers are after the step, before it and after the first stage.
+    auto weighted = [&] (double theta, double after, double before, double first) {
+        if (stage.number == 0)
+            return theta*after+(1-theta)*before;
+        return DIAGONAL*after+(stage.number == 2 ? (1-DIAGONAL)*first : 0);
+    };
+    const Array& first = stage.number == 2 ? stage.first : x;
     Array middle(x.size()), residual = f;
-    for (size_t i = 0; i < x.size(); i++)
+    for (size_t i = 0; i < x.size(); i++) {
         middle[i] = 0.5*(x[i]+y[i]);
+        residual[i] *= share;
+    }
     // Friction against turning depends on the segment before and after, and not on the length of the mean one.
     vector<Chain> withoutExtensional = chains;
     for (Chain& chain : withoutExtensional)
@@ -82,7 +101,7 @@ static Array residualOf(const vector<Chain>& chains, const Array& x, const Array
         // What flow does to lengths is part of the tension, with the lengths before and after.
         const Array drag = denseDrag(withoutExtensional, middle);
         for (size_t i = 0; i < x.size(); i++)
-            residual[i] += drag[i];
+            residual[i] += share*drag[i];
     }
     const double width = 1e-6;
     for (const Chain& chain : chains) {
@@ -95,13 +114,14 @@ static Array residualOf(const vector<Chain>& chains, const Array& x, const Array
             for (int i = 0; i < 3 && flows; i++)
                 for (int k = 0; k < 3; k++)
                     stretched += (between2[3+i]-between2[i])/length*FLOW.gradient[3*i+k]*(between2[3+k]-between2[k]);
-            const double theta = fmax(0.5, 1-segment.extensional/(h*segment.stiffness*segment.restLength*segment.restLength));
+            const double own = fmax(0.5, 1-segment.extensional/(h*segment.stiffness*segment.restLength*segment.restLength));
+            const double theta = stage.number == 1 ? DIAGONAL : own, rest = stage.number == 1 ? 0 : 1-own;
             const double between = 0.5*(before+after);
             const double slope = (stretchOf(chain.stretching, segment, between+width)-
                     stretchOf(chain.stretching, segment, between-width))/(2*width);
             const double tension = segment.stiffness*slope*(theta*stretchOf(chain.stretching, segment, after)+
-                    (1-theta)*stretchOf(chain.stretching, segment, before))+
-                    segment.extensional/(before*after)*((after-before)/h-stretched);
+                    rest*stretchOf(chain.stretching, segment, before))+
+                    segment.extensional/(before*after)*((after-before)/h-share*stretched);
             for (int k = 0; k < 3; k++) {
                 const double pull = tension*(between2[3+k]-between2[k])/length;
                 residual[componentFrom(chain, s, k)] += pull;
@@ -109,19 +129,21 @@ static Array residualOf(const vector<Chain>& chains, const Array& x, const Array
             }
         }
         for (size_t j = 0; j < chain.joints.size(); j++) {
-            const int count = chain.segments.size(), first = chain.closed ? (j+count-1)%count : j;
-            const double friction = fmin(chain.segments[first].rotational, chain.segments[(first+1)%count].rotational);
+            const int count = chain.segments.size(), start = chain.closed ? (j+count-1)%count : j;
+            const double friction = fmin(chain.segments[start].rotational, chain.segments[(start+1)%count].rotational);
             const double theta = fmax(0.5, 1-friction/(4*h*chain.joints[j]));
-            const Array before = bendOf(chain.bending, nodesFrom(chain, first, 3, x).data());
-            const Array after = bendOf(chain.bending, nodesFrom(chain, first, 3, y).data());
+            const Array before = bendOf(chain.bending, nodesFrom(chain, start, 3, x).data());
+            const Array after = bendOf(chain.bending, nodesFrom(chain, start, 3, y).data());
+            const Array between = bendOf(chain.bending, nodesFrom(chain, start, 3, first).data());
             for (int i = 0; i < 9; i++) {
-                Array moved = nodesFrom(chain, first, 3, middle);
+                Array moved = nodesFrom(chain, start, 3, middle);
                 moved[i] += width;
                 const Array above = bendOf(chain.bending, moved.data());
                 moved[i] -= 2*width;
                 const Array below = bendOf(chain.bending, moved.data());
                 for (int k = 0; k < 3; k++)
-                    residual[componentFrom(chain, first, i)] -= chain.joints[j]*(theta*after[k]+(1-theta)*before[k])*(above[k]-below[k])/(2*width);
+                    residual[componentFrom(chain, start, i)] -= chain.joints[j]*weighted(theta, after[k], before[k], between[k])*
+                            (above[k]-below[k])/(2*width);
             }
         }
         for (const Tether& tether : chain.tethers) {
@@ -135,7 +157,8 @@ static Array residualOf(const vector<Chain>& chains, const Array& x, const Array
             const double theta = fmax(0.5, 1-friction/(h*tether.stiffness));
             for (int k = 0; k < 3; k++) {
                 const int i = 3*chain.nodes[tether.node]+k;
-                residual[i] -= tether.stiffness*(theta*y[i]+(1-theta)*x[i]-tether.point[k]);
+                const double p = tether.point[k];
+                residual[i] -= tether.stiffness*weighted(theta, y[i]-p, x[i]-p, first[i]-p);
             }
         }
     }
@@ -148,15 +171,16 @@ static Array residualOf(const vector<Chain>& chains, const Array& x, const Array
 }
 
 /** Solve the equations by Newton's method with differences for derivatives, beginning near the solution. */
-static Array solutionNear(const vector<Chain>& chains, const Array& x, Array y, const Array& f, double h, bool flows) {
+static Array solutionNear(const vector<Chain>& chains, const Array& x, Array y, const Array& f, double h, bool flows,
+            const Stage& stage = {}) {
     const int n = x.size();
     for (int iteration = 0; iteration < 6; iteration++) {
-        const Array residual = residualOf(chains, x, y, f, h, flows);
+        const Array residual = residualOf(chains, x, y, f, h, flows, stage);
         vector<Array> jacobian(n, Array(n));
         for (int j = 0; j < n; j++) {
             Array moved = y;
             moved[j] += 1e-6;
-            const Array changed = residualOf(chains, x, moved, f, h, flows);
+            const Array changed = residualOf(chains, x, moved, f, h, flows, stage);
             for (int i = 0; i < n; i++)
                 jacobian[i][j] = (residual[i]-changed[i])/1e-6;
         }
@@ -177,19 +201,22 @@ static vector<Chain> tethered(vector<Chain> chains, const Array& x) {
     return chains;
 }
 
-static void checkSteps(const vector<Chain>& chains, const Array& x, bool flows, const Array& steps) {
+static void checkSteps(const vector<Chain>& chains, const Array& x, bool flows, const Array& steps, Scheme scheme) {
     ChainEngine engine(chains);
     Array f(x.size());
     for (size_t i = 0; i < f.size(); i++)
         f[i] = sin(i);
     for (double h : steps) {
         const BackgroundFlow flow = flows ? FLOW : BackgroundFlow {};
-        const Array change = stepOf(engine, x, f, {Scheme::Implicit, 0, h, 1, 1, 0, flow});
+        const Array change = stepOf(engine, x, f, {scheme, 0, h, 1, 1, 0, flow});
         Array y = x;
         for (size_t i = 0; i < x.size(); i++)
             y[i] += change[i];
-        const Array solution = solutionNear(chains, x, y, f, h, flows);
-        const Array residual = residualOf(chains, x, solution, f, h, flows);
+        Stage stage;
+        if (scheme == Scheme::ImplicitSecondOrder)
+            stage = {2, solutionNear(chains, x, x, f, h, flows, {1})};
+        const Array solution = solutionNear(chains, x, y, f, h, flows, stage);
+        const Array residual = residualOf(chains, x, solution, f, h, flows, stage);
         for (size_t i = 0; i < x.size(); i++) {
             checkClose(0, residual[i], 1, 1e-4, "residual of the dense solution");
             checkClose(solution[i], y[i], 10, 3e-3, "implicit step");
@@ -197,14 +224,14 @@ static void checkSteps(const vector<Chain>& chains, const Array& x, bool flows, 
     }
 }
 
-static void testStepsWithoutNoise() {
+static void testStepsWithoutNoise(Scheme scheme) {
     for (int bending = 0; bending < 3; bending++)
         for (int stretching = 0; stretching < 2; stretching++)
             for (bool tethers : {false, true})
                 for (bool flows : {false, true}) {
                     const Array shortSteps = {0.001, 0.005}, steps = flows ? shortSteps : Array {0.001, 0.03, 1.0};
                     auto check = [&] (const vector<Chain>& chains, const Array& x, const Array& steps) {
-                        checkSteps(tethers ? tethered(chains, x) : chains, x, flows, steps);
+                        checkSteps(tethers ? tethered(chains, x) : chains, x, flows, steps, scheme);
                     };
                     Array x, y, z;
                     const BendingModel b = (BendingModel) bending;
@@ -214,6 +241,11 @@ static void testStepsWithoutNoise() {
                     // The joints of a square are bent so much that long steps are divided.
                     check(makeRings({4}, b, s, false, z), z, shortSteps);
                 }
+}
+
+static void testStepsWithoutNoise() {
+    testStepsWithoutNoise(Scheme::Implicit);
+    testStepsWithoutNoise(Scheme::ImplicitSecondOrder);
 }
 
 static void testConvergenceToExplicitSteps() {
