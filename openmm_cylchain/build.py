@@ -305,7 +305,8 @@ class Filaments(FilamentCollection):
         step_size : time, or TimeStep
         scheme : {"implicit", "implicit-second-order", "midpoint", "euler"}, optional
             "implicit", the compiled engine's default, takes stretching, bending and tethers at the end of the step,
-            and steps a thousand times as long as the others. "midpoint", the portable engine's default, is Fixman's
+            and steps a thousand times as long as explicit ones. "implicit-second-order" does so in two stages, with
+            decay of bends of second order in the step. "midpoint", the portable engine's default, is Fixman's
             explicit scheme with the right drift on chains. "euler" is Section 4 of the paper, biased on chains.
         temperature : temperature, optional
             That of the filaments if not given.

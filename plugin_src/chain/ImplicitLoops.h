@@ -1,5 +1,5 @@
 /**
- * Scheme "implicit" over the segments of a pack. ChainLoops.h includes this file into the namespace of an instruction
+ * The implicit schemes over the segments of a pack. ChainLoops.h includes this file into the namespace of an instruction
  * set.
  *
  * A step solves, for the new nodes y, with the middle m = (x+y)/2 of the old and the new nodes,
@@ -19,7 +19,9 @@
  *     f_drift = -k_B T sum_a (k (2 theta-1) + g/h) H_a (Z/h+K)^-1 J_a
  *
  * with the second derivatives H_a of the lengths. It takes the blocks of the inverse next to its diagonal, which follow
- * from those of the elimination. In a flow u, friction is relative to u(m). IMPLICIT_SCHEME.md explains all this.
+ * from those of the elimination. In a flow u, friction is relative to u(m).
+ *
+ * In the scheme of second order, bends and tethers take two such stages. IMPLICIT_SCHEME.md explains all this.
  */
 
 /** The largest change of a segment in the last iteration, over its rest length; a fifth of it remains as an error. */
