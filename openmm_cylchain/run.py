@@ -18,6 +18,7 @@ from .placement import joint_stiffnesses
 from .progress import Progress
 from .quantities import thermal_energy
 from .run_directory import Checkpoint, EnergyTable, RunDirectory, TrajectoryFile, write_atomically
+from .step_check import check_time_step
 from .structure_files import write_lammps_data, write_psf
 from .theory import chain_mean_square_end_to_end
 
@@ -150,12 +151,53 @@ def _create_simulation(configuration, filaments):
         system, settings.time_step, scheme=settings.scheme, random_seed=settings.seed
     )
     platform, properties = _platform(settings)
-    try:
+    with _named_platform(settings):
         return app.Simulation(topology, system, integrator, platform, properties), positions
+
+
+@contextlib.contextmanager
+def _named_platform(settings):
+    try:
+        yield
     except openmm.OpenMMException as error:
         raise InputError(
             f'[simulation] platform = "{settings.platform}" cannot be used: {error}. "Reference" always can.'
         ) from None
+
+
+def check_step(configuration, seconds=20.0, say=lambda message: None):
+    """Run a configuration for a while with its step and with half of it: see ``step_check.check_time_step``.
+
+    Parameters
+    ----------
+    configuration : Configuration
+    seconds : float
+        Time that it may take.
+    say : callable (str), optional
+        Told how far it is.
+
+    Returns
+    -------
+    StepCheck
+    """
+    settings = configuration.simulation
+    filaments = create_filaments(configuration)
+    _, system, positions = filaments.build()
+    platform, properties = _platform(settings)
+    with _named_platform(settings):
+        return check_time_step(
+            filaments,
+            system,
+            positions,
+            settings.time_step,
+            scheme=settings.scheme,
+            seconds=seconds,
+            random_seed=settings.seed,
+            equilibrium=all(group.start == "equilibrium" for group in configuration.filaments),
+            platform=platform,
+            properties=properties,
+            say=say,
+        )
 
 
 def _platform(settings):
