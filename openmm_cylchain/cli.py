@@ -201,16 +201,21 @@ def _time_step(options):
 
 def _check_time_step(configuration, options):
     from .benchmark.report import Progress, check_output_path
-    from .run import check_step
+    from .run import RunInterrupted, check_step
     from .run_directory import write_atomically
 
     if options.json is not None:
         check_output_path(options.json)
+    # What is printed already is for the time until the check is done.
+    sys.stdout.flush()
     progress = Progress()
     try:
         check = check_step(configuration, _SECONDS_OF_CHECK if options.seconds is None else options.seconds, progress)
-    finally:
+    except RunInterrupted as interruption:
         progress.finish()
+        _say("interrupted", interruption)
+        raise SystemExit(128 + interruption.signal_number) from None
+    progress.finish()
     print(f"\n{check}", flush=True)
     if options.json is not None:
         content = json.dumps(check.as_dict(), indent=2, allow_nan=False)

@@ -151,14 +151,8 @@ def _create_simulation(configuration, filaments):
         system, settings.time_step, scheme=settings.scheme, random_seed=settings.seed
     )
     platform, properties = _platform(settings)
-    with _named_platform(settings):
-        return app.Simulation(topology, system, integrator, platform, properties), positions
-
-
-@contextlib.contextmanager
-def _named_platform(settings):
     try:
-        yield
+        return app.Simulation(topology, system, integrator, platform, properties), positions
     except openmm.OpenMMException as error:
         raise InputError(
             f'[simulation] platform = "{settings.platform}" cannot be used: {error}. "Reference" always can.'
@@ -179,13 +173,21 @@ def check_step(configuration, seconds=20.0, say=lambda message: None):
     Returns
     -------
     StepCheck
+
+    Raises
+    ------
+    InputError
+        If the configuration cannot be simulated.
+    RunInterrupted
+        After SIGINT or SIGTERM.
     """
     settings = configuration.simulation
     filaments = create_filaments(configuration)
     _, system, positions = filaments.build()
     platform, properties = _platform(settings)
-    with _named_platform(settings):
-        return check_time_step(
+    # An interruption that Python raises within a step may end as an error of OpenMM.
+    with _Signals() as signals:
+        check = check_time_step(
             filaments,
             system,
             positions,
@@ -197,7 +199,11 @@ def check_step(configuration, seconds=20.0, say=lambda message: None):
             platform=platform,
             properties=properties,
             say=say,
+            stop=lambda: signals.received is not None,
         )
+    if signals.received is not None:
+        raise RunInterrupted(signals.received, "The check has not come to its end: start it again.")
+    return check
 
 
 def _platform(settings):

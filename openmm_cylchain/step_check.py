@@ -11,8 +11,9 @@ It is given relative to the average with the shortest step. For a coordinate wit
 variance is too large by 1/(1 - lambda h/2), the former is then exact. Where the error is of second order, as that of a
 symmetric drift may be, two steps show 3/2 of it.
 
-The standard error comes from the differences, frame by frame: from their means over 16, 32 and 64 blocks of time, and
-over filaments of one kind if there are eight at least; the largest of them counts. The rule, with the error e and its
+The standard error comes from the differences, frame by frame: from their means over 16 and 32 blocks of time, and over
+filaments of one kind if there are eight at least. The largest of them counts, so that it is rather too large than too
+small, by a sixth or so. The rule, with the error e and its
 standard error s:
 
     wrong           |e| - 4 s > 5 %
@@ -52,7 +53,7 @@ STEPS_PER_FRAME = 10
 """Steps h between two looks at both runs."""
 
 _WEIGHTS = {2: (2.0, -2.0), 3: (2.0 / 3.0, 2.0, -8.0 / 3.0)}
-_BLOCKS = (64, 32, 16)
+_BLOCKS = (32, 16)
 _FEWEST_COPIES = 8
 _WARM_UP = 0.25
 _MODES = 3
@@ -262,6 +263,7 @@ def check_time_step(
     platform=None,
     properties=None,
     say=lambda message: None,
+    stop=lambda: False,
 ):
     """Run a System with a step and with half of it, and say whether the step is right.
 
@@ -302,6 +304,8 @@ def check_time_step(
         Of the platform.
     say : callable (str), optional
         Told how far it is.
+    stop : callable (), optional
+        Asked after every ten steps h whether to end early.
 
     Returns
     -------
@@ -334,7 +338,7 @@ def check_time_step(
         for level in range(levels)
     ]
     start = time.monotonic()
-    records, failure = _advance(runs, probe, seconds, frames, say)
+    records, failure = _advance(runs, probe, seconds, frames, say, stop)
     elapsed = time.monotonic() - start
     relaxation = _slowest_relaxation(probe.kinds, filaments, bath)
     observables = []
@@ -356,7 +360,7 @@ def check_time_step(
     )
 
 
-def _advance(runs, probe, seconds, frames, say):
+def _advance(runs, probe, seconds, frames, say, stop):
     # Values (levels, ...) of every frame but the first, and why it ended early.
     start, records, told = time.monotonic(), [], 0
     try:
@@ -368,7 +372,7 @@ def _advance(runs, probe, seconds, frames, say):
             if share >= (told + 1) / 10.0:
                 told = int(10.0 * share)
                 say(f"{min(100, 10 * told)} %, {len(records) * STEPS_PER_FRAME} steps")
-            if share >= 1.0:
+            if share >= 1.0 or stop():
                 return records, None
     except InstabilityError as error:
         return records, str(error)
@@ -395,7 +399,11 @@ class _Run:
         if paired:
             self._integrator.setPathLevel(level)
         arguments = () if platform is None else (platform, properties or {})
-        self.context = openmm.Context(self._system, self._integrator, *arguments)
+        try:
+            self.context = openmm.Context(self._system, self._integrator, *arguments)
+        except openmm.OpenMMException as error:
+            name = "OpenMM" if platform is None else f"The platform {platform.getName()}"
+            raise InputError(f'{name} cannot run this System: {error}. "Reference" always can.') from None
         self.context.setPositions(positions)
         self.context.computeVirtualSites()
         self._before = None
@@ -605,7 +613,7 @@ def _slowest_relaxation(kinds, filaments, temperature):
 
 
 def _compare(probe, records, exact, seconds):
-    late = records[math.ceil(_WARM_UP * len(records)) :]
+    late = records[int(_WARM_UP * len(records)) :]
     checks = []
     for row, (name, unit, kind, what) in enumerate(probe.rows):
         # (levels, frames, copies)
@@ -649,7 +657,8 @@ def _standard_error(series):
         length = frames // count
         if length:
             means = line[frames - count * length :].reshape(count, length).mean(axis=1)
-            errors.append(means.std(ddof=1) / math.sqrt(count))
+            # Blocks leave out what is left over of the frames.
+            errors.append(means.std(ddof=1) / math.sqrt(frames / length))
     if copies >= _FEWEST_COPIES:
         errors.append(series.mean(axis=0).std(ddof=1) / math.sqrt(copies))
     return float(max(errors))

@@ -48,27 +48,24 @@ def bound_particles(bonds, engine=None):
     return filaments, system, np.concatenate([positions._value, others])
 
 
-SPRINGS = ("HarmonicBondForce (force 1)", "HarmonicBondForce (force 3)")
-
-
 def springs_of(check):
     return next(one for one in check.observables if one.name.startswith("HarmonicBondForce"))
 
 
 def test_step_for_filaments_alone_is_wrong_for_a_stiff_bond():
-    filaments, system, positions = free_filaments(12, segments=8)
+    filaments, system, positions = free_filaments(24, segments=8)
     force = openmm.HarmonicBondForce()
     for first, second in zip(filaments.node_indices[::2], filaments.node_indices[1::2]):
-        force.addBond(int(first[4]), int(second[4]), 0.0, 1.6e-4)
+        force.addBond(int(first[4]), int(second[4]), 0.0, 8e-4)
     system.addForce(force)
     alone, right = filaments.recommended_time_step(), filaments.recommended_time_step(system=system)
     assert 8 < alone.step / right.step < 12
-    check = check_time_step(filaments, system, positions, alone, frames=160, platform=REFERENCE)
+    check = check_time_step(filaments, system, positions, alone, frames=500, platform=REFERENCE)
     bond = springs_of(check)
     assert bond.verdict == check.verdict == "wrong"
-    assert bond.error > 0.3 and bond.standard_error < 0.1
+    assert bond.error > 0.1 and bond.standard_error < 0.02
     assert "wrong by" in str(check) and "HarmonicBondForce" in check.explanation()
-    check = check_time_step(filaments, system, positions, right, frames=160, platform=REFERENCE)
+    check = check_time_step(filaments, system, positions, right, frames=300, platform=REFERENCE)
     assert springs_of(check).verdict == "right"
     assert 0.0 < springs_of(check).error <= 0.05 + 4 * springs_of(check).standard_error
 
@@ -88,8 +85,7 @@ def test_recommended_step_of_actin_is_right():
     assert gains["ACT bending mode 1, change"] > 2 and gains["ACT middle, displacement"] > 2, gains
 
 
-@pytest.mark.parametrize("levels", [2, 3])
-@pytest.mark.parametrize("rate", [0.1, 0.6, 1.0])
+@pytest.mark.parametrize("rate, levels", [(0.1, 2), (0.6, 2), (1.0, 2), (0.6, 3)])
 def test_error_of_a_spring_is_that_of_theory(rate, levels):
     filaments, system, positions = bound_particles(300)
     # Two particles of friction one relax with 2 k.
@@ -125,19 +121,19 @@ def test_standard_errors_are_right():
             0.2,
             scheme="midpoint",
             particle_friction=1.0,
-            frames=110,
+            frames=86,
             random_seed=seed,
             platform=REFERENCE,
         )
         found.append((springs_of(check).error, springs_of(check).standard_error))
     errors, bars = np.array(found).T
-    # The largest of three estimates is a little too large. Of 24 spreads one in 10^4 is below 0.5 or above 1.55.
-    assert 0.5 < errors.std(ddof=1) / bars.mean() < 1.3
+    # The largest of two estimates is a little too large. The spread of 24 errors is known to 15 %.
+    assert 0.4 < errors.std(ddof=1) / bars.mean() < 1.3
     assert errors.mean() == pytest.approx(1.0 / (1.0 - 0.2) - 1.0, abs=4 * errors.std(ddof=1) / np.sqrt(24))
 
 
 def test_portable_engine_compares_independent_runs():
-    settings = {"scheme": "midpoint", "particle_friction": 1.0, "frames": 100, "platform": REFERENCE}
+    settings = {"scheme": "midpoint", "particle_friction": 1.0, "frames": 64, "platform": REFERENCE}
     checks = [check_time_step(*bound_particles(100, engine), 0.4, **settings) for engine in ("portable", "compiled")]
     assert not checks[0].paired and checks[1].paired
     assert "independent paths" in str(checks[0])
@@ -221,6 +217,12 @@ def test_run_that_blows_up_is_wrong():
     check = check_time_step(filaments, system, positions, 1e6, scheme="midpoint", frames=100, platform=REFERENCE)
     assert check.verdict == "wrong" and "blown up" in check.failure and check.failure in str(check)
     assert check.observables == []
+
+
+def test_check_of_a_single_frame_says_so():
+    filaments, system, positions = free_filaments(2, 4)
+    check = check_time_step(filaments, system, positions, 1e7, seconds=1e-9, platform=REFERENCE)
+    assert check.frames == 1 and check.verdict == "not resolved" and "too few steps" in str(check)
 
 
 def test_short_check_is_not_resolved():
@@ -329,11 +331,16 @@ def test_exact_averages_count_only_from_equilibrium(tmp_path):
 
 
 def test_command_ends_cleanly_when_interrupted(tmp_path):
-    command = [sys.executable, "-m", "openmm_cylchain.cli", "timestep", configured(tmp_path), "--check"]
-    process = subprocess.Popen([*command, "--seconds", "60"], stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-    # The first progress comes after six seconds; the bounds are printed when the run begins.
-    time.sleep(5.0)
+    # Of the portable engine, which runs Python within a step.
+    path = configured(tmp_path, ("[simulation]", '[simulation]\nengine = "portable"'))
+    command = [sys.executable, "-c", "from openmm_cylchain.cli import main; exit(main())", "timestep", path, "--check"]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "cwd": tmp_path}
+    process = subprocess.Popen([*command, "--seconds", "60"], **pipes)
+    # Printed before the check begins.
+    while "in this configuration" not in process.stdout.readline():
+        assert process.poll() is None
+    time.sleep(1.0)
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=20)
     assert process.returncode == 130
-    assert "error: interrupted." in errors and "Traceback" not in errors
+    assert "interrupted" in errors and "Traceback" not in errors
