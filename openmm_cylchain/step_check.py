@@ -1,8 +1,12 @@
 """A run that checks its own step: averages with the step h beside those with h/2 on the same Brownian path.
 
 Both runs begin with the same positions and, with the compiled engine, follow one path (``setPathLevel``), so that what
-differs between their averages is the step, and little noise. All schemes are of weak order one: an average is
-A(h) = A + c h + O(h^2), so that its error is
+differs between their averages is the step, and little noise. With 16 segments of F-actin in the recommended step, error
+bars are 2 times (bending energy) to 18 times (end-to-end distance) as small as those of independent runs, 6 times for the
+slowest bending modes; for stretching, which is drawn anew in each step, 1.4 times. The runs are not brought together
+again on the way: that makes error bars hardly smaller, and would hide errors of averages that relax slowly.
+
+All schemes are of weak order one: an average is A(h) = A + c h + O(h^2), so that its error is
 
     A(h) - A = 2 (A(h) - A(h/2)) + O(h^2)                          two steps
     A(h) - A = (2 A(h) + 6 A(h/2) - 8 A(h/4))/3 + O(h^3)           three steps
@@ -13,8 +17,7 @@ symmetric drift may be, two steps show 3/2 of it.
 
 The standard error comes from the differences, frame by frame: from their means over 16 and 32 blocks of time, and over
 filaments of one kind if there are eight at least. The largest of them counts, so that it is rather too large than too
-small, by a sixth or so. The rule, with the error e and its
-standard error s:
+small, by a sixth or so. The rule, with the error e and its standard error s:
 
     wrong           |e| - 4 s > 5 %
     right           |e| <= 5 % and 4 s <= 5 %, within |e| + 4 s
@@ -134,7 +137,7 @@ class ObservableCheck:
         bar = f"error bar {_percent(SIGMAS * self.standard_error)}"
         if not math.isfinite(self.required_seconds):
             return "not resolved: too few steps, run longer"
-        return f"not resolved: {bar}, run about {self.required_seconds:.2g} s"
+        return f"not resolved: {bar}, run about {_round(self.required_seconds)} s"
 
 
 @dataclass(frozen=True)
@@ -208,7 +211,7 @@ class StepCheck:
             return f"The step of {step} is right."
         open_ = [one for one in self.observables if one.verdict != "right"]
         longest = max((one.required_seconds for one in open_), default=math.inf)
-        advice = f"check for about {longest:.2g} s" if math.isfinite(longest) else "check for longer"
+        advice = f"check for about {_round(longest)} s" if math.isfinite(longest) else "check for longer"
         return (
             f"Not resolved: {len(open_)} of {len(self.observables)} errors are not known to "
             f"{_percent(LARGEST_ERROR)}; {advice}."
@@ -243,6 +246,10 @@ def _surely_large(error, standard_error):
 
 def _percent(share, sign=""):
     return f"{100.0 * share:{sign}.2g} %" if abs(share) < 0.995 else f"{100.0 * share:{sign}.0f} %"
+
+
+def _round(seconds):
+    return f"{float(f'{seconds:.2g}'):.6g}"
 
 
 def check_time_step(
