@@ -2,9 +2,9 @@
 
 Both runs begin with the same positions and, with the compiled engine, follow one path (``setPathLevel``), so that what
 differs between their averages is the step, and little noise. With 16 segments of F-actin in the recommended step, error
-bars are 2 times (bending energy) to 18 times (end-to-end distance) as small as those of independent runs, 6 times for the
-slowest bending modes; for stretching, which is drawn anew in each step, 1.4 times. The runs are not brought together
-again on the way: that makes error bars hardly smaller, and would hide errors of averages that relax slowly.
+bars are 2 times (bending energy) to 18 times (end-to-end distance) as small as those of independent runs, 6 times for
+the slowest bending modes; for stretching, which is drawn anew in each step, 1.4 times. The runs are not brought
+together again on the way: that makes error bars hardly smaller, and would hide errors of averages that relax slowly.
 
 All schemes are of weak order one: an average is A(h) = A + c h + O(h^2), so that its error is
 
@@ -19,7 +19,7 @@ The standard error comes from the differences, frame by frame: from their means 
 filaments of one kind if there are eight at least. The largest of them counts, so that it is rather too large than too
 small, by a sixth or so. The rule, with the error e and its standard error s:
 
-    wrong           |e| - 4 s > 5 %
+    wrong           |e| - 4 s > 5 %, or |e| > 100: energies that grow without bound have no error bar
     right           |e| <= 5 % and 4 s <= 5 %, within |e| + 4 s
     not resolved    anything else: a longer check is needed
 
@@ -48,6 +48,9 @@ from .timestep import as_step, check_scheme, implicit_time_step
 
 LARGEST_ERROR = 0.05
 """Relative error up to which a step is right."""
+
+DIVERGED = 100.0
+"""Relative error from which on a step is wrong, whatever the standard error."""
 
 SIGMAS = 4.0
 """Standard errors in an error bar."""
@@ -128,6 +131,8 @@ class ObservableCheck:
 
     def explanation(self):
         """The verdict in words."""
+        if _diverged(self.error):
+            return "wrong: it grows without bound"
         if _surely_large(self.error, self.standard_error):
             return f"wrong by {_percent(self.error)} +- {_percent(self.standard_error)}"
         if self.off_exact:
@@ -135,7 +140,7 @@ class ObservableCheck:
         if self.verdict == "right":
             return f"right within {_percent(abs(self.error) + SIGMAS * self.standard_error)}"
         bar = f"error bar {_percent(SIGMAS * self.standard_error)}"
-        if not math.isfinite(self.required_seconds):
+        if not math.isfinite(self.standard_error):
             return "not resolved: too few steps, run longer"
         return f"not resolved: {bar}, run about {_round(self.required_seconds)} s"
 
@@ -200,8 +205,9 @@ class StepCheck:
         wrong = [one for one in self.observables if one.verdict == "wrong"]
         if wrong:
             worst = max(wrong, key=lambda one: abs(one.error))
-            text = f"The step of {step} is wrong: {', '.join(one.name for one in wrong)}."
-            if abs(worst.error) > LARGEST_ERROR:
+            others = f", and {len(wrong) - 1} more" if len(wrong) > 1 else ""
+            text = f"The step of {step} is wrong: {worst.name}{others}."
+            if LARGEST_ERROR < abs(worst.error) < DIVERGED:
                 better = format_time(self.step * LARGEST_ERROR / abs(worst.error), 2)
                 text += f" A step of {better} should do; check it, too."
             return text
@@ -240,12 +246,17 @@ def _finite(content):
 
 
 def _surely_large(error, standard_error):
-    # An error bar that is not finite is no reason to call anything wrong.
-    return abs(error) - SIGMAS * standard_error > LARGEST_ERROR
+    return abs(error) - SIGMAS * standard_error > LARGEST_ERROR or _diverged(error)
+
+
+def _diverged(error):
+    # Written so that NaN has.
+    return not abs(error) <= DIVERGED
 
 
 def _percent(share, sign=""):
-    return f"{100.0 * share:{sign}.2g} %" if abs(share) < 0.995 else f"{100.0 * share:{sign}.0f} %"
+    digits = ".2g" if abs(share) < 0.995 else ".0f" if abs(share) < DIVERGED else ".1e"
+    return f"{100.0 * share:{sign}{digits}} %"
 
 
 def _round(seconds):
@@ -424,9 +435,8 @@ class _Run:
         self._taken += self._steps
         values = self.look(probe)
         if not all(np.all(np.isfinite(one)) for one in values):
-            raise InstabilityError(
-                f"a run has blown up in step {self._taken} of {self._steps // STEPS_PER_FRAME} per step h."
-            )
+            step = format_time(self._integrator.getStepSize()._value, 3)
+            raise InstabilityError(f"with a step of {step} it has blown up by step {self._taken}.")
         return values
 
     def divided_share(self):
@@ -619,6 +629,7 @@ def _slowest_relaxation(kinds, filaments, temperature):
     return longest
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def _compare(probe, records, exact, seconds):
     late = records[int(_WARM_UP * len(records)) :]
     checks = []
@@ -737,7 +748,9 @@ def _table_row(one):
         one.name,
         one.unit,
         *(f"{value:.4g}" for value in one.values),
-        f"{100.0 * one.error:+.2f} +- {100.0 * one.standard_error:.2f} %",
+        _percent(one.error, "+")
+        if _diverged(one.error)
+        else f"{100.0 * one.error:+.2f} +- {100.0 * one.standard_error:.2f} %",
         exact,
         off,
         one.explanation(),

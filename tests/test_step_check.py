@@ -217,6 +217,14 @@ def test_run_that_blows_up_is_wrong():
     check = check_time_step(filaments, system, positions, 1e6, scheme="midpoint", frames=100, platform=REFERENCE)
     assert check.verdict == "wrong" and "blown up" in check.failure and check.failure in str(check)
     assert check.observables == []
+    # Springs that grow by 5 % in each step have no error bar before they blow up.
+    settings = {"scheme": "midpoint", "particle_friction": 1.0, "platform": REFERENCE}
+    growing = check_time_step(*bound_particles(20), 1.025, frames=100, **settings)
+    assert growing.verdict == springs_of(growing).verdict == "wrong" and "grows without bound" in str(growing)
+    assert max(map(len, str(growing).splitlines())) < 150
+    json.dumps(growing.as_dict(), allow_nan=False)
+    beyond = check_time_step(*bound_particles(20), 1.15, frames=400, **settings)
+    assert beyond.verdict == "wrong" and "blown up" in beyond.failure
 
 
 def test_check_of_a_single_frame_says_so():
@@ -256,6 +264,7 @@ def test_rule():
     assert observable(0.08, 0.01).verdict == "not resolved"
     assert observable(0.08, 0.01).required_seconds == pytest.approx(10 * (0.04 / 0.03) ** 2)
     assert observable(0.5, np.inf).verdict == "not resolved"
+    assert observable(101.0, np.inf).verdict == observable(np.nan, np.nan).verdict == "wrong"
     off = {"exact": 1.0, "deviation": 0.3, "deviation_standard_error": 0.01, "judged_by_exact": True}
     assert observable(0.0, 0.001, **off).verdict == "wrong"
     assert observable(0.0, 0.001, **(off | {"judged_by_exact": False})).verdict == "right"
