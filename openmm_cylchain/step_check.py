@@ -294,7 +294,7 @@ def check_time_step(
     The System is copied. What is not part of it, such as crosslinks that a Crosslinks object adds and removes, stays as
     it is in the System.
 
-    With the portable engine, runs do not follow one path: errors are right, but error bars are some ten times as large.
+    With the portable engine, runs do not follow one path: error bars are several times as large.
 
     Parameters
     ----------
