@@ -13,6 +13,7 @@ from .errors import (
 from .filament import DSDNA, F_ACTIN, MICROTUBULE, FilamentType
 from .flow import Flow
 from .friction import EndCorrections, SegmentFriction, stokes_friction
+from .step_check import check_time_step
 from .timestep import TimeStep, recommended_time_step
 from .version import __version__
 
@@ -34,6 +35,7 @@ __all__ = [
     "TimeStepError",
     "TimeStepWarning",
     "__version__",
+    "check_time_step",
     "recommended_time_step",
     "stokes_friction",
 ]

@@ -1,19 +1,22 @@
 """The console script ``openmm-cylchain``: runs a configuration, explains its time step, measures, reproduces, informs.
 
 Exit codes: 0 done, 1 the simulation blew up, a file could not be written or results are not reproduced, 2 wrong input,
-130 and 143 interrupted by SIGINT and SIGTERM.
+3 a time step is wrong, 130 and 143 interrupted by SIGINT and SIGTERM.
 """
 
 import argparse
+import json
 import math
 import sys
 import warnings
+from pathlib import Path
 
 from .engines import ENGINES
 from .errors import InputError, InstabilityError, TimeStepWarning
 from .version import __version__
 
-_FAILED, _WRONG_INPUT, _KEYBOARD_INTERRUPT = 1, 2, 130
+_FAILED, _WRONG_INPUT, _WRONG_STEP, _KEYBOARD_INTERRUPT = 1, 2, 3, 130
+_SECONDS_OF_CHECK = 20.0
 
 
 def main(arguments=None):
@@ -78,6 +81,16 @@ def _parser():
 
     timestep = commands.add_parser("timestep", help="print the bounds on the time step and the recommended step")
     timestep.add_argument("configuration", metavar="CONFIG", help="TOML file that describes filaments and solvent")
+    timestep.add_argument(
+        "--check",
+        action="store_true",
+        help="run with the step of CONFIG and with half of it, and say what is wrong; exit code 3 if something is, "
+        "0 if all is right or not resolved",
+    )
+    timestep.add_argument(
+        "--seconds", type=float, metavar="N", help=f"how long the check may take, {_SECONDS_OF_CHECK:g} if not given"
+    )
+    timestep.add_argument("--json", metavar="FILE", help="write the results of the check to FILE as well")
     timestep.set_defaults(command=_time_step)
 
     _add_benchmarks(commands.add_parser("benchmark", help="measure speed and memory on this machine"))
@@ -165,6 +178,8 @@ def _time_step(options):
     from .physical_units import format_time
     from .timestep import recommended_time_step, stability_bounds, time_step_bounds
 
+    if not options.check and (options.seconds is not None or options.json is not None):
+        raise InputError("--seconds and --json belong to --check: give that, too.")
     configuration = read_configuration(options.configuration)
     solvent, settings = configuration.solvent, configuration.simulation
     for group in configuration.filaments:
@@ -180,6 +195,36 @@ def _time_step(options):
             print(f"  {f'allowed by {name}':<36} {time:>12}")
         print(f"  {'recommended':<36} {format_time(recommended.step, 4):>12}  ({recommended.reason})")
         print(f"  {'in this configuration':<36} {format_time(settings.time_step, 4):>12}")
+    if options.check:
+        _check_time_step(configuration, options)
+
+
+def _check_time_step(configuration, options):
+    from .benchmark.report import Progress, check_output_path
+    from .run import RunInterrupted, check_step
+    from .run_directory import write_atomically
+
+    if options.json is not None:
+        check_output_path(options.json)
+    # What is printed already is for the time until the check is done.
+    sys.stdout.flush()
+    progress = Progress()
+    try:
+        check = check_step(configuration, _SECONDS_OF_CHECK if options.seconds is None else options.seconds, progress)
+    except RunInterrupted as interruption:
+        progress.finish()
+        _say("interrupted", interruption)
+        raise SystemExit(128 + interruption.signal_number) from None
+    progress.finish()
+    print(f"\n{check}", flush=True)
+    if options.json is not None:
+        content = json.dumps(check.as_dict(), indent=2, allow_nan=False)
+        write_atomically(Path(options.json), f"{content}\n".encode())
+        print(f"\nWritten to {options.json}")
+    if check.verdict == "wrong":
+        raise SystemExit(_WRONG_STEP)
+    if check.verdict != "right":
+        _say("warning", "the step is not known to be right: give the check more time with --seconds.")
 
 
 def _information(options):

@@ -18,6 +18,7 @@ from .placement import joint_stiffnesses
 from .progress import Progress
 from .quantities import thermal_energy
 from .run_directory import Checkpoint, EnergyTable, RunDirectory, TrajectoryFile, write_atomically
+from .step_check import check_time_step
 from .structure_files import write_lammps_data, write_psf
 from .theory import chain_mean_square_end_to_end
 
@@ -156,6 +157,53 @@ def _create_simulation(configuration, filaments):
         raise InputError(
             f'[simulation] platform = "{settings.platform}" cannot be used: {error}. "Reference" always can.'
         ) from None
+
+
+def check_step(configuration, seconds=20.0, say=lambda message: None):
+    """Run a configuration for a while with its step and with half of it: see ``step_check.check_time_step``.
+
+    Parameters
+    ----------
+    configuration : Configuration
+    seconds : float
+        Time that it may take.
+    say : callable (str), optional
+        Told how far it is.
+
+    Returns
+    -------
+    StepCheck
+
+    Raises
+    ------
+    InputError
+        If the configuration cannot be simulated.
+    RunInterrupted
+        After SIGINT or SIGTERM.
+    """
+    settings = configuration.simulation
+    filaments = create_filaments(configuration)
+    _, system, positions = filaments.build()
+    platform, properties = _platform(settings)
+    # An interruption that Python raises within a step may end as an error of OpenMM.
+    with _Signals() as signals:
+        check = check_time_step(
+            filaments,
+            system,
+            positions,
+            settings.time_step,
+            scheme=settings.scheme,
+            seconds=seconds,
+            random_seed=settings.seed,
+            equilibrium=all(group.start == "equilibrium" for group in configuration.filaments),
+            platform=platform,
+            properties=properties,
+            say=say,
+            stop=lambda: signals.received is not None,
+        )
+    if signals.received is not None:
+        raise RunInterrupted(signals.received, "The check has not come to its end: start it again.")
+    return check
 
 
 def _platform(settings):
