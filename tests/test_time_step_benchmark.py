@@ -11,6 +11,7 @@ from openmm_cylchain.benchmark import bead_spring, measurement, time_step, time_
 from openmm_cylchain.benchmark.measurement import Estimate
 from openmm_cylchain.benchmark.time_step import StepErrors, SystemErrors, ladder
 from openmm_cylchain.benchmark.time_step_systems import F_ACTIN_SYSTEM, WORKLOAD
+from openmm_cylchain.schemes import SCHEMES
 
 TINY = time_step.Effort((replace(F_ACTIN_SYSTEM, segments=4),), frames=24, share=0.05, every=3, repetitions=2)
 
@@ -69,7 +70,7 @@ def test_changes_of_the_middle():
 def test_errors_of_a_system():
     result = time_step.measure_system(TINY.systems[0], TINY)
     schemes = {one.scheme for one in result.steps}
-    assert schemes == {"euler", "midpoint", "implicit"}
+    assert schemes == set(SCHEMES)
     for one in result.steps:
         assert set(one.equilibrium) == {"stretching energy", "bending energy", "end-to-end distance"}
         assert all(np.isfinite(error.value) for error in (*one.equilibrium.values(), *one.dynamics.values()))
@@ -83,7 +84,7 @@ def test_errors_of_a_system():
 def test_steps_that_blow_up_end_the_ladder(monkeypatch):
     monkeypatch.setattr(time_step, "_simulate", lambda *arguments: None)
     result = time_step.measure_system(TINY.systems[0], TINY)
-    assert [one.scheme for one in result.steps] == ["implicit", "euler", "midpoint"]
+    assert [one.scheme for one in result.steps] == ["implicit", "euler", "midpoint", "implicit-second-order"]
     assert all(not one.passes(1.0, 1.0) for one in result.steps)
     assert "blown up" in time_step.format_errors(result)
 

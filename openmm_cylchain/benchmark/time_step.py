@@ -221,6 +221,9 @@ def _ladders(system, schemes, every):
     for scheme in EXPLICIT_SCHEMES:
         if scheme in schemes:
             ladders[scheme] = [step for step in ladders["implicit"] if 0.2 * explicit <= step <= min(bounds.values())]
+    if "implicit-second-order" in schemes:
+        # What it is for are steps at which scheme "implicit" is of first order.
+        ladders["implicit-second-order"] = [step for step in ladders["implicit"] if step >= 0.2 * recommended]
     return ladders
 
 
@@ -358,7 +361,7 @@ def largest_step_rows(results):
     for result in results:
         for suffix, allowed in CRITERIA.items():
             for scheme in SCHEMES:
-                name = f"largest_step_{scheme}_{result.system.name}{suffix}"
+                name = f"largest_step_{_words(scheme)}_{result.system.name}{suffix}"
                 largest = result.largest_step(scheme, *allowed)
                 if largest is None:
                     missing[name] = "no step that was tried is accurate enough"
@@ -375,7 +378,7 @@ def _speed_rows(actin, effort, say, missing):
     for scheme in SCHEMES:
         largest = actin.largest_step(scheme, *CRITERIA[""])
         if largest is None:
-            missing[f"simulated_time_per_second_{scheme}"] = "no step that was tried is accurate enough"
+            missing[f"simulated_time_per_second_{_words(scheme)}"] = "no step that was tried is accurate enough"
         else:
             steps[scheme] = (actin.system, scheme, largest.step)
     steps["implicit_recommended"] = (actin.system, "implicit", actin.recommended)
@@ -393,7 +396,7 @@ def _speed_rows(actin, effort, say, missing):
     for scheme in SCHEMES:
         if scheme in steps:
             speed = median(1e-12 * steps[scheme][2] / times[scheme])
-            rows.append(row(f"simulated_time_per_second_{scheme}", scaled(speed, 1e6), "us/s"))
+            rows.append(row(f"simulated_time_per_second_{_words(scheme)}", scaled(speed, 1e6), "us/s"))
     for scheme in EXPLICIT_SCHEMES:
         if scheme in steps and "implicit" in steps:
             speeds = ratio(times[scheme], times["implicit"])
@@ -453,20 +456,25 @@ def _error_rows(result):
     for one in result.steps:
         for name, error in {**one.equilibrium, **one.dynamics}.items():
             if np.isfinite(error.value):
-                words = name.replace(", ", "_at_").replace(" ", "_").replace("-", "_")
-                label = f"error_{words}_{one.scheme}_{result.system.name}_step_{one.step / _MICROSECOND:g}_us"
+                words = _words(name.replace(", ", "_at_"))
+                label = f"error_{words}_{_words(one.scheme)}_{result.system.name}_step_{one.step / _MICROSECOND:g}_us"
                 yield row(label, error, "1")
+
+
+def _words(name):
+    # As in names of rows.
+    return name.replace(" ", "_").replace("-", "_")
 
 
 def format_errors(result):
     """A table of the errors of a system in per cent, a line for each scheme and step."""
     header = (
-        f"{'scheme':<9} {'step':>8} {'V_el':>15} {'V_b':>15} {'R^2':>15} {'dynamics':>9} {'divided':>8} {'µs/s':>9}"
+        f"{'scheme':<21} {'step':>8} {'V_el':>15} {'V_b':>15} {'R^2':>15} {'dynamics':>9} {'divided':>8} {'µs/s':>9}"
     )
     lines = [f"{result.system.label} (errors in %; recommended {format_time(result.recommended, 3)})", header]
     for scheme in SCHEMES:
         for one in result.of_scheme(scheme):
-            lines.append(f"{scheme:<9} {format_time(one.step, 2):>8} {_columns(one)}")
+            lines.append(f"{scheme:<21} {format_time(one.step, 2):>8} {_columns(one)}")
     return "\n".join(lines)
 
 

@@ -11,7 +11,12 @@ from ..schemes import SCHEMES
 from .report import check_output_path
 from .time_step import CRITERIA
 
-_COLORS = {"euler": "tab:red", "midpoint": "tab:orange", "implicit": "tab:blue"}
+_COLORS = {
+    "euler": "tab:red",
+    "midpoint": "tab:orange",
+    "implicit": "tab:blue",
+    "implicit-second-order": "tab:purple",
+}
 _MICROSECOND = 1e6
 _LIMITS = (0.05, 200.0)
 _FORMATS = (".png", ".svg", ".pdf")
