@@ -8,6 +8,7 @@ import argparse
 import math
 import sys
 import warnings
+from dataclasses import replace
 
 from .engines import ENGINES
 from .errors import InputError, InstabilityError, TimeStepWarning
@@ -180,6 +181,8 @@ def _time_step(options):
             print(f"  {f'allowed by {name}':<36} {time:>12}")
         print(f"  {'recommended':<36} {format_time(recommended.step, 4):>12}  ({recommended.reason})")
         print(f"  {'in this configuration':<36} {format_time(settings.time_step, 4):>12}")
+        step = replace(recommended, step=settings.time_step)
+        print(f"  dynamics at that step: {step.describe_dynamics()}")
 
 
 def _information(options):
