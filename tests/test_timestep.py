@@ -366,7 +366,12 @@ def test_recommended_step_is_that_of_the_most_demanding_filament():
         filaments.recommended_time_step()
     filaments.add_straight(F_ACTIN, 10, [0, 0, 0], [1, 0, 0])
     filaments.add_straight(DSDNA, 10, [0, 0, 100], [1, 0, 0])
-    assert filaments.recommended_time_step() == recommended_time_step(DSDNA, VISCOSITY, TEMPERATURE, segments=10)
+    demanding = recommended_time_step(DSDNA, VISCOSITY, TEMPERATURE, segments=10)
+    recommended = filaments.recommended_time_step()
+    assert (recommended.step, recommended.reason) == (demanding.step, demanding.reason)
+    # Dynamics are those of both.
+    assert set(demanding.dynamics) < set(recommended.dynamics)
+    assert recommended.resolved_relaxation_time() >= demanding.resolved_relaxation_time()
 
 
 @pytest.mark.parametrize("scheme", ["verlet", "", "Midpoint"])
