@@ -94,7 +94,7 @@ def exact_energies(kind):
 
 def assert_energies(kind, filaments, exact, bound, steps, every=4, closed=False, step=None, bending_bound=None):
     """V_el and V_b within a bound, with errors of less than a quarter of it, and hardly a step divided."""
-    context, integrator = context_of(filaments, step)
+    context, integrator = context_of(filaments, step, checks=step is None)
     chains = len(filaments.node_indices)
     integrator.step(steps // 5)
     samples = []
@@ -107,6 +107,7 @@ def assert_energies(kind, filaments, exact, bound, steps, every=4, closed=False,
         if expected == 0.0:
             continue
         ratio, error = values.mean() / expected, values.std(ddof=1) / np.sqrt(chains) / expected
+        print(f"{name}: {ratio:.4f} +- {error:.4f} of exact")
         assert SIGMAS * error < allowed, (name, error)
         assert abs(ratio - 1.0) < allowed + SIGMAS * error, (name, ratio, error)
     taken = steps // 5 + steps // every * every
@@ -197,35 +198,41 @@ def wall_of(thickness):
 @pytest.mark.slow
 def test_walls_have_their_energy_at_the_recommended_step():
     """Actin between walls of 0.01 pN/nm: starts, and the exact energy, from free chains put there by weight."""
-    stiffness, thickness, segments, chains = 0.01 * PICONEWTON_PER_NANOMETER, 1000.0, 8, 400
+    stiffness, thickness, segments, chains = 0.01 * PICONEWTON_PER_NANOMETER, 100.0, 2, 1200
     generator = np.random.default_rng(1)
     shapes = np.array([filament.positions for filament in in_equilibrium(F_ACTIN, segments, 2000)])
     shapes -= shapes.mean(axis=1, keepdims=True)
     shape = generator.integers(len(shapes), size=1_000_000)
-    turns = Rotation.random(len(shape), random_state=generator)
-    up = turns.inv().apply([0.0, 0.0, 1.0])
-    heights = np.einsum("cni,ci->cn", shapes[shape], up) + generator.uniform(-1000, 1000, (len(shape), 1))
+    # The normal of the walls, as a filament has it, at most 0.4 along its axis: no other leaves it between them.
+    axis = shapes[shape, -1] - shapes[shape, 0]
+    axis /= np.linalg.norm(axis, axis=1)[:, None]
+    across = np.cross(axis, generator.normal(size=axis.shape))
+    across /= np.linalg.norm(across, axis=1)[:, None]
+    along = generator.uniform(-0.4, 0.4, (len(shape), 1))
+    up = along * axis + np.sqrt(1.0 - along**2) * across
+    heights = np.einsum("cni,ci->cn", shapes[shape], up) + generator.uniform(-250, 250, (len(shape), 1))
     energy = 0.5 * stiffness * np.sum(np.maximum(0.0, np.abs(heights) - thickness / 2) ** 2, axis=1) / KT
     weight = np.exp(-energy)
     exact = np.sum(weight * energy) / np.sum(weight)
-    chosen = generator.choice(len(shape), chains, p=weight / weight.sum())
+    assert weight.sum() ** 2 / np.sum(weight**2) > 1e5
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
-    for index in chosen:
-        nodes = turns[index].apply(shapes[shape[index]])
+    for index in generator.choice(len(shape), chains, p=weight / weight.sum()):
+        nodes = Rotation.align_vectors([[0.0, 0.0, 1.0]], [up[index]])[0].apply(shapes[shape[index]])
         filaments.add_nodes(F_ACTIN, nodes + [0, 0, heights[index, 0] - nodes[0, 2]])
     _, system, positions = filaments.build()
     system.addForce(confinement.wall_force(wall_of(thickness), stiffness, range(chains * (segments + 1))))
-    context, integrator = context_of(filaments, system=system, positions=positions)
     assert "Wall" in filaments.recommended_time_step("implicit", system=system).reason
+    context, integrator = context_of(filaments, system=system, positions=positions)
     samples = []
-    for _ in range(1500):
+    for _ in range(750):
         integrator.step(4)
         nodes = positions_of(context).reshape(chains, -1, 3)
         depth = np.maximum(0.0, np.abs(nodes[..., 2]) - thickness / 2)
         samples.append(0.5 * stiffness * np.sum(depth**2, axis=1) / KT)
     by_chain = np.mean(samples, axis=0)
     ratio, error = by_chain.mean() / exact, by_chain.std(ddof=1) / np.sqrt(chains) / exact
-    assert SIGMAS * error < 0.1
+    print(f"wall: {ratio:.4f} +- {error:.4f} of exact")
+    assert SIGMAS * error < 0.05
     assert abs(ratio - 1.0) < 0.05 + SIGMAS * error, (ratio, error)
     assert integrator.getNumDividedSteps() == 0
 
@@ -252,7 +259,8 @@ def test_a_wall_at_too_long_a_step_warns():
 
 STIFFNESSES = (1e2, 1e5, 1e8, 1e11)
 QUICK = {(1e11, 1000, ())}
-ALL = [(k, joint, clamped) for k in STIFFNESSES for joint in (0, 10, 1000) for clamped in ((), (0,))]
+ALL = [(k, joint, ()) for k in STIFFNESSES for joint in (0, 10, 1000)]
+ALL += [(k, joint, (0,)) for k in (1e2, 1e11) for joint in (0, 10, 1000)]
 FREE = [each if each in QUICK else slow(*each) for each in ALL]
 
 
@@ -260,9 +268,10 @@ FREE = [each if each in QUICK else slow(*each) for each in ALL]
 def test_energies_of_chains_of_any_stiffness(stiffness, joint, clamped):
     kind = chain_of(stiffness, joint)
     filaments = in_equilibrium(kind, 3, 2000, clamped=clamped)
-    # Soft lengths are right to 2 % only.
-    bound = 0.02 if stiffness < 1e3 else 0.01
-    assert_energies(kind, filaments, exact_energies(kind), bound, 800 if joint else 240)
+    # Soft lengths are right to 2 % only. Beside stiff joints they relax so slowly that they are measured to 4 %.
+    bound = 0.01 if stiffness > 1e3 else 0.02 if joint < 1000 else 0.04
+    steps = 240 if joint == 0 else 1800 if (stiffness, joint) == (1e2, 1000) else 1300
+    assert_energies(kind, filaments, exact_energies(kind), bound, steps, every=max(4, steps // 100))
 
 
 # Not where stiff joints stretch soft lengths by much: no material is like that, and weights have no draws for it.
@@ -275,7 +284,7 @@ HELD += [slow(1e11, 0), slow(1e11, 1000), slow(1e8, 1000), slow(1e2, 0)]
 def test_energies_of_held_chains_and_rings_of_any_stiffness(stiffness, joint, shape):
     kind = chain_of(stiffness, joint)
     distance = None if shape == "ring" else 250.0 if joint < 100 else 295.0
-    exact = ClosedShape(kind, distance, TEMPERATURE)
+    exact = ClosedShape(kind, distance, TEMPERATURE, draws=400_000 if stiffness > 1e3 else 1_000_000)
     assert exact.effective > 1e5
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
     for nodes in exact.draw(1000):
@@ -362,7 +371,7 @@ FENE = [
     (F_ACTIN, 36.0),
     (F_ACTIN, 0.1),
     *(slow(F_ACTIN, extension) for extension in (28.8, 18.0, 10.8, 3.6, 3.0, 1.0, 0.3)),
-    *(slow(replace(DSDNA, stretching_stiffness=k, stretching_modulus=None), d) for k, d in ((70.0, 2.0), (6.0, 2.0))),
+    slow(replace(DSDNA, stretching_stiffness=70.0, stretching_modulus=None), 2.0),
 ]
 
 
@@ -370,21 +379,23 @@ FENE = [
 def test_energies_of_fene_lengths(kind, extension):
     kind = fene(kind, extension)
     soft = kind.segment_stiffness * extension**2 / KT < 30
-    filaments = in_equilibrium(kind, 8, 320 if soft else 640)
-    assert_energies(kind, filaments, exact_energies(kind), 0.05 if soft else 0.02, 600, bending_bound=0.05)
+    filaments = in_equilibrium(kind, 8, 240)
+    assert_energies(kind, filaments, exact_energies(kind), 0.05 if soft else 0.02, 360, bending_bound=0.05)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("nu", [10, 3, 1])
-def test_energies_of_soft_fene_lengths_are_within_five_per_cent(nu):
+@pytest.mark.parametrize("which", ["resolved", "drawn anew"])
+def test_energies_of_soft_fene_lengths_are_within_five_per_cent(nu, which):
     # At the longest step that resolves them, and the shortest that draws them anew.
     kind = fene(replace(DSDNA, stretching_stiffness=nu * KT / 0.05**2, stretching_modulus=None), 0.05)
     resolved, drawn = fene_steps(kind, kind.segment_friction(VISCOSITY, TEMPERATURE), TEMPERATURE)
-    for step in (resolved, drawn):
-        filaments = in_equilibrium(kind, 2, 1000)
-        exact = exact_energies(kind)
-        steps = 400 if step == drawn else 20000 if nu == 1 else 4000
-        assert_energies(kind, filaments, (exact[0], 0.0), 0.05, steps, every=4 if step == drawn else 40, step=step)
+    filaments = in_equilibrium(kind, 2, 1000)
+    exact = exact_energies(kind)[0], 0.0
+    if which == "drawn anew":
+        assert_energies(kind, filaments, exact, 0.05, 400, step=drawn)
+    else:
+        assert_energies(kind, filaments, exact, 0.05, {10: 1600, 3: 4000, 1: 8000}[nu], every=20, step=resolved)
 
 
 def test_fene_lengths_that_a_step_gets_wrong_are_warned_of():
@@ -418,6 +429,7 @@ def test_dna_has_the_persistence_length_of_its_label():
     by_chain = np.mean(cosines, axis=0)
     persistence = -DSDNA.segment_length / np.log(by_chain.mean()) / length
     error = by_chain.std(ddof=1) / np.sqrt(3000) / (1 - by_chain.mean())
+    print(f"persistence length: {persistence:.4f} +- {error:.4f} of its label")
     assert SIGMAS * error < 0.02
     assert abs(persistence - 1.0) < 0.02, (persistence, error)
 
