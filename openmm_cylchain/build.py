@@ -33,6 +33,7 @@ from .timestep import (
     shortest,
     warn_if_driven_far,
     warn_if_far_above,
+    warn_if_fene_is_wrong,
     warn_if_strained,
     warn_if_unstable,
 )
@@ -331,8 +332,9 @@ class Filaments(FilamentCollection):
         -----
         TimeStepWarning
             If the step exceeds a bound of stability, or the recommended step of a filament more than four times; if
-            forces of the System are so stiff that variances double (k mu h > 1, see ``recommended_time_step``); or if
-            it is too long for the flow or for self-propelled filaments.
+            forces of the System are so stiff that variances double (k mu h > 1, see ``recommended_time_step``); if it is
+            too long for the flow or for self-propelled filaments; or if FENE lengths of scheme "implicit" have too much
+            energy at it (``timestep.fene_steps``).
         """
         step_size = as_step(step_size)
         self._refuse_if_not_in(system)
@@ -364,6 +366,7 @@ class Filaments(FilamentCollection):
             if not warn_if_unstable(f.type, self._viscosity, self._temperature, step, f.segments, scheme):
                 friction = self._friction(f.type, f.segments)
                 warn_if_far_above(f.type, self._viscosity, bath, step, f.segments, scheme, f.closed, friction)
+                warn_if_fene_is_wrong(f.type, bath, step, friction, scheme)
         ExplicitForces(system, self, scheme, particle_friction).warn_if_too_stiff(step)
 
     def chain_set(self, system):

@@ -9,6 +9,7 @@ import json
 import math
 import sys
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 from .engines import ENGINES
@@ -195,6 +196,8 @@ def _time_step(options):
             print(f"  {f'allowed by {name}':<36} {time:>12}")
         print(f"  {'recommended':<36} {format_time(recommended.step, 4):>12}  ({recommended.reason})")
         print(f"  {'in this configuration':<36} {format_time(settings.time_step, 4):>12}")
+        step = replace(recommended, step=settings.time_step)
+        print(f"  dynamics at that step: {step.describe_dynamics()}")
     if options.check:
         _check_time_step(configuration, options)
 

@@ -380,8 +380,11 @@ class ExplicitForces:
         if len(self._filaments) == 1:
             first, second = first[:1], np.array(ends[1:])
         stiffness = np.full(len(first), links.thermal_stiffness(None, self._filaments.temperature))
-        return [Springs(label, "crosslink to come, on the end of filament", np.arange(len(first)) // 2, first, second,
-                        stiffness)]
+        return [
+            Springs(
+                label, "crosslink to come, on the end of filament", np.arange(len(first)) // 2, first, second, stiffness
+            )
+        ]
 
     def _contacts(self, force, label):
         stiffness = next(

@@ -109,7 +109,7 @@ class ObservableCheck:
 
     @property
     def verdict(self):
-        """"right", "wrong" or "not resolved", see ``step_check``."""
+        """ "right", "wrong" or "not resolved", see ``step_check``."""
         if _surely_large(self.error, self.standard_error) or self.off_exact:
             return "wrong"
         right = abs(self.error) <= LARGEST_ERROR and SIGMAS * self.standard_error <= LARGEST_ERROR
@@ -184,7 +184,7 @@ class StepCheck:
 
     @property
     def verdict(self):
-        """"wrong" if anything is wrong, "right" if everything is right, or else "not resolved"."""
+        """ "wrong" if anything is wrong, "right" if everything is right, or else "not resolved"."""
         verdicts = [one.verdict for one in self.observables]
         if self.failure is not None or self.divided[0] > LARGEST_DIVIDED_SHARE or "wrong" in verdicts:
             return "wrong"

@@ -72,9 +72,7 @@ def test_fluctuations_decay_within_five_percent_up_to_one_over_the_step(slowest)
     for chain in range(256):
         filaments.add_equilibrium(KIND, SEGMENTS, seed=chain)
     _, system, positions = filaments.build()
-    integrator = filaments.create_integrator(
-        system, step, scheme="implicit-second-order", random_seed=3, checks=False
-    )
+    integrator = filaments.create_integrator(system, step, scheme="implicit-second-order", random_seed=3, checks=False)
     context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
     context.setPositions(positions)
     nodes = np.array(filaments.node_indices)

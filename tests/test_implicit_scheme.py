@@ -246,9 +246,7 @@ def test_filaments_that_are_pulled_and_pushed_hard_come_back(direction, nanonewt
         force.addParticle(int(nodes[-1]), direction)
     system.addForce(force)
     # Kicked so that steps are divided.
-    integrator = filaments.create_integrator(
-        system, 5 * MICROSECOND, scheme="implicit", random_seed=1, checks=False
-    )
+    integrator = filaments.create_integrator(system, 5 * MICROSECOND, scheme="implicit", random_seed=1, checks=False)
     context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
     context.setPositions(positions)
     try:

@@ -31,9 +31,7 @@ def context_of(engine, scheme="midpoint", step=STEP, level=0, seed=5, count=COUN
     for _ in range(count):
         system.addParticle(1.0)
     friction = stokes_friction(50, VISCOSITY)
-    integrator = filaments.create_integrator(
-        system, step, scheme=scheme, particle_friction=friction, random_seed=seed
-    )
+    integrator = filaments.create_integrator(system, step, scheme=scheme, particle_friction=friction, random_seed=seed)
     if level:
         integrator.setPathLevel(level)
     context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))

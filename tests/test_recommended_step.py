@@ -26,7 +26,7 @@ from openmm_cylchain import (
 from openmm_cylchain.crosslinks import Crosslinks
 from openmm_cylchain.explicit_forces import ACCURATE
 from openmm_cylchain.mobility import FilamentResponse
-from openmm_cylchain.timestep import as_step
+from openmm_cylchain.timestep import as_step, fene_steps
 
 VISCOSITY = 1.71e-3 * unit.pascal * unit.second
 TEMPERATURE = 310.0
@@ -505,22 +505,53 @@ def fene_actin(extension):
     return replace(F_ACTIN, stretching_model="fene", maximum_extension=extension)
 
 
-def test_fene_lengths_bind():
-    usual = recommended_time_step(F_ACTIN, VISCOSITY, TEMPERATURE, "implicit", 16)
-    wide = recommended_time_step(fene_actin(360.0), VISCOSITY, TEMPERATURE, "implicit", 16)
-    assert wide.allowed["rotation"] == usual.allowed["rotation"] and wide.allowed["range"] == np.inf
+def test_fene_lengths_bind_explicit_schemes():
     steps = [
-        recommended_time_step(fene_actin(extension), VISCOSITY, TEMPERATURE, "implicit", 16).step
-        for extension in (100.0, 36.0, 10.0, 3.6, 1.0, 0.5)
+        recommended_time_step(fene_actin(extension), VISCOSITY, TEMPERATURE, "midpoint", 16).step
+        for extension in (10.0, 3.6, 1.0, 0.5)
     ]
     assert np.all(np.diff(steps) < 0)
     # Half the step that noise takes beyond the range, at five sigma, and less where the range is narrow.
+    friction = F_ACTIN.segment_friction(VISCOSITY, TEMPERATURE)
     for extension in (3.6, 1.0):
         explicit = recommended_time_step(fene_actin(extension), VISCOSITY, TEMPERATURE, "midpoint", 16)
-        friction = F_ACTIN.segment_friction(VISCOSITY, TEMPERATURE)
         noise = np.sqrt(2 * KT * explicit.step * 360**2 / friction.extensional)
         assert 5 * noise < extension
     assert explicit.step < 0.01 * recommended_time_step(F_ACTIN, VISCOSITY, TEMPERATURE, "midpoint", 16).step
+
+
+def test_fene_lengths_bind_the_implicit_scheme_only_where_it_gets_them_wrong():
+    usual = recommended_time_step(F_ACTIN, VISCOSITY, TEMPERATURE, "implicit", 16).step
+    for extension in (360.0, 36.0, 3.6, 1.0, 0.1):
+        recommended = recommended_time_step(fene_actin(extension), VISCOSITY, TEMPERATURE, "implicit", 16)
+        assert recommended.step == usual and recommended.allowed["range"] == np.inf
+    # Its steps are no longer than what these lengths take.
+    soft = replace(DSDNA, stretching_stiffness=0.1, stretching_modulus=None)
+    kind = replace(soft, stretching_model="fene", maximum_extension=4.0)
+    friction = kind.segment_friction(VISCOSITY, TEMPERATURE)
+    resolved, drawn = fene_steps(kind, friction, TEMPERATURE * unit.kelvin)
+    assert (resolved, drawn) == fene_steps(kind, friction, TEMPERATURE)
+    nu = 0.1 * 16 / KT
+    assert resolved == pytest.approx((1.5e-5 + 6e-4 * nu**2) * 16 * friction.extensional / 144 / KT)
+    assert drawn == pytest.approx(200 * friction.extensional / 0.1 / 64 / nu)
+    recommended = recommended_time_step(kind, VISCOSITY, TEMPERATURE, "implicit", 4)
+    assert recommended.step == resolved < 0.1 * recommended_time_step(DSDNA, VISCOSITY, TEMPERATURE, "implicit", 4).step
+    assert "FENE" in recommended.reason
+    stiff = replace(kind, stretching_stiffness=30 * KT / 16)
+    assert fene_steps(stiff, friction, TEMPERATURE) == (np.inf, 0.0) == fene_steps(kind, friction, 0)
+
+
+def test_soft_lengths_bind():
+    length = 100.0
+    for segments, stiffness, binds in ((1, 100, True), (1, 500, False), (2, 100, True), (8, 100, False), (8, 30, True)):
+        kind = replace(
+            F_ACTIN.with_segment_length(length), stretching_stiffness=stiffness * KT / length**2, bending_rigidity=0
+        )
+        recommended = recommended_time_step(kind, VISCOSITY, TEMPERATURE, "implicit", segments)
+        assert ("soft lengths" in recommended.bounds) == binds
+        if binds:
+            friction = kind.segment_friction(VISCOSITY, TEMPERATURE, segments)
+            assert recommended.bounds["soft lengths"] == pytest.approx(0.004 * segments * friction.extensional / KT)
 
 
 @pytest.mark.slow

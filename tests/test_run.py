@@ -439,6 +439,7 @@ def test_timestep_explains_the_bounds(tmp_path, capsys):
     assert main(["timestep", configured(tmp_path, scheme='"implicit"')]) == 0
     text = capsys.readouterr().out
     assert re.search(r"recommended +[0-9.]+ us", text) and "relaxation of the whole filament" in text
+    assert re.search(r"dynamics at that step: modes of bending that relax in [0-9.]+ [a-z]+ or longer", text)
 
 
 def test_version(capsys):

@@ -341,8 +341,7 @@ def test_command_passes_a_right_step_and_warns_of_one_that_it_cannot_tell(tmp_pa
 def test_exact_averages_count_only_from_equilibrium(tmp_path):
     text = (CONFIGURATION.replace('"equilibrium"', '"straight"'), CONFIGURATION)
     judged = [
-        [one.judged_by_exact for one in check_step(parse_configuration(each), seconds=0.3).observables]
-        for each in text
+        [one.judged_by_exact for one in check_step(parse_configuration(each), seconds=0.3).observables] for each in text
     ]
     assert not any(judged[0]) and judged[1][:3] == [True, True, True] and not any(judged[1][3:])
 

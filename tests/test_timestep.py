@@ -95,7 +95,9 @@ def test_table_3(row, length, text):
 def test_table_3_bending(row, length, text):
     value, half_digit = printed(text)
     assert bounds_in_microseconds(PRINTED_ACTIN, length)[row] == pytest.approx(value, abs=1.001 * half_digit)
-    assert bounds_in_microseconds(PAPER_ACTIN, length)[row] == pytest.approx(value, abs=1.001 * half_digit + 0.003 * value)
+    assert bounds_in_microseconds(PAPER_ACTIN, length)[row] == pytest.approx(
+        value, abs=1.001 * half_digit + 0.003 * value
+    )
 
 
 @pytest.mark.parametrize("length, text", list(zip(LENGTHS, SPEED_UP.split())))
@@ -366,7 +368,12 @@ def test_recommended_step_is_that_of_the_most_demanding_filament():
         filaments.recommended_time_step()
     filaments.add_straight(F_ACTIN, 10, [0, 0, 0], [1, 0, 0])
     filaments.add_straight(DSDNA, 10, [0, 0, 100], [1, 0, 0])
-    assert filaments.recommended_time_step() == recommended_time_step(DSDNA, VISCOSITY, TEMPERATURE, segments=10)
+    demanding = recommended_time_step(DSDNA, VISCOSITY, TEMPERATURE, segments=10)
+    recommended = filaments.recommended_time_step()
+    assert (recommended.step, recommended.reason) == (demanding.step, demanding.reason)
+    # Dynamics are those of both.
+    assert set(demanding.dynamics) < set(recommended.dynamics)
+    assert recommended.resolved_relaxation_time() >= demanding.resolved_relaxation_time()
 
 
 @pytest.mark.parametrize("scheme", ["verlet", "", "Midpoint"])
@@ -458,3 +465,45 @@ def test_warnings_where_drive_is_not_resolved(engine):
             longer = Filaments(VISCOSITY, TEMPERATURE, engine=engine)
             longer.add_straight(F_ACTIN, 16, [0, 0, 0], [1, 0, 0], propulsion=1 * unit.piconewton)
             longer.create_integrator(longer.build()[1], 0.99 * bound, flow=Flow.shear(0.059 / bound))
+
+
+@pytest.mark.parametrize("scheme", ["euler", "midpoint", "implicit"])
+@pytest.mark.parametrize("error", [0.05, 0.10])
+def test_relaxation_times_that_a_step_resolves(scheme, error):
+    # Long implicit steps are those of the implicit Euler method.
+    fastest = 1e6
+    limit = timestep.resolved_relaxation_time(3.0, scheme, error, fastest)
+    for longer in (1.001, 3.0, 100.0):
+        assert abs(timestep.effective_rate(3.0, scheme, 1 / (longer * limit), fastest) * longer * limit - 1) < error
+    beyond = timestep.effective_rate(3.0, scheme, 1 / (0.999 * limit), fastest) * 0.999 * limit
+    assert abs(beyond - 1) > error
+    z = 3.0 / limit
+    exact = math.log1p(z) / z if scheme == "implicit" else -math.log1p(-z) / z
+    assert abs(exact - 1) == pytest.approx(error, rel=1e-4)
+
+
+def test_rates_of_the_implicit_scheme():
+    # theta is 1/2 up to steps of twice the relaxation of the sharpest bend.
+    z, rate = 0.5, 0.25
+    for fastest, theta in ((0.0, 0.5), (1.0, 0.5), (5.0, 0.9)):
+        expected = -math.log((1 - (1 - theta) * z) / (1 + theta * z)) / 2.0
+        assert timestep.effective_rate(2.0, "implicit", rate, fastest) == pytest.approx(expected, rel=1e-12)
+    picoseconds = 2.0 * unit.picosecond
+    with_units = timestep.effective_rate(picoseconds, "implicit", rate / unit.picosecond, 5.0 / unit.picosecond)
+    assert with_units == pytest.approx(expected, rel=1e-12)
+    assert timestep.effective_rate(4.0, "midpoint", 0.3) == math.inf
+    for wrong in ({"error": 0.0}, {"scheme": "verlet"}, {"step": -1.0}, {"step": 1 * unit.nanometer}):
+        with pytest.raises(InputError):
+            timestep.resolved_relaxation_time(**{"step": 1.0, "scheme": "implicit", **wrong})
+    limit = timestep.resolved_relaxation_time(picoseconds, "implicit", 0.05, 5.0 / unit.picosecond)
+    assert limit == timestep.resolved_relaxation_time(2.0, "implicit", 0.05, 5.0)
+
+
+def test_a_recommended_step_says_which_modes_it_resolves():
+    recommended = recommended_time_step(F_ACTIN, VISCOSITY, TEMPERATURE, "implicit", 16)
+    fastest = 4 * F_ACTIN.joint_stiffness / F_ACTIN.segment_friction(VISCOSITY, TEMPERATURE).rotational
+    five = timestep.resolved_relaxation_time(recommended.step, "implicit", 0.05, fastest)
+    assert recommended.resolved_relaxation_time() == five > recommended.resolved_relaxation_time(0.10)
+    assert re.search(r"relax in [0-9.]+ ms or longer are right to 5 %, in", recommended.describe_dynamics())
+    rod = recommended_time_step(F_ACTIN, VISCOSITY, TEMPERATURE, "implicit", 1)
+    assert rod.resolved_relaxation_time() == 0.0 and rod.describe_dynamics() == "no modes of bending"

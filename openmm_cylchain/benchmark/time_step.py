@@ -22,9 +22,9 @@ from .. import Filaments
 from ..engines import choose_engine
 from ..errors import InstabilityError
 from ..physical_units import format_time
-from ..theory import bending_energy_mean, stretching_energy_mean
-from ..step_watch import LARGEST_DIVIDED_SHARE
 from ..schemes import EXPLICIT_SCHEMES, SCHEMES
+from ..step_watch import LARGEST_DIVIDED_SHARE
+from ..theory import bending_energy_mean, stretching_energy_mean
 from ..timestep import recommended_time_step, stability_bounds
 from .measurement import Case, Estimate, describe_machine, median, ratio, scaled, time_interleaved
 from .report import Report, row

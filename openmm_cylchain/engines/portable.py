@@ -21,8 +21,8 @@ from ..flow import Flow, as_flow, flow_velocities
 from ..geometry import joined, to_nearest_images
 from ..potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
 from ..quantities import BOLTZMANN, TEMPERATURE, non_negative, whole_number
-from ..step_watch import ExplicitWork, WorkRecorder
 from ..schemes import EXPLICIT_SCHEMES
+from ..step_watch import ExplicitWork, WorkRecorder
 from ..timestep import as_step, check_scheme
 from .description import (
     advice_after_blow_up,
