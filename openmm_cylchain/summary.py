@@ -251,9 +251,9 @@ def _notes(configuration, group, members, trajectory, short):
     drift = bending_drift(trajectory, members) if bends else 0.0
     if abs(drift) > SIGNIFICANT_DRIFT:
         yield (
-            f"Not in equilibrium from the first frame on: joints are {'more' if drift > 0 else 'less'} bent in the last "
-            f"half of the run than in its first quarter, by {abs(drift):.1f} standard errors. Leave out the start, or run "
-            "longer."
+            f"Not in equilibrium from the first frame on: joints are {'more' if drift > 0 else 'less'} bent in the "
+            f"last half of the run than in its first quarter, by {abs(drift):.1f} standard errors. Leave out the "
+            "start, or run longer."
         )
     if len(group.clamped) > 1:
         yield "Several nodes are clamped: the exact values are those of free chains, so they are not compared."

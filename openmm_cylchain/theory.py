@@ -114,9 +114,9 @@ def chain_tangent_correlation(filament_type, lag, temperature, planar=False):
 def chain_persistence_length(filament_type, temperature):
     """Length over which tangents of the discrete chain decorrelate, ``-<l>/ln<c>``, in nm; exact.
 
-    Of a type given by its ``persistence_length`` it is that length at the temperature given with it, times <l>/l0. Of one
-    given by its ``bending_rigidity`` it tends to the a/(k_B T) of ``FilamentType.persistence_length_at`` for segments
-    that are short against it. A freely jointed chain has 0.
+    Of a type given by its ``persistence_length`` it is that length at the temperature given with it, times <l>/l0. Of
+    one given by its ``bending_rigidity`` it tends to the a/(k_B T) of ``FilamentType.persistence_length_at`` for
+    segments that are short against it. A freely jointed chain has 0.
     """
     if filament_type.joint_stiffness == 0:
         return 0.0

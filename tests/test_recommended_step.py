@@ -8,7 +8,7 @@ import numpy as np
 import openmm
 import pytest
 from openmm import unit
-from scipy.linalg import eigvals, solve_discrete_lyapunov
+from scipy.linalg import eigh, eigvals, solve_discrete_lyapunov
 
 from openmm_cylchain import (
     DSDNA,
@@ -26,6 +26,7 @@ from openmm_cylchain import (
 from openmm_cylchain.crosslinks import Crosslinks
 from openmm_cylchain.explicit_forces import ACCURATE
 from openmm_cylchain.mobility import FilamentResponse
+from openmm_cylchain.schemes import IMPLICIT_SCHEMES, SCHEMES, amplification_of_second_order
 from openmm_cylchain.timestep import as_step, fene_steps
 
 VISCOSITY = 1.71e-3 * unit.pascal * unit.second
@@ -86,18 +87,34 @@ def straight_matrices(kind, segments, step):
     return resistance, stiffness, max(0.5, 1 - 1 / fastest)
 
 
+def linear_step(scheme, resistance, stiffness, spring, theta):
+    """What a step makes of the nodes, without noise, for linear forces of its own and an explicit spring."""
+    if scheme == "implicit":
+        return np.eye(len(stiffness)) - np.linalg.solve(resistance + theta * stiffness, stiffness + spring)
+    diagonal = 1 - np.sqrt(0.5)
+    matrix = resistance + diagonal * stiffness
+    first = np.linalg.solve(matrix, resistance - diagonal * spring)
+    return np.linalg.solve(matrix, resistance - (1 - diagonal) * stiffness @ first - spring)
+
+
 @pytest.mark.parametrize("kind, segments", [(DSDNA, 8), (F_ACTIN, 16), (MICROTUBULE, 8)])
 @pytest.mark.parametrize("place", [0, 0.5])
-def test_no_variance_is_larger_than_the_bound(kind, segments, place):
-    # The linear scheme in full: y = x - A^-1 (K + S) x + noise, A = Z/h + theta K, whose noise keeps k_B T K^-1.
+@pytest.mark.parametrize("scheme", IMPLICIT_SCHEMES)
+def test_no_variance_is_larger_than_the_bound(kind, segments, place, scheme):
+    # The linear schemes in full, with noise that keeps k_B T K^-1.
     node = round(place * segments)
-    step = recommended_time_step(kind, VISCOSITY, TEMPERATURE, "implicit", segments).step
+    step = recommended_time_step(kind, VISCOSITY, TEMPERATURE, scheme, segments).step
     filaments, *_ = pairs_of_filaments(kind, segments)
     friction = kind.segment_friction(VISCOSITY, TEMPERATURE, segments)
-    response = FilamentResponse(filaments[0], friction, implicit=True)
+    response = FilamentResponse(filaments[0], friction, scheme)
     for h in (1e-6 * step, 1e-2 * step, step):
         resistance, stiffness, theta = straight_matrices(kind, segments, h)
         own = np.linalg.inv(resistance / h + (theta - 0.5) * stiffness)[node, node]
+        if scheme == "implicit-second-order":
+            rates, modes = eigh(stiffness, resistance)
+            z = np.maximum(h * rates, 1e-9)
+            left = amplification_of_second_order(z)
+            own = np.sum(modes[node] ** 2 * h * 2 * (1 - left) / (z * (1 + left)))
         # Across or along, whichever is more.
         assert response.at(0, [min(node, segments - 1)], [float(node == segments)], h)[0] >= own * (1 - 1e-6)
         for strength in (0.1, 0.5, 1.5, 2.5):
@@ -105,13 +122,13 @@ def test_no_variance_is_larger_than_the_bound(kind, segments, place):
             spring[node, node] = strength / own
             # A weak trap at every node keeps the filament in place, so that variances exist.
             held = stiffness + 1e-6 * np.eye(len(stiffness)) * np.trace(stiffness) / len(stiffness)
-            whole = resistance / h + theta * held
-            advance = np.eye(len(held)) - np.linalg.solve(whole, held + spring)
+            free = linear_step(scheme, resistance / h, held, np.zeros_like(held), theta)
+            advance = linear_step(scheme, resistance / h, held, spring, theta)
             if strength > 2:
                 assert np.max(np.abs(eigvals(advance))) > 1
                 continue
-            inverse = np.linalg.inv(whole)
-            noise = inverse @ (2 * whole - held) @ inverse.T
+            equilibrium = np.linalg.inv(held)
+            noise = equilibrium - free @ equilibrium @ free.T
             variance = solve_discrete_lyapunov(advance, noise)[node, node]
             excess = variance / np.linalg.inv(held + spring)[node, node]
             assert 1 - 1e-6 < excess <= (1 + 1e-3) / (1 - strength / 2)
@@ -123,11 +140,11 @@ def test_response_to_short_steps_is_the_mobility_of_the_nodes():
     across = straight_resistance(F_ACTIN, 5, friction.perpendicular, friction.rotational)
     along = straight_resistance(F_ACTIN, 5, friction.parallel, friction.extensional)
     mobility = np.maximum(np.diag(np.linalg.inv(across)), np.diag(np.linalg.inv(along)))
-    for implicit in (True, False):
-        response = FilamentResponse(filaments[0], friction, implicit)
+    for scheme in SCHEMES:
+        response = FilamentResponse(filaments[0], friction, scheme)
         assert response.at(0, np.arange(5), np.zeros(5), 1e-3) == pytest.approx(1e-3 * mobility[:5], rel=1e-9)
     one, *_ = pairs_of_filaments(F_ACTIN, 1)
-    rod = FilamentResponse(one[0], friction, implicit=True)
+    rod = FilamentResponse(one[0], friction, "implicit")
     quarter = 360**2 / 4
     across = 1 / friction.perpendicular + quarter / friction.rotational
     end = max(across, 1 / friction.parallel + quarter / friction.extensional)
@@ -141,7 +158,7 @@ def test_filaments_in_pieces_move_no_less_than_whole_ones():
     filaments.add_straight(F_ACTIN, 128, [0, 0, 0], [1, 0, 0])
     filaments.add_straight(F_ACTIN, 160, [0, 0, 0], [1, 0, 0])
     friction = F_ACTIN.segment_friction(VISCOSITY, TEMPERATURE)
-    whole, cut = (FilamentResponse(one, friction, True) for one in filaments)
+    whole, cut = (FilamentResponse(one, friction, "implicit") for one in filaments)
     for step in (1e3, 1e9):
         interior = whole.at(0, [64], [0.0], step)[0]
         assert cut.at(0, [64], [0.0], step)[0] == pytest.approx(interior, rel=1e-3)
