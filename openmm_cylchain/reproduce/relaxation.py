@@ -50,7 +50,7 @@ _LABELS = {
 
 
 def _relaxation(records, quick, extension_time):
-    chains = (400 if quick else 2000) if extension_time == _EXTENSION_TIME else (200 if quick else 1000)
+    chains = (400 if quick else 2000) if extension_time == _EXTENSION_TIME else (320 if quick else 1000)
     return measure_relaxation(records, extension_time, chains)
 
 
