@@ -331,9 +331,9 @@ class Filaments(FilamentCollection):
         -----
         TimeStepWarning
             If the step exceeds a bound of stability, or the recommended step of a filament more than four times; if
-            forces of the System are so stiff that variances double (k mu h > 1, see ``recommended_time_step``); if it is
-            too long for the flow or for self-propelled filaments; or if FENE lengths of scheme "implicit" have too much
-            energy at it (``timestep.fene_steps``).
+            forces of the System are so stiff that variances double (k mu h > 1, see ``recommended_time_step``); if it
+            is too long for the flow or for self-propelled filaments; or if FENE lengths of scheme "implicit" have too
+            much energy at it (``timestep.fene_steps``).
         """
         step_size = as_step(step_size)
         self._refuse_if_not_in(system)

@@ -220,7 +220,7 @@ class TimeStep:
     dynamics: tuple = ()
 
     def resolved_relaxation_time(self, error=0.05):
-        """The shortest relaxation time, in ps, of a mode of bending whose rate is right to within ``error`` at the step.
+        """The shortest relaxation time, in ps, of modes of bending whose rate is right to within ``error`` at the step.
 
         See ``resolved_relaxation_time`` of this module. Zero if it holds no filaments.
         """
@@ -521,7 +521,7 @@ def fene_bound(filament_type, friction, temperature):
 
 
 def fene_steps(filament_type, friction, temperature):
-    """Where scheme "implicit" keeps the energy of FENE lengths: up to the first step, in ps, and from the second one on.
+    """Where scheme "implicit" keeps the energy of FENE lengths: up to the first step, in ps, and from the second on.
 
     With nu = k D^2/k_B T, u = (l - l0)/D has the distribution (1 - u^2)^(nu/2). A length never leaves its range, at any
     step. Steps much longer than its relaxation, tau = gamma_def/(k l0^2), draw it anew from its distribution, and short
@@ -560,11 +560,12 @@ def implicit_time_step(filament_type, viscosity, temperature, segments=2, closed
     in which a ring of radius R becomes oval, gamma_perp/(l0 a) R^4/9 = gamma_perp/(l0 a) (L/10.9)^4. (With the friction
     along the ring it is (gamma_perp + gamma_par/4)/(l0 a) R^4/9.)
 
-    Stiff lengths do not bound the step, nor does their friction: that acts on true changes of a length, so
-    a segment turns freely however slowly its length relaxes, and the length needs a run that is longer than tau_l, not
-    shorter steps. Soft ones do: with the variance s l0^2 of a length (s = k_B T/(k l0^2) for a spring), V_el of N segments
-    is measured to be too large by 8 s/N at steps of tau = gamma_def/(k l0^2) and longer. Where that is more than 2 %,
-    the step may be 0.004 N gamma_def/k_B T, which leaves 2 %. At a temperature of zero, where nothing else moves (one segment, or free joints), the relaxation of a
+    Stiff lengths do not bound the step, nor does their friction: that acts on true changes of a length, so a segment
+    turns freely however slowly its length relaxes, and the length needs a run that is longer than tau_l, not shorter
+    steps. Soft ones do: with the variance s l0^2 of a length (s = k_B T/(k l0^2) for a spring), V_el of N segments is
+    measured to be too large by 8 s/N at most, at steps of tau = gamma_def/(k l0^2) and longer. Where that is more than
+    2 %, the step may be 0.004 N gamma_def/k_B T, which leaves 2 %. FENE lengths may bind it, see ``fene_steps``. At a
+    temperature of zero, where nothing else moves (one segment, or free joints), the relaxation of a
     segment's length is resolved by 20 steps.
 
     Returns
@@ -708,7 +709,7 @@ def warn_if_fene_is_wrong(filament_type, temperature, step, friction, scheme):
     if 1.01 * resolved < step < 0.99 * drawn:
         warnings.warn(
             f"A time step of {step:.4g} ps neither resolves the lengths of filament type {filament_type.name!r} within "
-            f"their FENE range nor is long enough to draw them anew: their energies are too high. Use a step of at most "
+            "their FENE range nor is long enough to draw them anew: their energies are too high. Use a step of at most "
             f"{resolved:.4g} ps, or of at least {drawn:.4g} ps if the rest allows it.",
             TimeStepWarning,
             stacklevel=4,
