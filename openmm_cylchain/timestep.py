@@ -574,9 +574,10 @@ def implicit_time_step(
     Stiff lengths do not bound the step, nor does their friction: that acts on true changes of a length, so a segment
     turns freely however slowly its length relaxes, and the length needs a run that is longer than tau_l, not shorter
     steps. Soft ones do: with the variance s l0^2 of a length (s = k_B T/(k l0^2) for a spring), V_el of N segments is
-    measured to be too large by 8 s/N at steps of tau = gamma_def/(k l0^2) and longer. Where that is more than 2 %, the
-    step may be 0.004 N gamma_def/k_B T, which leaves 2 %. At a temperature of zero, where nothing else moves (one
-    segment, or free joints), the relaxation of a segment's length is resolved by 20 steps.
+    measured to be too large by 8 s/N at most, at steps of tau = gamma_def/(k l0^2) and longer. Where that is more than
+    2 %, the step may be 0.004 N gamma_def/k_B T, which leaves 2 %. FENE lengths may bind it, see ``fene_steps``. At a
+    temperature of zero, where nothing else moves (one segment, or free joints), the relaxation of a
+    segment's length is resolved by 20 steps.
 
     Returns
     -------
