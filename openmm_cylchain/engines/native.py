@@ -248,7 +248,8 @@ class NativeIntegrator(CylinderChainIntegrator):
         TimeStepError
             If more than one in ten steps of filaments had to be divided.
         InputError
-            If a filament was torn because positions were wrapped into a periodic box.
+            If a filament was torn because positions were wrapped into a periodic box, or if a segment of the positions
+            that were set is longer or shorter than its FENE potential allows.
         """
         steps = whole_number(steps, 0, "steps")
         if not self.checks:
@@ -271,6 +272,8 @@ class NativeIntegrator(CylinderChainIntegrator):
         except openmm.OpenMMException as error:
             if "is torn" in str(error):
                 raise InputError(f"{self._with_labels(str(error))} (openmm_cylchain.periodic.make_whole).") from None
+            if "is out of range" in str(error):
+                raise InputError(f"{self._with_labels(str(error))}.") from None
             if "has blown up" in str(error):
                 raise InstabilityError(self._with_labels(str(error)) + self._advice) from None
             raise

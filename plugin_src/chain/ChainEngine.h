@@ -15,7 +15,10 @@ struct ChainEnergy {
     double stretching = 0, bending = 0, tethers = 0;
 };
 
-/** Where a step has gone wrong: a segment whose ends would move against each other by more than its rest length. */
+/**
+ * Where a step has gone wrong: a segment whose ends would move against each other by more than its rest length, or whose
+ * length would be one that its FENE potential does not have.
+ */
 struct Instability {
     int chain = -1, segment = -1;
     double change = 0;

@@ -182,6 +182,7 @@ void CylinderChainIntegrator::step(int steps) {
     IntegrateCylinderChainStepKernel& stepKernel = kernel.getAs<IntegrateCylinderChainStepKernel>();
     if (positionsHaveChanged) {
         stepKernel.refuseTornChains(*context);
+        stepKernel.refuseInfiniteEnergies(*context);
         positionsHaveChanged = false;
     }
     stepsTaken = findNextStep();

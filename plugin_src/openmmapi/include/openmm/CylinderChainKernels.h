@@ -83,6 +83,12 @@ public:
      */
     virtual void refuseTornChains(ContextImpl& context) const = 0;
     /**
+     * Throw an exception if a segment has a length at which its FENE potential is infinite.
+     *
+     * @param context  the context whose positions to look at
+     */
+    virtual void refuseInfiniteEnergies(ContextImpl& context) const = 0;
+    /**
      * Execute the kernel.  If a chain or a particle blows up, an exception is thrown and nothing has moved.
      *
      * @param context     the context in which to execute this kernel

@@ -19,6 +19,7 @@ public:
     void execute(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed, int level,
             std::uint64_t step, long long& divided);
     void refuseTornChains(ContextImpl& context) const;
+    void refuseInfiniteEnergies(ContextImpl& context) const;
     int executeTogether(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed, int level,
             std::uint64_t step, int count, long long& divided);
 private:
@@ -30,7 +31,8 @@ private:
     void displaceOthers(ContextImpl& context, const cylchain::StepSettings& settings, double friction);
     void displaceBlock(int block, const std::vector<Vec3>& positions, const std::vector<Vec3>& forces,
             const cylchain::StepSettings& settings, double friction);
-    void reportInstability(ContextImpl& context, int chain, const cylchain::StepSettings& settings) const;
+    void reportInstability(ContextImpl& context, const cylchain::Instability& found,
+            const cylchain::StepSettings& settings) const;
     void checkOthers(std::uint64_t step) const;
     ParallelLoop loop;
     ReferenceCalcCylinderChainForceKernel* chainKernel;

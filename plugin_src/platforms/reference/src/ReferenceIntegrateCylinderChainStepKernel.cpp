@@ -127,6 +127,41 @@ void ReferenceIntegrateCylinderChainStepKernel::refuseTornChains(ContextImpl& co
         }
 }
 
+/** Whether a FENE segment can have a length. NaN counts as such, because it has reasons of its own. */
+static bool isInRange(const Chain& chain, int segment, double length) {
+    const Segment& own = chain.segments[segment];
+    return chain.stretching != StretchingModel::FENE || !(fabs(length-own.restLength) >= own.maximumExtension);
+}
+
+static string describeRange(const Segment& segment) {
+    stringstream text;
+    text << "its FENE potential is finite between " << max(0.0, segment.restLength-segment.maximumExtension) << " and " <<
+            segment.restLength+segment.maximumExtension << " nm alone";
+    return text.str();
+}
+
+void ReferenceIntegrateCylinderChainStepKernel::refuseInfiniteEnergies(ContextImpl& context) const {
+    const vector<Vec3>& positions = *extractData(context).positions;
+    const double* box = chainKernel->getBox(context);
+    const vector<Chain>& chains = chainKernel->getChains();
+    for (size_t chain = 0; chain < chains.size(); chain++) {
+        if (chains[chain].stretching != StretchingModel::FENE)
+            continue;
+        const vector<int>& nodes = chains[chain].nodes;
+        for (size_t s = 0; s < chains[chain].segments.size(); s++) {
+            Vec3 between = positions[nodes[(s+1)%nodes.size()]]-positions[nodes[s]];
+            if (box != NULL)
+                takeToNearestImage(&between[0], box);
+            if (isInRange(chains[chain], s, norm(between)))
+                continue;
+            stringstream message;
+            message << "Chain " << chain << " is out of range at segment " << s << ": it is " << norm(between) <<
+                    " nm long, and " << describeRange(chains[chain].segments[s]) << ". Set other positions";
+            throw OpenMMException(message.str());
+        }
+    }
+}
+
 void ReferenceIntegrateCylinderChainStepKernel::execute(ContextImpl& context, const CylinderChainIntegrator& integrator,
         uint64_t seed, int level, uint64_t step, long long& divided) {
     const StepSettings settings = settingsOf(context, integrator, seed, level, step);
@@ -225,24 +260,24 @@ void ReferenceIntegrateCylinderChainStepKernel::displaceChains(ContextImpl& cont
 
     // Whatever the order of packs, report the first chain.
 
-    int first = -1;
+    Instability first;
     for (const Instability& instability : instabilities)
-        if (instability.chain != -1 && (first == -1 || instability.chain < first))
-            first = instability.chain;
-    if (first != -1)
+        if (instability.chain != -1 && (first.chain == -1 || instability.chain < first.chain))
+            first = instability;
+    if (first.chain != -1)
         reportInstability(context, first, settings);
     for (const Instability& instability : instabilities)
         divided += instability.divided;
 }
 
-void ReferenceIntegrateCylinderChainStepKernel::reportInstability(ContextImpl& context, int chain,
+void ReferenceIntegrateCylinderChainStepKernel::reportInstability(ContextImpl& context, const Instability& found,
         const StepSettings& settings) const {
     const vector<Vec3>& positions = *extractData(context).positions;
     const vector<Vec3>& forces = *extractData(context).forces;
-    const Chain& culprit = chainKernel->getChains()[chain];
+    const Chain& culprit = chainKernel->getChains()[found.chain];
     const vector<int>& nodes = culprit.nodes;
     stringstream message;
-    message << "Chain " << chain << " has blown up at segment ";
+    message << "Chain " << found.chain << " has blown up at segment ";
     message.precision(3);
 
     // A force that is not finite spoils the whole chain, so look for where it acts.
@@ -267,9 +302,24 @@ void ReferenceIntegrateCylinderChainStepKernel::reportInstability(ContextImpl& c
                 change = length;
             }
         }
+        // Where no segment changes that much, one leaves the range of its FENE potential.
+
+        const bool leavesRange = (greatest < 0 && settings.scheme != Scheme::Implicit);
+        if (leavesRange)
+            segment = found.segment;
         message << segment << " in step " << settings.step+1 << ": ";
         if (settings.scheme == Scheme::Implicit)
             message << "the equations of the implicit scheme cannot be solved";
+        else if (leavesRange) {
+            const int first = nodes[segment], second = nodes[(segment+1)%nodes.size()];
+            Vec3 between = positions[second]-positions[first];
+            const double* box = chainKernel->getBox(context);
+            if (box != NULL)
+                takeToNearestImage(&between[0], box);
+            message.precision(6);
+            message << "it would be " << norm(between+displacements[second]-displacements[first]) << " nm long after it, and " <<
+                    describeRange(culprit.segments[segment]);
+        }
         else
             message << "its ends would move by " << change << " nm against each other in one step";
     }
