@@ -12,7 +12,7 @@ import openmm
 from ..errors import InputError, InstabilityError
 from ..flow import Flow, as_flow
 from ..quantities import TEMPERATURE, non_negative, whole_number
-from ..step_watch import STEPS_BETWEEN_CHECKS, DividedSteps
+from ..step_watch import WINDOW, DividedSteps, ExplicitWork
 from ..timestep import as_step, check_scheme
 from .description import (
     advice_after_blow_up,
@@ -226,6 +226,7 @@ class NativeIntegrator(CylinderChainIntegrator):
         super().__init__(temperature, _OTHER_FRICTION, as_step(step_size))
         self.checks = checks
         self._divided_steps = DividedSteps(len(labels))
+        self._work = ExplicitWork()
         check_scheme(scheme)
         self._labels = list(labels)
         self._advice = advice
@@ -239,28 +240,34 @@ class NativeIntegrator(CylinderChainIntegrator):
         Warns
         -----
         TimeStepWarning
-            Once, if more than one in a thousand steps of filaments had to be divided; see ``step_watch``.
+            Once, if more than one in a thousand steps of filaments had to be divided, and once if the work of explicit
+            forces shows that the step is too long for them; see ``step_watch``.
 
         Raises
         ------
         InstabilityError
             If a chain or a particle blows up; positions are then those before the failing step.
         TimeStepError
-            If more than one in ten steps of filaments had to be divided.
+            If more than one in ten steps of filaments had to be divided, or if the step is far too long for the forces.
         InputError
             If a filament was torn because positions were wrapped into a periodic box, or if a segment of the positions
             that were set is longer or shorter than its FENE potential allows.
         """
         steps = whole_number(steps, 0, "steps")
+        self.setWorkWindow(WINDOW if self.checks else 0)
         if not self.checks:
             self._advance(steps)
             return
         while steps > 0:
-            chunk = min(steps, STEPS_BETWEEN_CHECKS)
+            # A window at most is finished meanwhile.
+            chunk = min(steps, WINDOW)
             before = self.getNumDividedSteps()
             self._advance(chunk)
             steps -= chunk
             self._divided_steps.add(chunk, self.getNumDividedSteps() - before)
+            work, particle, window, particles = self.takeExplicitWork()
+            if window:
+                self._work.add(work, particle, window, particles)
 
     def setStepSize(self, size):
         """Set the time step: a time, or a TimeStep."""

@@ -91,7 +91,7 @@ static void raiseOpenMMException(const std::exception& e) {
     }
 }
 
-%apply int& OUTPUT {int& bendingModel, int& stretchingModel, int& chain, int& node};
+%apply int& OUTPUT {int& bendingModel, int& stretchingModel, int& chain, int& node, int& particle, int& steps, int& particles};
 
 %typemap(in, numinputs=0) Vec3& point (OpenMM::Vec3 value) {
     $1 = &value;
@@ -108,7 +108,7 @@ static void raiseOpenMMException(const std::exception& e) {
         const Vec3& origin};
 %apply double& OUTPUT {double& restLength, double& stretchingStiffness, double& maximumExtension,
         double& parallelFriction, double& perpendicularFriction, double& rotationalFriction,
-        double& extensionalFriction, double& stiffness, double& stretching, double& bending, double& propulsion};
+        double& extensionalFriction, double& stiffness, double& stretching, double& bending, double& propulsion, double& work};
 
 %pythoncode %{
 import openmm

@@ -156,6 +156,36 @@ public:
         return dividedSteps;
     }
     /**
+     * Get the number of steps over which the work of explicit forces is averaged.  See setWorkWindow() for details.
+     */
+    int getWorkWindow() const {
+        return workWindow;
+    }
+    /**
+     * Set the number of steps over which the work of explicit forces is averaged, or 0, which is the default, to measure
+     * nothing.
+     *
+     * Forces are explicit if a step takes those of its start: all but those of the chains, with the scheme Implicit, or all
+     * of them.  If a step is too long for them, it shows by the work w = -(f(after)-f(before)).dx that they do on a particle
+     * in a step which moves it by dx: for a harmonic coordinate that relaxes by x = k mu h in a step, w has the mean
+     * 2 kT x/(1-x/2).  The means over the window of dx and of the change of f are taken off first.
+     *
+     * Steps are left out that follow on a change of positions, of parameters of Forces or of the Context, or of the periodic
+     * box.  Nothing is measured at zero temperature, nor where several steps are taken at once because there are no other
+     * forces than those of the chains.
+     */
+    void setWorkWindow(int steps);
+    /**
+     * Get the mean work of explicit forces in the last window of steps that has been finished, for the particle where it is
+     * largest.  Each window can be got once.  See setWorkWindow() for details.
+     *
+     * @param[out] work       the mean, over kT
+     * @param[out] particle   the index of the particle
+     * @param[out] steps      the number of steps in the window, or 0 if none has been finished since the last call
+     * @param[out] particles  the number of particles of which it is the largest: those with such work
+     */
+    void takeExplicitWork(double& work, int& particle, int& steps, int& particles);
+    /**
      * Get the random number seed.  See setRandomNumberSeed() for details.
      */
     int getRandomNumberSeed() const {
@@ -215,7 +245,8 @@ protected:
      */
     std::vector<std::string> getKernelNames();
     /**
-     * Note that positions have changed: chains may have been torn.
+     * Note that positions have changed: chains may have been torn.  Whatever has changed, the next step does not follow on
+     * the last one.
      */
     void stateChanged(State::DataType changed);
     /**
@@ -255,7 +286,8 @@ private:
 
     long long countAfterSteps;
     long long dividedSteps;
-    bool chainsAreAlone, positionsHaveChanged;
+    int workWindow;
+    bool chainsAreAlone, positionsHaveChanged, followsOn;
     CylinderChainForceImpl* chains;
     Kernel kernel;
 };

@@ -96,10 +96,15 @@ public:
      * @param seed        the seed of the noise
      * @param level       the level of the noise, see CylinderChainIntegrator::setPathLevel()
      * @param step        the number of the step.  The noise depends on this, the seed and the level alone.
+     * @param followsOn   whether nothing else than the step before has changed positions, forces and parameters
      * @param divided     increased by the number of chains whose step was taken in parts
      */
     virtual void execute(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed,
-            int level, std::uint64_t step, long long& divided) = 0;
+            int level, std::uint64_t step, bool followsOn, long long& divided) = 0;
+    /**
+     * Get the work of explicit forces in the last window of steps, see CylinderChainIntegrator::takeExplicitWork().
+     */
+    virtual void takeExplicitWork(double& work, int& particle, int& steps, int& particles) = 0;
     /**
      * Take several steps where there are no other forces than those of the chains, which are computed here.  Chains
      * do not know of each other then, so each can be advanced by all steps at once.

@@ -1,6 +1,7 @@
 #ifndef OPENMM_REFERENCEINTEGRATECYLINDERCHAINSTEPKERNEL_H_
 #define OPENMM_REFERENCEINTEGRATECYLINDERCHAINSTEPKERNEL_H_
 
+#include "ExplicitWork.h"
 #include "ParallelLoop.h"
 #include "ReferenceCalcCylinderChainForceKernel.h"
 #include "openmm/CylinderChainKernels.h"
@@ -17,7 +18,8 @@ public:
     void initialize(const System& system, const CylinderChainIntegrator& integrator,
             CalcCylinderChainForceKernel& forceKernel);
     void execute(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed, int level,
-            std::uint64_t step, long long& divided);
+            std::uint64_t step, bool followsOn, long long& divided);
+    void takeExplicitWork(double& work, int& particle, int& steps, int& particles);
     void refuseTornChains(ContextImpl& context) const;
     void refuseInfiniteEnergies(ContextImpl& context) const;
     int executeTogether(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed, int level,
@@ -35,6 +37,7 @@ private:
             const cylchain::StepSettings& settings) const;
     void checkOthers(std::uint64_t step) const;
     ParallelLoop loop;
+    ExplicitWork explicitWork;
     ReferenceCalcCylinderChainForceKernel* chainKernel;
     bool periodic;
     // Particles outside chains, and those of them that can move.

@@ -31,7 +31,8 @@ static bool isFinite(const Vec3& v) {
 }
 
 ReferenceIntegrateCylinderChainStepKernel::ReferenceIntegrateCylinderChainStepKernel(string name, const Platform& platform,
-        ContextImpl& context) : IntegrateCylinderChainStepKernel(name, platform), loop(context), chainKernel(NULL), periodic(false) {
+        ContextImpl& context) : IntegrateCylinderChainStepKernel(name, platform), loop(context), explicitWork(loop),
+        chainKernel(NULL), periodic(false) {
 }
 
 void ReferenceIntegrateCylinderChainStepKernel::initialize(const System& system, const CylinderChainIntegrator& integrator,
@@ -60,6 +61,13 @@ void ReferenceIntegrateCylinderChainStepKernel::initialize(const System& system,
     particleFrictions.assign(numParticles, 0.0);
     for (auto& entry : integrator.getParticleFrictions())
         particleFrictions[entry.first] = entry.second;
+    vector<int> mobile = others;
+    for (const Chain& chain : chainKernel->getChains())
+        for (size_t node = 0; node < chain.nodes.size(); node++)
+            if (!chain.fixed[node])
+                mobile.push_back(chain.nodes[node]);
+    sort(mobile.begin(), mobile.end());
+    explicitWork.initialize(mobile);
     displacements.assign(numParticles, Vec3());
     newPositions.assign(numParticles, Vec3());
 }
@@ -163,8 +171,9 @@ void ReferenceIntegrateCylinderChainStepKernel::refuseInfiniteEnergies(ContextIm
 }
 
 void ReferenceIntegrateCylinderChainStepKernel::execute(ContextImpl& context, const CylinderChainIntegrator& integrator,
-        uint64_t seed, int level, uint64_t step, long long& divided) {
+        uint64_t seed, int level, uint64_t step, bool followsOn, long long& divided) {
     const StepSettings settings = settingsOf(context, integrator, seed, level, step);
+    explicitWork.beginStep(*extractData(context).forces, displacements, followsOn, settings.kT, integrator.getWorkWindow());
     displaceChains(context, settings, divided);
     displaceOthers(context, settings, integrator.getFriction());
 
@@ -179,12 +188,18 @@ void ReferenceIntegrateCylinderChainStepKernel::execute(ContextImpl& context, co
     data.virtualSites->computePositions(context.getSystem(), *data.positions, data.periodicBoxVectors);
     data.time += settings.stepSize;
     data.stepCount++;
+    explicitWork.endStep();
+}
+
+void ReferenceIntegrateCylinderChainStepKernel::takeExplicitWork(double& work, int& particle, int& steps, int& particles) {
+    explicitWork.take(work, particle, steps, particles);
 }
 
 int ReferenceIntegrateCylinderChainStepKernel::executeTogether(ContextImpl& context, const CylinderChainIntegrator& integrator,
         uint64_t seed, int level, uint64_t step, int count, long long& divided) {
     if (!others.empty())
         return 0;
+    explicitWork.interrupt();
     const StepSettings settings = settingsOf(context, integrator, seed, level, step);
     ReferencePlatform::PlatformData& data = extractData(context);
     vector<int> taken(chainKernel->getEngine().getNumPacks());
