@@ -7,6 +7,7 @@ Importing this module loads the plugin into OpenMM. An ImportError says why that
 import re
 from pathlib import Path
 
+import numpy as np
 import openmm
 
 from ..errors import InputError, InstabilityError
@@ -117,6 +118,56 @@ def flow_of(context):
 def _flow_of_integrator(integrator):
     velocity, *gradient, origin = (tuple(vector._value) for vector in CylinderChainIntegrator.getFlow(integrator))
     return Flow(velocity, gradient, origin)
+
+
+def record_tensions(context):
+    """Let the integrator of a Context record mean tensions; see ``NativeIntegrator.setRecordsTensions``."""
+    _recording_integrator(context).setRecordsTensions(True)
+
+
+def mean_tensions(context, chains):
+    """What the integrator of a Context has recorded of the last step, for so many chains.
+
+    Returns
+    -------
+    list of (tensions, joint_forces, directions)
+        For each chain arrays (segments,) and (joints, 3) in kJ/(mol nm), and (segments, 3).
+
+    Raises
+    ------
+    InputError
+        If it has recorded nothing.
+    """
+    integrator = _recording_integrator(context)
+    try:
+        recorded = [CylinderChainIntegrator.getMeanTensions(integrator, chain) for chain in range(chains)]
+    except openmm.OpenMMException as error:
+        if "No tensions were recorded" not in str(error):
+            raise
+        raise InputError(
+            "No mean tensions were recorded in the last step: call integrator.setRecordsTensions(True) before it is taken."
+        ) from None
+    return [
+        (np.array(tensions._value), np.array(forces._value).reshape(-1, 3), np.array(directions).reshape(-1, 3))
+        for tensions, forces, directions in recorded
+    ]
+
+
+def _recording_integrator(context):
+    integrator = context.getIntegrator()
+    if not CylinderChainIntegrator.isinstance(integrator):
+        raise InputError("The Context has no integrator of Filaments.create_integrator: it records no mean tensions.")
+    integrator = CylinderChainIntegrator.cast(integrator)
+    _refuse_unless_implicit(integrator.getScheme())
+    return integrator
+
+
+def _refuse_unless_implicit(scheme):
+    if scheme != SCHEMES["implicit"]:
+        raise InputError(
+            'Mean tensions belong to scheme "implicit": the explicit schemes have those of the configuration alone '
+            "(Filaments.joint_tensions)."
+        )
 
 
 def move_tethers(context, tethers, node_indices):
@@ -312,6 +363,21 @@ class NativeIntegrator(CylinderChainIntegrator):
         if level > LARGEST_PATH_LEVEL:
             raise InputError(f"path level must be at most {LARGEST_PATH_LEVEL}, but is {level}.")
         super().setPathLevel(level)
+
+    def setRecordsTensions(self, records):
+        """Set whether mean tensions are recorded, in the last step of each call of ``step``.
+
+        ``Filaments.mean_joint_tensions`` and ``mean_tensions`` return them. The last step takes about a third longer
+        then.
+
+        Raises
+        ------
+        InputError
+            If the scheme is not "implicit".
+        """
+        if records:
+            _refuse_unless_implicit(self.getScheme())
+        super().setRecordsTensions(bool(records))
 
     def getFlow(self):
         """The Flow of the solvent."""

@@ -122,6 +122,25 @@ def move_tethers(context, tethers, node_indices):
             force.updateParametersInContext(context)
 
 
+def record_tensions(context):
+    """Refused: only scheme "implicit" solves for tensions."""
+    mean_tensions(context, 0)
+
+
+def mean_tensions(context, chains):
+    """Refused: only scheme "implicit" solves for tensions.
+
+    Raises
+    ------
+    InputError
+        Always.
+    """
+    raise InputError(
+        'Mean tensions belong to scheme "implicit" of the compiled engine: the portable engine has those of the '
+        "configuration alone (Filaments.joint_tensions)."
+    )
+
+
 def create_integrator(
     system,
     filaments,

@@ -63,7 +63,7 @@ template <class Real> struct ImplicitSegment {
     Vector<Real> difference, tangent, bend, bisector;
     Real length, inverse, coordinate, constantCoordinate;
     // The noise, and how implicit the segment and the joint are.
-    Vector<Real> randomBend, randomPair;
+    Vector<Real> randomBend, randomForce, randomPair, metricForce;
     Real randomCoordinate, randomTension, theta, jointTheta;
     // Of the last iteration: the direction of the new segment, its tension and how the tension changes.
     Vector<Real> newTangent;
@@ -133,7 +133,7 @@ public:
             eliminate(y);
             substitute<false>();
             if (iterations > 0)
-                refine();
+                settings.segmentForces == NULL ? refine() : refineAndRecord(y, active);
             else if (settings.kT > 0) {
                 if (stiffenTautSegments()) {
                     eliminate(y);
@@ -231,7 +231,7 @@ private:
             const Real stretchRate = h*property<Real>(pack, s, ChainPack::Stiffness)*l0*l0+TINY;
             segment.theta = larger<Real>(0.5+Real{}, 1-property<Real>(pack, s, ChainPack::Extensional)/stretchRate);
             segment.randomCoordinate = segment.randomTension = segment.multiplier = segment.extra = Real{};
-            segment.randomBend = Vec {};
+            segment.randomBend = segment.randomForce = segment.randomPair = segment.metricForce = Vec {};
             if (s > 0)
                 describeJoint(s);
         }
@@ -326,21 +326,26 @@ private:
         for (int node = 0; node < n; node++)
             loads[node] = f[node];
         for (int s = 0; s < pack.segments; s++) {
-            Geometry geometry;
-            describeNew(y, s, geometry);
-            const Vec direction = geometry.middleTangent;
-            const Vec u1 = flow.at((x[s]+y[s])*(0.5+Real{})), u2 = flow.at((x[s+1]+y[s+1])*(0.5+Real{}));
-            const Vec sum = u1+u2, difference = u2-u1;
-            const Real across = 0.25*property<Real>(pack, s, ChainPack::Perpendicular);
-            const Real along = 0.25*property<Real>(pack, s, ChainPack::Parallel);
-            const Vec carried = sum*across+direction*((along-across)*direction.dot(sum));
-            const Real turn = property<Real>(pack, s, ChainPack::Rotational)*turningFactor(s, geometry);
-            const Real stretch = property<Real>(pack, s, ChainPack::Extensional)*segments[s].inverse*geometry.inverse;
-            const Vec pair = (difference-direction*direction.dot(difference))*turn;
-            segments[s].tensionOfFlow = stretch*direction.dot(difference);
+            Vec carried, pair;
+            findDragOfFlow(flow, y, s, carried, pair);
             loads[s] = loads[s]+carried-pair;
             loads[s+1] = loads[s+1]+carried+pair;
         }
+    }
+    /** The drag of the flow on a segment: what each end gets, and what the second one has more and the first one less. */
+    CYLCHAIN_INLINE void findDragOfFlow(const LaneFlow<W>& flow, const Vec* y, int s, Vec& carried, Vec& pair) {
+        Geometry geometry;
+        describeNew(y, s, geometry);
+        const Vec direction = geometry.middleTangent;
+        const Vec u1 = flow.at((x[s]+y[s])*(0.5+Real{})), u2 = flow.at((x[s+1]+y[s+1])*(0.5+Real{}));
+        const Vec sum = u1+u2, difference = u2-u1;
+        const Real across = 0.25*property<Real>(pack, s, ChainPack::Perpendicular);
+        const Real along = 0.25*property<Real>(pack, s, ChainPack::Parallel);
+        const Real turn = property<Real>(pack, s, ChainPack::Rotational)*turningFactor(s, geometry);
+        const Real stretch = property<Real>(pack, s, ChainPack::Extensional)*segments[s].inverse*geometry.inverse;
+        carried = sum*across+direction*((along-across)*direction.dot(sum));
+        pair = (difference-direction*direction.dot(difference))*turn;
+        segments[s].tensionOfFlow = stretch*direction.dot(difference);
     }
     CYLCHAIN_INLINE void describeNew(const Vec* y, int s, Geometry& geometry) {
         geometry.difference = y[s+1]-y[s];
@@ -557,15 +562,18 @@ private:
         });
         substitute<true>();
     }
+    /** The same, and record the forces of the segments, for the lanes that are active; see ImplicitTensions.h. */
+    void refineAndRecord(const Vec* y, Real active);
     /** Add the metric forces of the lengths, in the first iteration, where the directions are those of the start. */
     void addMetricForces() {
         band.findResponses([&] (int s, Vec response) {
-            const ImplicitSegment<Real>& segment = segments[s];
+            ImplicitSegment<Real>& segment = segments[s];
             const Vec t = segment.tangent;
             response = response-t*t.dot(response);
             const Real drag = property<Real>(pack, s, ChainPack::Extensional)/(segment.length*segment.length*h);
             const Real noise = property<Real>(pack, s, ChainPack::Stiffness)*(2*segment.theta-1)+drag;
             const Vec force = response*(settings.kT*noise/segment.length);
+            segment.metricForce = force;
             f[s] = f[s]+force;
             f[s+1] = f[s+1]-force;
         });
@@ -611,6 +619,7 @@ private:
 };
 
 #include "ImplicitNoise.h"
+#include "ImplicitTensions.h"
 
 /**
  * Advance the lanes that failed, from the start, by the same time in more and more parts. They follow the Brownian path of
@@ -623,6 +632,7 @@ template <int W, bool CLOSED> void divideStep(const ChainPack& pack, const Vecto
     const double h = settings.stepSize;
     const std::uint64_t step = settings.step;
     const int level = settings.level;
+    const MeanOfParts<W> mean(pack, settings);
     Vector<Real>* from = scratch.reserve<Vector<Real> >(2*pack.nodes);
     Vector<Real>* to = from+pack.nodes;
     for (int division = 1; division <= LARGEST_DIVISION; division++) {
@@ -638,6 +648,7 @@ template <int W, bool CLOSED> void divideStep(const ChainPack& pack, const Vecto
             for (int node = 0; node < pack.nodes; node++)
                 from[node] = to[node];
             ImplicitStep<W, CLOSED>(pack, settings, box, memory).take(from, f, to, failedPart);
+            mean.add(part, parts, failed);
             hope = false;
             for (int i = 0; i < W; i++) {
                 failedNow[i] |= failedPart[i];

@@ -42,7 +42,7 @@ static CylinderChainForceImpl& findChains(ContextImpl& context) {
 
 CylinderChainIntegrator::CylinderChainIntegrator(double temperature, double frictionCoeff, double stepSize) :
         scheme(Implicit), pathLevel(0), noiseLevel(0), noiseSeed(0), stepsTaken(0), countAfterSteps(0), dividedSteps(0), workWindow(0),
-        positionsHaveChanged(true), followsOn(false), chains(NULL) {
+        positionsHaveChanged(true), followsOn(false), recordsTensions(false), chains(NULL) {
     setTemperature(temperature);
     setFriction(frictionCoeff);
     setStepSize(stepSize);
@@ -169,6 +169,13 @@ void CylinderChainIntegrator::takeExplicitWork(double& work, int& particle, int&
     kernel.getAs<IntegrateCylinderChainStepKernel>().takeExplicitWork(work, particle, steps, particles);
 }
 
+void CylinderChainIntegrator::getMeanTensions(int chain, vector<double>& tensions, vector<Vec3>& jointForces,
+        vector<Vec3>& directions) const {
+    if (context == NULL)
+        throw OpenMMException("This Integrator is not bound to a context!");
+    kernel.getAs<IntegrateCylinderChainStepKernel>().getMeanTensions(chain, tensions, jointForces, directions);
+}
+
 void CylinderChainIntegrator::stateChanged(State::DataType changed) {
     followsOn = false;
     if (changed == State::Positions)
@@ -212,7 +219,8 @@ void CylinderChainIntegrator::step(int steps) {
 
         if (done > 0 && chainsAreAlone && includesChains) {
             const int count = min(steps-done, STEPS_TOGETHER);
-            const int taken = stepKernel.executeTogether(*context, *this, noiseSeed, noiseLevel, stepsTaken, count, dividedSteps);
+            const int taken = stepKernel.executeTogether(*context, *this, noiseSeed, noiseLevel, stepsTaken, count,
+                    recordsTensions && done+count == steps, dividedSteps);
             stepsTaken += taken;
             countAfterSteps = context->getStepCount();
             done += taken;
@@ -225,7 +233,8 @@ void CylinderChainIntegrator::step(int steps) {
             CylinderChainForceImpl::Exclusion exclusion(*chains, scheme == Implicit);
             context->calcForcesAndEnergy(true, false, getIntegrationForceGroups());
         }
-        stepKernel.execute(*context, *this, noiseSeed, noiseLevel, stepsTaken, followsOn, dividedSteps);
+        stepKernel.execute(*context, *this, noiseSeed, noiseLevel, stepsTaken, followsOn, recordsTensions && done == steps-1,
+                dividedSteps);
         followsOn = true;
         stepsTaken++;
         countAfterSteps = context->getStepCount();

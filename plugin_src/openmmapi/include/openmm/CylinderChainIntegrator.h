@@ -186,6 +186,33 @@ public:
      */
     void takeExplicitWork(double& work, int& particle, int& steps, int& particles);
     /**
+     * Get whether tensions are recorded.  See getMeanTensions() for details.
+     */
+    bool getRecordsTensions() const {
+        return recordsTensions;
+    }
+    /**
+     * Set whether tensions are recorded, which is not so by default.  See getMeanTensions() for details.
+     */
+    void setRecordsTensions(bool records) {
+        recordsTensions = records;
+    }
+    /**
+     * Get the tension of a chain as a mean over the last step, with friction and noise, for the scheme Implicit.  It is
+     * recorded in the last step of each call to step() while setRecordsTensions(true) holds; otherwise this throws an
+     * exception.  Checkpoints do not contain it.
+     *
+     * @param chain             the index of the chain
+     * @param[out] tensions     the tension of each segment, measured in kJ/mol/nm: its elastic force, its friction against
+     *                          becoming longer relative to the fluid and the noise of both, along its mean direction
+     * @param[out] jointForces  the force that the segment behind each joint exerts on the one before it, measured in
+     *                          kJ/mol/nm.  Forces of tethers, and all that come from outside the chain, act on both segments
+     *                          of a joint in equal parts.  The last joint of a ring is that of its last segment and the first.
+     * @param[out] directions   the direction of each segment half-way through the step, a unit vector
+     */
+    void getMeanTensions(int chain, std::vector<double>& tensions, std::vector<Vec3>& jointForces,
+            std::vector<Vec3>& directions) const;
+    /**
      * Get the random number seed.  See setRandomNumberSeed() for details.
      */
     int getRandomNumberSeed() const {
@@ -287,7 +314,7 @@ private:
     long long countAfterSteps;
     long long dividedSteps;
     int workWindow;
-    bool chainsAreAlone, positionsHaveChanged, followsOn;
+    bool chainsAreAlone, positionsHaveChanged, followsOn, recordsTensions;
     CylinderChainForceImpl* chains;
     Kernel kernel;
 };

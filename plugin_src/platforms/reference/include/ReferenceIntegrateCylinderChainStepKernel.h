@@ -18,16 +18,19 @@ public:
     void initialize(const System& system, const CylinderChainIntegrator& integrator,
             CalcCylinderChainForceKernel& forceKernel);
     void execute(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed, int level,
-            std::uint64_t step, bool followsOn, long long& divided);
+            std::uint64_t step, bool followsOn, bool records, long long& divided);
     void takeExplicitWork(double& work, int& particle, int& steps, int& particles);
     void refuseTornChains(ContextImpl& context) const;
     void refuseInfiniteEnergies(ContextImpl& context) const;
     int executeTogether(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed, int level,
-            std::uint64_t step, int count, long long& divided);
+            std::uint64_t step, int count, bool records, long long& divided);
+    void getMeanTensions(int chain, std::vector<double>& tensions, std::vector<Vec3>& jointForces,
+            std::vector<Vec3>& directions) const;
 private:
     cylchain::BackgroundFlow flowOf(ContextImpl& context, const CylinderChainIntegrator& integrator) const;
     cylchain::StepSettings settingsOf(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed,
             int level, std::uint64_t step) const;
+    void recordForces(cylchain::StepSettings& settings, bool records);
     void displaceChains(ContextImpl& context, const cylchain::StepSettings& settings, long long& divided);
     int advancePack(ContextImpl& context, int pack, cylchain::StepSettings settings, int count, long long& divided);
     void displaceOthers(ContextImpl& context, const cylchain::StepSettings& settings, double friction);
@@ -45,6 +48,10 @@ private:
     std::vector<int> outside, others;
     std::vector<double> masses, particleFrictions;
     std::vector<Vec3> displacements, newPositions;
+    // The forces of all segments in the last step, if it was recorded.
+
+    std::vector<std::vector<cylchain::SegmentForces> > segmentForces;
+    bool recorded;
 };
 
 } // namespace OpenMM

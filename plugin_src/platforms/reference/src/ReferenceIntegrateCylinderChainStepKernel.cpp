@@ -32,7 +32,7 @@ static bool isFinite(const Vec3& v) {
 
 ReferenceIntegrateCylinderChainStepKernel::ReferenceIntegrateCylinderChainStepKernel(string name, const Platform& platform,
         ContextImpl& context) : IntegrateCylinderChainStepKernel(name, platform), loop(context), explicitWork(loop),
-        chainKernel(NULL), periodic(false) {
+        chainKernel(NULL), periodic(false), recorded(false) {
 }
 
 void ReferenceIntegrateCylinderChainStepKernel::initialize(const System& system, const CylinderChainIntegrator& integrator,
@@ -171,8 +171,9 @@ void ReferenceIntegrateCylinderChainStepKernel::refuseInfiniteEnergies(ContextIm
 }
 
 void ReferenceIntegrateCylinderChainStepKernel::execute(ContextImpl& context, const CylinderChainIntegrator& integrator,
-        uint64_t seed, int level, uint64_t step, bool followsOn, long long& divided) {
-    const StepSettings settings = settingsOf(context, integrator, seed, level, step);
+        uint64_t seed, int level, uint64_t step, bool followsOn, bool records, long long& divided) {
+    StepSettings settings = settingsOf(context, integrator, seed, level, step);
+    recordForces(settings, records);
     explicitWork.beginStep(*extractData(context).forces, displacements, followsOn, settings.kT, integrator.getWorkWindow());
     displaceChains(context, settings, divided);
     displaceOthers(context, settings, integrator.getFriction());
@@ -189,6 +190,44 @@ void ReferenceIntegrateCylinderChainStepKernel::execute(ContextImpl& context, co
     data.time += settings.stepSize;
     data.stepCount++;
     explicitWork.endStep();
+    recorded = (settings.segmentForces != NULL);
+}
+
+void ReferenceIntegrateCylinderChainStepKernel::recordForces(StepSettings& settings, bool records) {
+    recorded = false;
+    if (!records || settings.scheme != Scheme::Implicit)
+        return;
+    const vector<Chain>& chains = chainKernel->getChains();
+    segmentForces.resize(chains.size());
+    for (size_t chain = 0; chain < chains.size(); chain++)
+        segmentForces[chain].resize(chains[chain].segments.size());
+    settings.segmentForces = &segmentForces;
+}
+
+void ReferenceIntegrateCylinderChainStepKernel::getMeanTensions(int chain, vector<double>& tensions, vector<Vec3>& jointForces,
+        vector<Vec3>& directions) const {
+    if (!recorded)
+        throw OpenMMException("No tensions were recorded in the last step: call setRecordsTensions(true) before it, with "
+                "the scheme Implicit");
+    if (chain < 0 || chain >= (int) segmentForces.size())
+        throw OpenMMException("CylinderChainIntegrator: Illegal chain index: "+to_string(chain));
+    const vector<SegmentForces>& forces = segmentForces[chain];
+    tensions.clear();
+    jointForces.clear();
+    directions.clear();
+    for (const SegmentForces& one : forces) {
+        tensions.push_back(one.tension);
+        const Vec3 direction(one.direction[0], one.direction[1], one.direction[2]);
+        directions.push_back(direction/norm(direction));
+    }
+
+    // Forces from outside act on both segments of a joint in equal parts, which leaves half the difference of their own.
+
+    for (size_t joint = 0; joint < chainKernel->getChains()[chain].joints.size(); joint++) {
+        const double* before = forces[joint].plus;
+        const double* behind = forces[(joint+1)%forces.size()].minus;
+        jointForces.push_back(Vec3(behind[0]-before[0], behind[1]-before[1], behind[2]-before[2])*0.5);
+    }
 }
 
 void ReferenceIntegrateCylinderChainStepKernel::takeExplicitWork(double& work, int& particle, int& steps, int& particles) {
@@ -196,11 +235,12 @@ void ReferenceIntegrateCylinderChainStepKernel::takeExplicitWork(double& work, i
 }
 
 int ReferenceIntegrateCylinderChainStepKernel::executeTogether(ContextImpl& context, const CylinderChainIntegrator& integrator,
-        uint64_t seed, int level, uint64_t step, int count, long long& divided) {
+        uint64_t seed, int level, uint64_t step, int count, bool records, long long& divided) {
     if (!others.empty())
         return 0;
     explicitWork.interrupt();
-    const StepSettings settings = settingsOf(context, integrator, seed, level, step);
+    StepSettings settings = settingsOf(context, integrator, seed, level, step);
+    recordForces(settings, records);
     ReferencePlatform::PlatformData& data = extractData(context);
     vector<int> taken(chainKernel->getEngine().getNumPacks());
     vector<long long> dividedInPack(taken.size());
@@ -224,6 +264,7 @@ int ReferenceIntegrateCylinderChainStepKernel::executeTogether(ContextImpl& cont
     data.virtualSites->computePositions(context.getSystem(), *data.positions, data.periodicBoxVectors);
     data.time += done*settings.stepSize;
     data.stepCount += done;
+    recorded = (settings.segmentForces != NULL && done == count);
     return done;
 }
 
@@ -237,7 +278,9 @@ int ReferenceIntegrateCylinderChainStepKernel::advancePack(ContextImpl& context,
     for (int particle : particles)
         if (particle >= 0)
             newPositions[particle] = (*data.positions)[particle];
+    vector<vector<SegmentForces> >* const segmentForces = settings.segmentForces;
     for (int done = 0; done < count; done++, settings.step++) {
+        settings.segmentForces = (done == count-1 ? segmentForces : NULL);
         const double* positions = &newPositions[0][0];
         engine.clearForces(pack, forces);
         if (settings.scheme != Scheme::Implicit)
