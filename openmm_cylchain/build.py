@@ -23,7 +23,7 @@ from .insertion import (
 )
 from .placement import vector
 from .quantities import FORCE, LENGTH, STIFFNESS, TEMPERATURE, in_units_of, non_negative, positive, whole_number
-from .tension import filament_tensions
+from .tension import components_along, filament_tensions
 from .timestep import (
     as_step,
     check_scheme,
@@ -374,10 +374,11 @@ class Filaments(FilamentCollection):
         return describe_chains(system, self._filaments, self.node_indices, self._viscosity, self._temperature)
 
     def joint_tensions(self, context):
-        """Virtual forces Phi at the joints, eqs. (22)-(24), in the context's present configuration and flow.
+        """Instantaneous virtual forces Phi at the joints, without noise, in the context's configuration and flow.
 
-        Phi of joint i is the force that segment i + 1 exerts on segment i; its component along the chain is
-        positive under tension. Random forces are left out: this is the mean over the noise of a step.
+        Phi of joint i, eqs. (22)-(24), is the force that segment i + 1 exerts on segment i; its component along the
+        chain is positive under tension. Random forces are left out: this is the mean over the noise of an
+        infinitesimal step that begins here. See ``mean_joint_tensions`` for those of the steps that were taken.
         Stretching, bending and propulsion belong to their segments; any other force on a shared node is given to the
         two segments in equal parts.
 
@@ -399,6 +400,88 @@ class Filaments(FilamentCollection):
         flow = self._engine.flow_of(context)
         parts = filament_tensions(self._filaments, self._nodes, chains, positions, forces, flow)
         return [part * FORCE for part in parts]
+
+    def mean_joint_tensions(self, context):
+        """Virtual forces Phi at the joints as means over the last step, with friction and noise.
+
+        Phi of joint i is the force that segment i + 1 exerts on segment i, as in ``joint_tensions``, but of the step that
+        scheme "implicit" has solved, with all that moved the segments in it: their friction and the random forces, too.
+        Where the nodes of the joint are free to move, the forces q on the ends of the two segments, which they exert
+        themselves, and those from outside balance, q_plus(i) + q_minus(i+1) + f = 0, and f acts on both in equal parts:
+        Phi = (q_minus(i+1) - q_plus(i))/2. Averages over time are the forces that a filament transmits, such as that
+        of a trap at its end; the noise of a single step is large.
+
+        Parameters
+        ----------
+        context : openmm.Context
+            Of a System that these filaments were put into, in which a step was taken after
+            ``integrator.setRecordsTensions(True)``.
+
+        Returns
+        -------
+        list of (joints, 3) Quantity in kJ/(mol nm), one for each filament
+            In the order of ``joint_tensions``.
+
+        Raises
+        ------
+        InputError
+            With the portable engine or an explicit scheme, or if nothing was recorded.
+        """
+        return [forces * FORCE for _, forces, _ in self._engine.mean_tensions(context, len(self))]
+
+    def mean_tensions(self, context):
+        """Tensions T of the segments as means over the last step, with friction and noise.
+
+        T is the elastic force of the segment's length, its friction against becoming longer and the noise of both, as
+        scheme "implicit" has solved for them, along the direction of the segment half-way through the step; it is
+        positive where it pulls the ends together. See ``mean_joint_tensions``.
+
+        Parameters
+        ----------
+        context : openmm.Context
+
+        Returns
+        -------
+        list of (segments,) Quantity in kJ/(mol nm), one for each filament
+
+        Raises
+        ------
+        InputError
+            As for ``mean_joint_tensions``.
+        """
+        return [tensions * FORCE for tensions, _, _ in self._engine.mean_tensions(context, len(self))]
+
+    def mean_axial_tensions(self, context):
+        """Components of ``mean_joint_tensions`` along the filaments, positive under tension.
+
+        The direction of a filament at a joint is that of the sum of the unit vectors along its two segments half-way
+        through the step. (That at its end would be correlated with the noise of the step.)
+
+        Parameters
+        ----------
+        context : openmm.Context
+
+        Returns
+        -------
+        list of (joints,) Quantity in kJ/(mol nm), one for each filament
+
+        Raises
+        ------
+        InputError
+            As for ``mean_joint_tensions``.
+        """
+        recorded = self._engine.mean_tensions(context, len(self))
+        return [components_along(directions, forces) * FORCE for _, forces, directions in recorded]
+
+    def record_tensions(self, context):
+        """Let the integrator of a Context record mean tensions from its next step on; see ``mean_joint_tensions``.
+
+        Raises
+        ------
+        InputError
+            With the portable engine or an explicit scheme.
+        """
+        self._engine.record_tensions(context)
 
     def flow(self, context):
         """The Flow of the solvent in a Context, at rest where its integrator knows of none."""

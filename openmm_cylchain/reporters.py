@@ -176,21 +176,33 @@ class TensionReporter(FilamentsReporter):
         Go on with a file that exists.
     joints : bool
         Report every joint rather than every filament.
+    mean : bool
+        Report tensions as means over the last step, with friction and noise (``Filaments.mean_axial_tensions``), which
+        scheme "implicit" of the compiled engine has; the integrator records them then. By default, they are
+        instantaneous ones without noise, of the configuration. ``mean_tension`` is the mean over joints in both cases.
 
     Raises
     ------
     InputError
-        If no filament has joints.
+        If no filament has joints; with ``mean=True``, during a run, if the integrator has another scheme.
 
     Examples
     --------
     >>> simulation.reporters.append(TensionReporter("tension.csv", 100, filaments))  # doctest: +SKIP
     """
 
-    _include = ("positions", "forces")
-
-    def __init__(self, file, reportInterval, filaments, append=False, joints=False):  # noqa: N803 - OpenMM's name
+    def __init__(
+        self,
+        file,
+        reportInterval,  # noqa: N803 - OpenMM's name
+        filaments,
+        append=False,
+        joints=False,
+        mean=False,
+    ):
         self._joints = bool(joints)
+        self._mean = bool(mean)
+        self._include = () if mean else ("positions", "forces")
         if joints:
             self._thing, self._columns = "filament,joint", ("tension",)
             self.places = [(f, j) for f, filament in enumerate(filaments) for j in range(_joints(filament))]
@@ -202,21 +214,32 @@ class TensionReporter(FilamentsReporter):
         self._chains = None
         super().__init__(file, reportInterval, filaments, append)
 
+    def describeNextReport(self, simulation):  # noqa: N802 - OpenMM's name
+        if self._mean:
+            self._filaments.record_tensions(simulation.context)
+        return super().describeNextReport(simulation)
+
     def _table(self, simulation, state):
+        tensions = self._means(simulation) if self._mean else self._present(simulation, state)
+        labels = [",".join(map(str, place)) for place in self.places]
+        if self._joints:
+            return labels, [(tension,) for tension in np.concatenate(tensions)]
+        return labels, [(tension.mean(), tension.min(), tension.max()) for tension in tensions]
+
+    def _means(self, simulation):
+        return [part._value for part in self._filaments.mean_axial_tensions(simulation.context) if len(part)]
+
+    def _present(self, simulation, state):
         if self._chains is None:
             self._chains = self._filaments.chain_set(simulation.system)
         positions, forces = (values._value for values in (state.getPositions(True), state.getForces(True)))
         flow = self._filaments.flow(simulation.context)
         virtual = filament_tensions(self._filaments, self._nodes, self._chains, positions, forces, flow)
-        tensions = [
+        return [
             axial_tensions(positions[nodes], phi, filament.closed)
             for filament, nodes, phi in zip(self._filaments, self._nodes, virtual)
             if len(phi)
         ]
-        labels = [",".join(map(str, place)) for place in self.places]
-        if self._joints:
-            return labels, [(tension,) for tension in np.concatenate(tensions)]
-        return labels, [(tension.mean(), tension.min(), tension.max()) for tension in tensions]
 
 
 def _joints(filament):

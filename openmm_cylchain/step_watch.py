@@ -12,8 +12,8 @@ import numpy as np
 
 from .errors import TimeStepError, TimeStepWarning
 
-STEPS_BETWEEN_CHECKS = 500
-"""Steps that an integrator takes at once, however many it is asked for."""
+WINDOW = 128
+"""Steps over which the work of explicit forces is averaged, and that an integrator takes at once."""
 
 LARGEST_DIVIDED_SHARE = 1e-3
 """Scheme "implicit" divides steps whose equations it cannot solve: a larger share of them may bias averages."""
@@ -110,7 +110,10 @@ large by 1/(1 - x/2), which are 0.35 and 1.09 at x = 0.16.
 """
 
 ERROR_WORK = 3.0
-"""Mean work, in k_B T, at which a run is stopped if two windows in succession show it (x = 0.86 for one coordinate)."""
+"""Mean work, in k_B T, at which a run is stopped (x = 0.86 for one coordinate)."""
+
+WINDOWS = 3
+"""Windows in succession that must show such work."""
 
 
 class ExplicitWork:
@@ -121,7 +124,8 @@ class ExplicitWork:
     x = k mu h in a step, summed over the coordinates that the particle has. Its mean over a window of steps is
     compared with ``WARNING_WORK`` and ``ERROR_WORK``, for the particle where it is largest. Chance makes the largest of
     n means over s steps larger than what is expected of each by a factor of about 1 + sqrt(2/s) sqrt(2 ln n), which is
-    allowed for. Two windows in succession must show it: the relaxation of a start does not count.
+    allowed for. ``WINDOWS`` in succession must show it: a jump of a force, however large, and what relaxes after it or
+    after a start within the steps of a window, are in two at most.
     """
 
     def __init__(self):
@@ -145,24 +149,24 @@ class ExplicitWork:
         Warns
         -----
         TimeStepWarning
-            Once, if it is above ``WARNING_WORK`` for the second time in succession.
+            Once, if it is above ``WARNING_WORK`` for the third time in succession.
 
         Raises
         ------
         TimeStepError
-            If it is above ``ERROR_WORK`` for the second time in succession, or not a number.
+            If it is above ``ERROR_WORK``, or not a number, for the third time in succession.
         """
         chance = 1.0 + math.sqrt(2.0 / steps) * math.sqrt(2.0 * math.log(max(particles, 1)))
         # Written so that NaN is too large.
         self._large = 0 if work <= WARNING_WORK * chance else self._large + 1
         self._too_large = 0 if work <= ERROR_WORK * chance else self._too_large + 1
-        if self._too_large > 1:
+        if self._too_large >= WINDOWS:
             raise TimeStepError(
                 f"{_work_description(work, particle)}: energies are far too high. Use a smaller time step "
                 "(Filaments.recommended_time_step(system=system) knows the stiffness of most forces), or look for "
                 f"overlapping particles. {_TURN_OFF}"
             )
-        if self._large > 1 and not self._warned:
+        if self._large >= WINDOWS and not self._warned:
             self._warned = True
             warnings.warn(
                 f"{_work_description(work, particle)}: its fluctuations are more than 10 % too large, or "
@@ -193,7 +197,7 @@ class WorkRecorder:
         Steps of a window.
     """
 
-    window = 128
+    window = WINDOW
 
     def __init__(self):
         self.clear()

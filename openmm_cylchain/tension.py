@@ -99,6 +99,11 @@ def axial_tensions(nodes, virtual_forces, closed=False):
     """
     tangents = segment_vectors(nodes, closed)
     tangents /= np.linalg.norm(tangents, axis=1)[:, None]
+    return components_along(tangents, virtual_forces)
+
+
+def components_along(tangents, virtual_forces):
+    """Components (joints,) of virtual forces (joints, 3) along a chain with unit vectors (segments, 3)."""
     directions = tangents + np.roll(tangents, -1, axis=0)
     directions /= np.linalg.norm(directions, axis=1)[:, None]
     return np.einsum("ij,ij->i", virtual_forces, directions[: len(virtual_forces)])

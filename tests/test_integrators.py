@@ -1,7 +1,9 @@
 """Integrators inside OpenMM, on every engine: noise, seeds, checkpoints, groups, other particles, failures."""
 
 import copy
+import re
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import openmm
@@ -44,6 +46,13 @@ def _bead_system():
     bond.addBond(0, 2, 100.0, 0.01)
     system.addForce(bond)
     return topology, system, np.array([[0.0, 500.0, 0.0], [50.0, 500.0, 0.0], [100.0, 500.0, 0.0]])
+
+
+def periodic_force():
+    """A force that does nothing but make its System periodic."""
+    force = openmm.HarmonicBondForce()
+    force.setUsesPeriodicBoundaryConditions(True)
+    return force
 
 
 def mixed_system(engine):
@@ -371,6 +380,52 @@ def test_blow_up_within_steps_at_once_leaves_all_chains_at_the_step_before(engin
     assert str(at_once.value) == str(one_by_one.value)
     assert context.getStepCount() == other_context.getStepCount() > 2
     assert np.array_equal(_positions(context), _positions(other_context))
+
+
+@pytest.mark.parametrize(("engine", "platform"), ENGINE_PLATFORMS)
+@pytest.mark.parametrize("box", [None, 1800.0])
+def test_lengths_that_leave_the_range_of_fene_are_a_blow_up(engine, platform, box):
+    """A segment can be as short or long as its FENE potential allows, or else has no energy."""
+    kind = replace(F_ACTIN, stretching_model="fene", maximum_extension=1.0)
+    filaments = Filaments(VISCOSITY, TEMPERATURE, engine=engine)
+    for seed in range(3):
+        filaments.add_equilibrium(kind, 8, seed=seed)
+    _, system, positions = filaments.build()
+    if box is not None:
+        system.setDefaultPeriodicBoxVectors(*np.diag([box] * 3))
+        system.addForce(periodic_force())
+    step = 500 * filaments.recommended_time_step(scheme="midpoint").step
+    integrator = filaments.create_integrator(system, step, scheme="midpoint", random_seed=1, checks=False)
+    context = _context(system, integrator, positions, platform)
+    with pytest.raises(
+        InstabilityError,
+        match=r"Filament \d \(ACT\) has blown up at segment \d in step \d+: it would be 3(58|61)\.\d+ nm long after it, "
+        "and its FENE potential is finite between 359 and 361 nm alone",
+    ) as caught:
+        integrator.step(1000)
+    filament, segment = map(int, re.search(r"Filament (\d).*segment (\d)", str(caught.value)).groups())
+    assert filament < 3 and segment < 8
+    assert np.isfinite(context.getState(energy=True).getPotentialEnergy()._value)
+
+
+@pytest.mark.parametrize("scheme", ["implicit", "midpoint"])
+def test_starts_beyond_the_range_of_fene_are_refused(scheme):
+    kind = replace(F_ACTIN, stretching_model="fene", maximum_extension=1.0)
+    filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
+    for seed in range(2):
+        filaments.add_equilibrium(kind, 8, seed=seed, direction=[1, 0, 0])
+    _, system, positions = filaments.build()
+    integrator = filaments.create_integrator(system, 1.0, scheme=scheme)
+    moved = positions._value.copy()
+    moved[9] += [-5.0, 0, 0]
+    context = _context(system, integrator, moved)
+    with pytest.raises(
+        InputError,
+        match=r"Filament 1 \(ACT\) is out of range at segment 0: it is 36\d\.\d+ nm long, and its FENE potential is finite",
+    ):
+        integrator.step(1)
+    context.setPositions(positions)
+    integrator.step(1)
 
 
 def test_infinite_force_is_traced_to_its_segment(engine):

@@ -7,12 +7,13 @@ Importing this module loads the plugin into OpenMM. An ImportError says why that
 import re
 from pathlib import Path
 
+import numpy as np
 import openmm
 
 from ..errors import InputError, InstabilityError
 from ..flow import Flow, as_flow
 from ..quantities import TEMPERATURE, non_negative, whole_number
-from ..step_watch import STEPS_BETWEEN_CHECKS, DividedSteps
+from ..step_watch import WINDOW, DividedSteps, ExplicitWork
 from ..timestep import as_step, check_scheme
 from .description import (
     advice_after_blow_up,
@@ -118,6 +119,56 @@ def flow_of(context):
 def _flow_of_integrator(integrator):
     velocity, *gradient, origin = (tuple(vector._value) for vector in CylinderChainIntegrator.getFlow(integrator))
     return Flow(velocity, gradient, origin)
+
+
+def record_tensions(context):
+    """Let the integrator of a Context record mean tensions; see ``NativeIntegrator.setRecordsTensions``."""
+    _recording_integrator(context).setRecordsTensions(True)
+
+
+def mean_tensions(context, chains):
+    """What the integrator of a Context has recorded of the last step, for so many chains.
+
+    Returns
+    -------
+    list of (tensions, joint_forces, directions)
+        For each chain arrays (segments,) and (joints, 3) in kJ/(mol nm), and (segments, 3).
+
+    Raises
+    ------
+    InputError
+        If it has recorded nothing.
+    """
+    integrator = _recording_integrator(context)
+    try:
+        recorded = [CylinderChainIntegrator.getMeanTensions(integrator, chain) for chain in range(chains)]
+    except openmm.OpenMMException as error:
+        if "No tensions were recorded" not in str(error):
+            raise
+        raise InputError(
+            "No mean tensions were recorded in the last step: call integrator.setRecordsTensions(True) before it is taken."
+        ) from None
+    return [
+        (np.array(tensions._value), np.array(forces._value).reshape(-1, 3), np.array(directions).reshape(-1, 3))
+        for tensions, forces, directions in recorded
+    ]
+
+
+def _recording_integrator(context):
+    integrator = context.getIntegrator()
+    if not CylinderChainIntegrator.isinstance(integrator):
+        raise InputError("The Context has no integrator of Filaments.create_integrator: it records no mean tensions.")
+    integrator = CylinderChainIntegrator.cast(integrator)
+    _refuse_unless_implicit(integrator.getScheme())
+    return integrator
+
+
+def _refuse_unless_implicit(scheme):
+    if scheme != SCHEMES["implicit"]:
+        raise InputError(
+            'Mean tensions belong to scheme "implicit": the explicit schemes have those of the configuration alone '
+            "(Filaments.joint_tensions)."
+        )
 
 
 def move_tethers(context, tethers, node_indices):
@@ -227,6 +278,7 @@ class NativeIntegrator(CylinderChainIntegrator):
         super().__init__(temperature, _OTHER_FRICTION, as_step(step_size))
         self.checks = checks
         self._divided_steps = DividedSteps(len(labels))
+        self._work = ExplicitWork()
         check_scheme(scheme)
         self._labels = list(labels)
         self._advice = advice
@@ -240,27 +292,34 @@ class NativeIntegrator(CylinderChainIntegrator):
         Warns
         -----
         TimeStepWarning
-            Once, if more than one in a thousand steps of filaments had to be divided; see ``step_watch``.
+            Once, if more than one in a thousand steps of filaments had to be divided, and once if the work of explicit
+            forces shows that the step is too long for them; see ``step_watch``.
 
         Raises
         ------
         InstabilityError
             If a chain or a particle blows up; positions are then those before the failing step.
         TimeStepError
-            If more than one in ten steps of filaments had to be divided.
+            If more than one in ten steps of filaments had to be divided, or if the step is far too long for the forces.
         InputError
-            If a filament was torn because positions were wrapped into a periodic box.
+            If a filament was torn because positions were wrapped into a periodic box, or if a segment of the positions
+            that were set is longer or shorter than its FENE potential allows.
         """
         steps = whole_number(steps, 0, "steps")
+        self.setWorkWindow(WINDOW if self.checks else 0)
         if not self.checks:
             self._advance(steps)
             return
         while steps > 0:
-            chunk = min(steps, STEPS_BETWEEN_CHECKS)
+            # A window at most is finished meanwhile.
+            chunk = min(steps, WINDOW)
             before = self.getNumDividedSteps()
             self._advance(chunk)
             steps -= chunk
             self._divided_steps.add(chunk, self.getNumDividedSteps() - before)
+            work, particle, window, particles = self.takeExplicitWork()
+            if window:
+                self._work.add(work, particle, window, particles)
 
     def setStepSize(self, size):
         """Set the time step: a time, or a TimeStep."""
@@ -272,6 +331,8 @@ class NativeIntegrator(CylinderChainIntegrator):
         except openmm.OpenMMException as error:
             if "is torn" in str(error):
                 raise InputError(f"{self._with_labels(str(error))} (openmm_cylchain.periodic.make_whole).") from None
+            if "is out of range" in str(error):
+                raise InputError(f"{self._with_labels(str(error))}.") from None
             if "has blown up" in str(error):
                 raise InstabilityError(self._with_labels(str(error)) + self._advice) from None
             raise
@@ -303,6 +364,21 @@ class NativeIntegrator(CylinderChainIntegrator):
         if level > LARGEST_PATH_LEVEL:
             raise InputError(f"path level must be at most {LARGEST_PATH_LEVEL}, but is {level}.")
         super().setPathLevel(level)
+
+    def setRecordsTensions(self, records):
+        """Set whether mean tensions are recorded, in the last step of each call of ``step``.
+
+        ``Filaments.mean_joint_tensions`` and ``mean_tensions`` return them. The last step takes about a third longer
+        then.
+
+        Raises
+        ------
+        InputError
+            If the scheme is not "implicit".
+        """
+        if records:
+            _refuse_unless_implicit(self.getScheme())
+        super().setRecordsTensions(bool(records))
 
     def getFlow(self):
         """The Flow of the solvent."""

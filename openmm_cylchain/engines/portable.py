@@ -123,6 +123,25 @@ def move_tethers(context, tethers, node_indices):
             force.updateParametersInContext(context)
 
 
+def record_tensions(context):
+    """Refused: only scheme "implicit" solves for tensions."""
+    mean_tensions(context, 0)
+
+
+def mean_tensions(context, chains):
+    """Refused: only scheme "implicit" solves for tensions.
+
+    Raises
+    ------
+    InputError
+        Always.
+    """
+    raise InputError(
+        'Mean tensions belong to scheme "implicit" of the compiled engine: the portable engine has those of the '
+        "configuration alone (Filaments.joint_tensions)."
+    )
+
+
 def create_integrator(
     system,
     filaments,
@@ -143,10 +162,11 @@ def create_integrator(
     nodes = np.concatenate(node_indices)
     others, frictions = describe_other_particles(system, nodes, particle_friction)
     rest_lengths = np.concatenate([np.full(one.segments, one.type.segment_length) for one in filaments])
+    ranges = np.concatenate([np.full(one.segments, one.type.maximum_extension or np.inf) for one in filaments])
     labels = [filament_label(number, filament) for number, filament in enumerate(filaments)]
     advice = advice_after_blow_up(system)
     periodic = system.usesPeriodicBoundaryConditions()
-    computation = ChainDisplacements(chains, nodes, rest_lengths, labels, others, frictions, advice, periodic)
+    computation = ChainDisplacements(chains, nodes, rest_lengths, ranges, labels, others, frictions, advice, periodic)
     group = add_redistribution(system, computation)
     return PortableIntegrator(system, group, bath_temperature, step_size, scheme, seed, flow, checks)
 
@@ -279,6 +299,8 @@ class ChainDisplacements:
     nodes : (nodes,) int array
         Particle index of every node.
     rest_lengths : (segments,) array
+    ranges : (segments,) array
+        By how much a segment may be longer or shorter than that.
     labels : list of str
         What to call each chain in messages.
     others : (others,) int array
@@ -291,10 +313,11 @@ class ChainDisplacements:
         Whether a flow is that at the images nearest to its origin.
     """
 
-    def __init__(self, chains, nodes, rest_lengths, labels, others, frictions, advice="", periodic=False):
+    def __init__(self, chains, nodes, rest_lengths, ranges, labels, others, frictions, advice="", periodic=False):
         self._chains = chains
         self._nodes = nodes
         self._rest_lengths = rest_lengths
+        self._ranges = ranges
         self._labels = labels
         self._others = others
         self._frictions = frictions
@@ -365,9 +388,12 @@ class ChainDisplacements:
     def _check_chains(self, displacements, nodes, forces, steps_taken):
         first, second = self._chains.first_node, self._chains.second_node
         with np.errstate(all="ignore"):
-            change = np.linalg.norm(displacements[second] - displacements[first], axis=1)
+            changes = displacements[second] - displacements[first]
+            change = np.linalg.norm(changes, axis=1)
+            length = np.linalg.norm(nodes[second] - nodes[first] + changes, axis=1)
             # Written so that NaN counts as unstable.
-            unstable = ~(change < self._rest_lengths)
+            leaves_range = ~(np.abs(length - self._rest_lengths) < self._ranges)
+            unstable = ~(change < self._rest_lengths) | leaves_range
         if not unstable.any():
             return
         # A singular resistance spoils every chain, so the culprit is looked for in what went in.
@@ -381,6 +407,12 @@ class ChainDisplacements:
         chain, number = self._chains.locate_segment(segment)
         if not (finite[first[segment]] and finite[second[segment]]):
             what = "the force on it, or its position, is not finite"
+        elif change[segment] < self._rest_lengths[segment]:
+            rest, extension = self._rest_lengths[segment], self._ranges[segment]
+            what = (
+                f"it would be {length[segment]:.6g} nm long after it, and its FENE potential is finite between "
+                f"{max(0.0, rest - extension):.6g} and {rest + extension:.6g} nm alone"
+            )
         else:
             what = f"its ends would move by {change[segment]:.3g} nm against each other in one step"
         raise InstabilityError(

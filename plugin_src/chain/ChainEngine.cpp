@@ -129,6 +129,15 @@ void BackgroundFlow::getVelocity(const double* x, double* result) const {
         result[i] = velocity[i]+gradient[3*i]*r[0]+gradient[3*i+1]*r[1]+gradient[3*i+2]*r[2];
 }
 
+void SegmentForces::add(const SegmentForces& other, double weight) {
+    tension += weight*other.tension;
+    for (int k = 0; k < 3; k++) {
+        minus[k] += weight*other.minus[k];
+        plus[k] += weight*other.plus[k];
+        direction[k] += weight*other.direction[k];
+    }
+}
+
 struct ChainEngine::Implementation {
     vector<ChainPack> packs;
 };

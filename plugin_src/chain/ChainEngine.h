@@ -15,7 +15,10 @@ struct ChainEnergy {
     double stretching = 0, bending = 0, tethers = 0;
 };
 
-/** Where a step has gone wrong: a segment whose ends would move against each other by more than its rest length. */
+/**
+ * Where a step has gone wrong: a segment whose ends would move against each other by more than its rest length, or whose
+ * length would be one that its FENE potential does not have.
+ */
 struct Instability {
     int chain = -1, segment = -1;
     double change = 0;
@@ -61,6 +64,21 @@ private:
 /** The largest level of a step that may be divided. */
 const int LARGEST_LEVEL = 20;
 
+/** Forces of a segment in a step of the implicit scheme: means over its time, with friction and noise. */
+struct SegmentForces {
+    /** Along the segment, positive where it pulls its ends together. */
+    double tension = 0;
+    /**
+     * What the segment itself exerts on its ends: friction, noise, tension, the bending of its joints, propulsion and the
+     * drag of a flow.
+     */
+    double minus[3] = {}, plus[3] = {};
+    /** The direction from the minus to the plus end, half-way through the step. */
+    double direction[3] = {};
+    /** Add those of another time, with a weight. */
+    void add(const SegmentForces& other, double weight);
+};
+
 /** What a step needs besides positions and forces. */
 struct StepSettings {
     Scheme scheme;
@@ -73,6 +91,8 @@ struct StepSettings {
     std::uint64_t seed, step;
     int level = 0;
     BackgroundFlow flow = {};
+    /** Where to record the forces of segments, for each chain and segment, or NULL. The implicit scheme alone does so. */
+    std::vector<std::vector<SegmentForces> >* segmentForces = NULL;
 };
 
 /**

@@ -299,21 +299,29 @@ template <int W> Instability stepPack(const ChainPack& pack, const double* posit
         findVelocities<W>(pack, x, f, settings.flow, v);
     }
 
-    // Write displacements, and look for segments whose ends move apart.
+    // Write displacements, and look for segments whose ends move apart, or that leave the range of FENE.
     const double h = settings.stepSize;
     scatter<W>(pack, v, h, displacements);
+    const bool ranges = pack.stretching == StretchingModel::FENE;
+    if (ranges)
+        gatherStart<W>(pack, positions, box, x);
     Instability result;
     for (int s = 0; s < pack.segments; s++) {
-        const Vector<Real> change = v[s+1]-v[s];
-        Real square = change.dot(change)*(h*h), limit = property<Real>(pack, s, ChainPack::RestLength);
-        limit = limit*limit;
-        for (int i = 0; i < W; i++)
+        const Vector<Real> change = (v[s+1]-v[s])*(h+Real{});
+        Real square = change.dot(change), rest = property<Real>(pack, s, ChainPack::RestLength), relative = Real{};
+        if (ranges) {
+            const Vector<Real> after = x[s+1]-x[s]+change;
+            relative = (root(after.dot(after))-rest)*property<Real>(pack, s, ChainPack::InverseExtension);
+        }
+        for (int i = 0; i < W; i++) {
             // Written so that NaN counts as unstable.
-            if (!(lane(square, i) < lane(limit, i)) && s < pack.segmentsOfLane[i] && result.chain < 0) {
+            const bool stable = lane(square, i) < lane(rest, i)*lane(rest, i) && std::fabs(lane(relative, i)) < 1;
+            if (!stable && s < pack.segmentsOfLane[i] && result.chain < 0) {
                 result.chain = pack.chain[i];
                 result.segment = s;
                 result.change = std::sqrt(lane(square, i));
             }
+        }
     }
     return result;
 }

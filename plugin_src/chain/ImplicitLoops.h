@@ -66,7 +66,7 @@ template <class Real> struct ImplicitSegment {
     Vector<Real> difference, tangent, bend, bisector;
     Real length, inverse, coordinate;
     // The noise, and theta of the segment and of the joint.
-    Vector<Real> randomBend, randomPair;
+    Vector<Real> randomBend, randomForce, randomPair, metricForce;
     Real randomCoordinate, randomTension, theta, jointTheta;
     // What a stage makes of these: T = k (implicit q(y)+constant), with a part of the bend that turns with the joint.
     Vector<Real> constantBend, turningBend;
@@ -186,8 +186,12 @@ private:
         while (iterations < NEWTON_ITERATIONS) {
             eliminate(y);
             substitute<false>();
-            if (iterations > 0 || stage == Stage::Second)
-                refine();
+            if (iterations > 0 || stage == Stage::Second) {
+                if (settings.segmentForces == NULL || stage == Stage::First)
+                    refine();
+                else
+                    refineAndRecord(y, active);
+            }
             else if (settings.kT > 0) {
                 if (stiffenTautSegments()) {
                     eliminate(y);
@@ -348,7 +352,7 @@ private:
             const Real stretchRate = h*property<Real>(pack, s, ChainPack::Stiffness)*l0*l0+TINY;
             segment.theta = larger<Real>(0.5+Real{}, 1-property<Real>(pack, s, ChainPack::Extensional)/stretchRate);
             segment.randomCoordinate = segment.randomTension = segment.multiplier = segment.extra = Real{};
-            segment.randomBend = segment.randomPair = Vec {};
+            segment.randomBend = segment.randomForce = segment.randomPair = segment.metricForce = Vec {};
             if (s > 0)
                 describeJoint(s);
         }
@@ -444,21 +448,26 @@ private:
         for (int node = 0; node < n; node++)
             loads[node] = f[node];
         for (int s = 0; s < pack.segments; s++) {
-            Geometry geometry;
-            describeNew(y, s, geometry);
-            const Vec direction = geometry.middleTangent;
-            const Vec u1 = flow.at((x[s]+y[s])*(0.5+Real{})), u2 = flow.at((x[s+1]+y[s+1])*(0.5+Real{}));
-            const Vec sum = u1+u2, difference = u2-u1;
-            const Real across = 0.25*property<Real>(pack, s, ChainPack::Perpendicular);
-            const Real along = 0.25*property<Real>(pack, s, ChainPack::Parallel);
-            const Vec carried = sum*across+direction*((along-across)*direction.dot(sum));
-            const Real turn = property<Real>(pack, s, ChainPack::Rotational)*turningFactor(s, geometry);
-            const Real stretch = property<Real>(pack, s, ChainPack::Extensional)*segments[s].inverse*geometry.inverse;
-            const Vec pair = (difference-direction*direction.dot(difference))*turn;
-            segments[s].tensionOfFlow = stretch*direction.dot(difference)*share;
+            Vec carried, pair;
+            findDragOfFlow(flow, y, s, carried, pair);
             loads[s] = loads[s]+(carried-pair)*share;
             loads[s+1] = loads[s+1]+(carried+pair)*share;
         }
+    }
+    /** The drag of the flow on a segment: what each end gets, and what the second one has more and the first one less. */
+    CYLCHAIN_INLINE void findDragOfFlow(const LaneFlow<W>& flow, const Vec* y, int s, Vec& carried, Vec& pair) {
+        Geometry geometry;
+        describeNew(y, s, geometry);
+        const Vec direction = geometry.middleTangent;
+        const Vec u1 = flow.at((x[s]+y[s])*(0.5+Real{})), u2 = flow.at((x[s+1]+y[s+1])*(0.5+Real{}));
+        const Vec sum = u1+u2, difference = u2-u1;
+        const Real across = 0.25*property<Real>(pack, s, ChainPack::Perpendicular);
+        const Real along = 0.25*property<Real>(pack, s, ChainPack::Parallel);
+        const Real turn = property<Real>(pack, s, ChainPack::Rotational)*turningFactor(s, geometry);
+        const Real stretch = property<Real>(pack, s, ChainPack::Extensional)*segments[s].inverse*geometry.inverse;
+        carried = sum*across+direction*((along-across)*direction.dot(sum));
+        pair = (difference-direction*direction.dot(difference))*turn;
+        segments[s].tensionOfFlow = stretch*direction.dot(difference)*shareOfForces();
     }
     CYLCHAIN_INLINE void describeNew(const Vec* y, int s, Geometry& geometry) {
         geometry.difference = y[s+1]-y[s];
@@ -590,12 +599,13 @@ private:
     /**
      * The friction of a segment's ends against turning, over its rotational friction. A turn by phi obeys
      * 2 sin(phi/2) = A cos^(1/2)(phi/2) with Gaussian A then, which diffuses as it should to second order in the step. Of
-     * cos^(1/2), what is left out is of the sixth order in phi.
+     * cos^(1/2), what is left out is of the sixth order in phi. Like all of the friction, it is that of the middle of the
+     * step in what it depends on, here the length; otherwise soft lengths would lack a part of the drift.
      */
     CYLCHAIN_INLINE Real turningFactor(int s, const Geometry& geometry) const {
         const ImplicitSegment<Real>& segment = segments[s];
         const Real squareOfSine = 0.5-0.5*segment.tangent.dot(geometry.tangent);
-        return (1-squareOfSine*(0.25+0.09375*squareOfSine))*(segment.inverse*segment.inverse);
+        return (1-squareOfSine*(0.25+0.09375*squareOfSine))*(segment.inverse*geometry.inverse);
     }
     /** Add the tethers of a node, the next ones, to its equations. */
     void addTethers(const Vec* y, int node, std::size_t& next, Row& row) {
@@ -676,10 +686,12 @@ private:
         });
         substitute<true>();
     }
+    /** The same, and record the forces of the segments, for the lanes that are active; see ImplicitTensions.h. */
+    void refineAndRecord(const Vec* y, Real active);
     /** Add the metric forces of the lengths, in the first iteration, where the directions are those of the start. */
     void addMetricForces() {
         band.findResponses([&] (int s, Vec response) {
-            const ImplicitSegment<Real>& segment = segments[s];
+            ImplicitSegment<Real>& segment = segments[s];
             const Vec t = segment.tangent;
             const Real stiffness = property<Real>(pack, s, ChainPack::Stiffness);
             const Real drag = property<Real>(pack, s, ChainPack::Extensional)/(segment.length*segment.length*h);
@@ -689,6 +701,7 @@ private:
                 noise = noise/(1+stiffness*(segment.theta-DIAGONAL)*t.dot(response));
             response = response-t*t.dot(response);
             const Vec force = response*(settings.kT*noise/segment.length);
+            segment.metricForce = force;
             drift[s] = drift[s]+force;
             drift[s+1] = drift[s+1]-force;
         });
@@ -737,6 +750,7 @@ private:
 };
 
 #include "ImplicitNoise.h"
+#include "ImplicitTensions.h"
 
 /**
  * Advance the lanes that failed, from the start, by the same time in more and more parts. They follow the Brownian path of
@@ -749,6 +763,7 @@ template <int W, bool CLOSED> void divideStep(const ChainPack& pack, const Vecto
     const double h = settings.stepSize;
     const std::uint64_t step = settings.step;
     const int level = settings.level;
+    const MeanOfParts<W> mean(pack, settings);
     Vector<Real>* from = scratch.reserve<Vector<Real> >(2*pack.nodes);
     Vector<Real>* to = from+pack.nodes;
     for (int division = 1; division <= LARGEST_DIVISION; division++) {
@@ -764,6 +779,7 @@ template <int W, bool CLOSED> void divideStep(const ChainPack& pack, const Vecto
             for (int node = 0; node < pack.nodes; node++)
                 from[node] = to[node];
             ImplicitStep<W, CLOSED>(pack, settings, box, memory).take(from, f, to, failedPart);
+            mean.add(part, parts, failed);
             hope = false;
             for (int i = 0; i < W; i++) {
                 failedNow[i] |= failedPart[i];

@@ -45,6 +45,7 @@ CYLCHAIN_INLINE void ImplicitStep<W, CLOSED>::drawForces(const Real* normals, in
     const Vec pair = (b-t*t.dot(b))*(property<Real>(pack, s, ChainPack::RootRotational)*perLength);
     random[s] = random[s]+force-pair;
     random[s+1] = random[s+1]+force+pair;
+    segment.randomForce = force;
     segment.randomPair = pair;
     segment.randomTension = t.dot(b)*(property<Real>(pack, s, ChainPack::RootExtensional)*perLength);
 }

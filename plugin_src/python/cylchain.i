@@ -91,7 +91,7 @@ static void raiseOpenMMException(const std::exception& e) {
     }
 }
 
-%apply int& OUTPUT {int& bendingModel, int& stretchingModel, int& chain, int& node};
+%apply int& OUTPUT {int& bendingModel, int& stretchingModel, int& chain, int& node, int& particle, int& steps, int& particles};
 
 %typemap(in, numinputs=0) Vec3& point (OpenMM::Vec3 value) {
     $1 = &value;
@@ -103,12 +103,32 @@ static void raiseOpenMMException(const std::exception& e) {
 
 %typemap(argout) const Vec3& point {
 }
+
+%typemap(in, numinputs=0) std::vector<double>& tensions (std::vector<double> value) {
+    $1 = &value;
+}
+%typemap(argout) std::vector<double>& tensions {
+    PyObject* tuple = PyTuple_New($1->size());
+    for (size_t i = 0; i < $1->size(); i++)
+        PyTuple_SetItem(tuple, i, PyFloat_FromDouble((*$1)[i]));
+    $result = SWIG_Python_AppendOutput($result, tuple, 1);
+}
+%typemap(in, numinputs=0) std::vector<Vec3>& vectors (std::vector<OpenMM::Vec3> value) {
+    $1 = &value;
+}
+%typemap(argout, fragment="Vec3_to_PyVec3") std::vector<Vec3>& vectors {
+    PyObject* tuple = PyTuple_New($1->size());
+    for (size_t i = 0; i < $1->size(); i++)
+        PyTuple_SetItem(tuple, i, Vec3_to_PyVec3((*$1)[i]));
+    $result = SWIG_Python_AppendOutput($result, tuple, 1);
+}
+%apply std::vector<Vec3>& vectors {std::vector<Vec3>& jointForces, std::vector<Vec3>& directions};
 %apply Vec3& point {Vec3& velocity, Vec3& gradientX, Vec3& gradientY, Vec3& gradientZ, Vec3& origin};
 %apply const Vec3& point {const Vec3& velocity, const Vec3& gradientX, const Vec3& gradientY, const Vec3& gradientZ,
         const Vec3& origin};
 %apply double& OUTPUT {double& restLength, double& stretchingStiffness, double& maximumExtension,
         double& parallelFriction, double& perpendicularFriction, double& rotationalFriction,
-        double& extensionalFriction, double& stiffness, double& stretching, double& bending, double& propulsion};
+        double& extensionalFriction, double& stiffness, double& stretching, double& bending, double& propulsion, double& work};
 
 %pythoncode %{
 import openmm
@@ -153,6 +173,10 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %pythonappend OpenMM::CylinderChainIntegrator::getFlow(Vec3&, Vec3&, Vec3&, Vec3&, Vec3&) const %{
     units = (_VELOCITY, 1/unit.picosecond, 1/unit.picosecond, 1/unit.picosecond, _LENGTH)
     val = [unit.Quantity(v, u) for v, u in zip(val, units)]
+%}
+%pythonappend OpenMM::CylinderChainIntegrator::getMeanTensions(int, std::vector<double>&, std::vector<Vec3>&,
+        std::vector<Vec3>&) const %{
+    val = [unit.Quantity(val[0], _FORCE), unit.Quantity(val[1], _FORCE), val[2]]
 %}
 %pythonappend OpenMM::CylinderChainIntegrator::getParticleFrictions() const %{
     val = {particle: unit.Quantity(friction, _FRICTION) for particle, friction in val.items()}

@@ -193,6 +193,35 @@ static void testInstability() {
     throw runtime_error("instability not found");
 }
 
+static void testLengthsThatLeaveTheirRange() {
+    Array x;
+    vector<Chain> chains = makeChains(SEGMENTS, BendingModel::InscribedCircle, StretchingModel::FENE, x);
+    for (double extension : {6.0, 0.5}) {
+        // Of chain 5, one length is taken to the end of its range and beyond, by less than the change that is too much.
+        Segment& segment = chains[5].segments[7];
+        segment.maximumExtension = extension;
+        Array f(x.size()), displacements(x.size());
+        const int first = chains[5].nodes[7], second = chains[5].nodes[8];
+        for (int k = 0; k < 3; k++) {
+            f[3*first+k] = -500*(x[3*second+k]-x[3*first+k]);
+            f[3*second+k] = -f[3*first+k];
+        }
+        bool found = false;
+        for (bool fene : {false, true}) {
+            for (Chain& chain : chains)
+                chain.stretching = fene ? StretchingModel::FENE : StretchingModel::Harmonic;
+            ChainEngine engine(chains);
+            for (int pack = 0; pack < engine.getNumPacks(); pack++) {
+                const Instability one = engine.step(pack, x.data(), f.data(), NULL, {Scheme::Midpoint, 0, 1e-4, 1, 1},
+                        displacements.data());
+                check(one.chain == -1 || (fene && one.chain == 5 && one.segment == 7), "wrong chain or segment");
+                found |= one.chain == 5;
+            }
+        }
+        check(found == (extension < 1), "a length that leaves its range");
+    }
+}
+
 int main() {
     return runTests({
         testForces,
@@ -203,6 +232,7 @@ int main() {
         testPeriodicImages,
         testCovarianceOfNoise,
         testChainsDoNotDependOnTheirPack,
-        testInstability
+        testInstability,
+        testLengthsThatLeaveTheirRange
     });
 }

@@ -86,12 +86,13 @@ static Array residualOf(const vector<Chain>& chains, const Array& x, const Array
     for (Chain& chain : withoutExtensional)
         for (size_t s = 0; s < chain.segments.size(); s++) {
             const Array before = nodesFrom(chain, s, 2, x), after = nodesFrom(chain, s, 2, y);
-            const double length = lengthOf(before.data()), mean = lengthOf(nodesFrom(chain, s, 2, middle).data());
+            const double lengths = lengthOf(before.data())*lengthOf(after.data());
+            const double mean = lengthOf(nodesFrom(chain, s, 2, middle).data());
             double cosine = 0;
             for (int k = 0; k < 3; k++)
-                cosine += (before[3+k]-before[k])*(after[3+k]-after[k])/(length*lengthOf(after.data()));
+                cosine += (before[3+k]-before[k])*(after[3+k]-after[k])/lengths;
             chain.segments[s].extensional = 0;
-            chain.segments[s].rotational *= pow(0.5+0.5*cosine, 0.25)*mean*mean/(length*length);
+            chain.segments[s].rotational *= pow(0.5+0.5*cosine, 0.25)*mean*mean/lengths;
         }
     const vector<Array> z = denseResistance(withoutExtensional, middle);
     for (size_t i = 0; i < x.size(); i++)
@@ -380,6 +381,144 @@ static void testDivision() {
     throw runtime_error("instability not found");
 }
 
+static vector<vector<SegmentForces> > placesFor(const vector<Chain>& chains) {
+    vector<vector<SegmentForces> > places;
+    for (const Chain& chain : chains)
+        places.push_back(vector<SegmentForces>(chain.segments.size()));
+    return places;
+}
+
+/** What the segments of chains exert on nodes. */
+static Array onNodes(const vector<Chain>& chains, const vector<vector<SegmentForces> >& forces, size_t size) {
+    Array sum(size);
+    for (size_t chain = 0; chain < chains.size(); chain++)
+        for (size_t s = 0; s < forces[chain].size(); s++)
+            for (int k = 0; k < 3; k++) {
+                sum[componentFrom(chains[chain], s, k)] += forces[chain][s].minus[k];
+                sum[componentFrom(chains[chain], s, 3+k)] += forces[chain][s].plus[k];
+            }
+    return sum;
+}
+
+/** On every mobile node, forces of segments balance those from outside, in a step that is taken as a whole or in parts. */
+static void checkBalance(const vector<Chain>& chains, const Array& x, const StepSettings& given, const Array& f,
+        bool divided = false) {
+    vector<vector<SegmentForces> > forces = placesFor(chains);
+    StepSettings settings = given;
+    settings.segmentForces = &forces;
+    ChainEngine engine(chains);
+    const Array change = stepOf(engine, x, f, settings), unrecorded = stepOf(engine, x, f, given);
+    const Array sum = onNodes(chains, forces, x.size()), outside = withoutHeld(chains, f);
+    for (size_t chain = 0; chain < chains.size(); chain++) {
+        double scale = 0;
+        for (const SegmentForces& one : forces[chain])
+            for (int k = 0; k < 3; k++)
+                scale = fmax(scale, fabs(one.plus[k]));
+        vector<bool> held = chains[chain].fixed;
+        for (const Tether& tether : chains[chain].tethers) {
+            held[tether.node] = true;
+            double total = 0, expected = 0;
+            for (int k = 0; k < (chains[chain].planar ? 2 : 3) && !chains[chain].fixed[tether.node] && given.kT == 0; k++) {
+                const int i = componentFrom(chains[chain], tether.node, k);
+                // Between those at the start and the end of the step.
+                const double before = -tether.stiffness*(x[i]-tether.point[k]), after = before-tether.stiffness*change[i];
+                const double pull = -sum[i]-f[i];
+                total += pow(pull-before, 2);
+                expected += pow(after-before, 2);
+                if (!divided)
+                    checkClose(0, fmin(0, (pull-before)*(after-pull)), 1+after*after+before*before, 0.02, "force of a tether");
+            }
+            check(total <= 1.2*expected+1e-9*scale*scale, "force of a tether");
+        }
+        for (size_t node = 0; node < held.size(); node++)
+            for (int k = 0; k < 3 && !held[node]; k++) {
+                const int i = componentFrom(chains[chain], node, k);
+                checkClose(0, sum[i]+outside[i], scale+fabs(f[i])+1e-3, 1e-6, "balance of a node");
+            }
+        for (const SegmentForces& one : forces[chain])
+            if (!divided)
+                checkClose(1, one.direction[0]*one.direction[0]+one.direction[1]*one.direction[1]+
+                        one.direction[2]*one.direction[2], 1, 1e-12, "direction");
+    }
+    for (size_t i = 0; i < x.size(); i++)
+        checkClose(unrecorded[i], change[i], 0, 0, "step that is recorded");
+}
+
+static void testBalanceOfNodes() {
+    for (int bending = 0; bending < 3; bending++)
+        for (int stretching = 0; stretching < 2; stretching++)
+            for (bool tethers : {false, true})
+                for (bool flows : {false, true})
+                    for (double kT : {0.0, 2.5})
+                        for (double h : {0.001, 0.03, 1.0}) {
+                            Array x;
+                            vector<Chain> chains = makeAll((BendingModel) bending, (StretchingModel) stretching, x);
+                            if (tethers)
+                                chains = tethered(chains, x);
+                            for (size_t chain = 0; chain < chains.size(); chain += 2)
+                                for (Segment& segment : chains[chain].segments)
+                                    segment.propulsion = 3;
+                            Array f(x.size());
+                            for (size_t i = 0; i < f.size(); i++)
+                                f[i] = sin(i);
+                            // One of them is taut, so that it gets friction of its own.
+                            f[3*chains[5].nodes.front()] -= 600;
+                            f[3*chains[5].nodes.back()] += 600;
+                            BackgroundFlow flow = flows ? FLOW : BackgroundFlow {};
+                            for (double& derivative : flow.gradient)
+                                derivative *= 0.05/h*0.03;
+                            checkBalance(chains, x, {Scheme::Implicit, kT, h, 3, 7, 0, flow}, f, h > 0.9);
+                        }
+}
+
+static void testTensionsOfStraightChains() {
+    // A chain at rest that is held at one end and pulled at the other has one tension, and so has a hanging one at rest.
+    Chain chain;
+    Array x;
+    for (int node = 0; node <= 6; node++) {
+        chain.nodes.push_back(node);
+        chain.fixed.push_back(node == 0);
+        x.insert(x.end(), {10.5*node, 0, 0});
+    }
+    chain.segments.assign(6, {10, 30, 6, 5, 8, 70, 200});
+    chain.joints.assign(5, 20);
+    chain.bending = BendingModel::Quadratic;
+    chain.stretching = StretchingModel::Harmonic;
+    ChainEngine engine({chain});
+    Array f(x.size());
+    f[18] = 15;
+    for (double h : {0.01, 100.0}) {
+        vector<vector<SegmentForces> > forces = placesFor({chain});
+        StepSettings settings = {Scheme::Implicit, 0, h, 1, 1};
+        settings.segmentForces = &forces;
+        stepOf(engine, x, f, settings);
+        for (const SegmentForces& one : forces[0]) {
+            checkClose(15, one.tension, 15, 1e-9, "tension");
+            checkClose(15, one.minus[0], 15, 1e-9, "force on the minus end");
+            checkClose(-15, one.plus[0], 15, 1e-9, "force on the plus end");
+        }
+    }
+}
+
+static void testForcesOfDividedSteps() {
+    Array x;
+    const vector<Chain> chains = makeChains(SEGMENTS, BendingModel::InscribedCircle, StretchingModel::Harmonic, x);
+    Array moved = x, f(x.size());
+    moved[3*chains[5].nodes[4]+2] += 30;
+    checkBalance(chains, moved, {Scheme::Implicit, 0, 1, 1, 1}, f, true);
+    checkBalance(chains, moved, {Scheme::Implicit, 2.5, 1, 1, 1}, f, true);
+    // Chains beside the one that is divided have the forces of the whole step.
+    vector<vector<SegmentForces> > together = placesFor(chains), alone = placesFor(chains);
+    StepSettings settings = {Scheme::Implicit, 2.5, 1, 1, 1};
+    for (auto forces : {&together, &alone}) {
+        settings.segmentForces = forces;
+        stepOf(ChainEngine(chains), forces == &together ? moved : x, f, settings);
+    }
+    for (size_t chain = 0; chain < chains.size(); chain++)
+        for (size_t s = 0; s < chains[chain].segments.size() && chain != 5; s++)
+            checkClose(alone[chain][s].tension, together[chain][s].tension, 1, 1e-9, "tension beside a divided chain");
+}
+
 int main() {
     return runTests({
         testStepsWithoutNoise,
@@ -387,6 +526,9 @@ int main() {
         testChainsDoNotDependOnTheirPack,
         testPeriodicImages,
         testLongChainsOfShortSegments,
-        testDivision
+        testDivision,
+        testBalanceOfNodes,
+        testTensionsOfStraightChains,
+        testForcesOfDividedSteps
     });
 }

@@ -41,7 +41,8 @@ static CylinderChainForceImpl& findChains(ContextImpl& context) {
 }
 
 CylinderChainIntegrator::CylinderChainIntegrator(double temperature, double frictionCoeff, double stepSize) :
-        scheme(Implicit), pathLevel(0), noiseLevel(0), noiseSeed(0), stepsTaken(0), countAfterSteps(0), dividedSteps(0), positionsHaveChanged(true), chains(NULL) {
+        scheme(Implicit), pathLevel(0), noiseLevel(0), noiseSeed(0), stepsTaken(0), countAfterSteps(0), dividedSteps(0), workWindow(0),
+        positionsHaveChanged(true), followsOn(false), recordsTensions(false), chains(NULL) {
     setTemperature(temperature);
     setFriction(frictionCoeff);
     setStepSize(stepSize);
@@ -155,7 +156,28 @@ void CylinderChainIntegrator::setFlow(const Vec3& velocity, const Vec3& gradient
     flowOrigin = origin;
 }
 
+void CylinderChainIntegrator::setWorkWindow(int steps) {
+    if (steps < 0)
+        throw OpenMMException("CylinderChainIntegrator: The window for the work of forces must not be negative, but is "+
+                to_string(steps));
+    workWindow = steps;
+}
+
+void CylinderChainIntegrator::takeExplicitWork(double& work, int& particle, int& steps, int& particles) {
+    if (context == NULL)
+        throw OpenMMException("This Integrator is not bound to a context!");
+    kernel.getAs<IntegrateCylinderChainStepKernel>().takeExplicitWork(work, particle, steps, particles);
+}
+
+void CylinderChainIntegrator::getMeanTensions(int chain, vector<double>& tensions, vector<Vec3>& jointForces,
+        vector<Vec3>& directions) const {
+    if (context == NULL)
+        throw OpenMMException("This Integrator is not bound to a context!");
+    kernel.getAs<IntegrateCylinderChainStepKernel>().getMeanTensions(chain, tensions, jointForces, directions);
+}
+
 void CylinderChainIntegrator::stateChanged(State::DataType changed) {
+    followsOn = false;
     if (changed == State::Positions)
         positionsHaveChanged = true;
 }
@@ -182,20 +204,23 @@ void CylinderChainIntegrator::step(int steps) {
     IntegrateCylinderChainStepKernel& stepKernel = kernel.getAs<IntegrateCylinderChainStepKernel>();
     if (positionsHaveChanged) {
         stepKernel.refuseTornChains(*context);
+        stepKernel.refuseInfiniteEnergies(*context);
         positionsHaveChanged = false;
     }
     stepsTaken = findNextStep();
     countAfterSteps = context->getStepCount();
     const bool includesChains = (getIntegrationForceGroups()&(1<<chains->getOwner().getForceGroup())) != 0;
     for (int done = 0; done < steps;) {
-        context->updateContextState();
+        if (context->updateContextState())
+            followsOn = false;
 
         // Where there are only chains, several steps are taken at once.  The first one is not among them, because OpenMM
         // checks that positions have been set, nor is one that blows up.
 
         if (done > 0 && chainsAreAlone && includesChains) {
             const int count = min(steps-done, STEPS_TOGETHER);
-            const int taken = stepKernel.executeTogether(*context, *this, noiseSeed, noiseLevel, stepsTaken, count, dividedSteps);
+            const int taken = stepKernel.executeTogether(*context, *this, noiseSeed, noiseLevel, stepsTaken, count,
+                    recordsTensions && done+count == steps, dividedSteps);
             stepsTaken += taken;
             countAfterSteps = context->getStepCount();
             done += taken;
@@ -208,7 +233,9 @@ void CylinderChainIntegrator::step(int steps) {
             CylinderChainForceImpl::Exclusion exclusion(*chains, scheme == Implicit || scheme == ImplicitSecondOrder);
             context->calcForcesAndEnergy(true, false, getIntegrationForceGroups());
         }
-        stepKernel.execute(*context, *this, noiseSeed, noiseLevel, stepsTaken, dividedSteps);
+        stepKernel.execute(*context, *this, noiseSeed, noiseLevel, stepsTaken, followsOn, recordsTensions && done == steps-1,
+                dividedSteps);
+        followsOn = true;
         stepsTaken++;
         countAfterSteps = context->getStepCount();
         done++;

@@ -30,6 +30,8 @@ void CylinderChainIntegratorProxy::serialize(const void* object, SerializationNo
     node.setDoubleProperty("friction", integrator.getFriction());
     node.setIntProperty("scheme", integrator.getScheme());
     node.setIntProperty("pathLevel", integrator.getPathLevel());
+    node.setIntProperty("workWindow", integrator.getWorkWindow());
+    node.setIntProperty("recordsTensions", integrator.getRecordsTensions());
     node.setIntProperty("randomSeed", integrator.getRandomNumberSeed());
     node.setIntProperty("integrationForceGroups", integrator.getIntegrationForceGroups());
     Vec3 velocity, gradientX, gradientY, gradientZ, origin;
@@ -56,6 +58,8 @@ void* CylinderChainIntegratorProxy::deserialize(const SerializationNode& node) c
     integrator->setScheme((CylinderChainIntegrator::Scheme) node.getIntProperty("scheme"));
     integrator->setRandomNumberSeed(node.getIntProperty("randomSeed"));
     integrator->setPathLevel(node.getIntProperty("pathLevel", 0));
+    integrator->setWorkWindow(node.getIntProperty("workWindow", 0));
+    integrator->setRecordsTensions(node.getIntProperty("recordsTensions", 0) != 0);
     integrator->setIntegrationForceGroups(node.getIntProperty("integrationForceGroups"));
     if (version > 1) {
         const SerializationNode& flow = node.getChildNode("Flow");

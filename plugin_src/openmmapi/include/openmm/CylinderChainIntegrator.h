@@ -161,6 +161,63 @@ public:
         return dividedSteps;
     }
     /**
+     * Get the number of steps over which the work of explicit forces is averaged.  See setWorkWindow() for details.
+     */
+    int getWorkWindow() const {
+        return workWindow;
+    }
+    /**
+     * Set the number of steps over which the work of explicit forces is averaged, or 0, which is the default, to measure
+     * nothing.
+     *
+     * Forces are explicit if a step takes those of its start: all but those of the chains, with the scheme Implicit, or all
+     * of them.  If a step is too long for them, it shows by the work w = -(f(after)-f(before)).dx that they do on a particle
+     * in a step which moves it by dx: for a harmonic coordinate that relaxes by x = k mu h in a step, w has the mean
+     * 2 kT x/(1-x/2).  The means over the window of dx and of the change of f are taken off first.
+     *
+     * Steps are left out that follow on a change of positions, of parameters of Forces or of the Context, or of the periodic
+     * box.  Nothing is measured at zero temperature, nor where several steps are taken at once because there are no other
+     * forces than those of the chains.
+     */
+    void setWorkWindow(int steps);
+    /**
+     * Get the mean work of explicit forces in the last window of steps that has been finished, for the particle where it is
+     * largest.  Each window can be got once.  See setWorkWindow() for details.
+     *
+     * @param[out] work       the mean, over kT
+     * @param[out] particle   the index of the particle
+     * @param[out] steps      the number of steps in the window, or 0 if none has been finished since the last call
+     * @param[out] particles  the number of particles of which it is the largest: those with such work
+     */
+    void takeExplicitWork(double& work, int& particle, int& steps, int& particles);
+    /**
+     * Get whether tensions are recorded.  See getMeanTensions() for details.
+     */
+    bool getRecordsTensions() const {
+        return recordsTensions;
+    }
+    /**
+     * Set whether tensions are recorded, which is not so by default.  See getMeanTensions() for details.
+     */
+    void setRecordsTensions(bool records) {
+        recordsTensions = records;
+    }
+    /**
+     * Get the tension of a chain as a mean over the last step, with friction and noise, for the scheme Implicit.  It is
+     * recorded in the last step of each call to step() while setRecordsTensions(true) holds; otherwise this throws an
+     * exception.  Checkpoints do not contain it.
+     *
+     * @param chain             the index of the chain
+     * @param[out] tensions     the tension of each segment, measured in kJ/mol/nm: its elastic force, its friction against
+     *                          becoming longer relative to the fluid and the noise of both, along its mean direction
+     * @param[out] jointForces  the force that the segment behind each joint exerts on the one before it, measured in
+     *                          kJ/mol/nm.  Forces of tethers, and all that come from outside the chain, act on both segments
+     *                          of a joint in equal parts.  The last joint of a ring is that of its last segment and the first.
+     * @param[out] directions   the direction of each segment half-way through the step, a unit vector
+     */
+    void getMeanTensions(int chain, std::vector<double>& tensions, std::vector<Vec3>& jointForces,
+            std::vector<Vec3>& directions) const;
+    /**
      * Get the random number seed.  See setRandomNumberSeed() for details.
      */
     int getRandomNumberSeed() const {
@@ -220,7 +277,8 @@ protected:
      */
     std::vector<std::string> getKernelNames();
     /**
-     * Note that positions have changed: chains may have been torn.
+     * Note that positions have changed: chains may have been torn.  Whatever has changed, the next step does not follow on
+     * the last one.
      */
     void stateChanged(State::DataType changed);
     /**
@@ -260,7 +318,8 @@ private:
 
     long long countAfterSteps;
     long long dividedSteps;
-    bool chainsAreAlone, positionsHaveChanged;
+    int workWindow;
+    bool chainsAreAlone, positionsHaveChanged, followsOn, recordsTensions;
     CylinderChainForceImpl* chains;
     Kernel kernel;
 };

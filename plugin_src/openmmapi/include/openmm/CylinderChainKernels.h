@@ -9,6 +9,7 @@
 #include "openmm/internal/ContextImpl.h"
 #include <cstdint>
 #include <string>
+#include <vector>
 
 namespace OpenMM {
 
@@ -83,6 +84,12 @@ public:
      */
     virtual void refuseTornChains(ContextImpl& context) const = 0;
     /**
+     * Throw an exception if a segment has a length at which its FENE potential is infinite.
+     *
+     * @param context  the context whose positions to look at
+     */
+    virtual void refuseInfiniteEnergies(ContextImpl& context) const = 0;
+    /**
      * Execute the kernel.  If a chain or a particle blows up, an exception is thrown and nothing has moved.
      *
      * @param context     the context in which to execute this kernel
@@ -90,22 +97,34 @@ public:
      * @param seed        the seed of the noise
      * @param level       the level of the noise, see CylinderChainIntegrator::setPathLevel()
      * @param step        the number of the step.  The noise depends on this, the seed and the level alone.
+     * @param followsOn   whether nothing else than the step before has changed positions, forces and parameters
+     * @param records     whether to record tensions, see getMeanTensions()
      * @param divided     increased by the number of chains whose step was taken in parts
      */
     virtual void execute(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed,
-            int level, std::uint64_t step, long long& divided) = 0;
+            int level, std::uint64_t step, bool followsOn, bool records, long long& divided) = 0;
+    /**
+     * Get the work of explicit forces in the last window of steps, see CylinderChainIntegrator::takeExplicitWork().
+     */
+    virtual void takeExplicitWork(double& work, int& particle, int& steps, int& particles) = 0;
     /**
      * Take several steps where there are no other forces than those of the chains, which are computed here.  Chains
      * do not know of each other then, so each can be advanced by all steps at once.
      *
      * @param step        the number of the first step
      * @param count       the number of steps
+     * @param records     whether to record tensions in the last of them, see getMeanTensions()
      * @param divided     increased by the number of steps of a chain that were taken in parts
      * @return the number of steps that were taken: fewer than count if the one after them would blow up, or 0 if this
      *         cannot be done for the context
      */
     virtual int executeTogether(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed,
-            int level, std::uint64_t step, int count, long long& divided) = 0;
+            int level, std::uint64_t step, int count, bool records, long long& divided) = 0;
+    /**
+     * Get the tensions of a chain in the last step, see CylinderChainIntegrator::getMeanTensions().
+     */
+    virtual void getMeanTensions(int chain, std::vector<double>& tensions, std::vector<Vec3>& jointForces,
+            std::vector<Vec3>& directions) const = 0;
 };
 
 } // namespace OpenMM

@@ -31,7 +31,8 @@ static bool isFinite(const Vec3& v) {
 }
 
 ReferenceIntegrateCylinderChainStepKernel::ReferenceIntegrateCylinderChainStepKernel(string name, const Platform& platform,
-        ContextImpl& context) : IntegrateCylinderChainStepKernel(name, platform), loop(context), chainKernel(NULL), periodic(false) {
+        ContextImpl& context) : IntegrateCylinderChainStepKernel(name, platform), loop(context), explicitWork(loop),
+        chainKernel(NULL), periodic(false), recorded(false) {
 }
 
 void ReferenceIntegrateCylinderChainStepKernel::initialize(const System& system, const CylinderChainIntegrator& integrator,
@@ -60,6 +61,13 @@ void ReferenceIntegrateCylinderChainStepKernel::initialize(const System& system,
     particleFrictions.assign(numParticles, 0.0);
     for (auto& entry : integrator.getParticleFrictions())
         particleFrictions[entry.first] = entry.second;
+    vector<int> mobile = others;
+    for (const Chain& chain : chainKernel->getChains())
+        for (size_t node = 0; node < chain.nodes.size(); node++)
+            if (!chain.fixed[node])
+                mobile.push_back(chain.nodes[node]);
+    sort(mobile.begin(), mobile.end());
+    explicitWork.initialize(mobile);
     displacements.assign(numParticles, Vec3());
     newPositions.assign(numParticles, Vec3());
 }
@@ -135,9 +143,46 @@ void ReferenceIntegrateCylinderChainStepKernel::refuseTornChains(ContextImpl& co
         }
 }
 
+/** Whether a FENE segment can have a length. NaN counts as such, because it has reasons of its own. */
+static bool isInRange(const Chain& chain, int segment, double length) {
+    const Segment& own = chain.segments[segment];
+    return chain.stretching != StretchingModel::FENE || !(fabs(length-own.restLength) >= own.maximumExtension);
+}
+
+static string describeRange(const Segment& segment) {
+    stringstream text;
+    text << "its FENE potential is finite between " << max(0.0, segment.restLength-segment.maximumExtension) << " and " <<
+            segment.restLength+segment.maximumExtension << " nm alone";
+    return text.str();
+}
+
+void ReferenceIntegrateCylinderChainStepKernel::refuseInfiniteEnergies(ContextImpl& context) const {
+    const vector<Vec3>& positions = *extractData(context).positions;
+    const double* box = chainKernel->getBox(context);
+    const vector<Chain>& chains = chainKernel->getChains();
+    for (size_t chain = 0; chain < chains.size(); chain++) {
+        if (chains[chain].stretching != StretchingModel::FENE)
+            continue;
+        const vector<int>& nodes = chains[chain].nodes;
+        for (size_t s = 0; s < chains[chain].segments.size(); s++) {
+            Vec3 between = positions[nodes[(s+1)%nodes.size()]]-positions[nodes[s]];
+            if (box != NULL)
+                takeToNearestImage(&between[0], box);
+            if (isInRange(chains[chain], s, norm(between)))
+                continue;
+            stringstream message;
+            message << "Chain " << chain << " is out of range at segment " << s << ": it is " << norm(between) <<
+                    " nm long, and " << describeRange(chains[chain].segments[s]) << ". Set other positions";
+            throw OpenMMException(message.str());
+        }
+    }
+}
+
 void ReferenceIntegrateCylinderChainStepKernel::execute(ContextImpl& context, const CylinderChainIntegrator& integrator,
-        uint64_t seed, int level, uint64_t step, long long& divided) {
-    const StepSettings settings = settingsOf(context, integrator, seed, level, step);
+        uint64_t seed, int level, uint64_t step, bool followsOn, bool records, long long& divided) {
+    StepSettings settings = settingsOf(context, integrator, seed, level, step);
+    recordForces(settings, records);
+    explicitWork.beginStep(*extractData(context).forces, displacements, followsOn, settings.kT, integrator.getWorkWindow());
     displaceChains(context, settings, divided);
     displaceOthers(context, settings, integrator.getFriction());
 
@@ -152,13 +197,58 @@ void ReferenceIntegrateCylinderChainStepKernel::execute(ContextImpl& context, co
     data.virtualSites->computePositions(context.getSystem(), *data.positions, data.periodicBoxVectors);
     data.time += settings.stepSize;
     data.stepCount++;
+    explicitWork.endStep();
+    recorded = (settings.segmentForces != NULL);
+}
+
+void ReferenceIntegrateCylinderChainStepKernel::recordForces(StepSettings& settings, bool records) {
+    recorded = false;
+    if (!records || !isImplicit(settings.scheme))
+        return;
+    const vector<Chain>& chains = chainKernel->getChains();
+    segmentForces.resize(chains.size());
+    for (size_t chain = 0; chain < chains.size(); chain++)
+        segmentForces[chain].resize(chains[chain].segments.size());
+    settings.segmentForces = &segmentForces;
+}
+
+void ReferenceIntegrateCylinderChainStepKernel::getMeanTensions(int chain, vector<double>& tensions, vector<Vec3>& jointForces,
+        vector<Vec3>& directions) const {
+    if (!recorded)
+        throw OpenMMException("No tensions were recorded in the last step: call setRecordsTensions(true) before it, with "
+                "an implicit scheme");
+    if (chain < 0 || chain >= (int) segmentForces.size())
+        throw OpenMMException("CylinderChainIntegrator: Illegal chain index: "+to_string(chain));
+    const vector<SegmentForces>& forces = segmentForces[chain];
+    tensions.clear();
+    jointForces.clear();
+    directions.clear();
+    for (const SegmentForces& one : forces) {
+        tensions.push_back(one.tension);
+        const Vec3 direction(one.direction[0], one.direction[1], one.direction[2]);
+        directions.push_back(direction/norm(direction));
+    }
+
+    // Forces from outside act on both segments of a joint in equal parts, which leaves half the difference of their own.
+
+    for (size_t joint = 0; joint < chainKernel->getChains()[chain].joints.size(); joint++) {
+        const double* before = forces[joint].plus;
+        const double* behind = forces[(joint+1)%forces.size()].minus;
+        jointForces.push_back(Vec3(behind[0]-before[0], behind[1]-before[1], behind[2]-before[2])*0.5);
+    }
+}
+
+void ReferenceIntegrateCylinderChainStepKernel::takeExplicitWork(double& work, int& particle, int& steps, int& particles) {
+    explicitWork.take(work, particle, steps, particles);
 }
 
 int ReferenceIntegrateCylinderChainStepKernel::executeTogether(ContextImpl& context, const CylinderChainIntegrator& integrator,
-        uint64_t seed, int level, uint64_t step, int count, long long& divided) {
+        uint64_t seed, int level, uint64_t step, int count, bool records, long long& divided) {
     if (!others.empty())
         return 0;
-    const StepSettings settings = settingsOf(context, integrator, seed, level, step);
+    explicitWork.interrupt();
+    StepSettings settings = settingsOf(context, integrator, seed, level, step);
+    recordForces(settings, records);
     ReferencePlatform::PlatformData& data = extractData(context);
     vector<int> taken(chainKernel->getEngine().getNumPacks());
     vector<long long> dividedInPack(taken.size());
@@ -182,6 +272,7 @@ int ReferenceIntegrateCylinderChainStepKernel::executeTogether(ContextImpl& cont
     data.virtualSites->computePositions(context.getSystem(), *data.positions, data.periodicBoxVectors);
     data.time += done*settings.stepSize;
     data.stepCount += done;
+    recorded = (settings.segmentForces != NULL && done == count);
     return done;
 }
 
@@ -195,7 +286,9 @@ int ReferenceIntegrateCylinderChainStepKernel::advancePack(ContextImpl& context,
     for (int particle : particles)
         if (particle >= 0)
             newPositions[particle] = (*data.positions)[particle];
+    vector<vector<SegmentForces> >* const segmentForces = settings.segmentForces;
     for (int done = 0; done < count; done++, settings.step++) {
+        settings.segmentForces = (done == count-1 ? segmentForces : NULL);
         const double* positions = &newPositions[0][0];
         engine.clearForces(pack, forces);
         if (!isImplicit(settings.scheme))
@@ -233,24 +326,24 @@ void ReferenceIntegrateCylinderChainStepKernel::displaceChains(ContextImpl& cont
 
     // Whatever the order of packs, report the first chain.
 
-    int first = -1;
+    Instability first;
     for (const Instability& instability : instabilities)
-        if (instability.chain != -1 && (first == -1 || instability.chain < first))
-            first = instability.chain;
-    if (first != -1)
+        if (instability.chain != -1 && (first.chain == -1 || instability.chain < first.chain))
+            first = instability;
+    if (first.chain != -1)
         reportInstability(context, first, settings);
     for (const Instability& instability : instabilities)
         divided += instability.divided;
 }
 
-void ReferenceIntegrateCylinderChainStepKernel::reportInstability(ContextImpl& context, int chain,
+void ReferenceIntegrateCylinderChainStepKernel::reportInstability(ContextImpl& context, const Instability& found,
         const StepSettings& settings) const {
     const vector<Vec3>& positions = *extractData(context).positions;
     const vector<Vec3>& forces = *extractData(context).forces;
-    const Chain& culprit = chainKernel->getChains()[chain];
+    const Chain& culprit = chainKernel->getChains()[found.chain];
     const vector<int>& nodes = culprit.nodes;
     stringstream message;
-    message << "Chain " << chain << " has blown up at segment ";
+    message << "Chain " << found.chain << " has blown up at segment ";
     message.precision(3);
 
     // A force that is not finite spoils the whole chain, so look for where it acts.
@@ -275,9 +368,24 @@ void ReferenceIntegrateCylinderChainStepKernel::reportInstability(ContextImpl& c
                 change = length;
             }
         }
+        // Where no segment changes that much, one leaves the range of its FENE potential.
+
+        const bool leavesRange = (greatest < 0 && !isImplicit(settings.scheme));
+        if (leavesRange)
+            segment = found.segment;
         message << segment << " in step " << settings.step+1 << ": ";
         if (isImplicit(settings.scheme))
             message << "the equations of the implicit scheme cannot be solved";
+        else if (leavesRange) {
+            const int first = nodes[segment], second = nodes[(segment+1)%nodes.size()];
+            Vec3 between = positions[second]-positions[first];
+            const double* box = chainKernel->getBox(context);
+            if (box != NULL)
+                takeToNearestImage(&between[0], box);
+            message.precision(6);
+            message << "it would be " << norm(between+displacements[second]-displacements[first]) << " nm long after it, and " <<
+                    describeRange(culprit.segments[segment]);
+        }
         else
             message << "its ends would move by " << change << " nm against each other in one step";
     }

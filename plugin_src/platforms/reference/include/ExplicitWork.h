@@ -1,0 +1,72 @@
+#ifndef OPENMM_EXPLICITWORK_H_
+#define OPENMM_EXPLICITWORK_H_
+
+#include "ParallelLoop.h"
+#include "openmm/Vec3.h"
+#include <vector>
+
+namespace OpenMM {
+
+/**
+ * The work that forces do because they are those of the start of a step.  With the forces f on a particle before and after
+ * a step that moves it by dx, this is w = -(f(after)-f(before)).dx.  Its means over windows of steps are those of
+ * CylinderChainIntegrator::setWorkWindow().
+ *
+ * Of dx and of the changes of forces, their means over the window are taken off: a filament that is dragged along steadily
+ * while its tension turns is no sign of a step that is too long.
+ */
+class ExplicitWork {
+public:
+    explicit ExplicitWork(ParallelLoop& loop);
+    /**
+     * Begin with the particles that can move.
+     */
+    void initialize(const std::vector<int>& particles);
+    /**
+     * Take note of the forces at the start of a step.
+     *
+     * @param forces     the forces on all particles
+     * @param moves      the displacements of all particles in the step before
+     * @param followsOn  whether nothing else than that step has changed positions and forces
+     * @param kT         with zero, nothing is measured
+     * @param window     the number of steps to average over, or zero to measure nothing
+     */
+    void beginStep(const std::vector<Vec3>& forces, const std::vector<Vec3>& moves, bool followsOn, double kT, int window);
+    /**
+     * Take note that particles have moved by the displacements of the step.
+     */
+    void endStep();
+    /**
+     * Take note of steps that nothing is known of.
+     */
+    void interrupt();
+    /**
+     * Get the largest mean of the last window that has been finished, over kT, once.
+     *
+     * @param[out] work       the largest mean
+     * @param[out] particle   the particle that has it
+     * @param[out] steps      the number of steps in the window, or zero if none has been finished since the last call
+     * @param[out] particles  the number of particles of which it is the largest: those whose means are not zero
+     */
+    void take(double& work, int& particle, int& steps, int& particles);
+private:
+    struct Sums {
+        // The force at the start of the step before; the changes over kT, displacements, and products of them.
+
+        Vec3 force, change, way;
+        double work;
+    };
+    void add(int block, const std::vector<Vec3>& forces, const std::vector<Vec3>& moves, double perEnergy);
+    void finish();
+    ParallelLoop& loop;
+    std::vector<int> particles;
+    std::vector<Sums> sums;
+    bool known;
+    int count;
+    double largest;
+    int worst, finishedSteps, active;
+};
+
+} // namespace OpenMM
+
+#endif /*OPENMM_EXPLICITWORK_H_*/
