@@ -299,7 +299,7 @@ def test_soft_lengths_are_right_at_the_recommended_step(segments, stiffness):
     kind = chain_of(stiffness, 0)
     filaments = in_equilibrium(kind, segments, 2000)
     assert "soft lengths" in filaments.recommended_time_step("implicit").reason
-    assert_energies(kind, filaments, exact_energies(kind), 0.02, 1000 if stiffness > 50 else 3000)
+    assert_energies(kind, filaments, exact_energies(kind), 0.02, 1000 if stiffness > 50 else 2000)
 
 
 STIFF_MATERIALS = {
@@ -421,7 +421,7 @@ def test_dna_has_the_persistence_length_of_its_label():
     context, integrator = context_of(in_equilibrium(DSDNA, 6, 3000))
     integrator.step(100)
     cosines = []
-    for _ in range(250):
+    for _ in range(150):
         integrator.step(4)
         vectors = np.diff(positions_of(context).reshape(3000, 7, 3), axis=1)
         tangents = vectors / np.linalg.norm(vectors, axis=2)[..., None]
