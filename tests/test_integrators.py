@@ -399,8 +399,8 @@ def test_lengths_that_leave_the_range_of_fene_are_a_blow_up(engine, platform, bo
     context = _context(system, integrator, positions, platform)
     with pytest.raises(
         InstabilityError,
-        match=r"Filament \d \(ACT\) has blown up at segment \d in step \d+: it would be 3(58|61)\.\d+ nm long after it, "
-        "and its FENE potential is finite between 359 and 361 nm alone",
+        match=r"Filament \d \(ACT\) has blown up at segment \d in step \d+: it would be 3(58|61)\.\d+ nm long after "
+        "it, and its FENE potential is finite between 359 and 361 nm alone",
     ) as caught:
         integrator.step(1000)
     filament, segment = map(int, re.search(r"Filament (\d).*segment (\d)", str(caught.value)).groups())
@@ -421,7 +421,8 @@ def test_starts_beyond_the_range_of_fene_are_refused(scheme):
     context = _context(system, integrator, moved)
     with pytest.raises(
         InputError,
-        match=r"Filament 1 \(ACT\) is out of range at segment 0: it is 36\d\.\d+ nm long, and its FENE potential is finite",
+        match=r"Filament 1 \(ACT\) is out of range at segment 0: it is 36\d\.\d+ nm long, and its FENE "
+        "potential is finite",
     ):
         integrator.step(1)
     context.setPositions(positions)

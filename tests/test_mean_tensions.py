@@ -1,4 +1,4 @@
-"""Tensions as means over a step, with friction and noise: against forces from outside, and against those without noise."""
+"""Tensions as means over a step, with friction and noise: against outer forces, and against those without noise."""
 
 import copy
 
@@ -101,7 +101,7 @@ def test_without_noise_tension_is_elastic_force_and_friction_of_the_length(what)
 
 
 def test_joints_of_a_pulled_filament_carry_the_force():
-    """The mean over time is exact: what is behind a joint gets the force at the end, and friction and noise are zero."""
+    """The mean over time is exact: the force at the end acts on all behind a joint; friction and noise have no mean."""
     force = 0.3
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
     for seed in range(48):

@@ -303,7 +303,13 @@ def between_walls(stiffness=0.01):
     return filaments, system, positions
 
 
-TOO_STIFF = [(DSDNA, 8, 10.0), (MICROTUBULE, 8, 0.03), (MICROTUBULE, 8, 0.1), (F_ACTIN, 16, 0.001), (F_ACTIN, 16, 0.003)]
+TOO_STIFF = [
+    (DSDNA, 8, 10.0),
+    (MICROTUBULE, 8, 0.03),
+    (MICROTUBULE, 8, 0.1),
+    (F_ACTIN, 16, 0.001),
+    (F_ACTIN, 16, 0.003),
+]
 
 
 @pytest.mark.parametrize(("kind", "segments", "stiffness"), TOO_STIFF)

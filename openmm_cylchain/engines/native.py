@@ -146,7 +146,8 @@ def mean_tensions(context, chains):
         if "No tensions were recorded" not in str(error):
             raise
         raise InputError(
-            "No mean tensions were recorded in the last step: call integrator.setRecordsTensions(True) before it is taken."
+            "No mean tensions were recorded in the last step: call integrator.setRecordsTensions(True) before it is "
+            "taken."
         ) from None
     return [
         (np.array(tensions._value), np.array(forces._value).reshape(-1, 3), np.array(directions).reshape(-1, 3))
