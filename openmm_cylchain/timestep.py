@@ -376,9 +376,9 @@ _IMPLICIT_TURNING_ANGLE = 0.15
 _NOISE_LEAK = 0.1
 _CONTACT_MARGIN = 4.0
 _RANGE_OF_TURNING = 12.0
-_SOFT_LENGTHS = 8.0
+_SOFT_LENGTHS = 16.0
 _SOFT_LENGTH_ERROR = 0.02
-_LENGTH_DIFFUSION = 0.004
+_LENGTH_DIFFUSION = 0.002
 _FAR_ABOVE = 4.0
 
 
@@ -574,8 +574,8 @@ def implicit_time_step(
     Stiff lengths do not bound the step, nor does their friction: that acts on true changes of a length, so a segment
     turns freely however slowly its length relaxes, and the length needs a run that is longer than tau_l, not shorter
     steps. Soft ones do: with the variance s l0^2 of a length (s = k_B T/(k l0^2) for a spring), V_el of N segments is
-    measured to be too large by 8 s/N at most, at steps of tau = gamma_def/(k l0^2) and longer. Where that is more than
-    2 %, the step may be 0.004 N gamma_def/k_B T, which leaves 2 %. FENE lengths may bind it, see ``fene_steps``. At a
+    measured to be too large by 16 s/N at most, at steps of tau = gamma_def/(k l0^2) and longer. Where that is more than
+    2 %, the step may be 0.002 N gamma_def/k_B T, which leaves 2 %. FENE lengths may bind it, see ``fene_steps``. At a
     temperature of zero, where nothing else moves (one segment, or free joints), the relaxation of a
     segment's length is resolved by 20 steps.
 

@@ -208,7 +208,8 @@ def test_a_link_has_its_energy_at_the_recommended_step():
 
 def test_a_link_has_too_much_energy_at_the_step_of_filaments_alone():
     step = recommended_time_step(DSDNA, VISCOSITY, TEMPERATURE, "implicit", 8)
-    mean, error, _ = link_energies(DSDNA, 8, 10.0, step, 50, 500)
+    with pytest.warns(TimeStepWarning, match="too long for the forces"):
+        mean, error, _ = link_energies(DSDNA, 8, 10.0, step, 50, 500)
     assert mean > 1.15 * 1.5 + SIGMAS * error
 
 
@@ -560,7 +561,13 @@ def test_fene_lengths_bind_the_implicit_scheme_only_where_it_gets_them_wrong():
 
 def test_soft_lengths_bind():
     length = 100.0
-    for segments, stiffness, binds in ((1, 100, True), (1, 500, False), (2, 100, True), (8, 100, False), (8, 30, True)):
+    for segments, stiffness, binds in (
+        (1, 100, True),
+        (1, 1000, False),
+        (2, 100, True),
+        (8, 110, False),
+        (8, 30, True),
+    ):
         kind = replace(
             F_ACTIN.with_segment_length(length), stretching_stiffness=stiffness * KT / length**2, bending_rigidity=0
         )
@@ -568,7 +575,7 @@ def test_soft_lengths_bind():
         assert ("soft lengths" in recommended.bounds) == binds
         if binds:
             friction = kind.segment_friction(VISCOSITY, TEMPERATURE, segments)
-            assert recommended.bounds["soft lengths"] == pytest.approx(0.004 * segments * friction.extensional / KT)
+            assert recommended.bounds["soft lengths"] == pytest.approx(0.002 * segments * friction.extensional / KT)
 
 
 @pytest.mark.slow
