@@ -434,7 +434,7 @@ class Filaments(FilamentCollection):
         """Tensions T of the segments as means over the last step, with friction and noise.
 
         T is the elastic force of the segment's length, its friction against becoming longer and the noise of both, as
-        scheme "implicit" has solved for them, along the direction of the segment half-way through the step; it is
+        an implicit scheme has solved for them, along the direction of the segment half-way through the step; it is
         positive where it pulls the ends together. See ``mean_joint_tensions``.
 
         Parameters

@@ -13,6 +13,7 @@ import openmm
 from ..errors import InputError, InstabilityError
 from ..flow import Flow, as_flow
 from ..quantities import TEMPERATURE, non_negative, whole_number
+from ..schemes import IMPLICIT_SCHEMES
 from ..step_watch import WINDOW, DividedSteps, ExplicitWork
 from ..timestep import as_step, check_scheme
 from .description import (
@@ -165,9 +166,9 @@ def _recording_integrator(context):
 
 
 def _refuse_unless_implicit(scheme):
-    if scheme != SCHEMES["implicit"]:
+    if scheme not in (SCHEMES[name] for name in IMPLICIT_SCHEMES):
         raise InputError(
-            'Mean tensions belong to scheme "implicit": the explicit schemes have those of the configuration alone '
+            "Mean tensions belong to the implicit schemes: the explicit schemes have those of the configuration alone "
             "(Filaments.joint_tensions)."
         )
 

@@ -137,7 +137,7 @@ def mean_tensions(context, chains):
         Always.
     """
     raise InputError(
-        'Mean tensions belong to scheme "implicit" of the compiled engine: the portable engine has those of the '
+        "Mean tensions belong to the implicit schemes of the compiled engine: the portable engine has those of the "
         "configuration alone (Filaments.joint_tensions)."
     )
 

@@ -467,7 +467,8 @@ static void testBalanceOfNodes() {
                             BackgroundFlow flow = flows ? FLOW : BackgroundFlow {};
                             for (double& derivative : flow.gradient)
                                 derivative *= 0.05/h*0.03;
-                            checkBalance(chains, x, {Scheme::Implicit, kT, h, 3, 7, 0, flow}, f, h > 0.9);
+                            for (Scheme scheme : {Scheme::Implicit, Scheme::ImplicitSecondOrder})
+                                checkBalance(chains, x, {scheme, kT, h, 3, 7, 0, flow}, f, h > 0.9);
                         }
 }
 
