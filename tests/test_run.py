@@ -376,7 +376,7 @@ def test_blow_up_is_reported_and_leaves_no_broken_frame(tmp_path, capsys):
 
 
 def test_infinite_energy_is_not_written(tmp_path, capsys):
-    # A FENE segment that a large step carries beyond its maximum extension, at positions that are finite.
+    # A FENE segment that a large step carries beyond its maximum extension, at finite positions: the engine stops.
     text = SHORT.replace("segments = 6", 'segments = 6\nstretching_model = "fene"\nmaximum_extension = "1 nm"')
     config = configured(
         tmp_path,
@@ -389,7 +389,7 @@ def test_infinite_energy_is_not_written(tmp_path, capsys):
     )
     output = tmp_path / "out"
     assert main(["run", config, "--output", str(output)]) == 1
-    assert re.search(r"error: Filament \d \(ACT\) has blown up at segment \d by step \d+", capsys.readouterr().err)
+    assert re.search(r"error: Filament \d \(ACT\) has blown up at segment \d in step \d+", capsys.readouterr().err)
     energies = read_energies(output / "energies.csv")
     assert all(np.all(np.isfinite(column)) for column in energies.values())
 
