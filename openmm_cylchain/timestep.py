@@ -359,7 +359,7 @@ _REASONS = {
     "contact diffusion": "diffusion of a segment's ends, eq. (56) with the contact diameter: filaments must not jump "
     "through each other",
     "contact stiffness": "stiffness of contacts, which are explicit, with a margin of {contact_margin:g}",
-    "soft lengths": "soft lengths, which may change by a tenth of themselves in a step (more where segments are many)",
+    "soft lengths": "soft lengths, which may change by a twentieth of themselves in a step (more where segments are many)",
     "range": "FENE lengths, whose distribution a step must resolve (or be much longer than their relaxation)",
     "flow": "flow, which may strain the solvent by {strain:g} in a step",
     _IDLE: "relaxation of a segment's length, which takes 20 steps: at a temperature of zero nothing else moves",
@@ -377,8 +377,8 @@ _NOISE_LEAK = 0.1
 _CONTACT_MARGIN = 4.0
 _RANGE_OF_TURNING = 12.0
 _SOFT_LENGTHS = 16.0
-_SOFT_LENGTH_ERROR = 0.02
-_LENGTH_DIFFUSION = 0.002
+_SOFT_LENGTH_ERROR = 0.008
+_LENGTH_DIFFUSION = 0.0008
 _FAR_ABOVE = 4.0
 
 
@@ -575,9 +575,9 @@ def implicit_time_step(
     turns freely however slowly its length relaxes, and the length needs a run that is longer than tau_l, not shorter
     steps. Soft ones do: with the variance s l0^2 of a length (s = k_B T/(k l0^2) for a spring), V_el of N segments is
     measured to be too large by 16 s/N at most, at steps of tau = gamma_def/(k l0^2) and longer. Where that is more than
-    2 %, the step may be 0.002 N gamma_def/k_B T, which leaves 2 %. FENE lengths may bind it, see ``fene_steps``. At a
-    temperature of zero, where nothing else moves (one segment, or free joints), the relaxation of a
-    segment's length is resolved by 20 steps.
+    0.8 %, the step may be 0.0008 N gamma_def/k_B T, which leaves 0.8 %. FENE lengths may bind it, see ``fene_steps``.
+    At a temperature of zero, where nothing else moves (one segment, or free joints), the relaxation of a segment's
+    length is resolved by 20 steps.
 
     Returns
     -------

@@ -126,8 +126,8 @@ public:
      * @param before  the nodes before
      * @param forces  the forces on them, but for those of the chains
      * @param y       receives the nodes after
-     * @param failed  receives true for each lane that has not converged or whose segments change by more than their
-     *                length
+     * @param failed  receives true for each lane that has not converged or a segment of which changes by more than a
+     *                quarter of a turn would do
      * @return the number of iterations
      */
     int take(const Vec* before, const Vec* forces, Vec* y, bool* failed) {
@@ -216,8 +216,8 @@ private:
         return stage == Stage::First ? DIAGONAL : 1;
     }
     /** Describe a stage. The second one begins with the end of the first, y. */
-    void prepare(Stage stage, const Vec* y) {
-        this->stage = stage;
+    void prepare(Stage next, const Vec* y) {
+        stage = next;
         Vec before = {};
         for (int s = 0; s < n-1; s++) {
             ImplicitSegment<Real>& segment = segments[s];
@@ -735,7 +735,7 @@ private:
     void findExcessiveChanges(const Vec* y, bool* failed) {
         for (int s = 0; s < pack.segments; s++) {
             const Vec difference = y[s+1]-y[s]-segments[s].difference;
-                // A quarter of a turn.
+            // A quarter of a turn.
             Real square = 0.5*difference.dot(difference), limit = property<Real>(pack, s, ChainPack::RestLength);
             for (int i = 0; i < W; i++)
                 failed[i] |= s < pack.segmentsOfLane[i] && !(lane(square, i) < lane(limit, i)*lane(limit, i));
