@@ -405,8 +405,7 @@ class Filaments(FilamentCollection):
         """Virtual forces Phi at the joints as means over the last step, with friction and noise.
 
         Phi of joint i is the force that segment i + 1 exerts on segment i, as in ``joint_tensions``, but of the step
-        that scheme "implicit" has solved, with all that moved the segments in it: their friction and the random forces,
-        too.
+        that scheme "implicit" has solved, with all that moved the segments in it, their friction and the random forces.
         Where the nodes of the joint are free to move, the forces q on the ends of the two segments, which they exert
         themselves, and those from outside balance, q_plus(i) + q_minus(i+1) + f = 0, and f acts on both in equal parts:
         Phi = (q_minus(i+1) - q_plus(i))/2. Averages over time are the forces that a filament transmits, such as that

@@ -15,6 +15,9 @@ from .errors import TimeStepError, TimeStepWarning
 WINDOW = 128
 """Steps over which the work of explicit forces is averaged, and that an integrator takes at once."""
 
+FIRST_WINDOW = 32
+"""Steps of the first windows of a run: three of them are over within its first hundred steps."""
+
 LARGEST_DIVIDED_SHARE = 1e-3
 """Scheme "implicit" divides steps whose equations it cannot solve: a larger share of them may bias averages."""
 
@@ -126,11 +129,21 @@ class ExplicitWork:
     n means over s steps larger than what is expected of each by a factor of about 1 + sqrt(2/s) sqrt(2 ln n), which is
     allowed for. ``WINDOWS`` in succession must show it: a jump of a force, however large, and what relaxes after it or
     after a start within the steps of a window, are in two at most.
+
+    The first ``WINDOWS`` are shorter, so that a run that is far too coarse is warned of within its first hundred steps:
+    if all of them show the work of an error and the last one at least half of the first one's, as nothing does that
+    relaxes.
     """
 
     def __init__(self):
         self._warned = False
         self._large = self._too_large = 0
+        self._first = []
+
+    @property
+    def window(self):
+        """Steps of the next window."""
+        return WINDOW if len(self._first) == WINDOWS else FIRST_WINDOW
 
     def add(self, work, particle, steps, particles):
         """Take note of a window.
@@ -157,6 +170,12 @@ class ExplicitWork:
             If it is above ``ERROR_WORK``, or not a number, for the third time in succession.
         """
         chance = 1.0 + math.sqrt(2.0 / steps) * math.sqrt(2.0 * math.log(max(particles, 1)))
+        if steps < WINDOW:
+            self._first.append(work)
+            far_too_large = all(not one <= ERROR_WORK * chance for one in self._first)
+            if len(self._first) == WINDOWS and far_too_large and not work < 0.5 * self._first[0]:
+                self._warn(work, particle)
+            return
         # Written so that NaN is too large.
         self._large = 0 if work <= WARNING_WORK * chance else self._large + 1
         self._too_large = 0 if work <= ERROR_WORK * chance else self._too_large + 1
@@ -167,14 +186,17 @@ class ExplicitWork:
                 f"overlapping particles. {_TURN_OFF}"
             )
         if self._large >= WINDOWS and not self._warned:
-            self._warned = True
-            warnings.warn(
-                f"{_work_description(work, particle)}: its fluctuations are more than 10 % too large, or "
-                "it is driven too fast. Use a smaller time step (see Filaments.recommended_time_step(system=system)). "
-                f"{_TURN_OFF}",
-                TimeStepWarning,
-                stacklevel=3,
-            )
+            self._warn(work, particle)
+
+    def _warn(self, work, particle):
+        self._warned = True
+        warnings.warn(
+            f"{_work_description(work, particle)}: its fluctuations are more than 10 % too large, or "
+            "it is driven too fast. Use a smaller time step (see Filaments.recommended_time_step(system=system)). "
+            f"{_TURN_OFF}",
+            TimeStepWarning,
+            stacklevel=4,
+        )
 
 
 def _work_description(work, particle):
@@ -191,15 +213,19 @@ class WorkRecorder:
     displacements and changes of forces, their means over the window are taken off: a filament that is dragged along
     steadily, while its tension turns, is no sign of a step that is too long.
 
-    Attributes
+    Parameters
     ----------
     window : int
         Steps of a window.
+
+    Attributes
+    ----------
+    window : int
+        May be changed at any time.
     """
 
-    window = WINDOW
-
-    def __init__(self):
+    def __init__(self, window=WINDOW):
+        self.window = window
         self.clear()
 
     def clear(self):
@@ -233,7 +259,7 @@ class WorkRecorder:
             self._work = self._work + np.einsum("ij,ij->i", change, self._moves)
             self._change, self._way = self._change + change, self._way + self._moves
             self._count += 1
-            if self._count == self.window:
+            if self._count >= self.window:
                 steady = np.einsum("ij,ij->i", self._change, self._way) / self._count
                 self._finished = (steady - self._work) / (self._count * kT)
                 self._begin()

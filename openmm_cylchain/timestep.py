@@ -359,7 +359,7 @@ _REASONS = {
     "contact diffusion": "diffusion of a segment's ends, eq. (56) with the contact diameter: filaments must not jump "
     "through each other",
     "contact stiffness": "stiffness of contacts, which are explicit, with a margin of {contact_margin:g}",
-    "soft lengths": "soft lengths, which may change by a twentieth of themselves in a step (more where segments are many)",
+    "soft lengths": "soft lengths, which may change by a twentieth of themselves in a step (more if segments are many)",
     "range": "FENE lengths, whose distribution a step must resolve (or be much longer than their relaxation)",
     "flow": "flow, which may strain the solvent by {strain:g} in a step",
     _IDLE: "relaxation of a segment's length, which takes 20 steps: at a temperature of zero nothing else moves",

@@ -85,8 +85,8 @@ def test_rotation_and_diffusion_of_728_segments(engine, scheme):
 def test_rotation_and_diffusion_to_a_percent(engine, scheme):
     """Enough segments that 5 % of friction or noise would show at a single time.
 
-    Explicit schemes are of first order: such soft segments turn 1.3 % too slowly (midpoint) or 1.1 % too fast (Euler) in
-    the steps of the test above, half as much in these.
+    Explicit schemes are of first order: such soft segments turn 1.3 % too slowly (midpoint) or 1.1 % too fast (Euler)
+    in the steps of the test above, half as much in these.
     """
     times, tangents, displacements = _run(20 * 728, engine, scheme, samples=15, duration=1.0, steps_per_sample=64)
     _check(times, tangents, displacements)

@@ -106,6 +106,28 @@ def test_warning_and_error_of_work():
         watch.add(np.nan, 7, 10**6, 1)
 
 
+@pytest.mark.parametrize(
+    "works, warns", [((4, 4, 4), True), ((9, 6, 3.4), False), ((np.nan,) * 3, True), ((9, 3, 9), False)]
+)
+def test_the_first_windows_are_short_and_warn_of_what_does_not_relax(works, warns):
+    watch = ExplicitWork()
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        for work in works:
+            assert watch.window == 32
+            watch.add(work / 3 * ERROR_WORK, 5, watch.window, 1)
+    assert bool(caught) == warns
+    assert watch.window == 128
+
+
+def test_a_force_that_is_not_known_is_noticed_within_a_hundred_steps():
+    _, integrator = particle_in_a_trap(1.5)
+    with pytest.warns(TimeStepWarning, match="too long for the forces on particle"):
+        integrator.step(100)
+    with pytest.raises(TimeStepError, match="energies are far too high"):
+        integrator.step(400)
+
+
 def test_the_largest_of_many_is_allowed_to_be_larger():
     # The work of harmonic coordinates in windows: squares of Gaussian displacements.
     generator = np.random.default_rng(3)
@@ -319,7 +341,7 @@ def test_springs_that_are_too_stiff_for_the_step_are_noticed(kind, segments, sti
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
-            integrator.step(400)
+            integrator.step(500)
             stopped = False
         except TimeStepError:
             stopped = True

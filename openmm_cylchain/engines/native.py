@@ -14,7 +14,7 @@ from ..errors import InputError, InstabilityError
 from ..flow import Flow, as_flow
 from ..quantities import TEMPERATURE, non_negative, whole_number
 from ..schemes import IMPLICIT_SCHEMES
-from ..step_watch import WINDOW, DividedSteps, ExplicitWork
+from ..step_watch import DividedSteps, ExplicitWork
 from ..timestep import as_step, check_scheme
 from .description import (
     advice_after_blow_up,
@@ -308,13 +308,14 @@ class NativeIntegrator(CylinderChainIntegrator):
             that were set is longer or shorter than its FENE potential allows.
         """
         steps = whole_number(steps, 0, "steps")
-        self.setWorkWindow(WINDOW if self.checks else 0)
         if not self.checks:
+            self.setWorkWindow(0)
             self._advance(steps)
             return
         while steps > 0:
+            self.setWorkWindow(self._work.window)
             # A window at most is finished meanwhile.
-            chunk = min(steps, WINDOW)
+            chunk = min(steps, self._work.window)
             before = self.getNumDividedSteps()
             self._advance(chunk)
             steps -= chunk

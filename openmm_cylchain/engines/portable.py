@@ -644,6 +644,7 @@ class PortableIntegrator(openmm.CustomIntegrator):
             self._advance(steps, None)
             return
         while steps > 0:
+            self._recorder.window = self._work.window
             # A window at most is finished meanwhile.
             chunk = min(steps, self._recorder.window)
             self._advance(chunk, self._recorder)
