@@ -563,9 +563,10 @@ def test_soft_lengths_bind():
     length = 100.0
     for segments, stiffness, binds in (
         (1, 100, True),
-        (1, 1000, False),
+        (1, 1900, True),
+        (1, 2100, False),
         (2, 100, True),
-        (8, 110, False),
+        (8, 260, False),
         (8, 30, True),
     ):
         kind = replace(
@@ -575,7 +576,7 @@ def test_soft_lengths_bind():
         assert ("soft lengths" in recommended.bounds) == binds
         if binds:
             friction = kind.segment_friction(VISCOSITY, TEMPERATURE, segments)
-            assert recommended.bounds["soft lengths"] == pytest.approx(0.002 * segments * friction.extensional / KT)
+            assert recommended.bounds["soft lengths"] == pytest.approx(0.0008 * segments * friction.extensional / KT)
 
 
 @pytest.mark.slow
