@@ -1,0 +1,2 @@
+#include "TestChains.h"
+int main() {return runTests({});}
