@@ -236,9 +236,7 @@ def create_integrator(
     others, frictions = describe_other_particles(system, nodes, particle_friction)
     labels = [filament_label(number, filament) for number, filament in enumerate(filaments)]
     advice = advice_after_blow_up(system)
-    integrator = NativeIntegrator(
-        bath_temperature, step_size, scheme, seed, labels, flow, advice, checks, precision
-    )
+    integrator = NativeIntegrator(bath_temperature, step_size, scheme, seed, labels, flow, advice, checks, precision)
     for particle, friction in zip(others, frictions):
         integrator.setParticleFriction(int(particle), float(friction))
     return integrator

@@ -109,9 +109,13 @@ template <class Scalar> ChainPack<Scalar> packed(const vector<Chain>& chains, co
     pack.mobile.resize(places, 0.0);
     pack.joints.resize(places, 0.0);
     pack.properties.resize((places-lanes)*ChainPack<Scalar>::NumProperties);
+    // A filling segment that has no inverse length is not looked at when an iteration might end.
+    typedef ChainPack<Scalar> Pack;
     for (int s = 0; s < pack.nodes-1; s++)
-        for (int lane = 0; lane < lanes; lane++)
+        for (int lane = 0; lane < lanes; lane++) {
             setSegment(pack, lane, s, {1, 0, 1, 0, 0, 0, 0}, 0);
+            pack.properties[((size_t) s*Pack::NumProperties+Pack::InverseRestLength)*lanes+lane] = 0;
+        }
     for (size_t lane = 0; lane < members.size(); lane++)
         fillLane(pack, lane, chains[members[lane]], members[lane]);
     stable_sort(pack.tethers.begin(), pack.tethers.end(), [] (const LaneTether& a, const LaneTether& b) {
@@ -312,6 +316,11 @@ void cylchain::drawWords(const NoiseKey& key, NoiseKind kind, uint32_t draw, con
 void cylchain::drawNormals(const NoiseKey& key, NoiseKind kind, const uint32_t* chains, const uint32_t* parts, int count,
             double* normals) {
     kernels().drawNormals(key, kind, chains, parts, count, normals);
+}
+
+void cylchain::drawNormalsInSinglePrecision(const NoiseKey& key, NoiseKind kind, const uint32_t* chains,
+            const uint32_t* parts, int count, double* normals) {
+    kernels().wide.drawNormals(key, kind, chains, parts, count, normals);
 }
 
 void cylchain::drawFeneCoordinates(const NoiseKey& key, const uint32_t* chains, const uint32_t* segments,
