@@ -160,8 +160,8 @@ def create_integrator(
     """Create the integrator of a System with filaments; see ``Filaments.create_integrator``."""
     if precision == "mixed":
         raise InputError(
-            "The portable engine computes filaments in double precision alone: use the compiled engine, or leave precision "
-            "out."
+            "The portable engine computes filaments in double precision alone: use the compiled engine, or leave "
+            "precision out."
         )
     refuse_constraints(system, filaments, node_indices)
     chains = describe_chains(system, filaments, node_indices, viscosity, temperature)
