@@ -40,11 +40,11 @@ bool mayShareLanes(const Chain& longest, const Chain& chain) {
 }
 
 /**
- * Where single precision is right, as measured: see IMPLICIT_SCHEME.md. These are for the step over the relaxation time of
- * the sharpest bends, 4 h kappa/gamma_rot, and for the stiffness of lengths, k l0^2/k_B T.
+ * Where single precision is right, as measured: see IMPLICIT_SCHEME.md. These are for the step over the relaxation time
+ * of the sharpest bends, 4 h kappa/gamma_rot, and for the stiffness of lengths, k l0^2/k_B T.
  */
 const double LARGEST_BENDING_RATE = 1e4, LARGEST_STRETCHING = 1e9;
-/** The resistance of a node to its motion, in any units; third powers of it are computed, also for a thousandth of a step. */
+/** The resistance of a node to its motion. Third powers of it are computed, also for a thousandth of a step. */
 const double LEAST_RESISTANCE = 1e-9, LARGEST_RESISTANCE = 1e8;
 
 template <class Scalar> void setSegment(ChainPack<Scalar>& pack, int lane, int s, const Segment& segment, int dimensions) {

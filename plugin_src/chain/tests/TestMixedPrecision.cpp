@@ -1,6 +1,6 @@
 /**
- * This tests chains in single precision: that a step is that in double precision but for rounding, that energies and motion
- * are right in the mean, and that double precision is used where single precision would not do.
+ * This tests chains in single precision: that a step is that in double precision but for rounding, that energies and
+ * motion are right in the mean, and that double precision is used where single precision would not do.
  */
 
 #include "TestChains.h"
@@ -65,6 +65,11 @@ static vector<Chain> tethered(vector<Chain> chains, const Array& x) {
     return chains;
 }
 
+static vector<Chain> tetheredChains(Array& x) {
+    const vector<Chain> chains = makeChains(LENGTHS, BendingModel::InscribedCircle, StretchingModel::Harmonic, x);
+    return tethered(chains, x);
+}
+
 static Array someForces(const Array& x) {
     Array f(x.size());
     for (size_t i = 0; i < f.size(); i++)
@@ -85,7 +90,8 @@ static void checkSteps(const string& kind, const vector<Chain>& chains, const Ar
         for (double h : {1e-3, 0.03, 0.5})
             for (uint64_t step = 0; step < 10; step++) {
                 const StepSettings settings = settingsFor(scheme, h, step);
-                check(mixedChains(Precision::Mixed, engine, settings) == (int) chains.size(), kind+" in mixed precision");
+                const int mixed = mixedChains(Precision::Mixed, engine, settings);
+                check(mixed == (int) chains.size(), kind+" in mixed precision");
                 const StepResult expected = stepIn(Precision::Double, engine, x, f, settings);
                 const StepResult found = stepIn(Precision::Mixed, engine, x, f, settings);
                 check(abs(expected.divided-found.divided) <= 1, "divided steps of "+kind);
@@ -160,27 +166,27 @@ static void testPlaceInSpaceDoesNotMatter() {
     Array x;
     const vector<Chain> plain = makeChains(LENGTHS, BendingModel::InscribedCircle, StretchingModel::Harmonic, x);
     x = onLattice(x);
-    const vector<Chain> chains = tethered(plain, x);
     Array far = x;
     for (double& component : far)
         component += 131072;
+    const ChainEngine engine(tethered(plain, x)), farEngine(tethered(plain, far));
     const Array f = someForces(x), wrapped = acrossBox(x);
     for (Scheme scheme : {Scheme::Implicit, Scheme::ImplicitSecondOrder})
         for (double h : {0.03, 0.5}) {
             const StepSettings settings = settingsFor(scheme, h);
-            const Array change = stepIn(Precision::Mixed, ChainEngine(chains), x, f, settings).displacements;
-            const Array changeFar = stepIn(Precision::Mixed, ChainEngine(tethered(plain, far)), far, f, settings).displacements;
-            const Array changeWrapped = stepIn(Precision::Mixed, ChainEngine(chains), wrapped, f, settings, BOX).displacements;
+            const StepResult here = stepIn(Precision::Mixed, engine, x, f, settings);
+            const StepResult there = stepIn(Precision::Mixed, farEngine, far, f, settings);
+            const StepResult across = stepIn(Precision::Mixed, engine, wrapped, f, settings, BOX);
             for (size_t i = 0; i < x.size(); i++) {
-                checkClose(change[i], changeFar[i], 0, 0, "step far from the origin");
-                checkClose(change[i], changeWrapped[i], 0, 0, "step across the box");
+                checkClose(here.displacements[i], there.displacements[i], 0, 0, "step far from the origin");
+                checkClose(here.displacements[i], across.displacements[i], 0, 0, "step across the box");
             }
         }
 }
 
 static void testChainsDoNotDependOnTheirPack() {
     Array x;
-    const vector<Chain> chains = tethered(makeChains(LENGTHS, BendingModel::InscribedCircle, StretchingModel::Harmonic, x), x);
+    const vector<Chain> chains = tetheredChains(x);
     const ChainEngine together(chains);
     // Some of its neighbours are taut.
     Array f = someForces(x);
@@ -212,7 +218,7 @@ static void testChainsDoNotDependOnTheirPack() {
 
 static void testDividedSteps() {
     Array x;
-    const vector<Chain> chains = tethered(makeChains(LENGTHS, BendingModel::InscribedCircle, StretchingModel::Harmonic, x), x);
+    const vector<Chain> chains = tetheredChains(x);
     const ChainEngine engine(chains);
     Array moved = x, f(x.size());
     moved[3*chains[5].nodes[4]+2] += 30;
@@ -497,7 +503,7 @@ static void testWhereSinglePrecisionWouldNotDo() {
     changed.stepSize = 1e15;
     check(mixed([] (Chain& chain) {chain.joints.assign(3, 0);}, changed) == 0, "friction per step that underflows");
 
-    check(mixed([] (Chain& chain) {chain.segments[2].stiffness *= 1.01e4;}, usual) == 0, "one length that is too stiff");
+    check(mixed([] (Chain& chain) {chain.segments[2].stiffness *= 1.01e4;}, usual) == 0, "a length that is too stiff");
     check(mixed([] (Chain& chain) {chain.joints[1] *= 1.01e3;}, usual) == 0, "one joint that is too stiff");
     check(mixed([] (Chain& chain) {chain.joints[1] *= 0.99e3;}, usual) == 20, "one joint that is nearly too stiff");
     check(mixed([] (Chain& chain) {
