@@ -60,6 +60,17 @@ def test_shortening_is_that_of_fine_steps(reference, step):
         assert relaxation[200][1][0] + 4 * relaxation[200][1][1] < 1.1 * 0.5
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", ["implicit", "implicit-second-order"])
+def test_steps_of_different_lengths_shorten_filaments_alike(scheme):
+    """Those in between converge in the fewest iterations; two of them were not enough."""
+    shortening = {step: _relax(scheme, step, [moment], seed=3)[moment][0] for step, moment in ((3, 999), (10, 1000))}
+    (mean, error), (other, other_error) = shortening.values()
+    relative_error = np.hypot(error / mean, other_error / other)
+    assert 4 * relative_error < 0.025
+    assert abs(mean / other - 1) < 4 * relative_error, shortening
+
+
 @pytest.mark.parametrize("extension_time, moment, steps", [(10, 3, (0.01, 0.1, 1)), (100, 10, (1,))])
 def test_lengths_with_much_friction(extension_time, moment, steps):
     """Their tension is that of friction alone: steps, short or long, must turn it with the segments."""
