@@ -45,7 +45,7 @@ box = BOX * np.eye(3)
 
 
 def network(with_contacts, step=None):
-    """Filaments in a Simulation, with contacts or without, and its step, which is that for contacts if none is given."""
+    """Filaments in a Simulation, with contacts or without, and its step: that for contacts if none is given."""
     generator = np.random.default_rng(5)
     filaments = Filaments(VISCOSITY, TEMPERATURE)
     for number in range(FILAMENTS):
