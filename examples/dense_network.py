@@ -33,7 +33,7 @@ BEAD_SPACING = 18.0  # nm
 STEPS = 1500
 FRAMES = 100
 # Filaments are drawn on top of each other, and come apart in these steps, which are not looked at.
-RELAXATION_STEPS = 100
+RELAXATION_STEPS = 400
 VISCOSITY = 1.71e-3 * unit.pascal * unit.second
 TEMPERATURE = 310 * unit.kelvin
 
@@ -44,8 +44,8 @@ actin = F_ACTIN.with_segment_length(SEGMENT_LENGTH)
 box = BOX * np.eye(3)
 
 
-def network(with_contacts):
-    """Filaments in a Simulation, with contacts or without, and the step at which contacts hold."""
+def network(with_contacts, step=None):
+    """Filaments in a Simulation, with contacts or without, and its step: that for contacts if none is given."""
     generator = np.random.default_rng(5)
     filaments = Filaments(VISCOSITY, TEMPERATURE)
     for number in range(FILAMENTS):
@@ -54,12 +54,13 @@ def network(with_contacts):
     topology, system, positions = filaments.build(box_vectors=box)
     if with_contacts:
         system.addForce(contact_force(filaments, system, CONTACT_DIAMETER))
-    recommended = filaments.recommended_time_step(contact_diameter=CONTACT_DIAMETER)
-    integrator = filaments.create_integrator(system, recommended.step, random_seed=1)
+    if step is None:
+        step = filaments.recommended_time_step(system=system)
+    integrator = filaments.create_integrator(system, step, random_seed=1)
     simulation = app.Simulation(topology, system, integrator, Platform.getPlatformByName("CPU"))
     simulation.context.setPositions(positions)
     simulation.step(RELAXATION_STEPS)
-    return filaments, simulation, recommended
+    return filaments, simulation, step
 
 
 def current(simulation):
@@ -84,7 +85,7 @@ with open(folder / "network.cif", "w") as file:
 reporter = app.DCDReporter(str(folder / "network.dcd"), max(1, steps // FRAMES), enforcePeriodicBox=False)
 simulation.reporters.append(reporter)
 held = crossings(filaments, simulation)
-free_filaments, free_simulation, _ = network(with_contacts=False)
+free_filaments, free_simulation, _ = network(with_contacts=False, step=recommended)
 passed = crossings(free_filaments, free_simulation)
 
 length = FILAMENTS * SEGMENTS * SEGMENT_LENGTH / BOX**3

@@ -92,8 +92,9 @@ def _neighbouring_beads(filaments, positions, distance):
 
 
 def _relaxed(filaments, system, positions, box, seed, relaxation):
+    # At this step filaments do not cross. Energies of contacts are too high, which integrators warn of.
     step = filaments.recommended_time_step(contact_diameter=DIAMETER).step
-    integrator = filaments.create_integrator(system, step, random_seed=seed)
+    integrator = filaments.create_integrator(system, step, random_seed=seed, checks=False)
     context = openmm.Context(system, integrator, openmm.Platform.getPlatform("CPU"))
     context.setPositions(positions)
     integrator.step(relaxation)
