@@ -34,7 +34,8 @@ PRESETS = {name: getattr(filament_types, name) for name in ("F_ACTIN", "DSDNA", 
 """Filament types by the names that a configuration uses."""
 
 STARTS = ("equilibrium", "straight")
-PRECISIONS = ("single", "mixed", "double")
+PRECISIONS = ("automatic", "single", "mixed", "double")
+"""Those of filaments with the compiled engine, and those of platforms. The default, "automatic", chooses for them."""
 
 
 @dataclass(frozen=True)

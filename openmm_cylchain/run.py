@@ -15,6 +15,7 @@ from .equilibrium import draw_chain
 from .errors import InputError, InstabilityError
 from .physical_units import format_time
 from .placement import joint_stiffnesses
+from .precision import PRECISIONS
 from .progress import Progress
 from .quantities import thermal_energy
 from .run_directory import Checkpoint, EnergyTable, RunDirectory, TrajectoryFile, write_atomically
@@ -147,10 +148,14 @@ def _extent(group, temperature):
 def _create_simulation(configuration, filaments):
     settings = configuration.simulation
     topology, system, positions = filaments.build()
+    platform, properties = _platform(settings, filaments.engine)
     integrator = filaments.create_integrator(
-        system, settings.time_step, scheme=settings.scheme, random_seed=settings.seed
+        system,
+        settings.time_step,
+        scheme=settings.scheme,
+        random_seed=settings.seed,
+        precision=_of_filaments(settings, filaments.engine) or "automatic",
     )
-    platform, properties = _platform(settings)
     try:
         return app.Simulation(topology, system, integrator, platform, properties), positions
     except openmm.OpenMMException as error:
@@ -184,7 +189,7 @@ def check_step(configuration, seconds=20.0, say=lambda message: None):
     settings = configuration.simulation
     filaments = create_filaments(configuration)
     _, system, positions = filaments.build()
-    platform, properties = _platform(settings)
+    platform, properties = _platform(settings, filaments.engine)
     # An interruption that Python raises within a step may end as an error of OpenMM.
     with _Signals() as signals:
         check = check_time_step(
@@ -206,7 +211,12 @@ def check_step(configuration, seconds=20.0, say=lambda message: None):
     return check
 
 
-def _platform(settings):
+def _of_filaments(settings, engine):
+    # The precision if it is that of filaments. Others are of the platform, and so is any with the portable engine.
+    return settings.precision if engine == "compiled" and settings.precision in PRECISIONS else None
+
+
+def _platform(settings, engine):
     names = [openmm.Platform.getPlatform(index).getName() for index in range(openmm.Platform.getNumPlatforms())]
     if settings.platform not in names:
         raise InputError(
@@ -218,7 +228,7 @@ def _platform(settings):
     # Forces must be summed in a fixed order for a resumed run to be identical to an unbroken one.
     if "DeterministicForces" in platform.getPropertyNames():
         properties["DeterministicForces"] = "true"
-    if settings.precision is not None:
+    if settings.precision not in (None, "automatic") and _of_filaments(settings, engine) is None:
         if "Precision" not in platform.getPropertyNames():
             raise InputError(
                 f"[simulation] precision cannot be chosen on the platform {settings.platform}: leave it out."

@@ -120,6 +120,10 @@ TIMES = given_times(
     compiled_1_thread=0.4e-3,
     compiled_2_threads=0.25e-3,
     compiled_all_threads=0.1e-3,
+    implicit_reference=1.6e-3,
+    implicit_1_thread=1.5e-3,
+    implicit_double_reference=3.0e-3,
+    implicit_double_1_thread=4.0e-3,
     portable_reference=20e-3,
     portable_1_thread=24e-3,
     stock_harmonic_angle_reference=1.2e-3,
@@ -136,6 +140,8 @@ def test_engine_ratios():
     assert compared == {
         "compiled": "compiled_1_thread",
         "portable": "portable_reference",
+        "implicit": "implicit_1_thread",
+        "implicit_double": "implicit_double_reference",
         "stock_openmm": "stock_harmonic_angle_reference",
         "stock_openmm_custom_angle": "stock_custom_angle_1_thread",
     }
@@ -144,6 +150,7 @@ def test_engine_ratios():
         "compiled_over_stock_openmm": 3.0,
         "compiled_over_stock_openmm_custom_angle": 5.0,
         "portable_over_stock_openmm": 0.06,
+        "implicit_over_implicit_double": 2.0,
         "portable_over_stock_openmm_custom_angle": 0.1,
         "two_threads_over_one": 1.6,
         "compiled_all_threads_over_one": 4.0,

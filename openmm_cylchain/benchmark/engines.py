@@ -4,6 +4,9 @@ Stock OpenMM moves as many particles with a BrownianIntegrator, bonds of a Harmo
 HarmonicAngleForce or, with the potential of the filaments, a CustomAngleForce. Everything is measured in one
 run, in turn. Where two are compared on one thread, each takes part with the faster of the Reference platform
 and the CPU platform with one thread, and stock OpenMM with the faster of its angle forces as well.
+
+The compiled engine takes steps of 1 ms with scheme "implicit" as well, in the precision that it chooses and in double
+precision.
 """
 
 from dataclasses import dataclass
@@ -15,11 +18,12 @@ import openmm
 from ..engines import ENGINES, available_engines
 from .measurement import Case, describe_machine, median, processors, ratio, scaled, time_interleaved
 from .report import Report, row
-from .systems import SCHEME, TIME_STEP, simulate_beads, simulate_filaments
+from .systems import IMPLICIT_TIME_STEP, SCHEME, TIME_STEP, simulate_beads, simulate_filaments
 
 CHAINS, SEGMENTS = 200, 64
 SPEED_UNIT = "10^6 segment steps/s"
 
+_PRECISIONS = {"implicit": "automatic", "implicit_double": "double"}
 _STOCK = ("stock_harmonic_angle", "stock_custom_angle")
 _ONE_THREAD, _ALL_THREADS, _TWO_THREADS, _REFERENCE = "1_thread", "all_threads", "2_threads", "reference"
 
@@ -61,6 +65,7 @@ def benchmark_engines(effort=FULL, chains=CHAINS, segments=SEGMENTS, say=lambda 
         "particles": chains * (segments + 1),
         "time_step_ps": TIME_STEP,
         "scheme": SCHEME,
+        "time_step_implicit_ps": IMPLICIT_TIME_STEP,
         "repetitions": effort.repetitions,
         "seconds_per_repetition": effort.seconds,
         "compared_on_one_thread": compared,
@@ -73,6 +78,10 @@ def _cases(chains, segments):
     """All cases that can be measured here, and why others cannot."""
     missing = {f"{name} engine": reason for name, reason in available_engines().items() if reason is not None}
     families = {name: partial(simulate_filaments, name) for name in ENGINES if f"{name} engine" not in missing}
+    if "compiled" in families:
+        options = {"scheme": "implicit", "step": IMPLICIT_TIME_STEP}
+        for name, precision in _PRECISIONS.items():
+            families[name] = partial(simulate_filaments, "compiled", **options, precision=precision)
     families |= {name: partial(simulate_beads, angle) for name, angle in zip(_STOCK, ("harmonic", "custom"))}
     cases = []
     for family, simulate in families.items():
@@ -119,6 +128,7 @@ def engine_rows(times, segments):
     compared = {
         "compiled": _fastest(times, ("compiled",)),
         "portable": _fastest(times, ("portable",)),
+        **{name: _fastest(times, (name,)) for name in _PRECISIONS},
         "stock_openmm": _fastest(times, _STOCK),
         "stock_openmm_custom_angle": _fastest(times, _STOCK[1:]),
     }
@@ -135,7 +145,7 @@ def _fastest(times, families):
 
 def _one_thread_ratios(times, compared):
     pairs = [("compiled", "portable"), ("compiled", "stock_openmm"), ("compiled", "stock_openmm_custom_angle")]
-    pairs += [("portable", "stock_openmm"), ("portable", "stock_openmm_custom_angle")]
+    pairs += [("portable", "stock_openmm"), ("portable", "stock_openmm_custom_angle"), tuple(_PRECISIONS)]
     for numerator, denominator in pairs:
         if numerator in compared and denominator in compared:
             speeds = ratio(times[compared[denominator]], times[compared[numerator]])

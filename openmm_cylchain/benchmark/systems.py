@@ -14,6 +14,9 @@ VISCOSITY = 1.71e-3 * unit.pascal * unit.second
 TIME_STEP = 5.0e3
 """In ps, half the recommended step."""
 
+IMPLICIT_TIME_STEP = 1.0e9
+"""The same for scheme "implicit", three quarters of it."""
+
 SCHEME = "euler"
 """That which is most like what stock OpenMM does: one evaluation of forces and one solution a step."""
 
@@ -49,7 +52,9 @@ def one_thread_context(system, integrator, positions, platform=None):
     return _started(None, None, system, integrator, positions, platform, properties).context
 
 
-def simulate_filaments(engine, chains, segments, platform, properties):
+def simulate_filaments(
+    engine, chains, segments, platform, properties, scheme=SCHEME, step=TIME_STEP, precision="automatic"
+):
     """Actin filaments in equilibrium, with an engine, ready to step.
 
     Parameters
@@ -60,6 +65,10 @@ def simulate_filaments(engine, chains, segments, platform, properties):
     platform : str
     properties : dict
         Of the platform.
+    scheme : str
+    step : float
+        In ps.
+    precision : {"automatic", "mixed", "double"}
 
     Returns
     -------
@@ -69,7 +78,7 @@ def simulate_filaments(engine, chains, segments, platform, properties):
     for positions in _node_positions(chains, segments):
         filaments.add_nodes(F_ACTIN, positions)
     topology, system, positions = filaments.build()
-    integrator = filaments.create_integrator(system, TIME_STEP, scheme=SCHEME, random_seed=1)
+    integrator = filaments.create_integrator(system, step, scheme=scheme, random_seed=1, precision=precision)
     return _started(filaments, topology, system, integrator, positions, platform, properties)
 
 

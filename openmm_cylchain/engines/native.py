@@ -12,6 +12,7 @@ import openmm
 
 from ..errors import InputError, InstabilityError
 from ..flow import Flow, as_flow
+from ..precision import check_precision
 from ..quantities import TEMPERATURE, non_negative, whole_number
 from ..schemes import IMPLICIT_SCHEMES
 from ..step_watch import DividedSteps, ExplicitWork
@@ -67,6 +68,11 @@ SCHEMES = {
     "midpoint": CylinderChainIntegrator.Midpoint,
     "implicit": CylinderChainIntegrator.Implicit,
     "implicit-second-order": CylinderChainIntegrator.ImplicitSecondOrder,
+}
+PRECISIONS = {
+    "automatic": CylinderChainIntegrator.Automatic,
+    "mixed": CylinderChainIntegrator.Mixed,
+    "double": CylinderChainIntegrator.Double,
 }
 
 _OTHER_FRICTION = 1.0
@@ -221,6 +227,7 @@ def create_integrator(
     seed,
     flow=None,
     checks=True,
+    precision="automatic",
 ):
     """Create the integrator of a System with filaments; see ``Filaments.create_integrator``."""
     refuse_constraints(system, filaments, node_indices)
@@ -229,7 +236,7 @@ def create_integrator(
     others, frictions = describe_other_particles(system, nodes, particle_friction)
     labels = [filament_label(number, filament) for number, filament in enumerate(filaments)]
     advice = advice_after_blow_up(system)
-    integrator = NativeIntegrator(bath_temperature, step_size, scheme, seed, labels, flow, advice, checks)
+    integrator = NativeIntegrator(bath_temperature, step_size, scheme, seed, labels, flow, advice, checks, precision)
     for particle, friction in zip(others, frictions):
         integrator.setParticleFriction(int(particle), float(friction))
     return integrator
@@ -254,6 +261,8 @@ class NativeIntegrator(CylinderChainIntegrator):
         What else to say of a chain that has blown up.
     checks : bool
         Whether to look, while it runs, for signs of a step that is too long.
+    precision : {"automatic", "mixed", "double"}
+        As for ``Filaments.create_integrator``.
 
     Attributes
     ----------
@@ -262,7 +271,7 @@ class NativeIntegrator(CylinderChainIntegrator):
     Raises
     ------
     InputError
-        For an unknown scheme, a negative temperature or a step size that is not positive.
+        For an unknown scheme or precision, a negative temperature or a step size that is not positive.
     """
 
     def __init__(
@@ -275,6 +284,7 @@ class NativeIntegrator(CylinderChainIntegrator):
         flow=None,
         advice="",
         checks=True,
+        precision="automatic",
     ):
         temperature = non_negative(temperature, TEMPERATURE, "temperature")
         super().__init__(temperature, _OTHER_FRICTION, as_step(step_size))
@@ -282,9 +292,11 @@ class NativeIntegrator(CylinderChainIntegrator):
         self._divided_steps = DividedSteps(len(labels))
         self._work = ExplicitWork()
         check_scheme(scheme)
+        check_precision(precision)
         self._labels = list(labels)
         self._advice = advice
         self.setScheme(SCHEMES[scheme])
+        self.setPrecision(PRECISIONS[precision])
         self.setRandomNumberSeed(random_seed)
         self.setFlow(flow)
 

@@ -155,8 +155,14 @@ def create_integrator(
     seed,
     flow=None,
     checks=True,
+    precision="automatic",
 ):
     """Create the integrator of a System with filaments; see ``Filaments.create_integrator``."""
+    if precision == "mixed":
+        raise InputError(
+            "The portable engine computes filaments in double precision alone: use the compiled engine, or leave "
+            "precision out."
+        )
     refuse_constraints(system, filaments, node_indices)
     chains = describe_chains(system, filaments, node_indices, viscosity, temperature)
     nodes = np.concatenate(node_indices)

@@ -3,6 +3,20 @@
  * ChainLoops.h includes this file into the namespace of an instruction set.
  */
 
+#ifdef CYLCHAIN_SINGLE_PRECISION
+const Scalar LEAST = 1e-6f, TINY = 1e-30f;
+#else
+const Scalar LEAST = 1e-12, TINY = 1e-300;
+#endif
+
+template <class Real> CYLCHAIN_INLINE Real larger(Real a, Real b) {
+    return a > b ? a : b;
+}
+
+template <class Real> CYLCHAIN_INLINE Real lesser(Real a, Real b) {
+    return a < b ? a : b;
+}
+
 /** A bend b = f (t2-t1), with the energy (stiffness/2) b^2, and df/dc, for the cosine c. */
 template <class Real> struct BendFactor {
     Real f, slope;
@@ -13,12 +27,12 @@ template <class Real> CYLCHAIN_INLINE BendFactor<Real> bendFactor(BendingModel m
     if (model == BendingModel::KratkyPorod)
         return {1+Real{}, Real{}};
     if (model == BendingModel::InscribedCircle) {
-        const Real sum = 4-square+1e-12;
+        const Real sum = larger<Real>(4-square, LEAST+Real{});
         const Real f = 2/root(sum);
-        return {f, f*f*f*-0.25};
+        return {f, f*f*f*Scalar(-0.25)};
     }
     BendFactor<Real> result;
-    for (int i = 0; i < (int) (sizeof(Real)/sizeof(double)); i++) {
+    for (int i = 0; i < (int) (sizeof(Real)/sizeof(Scalar)); i++) {
         Real copy = square;
         const double chord = std::fmin(std::sqrt(lane(copy, i)), 2.0), half = std::asin(0.5*chord);
         const bool small = chord < 1e-3;
@@ -37,12 +51,13 @@ template <class Real> CYLCHAIN_INLINE void bendFactors(BendingModel model, const
             Real& inverse1, Real& inverse2) {
     const Real numbers = number1*number2;
     if (model == BendingModel::InscribedCircle) {
-        const Real root1 = root(4-difference1.dot(difference1)+1e-12), root2 = root(4-difference2.dot(difference2)+1e-12);
+        const Real root1 = root(larger<Real>(4-difference1.dot(difference1), LEAST+Real{}));
+        const Real root2 = root(larger<Real>(4-difference2.dot(difference2), LEAST+Real{}));
         const Real roots = root1*root2, all = 1/(roots*numbers);
         const Real perRoots = all*numbers, perNumbers = all*roots;
         const Real f1 = 2*perRoots*root2, f2 = 2*perRoots*root1;
-        factor1 = {f1, f1*f1*f1*-0.25};
-        factor2 = {f2, f2*f2*f2*-0.25};
+        factor1 = {f1, f1*f1*f1*Scalar(-0.25)};
+        factor2 = {f2, f2*f2*f2*Scalar(-0.25)};
         inverse1 = perNumbers*number2;
         inverse2 = perNumbers*number1;
         return;
@@ -135,6 +150,10 @@ template <class Real> CYLCHAIN_INLINE void stretchCoordinate(StretchingModel mod
     q = e;
     slope = 1+Real{};
     if (model == StretchingModel::FENE)
-        for (int i = 0; i < (int) (sizeof(Real)/sizeof(double)); i++)
-            feneCoordinate(lane(inverse, i), lane(e, i), lane(q, i), lane(slope, i));
+        for (int i = 0; i < (int) (sizeof(Real)/sizeof(Scalar)); i++) {
+            double coordinate, derivative;
+            feneCoordinate(lane(inverse, i), lane(e, i), coordinate, derivative);
+            lane(q, i) = coordinate;
+            lane(slope, i) = derivative;
+        }
 }

@@ -79,6 +79,15 @@ struct SegmentForces {
     void add(const SegmentForces& other, double weight);
 };
 
+/** The precision that chains are computed in. Positions, forces and displacements are doubles in any case. */
+enum class Precision {
+    /** Mixed precision where it is right, and faster. */
+    Automatic = 0,
+    /** Single precision within a step, wherever it is right: see IMPLICIT_SCHEME.md. */
+    Mixed = 1,
+    Double = 2
+};
+
 /** What a step needs besides positions and forces. */
 struct StepSettings {
     Scheme scheme;
@@ -93,12 +102,16 @@ struct StepSettings {
     BackgroundFlow flow = {};
     /** Where to record the forces of segments, for each chain and segment, or NULL. The implicit scheme alone does so. */
     std::vector<std::vector<SegmentForces> >* segmentForces = NULL;
+    Precision precision = Precision::Double;
 };
 
 /**
  * Forces and displacements of many chains. Chains are gathered into packs that are computed in the lanes of the
  * processor's vector registers; packs are independent, so they can be given to different threads, and no result
  * depends on which thread computes what.
+ *
+ * Registers hold twice as many numbers in single precision. Beside the packs that hold all chains, each of them once,
+ * there are wide ones for the chains of several of these. A step takes those that getPacksOfStep() says.
  *
  * Positions, forces and displacements are arrays of three doubles for each particle.
  */
@@ -109,9 +122,21 @@ public:
      */
     explicit ChainEngine(const std::vector<Chain>& chains);
     ~ChainEngine();
+    /**
+     * Get the number of packs in double precision, which hold all chains.
+     */
     int getNumPacks() const;
     /**
-     * Add the forces on the nodes of a pack.
+     * Get the packs that a step with some settings takes: together, they hold each chain once. Those whose number is not
+     * below getNumPacks() are wide ones. This depends on the settings but for seed, step and what is recorded.
+     */
+    std::vector<int> getPacksOfStep(const StepSettings& settings) const;
+    /**
+     * Get the number of chains that some packs take in mixed precision.
+     */
+    int getNumMixedChains(const std::vector<int>& packs) const;
+    /**
+     * Add the forces on the nodes of a pack, which is not a wide one.
      *
      * @param box            the three vectors of a periodic box (nine doubles), to take each segment as its shortest
      *                       image, or NULL
@@ -128,7 +153,8 @@ public:
     void clearForces(int pack, double* forces) const;
     /**
      * Compute the displacements of the nodes of a pack in one step: noise, resistance, redistribution. The forces are
-     * all those on the nodes; for the implicit scheme, all but those of the chains themselves.
+     * all those on the nodes; for the implicit scheme, all but those of the chains themselves. A wide pack is for the
+     * settings that getPacksOfStep() gives it for.
      *
      * @param displacements  receives those of the pack's nodes
      * @return the first instability found, with chain = -1 if there is none

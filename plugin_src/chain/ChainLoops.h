@@ -1,6 +1,7 @@
 /**
- * The loops over the segments of a pack. This file is compiled once for each instruction set, into a namespace of its
- * own, CYLCHAIN_LOOPS, so that no function of one is used by another, and for up to CYLCHAIN_LANES lanes.
+ * The loops over the segments of a pack. This file is compiled for each instruction set in double precision and, if
+ * CYLCHAIN_SINGLE_PRECISION is defined, in single precision: into a namespace of its own, CYLCHAIN_LOOPS, so that no
+ * function of one is used by another, and for up to CYLCHAIN_LANES lanes.
  */
 
 #include "ChainPack.h"
@@ -18,8 +19,10 @@ namespace CYLCHAIN_LOOPS {
 
 #include "VectorLanes.h"
 
+typedef ChainPack<Scalar> Pack;
+
 /** Bring an array of three doubles for each particle into lanes. */
-template <int W> void gather(const ChainPack& pack, const double* values, Vector<typename Lanes<W>::Type>* result) {
+template <int W> void gather(const Pack& pack, const double* values, Vector<typename Lanes<W>::Type>* result) {
     for (int node = 0; node < pack.nodes; node++)
         for (int i = 0; i < W; i++) {
             const int particle = pack.particles[node*W+i];
@@ -34,7 +37,7 @@ template <int W> void gather(const ChainPack& pack, const double* values, Vector
 }
 
 /** Bring forces into lanes: once for nodes that come twice, and in the plane for chains that stay there. */
-template <int W> void gatherForces(const ChainPack& pack, const double* forces, Vector<typename Lanes<W>::Type>* f) {
+template <int W> void gatherForces(const Pack& pack, const double* forces, Vector<typename Lanes<W>::Type>* f) {
     typedef typename Lanes<W>::Type Real;
     gather<W>(pack, forces, f);
     for (int node = pack.ownNodes(); node < pack.nodes; node++)
@@ -45,7 +48,7 @@ template <int W> void gatherForces(const ChainPack& pack, const double* forces, 
 }
 
 /** Write vectors, times a factor, to an array of three doubles for each particle. */
-template <int W> void scatter(const ChainPack& pack, Vector<typename Lanes<W>::Type>* values, double factor, double* result) {
+template <int W> void scatter(const Pack& pack, Vector<typename Lanes<W>::Type>* values, double factor, double* result) {
     for (int node = 0; node < pack.ownNodes(); node++)
         for (int i = 0; i < W; i++) {
             const int particle = pack.particles[node*W+i];
@@ -58,7 +61,7 @@ template <int W> void scatter(const ChainPack& pack, Vector<typename Lanes<W>::T
 }
 
 /** Bring positions into lanes. Each node is the image that is nearest to the one before it if there is a box. */
-template <int W> void gatherPositions(const ChainPack& pack, const double* positions, const double* box,
+template <int W> void gatherPositions(const Pack& pack, const double* positions, const double* box,
             Vector<typename Lanes<W>::Type>* x) {
     gather<W>(pack, positions, x);
     for (int i = 0; i < W; i++) {
@@ -80,7 +83,7 @@ template <int W> void gatherPositions(const ChainPack& pack, const double* posit
 }
 
 /** Bring the positions a step begins with into lanes. Chains that stay in a plane are seen in it. */
-template <int W> void gatherStart(const ChainPack& pack, const double* positions, const double* box,
+template <int W> void gatherStart(const Pack& pack, const double* positions, const double* box,
             Vector<typename Lanes<W>::Type>* x) {
     gatherPositions<W>(pack, positions, box, x);
     if (pack.planar)
@@ -88,146 +91,85 @@ template <int W> void gatherStart(const ChainPack& pack, const double* positions
             x[node].z = x[0].z;
 }
 
-template <class Real> CYLCHAIN_INLINE Real property(const ChainPack& pack, int segment, int which) {
-    return loaded<Real>(pack.properties, (std::size_t) segment*ChainPack::NumProperties+which);
+/** Bring the vectors of segments into lanes: differences of doubles, however far from the origin they are. */
+template <int W> void gatherSegments(const Pack& pack, const double* positions, const double* box,
+            Vector<typename Lanes<W>::Type>* result) {
+    for (int s = 0; s < pack.nodes-1; s++)
+        for (int i = 0; i < W; i++) {
+            const int first = pack.particles[s*W+i], second = pack.particles[(s+1)*W+i];
+            double d[] = {1, 0, 0};
+            if (first >= 0 && second >= 0) {
+                for (int k = 0; k < 3; k++)
+                    d[k] = positions[3*second+k]-positions[3*first+k];
+                if (box != NULL)
+                    takeToNearestImage(d, box);
+                if (pack.planar)
+                    d[2] = 0;
+            }
+            lane(result[s].x, i) = d[0];
+            lane(result[s].y, i) = d[1];
+            lane(result[s].z, i) = d[2];
+        }
 }
 
-/** The slope dV/dc of the bending energy of a joint with the cosine c and the sine s. */
-template <int W> inline typename Lanes<W>::Type bendingSlope(BendingModel model, typename Lanes<W>::Type stiffness,
-            typename Lanes<W>::Type c, typename Lanes<W>::Type sineSquared) {
-    typedef typename Lanes<W>::Type Real;
-    if (model == BendingModel::InscribedCircle)
-        return -4*stiffness/((1+c)*(1+c));
-    if (model == BendingModel::KratkyPorod)
-        return -stiffness;
-    Real slope;
-    for (int i = 0; i < W; i++) {
-        const double sine = std::sqrt(lane(sineSquared, i)), angle = std::atan2(sine, lane(c, i));
-        lane(slope, i) = -lane(stiffness, i)*(sine > 1e-8 ? angle/sine : 1.0);
-    }
-    return slope;
+template <class Real> CYLCHAIN_INLINE Real property(const Pack& pack, int segment, int which) {
+    return loaded<Real>(pack.properties, (std::size_t) segment*Pack::NumProperties+which);
 }
 
-inline double bendingEnergy(BendingModel model, double stiffness, double c, double sineSquared) {
-    if (model == BendingModel::InscribedCircle)
-        return 2*stiffness*sineSquared/((1+c)*(1+c));
-    if (model == BendingModel::KratkyPorod)
-        return c > 0 ? stiffness*sineSquared/(1+c) : stiffness*(1-c);
-    const double angle = std::atan2(std::sqrt(sineSquared), c);
-    return 0.5*stiffness*angle*angle;
-}
-
-/** The vector from a tether's point to its node. */
-template <int W> void tetherVector(const LaneTether& tether, const Vector<typename Lanes<W>::Type>* x, const double* box,
+/** The vector from a tether's point to its node, in double precision. */
+inline void tetherVector(const Pack& pack, const LaneTether& tether, const double* positions, const double* box,
             double* d) {
-    Vector<typename Lanes<W>::Type> node = x[tether.node];
-    d[0] = lane(node.x, tether.lane)-tether.point[0];
-    d[1] = lane(node.y, tether.lane)-tether.point[1];
-    d[2] = lane(node.z, tether.lane)-tether.point[2];
+    const double* node = positions+3*pack.particles[tether.node*pack.lanes+tether.lane];
+    for (int k = 0; k < 3; k++)
+        d[k] = node[k]-tether.point[k];
     if (box != NULL)
         takeToNearestImage(d, box);
 }
 
 /** Add the propulsion of segments, half of it on each end. */
-template <int W> void addPropulsion(const ChainPack& pack, const Vector<typename Lanes<W>::Type>* x,
+template <int W> void addPropulsion(const Pack& pack, const Vector<typename Lanes<W>::Type>* vectors,
             Vector<typename Lanes<W>::Type>* f) {
     typedef typename Lanes<W>::Type Real;
     if (pack.propulsions.empty())
         return;
     for (int s = 0; s < pack.segments; s++) {
-        const Vector<Real> difference = x[s+1]-x[s];
-        const Vector<Real> half = difference*(loaded<Real>(pack.propulsions, s)/root(difference.dot(difference)));
+        const Vector<Real> half = vectors[s]*(loaded<Real>(pack.propulsions, s)/root(vectors[s].dot(vectors[s])));
         f[s] = f[s]+half;
         f[s+1] = f[s+1]+half;
     }
 }
 
-template <int W> ChainEnergy addForcesTo(const ChainPack& pack, const double* positions, double* forces,
-            const double* box, bool includeEnergy) {
+/** The flow for each lane: in a periodic box, with the image of the lane's chain whose first node is nearest to the origin. */
+template <int W> class LaneFlow {
     typedef typename Lanes<W>::Type Real;
-    static thread_local Scratch scratch;
-    Vector<Real>* x = scratch.reserve<Vector<Real>>(2*pack.nodes);
-    Vector<Real>* f = x+pack.nodes;
-    gatherPositions<W>(pack, positions, box, x);
-    ChainEnergy energy;
-    Vector<Real> before = {}, push = {};
-    Real inverseBefore = {};
-    for (int s = 0; s < pack.nodes-1; s++) {
-        const Vector<Real> difference = x[s+1]-x[s];
-        const Real length = root(difference.dot(difference));
-        const Real inverse = 1/length;
-        const Vector<Real> t = difference*inverse;
-
-        // Stretching.
-        const Real stiffness = property<Real>(pack, s, ChainPack::Stiffness);
-        const Real extension = length-property<Real>(pack, s, ChainPack::RestLength);
-        Real tension = stiffness*extension;
-        if (pack.stretching == StretchingModel::FENE) {
-            const Real relative = extension*property<Real>(pack, s, ChainPack::InverseExtension);
-            tension = tension/(1-relative*relative);
+public:
+    LaneFlow(const BackgroundFlow& flow, const Pack& pack, const Vector<Real>* x) : planar(pack.planar) {
+        std::copy(flow.gradient, flow.gradient+9, gradient);
+        for (int i = 0; i < W && flow.present; i++) {
+            // What a node at zero would have to be carried along with.
+            Vector<Real> first = x[0];
+            const double r[] = {lane(first.x, i), lane(first.y, i), lane(first.z, i)};
+            double u[3];
+            flow.getVelocity(r, u);
+            for (int k = 0; k < 3; k++)
+                for (int j = 0; j < 3; j++)
+                    u[k] -= flow.gradient[3*k+j]*r[j];
+            lane(velocity.x, i) = u[0];
+            lane(velocity.y, i) = u[1];
+            lane(velocity.z, i) = u[2];
         }
-        // The last segment of an unrolled chain is there for its joint alone.
-        const bool twice = (s >= pack.segments);
-        Vector<Real> pull = twice ? Vector<Real> {} : t*tension;
-
-        // Bending at the joint with the segment before.
-        if (s > 0) {
-            const Real joint = loaded<Real>(pack.joints, s);
-            const Real c = before.dot(t);
-            const Vector<Real> normal = crossProduct(before, t);
-            const Real sineSquared = normal.dot(normal);
-            const Real slope = bendingSlope<W>(pack.bending, joint, c, sineSquared);
-            const Vector<Real> first = (t-before*c)*(-slope*inverseBefore);
-            const Vector<Real> second = (before-t*c)*(-slope*inverse);
-            f[s-1] = f[s-1]-first;
-            push = push+first-second;
-            f[s] = push+pull;
-            push = second;
-            if (includeEnergy)
-                for (int i = 0; i < W; i++) {
-                    Real k = joint, cosine = c, square = sineSquared;
-                    if (s < pack.nodesOfLane[i]-1)
-                        energy.bending += bendingEnergy(pack.bending, lane(k, i), lane(cosine, i), lane(square, i));
-                }
-        }
-        else
-            f[s] = pull;
-        push = push-pull;
-        if (includeEnergy)
-            for (int i = 0; i < W; i++) {
-                if (s >= pack.segmentsOfLane[i])
-                    continue;
-                Real k = stiffness, e = extension, d = property<Real>(pack, s, ChainPack::InverseExtension);
-                const double square = lane(e, i)*lane(e, i), relative = lane(d, i)*lane(d, i)*square;
-                energy.stretching += pack.stretching == StretchingModel::Harmonic ? 0.5*lane(k, i)*square :
-                        -0.5*lane(k, i)/(lane(d, i)*lane(d, i))*std::log1p(-relative);
-            }
-        before = t;
-        inverseBefore = inverse;
     }
-    f[pack.nodes-1] = push;
-    addPropulsion<W>(pack, x, f);
-    for (const LaneTether& tether : pack.tethers) {
-        double d[3];
-        tetherVector<W>(tether, x, box, d);
-        lane(f[tether.node].x, tether.lane) -= tether.stiffness*d[0];
-        lane(f[tether.node].y, tether.lane) -= tether.stiffness*d[1];
-        lane(f[tether.node].z, tether.lane) -= tether.stiffness*d[2];
-        energy.tethers += 0.5*tether.stiffness*(d[0]*d[0]+d[1]*d[1]+d[2]*d[2]);
+    CYLCHAIN_INLINE Vector<Real> at(const Vector<Real>& x) const {
+        const Scalar* g = gradient;
+        return {velocity.x+x.x*g[0]+x.y*g[1]+x.z*g[2], velocity.y+x.x*g[3]+x.y*g[4]+x.z*g[5],
+                planar ? Real{} : velocity.z+x.x*g[6]+x.y*g[7]+x.z*g[8]};
     }
-    for (int node = 0; node < pack.nodes; node++)
-        for (int i = 0; i < W; i++) {
-            const int particle = pack.particles[node*W+i];
-            if (particle >= 0) {
-                forces[3*particle] += lane(f[node].x, i);
-                forces[3*particle+1] += lane(f[node].y, i);
-                forces[3*particle+2] += lane(f[node].z, i);
-            }
-        }
-    return energy;
-}
+private:
+    Vector<Real> velocity = {};
+    Scalar gradient[9];
+    bool planar;
+};
 
-#include "Redistribution.h"
 #include "NoiseLanes.h"
 
 inline NoiseKey noiseKey(const StepSettings& settings) {
@@ -235,11 +177,11 @@ inline NoiseKey noiseKey(const StepSettings& settings) {
 }
 
 /** The first part of each chain of a pack. */
-template <int W> inline NoisePlaces<W> noisePlaces(const ChainPack& pack) {
+template <int W> inline NoisePlaces<W> noisePlaces(const Pack& pack) {
     NoisePlaces<W> places;
     for (int i = 0; i < W; i++) {
-        reinterpret_cast<std::uint64_t*>(&places.chain)[i] = pack.chain[i];
-        reinterpret_cast<std::uint64_t*>(&places.part)[i] = 0;
+        reinterpret_cast<Word*>(&places.chain)[i] = pack.chain[i];
+        reinterpret_cast<Word*>(&places.part)[i] = 0;
     }
     return places;
 }
@@ -250,87 +192,23 @@ template <class Real> CYLCHAIN_INLINE void forceNoise(const Real* normals, bool 
     b = {normals[3], normals[4], planar ? Real{} : normals[5]};
 }
 
-/** Add the random forces, step (1) of Section 4, and for Euler's scheme the thermal torques (15), step (2). */
-template <int W> void addRandomForces(const ChainPack& pack, const Vector<typename Lanes<W>::Type>* x,
-            const StepSettings& settings, Vector<typename Lanes<W>::Type>* f) {
-    typedef typename Lanes<W>::Type Real;
-    const NoiseKey key = noiseKey(settings);
-    NoisePlaces<W> places = noisePlaces<W>(pack);
-    const double amplitude = std::sqrt(2*settings.kT/settings.stepSize);
-    const double thermal = (settings.scheme == Scheme::Euler ? settings.kT : 0.0);
-    for (int s = 0; s < pack.segments; s++) {
-        const Vector<Real> difference = x[s+1]-x[s];
-        const Real inverse = 1/root(difference.dot(difference));
-        const Vector<Real> t = difference*inverse;
-        Real normals[6];
-        Vector<Real> a, b;
-        drawNormals<W, 3>(key, NoiseKind::Segment, places, normals);
-        places.part += 1;
-        forceNoise<Real>(normals, pack.planar, a, b);
-        const Real across = property<Real>(pack, s, ChainPack::RootPerpendicular);
-        const Real along = property<Real>(pack, s, ChainPack::RootParallel);
-        const Vector<Real> force = (a*across+t*((along-across)*t.dot(a)))*(0.5*amplitude+Real{});
-        const Real turn = property<Real>(pack, s, ChainPack::RootRotational);
-        const Real stretch = property<Real>(pack, s, ChainPack::RootExtensional);
-        const Real drift = thermal*property<Real>(pack, s, ChainPack::Drift);
-        const Vector<Real> pair = (b*turn+t*((stretch-turn)*t.dot(b)))*(amplitude*inverse)+t*(drift*inverse);
-        f[s] = f[s]+force-pair;
-        f[s+1] = f[s+1]+force+pair;
-    }
-}
-
-template <int W> Instability stepPack(const ChainPack& pack, const double* positions, const double* forces,
-            const double* box, const StepSettings& settings, double* displacements) {
-    typedef typename Lanes<W>::Type Real;
-    static thread_local Scratch vectors;
-    const int n = pack.nodes;
-    Vector<Real>* x = vectors.reserve<Vector<Real>>(3*n);
-    Vector<Real>* f = x+n;
-    Vector<Real>* v = f+n;
-    gatherStart<W>(pack, positions, box, x);
-    gatherForces<W>(pack, forces, f);
-    if (settings.kT > 0)
-        addRandomForces<W>(pack, x, settings, f);
-    findVelocities<W>(pack, x, f, settings.flow, v);
-    if (settings.scheme == Scheme::Midpoint) {
-        const Real half = 0.5*settings.stepSize+Real{};
-        for (int node = 0; node < n; node++)
-            x[node] = x[node]+v[node]*half;
-        findVelocities<W>(pack, x, f, settings.flow, v);
-    }
-
-    // Write displacements, and look for segments whose ends move apart, or that leave the range of FENE.
-    const double h = settings.stepSize;
-    scatter<W>(pack, v, h, displacements);
-    const bool ranges = pack.stretching == StretchingModel::FENE;
-    if (ranges)
-        gatherStart<W>(pack, positions, box, x);
-    Instability result;
-    for (int s = 0; s < pack.segments; s++) {
-        const Vector<Real> change = (v[s+1]-v[s])*(h+Real{});
-        Real square = change.dot(change), rest = property<Real>(pack, s, ChainPack::RestLength), relative = Real{};
-        if (ranges) {
-            const Vector<Real> after = x[s+1]-x[s]+change;
-            relative = (root(after.dot(after))-rest)*property<Real>(pack, s, ChainPack::InverseExtension);
-        }
-        for (int i = 0; i < W; i++) {
-            // Written so that NaN counts as unstable.
-            const bool stable = lane(square, i) < lane(rest, i)*lane(rest, i) && std::fabs(lane(relative, i)) < 1;
-            if (!stable && s < pack.segmentsOfLane[i] && result.chain < 0) {
-                result.chain = pack.chain[i];
-                result.segment = s;
-                result.change = std::sqrt(lane(square, i));
-            }
-        }
-    }
-    return result;
-}
-
 #include "ChainCoordinates.h"
 #include "TensionBand.h"
 #include "ImplicitLoops.h"
 
-template <int W> Instability stepPackAs(const ChainPack& pack, const double* positions, const double* forces,
+#ifdef CYLCHAIN_SINGLE_PRECISION
+
+/** All lanes there are, and open chains alone: what is not in single precision need not be compiled for it. */
+Instability stepOfPack(const Pack& pack, const double* positions, const double* forces, const double* box,
+            const StepSettings& settings, double* displacements) {
+    return stepPackImplicitly<CYLCHAIN_LANES, false>(pack, positions, forces, box, settings, displacements);
+}
+
+#else
+
+#include "ExplicitLoops.h"
+
+template <int W> Instability stepPackAs(const Pack& pack, const double* positions, const double* forces,
             const double* box, const StepSettings& settings, double* displacements) {
     if (isImplicit(settings.scheme))
         return pack.closed ? stepPackImplicitly<W, true>(pack, positions, forces, box, settings, displacements) :
@@ -339,26 +217,28 @@ template <int W> Instability stepPackAs(const ChainPack& pack, const double* pos
 }
 
 /** Call a function with as many lanes as a pack has. Those that the instruction set has not are not compiled. */
-template <int W = CYLCHAIN_LANES, class Function> auto withLanesOf(const ChainPack& pack, Function function) {
+template <int W = CYLCHAIN_LANES, class Function> auto withLanesOf(const Pack& pack, Function function) {
     if constexpr (W > 1)
         if (pack.lanes < W)
             return withLanesOf<W/2>(pack, function);
     return function(std::integral_constant<int, W>());
 }
 
-ChainEnergy addForcesOfPack(const ChainPack& pack, const double* positions, double* forces, const double* box,
+ChainEnergy addForcesOfPack(const Pack& pack, const double* positions, double* forces, const double* box,
             bool includeEnergy) {
     return withLanesOf(pack, [&] (auto lanes) {
         return addForcesTo<lanes>(pack, positions, forces, box, includeEnergy);
     });
 }
 
-Instability stepOfPack(const ChainPack& pack, const double* positions, const double* forces, const double* box,
+Instability stepOfPack(const Pack& pack, const double* positions, const double* forces, const double* box,
             const StepSettings& settings, double* displacements) {
     return withLanesOf(pack, [&] (auto lanes) {
         return stepPackAs<lanes>(pack, positions, forces, box, settings, displacements);
     });
 }
+
+#endif
 
 } // namespace CYLCHAIN_LOOPS
 } // namespace cylchain

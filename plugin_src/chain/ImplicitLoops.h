@@ -25,35 +25,26 @@
  */
 
 /** The largest change of a segment in the last iteration, over its rest length; a fifth of it remains as an error. */
-const double NEWTON_TOLERANCE = 1e-2;
+const Scalar NEWTON_TOLERANCE = 1e-2;
 /** The largest change of a node in the last iteration, over that length. */
-const double NODE_TOLERANCE = 0.1;
+const Scalar NODE_TOLERANCE = 0.1;
 /** The largest error of a length that an iteration leaves, over its thermal fluctuation against what resists in a step. */
-const double LENGTH_TOLERANCE = 0.07;
+const Scalar LENGTH_TOLERANCE = 0.07;
 const int NEWTON_ITERATIONS = 14;
 /** A step that does not converge is cut into at most two to this power. */
 const int LARGEST_DIVISION = 10;
 /** The part of the friction against turning that compression may take away in the iteration's matrix. */
-const double COMPRESSION = 0.9;
+const Scalar COMPRESSION = 0.9;
 /** A bend is drawn as a Gaussian with rejection if the joint is stiffer than this many k_B T, or else from the sphere. */
-const double STIFF_JOINT = 2;
+const Scalar STIFF_JOINT = 2;
 /** The tension of a segment turns it back by this much of what resists, in a step. */
-const double NEARLY_TAUT = 0.5;
-const double TINY = 1e-300;
-
-template <class Real> CYLCHAIN_INLINE Real larger(Real a, Real b) {
-    return a > b ? a : b;
-}
-
-template <class Real> CYLCHAIN_INLINE Real lesser(Real a, Real b) {
-    return a < b ? a : b;
-}
+const Scalar NEARLY_TAUT = 0.5;
 
 /** Two vectors that are orthogonal to a unit vector and to each other (Duff et al., J. Comput. Graph. Tech. 2017, 6, 1). */
 template <class Real> CYLCHAIN_INLINE void orthogonal(const Vector<Real>& n, Vector<Real>& first, Vector<Real>& second) {
     Real sign;
     Vector<Real> copy = n;
-    for (int i = 0; i < (int) (sizeof(Real)/sizeof(double)); i++)
+    for (int i = 0; i < (int) (sizeof(Real)/sizeof(Scalar)); i++)
         lane(sign, i) = std::copysign(1.0, lane(copy.z, i));
     const Real a = -1/(sign+n.z), b = n.x*n.y*a;
     first = {1+sign*n.x*n.x*a, sign*b, -sign*n.x};
@@ -80,20 +71,34 @@ template <class Real> struct ImplicitSegment {
     Vector<Real> turned;
 };
 
+/** The vector from the point of a tether to its node. */
+struct TetherVector {
+    double d[3];
+};
+
 /** What a step keeps of a tether: the vector from its point to its node at the start, its noise, and the same of a stage. */
 struct ImplicitTether {
     double start[3], random[3], theta;
     double constant[3], implicit;
 };
 
+/**
+ * What a step begins with: the vectors of the segments and those of tethers. In single precision, they say more than the
+ * nodes, which may be far from the origin: only a flow looks at these.
+ */
+template <int W> struct StepStart {
+    Vector<typename Lanes<W>::Type> *nodes, *segments;
+    TetherVector* tethers;
+};
+
 /** The stages that steps are made of: the one of scheme "implicit", and the two of second order. */
 enum class Stage {Only, First, Second};
 /** The stages of second order are those of the L-stable singly diagonally implicit method, with this on the diagonal. */
-const double DIAGONAL = 1-M_SQRT1_2;
+const Scalar DIAGONAL = 1-M_SQRT1_2;
 /** The first stage has this part of the noise, and its end is where that of the second begins. */
-const double NOISE_OF_FIRST = DIAGONAL/(1-DIAGONAL);
+const Scalar NOISE_OF_FIRST = DIAGONAL/(1-DIAGONAL);
 /** The tolerances of its stages over those of scheme "implicit". */
-const double TOLERANCE_OF_STAGES = 0.3;
+const Scalar TOLERANCE_OF_STAGES = 0.3;
 
 /** A step of open chains or, if CLOSED, of rings. */
 template <int W, bool CLOSED> class ImplicitStep {
@@ -107,8 +112,8 @@ public:
         Scratch segments, vectors, tethers;
         typename Band::Memory band;
     };
-    ImplicitStep(const ChainPack& pack, const StepSettings& settings, const double* box, Memory& memory) : pack(pack),
-            settings(settings), box(box), n(pack.nodes), h(settings.stepSize), band(pack, memory.band) {
+    ImplicitStep(const Pack& pack, const StepSettings& settings, Memory& memory) : pack(pack), settings(settings),
+            n(pack.nodes), h(settings.stepSize), kT(settings.kT), band(pack, memory.band) {
         tethers = memory.tethers.template reserve<ImplicitTether>(pack.tethers.size());
         segments = memory.segments.template reserve<ImplicitSegment<Real> >(n);
         f = memory.vectors.template reserve<Vec>(7*n);
@@ -123,23 +128,23 @@ public:
     /**
      * Take one step.
      *
-     * @param before  the nodes before
-     * @param forces  the forces on them, but for those of the chains
-     * @param y       receives the nodes after
+     * @param start   the chains before the step
+     * @param forces  the forces on nodes, but for those of the chains
+     * @param y       receives how far the nodes move
      * @param failed  receives true for each lane that has not converged or a segment of which changes by more than a
      *                quarter of a turn would do
      * @return the number of iterations
      */
-    int take(const Vec* before, const Vec* forces, Vec* y, bool* failed) {
-        x = before;
+    int take(const StepStart<W>& start, const Vec* forces, Vec* y, bool* failed) {
+        x = start.nodes;
         for (int node = 0; node < n; node++) {
-            y[node] = x[node];
+            y[node] = Vec {};
             external[node] = forces[node];
             if (twoStages)
                 random[node] = drift[node] = Vec {};
         }
-        addPropulsion<W>(pack, x, external);
-        describe();
+        addPropulsion<W>(pack, start.segments, external);
+        describe(start);
         if (settings.kT > 0)
             addNoise();
         for (int i = 0; i < W; i++)
@@ -158,11 +163,10 @@ public:
         return iterations;
     }
 private:
-    const ChainPack& pack;
+    const Pack& pack;
     const StepSettings& settings;
-    const double* const box;
     const int n;
-    const double h;
+    const Scalar h, kT;
     Band band;
     ImplicitSegment<Real>* segments;
     ImplicitTether* tethers;
@@ -212,7 +216,7 @@ private:
         return iterations;
     }
     /** How much of the forces that last for the whole step a stage has. */
-    double shareOfForces() const {
+    Scalar shareOfForces() const {
         return stage == Stage::First ? DIAGONAL : 1;
     }
     /** Describe a stage. The second one begins with the end of the first, y. */
@@ -238,7 +242,8 @@ private:
                 segment.turningBend = segment.randomBend*root(2*segment.jointTheta-1);
             }
             else {
-                const Vec difference = y[s+1]-y[s], tangent = difference*(1/root(difference.dot(difference)));
+                const Vec difference = segment.difference+(y[s+1]-y[s]);
+                const Vec tangent = difference*(1/root(difference.dot(difference)));
                 const Vec bent = tangent-before;
                 if (s > 0)
                     segment.constantBend = bent*(bendFactor<Real>(pack.bending, bent).f*(1-DIAGONAL));
@@ -254,7 +259,7 @@ private:
     }
     void prepareTether(const LaneTether& place, ImplicitTether& tether, const Vec* y) const {
         tether.implicit = stage == Stage::Only ? tether.theta : DIAGONAL;
-        const Vec moved = y[place.node]-x[place.node];
+        const Vec moved = y[place.node];
         Real components[] = {moved.x, moved.y, moved.z};
         for (int k = 0; k < 3; k++) {
             if (stage == Stage::Only)
@@ -279,8 +284,10 @@ private:
         Vec end = y[0];
         for (int node = 0; node < n; node++) {
             const Vec found = y[node];
-            y[node] = found+(x[node]-found)*free+(found-x[node])*(scale*free);
+            y[node] = found+found*((scale-1)*free);
             rest[node] = found-end;
+            if (node > 0)
+                rest[node] = rest[node]+segments[node-1].difference;
             end = found;
         }
         if (!CLOSED)
@@ -292,8 +299,8 @@ private:
      * are, and the matrix symmetric.
      */
     void carryAlong(Vec* y) const {
-        const LaneFlow<W> flow(settings.flow, pack, x[0]);
-        const Vec halfway = x[0]+flow.at(x[0])*(0.5*h*shareOfForces()+Real{});
+        const LaneFlow<W> flow(settings.flow, pack, x);
+        const Vec halfway = x[0]+flow.at(x[0])*(Scalar(0.5)*h*shareOfForces()+Real{});
         const Real free = loaded<Real>(pack.free, 0);
         const Vec carried = flow.at(halfway)*(free*(h*shareOfForces()));
         for (int node = 0; node < n; node++)
@@ -317,8 +324,8 @@ private:
         for (int node = 0; node < n; node++) {
             const Real mobile = loaded<Real>(pack.mobile, node);
             if (node > 0) {
-                const Vec difference = y[node]-end;
-                moved = moved+difference*(lengthOf(node-1, difference)/root(difference.dot(difference)));
+                const Vec change = y[node]-end, difference = segments[node-1].difference+change;
+                moved = moved+change+difference*(lengthOf(node-1, difference)/root(difference.dot(difference))-1);
                 end = y[node];
             }
             sum = sum+end*mobile;
@@ -333,52 +340,50 @@ private:
     }
     /** A length that a FENE segment can have. */
     CYLCHAIN_INLINE Real withinRange(int s, Real length) const {
-        const Real rest = property<Real>(pack, s, ChainPack::RestLength);
-        const Real range = (1-1e-9)/(property<Real>(pack, s, ChainPack::InverseExtension)+TINY);
+        const Real rest = property<Real>(pack, s, Pack::RestLength);
+        const Real range = Scalar(1-1e-9)/(property<Real>(pack, s, Pack::InverseExtension)+TINY);
         return larger<Real>(lesser<Real>(length, rest+range), rest-range);
     }
     /** Describe the start of a step, without noise. */
-    void describe() {
+    void describe(const StepStart<W>& start) {
         for (int s = 0; s < n-1; s++) {
             ImplicitSegment<Real>& segment = segments[s];
-            segment.difference = x[s+1]-x[s];
+            segment.difference = start.segments[s];
             segment.length = root(segment.difference.dot(segment.difference));
             segment.inverse = 1/segment.length;
             segment.tangent = segment.difference*segment.inverse;
-            const Real l0 = property<Real>(pack, s, ChainPack::RestLength);
+            const Real l0 = property<Real>(pack, s, Pack::RestLength);
             Real slope;
-            stretchCoordinate(pack.stretching, property<Real>(pack, s, ChainPack::InverseExtension), segment.length-l0,
+            stretchCoordinate(pack.stretching, property<Real>(pack, s, Pack::InverseExtension), segment.length-l0,
                     segment.coordinate, slope);
-            const Real stretchRate = h*property<Real>(pack, s, ChainPack::Stiffness)*l0*l0+TINY;
-            segment.theta = larger<Real>(0.5+Real{}, 1-property<Real>(pack, s, ChainPack::Extensional)/stretchRate);
+            const Real stretchRate = h*property<Real>(pack, s, Pack::Stiffness)*l0*l0+TINY;
+            segment.theta = larger<Real>(0.5+Real{}, 1-property<Real>(pack, s, Pack::Extensional)/stretchRate);
             segment.randomCoordinate = segment.randomTension = segment.multiplier = segment.extra = Real{};
             segment.randomBend = segment.randomForce = segment.randomPair = segment.metricForce = Vec {};
             if (s > 0)
                 describeJoint(s);
         }
         for (std::size_t i = 0; i < pack.tethers.size(); i++)
-            describeTether(pack.tethers[i], tethers[i]);
+            describeTether(pack.tethers[i], start.tethers[i], tethers[i]);
     }
     void describeJoint(int s) {
         ImplicitSegment<Real>& segment = segments[s];
         const Vec sum = segments[s-1].tangent+segment.tangent, bent = segment.tangent-segments[s-1].tangent;
         segment.bisector = sum*(1/root(sum.dot(sum)+TINY));
         segment.bend = bent*bendFactor<Real>(pack.bending, bent).f;
-        const Real friction = -larger<Real>(-property<Real>(pack, s-1, ChainPack::Rotational),
-                -property<Real>(pack, s, ChainPack::Rotational));
+        const Real friction = -larger<Real>(-property<Real>(pack, s-1, Pack::Rotational),
+                -property<Real>(pack, s, Pack::Rotational));
         const Real bendRate = 4*h*loaded<Real>(pack.joints, s)+TINY;
         segment.jointTheta = larger<Real>(0.5+Real{}, 1-friction/bendRate);
     }
-    void describeTether(const LaneTether& tether, ImplicitTether& result) {
-        tetherVector<W>(tether, x, box, result.start);
-        if (pack.planar)
-            result.start[2] = 0;
+    void describeTether(const LaneTether& tether, const TetherVector& start, ImplicitTether& result) {
+        std::copy(start.d, start.d+3, result.start);
         double friction = 0;
         for (int side = tether.node-1; side <= tether.node; side++) {
             const int s = CLOSED && side < 0 ? pack.segments-1 : side;
             if (s >= 0 && s < pack.segmentsOfLane[tether.lane]) {
-                Real parallel = property<Real>(pack, s, ChainPack::Parallel), l0 = property<Real>(pack, s, ChainPack::RestLength);
-                Real extensional = property<Real>(pack, s, ChainPack::Extensional);
+                Real parallel = property<Real>(pack, s, Pack::Parallel), l0 = property<Real>(pack, s, Pack::RestLength);
+                Real extensional = property<Real>(pack, s, Pack::Extensional);
                 const double length = lane(l0, tether.lane);
                 friction += 0.25*lane(parallel, tether.lane)+lane(extensional, tether.lane)/(length*length);
             }
@@ -389,7 +394,7 @@ private:
     }
     /** Draw the random forces, lengths and bends, and those of tethers. */
     void addNoise();
-    void drawForces(const Real* normals, int s, double amplitude);
+    void drawForces(const Real* normals, int s, Scalar amplitude);
     void drawLength(const NoisePlaces<W>& places, int s, Real normal);
     void drawBend(const NoisePlaces<W>& places, int s);
     /** In a plane, a bend has one component, and its angle a uniform measure. */
@@ -405,15 +410,19 @@ private:
             addDragOfFlow(y);
         Row rows[3];
         Row *before = rows, *here = rows+1, *after = rows+2;
-        Geometry previous = {}, current;
+        // Roots and divisions take long: those of the segment ahead come before the node is eliminated.
+        Geometry previous = {}, current, ahead;
+        JointGeometry joint = {}, jointAhead = {};
         std::size_t tether = 0;
         band.begin();
         *here = Row {};
         here->right = loads[0];
+        describeNew(y, 0, ahead);
         for (int s = 0; s < n-1; s++) {
             if constexpr (CLOSED)
                 *after = Row {};
-            describeNew(y, s, current);
+            current = ahead;
+            joint = jointAhead;
             if (!CLOSED || s < pack.segments)
                 addSegment(y, s, current, *here, *after);
             else {
@@ -423,10 +432,14 @@ private:
                 after->right = loads[s+1];
             }
             addTethers(y, s, tether, *here);
-            if (s > 0) {
-                addJoint(s, previous, current, *before, *here, *after);
-                band.template eliminate<2>(s-1, *before, *here, *after);
+            if (s > 0)
+                addJoint(s, joint, previous, current, *before, *here, *after);
+            if (s < n-2) {
+                describeNew(y, s+1, ahead);
+                describeNewJoint(s+1, current, ahead, jointAhead);
             }
+            if (s > 0)
+                band.template eliminate<2>(s-1, *before, *here, *after);
             previous = current;
             Row* const free = before;
             before = here;
@@ -443,7 +456,7 @@ private:
     }
     /** Add the drag of the flow, at the middle of the step, on segments at rest. Its part along a segment is a tension. */
     void addDragOfFlow(const Vec* y) {
-        const LaneFlow<W> flow(settings.flow, pack, x[0]);
+        const LaneFlow<W> flow(settings.flow, pack, x);
         const Real share = shareOfForces()+Real{};
         for (int node = 0; node < n; node++)
             loads[node] = f[node];
@@ -459,18 +472,18 @@ private:
         Geometry geometry;
         describeNew(y, s, geometry);
         const Vec direction = geometry.middleTangent;
-        const Vec u1 = flow.at((x[s]+y[s])*(0.5+Real{})), u2 = flow.at((x[s+1]+y[s+1])*(0.5+Real{}));
+        const Vec u1 = flow.at(x[s]+y[s]*(0.5+Real{})), u2 = flow.at(x[s+1]+y[s+1]*(0.5+Real{}));
         const Vec sum = u1+u2, difference = u2-u1;
-        const Real across = 0.25*property<Real>(pack, s, ChainPack::Perpendicular);
-        const Real along = 0.25*property<Real>(pack, s, ChainPack::Parallel);
-        const Real turn = property<Real>(pack, s, ChainPack::Rotational)*turningFactor(s, geometry);
-        const Real stretch = property<Real>(pack, s, ChainPack::Extensional)*segments[s].inverse*geometry.inverse;
+        const Real across = 0.25*property<Real>(pack, s, Pack::Perpendicular);
+        const Real along = 0.25*property<Real>(pack, s, Pack::Parallel);
+        const Real turn = property<Real>(pack, s, Pack::Rotational)*turningFactor(s, geometry);
+        const Real stretch = property<Real>(pack, s, Pack::Extensional)*segments[s].inverse*geometry.inverse;
         carried = sum*across+direction*((along-across)*direction.dot(sum));
         pair = (difference-direction*direction.dot(difference))*turn;
         segments[s].tensionOfFlow = stretch*direction.dot(difference)*shareOfForces();
     }
     CYLCHAIN_INLINE void describeNew(const Vec* y, int s, Geometry& geometry) {
-        geometry.difference = y[s+1]-y[s];
+        geometry.difference = segments[s].difference+(y[s+1]-y[s]);
         const Vec middle = (segments[s].difference+geometry.difference)*(0.5+Real{});
         const Real length = root(geometry.difference.dot(geometry.difference)), middleLength = root(middle.dot(middle));
         // Divisions take longer than all the rest.
@@ -483,9 +496,9 @@ private:
     }
     /** The friction of a segment's ends against turning, and the stiffness with which its tension turns it back, in a step. */
     void turningRates(int s, Real& friction, Real& tension) const {
-        const Real l0 = property<Real>(pack, s, ChainPack::RestLength);
-        friction = 0.25*property<Real>(pack, s, ChainPack::Perpendicular)+
-                property<Real>(pack, s, ChainPack::Rotational)/(l0*l0)+TINY;
+        const Real l0 = property<Real>(pack, s, Pack::RestLength);
+        friction = 0.25*property<Real>(pack, s, Pack::Perpendicular)+
+                property<Real>(pack, s, Pack::Rotational)/(l0*l0)+TINY;
         tension = (h/shareOfForces())*segments[s].multiplier/segments[s].length;
     }
     /**
@@ -513,7 +526,7 @@ private:
             Real friction, tension;
             turningRates(s, friction, tension);
             ImplicitSegment<Real>& segment = segments[s];
-            const Real rotational = property<Real>(pack, s, ChainPack::Rotational);
+            const Real rotational = property<Real>(pack, s, Pack::Rotational);
             segment.extra = taut*larger<Real>(0.5*tension-friction, Real{})*segment.length*segment.length;
             // Chains that are not taut solve the same equations once more.
             segment.multiplier = segment.multiplier*taut;
@@ -531,23 +544,23 @@ private:
         const Vec t = geometry.tangent, direction = geometry.middleTangent;
 
         // Friction.
-        const Real acrossTrans = 0.25*property<Real>(pack, s, ChainPack::Perpendicular);
-        const Real alongTrans = 0.25*property<Real>(pack, s, ChainPack::Parallel);
-        const Real acrossTurn = (property<Real>(pack, s, ChainPack::Rotational)+segment.extra)*turningFactor(s, geometry);
-        const double perStep = 1/h;
+        const Real acrossTrans = 0.25*property<Real>(pack, s, Pack::Perpendicular);
+        const Real alongTrans = 0.25*property<Real>(pack, s, Pack::Parallel);
+        const Real acrossTurn = (property<Real>(pack, s, Pack::Rotational)+segment.extra)*turningFactor(s, geometry);
+        const Scalar perStep = 1/h;
         const Real sameAcross = (acrossTrans+acrossTurn)*perStep, otherAcross = (acrossTrans-acrossTurn)*perStep;
         const Real along = alongTrans*perStep;
-        const Vec first = y[s]-x[s], second = y[s+1]-x[s+1];
+        const Vec first = y[s], second = y[s+1];
         const Vec axial1 = direction*((along-sameAcross)*direction.dot(first)+(along-otherAcross)*direction.dot(second));
         const Vec axial2 = direction*((along-sameAcross)*direction.dot(second)+(along-otherAcross)*direction.dot(first));
 
         // Tension.
-        const Real drag = property<Real>(pack, s, ChainPack::Extensional)*segment.inverse*perStep;
+        const Real drag = property<Real>(pack, s, Pack::Extensional)*segment.inverse*perStep;
         if (pack.stretching == StretchingModel::FENE)
             findFeneTension(s, length, drag);
         else {
-            const Real stiffness = property<Real>(pack, s, ChainPack::Stiffness);
-            const Real extension = length-property<Real>(pack, s, ChainPack::RestLength);
+            const Real stiffness = property<Real>(pack, s, Pack::Stiffness);
+            const Real extension = length-property<Real>(pack, s, Pack::RestLength);
             segment.tension = stiffness*(segment.implicit*extension+segment.constantCoordinate)+
                     drag*(length-segment.length)*geometry.inverse+segment.constantTension;
             segment.response = stiffness*segment.implicit+drag*segment.length*geometry.inverse*geometry.inverse;
@@ -581,8 +594,8 @@ private:
      */
     void findFeneTension(int s, Real length, Real drag) {
         ImplicitSegment<Real>& segment = segments[s];
-        Real stiffness = property<Real>(pack, s, ChainPack::Stiffness), rest = property<Real>(pack, s, ChainPack::RestLength);
-        Real inverse = property<Real>(pack, s, ChainPack::InverseExtension);
+        Real stiffness = property<Real>(pack, s, Pack::Stiffness), rest = property<Real>(pack, s, Pack::RestLength);
+        Real inverse = property<Real>(pack, s, Pack::InverseExtension);
         Real flow = settings.flow.present ? segment.tensionOfFlow : Real{};
         for (int i = 0; i < W; i++) {
             const FeneTension law = {lane(stiffness, i), lane(inverse, i), lane(rest, i), lane(segment.length, i),
@@ -612,8 +625,8 @@ private:
         for (; next < pack.tethers.size() && pack.tethers[next].node == node; next++) {
             const int i = pack.tethers[next].lane;
             const ImplicitTether& tether = tethers[next];
-            Vec moved = y[node]-x[node];
-            const double stiffness = pack.tethers[next].stiffness, implicit = stiffness*tether.implicit;
+            Vec moved = y[node];
+            const Scalar stiffness = pack.tethers[next].stiffness, implicit = stiffness*tether.implicit;
             lane(row.right.x, i) -= implicit*lane(moved.x, i)+stiffness*tether.constant[0];
             lane(row.right.y, i) -= implicit*lane(moved.y, i)+stiffness*tether.constant[1];
             lane(row.right.z, i) -= implicit*lane(moved.z, i)+stiffness*tether.constant[2];
@@ -622,23 +635,35 @@ private:
             lane(row.diagonal.zz, i) += implicit;
         }
     }
+    /** What takes roots and divisions of a joint: its bends, and how the random one turns with it. */
+    struct JointGeometry {
+        BendFactor<Real> newFactor, factor;
+        Vec sum;
+        Real sumLength, projection, perSum, perOne;
+    };
+    CYLCHAIN_INLINE void describeNewJoint(int s, const Geometry& geometry1, const Geometry& geometry2,
+                JointGeometry& joint) {
+        const ImplicitSegment<Real>& segment = segments[s];
+        const Vec newBent = geometry2.tangent-geometry1.tangent, bent = geometry2.middleTangent-geometry1.middleTangent;
+        // The random bend turns with the joint.
+        joint.sum = segments[s-1].tangent+segment.tangent+geometry1.tangent+geometry2.tangent;
+        joint.sumLength = root(joint.sum.dot(joint.sum)+LEAST*LEAST);
+        joint.projection = segment.bisector.dot(joint.sum);
+        // The inverse of the length, and of one plus the cosine.
+        bendFactors<Real>(pack.bending, newBent, bent, joint.newFactor, joint.factor, joint.sumLength,
+                joint.sumLength+joint.projection+LEAST, joint.perSum, joint.perOne);
+    }
     /** Add the joint between two segments to the equations of their nodes. */
-    CYLCHAIN_INLINE void addJoint(int s, const Geometry& geometry1, const Geometry& geometry2, Row& before, Row& here,
-                Row& after) {
+    CYLCHAIN_INLINE void addJoint(int s, const JointGeometry& joint, const Geometry& geometry1, const Geometry& geometry2,
+                Row& before, Row& here, Row& after) {
         const ImplicitSegment<Real>& segment = segments[s];
         const Vec t1 = geometry1.middleTangent, t2 = geometry2.middleTangent;
         const Real perLength1 = geometry1.middleInverse, perLength2 = geometry2.middleInverse;
         const Vec newBent = geometry2.tangent-geometry1.tangent, bent = t2-t1;
-        BendFactor<Real> newFactor, factor;
-
-        // The random bend turns with the joint.
-        const Vec sum = segments[s-1].tangent+segment.tangent+geometry1.tangent+geometry2.tangent;
-        const Real sumLength = root(sum.dot(sum)+1e-24), projection = segment.bisector.dot(sum);
-        // The inverse of the length, and of one plus the cosine.
-        Real perSum, perOne;
-        bendFactors<Real>(pack.bending, newBent, bent, newFactor, factor, sumLength, sumLength+projection+1e-12, perSum, perOne);
-        const Vec bisector = sum*perSum;
-        const Real cosine = projection*perSum;
+        const BendFactor<Real> newFactor = joint.newFactor, factor = joint.factor;
+        const Real sumLength = joint.sumLength, perOne = joint.perOne;
+        const Vec bisector = joint.sum*joint.perSum;
+        const Real cosine = joint.projection*joint.perSum;
         const Vec axis = crossProduct(segment.bisector, bisector);
         const Vec turned = segment.turningBend*cosine+crossProduct(axis, segment.turningBend)+
                 axis*(axis.dot(segment.turningBend)*sumLength*perOne);
@@ -693,14 +718,14 @@ private:
         band.findResponses([&] (int s, Vec response) {
             ImplicitSegment<Real>& segment = segments[s];
             const Vec t = segment.tangent;
-            const Real stiffness = property<Real>(pack, s, ChainPack::Stiffness);
-            const Real drag = property<Real>(pack, s, ChainPack::Extensional)/(segment.length*segment.length*h);
+            const Real stiffness = property<Real>(pack, s, Pack::Stiffness);
+            const Real drag = property<Real>(pack, s, Pack::Extensional)/(segment.length*segment.length*h);
             Real noise = stiffness*(2*segment.theta-1)+drag;
             // The length resists more in the second stage than in this one.
             if (twoStages)
                 noise = noise/(1+stiffness*(segment.theta-DIAGONAL)*t.dot(response));
             response = response-t*t.dot(response);
-            const Vec force = response*(settings.kT*noise/segment.length);
+            const Vec force = response*(kT*noise/segment.length);
             segment.metricForce = force;
             drift[s] = drift[s]+force;
             drift[s+1] = drift[s+1]-force;
@@ -710,16 +735,16 @@ private:
     /** Whether any lane has not converged; those that have are taken out. NaN counts as not converged. */
     bool anyUnfinished(Real& active) {
         Real excess = Real{};
-        const Real perEnergy = (CLOSED ? 1+Real{} : 1-loaded<Real>(pack.free, 0))*(1/(settings.kT+TINY));
-        const double tighter = twoStages ? 1/(TOLERANCE_OF_STAGES*TOLERANCE_OF_STAGES) : 1;
+        const Real perEnergy = (CLOSED ? 1+Real{} : 1-loaded<Real>(pack.free, 0))*(1/(kT+TINY));
+        const Scalar tighter = twoStages ? 1/(TOLERANCE_OF_STAGES*TOLERANCE_OF_STAGES) : 1;
         for (int s = 0; s < pack.segments; s++) {
             const Vec difference = change[s+1]-change[s];
-            const Real inverse = property<Real>(pack, s, ChainPack::InverseRestLength), square = difference.dot(difference);
+            const Real inverse = property<Real>(pack, s, Pack::InverseRestLength), square = difference.dot(difference);
             const Real moved = change[s].dot(change[s])*(NEWTON_TOLERANCE*NEWTON_TOLERANCE/(NODE_TOLERANCE*NODE_TOLERANCE));
             const Real ratio = larger<Real>(square, moved)*(inverse*inverse*(tighter/(NEWTON_TOLERANCE*NEWTON_TOLERANCE)));
             // An iteration takes a length to first order in the change, so that an error of square/(2 l0) is left where
             // lengths are not reset.
-            const Real error = square*inverse*(0.5/LENGTH_TOLERANCE);
+            const Real error = square*inverse*(Scalar(0.5)/LENGTH_TOLERANCE);
             excess = ratio < excess ? excess : ratio;
             if (settings.kT > 0)
                 excess = larger(excess, error*error*segments[s].response*(perEnergy*tighter));
@@ -734,14 +759,14 @@ private:
     }
     void findExcessiveChanges(const Vec* y, bool* failed) {
         for (int s = 0; s < pack.segments; s++) {
-            const Vec difference = y[s+1]-y[s]-segments[s].difference;
+            const Vec difference = y[s+1]-y[s];
             // A quarter of a turn.
-            Real square = 0.5*difference.dot(difference), limit = property<Real>(pack, s, ChainPack::RestLength);
+            Real square = 0.5*difference.dot(difference), limit = property<Real>(pack, s, Pack::RestLength);
             for (int i = 0; i < W; i++)
                 failed[i] |= s < pack.segmentsOfLane[i] && !(lane(square, i) < lane(limit, i)*lane(limit, i));
             if (pack.stretching == StretchingModel::FENE) {
-                const Vec after = y[s+1]-y[s];
-                Real relative = (root(after.dot(after))-limit)*property<Real>(pack, s, ChainPack::InverseExtension);
+                const Vec after = segments[s].difference+(y[s+1]-y[s]);
+                Real relative = (root(after.dot(after))-limit)*property<Real>(pack, s, Pack::InverseExtension);
                 for (int i = 0; i < W; i++)
                     failed[i] |= s < pack.segmentsOfLane[i] && !(std::fabs(lane(relative, i)) < 1);
             }
@@ -752,33 +777,52 @@ private:
 #include "ImplicitNoise.h"
 #include "ImplicitTensions.h"
 
+/** Where a step would begin if its nodes had moved already. */
+template <int W> void moveStart(const Pack& pack, const StepStart<W>& start, const Vector<typename Lanes<W>::Type>* moved,
+            bool needsNodes, const StepStart<W>& result) {
+    for (int node = 0; needsNodes && node < pack.nodes; node++)
+        result.nodes[node] = start.nodes[node]+moved[node];
+    for (int s = 0; s < pack.nodes-1; s++)
+        result.segments[s] = start.segments[s]+(moved[s+1]-moved[s]);
+    for (std::size_t i = 0; i < pack.tethers.size(); i++) {
+        const LaneTether& tether = pack.tethers[i];
+        Vector<typename Lanes<W>::Type> change = moved[tether.node];
+        result.tethers[i].d[0] = start.tethers[i].d[0]+lane(change.x, tether.lane);
+        result.tethers[i].d[1] = start.tethers[i].d[1]+lane(change.y, tether.lane);
+        result.tethers[i].d[2] = start.tethers[i].d[2]+lane(change.z, tether.lane);
+    }
+}
+
 /**
  * Advance the lanes that failed, from the start, by the same time in more and more parts. They follow the Brownian path of
  * the step, so that what failed is not left out of the noise.
  */
-template <int W, bool CLOSED> void divideStep(const ChainPack& pack, const Vector<typename Lanes<W>::Type>* x,
-            const Vector<typename Lanes<W>::Type>* f, StepSettings settings, Vector<typename Lanes<W>::Type>* y,
-            const double* box, bool* failed, typename ImplicitStep<W, CLOSED>::Memory& memory, Scratch& scratch) {
+template <int W, bool CLOSED> void divideStep(const Pack& pack, const StepStart<W>& start,
+            const Vector<typename Lanes<W>::Type>* f, StepSettings settings, Vector<typename Lanes<W>::Type>* y, bool* failed,
+            typename ImplicitStep<W, CLOSED>::Memory& memory) {
     typedef typename Lanes<W>::Type Real;
+    static thread_local Scratch vectors, tethers;
     const double h = settings.stepSize;
     const std::uint64_t step = settings.step;
-    const int level = settings.level;
+    const int level = settings.level, n = pack.nodes;
     const MeanOfParts<W> mean(pack, settings);
-    Vector<Real>* from = scratch.reserve<Vector<Real> >(2*pack.nodes);
-    Vector<Real>* to = from+pack.nodes;
+    Vector<Real>* moved = vectors.reserve<Vector<Real> >(4*n);
+    Vector<Real>* change = moved+n;
+    const StepStart<W> from = {moved+2*n, moved+3*n, tethers.reserve<TetherVector>(pack.tethers.size())};
     for (int division = 1; division <= LARGEST_DIVISION; division++) {
         const int parts = 1<<division;
         settings.stepSize = h/parts;
         settings.level = level+division;
         bool failedNow[W] = {}, failedPart[W];
-        for (int node = 0; node < pack.nodes; node++)
-            to[node] = x[node];
+        for (int node = 0; node < n; node++)
+            moved[node] = Vector<Real> {};
         bool hope = true;
         for (int part = 0; part < parts && hope; part++) {
             settings.step = (step<<division)+part;
-            for (int node = 0; node < pack.nodes; node++)
-                from[node] = to[node];
-            ImplicitStep<W, CLOSED>(pack, settings, box, memory).take(from, f, to, failedPart);
+            moveStart<W>(pack, start, moved, settings.flow.present, from);
+            ImplicitStep<W, CLOSED>(pack, settings, memory).take(from, f, change, failedPart);
+            for (int node = 0; node < n; node++)
+                moved[node] = moved[node]+change[node];
             mean.add(part, parts, failed);
             hope = false;
             for (int i = 0; i < W; i++) {
@@ -790,10 +834,10 @@ template <int W, bool CLOSED> void divideStep(const ChainPack& pack, const Vecto
         for (int i = 0; i < W; i++) {
             if (failed[i] && !failedNow[i]) {
                 failed[i] = false;
-                for (int node = 0; node < pack.nodes; node++) {
-                    lane(y[node].x, i) = lane(to[node].x, i);
-                    lane(y[node].y, i) = lane(to[node].y, i);
-                    lane(y[node].z, i) = lane(to[node].z, i);
+                for (int node = 0; node < n; node++) {
+                    lane(y[node].x, i) = lane(moved[node].x, i);
+                    lane(y[node].y, i) = lane(moved[node].y, i);
+                    lane(y[node].z, i) = lane(moved[node].z, i);
                 }
             }
             any |= failed[i];
@@ -803,26 +847,31 @@ template <int W, bool CLOSED> void divideStep(const ChainPack& pack, const Vecto
     }
 }
 
-template <int W, bool CLOSED> Instability stepPackImplicitly(const ChainPack& pack, const double* positions, const double* forces,
+template <int W, bool CLOSED> Instability stepPackImplicitly(const Pack& pack, const double* positions, const double* forces,
             const double* box, const StepSettings& settings, double* displacements) {
     typedef typename Lanes<W>::Type Real;
     static thread_local typename ImplicitStep<W, CLOSED>::Memory memory;
-    static thread_local Scratch vectors, scratch;
+    static thread_local Scratch vectors, tethers;
     const int n = pack.nodes;
-    Vector<Real>* x = vectors.reserve<Vector<Real> >(3*n);
-    Vector<Real>* f = x+n;
+    Vector<Real>* f = vectors.reserve<Vector<Real> >(4*n);
     Vector<Real>* y = f+n;
-    gatherStart<W>(pack, positions, box, x);
+    const StepStart<W> start = {y+n, y+2*n, tethers.reserve<TetherVector>(pack.tethers.size())};
+    if (settings.flow.present)
+        gatherStart<W>(pack, positions, box, start.nodes);
+    gatherSegments<W>(pack, positions, box, start.segments);
+    for (std::size_t i = 0; i < pack.tethers.size(); i++) {
+        tetherVector(pack, pack.tethers[i], positions, box, start.tethers[i].d);
+        if (pack.planar)
+            start.tethers[i].d[2] = 0;
+    }
     gatherForces<W>(pack, forces, f);
     bool failed[W];
     Instability result;
-    result.iterations = ImplicitStep<W, CLOSED>(pack, settings, box, memory).take(x, f, y, failed);
+    result.iterations = ImplicitStep<W, CLOSED>(pack, settings, memory).take(start, f, y, failed);
     for (int i = 0; i < W; i++)
         result.divided += failed[i];
     if (result.divided > 0)
-        divideStep<W, CLOSED>(pack, x, f, settings, y, box, failed, memory, scratch);
-    for (int node = 0; node < n; node++)
-        y[node] = y[node]-x[node];
+        divideStep<W, CLOSED>(pack, start, f, settings, y, failed, memory);
     scatter<W>(pack, y, 1, displacements);
     for (int i = 0; i < W; i++)
         if (failed[i] && result.chain < 0)

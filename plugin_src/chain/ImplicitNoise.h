@@ -6,7 +6,7 @@ template <int W, bool CLOSED>
 void ImplicitStep<W, CLOSED>::addNoise() {
     const NoiseKey key = noiseKey(settings);
     NoisePlaces<W> places = noisePlaces<W>(pack);
-    const double amplitude = std::sqrt(2*settings.kT/h);
+    const Scalar amplitude = std::sqrt(2*settings.kT/h);
     for (int s = 0; s < n-1; s++, places.part += 1) {
         if (!CLOSED || s < pack.segments) {
             Real normals[8];
@@ -24,8 +24,8 @@ void ImplicitStep<W, CLOSED>::addNoise() {
     for (std::size_t i = 0; i < pack.tethers.size(); i++) {
         const LaneTether& tether = pack.tethers[i];
         const double deviation = std::sqrt(settings.kT/(tether.stiffness+TINY));
-        const NoisePlaces<1> place = {(std::uint64_t) pack.chain[tether.lane], (std::uint64_t) tether.number};
-        double normals[4];
+        const NoisePlaces<1> place = {(Word) pack.chain[tether.lane], (Word) tether.number};
+        Scalar normals[4];
         drawNormals<1, 2>(key, NoiseKind::Tether, place, normals);
         for (int k = 0; k < 3; k++)
             tethers[i].random[k] = pack.planar && k == 2 ? 0 : deviation*normals[k];
@@ -33,45 +33,57 @@ void ImplicitStep<W, CLOSED>::addNoise() {
 }
 
 template <int W, bool CLOSED>
-CYLCHAIN_INLINE void ImplicitStep<W, CLOSED>::drawForces(const Real* normals, int s, double amplitude) {
+CYLCHAIN_INLINE void ImplicitStep<W, CLOSED>::drawForces(const Real* normals, int s, Scalar amplitude) {
     ImplicitSegment<Real>& segment = segments[s];
     const Vec t = segment.tangent;
     Vec a, b;
     forceNoise<Real>(normals, pack.planar, a, b);
-    const Real across = property<Real>(pack, s, ChainPack::RootPerpendicular);
-    const Real along = property<Real>(pack, s, ChainPack::RootParallel);
-    const Vec force = (a*across+t*((along-across)*t.dot(a)))*(0.5*amplitude+Real{});
+    const Real across = property<Real>(pack, s, Pack::RootPerpendicular);
+    const Real along = property<Real>(pack, s, Pack::RootParallel);
+    const Vec force = (a*across+t*((along-across)*t.dot(a)))*(Scalar(0.5)*amplitude+Real{});
     const Real perLength = amplitude/segment.length;
-    const Vec pair = (b-t*t.dot(b))*(property<Real>(pack, s, ChainPack::RootRotational)*perLength);
+    const Vec pair = (b-t*t.dot(b))*(property<Real>(pack, s, Pack::RootRotational)*perLength);
     random[s] = random[s]+force-pair;
     random[s+1] = random[s+1]+force+pair;
     segment.randomForce = force;
     segment.randomPair = pair;
-    segment.randomTension = t.dot(b)*(property<Real>(pack, s, ChainPack::RootExtensional)*perLength);
+    segment.randomTension = t.dot(b)*(property<Real>(pack, s, Pack::RootExtensional)*perLength);
 }
 
 template <int W, bool CLOSED>
 void ImplicitStep<W, CLOSED>::drawLength(const NoisePlaces<W>& places, int s, Real normal) {
     ImplicitSegment<Real>& segment = segments[s];
-    const Real stiffness = property<Real>(pack, s, ChainPack::Stiffness);
+    const Real stiffness = property<Real>(pack, s, Pack::Stiffness);
     if (pack.stretching == StretchingModel::FENE) {
         // Segments that fill up a lane have neither stiffness nor a maximum extension.
-        const Real inverse = property<Real>(pack, s, ChainPack::InverseExtension);
-        drawFeneCoordinates<W>(noiseKey(settings), places, stiffness/(inverse*inverse*settings.kT+TINY), normal);
+        const Real inverse = property<Real>(pack, s, Pack::InverseExtension);
+        drawFeneCoordinates<W>(noiseKey(settings), places, stiffness/(inverse*inverse*kT+TINY), normal);
         segment.randomCoordinate = normal/(inverse+TINY);
     }
     else
-        segment.randomCoordinate = normal*root(settings.kT/(stiffness+TINY));
+        segment.randomCoordinate = normal*root(kT/(stiffness+TINY));
 }
 
 template <int W, bool CLOSED>
 void ImplicitStep<W, CLOSED>::drawBend(const NoisePlaces<W>& places, int s) {
     ImplicitSegment<Real>& segment = segments[s];
     const NoiseKey key = noiseKey(settings);
-    Real stiffness = loaded<Real>(pack.joints, s)/settings.kT, theta = segment.jointTheta;
+    Real stiffness = loaded<Real>(pack.joints, s)/kT, theta = segment.jointTheta;
     Real normals[2], acceptance;
     drawCandidates<W>(key, NoiseKind::Bend, places, normals, acceptance);
+    // Nearly all bends of stiff joints are accepted at once.
+    Real accepted = Real{};
+    if (pack.bending == BendingModel::InscribedCircle) {
+        const Real deviation = 1/root(stiffness+TINY);
+        const Real density = 1+0.25*(normals[0]*normals[0]+normals[1]*normals[1])*deviation*deviation;
+        accepted = (acceptance*density*density <= 1) & (stiffness > STIFF_JOINT) ? 1+Real{} : Real{};
+        const Real used = twoStages ? deviation : (theta > 0.5 ? deviation : Real{});
+        for (int k = 0; k < 2; k++)
+            normals[k] = normals[k]*(accepted > 0 ? used : 1+Real{});
+    }
     for (int i = 0; i < W; i++) {
+        if (lane(accepted, i) != 0)
+            continue;
         const double k = lane(stiffness, i);
         double drawn[2] = {lane(normals[0], i), lane(normals[1], i)};
         double& a = drawn[0], &b = drawn[1];
@@ -107,7 +119,7 @@ template <int W, bool CLOSED>
 void ImplicitStep<W, CLOSED>::drawPlanarBend(const NoisePlaces<W>& places, int s) {
     ImplicitSegment<Real>& segment = segments[s];
     const NoiseKey key = noiseKey(settings);
-    Real stiffness = loaded<Real>(pack.joints, s)/settings.kT, theta = segment.jointTheta, bend = Real{};
+    Real stiffness = loaded<Real>(pack.joints, s)/kT, theta = segment.jointTheta, bend = Real{};
     Real normals[2], acceptance;
     drawCandidates<W>(key, NoiseKind::Bend, places, normals, acceptance);
     // The energy is that of a Gaussian or more, in the angle.

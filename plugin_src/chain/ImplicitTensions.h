@@ -14,7 +14,7 @@ void ImplicitStep<W, CLOSED>::refineAndRecord(const Vec* y, Real active) {
     for (int s = 0; s < pack.segments; s++)
         refined[s] = segments[s].turned*(segments[s].multiplier-segments[s].multiplierBefore);
     refine();
-    const LaneFlow<W> flow(settings.flow, pack, x[0]);
+    const LaneFlow<W> flow(settings.flow, pack, x);
     Geometry previous = {}, current;
     for (int s = 0; s < pack.segments; s++) {
         ImplicitSegment<Real>& segment = segments[s];
@@ -33,7 +33,7 @@ void ImplicitStep<W, CLOSED>::refineAndRecord(const Vec* y, Real active) {
         plus[s] = after.right-loads[s+1]-here.upper.transposedTimes(first)-after.diagonal*second-pull;
 
         // Noise, with that of taut segments, metric forces and propulsion.
-        const Real rotational = property<Real>(pack, s, ChainPack::Rotational);
+        const Real rotational = property<Real>(pack, s, Pack::Rotational);
         const Vec pair = segment.randomPair*root(1+segment.extra/(rotational+TINY))-segment.metricForce;
         Vec both = segment.randomForce;
         if (!pack.propulsions.empty())
@@ -51,7 +51,9 @@ void ImplicitStep<W, CLOSED>::refineAndRecord(const Vec* y, Real active) {
         describeNew(y, s, current);
         if (s > 0) {
             Row before = {}, here = {}, after = {};
-            addJoint(s, previous, current, before, here, after);
+            JointGeometry joint;
+            describeNewJoint(s, previous, current, joint);
+            addJoint(s, joint, previous, current, before, here, after);
             const Vec change1 = change[s]-change[s-1], change2 = change[s+1]-change[s];
             const Vec force1 = before.right+before.diagonal*change1-before.second*change2;
             const Vec force2 = after.diagonal*change2-before.second.transposedTimes(change1)-after.right;
@@ -64,7 +66,7 @@ void ImplicitStep<W, CLOSED>::refineAndRecord(const Vec* y, Real active) {
         previous = current;
     }
     for (int s = 0; s < pack.segments; s++) {
-        Vec direction = segments[s].difference+y[s+1]-y[s]+change[s+1]-change[s];
+        Vec direction = segments[s].difference*(2+Real{})+y[s+1]-y[s]+change[s+1]-change[s];
         direction = direction*(1/root(direction.dot(direction)));
         for (int i = 0; i < W; i++)
             if (lane(active, i) != 0 && s < pack.segmentsOfLane[i]) {
@@ -86,12 +88,13 @@ void ImplicitStep<W, CLOSED>::refineAndRecord(const Vec* y, Real active) {
 template <int W> class MeanOfParts {
 public:
     /** From now on, the settings record the forces of a part. */
-    MeanOfParts(const ChainPack& pack, StepSettings& settings) : pack(pack), whole(settings.segmentForces) {
+    MeanOfParts(const Pack& pack, StepSettings& settings) : pack(pack), whole(settings.segmentForces) {
         if (whole == NULL)
             return;
         part.resize(whole->size());
         for (int chain : pack.chain)
-            part[chain].resize((*whole)[chain].size());
+            if (chain >= 0)
+                part[chain].resize((*whole)[chain].size());
         settings.segmentForces = &part;
     }
     /** Add one of so many parts, the first of which begins anew. */
@@ -105,7 +108,7 @@ public:
             }
     }
 private:
-    const ChainPack& pack;
+    const Pack& pack;
     std::vector<std::vector<SegmentForces> >* const whole;
     std::vector<std::vector<SegmentForces> > part;
 };

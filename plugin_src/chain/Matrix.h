@@ -110,3 +110,12 @@ template <class Real> struct Matrix {
         return {{x.x, y.x, z.x}, {x.y, y.y, z.y}, {x.z, y.z, z.z}};
     }
 };
+
+/** The inverse for a mobile node, and zero for a fixed one, which neither moves nor passes anything on. */
+template <class Real> inline Symmetric<Real> inverseOfMobile(Symmetric<Real> diagonal, Real mobile) {
+    const Real held = 1-mobile;
+    diagonal.xx += held;
+    diagonal.yy += held;
+    diagonal.zz += held;
+    return diagonal.inverse(mobile);
+}

@@ -38,7 +38,7 @@ enum class NoiseKind : std::uint32_t {
  * good to 10^-11. Draw 0 gives the normal
  * numbers 0 and 1 from w0 and w1, and 2 and 3 from w2 and w3; draw 1 gives the next four. All this takes integers and
  * operations that IEEE 754 rounds correctly, without fused multiplication and addition, so that all instruction sets give
- * the same bits, and others can.
+ * the same bits, and others can. Single precision has fewer bits of the same numbers.
  *
  * Levels make steps of different sizes follow the same Brownian path, by Levy's construction. A normal number x of a step
  * m at level l > 0 comes from that of the step m/2, rounded down, at the level below, and from another one, e, of that
@@ -69,6 +69,10 @@ void drawWords(const NoiseKey& key, NoiseKind kind, std::uint32_t draw, const st
 /** Draw the normal numbers 0 to 3 of places. */
 void drawNormals(const NoiseKey& key, NoiseKind kind, const std::uint32_t* chains, const std::uint32_t* parts, int count,
         double* normals);
+
+/** The same as wide packs draw them, in single precision. */
+void drawNormalsInSinglePrecision(const NoiseKey& key, NoiseKind kind, const std::uint32_t* chains,
+        const std::uint32_t* parts, int count, double* normals);
 
 /**
  * Draw extensions of FENE segments from equilibrium, as coordinates q with the energy k q^2/2 over the maximum extension D.

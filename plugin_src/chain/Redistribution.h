@@ -1,6 +1,6 @@
 /**
  * The resistance of chains to the motion of their nodes: forces redistributed along chains, in O(N), and the drag of a flow.
- * ChainLoops.h includes this file into the namespace of an instruction set.
+ * ExplicitLoops.h includes this file into the namespace of an instruction set.
  */
 
 /** What elimination leaves of a node for substitution, and the coupling s 1 + r tt to the next node. */
@@ -10,23 +10,14 @@ template <class Real> struct Eliminated {
     Real coupling, axial;
 };
 
-/** The inverse for a mobile node, and zero for a fixed one, which neither moves nor passes anything on. */
-template <class Real> inline Symmetric<Real> inverseOfMobile(Symmetric<Real> diagonal, Real mobile) {
-    const Real held = 1-mobile;
-    diagonal.xx += held;
-    diagonal.yy += held;
-    diagonal.zz += held;
-    return diagonal.inverse(mobile);
-}
-
 /** The friction of a segment on its ends: (s 1 + r tt) on the velocity of the same end, and of the other. */
 template <class Real> struct EndFriction {
     Real same, sameAxial, other, otherAxial;
-    CYLCHAIN_INLINE EndFriction(const ChainPack& pack, int s, Real inverseSquare) {
-        const Real acrossTrans = 0.25*property<Real>(pack, s, ChainPack::Perpendicular);
-        const Real alongTrans = 0.25*property<Real>(pack, s, ChainPack::Parallel);
-        const Real acrossTurn = property<Real>(pack, s, ChainPack::Rotational)*inverseSquare;
-        const Real alongTurn = property<Real>(pack, s, ChainPack::Extensional)*inverseSquare;
+    CYLCHAIN_INLINE EndFriction(const Pack& pack, int s, Real inverseSquare) {
+        const Real acrossTrans = 0.25*property<Real>(pack, s, Pack::Perpendicular);
+        const Real alongTrans = 0.25*property<Real>(pack, s, Pack::Parallel);
+        const Real acrossTurn = property<Real>(pack, s, Pack::Rotational)*inverseSquare;
+        const Real alongTurn = property<Real>(pack, s, Pack::Extensional)*inverseSquare;
         same = acrossTrans+acrossTurn;
         sameAxial = alongTrans+alongTurn-same;
         other = acrossTrans-acrossTurn;
@@ -35,7 +26,7 @@ template <class Real> struct EndFriction {
 };
 
 /** Solve Z(x) v = f for a pack: v = Z^-1 f by block elimination from the first node to the last and back. */
-template <int W> void redistribute(const ChainPack& pack, const Vector<typename Lanes<W>::Type>* x,
+template <int W> void redistribute(const Pack& pack, const Vector<typename Lanes<W>::Type>* x,
             const Vector<typename Lanes<W>::Type>* f, Eliminated<typename Lanes<W>::Type>* nodes,
             Vector<typename Lanes<W>::Type>* v) {
     typedef typename Lanes<W>::Type Real;
@@ -86,7 +77,7 @@ template <int W> void redistribute(const ChainPack& pack, const Vector<typename 
  * Solve Z(x) v = f for a pack of closed chains: elimination from the second node to the last, each of which is also
  * coupled to the first one then, which comes last.
  */
-template <int W> void redistributeClosed(const ChainPack& pack, const Vector<typename Lanes<W>::Type>* x,
+template <int W> void redistributeClosed(const Pack& pack, const Vector<typename Lanes<W>::Type>* x,
             const Vector<typename Lanes<W>::Type>* f, Eliminated<typename Lanes<W>::Type>* nodes,
             Matrix<typename Lanes<W>::Type>* toFirst, Vector<typename Lanes<W>::Type>* v) {
     typedef typename Lanes<W>::Type Real;
@@ -148,38 +139,8 @@ template <int W> void redistributeClosed(const ChainPack& pack, const Vector<typ
     v[count+1] = v[1];
 }
 
-/** The flow for each lane: in a periodic box, with the image of the lane's chain whose first node is nearest to the origin. */
-template <int W> class LaneFlow {
-    typedef typename Lanes<W>::Type Real;
-public:
-    LaneFlow(const BackgroundFlow& flow, const ChainPack& pack, Vector<Real> first) : gradient(flow.gradient),
-            planar(pack.planar) {
-        for (int i = 0; i < W; i++) {
-            // What a node at zero would have to be carried along with.
-            const double x[] = {lane(first.x, i), lane(first.y, i), lane(first.z, i)};
-            double u[3];
-            flow.getVelocity(x, u);
-            for (int k = 0; k < 3; k++)
-                for (int j = 0; j < 3; j++)
-                    u[k] -= gradient[3*k+j]*x[j];
-            lane(velocity.x, i) = u[0];
-            lane(velocity.y, i) = u[1];
-            lane(velocity.z, i) = u[2];
-        }
-    }
-    CYLCHAIN_INLINE Vector<Real> at(const Vector<Real>& x) const {
-        const double* g = gradient;
-        return {velocity.x+x.x*g[0]+x.y*g[1]+x.z*g[2], velocity.y+x.x*g[3]+x.y*g[4]+x.z*g[5],
-                planar ? Real{} : velocity.z+x.x*g[6]+x.y*g[7]+x.z*g[8]};
-    }
-private:
-    Vector<Real> velocity;
-    const double* gradient;
-    bool planar;
-};
-
 /** Add the drag of the fluid on nodes at rest, Z u. It varies linearly, so the velocities of the ends say all of it. */
-template <int W> void addDrag(const ChainPack& pack, const Vector<typename Lanes<W>::Type>* x, const LaneFlow<W>& flow,
+template <int W> void addDrag(const Pack& pack, const Vector<typename Lanes<W>::Type>* x, const LaneFlow<W>& flow,
             Vector<typename Lanes<W>::Type>* f) {
     typedef typename Lanes<W>::Type Real;
     for (int s = 0; s < pack.segments; s++) {
@@ -196,7 +157,7 @@ template <int W> void addDrag(const ChainPack& pack, const Vector<typename Lanes
 }
 
 /** Velocities of all nodes under the forces f, in the flow. */
-template <int W> void findVelocities(const ChainPack& pack, const Vector<typename Lanes<W>::Type>* x,
+template <int W> void findVelocities(const Pack& pack, const Vector<typename Lanes<W>::Type>* x,
             const Vector<typename Lanes<W>::Type>* f, const BackgroundFlow& flow, Vector<typename Lanes<W>::Type>* v) {
     typedef typename Lanes<W>::Type Real;
     static thread_local Scratch scratch, couplings, vectors;
@@ -204,7 +165,7 @@ template <int W> void findVelocities(const ChainPack& pack, const Vector<typenam
     if (flow.present) {
         Vector<Real>* dragged = vectors.reserve<Vector<Real>>(pack.nodes);
         std::copy(f, f+pack.nodes, dragged);
-        addDrag<W>(pack, x, LaneFlow<W>(flow, pack, x[0]), dragged);
+        addDrag<W>(pack, x, LaneFlow<W>(flow, pack, x), dragged);
         f = dragged;
     }
     if (pack.closed)

@@ -62,7 +62,7 @@ public:
     struct Memory {
         Scratch nodes, equations, tensions;
     };
-    TensionBand(const ChainPack& pack, Memory& memory) : pack(pack), n(pack.ownNodes()) {
+    TensionBand(const Pack& pack, Memory& memory) : pack(pack), n(pack.ownNodes()) {
         nodes = memory.nodes.template reserve<EliminatedPair<Real, CLOSED> >(n);
         equations = memory.equations.template reserve<TensionEquation<Real> >(n);
         tensions = memory.tensions.template reserve<Real>(n);
@@ -188,7 +188,7 @@ public:
      */
     template <class Function> void findResponses(Function use) const;
 private:
-    const ChainPack& pack;
+    const Pack& pack;
     const int n;
     EliminatedPair<Real, CLOSED>* nodes;
     TensionEquation<Real>* equations;

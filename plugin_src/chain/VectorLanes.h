@@ -6,22 +6,31 @@
 // Called functions cannot keep vectors in registers.
 #define CYLCHAIN_INLINE inline __attribute__((always_inline))
 
+/** The numbers in lanes, and integers of the same size. */
+#ifdef CYLCHAIN_SINGLE_PRECISION
+typedef float Scalar;
+typedef std::uint32_t Word;
+#else
+typedef double Scalar;
+typedef std::uint64_t Word;
+#endif
+
 template <int W> struct Lanes {
-    typedef double Type __attribute__((vector_size(8*W)));
-    typedef std::uint64_t Bits __attribute__((vector_size(8*W)));
+    typedef Scalar Type __attribute__((vector_size(sizeof(Scalar)*W)));
+    typedef Word Bits __attribute__((vector_size(sizeof(Scalar)*W)));
 };
 template <> struct Lanes<1> {
-    typedef double Type;
-    typedef std::uint64_t Bits;
+    typedef Scalar Type;
+    typedef Word Bits;
 };
 
-template <class Real> CYLCHAIN_INLINE double& lane(Real& value, int i) {
-    return reinterpret_cast<double*>(&value)[i];
+template <class Real> CYLCHAIN_INLINE Scalar& lane(Real& value, int i) {
+    return reinterpret_cast<Scalar*>(&value)[i];
 }
 
 template <class Real> CYLCHAIN_INLINE Real root(Real value) {
     Real result;
-    for (int i = 0; i < (int) (sizeof(Real)/sizeof(double)); i++)
+    for (int i = 0; i < (int) (sizeof(Real)/sizeof(Scalar)); i++)
         lane(result, i) = std::sqrt(lane(value, i));
     return result;
 }
@@ -62,9 +71,9 @@ private:
     std::size_t size = 0;
 };
 
-template <class Real> CYLCHAIN_INLINE Real loaded(const std::vector<double>& values, std::size_t index) {
+template <class Real> CYLCHAIN_INLINE Real loaded(const std::vector<Scalar>& values, std::size_t index) {
     Real result;
-    for (int i = 0; i < (int) (sizeof(Real)/sizeof(double)); i++)
-        lane(result, i) = values[index*(sizeof(Real)/sizeof(double))+i];
+    for (int i = 0; i < (int) (sizeof(Real)/sizeof(Scalar)); i++)
+        lane(result, i) = values[index*(sizeof(Real)/sizeof(Scalar))+i];
     return result;
 }

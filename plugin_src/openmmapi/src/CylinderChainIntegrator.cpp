@@ -41,8 +41,8 @@ static CylinderChainForceImpl& findChains(ContextImpl& context) {
 }
 
 CylinderChainIntegrator::CylinderChainIntegrator(double temperature, double frictionCoeff, double stepSize) :
-        scheme(Implicit), pathLevel(0), noiseLevel(0), noiseSeed(0), stepsTaken(0), countAfterSteps(0), dividedSteps(0), workWindow(0),
-        positionsHaveChanged(true), followsOn(false), recordsTensions(false), chains(NULL) {
+        scheme(Implicit), precision(Automatic), pathLevel(0), noiseLevel(0), noiseSeed(0), stepsTaken(0), countAfterSteps(0),
+        dividedSteps(0), workWindow(0), positionsHaveChanged(true), followsOn(false), recordsTensions(false), chains(NULL) {
     setTemperature(temperature);
     setFriction(frictionCoeff);
     setStepSize(stepSize);
@@ -126,6 +126,18 @@ void CylinderChainIntegrator::setScheme(Scheme scheme) {
     if (scheme != Euler && scheme != Midpoint && scheme != Implicit && scheme != ImplicitSecondOrder)
         throw OpenMMException("CylinderChainIntegrator: Illegal scheme: "+to_string((int) scheme));
     this->scheme = scheme;
+}
+
+void CylinderChainIntegrator::setPrecision(Precision precision) {
+    if (precision != Automatic && precision != Mixed && precision != Double)
+        throw OpenMMException("CylinderChainIntegrator: Illegal precision: "+to_string((int) precision));
+    this->precision = precision;
+}
+
+int CylinderChainIntegrator::getNumMixedPrecisionChains() const {
+    if (context == NULL)
+        throw OpenMMException("This Integrator is not bound to a context!");
+    return kernel.getAs<IntegrateCylinderChainStepKernel>().getNumMixedPrecisionChains();
 }
 
 void CylinderChainIntegrator::setPathLevel(int level) {

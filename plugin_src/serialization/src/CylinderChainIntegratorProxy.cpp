@@ -29,6 +29,7 @@ void CylinderChainIntegratorProxy::serialize(const void* object, SerializationNo
     node.setDoubleProperty("temperature", integrator.getTemperature());
     node.setDoubleProperty("friction", integrator.getFriction());
     node.setIntProperty("scheme", integrator.getScheme());
+    node.setIntProperty("precision", integrator.getPrecision());
     node.setIntProperty("pathLevel", integrator.getPathLevel());
     node.setIntProperty("workWindow", integrator.getWorkWindow());
     node.setIntProperty("recordsTensions", integrator.getRecordsTensions());
@@ -56,6 +57,8 @@ void* CylinderChainIntegratorProxy::deserialize(const SerializationNode& node) c
             node.getDoubleProperty("friction"), node.getDoubleProperty("stepSize")));
     integrator->setConstraintTolerance(node.getDoubleProperty("constraintTolerance"));
     integrator->setScheme((CylinderChainIntegrator::Scheme) node.getIntProperty("scheme"));
+    integrator->setPrecision((CylinderChainIntegrator::Precision) node.getIntProperty("precision",
+            CylinderChainIntegrator::Automatic));
     integrator->setRandomNumberSeed(node.getIntProperty("randomSeed"));
     integrator->setPathLevel(node.getIntProperty("pathLevel", 0));
     integrator->setWorkWindow(node.getIntProperty("workWindow", 0));

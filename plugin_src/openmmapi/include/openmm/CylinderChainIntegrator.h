@@ -72,6 +72,28 @@ public:
         ImplicitSecondOrder = 3
     };
     /**
+     * The precision that steps of chains are computed in.  Positions, forces and energies are in double precision in any
+     * case.
+     */
+    enum Precision {
+        /**
+         * Mixed, where it is right and faster: for open chains with harmonic lengths and a scheme that is implicit, at a
+         * temperature above zero, without a flow, with bends that relax within a step by less than 10^4 of their
+         * relaxation time and lengths of at most 10^9 kT, if there are enough such chains to fill more than half of a
+         * vector register.  It is the default.
+         */
+        Automatic = 0,
+        /**
+         * What happens within a step is computed in single precision wherever that is right, for as few chains as there
+         * are.  Chains for which it is not right are computed in double precision.
+         */
+        Mixed = 1,
+        /**
+         * Everything is computed in double precision.
+         */
+        Double = 2
+    };
+    /**
      * Create a CylinderChainIntegrator.
      *
      * @param temperature    the temperature of the heat bath (in Kelvin)
@@ -128,6 +150,22 @@ public:
      * Set how chains are advanced by one step.
      */
     void setScheme(Scheme scheme);
+    /**
+     * Get the precision that steps of chains are computed in.
+     */
+    Precision getPrecision() const {
+        return precision;
+    }
+    /**
+     * Set the precision that steps of chains are computed in.  In a Context that exists already, this takes effect with the
+     * next step.  The noise is that of the same Brownian path in any precision, so that positions differ by rounding alone
+     * at first.  Checkpoints do not contain the precision.
+     */
+    void setPrecision(Precision precision);
+    /**
+     * Get the number of chains that the last step has computed in mixed precision.  It is 0 before the first one.
+     */
+    int getNumMixedPrecisionChains() const;
     /**
      * Get the flow of the fluid.  See setFlow() for details.
      *
@@ -311,6 +349,7 @@ private:
     double temperature, friction;
     std::map<int, double> particleFrictions;
     Scheme scheme;
+    Precision precision;
     Vec3 flowVelocity, flowGradient[3], flowOrigin;
     int randomNumberSeed, pathLevel, noiseLevel;
     std::uint64_t noiseSeed, stepsTaken;

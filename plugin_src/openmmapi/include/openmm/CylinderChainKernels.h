@@ -121,6 +121,10 @@ public:
     virtual int executeTogether(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed,
             int level, std::uint64_t step, int count, bool records, long long& divided) = 0;
     /**
+     * Get the number of chains that the last step has computed in mixed precision.
+     */
+    virtual int getNumMixedPrecisionChains() const = 0;
+    /**
      * Get the tensions of a chain in the last step, see CylinderChainIntegrator::getMeanTensions().
      */
     virtual void getMeanTensions(int chain, std::vector<double>& tensions, std::vector<Vec3>& jointForces,

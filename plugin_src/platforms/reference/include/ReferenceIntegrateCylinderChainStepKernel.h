@@ -24,6 +24,9 @@ public:
     void refuseInfiniteEnergies(ContextImpl& context) const;
     int executeTogether(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed, int level,
             std::uint64_t step, int count, bool records, long long& divided);
+    int getNumMixedPrecisionChains() const {
+        return mixedChains;
+    }
     void getMeanTensions(int chain, std::vector<double>& tensions, std::vector<Vec3>& jointForces,
             std::vector<Vec3>& directions) const;
 private:
@@ -43,6 +46,7 @@ private:
     ExplicitWork explicitWork;
     ReferenceCalcCylinderChainForceKernel* chainKernel;
     bool periodic;
+    int mixedChains;
     // Particles outside chains, and those of them that can move.
 
     std::vector<int> outside, others;

@@ -32,7 +32,7 @@ static bool isFinite(const Vec3& v) {
 
 ReferenceIntegrateCylinderChainStepKernel::ReferenceIntegrateCylinderChainStepKernel(string name, const Platform& platform,
         ContextImpl& context) : IntegrateCylinderChainStepKernel(name, platform), loop(context), explicitWork(loop),
-        chainKernel(NULL), periodic(false), recorded(false) {
+        chainKernel(NULL), periodic(false), mixedChains(0), recorded(false) {
 }
 
 void ReferenceIntegrateCylinderChainStepKernel::initialize(const System& system, const CylinderChainIntegrator& integrator,
@@ -68,6 +68,7 @@ void ReferenceIntegrateCylinderChainStepKernel::initialize(const System& system,
                 mobile.push_back(chain.nodes[node]);
     sort(mobile.begin(), mobile.end());
     explicitWork.initialize(mobile);
+    mixedChains = 0;
     displacements.assign(numParticles, Vec3());
     newPositions.assign(numParticles, Vec3());
 }
@@ -113,6 +114,17 @@ StepSettings ReferenceIntegrateCylinderChainStepKernel::settingsOf(ContextImpl& 
     settings.level = level;
     settings.step = step;
     settings.flow = flowOf(context, integrator);
+    switch (integrator.getPrecision()) {
+        case CylinderChainIntegrator::Automatic:
+            settings.precision = Precision::Automatic;
+            break;
+        case CylinderChainIntegrator::Mixed:
+            settings.precision = Precision::Mixed;
+            break;
+        case CylinderChainIntegrator::Double:
+            settings.precision = Precision::Double;
+            break;
+    }
     return settings;
 }
 
@@ -250,12 +262,13 @@ int ReferenceIntegrateCylinderChainStepKernel::executeTogether(ContextImpl& cont
     StepSettings settings = settingsOf(context, integrator, seed, level, step);
     recordForces(settings, records);
     ReferencePlatform::PlatformData& data = extractData(context);
-    vector<int> taken(chainKernel->getEngine().getNumPacks());
-    vector<long long> dividedInPack(taken.size());
+    const vector<int> packs = chainKernel->getEngine().getPacksOfStep(settings);
+    vector<int> taken(packs.size());
+    vector<long long> dividedInPack(packs.size());
     auto advance = [&] (int steps) {
-        loop.run(taken.size(), [&] (int pack) {
-            dividedInPack[pack] = 0;
-            taken[pack] = advancePack(context, pack, settings, steps, dividedInPack[pack]);
+        loop.run(packs.size(), [&] (int i) {
+            dividedInPack[i] = 0;
+            taken[i] = advancePack(context, packs[i], settings, steps, dividedInPack[i]);
         });
         return *min_element(taken.begin(), taken.end());
     };
@@ -273,6 +286,8 @@ int ReferenceIntegrateCylinderChainStepKernel::executeTogether(ContextImpl& cont
     data.time += done*settings.stepSize;
     data.stepCount += done;
     recorded = (settings.segmentForces != NULL && done == count);
+    if (done > 0)
+        mixedChains = chainKernel->getEngine().getNumMixedChains(packs);
     return done;
 }
 
@@ -314,10 +329,11 @@ void ReferenceIntegrateCylinderChainStepKernel::displaceChains(ContextImpl& cont
     const double* positions = &(*data.positions)[0][0];
     const double* forces = &(*data.forces)[0][0];
     const double* box = chainKernel->getBox(context);
-    vector<Instability> instabilities(engine.getNumPacks());
-    loop.run(instabilities.size(), [&] (int pack) {
-        instabilities[pack] = engine.step(pack, positions, forces, box, settings, &displacements[0][0]);
-        for (int particle : engine.getParticles(pack))
+    const vector<int> packs = engine.getPacksOfStep(settings);
+    vector<Instability> instabilities(packs.size());
+    loop.run(packs.size(), [&] (int i) {
+        instabilities[i] = engine.step(packs[i], positions, forces, box, settings, &displacements[0][0]);
+        for (int particle : engine.getParticles(packs[i]))
             if (particle >= 0) {
                 newPositions[particle] = (*data.positions)[particle]+displacements[particle];
                 (*data.velocities)[particle] = displacements[particle]/settings.stepSize;
@@ -334,6 +350,7 @@ void ReferenceIntegrateCylinderChainStepKernel::displaceChains(ContextImpl& cont
         reportInstability(context, first, settings);
     for (const Instability& instability : instabilities)
         divided += instability.divided;
+    mixedChains = engine.getNumMixedChains(packs);
 }
 
 void ReferenceIntegrateCylinderChainStepKernel::reportInstability(ContextImpl& context, const Instability& found,
