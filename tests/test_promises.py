@@ -291,7 +291,7 @@ def test_energies_of_held_chains_and_rings_of_any_stiffness(stiffness, joint, sh
     for nodes in exact.draw(1000):
         filaments.add_nodes(kind, nodes, clamped=(0, -1) if distance else (), closed=distance is None)
     energies = exact.stretching, exact.bending if joint else 0.0
-    steps = 640 if stiffness > 1e3 else 16000
+    steps = 640 if stiffness > 1e3 else 24000
     assert_energies(kind, filaments, energies, 0.01, steps, every=max(4, steps // 160), closed=distance is None)
 
 
