@@ -371,8 +371,8 @@ private:
         const Vec sum = segments[s-1].tangent+segment.tangent, bent = segment.tangent-segments[s-1].tangent;
         segment.bisector = sum*(1/root(sum.dot(sum)+TINY));
         segment.bend = bent*bendFactor<Real>(pack.bending, bent).f;
-        const Real friction = -larger<Real>(-property<Real>(pack, s-1, Pack::Rotational),
-                -property<Real>(pack, s, Pack::Rotational));
+        const Real friction = lesser<Real>(property<Real>(pack, s-1, Pack::Rotational),
+                property<Real>(pack, s, Pack::Rotational));
         const Real bendRate = 4*h*loaded<Real>(pack.joints, s)+TINY;
         segment.jointTheta = larger<Real>(0.5+Real{}, 1-friction/bendRate);
     }
