@@ -10,6 +10,7 @@ import math
 import re
 import warnings
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import openmm
@@ -110,11 +111,6 @@ class ExplicitForces:
         self._scheme = scheme
         self._other_friction = self._frictions(particle_friction)
         self._responses = {}
-        self._node = {
-            int(particle): (number, node)
-            for number, nodes in enumerate(filaments.node_indices)
-            for node, particle in enumerate(nodes)
-        }
         self.springs, unknown = [], []
         for index, force in enumerate(system.getForces()):
             found = self._read(force, f"{force.getName()} (force {index})")
@@ -128,6 +124,15 @@ class ExplicitForces:
             self.springs.append(Springs.at_points("Tethers", "tether", nodes, stiffness))
         unknown += self._find_places()
         self.unknown = tuple(unknown)
+
+    @cached_property
+    def _node(self):
+        # Filament and node of each particle that is one: in a large System without such forces, nobody asks for it.
+        return {
+            int(particle): (number, node)
+            for number, nodes in enumerate(self._filaments.node_indices)
+            for node, particle in enumerate(nodes)
+        }
 
     def recommended_step(self):
         """The TimeStep of these forces, one by one and together; an infinite step if there are none."""

@@ -24,6 +24,8 @@ def filament_label(number, filament):
 
 def refuse_constraints(system, filaments, node_indices):
     """Raise InputError if the System has constraints, naming the filament that one is on."""
+    if not system.getNumConstraints():
+        return
     owner = {node: number for number, nodes in enumerate(node_indices) for node in nodes}
     for index in range(system.getNumConstraints()):
         first, second, _ = system.getConstraintParameters(index)
@@ -34,11 +36,10 @@ def refuse_constraints(system, filaments, node_indices):
                     f"{filament_label(number, filaments[number])}: node {particle - node_indices[number][0]} has a "
                     "System constraint. Segments are held by stiff springs, not by constraints: remove it."
                 )
-    if system.getNumConstraints():
-        raise InputError(
-            f"Particles {first} and {second} have a System constraint, which the dynamics of filaments cannot keep: "
-            "replace it by a bond."
-        )
+    raise InputError(
+        f"Particles {first} and {second} have a System constraint, which the dynamics of filaments cannot keep: "
+        "replace it by a bond."
+    )
 
 
 def describe_chains(system, filaments, node_indices, viscosity, temperature):

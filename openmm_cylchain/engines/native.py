@@ -232,8 +232,7 @@ def create_integrator(
     """Create the integrator of a System with filaments; see ``Filaments.create_integrator``."""
     refuse_constraints(system, filaments, node_indices)
     describe_chains(system, filaments, node_indices, viscosity, temperature)
-    nodes = [node for nodes in node_indices for node in nodes]
-    others, frictions = describe_other_particles(system, nodes, particle_friction)
+    others, frictions = describe_other_particles(system, np.concatenate(node_indices), particle_friction)
     labels = [filament_label(number, filament) for number, filament in enumerate(filaments)]
     advice = advice_after_blow_up(system)
     integrator = NativeIntegrator(bath_temperature, step_size, scheme, seed, labels, flow, advice, checks, precision)

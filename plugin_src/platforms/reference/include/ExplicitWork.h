@@ -51,15 +51,18 @@ public:
     void take(double& work, int& particle, int& steps, int& particles);
 private:
     struct Sums {
-        // The force at the start of the step before; the changes over kT, displacements, and products of them.
+        // The changes of forces over kT, displacements, and products of them.
 
-        Vec3 force, change, way;
-        double work;
+        Vec3 change, way;
+        double work = 0;
     };
-    void add(int block, const std::vector<Vec3>& forces, const std::vector<Vec3>& moves, double perEnergy);
+    void add(int particle, const Vec3& force, const Vec3& move, double perEnergy);
     void finish();
     ParallelLoop& loop;
     std::vector<int> particles;
+    // At the start of the step before.
+    std::vector<Vec3> forcesBefore;
+    // Nothing until two steps have followed on each other: those of filaments alone are taken many at a time.
     std::vector<Sums> sums;
     bool known;
     int count;

@@ -22,45 +22,37 @@ void ExplicitWork::initialize(const vector<int>& particles) {
 }
 
 void ExplicitWork::beginStep(const vector<Vec3>& forces, const vector<Vec3>& moves, bool followsOn, double kT, int window) {
-    const bool measured = (window > 0 && kT > 0);
-    if (!measured || sums.empty()) {
+    if (window <= 0 || !(kT > 0)) {
         known = false;
         count = 0;
-    }
-    if (!measured)
+        sums.clear();
         return;
-    sums.resize(particles.size());
+    }
     const bool pair = (known && followsOn);
+    forcesBefore.resize(particles.size());
+    if (pair)
+        sums.resize(particles.size());
     const int numBlocks = (particles.size()+BLOCK_SIZE-1)/BLOCK_SIZE;
     loop.run(numBlocks, [&] (int block) {
-        if (pair)
-            add(block, forces, moves, 1/kT);
-        else
-            for (size_t i = block*BLOCK_SIZE; i < min(particles.size(), (size_t) (block+1)*BLOCK_SIZE); i++) {
-                sums[i].force = forces[particles[i]];
-                if (count == 0) {
-                    sums[i].change = sums[i].way = Vec3();
-                    sums[i].work = 0;
-                }
-            }
+        const int end = min((int) particles.size(), (block+1)*BLOCK_SIZE);
+        for (int i = block*BLOCK_SIZE; i < end; i++) {
+            const Vec3& force = forces[particles[i]];
+            if (pair)
+                add(i, force, moves[particles[i]], 1/kT);
+            forcesBefore[i] = force;
+        }
     });
     known = false;
     if (pair && ++count >= window)
         finish();
 }
 
-void ExplicitWork::add(int block, const vector<Vec3>& forces, const vector<Vec3>& moves, double perEnergy) {
-    const int end = min((int) particles.size(), (block+1)*BLOCK_SIZE);
-    for (int i = block*BLOCK_SIZE; i < end; i++) {
-        Sums& own = sums[i];
-        const Vec3& force = forces[particles[i]];
-        const Vec3& move = moves[particles[i]];
-        const Vec3 change = (force-own.force)*perEnergy;
-        own.work -= change.dot(move);
-        own.change += change;
-        own.way += move;
-        own.force = force;
-    }
+void ExplicitWork::add(int particle, const Vec3& force, const Vec3& move, double perEnergy) {
+    Sums& own = sums[particle];
+    const Vec3 change = (force-forcesBefore[particle])*perEnergy;
+    own.work -= change.dot(move);
+    own.change += change;
+    own.way += move;
 }
 
 void ExplicitWork::finish() {
@@ -79,8 +71,7 @@ void ExplicitWork::finish() {
                 worst = particles[i];
             }
         }
-        own.change = own.way = Vec3();
-        own.work = 0;
+        own = Sums();
     }
     count = 0;
 }
