@@ -327,7 +327,8 @@ class Filaments(FilamentCollection):
         precision : {"automatic", "mixed", "double"}
             "mixed" computes what happens within a step in single precision, wherever that changes no result beyond its
             statistical error: for open filaments with harmonic lengths and an implicit scheme of the compiled engine,
-            above zero temperature, without flow, while 4 h K/gamma_rot is at most 10^4 and k l0^2/k_BT at most 10^9.
+            above zero temperature, without flow, while 4 h K/gamma_rot is at most 10^4, k l0^2/k_BT at most 10^9, and
+            noise changes lengths by 10^-5 of themselves in a step, or more.
             Positions and forces are in double precision, and other filaments altogether. "automatic" does so where it
             is faster as well, about twice as fast: where there are enough filaments of similar length. With the
             portable engine it is the same as "double". ``integrator.getNumMixedPrecisionChains()`` says for how many

@@ -44,6 +44,8 @@ bool mayShareLanes(const Chain& longest, const Chain& chain) {
  * of the sharpest bends, 4 h kappa/gamma_rot, and for the stiffness of lengths, k l0^2/k_B T.
  */
 const double LARGEST_BENDING_RATE = 1e4, LARGEST_STRETCHING = 1e9;
+/** The change of a length by its noise in a step, over the length. Rounding adds to it. */
+const double LEAST_CHANGE = 1e-5;
 /** The resistance of a node to its motion. Third powers of it are computed, also for a thousandth of a step. */
 const double LEAST_RESISTANCE = 1e-9, LARGEST_RESISTANCE = 1e8;
 
@@ -147,15 +149,19 @@ public:
         // A flow needs to know where chains are. Written so that NaN is not right.
         return settings.precision != Precision::Double && isImplicit(settings.scheme) && !settings.flow.present &&
                 settings.kT > 0 && stretching <= LARGEST_STRETCHING*settings.kT && h*bendingRate <= LARGEST_BENDING_RATE &&
+                2*settings.kT*h >= LEAST_CHANGE*LEAST_CHANGE*lengthFriction &&
                 leastFriction >= LEAST_RESISTANCE*h && largestFriction+h*bending <= LARGEST_RESISTANCE*h;
     }
 private:
     /** The largest k l0^2, 4 kappa/gamma_rot, kappa/l0^2 and friction of a node, and the least of the latter. */
     double stretching = 0, bendingRate = 0, bending = 0, largestFriction = 0, leastFriction = HUGE_VAL;
+    /** The largest friction against a change of a length, times its square. */
+    double lengthFriction = 0;
     void include(const Chain& chain) {
         for (const Segment& segment : chain.segments) {
             const double square = segment.restLength*segment.restLength;
             stretching = max(stretching, segment.stiffness*square);
+            lengthFriction = max(lengthFriction, segment.extensional+0.25*segment.parallel*square);
             leastFriction = min(leastFriction, 0.25*min(segment.parallel, segment.perpendicular));
             largestFriction = max(largestFriction, 0.25*segment.perpendicular+segment.rotational/square);
         }

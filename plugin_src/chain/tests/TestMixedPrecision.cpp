@@ -447,6 +447,39 @@ static void testDiffusionOfRods() {
     cosines.checkMean(1-exp(-2*0.01), 0.005, "rotation of rods");
 }
 
+/** The step in which noise changes lengths by 1e-5 of themselves. */
+static double shortestStep(const Material& material) {
+    const Segment& segment = material.segment;
+    return 1e-10*(segment.extensional+0.25*segment.parallel*1e4)/(2*KT);
+}
+
+static void testLengthsBeginToFluctuateInShortSteps() {
+    // What rounding adds to the changes of lengths would heat them.
+    const Material material(1e6, 10);
+    const int count = 64, steps = 400;
+    StepSettings settings = settingsFor(Scheme::Implicit, 1.01*shortestStep(material));
+    double energies[2] = {};
+    for (Precision precision : {Precision::Double, Precision::Mixed}) {
+        Array x;
+        const vector<Chain> chains = material.chains(count, 16, x);
+        const ChainEngine engine(chains);
+        check(mixedChains(precision, engine, settings) == (precision == Precision::Mixed ? count : 0), "mixed chains");
+        for (settings.step = 0; settings.step < steps; settings.step++) {
+            const StepResult found = stepIn(precision, engine, x, Array(x.size()), settings);
+            for (size_t i = 0; i < x.size(); i++)
+                x[i] += found.displacements[i];
+        }
+        for (const Chain& chain : chains)
+            for (size_t s = 0; s < chain.segments.size(); s++) {
+                double square = 0;
+                for (int k = 0; k < 3; k++)
+                    square += pow(x[3*chain.nodes[s+1]+k]-x[3*chain.nodes[s]+k], 2);
+                energies[precision == Precision::Mixed] += pow(sqrt(square)-100, 2);
+            }
+    }
+    checkClose(1, energies[1]/energies[0], 1, 0.003, "energy of lengths in short steps");
+}
+
 /** How many of some equal chains are computed in mixed precision. */
 static int mixedOf(Precision precision, int count, const function<void(Chain&)>& change, StepSettings settings) {
     Array x;
@@ -498,6 +531,12 @@ static void testWhereSinglePrecisionWouldNotDo() {
     check(mixed(asItIs, changed) == 20, "long step");
     changed.stepSize = 1.01e4*time;
     check(mixed(asItIs, changed) == 0, "step that is too long for bends");
+    // Lengths change by 1e-5 of themselves in a step of 1e-10 (gamma_def+gamma_par l^2/4)/(2 k_B T).
+    const double shortest = shortestStep(Material(1e5, 100));
+    changed.stepSize = 1.01*shortest;
+    check(mixed(asItIs, changed) == 20, "short step");
+    changed.stepSize = 0.99*shortest;
+    check(mixed(asItIs, changed) == 0, "step that is too short for lengths");
     changed.stepSize = 1e-4;
     check(mixed(asItIs, changed) == 0, "friction per step that overflows");
     changed.stepSize = 1e15;
@@ -541,6 +580,7 @@ int main() {
         testForcesOfSegments,
         testEnergies,
         testDiffusionOfRods,
+        testLengthsBeginToFluctuateInShortSteps,
         testWhereSinglePrecisionWouldNotDo,
         testWhereSinglePrecisionIsFaster
     });

@@ -79,8 +79,8 @@ public:
         /**
          * Mixed, where it is right and faster: for open chains with harmonic lengths and a scheme that is implicit, at a
          * temperature above zero, without a flow, with bends that relax within a step by less than 10^4 of their
-         * relaxation time and lengths of at most 10^9 kT, if there are enough such chains to fill more than half of a
-         * vector register.  It is the default.
+         * relaxation time, lengths of at most 10^9 kT that noise changes by 10^-5 in a step or more, if there are enough
+         * such chains to fill more than half of a vector register.  It is the default.
          */
         Automatic = 0,
         /**
