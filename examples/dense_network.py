@@ -21,8 +21,8 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection
 from openmm import Platform, app, unit
 
 from openmm_cylchain import F_ACTIN, Filaments
-from openmm_cylchain.contacts import contact_force
-from openmm_cylchain.crossings import CrossingCounter
+from openmm_cylchain.analysis.crossings import CrossingCounter
+from openmm_cylchain.couplings.contacts import contact_force
 
 FILAMENTS = 120
 SEGMENTS = 10

@@ -20,7 +20,7 @@ import openmm
 from openmm import app, unit
 
 from openmm_cylchain import F_ACTIN, Filaments, stokes_friction
-from openmm_cylchain.confinement import Sphere, wall_force
+from openmm_cylchain.couplings.walls import Sphere, wall_force
 from openmm_cylchain.theory import bending_energy_mean
 
 RADIUS = 500.0  # nm

@@ -22,9 +22,9 @@ import openmm
 from openmm import app, unit
 
 from openmm_cylchain import DSDNA, Filaments
-from openmm_cylchain.pulling import ConstantVelocityPulling
-from openmm_cylchain.quantities import BOLTZMANN
+from openmm_cylchain.couplings.pulling import ConstantVelocityPulling
 from openmm_cylchain.theory import chain_extension, marko_siggia_extension
+from openmm_cylchain.units.quantities import BOLTZMANN
 
 MOLECULES, SEGMENTS = 24, 20
 PICONEWTON = 0.602214076  # kJ/(mol nm)

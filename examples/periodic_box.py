@@ -21,8 +21,8 @@ import openmm
 from openmm import app, unit
 
 from openmm_cylchain import F_ACTIN, Filaments, stokes_friction
-from openmm_cylchain.periodic import make_whole
-from openmm_cylchain.structure_files import write_psf
+from openmm_cylchain.output.structure_files import write_psf
+from openmm_cylchain.systems.periodic import make_whole
 
 BOX = 2000.0  # nm
 FILAMENTS = 8

@@ -1,7 +1,6 @@
 """Filaments for OpenMM: Brownian dynamics of extensible cylinder chains."""
 
-from .build import Filaments
-from .collection import Filament
+from .dynamics.time_step import TimeStep, recommended_time_step
 from .errors import (
     ContactWarning,
     EquilibrationWarning,
@@ -10,11 +9,12 @@ from .errors import (
     TimeStepError,
     TimeStepWarning,
 )
-from .filament import DSDNA, F_ACTIN, MICROTUBULE, FilamentType
-from .flow import Flow
-from .friction import EndCorrections, SegmentFriction, stokes_friction
-from .step_check import check_time_step
-from .timestep import TimeStep, recommended_time_step
+from .filaments.collection import Filament
+from .filaments.filament_type import DSDNA, F_ACTIN, MICROTUBULE, FilamentType
+from .mechanics.flow import Flow
+from .mechanics.friction import EndCorrections, SegmentFriction, stokes_friction
+from .systems.filaments import Filaments
+from .systems.step_check import check_time_step
 from .version import __version__
 
 __all__ = [

@@ -141,9 +141,9 @@ def _add_reproductions(parser):
 
 
 def _run(options):
-    from .configuration import read_configuration
-    from .run import RunInterrupted, run
-    from .run_directory import RunDirectory
+    from .runs.configuration import read_configuration
+    from .runs.run import RunInterrupted, run
+    from .runs.run_directory import RunDirectory
 
     configuration = read_configuration(options.configuration)
     try:
@@ -152,8 +152,8 @@ def _run(options):
         _say("interrupted", interruption)
         raise SystemExit(128 + interruption.signal_number) from None
 
-    from .summary import format_summary, load_trajectory, summarise, write_summary
-    from .summary_figure import write_figure
+    from .runs.summary import format_summary, load_trajectory, summarise, write_summary
+    from .runs.summary_figure import write_figure
 
     directory = RunDirectory(options.output)
     trajectory = load_trajectory(configuration, directory)
@@ -175,9 +175,9 @@ _BOUND_LABELS = {
 
 
 def _time_step(options):
-    from .configuration import read_configuration
-    from .physical_units import format_time
-    from .timestep import recommended_time_step, stability_bounds, time_step_bounds
+    from .dynamics.time_step import recommended_time_step, stability_bounds, time_step_bounds
+    from .runs.configuration import read_configuration
+    from .units.text import format_time
 
     if not options.check and (options.seconds is not None or options.json is not None):
         raise InputError("--seconds and --json belong to --check: give that, too.")
@@ -204,8 +204,8 @@ def _time_step(options):
 
 def _check_time_step(configuration, options):
     from .benchmark.report import Progress, check_output_path
-    from .run import RunInterrupted, check_step
-    from .run_directory import write_atomically
+    from .runs.run import RunInterrupted, check_step
+    from .runs.run_directory import write_atomically
 
     if options.json is not None:
         check_output_path(options.json)
@@ -231,7 +231,7 @@ def _check_time_step(configuration, options):
 
 
 def _information(options):
-    from .information import format_information
+    from .runs.information import format_information
 
     print(format_information())
 

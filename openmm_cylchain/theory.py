@@ -11,10 +11,10 @@ import math
 
 import numpy as np
 
-from .equilibrium import JointAngleDistribution, PlanarJointAngleDistribution, SegmentLengthDistribution
 from .errors import InputError
-from .friction import rotational_relaxation_time
-from .quantities import (
+from .filaments.equilibrium import JointAngleDistribution, PlanarJointAngleDistribution, SegmentLengthDistribution
+from .mechanics.friction import rotational_relaxation_time
+from .units.quantities import (
     DIMENSIONLESS,
     FORCE,
     LENGTH,

@@ -5,7 +5,7 @@ import os
 import openmm
 import pytest
 
-from openmm_cylchain.schemes import EXPLICIT_SCHEMES
+from openmm_cylchain.dynamics.schemes import EXPLICIT_SCHEMES
 
 _WANTED = ("Reference", "CPU", "OpenCL")
 

@@ -9,11 +9,11 @@ from physics_cases import TEMPERATURE, VISCOSITY
 from scipy.spatial import cKDTree
 
 from openmm_cylchain import F_ACTIN, Filaments
-from openmm_cylchain.confinement import Sphere, wall_force
-from openmm_cylchain.contacts import contact_force
-from openmm_cylchain.crossings import CrossingCounter
-from openmm_cylchain.crosslinks import Crosslinks
-from openmm_cylchain.equilibrium import draw_chain
+from openmm_cylchain.analysis.crossings import CrossingCounter
+from openmm_cylchain.couplings.contacts import contact_force
+from openmm_cylchain.couplings.crosslinks import Crosslinks
+from openmm_cylchain.couplings.walls import Sphere, wall_force
+from openmm_cylchain.filaments.equilibrium import draw_chain
 
 DIAMETER = 30 * unit.nanometer
 SPACING = 18 * unit.nanometer

@@ -8,9 +8,9 @@ from conftest import PLATFORMS
 from openmm import unit
 
 from openmm_cylchain import F_ACTIN, Filaments, FilamentType
-from openmm_cylchain.equilibrium import JointAngleDistribution, SegmentLengthDistribution
-from openmm_cylchain.quantities import BOLTZMANN
-from openmm_cylchain.timestep import stability_bounds
+from openmm_cylchain.dynamics.time_step import stability_bounds
+from openmm_cylchain.filaments.equilibrium import JointAngleDistribution, SegmentLengthDistribution
+from openmm_cylchain.units.quantities import BOLTZMANN
 
 TEMPERATURE = 310.0
 KT = BOLTZMANN * TEMPERATURE

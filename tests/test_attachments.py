@@ -7,7 +7,8 @@ import pytest
 from openmm import app, unit
 from physics_cases import TEMPERATURE, VISCOSITY
 
-from openmm_cylchain import DSDNA, F_ACTIN, Filaments, InputError, analysis
+from openmm_cylchain import DSDNA, F_ACTIN, Filaments, InputError
+from openmm_cylchain.analysis import trajectories as analysis
 
 MICROSECOND = 1e6
 

@@ -10,11 +10,12 @@ import numpy as np
 import openmm
 import pytest
 
-from openmm_cylchain import Filaments, InputError, cli, engines, information
+from openmm_cylchain import Filaments, InputError, cli, engines
 from openmm_cylchain.benchmark import engines as engine_benchmark
 from openmm_cylchain.benchmark import measurement, memory, report, scaling, systems
+from openmm_cylchain.runs import information
 
-NATIVE = "openmm_cylchain.engines.native"
+NATIVE = "openmm_cylchain.engines.compiled"
 TINY_ENGINES = engine_benchmark.Effort(repetitions=2, seconds=1e-3)
 TINY_SCALING = scaling.Effort((2, 3), (1, 2), (2,), (), 2, 2, 1e-3)
 

@@ -11,8 +11,12 @@ from physics_cases import KT, TEMPERATURE, VISCOSITY, Case, soft_chain, time_ste
 from scipy.integrate import solve_bvp
 
 from openmm_cylchain import F_ACTIN, Filaments, theory
-from openmm_cylchain.equilibrium import JointAngleDistribution, PlanarJointAngleDistribution, SegmentLengthDistribution
-from openmm_cylchain.reporters import FilamentReporter
+from openmm_cylchain.filaments.equilibrium import (
+    JointAngleDistribution,
+    PlanarJointAngleDistribution,
+    SegmentLengthDistribution,
+)
+from openmm_cylchain.output.reporters import FilamentReporter
 
 SIGMAS = 4.0
 LENGTH = 2000.0  # nm of the cantilevers

@@ -7,9 +7,10 @@ import pytest
 from openmm import unit
 
 from openmm_cylchain import DSDNA, F_ACTIN, MICROTUBULE, EndCorrections, FilamentType, InputError
-from openmm_cylchain.configuration import changed_keys, parse_configuration, read_configuration
+from openmm_cylchain.dynamics.time_step import recommended_time_step
 from openmm_cylchain.engines import default_scheme
-from openmm_cylchain.physical_units import (
+from openmm_cylchain.runs.configuration import changed_keys, parse_configuration, read_configuration
+from openmm_cylchain.units.text import (
     BENDING_RIGIDITY,
     FORCE,
     LENGTH,
@@ -22,7 +23,6 @@ from openmm_cylchain.physical_units import (
     format_time,
     parse_quantity,
 )
-from openmm_cylchain.timestep import recommended_time_step
 
 SOLVENT = '[solvent]\ntemperature = "310 K"\nviscosity = "1.71 mPa*s"\n'
 FILAMENT = '[[filament]]\ntype = "F_ACTIN"\nsegments = 8\n'

@@ -7,7 +7,7 @@ from openmm import unit
 from physics_cases import KT, TEMPERATURE, VISCOSITY
 
 from openmm_cylchain import F_ACTIN, Filaments, InputError
-from openmm_cylchain.confinement import Box, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere, wall_force
+from openmm_cylchain.couplings.walls import Box, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere, wall_force
 
 SHAPES = [
     Plane([0, 0, 1], [1, 2, -2]),

@@ -10,7 +10,7 @@ from openmm import app, unit
 from physics_cases import ENGINE_PLATFORMS, KT, TEMPERATURE, VISCOSITY
 
 from openmm_cylchain import DSDNA, F_ACTIN, ContactWarning, Filaments, InputError
-from openmm_cylchain.contacts import (
+from openmm_cylchain.couplings.contacts import (
     add_exclusions,
     contact_force,
     crossing_barrier,
@@ -18,7 +18,7 @@ from openmm_cylchain.contacts import (
     excluded_pairs,
     share_exclusions,
 )
-from openmm_cylchain.timestep import contact_stiffness_bound, contact_time_step, diffusion_bound
+from openmm_cylchain.dynamics.time_step import contact_stiffness_bound, contact_time_step, diffusion_bound
 
 ACTIN = F_ACTIN.with_segment_length(100)
 DIAMETER = 30.0

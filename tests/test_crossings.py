@@ -7,7 +7,7 @@ import pytest
 from openmm import unit
 
 from openmm_cylchain import F_ACTIN, Filaments, InputError
-from openmm_cylchain.crossings import CrossingCounter, find_crossings, segment_distances
+from openmm_cylchain.analysis.crossings import CrossingCounter, find_crossings, segment_distances
 
 TWO = [np.array([0, 1]), np.array([2, 3])]
 

@@ -16,9 +16,10 @@ from conftest import ENGINE_SCHEMES
 from openmm import app, unit
 from physics_cases import CASES, ENGINE_PLATFORMS, KT, TEMPERATURE, VISCOSITY
 
-from openmm_cylchain import F_ACTIN, Filaments, InputError, InstabilityError, crosslinks
-from openmm_cylchain.crosslinks import Crosslinks, CrosslinkTable
-from openmm_cylchain.reporters import CrosslinkReporter
+from openmm_cylchain import F_ACTIN, Filaments, InputError, InstabilityError
+from openmm_cylchain.couplings import crosslinks
+from openmm_cylchain.couplings.crosslinks import Crosslinks, CrosslinkTable
+from openmm_cylchain.output.reporters import CrosslinkReporter
 
 BOX = np.array([[3.0, 0.0, 0.0], [0.5, 3.1, 0.0], [-0.4, 0.6, 2.9]])
 PAIRS = [(0, 1), (0, 2), (0, 1), (4, 0), (3, 4), (2, 5)]

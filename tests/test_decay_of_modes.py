@@ -7,7 +7,7 @@ from physics_cases import KT, TEMPERATURE, VISCOSITY
 from scipy.linalg import eigh
 
 from openmm_cylchain import MICROTUBULE, Filaments
-from openmm_cylchain.schemes import IMPLICIT_SCHEMES, amplification_of_second_order
+from openmm_cylchain.dynamics.schemes import IMPLICIT_SCHEMES, amplification_of_second_order
 
 SEGMENTS = 8
 KIND = MICROTUBULE

@@ -12,7 +12,7 @@ from openmm import unit
 from scipy.integrate import quad
 
 from openmm_cylchain import DSDNA, F_ACTIN, MICROTUBULE, Filaments, FilamentType, InputError
-from openmm_cylchain.equilibrium import JointAngleDistribution, SegmentLengthDistribution, draw_chain
+from openmm_cylchain.filaments.equilibrium import JointAngleDistribution, SegmentLengthDistribution, draw_chain
 
 TEMPERATURE = 300.0
 KT = 8.31446262e-3 * TEMPERATURE

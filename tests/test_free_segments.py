@@ -8,7 +8,7 @@ from physics_cases import KT, TEMPERATURE, VISCOSITY
 from scipy.optimize import curve_fit
 
 from openmm_cylchain import F_ACTIN, Filaments, FilamentType
-from openmm_cylchain.friction import rotational_relaxation_time
+from openmm_cylchain.mechanics.friction import rotational_relaxation_time
 from openmm_cylchain.theory import free_segment_mean_square_displacement, mean_orientation
 
 # Orientation and centre do not depend on the elastic potential, so a soft segment allows long steps.

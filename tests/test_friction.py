@@ -7,7 +7,7 @@ import pytest
 from openmm import unit
 
 from openmm_cylchain import F_ACTIN, InputError, SegmentFriction, stokes_friction
-from openmm_cylchain import friction as module
+from openmm_cylchain.mechanics import friction as module
 
 PN_NM = 0.602214076  # kJ/mol
 PN_US_PER_NM = 1e6 * PN_NM  # kJ ps/(mol nm^2)

@@ -9,8 +9,8 @@ from openmm import app
 from physics_cases import TEMPERATURE, VISCOSITY
 
 from openmm_cylchain import F_ACTIN, Filaments, Flow, InputError
-from openmm_cylchain.geometry import regular_polygon, segment_vectors
-from openmm_cylchain.reporters import TensionReporter
+from openmm_cylchain.mechanics.geometry import regular_polygon, segment_vectors
+from openmm_cylchain.output.reporters import TensionReporter
 
 
 def context_of(filaments, step=None, pull=0.0, recording=True, **options):

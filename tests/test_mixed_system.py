@@ -10,7 +10,7 @@ import openmm
 import pytest
 from physics_cases import ENGINE_PLATFORMS
 
-from openmm_cylchain.flow import Flow
+from openmm_cylchain.mechanics.flow import Flow
 
 _SPECIFICATION = importlib.util.spec_from_file_location(
     "mixed_system", Path(__file__).parents[1] / "examples" / "mixed_system.py"

@@ -9,9 +9,9 @@ import pytest
 from openmm import unit
 
 from openmm_cylchain import DSDNA, F_ACTIN, Filaments, InputError, InstabilityError
-from openmm_cylchain.engines import native
-from openmm_cylchain.engines.native import CylinderChainForce, CylinderChainIntegrator
-from openmm_cylchain.schemes import SCHEMES
+from openmm_cylchain.dynamics.schemes import SCHEMES
+from openmm_cylchain.engines import compiled as native
+from openmm_cylchain.engines.compiled import CylinderChainForce, CylinderChainIntegrator
 
 VISCOSITY = 1029.8
 TEMPERATURE = 310.0

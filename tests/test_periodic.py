@@ -9,7 +9,7 @@ from openmm import app, unit
 from physics_cases import ENGINE_PLATFORMS, VISCOSITY
 
 from openmm_cylchain import F_ACTIN, Filaments, InputError, InstabilityError
-from openmm_cylchain.periodic import make_trajectory_whole, make_whole, remove_jumps
+from openmm_cylchain.systems.periodic import make_trajectory_whole, make_whole, remove_jumps
 
 CUBIC = 1500.0 * np.eye(3)
 TRICLINIC = np.array([[1500.0, 0.0, 0.0], [400.0, 1400.0, 0.0], [-600.0, 500.0, 1600.0]])

@@ -12,8 +12,8 @@ from openmm import unit
 from scipy.integrate import quad
 
 from openmm_cylchain import DSDNA, F_ACTIN, MICROTUBULE, EndCorrections, Filaments, FilamentType, InputError, theory
-from openmm_cylchain.equilibrium import JointAngleDistribution, PlanarJointAngleDistribution, draw_chain
-from openmm_cylchain.joint_calibration import calibrated_stiffness, tangent_decorrelation
+from openmm_cylchain.filaments.equilibrium import JointAngleDistribution, PlanarJointAngleDistribution, draw_chain
+from openmm_cylchain.filaments.joint_calibration import calibrated_stiffness, tangent_decorrelation
 
 TEMPERATURE = 310.0
 KT = 8.31446262e-3 * TEMPERATURE

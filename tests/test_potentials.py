@@ -11,9 +11,9 @@ from openmm import unit
 from scipy.spatial.transform import Rotation
 
 from openmm_cylchain import Filaments, FilamentType, InputError
-from openmm_cylchain.collection import Filament
-from openmm_cylchain.potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
-from openmm_cylchain.tension import segment_end_forces
+from openmm_cylchain.filaments.collection import Filament
+from openmm_cylchain.mechanics.potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
+from openmm_cylchain.mechanics.tension import segment_end_forces
 
 ANGLES = (0.0, 1e-4, 0.01, 0.3, 1.0, 2.0, 3.0, 3.1)
 BENDING_GROUP, STRETCHING_GROUP = 1, 2

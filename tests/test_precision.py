@@ -11,10 +11,11 @@ from openmm import unit
 from physics_cases import KT, TEMPERATURE, VISCOSITY
 from test_promises import energies_of, exact_energies, positions_of
 
-from openmm_cylchain import F_ACTIN, Filaments, Flow, InputError, configuration
-from openmm_cylchain.engines.native import PRECISIONS, CylinderChainIntegrator
-from openmm_cylchain.precision import check_precision
-from openmm_cylchain.run import _create_simulation, create_filaments
+from openmm_cylchain import F_ACTIN, Filaments, Flow, InputError
+from openmm_cylchain.dynamics.precision import check_precision
+from openmm_cylchain.engines.compiled import PRECISIONS, CylinderChainIntegrator
+from openmm_cylchain.runs import configuration
+from openmm_cylchain.runs.run import _create_simulation, create_filaments
 
 SIGMAS = 4.0
 # Of these, any vector register of single precision has all lanes filled.

@@ -22,11 +22,11 @@ from openmm_cylchain import (
     Flow,
     TimeStepError,
     TimeStepWarning,
-    confinement,
     recommended_time_step,
 )
-from openmm_cylchain.equilibrium import JointAngleDistribution, SegmentLengthDistribution
-from openmm_cylchain.timestep import effective_rate, fene_steps
+from openmm_cylchain.couplings import walls as confinement
+from openmm_cylchain.dynamics.time_step import effective_rate, fene_steps
+from openmm_cylchain.filaments.equilibrium import JointAngleDistribution, SegmentLengthDistribution
 
 SIGMAS = 4.0
 LARGEST_DIVIDED_SHARE = 1e-3

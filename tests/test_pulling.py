@@ -13,14 +13,14 @@ from physics_cases import CASES, ENGINE_PLATFORMS, KT, TEMPERATURE, VISCOSITY
 from scipy.integrate import quad
 
 from openmm_cylchain import DSDNA, F_ACTIN, Filaments, InputError, recommended_time_step, theory
-from openmm_cylchain.equilibrium import JointAngleDistribution, SegmentLengthDistribution
-from openmm_cylchain.pulling import (
+from openmm_cylchain.couplings.pulling import (
     ConstantVelocityPulling,
     change_constant_force,
     constant_force,
     constant_tension,
     tension_forces,
 )
+from openmm_cylchain.filaments.equilibrium import JointAngleDistribution, SegmentLengthDistribution
 
 PICONEWTON = 0.602214076
 FREELY_JOINTED = CASES["freely-jointed"].type

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from openmm import Vec3, unit
 
-from openmm_cylchain import InputError, quantities
-from openmm_cylchain.quantities import in_units_of, non_negative, positive, thermal_energy, whole_number
+from openmm_cylchain import InputError
+from openmm_cylchain.units import quantities
+from openmm_cylchain.units.quantities import in_units_of, non_negative, positive, thermal_energy, whole_number
 
 # 1 pN nm = 1e-21 J; times 6.02214076e23 per mole, divided by 1000 J per kJ.
 KJ_PER_MOLE_IN_ONE_PN_NM = 0.602214076

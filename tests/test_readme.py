@@ -10,7 +10,8 @@ import pytest
 from openmm import unit
 from physics_cases import VISCOSITY
 
-from openmm_cylchain import F_ACTIN, Filaments, build, cli, stokes_friction
+from openmm_cylchain import F_ACTIN, Filaments, cli, stokes_friction
+from openmm_cylchain.systems import filaments as build
 
 README = (Path(__file__).parent.parent / "README.md").read_text()
 BUILDING, ADDING, ANALYSING = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)

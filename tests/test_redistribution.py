@@ -9,9 +9,9 @@ from conftest import ENGINES
 from physics_cases import TEMPERATURE, VISCOSITY
 
 from openmm_cylchain import DSDNA, F_ACTIN, Filaments
-from openmm_cylchain.collection import Filament
-from openmm_cylchain.engines import redistribution
-from openmm_cylchain.tension import segment_end_forces
+from openmm_cylchain.filaments.collection import Filament
+from openmm_cylchain.mechanics import redistribution
+from openmm_cylchain.mechanics.tension import segment_end_forces
 
 
 def _project(tangent, along, across):

@@ -10,7 +10,7 @@ from openmm import app
 from physics_cases import TEMPERATURE, VISCOSITY
 
 from openmm_cylchain import DSDNA, F_ACTIN, Filaments, InputError
-from openmm_cylchain.reporters import FilamentReporter, TetherReporter
+from openmm_cylchain.output.reporters import FilamentReporter, TetherReporter
 
 COLUMNS = ["stretching_energy", "bending_energy", "end_to_end_distance", "contour_length"]
 

@@ -12,10 +12,11 @@ from scipy.integrate import simpson
 from scipy.spatial.transform import Rotation
 from test_redistribution import _bent_chain, _dense_resistance
 
-from openmm_cylchain import F_ACTIN, Filaments, InputError, analysis
-from openmm_cylchain.engines import redistribution
-from openmm_cylchain.equilibrium import SegmentLengthDistribution
-from openmm_cylchain.reporters import FilamentReporter
+from openmm_cylchain import F_ACTIN, Filaments, InputError
+from openmm_cylchain.analysis import trajectories as analysis
+from openmm_cylchain.filaments.equilibrium import SegmentLengthDistribution
+from openmm_cylchain.mechanics import redistribution
+from openmm_cylchain.output.reporters import FilamentReporter
 
 FRICTION = F_ACTIN.segment_friction(VISCOSITY, TEMPERATURE)
 SIGMAS = 4.0

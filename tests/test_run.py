@@ -17,10 +17,10 @@ import pytest
 
 from openmm_cylchain import F_ACTIN, InputError
 from openmm_cylchain.cli import main
-from openmm_cylchain.configuration import parse_configuration, read_configuration
-from openmm_cylchain.run import create_filaments, run
-from openmm_cylchain.run_directory import RunDirectory, read_energies
-from openmm_cylchain.summary import format_summary, load_trajectory, summarise
+from openmm_cylchain.runs.configuration import parse_configuration, read_configuration
+from openmm_cylchain.runs.run import create_filaments, run
+from openmm_cylchain.runs.run_directory import RunDirectory, read_energies
+from openmm_cylchain.runs.summary import format_summary, load_trajectory, summarise
 
 SHORT = """
 title = "short"

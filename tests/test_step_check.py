@@ -11,10 +11,12 @@ import openmm
 import pytest
 from openmm import unit
 
-from openmm_cylchain import F_ACTIN, Filaments, Flow, InputError, check_time_step, pulling, step_check
+from openmm_cylchain import F_ACTIN, Filaments, Flow, InputError, check_time_step
 from openmm_cylchain.cli import main
-from openmm_cylchain.configuration import parse_configuration
-from openmm_cylchain.run import check_step
+from openmm_cylchain.couplings import pulling
+from openmm_cylchain.runs.configuration import parse_configuration
+from openmm_cylchain.runs.run import check_step
+from openmm_cylchain.systems import step_check
 
 VISCOSITY = 1.71e-3 * unit.pascal * unit.second
 TEMPERATURE = 310.0

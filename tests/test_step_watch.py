@@ -16,9 +16,9 @@ from openmm_cylchain import (
     TimeStepError,
     TimeStepWarning,
 )
-from openmm_cylchain.confinement import Slab, wall_force
-from openmm_cylchain.engines.native import CylinderChainIntegrator
-from openmm_cylchain.step_watch import ERROR_WORK, WARNING_WORK, DividedSteps, ExplicitWork, WorkRecorder
+from openmm_cylchain.couplings.walls import Slab, wall_force
+from openmm_cylchain.dynamics.step_watch import ERROR_WORK, WARNING_WORK, DividedSteps, ExplicitWork, WorkRecorder
+from openmm_cylchain.engines.compiled import CylinderChainIntegrator
 
 VISCOSITY = 1.71e-3 * unit.pascal * unit.second
 TEMPERATURE = 310.0

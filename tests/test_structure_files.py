@@ -11,7 +11,7 @@ from openmm import app, unit
 from physics_cases import TEMPERATURE, VISCOSITY
 
 from openmm_cylchain import DSDNA, F_ACTIN, Filaments, InputError
-from openmm_cylchain.structure_files import write_lammps_data, write_psf
+from openmm_cylchain.output.structure_files import write_lammps_data, write_psf
 
 BOX = np.array([[1500.0, 0.0, 0.0], [400.0, 1400.0, 0.0], [-600.0, 500.0, 1600.0]])
 

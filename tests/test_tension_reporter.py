@@ -12,7 +12,7 @@ from test_openmm_reporters import close, simulation_of
 from test_periodic import CUBIC, TRICLINIC
 
 from openmm_cylchain import F_ACTIN, Filaments, InputError
-from openmm_cylchain.reporters import FilamentReporter, TensionReporter
+from openmm_cylchain.output.reporters import FilamentReporter, TensionReporter
 
 
 def pulled(filaments, force, temperature=0, step=1e4):

@@ -53,7 +53,7 @@ def test_energy_and_force_of_a_tether_that_is_moved(engine):
 
 
 def test_the_nearest_image_of_a_point_counts_in_a_periodic_box():
-    from openmm_cylchain.engines.native import CylinderChainForce
+    from openmm_cylchain.engines.compiled import CylinderChainForce
 
     filaments = _trapped("compiled", {0: [5010, 0, 0]})
     topology, system, positions = filaments.build(box_vectors=5000 * np.eye(3))
@@ -82,7 +82,7 @@ def test_both_engines_move_a_trapped_filament_alike():
 def test_copies_and_xml_keep_tethers():
     filaments = _trapped("compiled", {0: [1, 2, 3], 2: [4, 5, 6]})
     _, system, _ = filaments.build()
-    from openmm_cylchain.engines.native import CylinderChainForce
+    from openmm_cylchain.engines.compiled import CylinderChainForce
 
     force = CylinderChainForce.cast(system.getForce(0))
     for duplicate in (copy.deepcopy(force), openmm.XmlSerializer.deserialize(openmm.XmlSerializer.serialize(force))):

@@ -9,10 +9,10 @@ from openmm import unit
 from scipy.integrate import quad
 
 from openmm_cylchain import theory
-from openmm_cylchain.equilibrium import draw_chain
 from openmm_cylchain.errors import InputError
-from openmm_cylchain.filament import DSDNA, F_ACTIN, FilamentType
-from openmm_cylchain.quantities import thermal_energy
+from openmm_cylchain.filaments.equilibrium import draw_chain
+from openmm_cylchain.filaments.filament_type import DSDNA, F_ACTIN, FilamentType
+from openmm_cylchain.units.quantities import thermal_energy
 
 TEMPERATURE = 310.0
 KT = thermal_energy(TEMPERATURE)

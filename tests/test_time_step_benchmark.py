@@ -11,7 +11,7 @@ from openmm_cylchain.benchmark import bead_spring, measurement, time_step, time_
 from openmm_cylchain.benchmark.measurement import Estimate
 from openmm_cylchain.benchmark.time_step import StepErrors, SystemErrors, ladder
 from openmm_cylchain.benchmark.time_step_systems import F_ACTIN_SYSTEM, WORKLOAD
-from openmm_cylchain.schemes import SCHEMES
+from openmm_cylchain.dynamics.schemes import SCHEMES
 
 TINY = time_step.Effort((replace(F_ACTIN_SYSTEM, segments=4),), frames=24, share=0.05, every=3, repetitions=2)
 

@@ -21,10 +21,10 @@ from openmm_cylchain import (
     SegmentFriction,
     TimeStepWarning,
     recommended_time_step,
-    timestep,
 )
-from openmm_cylchain.engines.redistribution import STEPS, ChainSet, resistance_bands
-from openmm_cylchain.flow import Flow
+from openmm_cylchain.dynamics import time_step as timestep
+from openmm_cylchain.mechanics.flow import Flow
+from openmm_cylchain.mechanics.redistribution import STEPS, ChainSet, resistance_bands
 
 MICROSECOND = 1e6  # ps
 VISCOSITY = 1.71e-3 * unit.pascal * unit.second

@@ -16,10 +16,10 @@ import openmm
 
 from .. import F_ACTIN
 from ..engines import choose_engine
-from ..equilibrium import draw_chain
-from ..filament import FilamentType
-from ..physical_units import format_time
+from ..filaments.equilibrium import draw_chain
+from ..filaments.filament_type import FilamentType
 from ..theory import bending_energy_mean, stretching_energy_mean
+from ..units.text import format_time
 from .measurement import Case, Estimate, describe_machine, median, ratio, scaled, time_interleaved
 from .report import Report, row
 from .systems import bonds, harmonic_angles, one_thread_context

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..information import versions
+from ..runs.information import versions
 
 _MEDIAN_OVER_MEAN = np.sqrt(0.5 * np.pi)
 _INSTRUCTION_SETS = ("sse4_2", "avx", "avx2", "fma", "avx512f", "asimd", "sve")

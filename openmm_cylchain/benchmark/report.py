@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from ..errors import InputError
-from ..run_directory import write_atomically
+from ..runs.run_directory import write_atomically
 
 
 @dataclass(frozen=True)

@@ -19,13 +19,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import Filaments
+from ..dynamics.schemes import EXPLICIT_SCHEMES, SCHEMES
+from ..dynamics.step_watch import LARGEST_DIVIDED_SHARE
+from ..dynamics.time_step import recommended_time_step, stability_bounds
 from ..engines import choose_engine
 from ..errors import InstabilityError
-from ..physical_units import format_time
-from ..schemes import EXPLICIT_SCHEMES, SCHEMES
-from ..step_watch import LARGEST_DIVIDED_SHARE
 from ..theory import bending_energy_mean, stretching_energy_mean
-from ..timestep import recommended_time_step, stability_bounds
+from ..units.text import format_time
 from .measurement import Case, Estimate, describe_machine, median, ratio, scaled, time_interleaved
 from .report import Report, row
 from .systems import one_thread_context, one_thread_platform, simulate_beads

@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from ..dynamics.schemes import SCHEMES
 from ..errors import InputError
-from ..schemes import SCHEMES
 from .report import check_output_path
 from .time_step import CRITERIA
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from openmm import unit
 
 from .. import DSDNA, F_ACTIN, MICROTUBULE
-from ..filament import FilamentType
-from ..quantities import BOLTZMANN, VISCOSITY, in_units_of
+from ..filaments.filament_type import FilamentType
+from ..units.quantities import BOLTZMANN, VISCOSITY, in_units_of
 from . import systems
 
 _VISCOSITY = in_units_of(systems.VISCOSITY, VISCOSITY, "viscosity")

@@ -7,7 +7,7 @@ from ..errors import InputError
 ENGINES = ("compiled", "portable")
 """All engines that there are, the fastest first."""
 
-_MODULES = {"compiled": f"{__name__}.native", "portable": f"{__name__}.portable"}
+_MODULES = {"compiled": f"{__name__}.compiled", "portable": f"{__name__}.portable"}
 
 
 _DEFAULT_SCHEMES = {"compiled": "implicit", "portable": "midpoint"}

@@ -3,8 +3,8 @@
 import numpy as np
 
 from ..errors import InputError
-from ..quantities import FRICTION, in_units_of
-from .redistribution import ChainSet
+from ..mechanics.redistribution import ChainSet
+from ..units.quantities import FRICTION, in_units_of
 
 
 def advice_after_blow_up(system):
@@ -13,7 +13,7 @@ def advice_after_blow_up(system):
         return ""
     return (
         " If positions were wrapped into the periodic box particle by particle, make filaments whole first with "
-        "openmm_cylchain.periodic.make_whole."
+        "openmm_cylchain.systems.periodic.make_whole."
     )
 
 

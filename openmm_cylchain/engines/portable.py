@@ -16,14 +16,15 @@ import numpy as np
 import openmm
 from openmm import unit
 
+from ..dynamics.schemes import EXPLICIT_SCHEMES
+from ..dynamics.step_watch import ExplicitWork, WorkRecorder
+from ..dynamics.time_step import as_step, check_scheme
 from ..errors import InputError, InstabilityError
-from ..flow import Flow, as_flow, flow_velocities
-from ..geometry import joined, to_nearest_images
-from ..potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
-from ..quantities import BOLTZMANN, TEMPERATURE, non_negative, whole_number
-from ..schemes import EXPLICIT_SCHEMES
-from ..step_watch import ExplicitWork, WorkRecorder
-from ..timestep import as_step, check_scheme
+from ..mechanics.flow import Flow, as_flow, flow_velocities
+from ..mechanics.geometry import joined, to_nearest_images
+from ..mechanics.potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
+from ..mechanics.redistribution import STEPS
+from ..units.quantities import BOLTZMANN, TEMPERATURE, non_negative, whole_number
 from .description import (
     advice_after_blow_up,
     describe_chains,
@@ -31,7 +32,6 @@ from .description import (
     filament_label,
     refuse_constraints,
 )
-from .redistribution import STEPS
 
 REDISTRIBUTION_NAME = "CylinderChainRedistribution"
 STRETCHING_NAME = "CylinderChainStretching"

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..benchmark.measurement import Estimate
-from ..filament import FilamentType
+from ..filaments.filament_type import FilamentType
 from . import simulation, style
 from .case import Case, Outcome
 from .result import Result, Rule

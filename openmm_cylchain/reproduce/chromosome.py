@@ -5,9 +5,9 @@ import math
 import numpy as np
 from openmm import unit
 
-from ..quantities import FORCE, LENGTH, VISCOSITY, in_units_of, thermal_energy
-from ..statistics import fit_relaxation_time
+from ..analysis.statistics import fit_relaxation_time
 from ..theory import clamped_angle_variance, clamped_deflection_variance
+from ..units.quantities import FORCE, LENGTH, VISCOSITY, in_units_of, thermal_energy
 from . import rods_on_string, simulation, style
 from .case import Case, Outcome
 from .result import Estimate, Result, Rule, printed

@@ -8,8 +8,8 @@ import math
 
 import numpy as np
 
+from ..dynamics.time_step import recommended_time_step
 from ..theory import chain_mean_square_end_to_end, chain_persistence_length, wlc_mean_square_end_to_end
-from ..timestep import recommended_time_step
 from . import simulation, style
 from .case import Case, Outcome
 from .result import Estimate, Result, Rule, printed

@@ -8,7 +8,8 @@ import math
 
 import numpy as np
 
-from ..pulling import constant_tension
+from ..couplings.pulling import constant_tension
+from ..dynamics.time_step import recommended_time_step
 from ..theory import (
     chain_extension,
     crossover_force,
@@ -18,7 +19,6 @@ from ..theory import (
     marko_siggia_extension,
     marko_siggia_spring_constant,
 )
-from ..timestep import recommended_time_step
 from . import simulation, style
 from .case import Case, Outcome
 from .result import Estimate, Result, Rule, printed

@@ -6,8 +6,8 @@ turns alike wherever it is.
 
 import numpy as np
 
-from ..friction import rotational_relaxation_time
-from ..statistics import fit_relaxation_time
+from ..analysis.statistics import fit_relaxation_time
+from ..mechanics.friction import rotational_relaxation_time
 from ..theory import (
     free_segment_mean_square_displacement,
     long_time_mean_square_displacement,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..run_directory import write_atomically
+from ..runs.run_directory import write_atomically
 from ..version import __version__
 
 

@@ -10,8 +10,8 @@ from itertools import pairwise
 import numpy as np
 
 from ..benchmark.measurement import scaled
-from ..friction import EndCorrections
-from ..quantities import VISCOSITY, in_units_of
+from ..mechanics.friction import EndCorrections
+from ..units.quantities import VISCOSITY, in_units_of
 from . import rods_on_string, simulation, style
 from .case import Case, Outcome
 from .result import ROUNDING, Estimate, Result, Rule

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from openmm import unit
 
 from .. import EndCorrections, Filaments, FilamentType
-from ..quantities import BENDING_RIGIDITY, VISCOSITY, in_units_of, thermal_energy
+from ..units.quantities import BENDING_RIGIDITY, VISCOSITY, in_units_of, thermal_energy
 
 SECOND = 1e12
 """In ps."""

@@ -5,7 +5,7 @@ from dataclasses import replace
 from openmm import unit
 
 from .. import DSDNA, F_ACTIN
-from ..quantities import FORCE, STIFFNESS, VISCOSITY, in_units_of, thermal_energy
+from ..units.quantities import FORCE, STIFFNESS, VISCOSITY, in_units_of, thermal_energy
 
 ACTIN = replace(F_ACTIN, temperature=None)
 """With the joints of the paper, l_p k_B T/l0; those of the preset are calibrated to l_p."""

@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 
+from ..analysis.statistics import fit_relaxation_time
 from ..benchmark.measurement import scaled
-from ..statistics import fit_relaxation_time
+from ..dynamics.time_step import recommended_time_step
 from ..theory import (
     bending_mode_variance,
     chain_mean_square_end_to_end,
@@ -14,7 +15,6 @@ from ..theory import (
     wlc_mean_square_end_to_end,
     wlc_tangent_correlation,
 )
-from ..timestep import recommended_time_step
 from . import rods_on_string, simulation, style
 from .case import Case, Outcome
 from .result import ROUNDING, Estimate, Result, Rule, printed

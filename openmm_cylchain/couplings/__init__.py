@@ -1,0 +1,1 @@
+"""Forces between filaments and on them: crosslinks, contacts, walls, pulling."""

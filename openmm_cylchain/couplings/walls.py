@@ -1,0 +1,280 @@
+"""Walls that confine filaments: planes, slabs, spheres, cylinders, boxes and ellipsoids.
+
+A wall pushes back what is beyond it, with the energy ``(k/2) d^2`` for the depth d to which a particle has got in.
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+import openmm
+
+from ..errors import InputError
+from ..filaments.placement import unit_vector, vector
+from ..units.quantities import LENGTH, STIFFNESS, positive
+
+WALL_NAME = "Wall"
+
+# In nm^2: keeps the derivative of a square root finite at its zero, in single precision as well.
+_TINY = "1e-30"
+
+
+class Shape(ABC):
+    """A region that particles are kept in.
+
+    ``expression`` is the square of the depth d beyond the wall in OpenMM's syntax, a function of x, y and z in nm.
+    """
+
+    @property
+    @abstractmethod
+    def expression(self):
+        """The square of the depth for OpenMM."""
+
+    @abstractmethod
+    def square_depth(self, positions):
+        """The square of the depth, in nm^2, for positions (..., 3); zero inside."""
+
+
+def _number(value):
+    return f"({float(value)!r})"
+
+
+def _along(point, direction):
+    terms = (f"{_number(n)}*({name}-{_number(p)})" for name, n, p in zip("xyz", direction, point))
+    return f"({'+'.join(terms)})"
+
+
+def _beyond(expression):
+    return f"max(0, {expression})^2"
+
+
+@dataclass(frozen=True)
+class Plane(Shape):
+    """The half space to which a normal points.
+
+    Parameters
+    ----------
+    point : (3,) length
+        On the plane.
+    normal : (3,) array
+        Need not be normalised.
+    """
+
+    point: tuple
+    normal: tuple
+
+    def __post_init__(self):
+        _set(self, "point", vector(self.point, LENGTH, "Plane: point"))
+        _set(self, "normal", unit_vector(self.normal, "Plane"))
+
+    @property
+    def expression(self):
+        return _beyond(f"-{_along(self.point, self.normal)}")
+
+    def square_depth(self, positions):
+        return np.maximum(0.0, -((np.asarray(positions) - self.point) @ self.normal)) ** 2
+
+
+@dataclass(frozen=True)
+class Slab(Shape):
+    """The space between two parallel planes.
+
+    Parameters
+    ----------
+    point : (3,) length
+        Half-way between the planes.
+    normal : (3,) array
+    thickness : length
+    """
+
+    point: tuple
+    normal: tuple
+    thickness: float
+
+    def __post_init__(self):
+        _set(self, "point", vector(self.point, LENGTH, "Slab: point"))
+        _set(self, "normal", unit_vector(self.normal, "Slab"))
+        _set(self, "thickness", positive(self.thickness, LENGTH, "Slab: thickness"))
+
+    @property
+    def expression(self):
+        return _beyond(f"abs({_along(self.point, self.normal)})-{_number(0.5 * self.thickness)}")
+
+    def square_depth(self, positions):
+        height = np.abs((np.asarray(positions) - self.point) @ self.normal)
+        return np.maximum(0.0, height - 0.5 * self.thickness) ** 2
+
+
+@dataclass(frozen=True)
+class Sphere(Shape):
+    """The inside of a sphere.
+
+    Parameters
+    ----------
+    center : (3,) length
+    radius : length
+    """
+
+    center: tuple
+    radius: float
+
+    def __post_init__(self):
+        _set(self, "center", vector(self.center, LENGTH, "Sphere: center"))
+        _set(self, "radius", positive(self.radius, LENGTH, "Sphere: radius"))
+
+    @property
+    def expression(self):
+        squares = "+".join(f"({name}-{_number(c)})^2" for name, c in zip("xyz", self.center))
+        return _beyond(f"sqrt({squares}+{_TINY})-{_number(self.radius)}")
+
+    def square_depth(self, positions):
+        distance = np.linalg.norm(np.asarray(positions) - self.center, axis=-1)
+        return np.maximum(0.0, distance - self.radius) ** 2
+
+
+@dataclass(frozen=True)
+class Cylinder(Shape):
+    """The inside of a cylinder without ends.
+
+    Parameters
+    ----------
+    point : (3,) length
+        On the axis.
+    axis : (3,) array
+    radius : length
+    """
+
+    point: tuple
+    axis: tuple
+    radius: float
+
+    def __post_init__(self):
+        _set(self, "point", vector(self.point, LENGTH, "Cylinder: point"))
+        _set(self, "axis", unit_vector(self.axis, "Cylinder"))
+        _set(self, "radius", positive(self.radius, LENGTH, "Cylinder: radius"))
+
+    def _across(self):
+        # Two directions orthogonal to the axis and to each other.
+        first = np.cross(self.axis, np.eye(3)[np.argmin(np.abs(self.axis))])
+        first /= np.linalg.norm(first)
+        return first, np.cross(self.axis, first)
+
+    @property
+    def expression(self):
+        first, second = (_along(self.point, direction) for direction in self._across())
+        return _beyond(f"sqrt({first}^2+{second}^2+{_TINY})-{_number(self.radius)}")
+
+    def square_depth(self, positions):
+        across = (np.asarray(positions) - self.point) @ np.transpose(self._across())
+        return np.maximum(0.0, np.linalg.norm(across, axis=-1) - self.radius) ** 2
+
+
+@dataclass(frozen=True)
+class Box(Shape):
+    """The inside of a box with edges along the axes; d is the distance from the box.
+
+    Parameters
+    ----------
+    lower, upper : (3,) length
+        Two opposite corners.
+    """
+
+    lower: tuple
+    upper: tuple
+
+    def __post_init__(self):
+        _set(self, "lower", vector(self.lower, LENGTH, "Box: lower"))
+        _set(self, "upper", vector(self.upper, LENGTH, "Box: upper"))
+        if not np.all(self.lower < self.upper):
+            raise InputError(f"Box: upper must exceed lower along every axis, but they are {self.upper}, {self.lower}.")
+
+    @property
+    def expression(self):
+        pairs = zip("xyz", self.lower, self.upper)
+        return "+".join(f"max(0, max({_number(a)}-{name}, {name}-{_number(b)}))^2" for name, a, b in pairs)
+
+    def square_depth(self, positions):
+        positions = np.asarray(positions)
+        beyond = np.maximum(0.0, np.maximum(self.lower - positions, positions - self.upper))
+        return np.sum(beyond**2, axis=-1)
+
+
+@dataclass(frozen=True)
+class Ellipsoid(Shape):
+    """The inside of an ellipsoid with axes along x, y and z.
+
+    With s^2 the sum of (x_i/a_i)^2, the depth is taken as (s-1)/|grad s|, which is the distance from the surface to
+    first order.
+
+    Parameters
+    ----------
+    center : (3,) length
+    semi_axes : (3,) length
+    """
+
+    center: tuple
+    semi_axes: tuple
+
+    def __post_init__(self):
+        _set(self, "center", vector(self.center, LENGTH, "Ellipsoid: center"))
+        _set(self, "semi_axes", vector(self.semi_axes, LENGTH, "Ellipsoid: semi_axes"))
+        if not np.all(self.semi_axes > 0):
+            raise InputError(f"Ellipsoid: semi_axes must be positive, but are {self.semi_axes}.")
+
+    @property
+    def expression(self):
+        def total(power):
+            terms = zip("xyz", self.center, self.semi_axes)
+            return "+".join(f"({name}-{_number(c)})^2*{_number(a**-power)}" for name, c, a in terms)
+
+        floor = _number(self._least_steepness)
+        return f"max(0, s-1)^2*s^2/max(steepness, {floor}); s=sqrt({total(2.0)}+{_TINY}); steepness={total(4.0)}"
+
+    @property
+    def _least_steepness(self):
+        # Less than anywhere outside, for a quotient that is finite at the center.
+        return 0.25 / np.max(self.semi_axes) ** 2
+
+    def square_depth(self, positions):
+        relative = np.asarray(positions) - self.center
+        s = np.sqrt(np.sum((relative / self.semi_axes) ** 2, axis=-1))
+        steepness = np.sum(relative**2 / self.semi_axes**4, axis=-1)
+        return np.maximum(0.0, s - 1.0) ** 2 * s**2 / np.maximum(steepness, self._least_steepness)
+
+
+def _set(instance, name, value):
+    object.__setattr__(instance, name, value)
+
+
+def wall_force(shape, stiffness, particles):
+    """A CustomExternalForce with the energy (k/2) d^2 of each particle, for its depth d beyond a wall.
+
+    It is explicit in every scheme: ``Filaments.recommended_time_step(system=system)`` says which step it allows.
+
+    Parameters
+    ----------
+    shape : Shape
+    stiffness : energy/length^2
+    particles : sequence of int
+        Particle indices, of nodes, attachment points or anything else.
+
+    Returns
+    -------
+    openmm.CustomExternalForce
+        To be added to the System.
+
+    Raises
+    ------
+    InputError
+        For a shape that is none, or a stiffness that is not positive.
+    """
+    if not isinstance(shape, Shape):
+        raise InputError(f"shape must be a Shape such as Sphere, but is {shape!r}.")
+    stiffness = positive(stiffness, STIFFNESS, "stiffness")
+    square_depth, *definitions = shape.expression.split(";", 1)
+    expression = ";".join([f"{_number(0.5 * stiffness)}*({square_depth})", *definitions])
+    force = openmm.CustomExternalForce(expression)
+    force.setName(f"{WALL_NAME} ({type(shape).__name__.lower()})")
+    for particle in particles:
+        force.addParticle(int(particle), [])
+    return force

@@ -1,0 +1,11 @@
+"""The precision that the steps of filaments are computed in."""
+
+from ..errors import InputError
+
+PRECISIONS = ("automatic", "mixed", "double")
+
+
+def check_precision(precision):
+    """Raise InputError unless ``precision`` names one of filaments."""
+    if precision not in PRECISIONS:
+        raise InputError(f"precision must be one of {', '.join(PRECISIONS)}, but is {precision!r}.")

@@ -1,0 +1,406 @@
+"""The compiled engine: a CylinderChainForce and a CylinderChainIntegrator from the plugin, on the Reference and CPU
+platforms.
+
+Importing this module loads the plugin into OpenMM. An ImportError says why that cannot be done.
+"""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import openmm
+
+from ..dynamics.precision import check_precision
+from ..dynamics.schemes import IMPLICIT_SCHEMES
+from ..dynamics.step_watch import DividedSteps, ExplicitWork
+from ..dynamics.time_step import as_step, check_scheme
+from ..errors import InputError, InstabilityError
+from ..mechanics.flow import Flow, as_flow
+from ..units.quantities import TEMPERATURE, non_negative, whole_number
+from .description import (
+    advice_after_blow_up,
+    describe_chains,
+    describe_other_particles,
+    filament_label,
+    refuse_constraints,
+)
+
+
+def _load_plugin():
+    try:
+        from ..plugin_version import OPENMM_VERSION
+    except ModuleNotFoundError:
+        raise ImportError(
+            f"the package in {Path(__file__).parents[1]} has no compiled plugin. Install it with pip and a C++ "
+            "compiler, without OPENMM_CYLCHAIN_PORTABLE, and run Python outside its source directory."
+        ) from None
+    installed = openmm.Platform.getOpenMMVersion()
+    if installed.split(".")[:2] != OPENMM_VERSION.split(".")[:2]:
+        raise ImportError(
+            f"the plugin was built against OpenMM {OPENMM_VERSION}, but OpenMM {installed} is installed. "
+            "Install openmm_cylchain again."
+        )
+    from .. import plugin
+
+    libraries = sorted((Path(plugin._plugin.__file__).parent / "lib" / "plugins").glob("libOpenMMCylinderChain*"))
+    if not libraries:
+        raise ImportError("the installation lacks the plugin's libraries for OpenMM. Install openmm_cylchain again.")
+    try:
+        for library in libraries:
+            openmm.Platform.loadPluginLibrary(str(library))
+    except openmm.OpenMMException as error:
+        raise ImportError(f"OpenMM cannot load the plugin: {error}") from None
+    return plugin
+
+
+plugin = _load_plugin()
+CylinderChainForce = plugin.CylinderChainForce
+CylinderChainIntegrator = plugin.CylinderChainIntegrator
+
+BENDING_MODELS = {
+    "kratky-porod": CylinderChainForce.KratkyPorod,
+    "quadratic": CylinderChainForce.Quadratic,
+    "inscribed-circle": CylinderChainForce.InscribedCircle,
+}
+STRETCHING_MODELS = {"harmonic": CylinderChainForce.Harmonic, "fene": CylinderChainForce.FENE}
+SCHEMES = {
+    "euler": CylinderChainIntegrator.Euler,
+    "midpoint": CylinderChainIntegrator.Midpoint,
+    "implicit": CylinderChainIntegrator.Implicit,
+    "implicit-second-order": CylinderChainIntegrator.ImplicitSecondOrder,
+}
+PRECISIONS = {
+    "automatic": CylinderChainIntegrator.Automatic,
+    "mixed": CylinderChainIntegrator.Mixed,
+    "double": CylinderChainIntegrator.Double,
+}
+
+_OTHER_FRICTION = 1.0
+LARGEST_PATH_LEVEL = 20
+
+
+def add_forces(
+    system, filaments, node_indices, tethers, viscosity, temperature, stretching_force_group, bending_force_group
+):
+    """Add the chains to a System that holds their nodes: one CylinderChainForce.
+
+    Parameters
+    ----------
+    system : openmm.System
+    filaments : sequence of Filament
+    node_indices : sequence of int arrays
+        Particle indices of the nodes of each filament.
+    tethers : sequence of Tether
+    viscosity, temperature : float
+        For the friction of the segments.
+    stretching_force_group, bending_force_group : int
+        One number for both.
+
+    Raises
+    ------
+    InputError
+        If the force groups differ.
+    """
+    if stretching_force_group != bending_force_group:
+        raise InputError(
+            "The compiled engine has one force for stretching and bending: give them the same force group. "
+            "CylinderChainForce.computeEnergies tells their energies apart."
+        )
+    force = CylinderChainForce()
+    force.setForceGroup(int(stretching_force_group))
+    for filament, nodes in zip(filaments, node_indices):
+        _add_chain(force, filament, nodes, viscosity, temperature)
+    for tether in tethers:
+        force.addTether(tether.filament, tether.node, openmm.Vec3(*tether.point), tether.stiffness)
+    system.addForce(force)
+
+
+def flow_of(context):
+    """The flow of the solvent in a Context, at rest where its integrator knows of none."""
+    integrator = context.getIntegrator()
+    if not CylinderChainIntegrator.isinstance(integrator):
+        return Flow()
+    return _flow_of_integrator(CylinderChainIntegrator.cast(integrator))
+
+
+def _flow_of_integrator(integrator):
+    velocity, *gradient, origin = (tuple(vector._value) for vector in CylinderChainIntegrator.getFlow(integrator))
+    return Flow(velocity, gradient, origin)
+
+
+def record_tensions(context):
+    """Let the integrator of a Context record mean tensions; see ``NativeIntegrator.setRecordsTensions``."""
+    _recording_integrator(context).setRecordsTensions(True)
+
+
+def mean_tensions(context, chains):
+    """What the integrator of a Context has recorded of the last step, for so many chains.
+
+    Returns
+    -------
+    list of (tensions, joint_forces, directions)
+        For each chain arrays (segments,) and (joints, 3) in kJ/(mol nm), and (segments, 3).
+
+    Raises
+    ------
+    InputError
+        If it has recorded nothing.
+    """
+    integrator = _recording_integrator(context)
+    try:
+        recorded = [CylinderChainIntegrator.getMeanTensions(integrator, chain) for chain in range(chains)]
+    except openmm.OpenMMException as error:
+        if "No tensions were recorded" not in str(error):
+            raise
+        raise InputError(
+            "No mean tensions were recorded in the last step: call integrator.setRecordsTensions(True) before it is "
+            "taken."
+        ) from None
+    return [
+        (np.array(tensions._value), np.array(forces._value).reshape(-1, 3), np.array(directions).reshape(-1, 3))
+        for tensions, forces, directions in recorded
+    ]
+
+
+def _recording_integrator(context):
+    integrator = context.getIntegrator()
+    if not CylinderChainIntegrator.isinstance(integrator):
+        raise InputError("The Context has no integrator of Filaments.create_integrator: it records no mean tensions.")
+    integrator = CylinderChainIntegrator.cast(integrator)
+    _refuse_unless_implicit(integrator.getScheme())
+    return integrator
+
+
+def _refuse_unless_implicit(scheme):
+    if scheme not in (SCHEMES[name] for name in IMPLICIT_SCHEMES):
+        raise InputError(
+            "Mean tensions belong to the implicit schemes: the explicit schemes have those of the configuration alone "
+            "(Filaments.joint_tensions)."
+        )
+
+
+def move_tethers(context, tethers, node_indices):
+    """Change tethers, pairs of a number and a Tether, in a Context; see ``Filaments.move_tethers``."""
+    for force in context.getSystem().getForces():
+        if CylinderChainForce.isinstance(force):
+            force = CylinderChainForce.cast(force)
+            for index, tether in tethers:
+                point = openmm.Vec3(*tether.point)
+                force.setTetherParameters(index, tether.filament, tether.node, point, tether.stiffness)
+            force.updateParametersInContext(context)
+
+
+def _add_chain(force, filament, nodes, viscosity, temperature):
+    kind = filament.type
+    friction = kind.segment_friction(viscosity, temperature, filament.segments)
+    chain = force.addChain(
+        [int(node) for node in nodes],
+        BENDING_MODELS[kind.bending_model],
+        STRETCHING_MODELS[kind.stretching_model],
+        kind.segment_length,
+        kind.segment_stiffness,
+        0.0 if kind.maximum_extension is None else kind.maximum_extension,
+        kind.joint_stiffness,
+        friction.parallel,
+        friction.perpendicular,
+        friction.rotational,
+        friction.extensional,
+        filament.closed,
+    )
+    force.setChainPlanar(chain, filament.planar)
+    for segment in range(filament.segments if filament.propulsion else 0):
+        force.setSegmentPropulsion(chain, segment, filament.propulsion)
+    for joint, stiffness in enumerate(filament.joint_stiffnesses):
+        force.setJointParameters(chain, joint, float(stiffness))
+
+
+def create_integrator(
+    system,
+    filaments,
+    node_indices,
+    viscosity,
+    temperature,
+    bath_temperature,
+    step_size,
+    scheme,
+    particle_friction,
+    seed,
+    flow=None,
+    checks=True,
+    precision="automatic",
+):
+    """Create the integrator of a System with filaments; see ``Filaments.create_integrator``."""
+    refuse_constraints(system, filaments, node_indices)
+    describe_chains(system, filaments, node_indices, viscosity, temperature)
+    others, frictions = describe_other_particles(system, np.concatenate(node_indices), particle_friction)
+    labels = [filament_label(number, filament) for number, filament in enumerate(filaments)]
+    advice = advice_after_blow_up(system)
+    integrator = NativeIntegrator(bath_temperature, step_size, scheme, seed, labels, flow, advice, checks, precision)
+    for particle, friction in zip(others, frictions):
+        integrator.setParticleFriction(int(particle), float(friction))
+    return integrator
+
+
+class NativeIntegrator(CylinderChainIntegrator):
+    """A CylinderChainIntegrator that knows filaments by their labels and raises the errors of this package.
+
+    Parameters
+    ----------
+    temperature : temperature
+        Zero is allowed: no noise.
+    step_size : time, or TimeStep
+    scheme : {"implicit", "implicit-second-order", "midpoint", "euler"}
+    random_seed : int
+        0 draws a fresh seed for each Context.
+    labels : sequence of str
+        What to call each chain in messages.
+    flow : Flow, optional
+        Of the solvent; at rest if not given.
+    advice : str
+        What else to say of a chain that has blown up.
+    checks : bool
+        Whether to look, while it runs, for signs of a step that is too long.
+    precision : {"automatic", "mixed", "double"}
+        As for ``Filaments.create_integrator``.
+
+    Attributes
+    ----------
+    checks : bool
+
+    Raises
+    ------
+    InputError
+        For an unknown scheme or precision, a negative temperature or a step size that is not positive.
+    """
+
+    def __init__(
+        self,
+        temperature,
+        step_size,
+        scheme="implicit",
+        random_seed=0,
+        labels=(),
+        flow=None,
+        advice="",
+        checks=True,
+        precision="automatic",
+    ):
+        temperature = non_negative(temperature, TEMPERATURE, "temperature")
+        super().__init__(temperature, _OTHER_FRICTION, as_step(step_size))
+        self.checks = checks
+        self._divided_steps = DividedSteps(len(labels))
+        self._work = ExplicitWork()
+        check_scheme(scheme)
+        check_precision(precision)
+        self._labels = list(labels)
+        self._advice = advice
+        self.setScheme(SCHEMES[scheme])
+        self.setPrecision(PRECISIONS[precision])
+        self.setRandomNumberSeed(random_seed)
+        self.setFlow(flow)
+
+    def step(self, steps):
+        """Advance by a number of steps.
+
+        Warns
+        -----
+        TimeStepWarning
+            Once, if more than one in a thousand steps of filaments had to be divided, and once if the work of explicit
+            forces shows that the step is too long for them; see ``step_watch``.
+
+        Raises
+        ------
+        InstabilityError
+            If a chain or a particle blows up; positions are then those before the failing step.
+        TimeStepError
+            If more than one in ten steps of filaments had to be divided, or if the step is far too long for the forces.
+        InputError
+            If a filament was torn because positions were wrapped into a periodic box, or if a segment of the positions
+            that were set is longer or shorter than its FENE potential allows.
+        """
+        steps = whole_number(steps, 0, "steps")
+        if not self.checks:
+            self.setWorkWindow(0)
+            self._advance(steps)
+            return
+        while steps > 0:
+            self.setWorkWindow(self._work.window)
+            # A window at most is finished meanwhile.
+            chunk = min(steps, self._work.window)
+            before = self.getNumDividedSteps()
+            self._advance(chunk)
+            steps -= chunk
+            self._divided_steps.add(chunk, self.getNumDividedSteps() - before)
+            work, particle, window, particles = self.takeExplicitWork()
+            if window:
+                self._work.add(work, particle, window, particles)
+
+    def setStepSize(self, size):
+        """Set the time step: a time, or a TimeStep."""
+        super().setStepSize(as_step(size))
+
+    def _advance(self, steps):
+        try:
+            super().step(steps)
+        except openmm.OpenMMException as error:
+            if "is torn" in str(error):
+                raise InputError(
+                    f"{self._with_labels(str(error))} (openmm_cylchain.systems.periodic.make_whole)."
+                ) from None
+            if "is out of range" in str(error):
+                raise InputError(f"{self._with_labels(str(error))}.") from None
+            if "has blown up" in str(error):
+                raise InstabilityError(self._with_labels(str(error)) + self._advice) from None
+            raise
+
+    def _with_labels(self, message):
+        message = message.replace("outside chains", "outside filaments")
+        chain = re.match(r"Chain (\d+)", message)
+        if chain is None or int(chain[1]) >= len(self._labels):
+            return message
+        return self._labels[int(chain[1])] + message[chain.end() :]
+
+    def setRandomNumberSeed(self, seed):
+        """Set the seed of the noise; 0 draws one for each Context that is created."""
+        seed = whole_number(seed, 0, "random_seed")
+        if seed >= 2**31:
+            raise InputError(f"random_seed must be below 2^31, but is {seed}.")
+        super().setRandomNumberSeed(seed)
+
+    def setPathLevel(self, level):
+        """Set the path level of the noise: that of two runs whose steps are h and h/2^level, at level 0 and at another
+        level, is that of the same Brownian path, if their seeds are equal. It holds for Contexts created later.
+
+        Raises
+        ------
+        InputError
+            If it is not a whole number between 0 and 20.
+        """
+        level = whole_number(level, 0, "path level")
+        if level > LARGEST_PATH_LEVEL:
+            raise InputError(f"path level must be at most {LARGEST_PATH_LEVEL}, but is {level}.")
+        super().setPathLevel(level)
+
+    def setRecordsTensions(self, records):
+        """Set whether mean tensions are recorded, in the last step of each call of ``step``.
+
+        ``Filaments.mean_joint_tensions`` and ``mean_tensions`` return them. The last step takes about a third longer
+        then.
+
+        Raises
+        ------
+        InputError
+            If the scheme is not "implicit".
+        """
+        if records:
+            _refuse_unless_implicit(self.getScheme())
+        super().setRecordsTensions(bool(records))
+
+    def getFlow(self):
+        """The Flow of the solvent."""
+        return _flow_of_integrator(self)
+
+    def setFlow(self, flow):
+        """Set the Flow of the solvent; None brings it to rest."""
+        flow = as_flow(flow)
+        super().setFlow(*(openmm.Vec3(*vector) for vector in (flow.velocity, *flow.gradient, flow.origin)))

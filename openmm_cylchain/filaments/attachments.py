@@ -1,0 +1,129 @@
+"""Attachment points: places on filaments where any OpenMM force can act.
+
+An attachment point is a virtual site between the two ends of a segment, x = (1-s) x_minus + s x_plus, and follows them
+in the same step. OpenMM hands a force on it to the ends in the same proportions, which is what a force F at the place s
+of a cylinder does: the sum is F, and the torque around the segment's middle (s-1/2) l t x F (step 5 of Section 4 of
+Pesek et al., Soft Matter 2016, 12, 3360).
+"""
+
+import math
+from collections import defaultdict
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+import openmm
+
+from ..errors import InputError
+from ..units.quantities import DIMENSIONLESS, LENGTH, in_units_of, non_negative, whole_number
+
+ATTACHMENT_NAME = "ATT"
+"""Atom name of attachment points in topologies."""
+
+
+@dataclass(frozen=True)
+class Attachment:
+    """A place on a filament.
+
+    Attributes
+    ----------
+    filament, segment : int
+    fraction : float
+        Of the segment's length, from its minus end: 0 to 1.
+    name : str
+        Of its atom in topologies.
+    """
+
+    filament: int
+    segment: int
+    fraction: float
+    name: str = ATTACHMENT_NAME
+
+
+def locate(filament, number, label, arc_length=None, segment=None, fraction=None):
+    """An Attachment from an arc length, or from a segment and a fraction of it.
+
+    Parameters
+    ----------
+    filament : Filament
+    number : int
+        Of the filament.
+    label : str
+        What to call the attachment point in messages.
+    arc_length : length, optional
+        Along segments of rest length, from the first node.
+    segment : int, optional
+        Negative numbers count from the end.
+    fraction : float, optional
+        0.5 if not given.
+
+    Raises
+    ------
+    InputError
+        If both or neither are given, or the place is not on the filament.
+    """
+    if (arc_length is None) == (segment is None):
+        raise InputError(f"{label}: give either arc_length or segment (and fraction).")
+    if arc_length is None:
+        return Attachment(number, _segment(segment, filament, label), _fraction(fraction, label))
+    if fraction is not None:
+        raise InputError(f"{label}: a fraction goes with a segment, not with an arc_length.")
+    arc_length = non_negative(arc_length, LENGTH, f"{label}: arc_length")
+    place = arc_length / filament.type.segment_length
+    if place > filament.segments * (1.0 + 1e-12):
+        contour = filament.segments * filament.type.segment_length
+        raise InputError(f"{label}: arc_length is {arc_length:g} nm, but the filament is {contour:g} nm long.")
+    segment = min(math.floor(place), filament.segments - 1)
+    return Attachment(number, segment, min(place - segment, 1.0))
+
+
+def _segment(segment, filament, label):
+    segment = whole_number(segment, -filament.segments, f"{label}: segment")
+    if segment >= filament.segments:
+        raise InputError(f"{label}: segment {segment} does not exist; there are {filament.segments}.")
+    return segment % filament.segments
+
+
+def _fraction(fraction, label):
+    fraction = 0.5 if fraction is None else in_units_of(fraction, DIMENSIONLESS, f"{label}: fraction")
+    if not isinstance(fraction, float) or not 0.0 <= fraction <= 1.0:
+        raise InputError(f"{label}: fraction must be a number between 0 and 1, but is {fraction}.")
+    return fraction
+
+
+def add_virtual_site(system, attachment, nodes):
+    """Add the particle of an attachment point to a System that holds the nodes of its filament; return its index."""
+    particle = system.addParticle(0.0)
+    minus, plus = int(nodes[attachment.segment]), int(nodes[(attachment.segment + 1) % len(nodes)])
+    site = openmm.TwoParticleAverageSite(minus, plus, 1.0 - attachment.fraction, attachment.fraction)
+    system.setVirtualSite(particle, site)
+    return particle
+
+
+def neighbors(attachments, particles, nodes):
+    """Pairs of particles of one filament that may coincide: attachment points, and the ends of their segments.
+
+    Parameters
+    ----------
+    attachments : sequence of Attachment
+    particles : sequence of int
+        Their particle indices.
+    nodes : sequence of int
+        Particle indices of the nodes.
+    """
+    on_segment = defaultdict(list)
+    for attachment, particle in zip(attachments, particles):
+        on_segment[attachment.segment].append(int(particle))
+    for segment, points in on_segment.items():
+        # Those at the end of a segment may meet those at the beginning of the next.
+        following = (segment + 1) % len(nodes)
+        others = [int(nodes[segment]), int(nodes[following]), *on_segment.get(following, ())]
+        yield from combinations(points, 2)
+        yield from ((point, other) for point in points for other in others)
+
+
+def attachment_positions(attachments, positions):
+    """Where attachment points are on a filament with node positions (n, 3): an array (attachments, 3)."""
+    segments = np.array([one.segment for one in attachments], dtype=int)
+    fractions = np.array([one.fraction for one in attachments], dtype=float)[:, None]
+    return (1.0 - fractions) * positions[segments] + fractions * positions[(segments + 1) % len(positions)]

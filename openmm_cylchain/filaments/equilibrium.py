@@ -1,0 +1,213 @@
+"""Exact equilibrium of the discrete chain: marginals of segment lengths and joint angles, and draws.
+
+In node coordinates the equilibrium is exp(-V/k_B T). With l0, not l, in the bending potential, segment
+lengths and joint angles are independent,
+
+    rho(l) ~ l^2 exp(-V_el(l)/k_B T)        eq. (19) of Pesek et al., Soft Matter 2016, 12, 3360
+    rho(c) ~ exp(-V_b(c)/k_B T)             c = t1.t2 in [-1, 1]
+
+and the azimuth of every joint is uniform, so every average below is exact at any stiffness. For filaments that move
+in a plane,
+
+    rho(l) ~ l exp(-V_el(l)/k_B T)
+    rho(theta) ~ exp(-V_b(cos theta)/k_B T)         theta in (-pi, pi)
+"""
+
+from functools import lru_cache
+
+import numpy as np
+from scipy.integrate import simpson
+
+from ..units.quantities import TEMPERATURE, positive, thermal_energy
+
+_GRID = 20001
+
+
+class _Marginal:
+    """A density exp(log_density) on a grid fine enough for both averages and draws."""
+
+    def __init__(self, coordinate, log_density):
+        weight = np.exp(log_density - np.max(log_density))
+        spacing = np.diff(coordinate)
+        cumulative = np.concatenate([[0.0], np.cumsum(0.5 * (weight[1:] + weight[:-1]) * spacing)])
+        self._coordinate = coordinate
+        self._weight = weight
+        self._cumulative = cumulative / cumulative[-1]
+
+    def mean(self, function):
+        """Average of ``function`` (of the coordinate) by Simpson's rule."""
+        values = np.where(self._weight > 0, function(self._coordinate), 0.0)
+        return simpson(values * self._weight, x=self._coordinate) / simpson(self._weight, x=self._coordinate)
+
+    def sample(self, generator, size):
+        """Independent draws by inversion of the cumulative distribution."""
+        return self.quantile(generator.random(size))
+
+    def quantile(self, probability):
+        """Where the cumulative distribution has the given values."""
+        return np.interp(probability, self._cumulative, self._coordinate)
+
+
+def _grid(low, high):
+    # Dense towards both ends, where potentials diverge within a narrow layer.
+    return low + (high - low) * 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, _GRID)))
+
+
+class SegmentLengthDistribution(_Marginal):
+    """Equilibrium distribution of the length of a segment, eq. (19): rho(l) ~ l^2 exp(-V_el/k_B T).
+
+    Parameters
+    ----------
+    filament_type : FilamentType
+    temperature : temperature, above zero
+    planar : bool
+        In a plane: rho(l) ~ l exp(-V_el/k_B T).
+    """
+
+    def __init__(self, filament_type, temperature, planar=False):
+        kT = thermal_energy(positive(temperature, TEMPERATURE, "temperature"))
+        rest, stiffness = filament_type.segment_length, filament_type.segment_stiffness
+        if filament_type.stretching_model == "fene":
+            extension = filament_type.maximum_extension * (1.0 - 1e-12)
+            low, high = rest - extension, rest + extension
+        else:
+            low, high = 0.0, np.inf
+        # Twelve standard deviations about the most probable length leave out less than 1e-30.
+        width = np.sqrt(kT / stiffness)
+        power = 1.0 if planar else 2.0
+        mode = 0.5 * (rest + np.sqrt(rest**2 + 4.0 * power * width**2))
+        length = _grid(max(low, mode - 12.0 * width), min(high, mode + 12.0 * width))
+        with np.errstate(divide="ignore"):
+            super().__init__(length, power * np.log(length) - filament_type.stretching_energy(length) / kT)
+
+
+class JointAngleDistribution(_Marginal):
+    """Equilibrium distribution of the cosine c = t1.t2 of a joint: rho(c) ~ exp(-V_b/k_B T) on [-1, 1].
+
+    Parameters
+    ----------
+    filament_type : FilamentType
+    temperature : temperature, above zero
+    joint_stiffness : float, optional
+        In kJ/mol; the type's if not given.
+    """
+
+    def __init__(self, filament_type, temperature, joint_stiffness=None):
+        kT = thermal_energy(positive(temperature, TEMPERATURE, "temperature"))
+        joint_stiffness = filament_type.joint_stiffness if joint_stiffness is None else joint_stiffness
+        cosine = _grid(1.0 - _widest_bend(joint_stiffness / kT), 1.0)
+        with np.errstate(divide="ignore", over="ignore"):
+            super().__init__(cosine, -filament_type.bending_energy(cosine, joint_stiffness) / kT)
+
+
+class PlanarJointAngleDistribution(_Marginal):
+    """Equilibrium distribution of the angle of a joint in a plane: rho(theta) ~ exp(-V_b/k_B T) on [-pi, pi].
+
+    Parameters
+    ----------
+    filament_type : FilamentType
+    temperature : temperature, above zero
+    joint_stiffness : float, optional
+        In kJ/mol; the type's if not given.
+    """
+
+    def __init__(self, filament_type, temperature, joint_stiffness=None):
+        kT = thermal_energy(positive(temperature, TEMPERATURE, "temperature"))
+        joint_stiffness = filament_type.joint_stiffness if joint_stiffness is None else joint_stiffness
+        widest = np.arccos(1.0 - _widest_bend(joint_stiffness / kT))
+        angle = _grid(-widest, widest)
+        with np.errstate(divide="ignore", over="ignore"):
+            super().__init__(angle, -filament_type.bending_energy(np.cos(angle), joint_stiffness) / kT)
+
+
+def _widest_bend(stiffness):
+    # V_b is at least K (1-c)*0.8, so 1-c up to 60 k_B T/K holds all of a stiff joint.
+    return 2.0 if stiffness < 50.0 else min(2.0, 100.0 / stiffness)
+
+
+@lru_cache(maxsize=32)
+def _length_distribution(filament_type, temperature, planar):
+    return SegmentLengthDistribution(filament_type, temperature, planar)
+
+
+@lru_cache(maxsize=32)
+def _angle_distribution(filament_type, temperature, planar, joint_stiffness):
+    kind = PlanarJointAngleDistribution if planar else JointAngleDistribution
+    return kind(filament_type, temperature, joint_stiffness)
+
+
+def _draw_joints(filament_type, temperature, generator, planar, stiffnesses):
+    # Angles of all joints in a plane, cosines in space.
+    probability = generator.random(len(stiffnesses))
+    drawn = np.empty(len(stiffnesses))
+    for stiffness in np.unique(stiffnesses):
+        chosen = stiffnesses == stiffness
+        distribution = _angle_distribution(filament_type, temperature, planar, float(stiffness))
+        drawn[chosen] = distribution.quantile(probability[chosen])
+    return drawn
+
+
+def draw_chain(
+    filament_type,
+    segments,
+    temperature,
+    generator,
+    start=(0.0, 0.0, 0.0),
+    direction=None,
+    planar=False,
+    stiffnesses=None,
+):
+    """Node positions of a chain drawn from the equilibrium of the free discrete chain.
+
+    Parameters
+    ----------
+    filament_type : FilamentType
+    segments : int
+    temperature : temperature, above zero
+    generator : numpy.random.Generator
+    start : (3,) array, nm
+        Position of the first node.
+    direction : (3,) array, optional
+        Unit vector of the first segment; drawn from the sphere, or the circle, if not given.
+    planar : bool
+        Draw from the equilibrium in the plane z = start[2].
+    stiffnesses : (segments - 1,) array, optional
+        Bending stiffnesses of the joints in kJ/mol; the type's if not given.
+
+    Returns
+    -------
+    (segments + 1, 3) array in nm
+    """
+    lengths = _length_distribution(filament_type, temperature, planar).sample(generator, segments)
+    if stiffnesses is None:
+        stiffnesses = np.full(segments - 1, filament_type.joint_stiffness)
+    joints = _draw_joints(filament_type, temperature, generator, planar, stiffnesses)
+    draw = _tangents_in_plane if planar else _tangents_in_space
+    steps = lengths[:, None] * draw(joints, generator, direction)
+    return np.asarray(start, dtype=float) + np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+
+
+def _tangents_in_plane(angles, generator, direction):
+    first = generator.uniform(-np.pi, np.pi) if direction is None else np.arctan2(direction[1], direction[0])
+    angle = first + np.concatenate([[0.0], np.cumsum(angles)])
+    return np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
+
+
+def _tangents_in_space(cosines, generator, direction):
+    azimuths = generator.uniform(0.0, 2.0 * np.pi, len(cosines))
+    if direction is None:
+        direction = generator.normal(size=3)
+    tangent = np.asarray(direction, dtype=float) / np.linalg.norm(direction)
+    normal = np.cross(tangent, np.eye(3)[np.argmin(np.abs(tangent))])
+    normal /= np.linalg.norm(normal)
+    tangents = [tangent]
+    for cosine, azimuth in zip(cosines, azimuths):
+        binormal = np.cross(tangent, normal)
+        across = np.cos(azimuth) * normal + np.sin(azimuth) * binormal
+        sine = np.sqrt((1.0 - cosine) * (1.0 + cosine))
+        tangent, normal = cosine * tangent + sine * across, cosine * across - sine * tangent
+        tangent /= np.linalg.norm(tangent)
+        normal -= tangent * (tangent @ normal)
+        normal /= np.linalg.norm(normal)
+        tangents.append(tangent)
+    return np.array(tangents)

@@ -1,0 +1,434 @@
+"""FilamentType: what a filament is made of, and presets for actin, DNA and microtubules."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from openmm import unit
+
+from ..errors import InputError
+from ..mechanics.friction import (
+    EndCorrections,
+    SegmentFriction,
+    affine_extensional_friction,
+    extensional_friction,
+    rotational_friction,
+    translational_friction_parallel,
+    translational_friction_perpendicular,
+)
+from ..mechanics.geometry import joint_cosines, segment_vectors
+from ..mechanics.potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
+from ..units.quantities import (
+    BENDING_RIGIDITY,
+    DIMENSIONLESS,
+    FORCE,
+    LENGTH,
+    MASS,
+    ROTATIONAL_FRICTION,
+    STIFFNESS,
+    TEMPERATURE,
+    TIME,
+    in_units_of,
+    positive,
+    thermal_energy,
+    whole_number,
+)
+from .joint_calibration import calibrated_stiffness
+
+
+@dataclass(frozen=True, kw_only=True)
+class FilamentType:
+    """Material, geometry and model of a filament: an immutable description.
+
+    All arguments are keywords and take ``openmm.unit`` quantities or plain numbers in OpenMM's
+    units; the attributes hold plain numbers in OpenMM's units (nm, ps, kJ/mol, Da).
+
+    Parameters
+    ----------
+    name : str
+        Residue name of its nodes in topologies and its name in messages; up to 5 letters or digits
+        so that every format can hold it.
+    diameter : length
+        Diameter d of the cylinder.
+    segment_length : length
+        Rest length l0 of a segment. With ``friction_length="segment"`` it must be long enough for eq. (6): every
+        ln(l0/d) + c positive.
+    persistence_length : length with temperature : temperature
+        The length l_p over which tangents of the free discrete chain decorrelate in space at that temperature:
+        ``<t_i.t_(i+k)> = exp(-k l0/l_p)``, exactly, for every bending model and segment length. The stiffness K of a
+        joint is the one with that average; K tends to a/l0, a = l_p k_B T, for segments that are short against l_p.
+        K, a property of the material, stays when the simulation runs at another temperature or in a plane. In a
+        plane ``<t_i.t_(i+k)>`` is about exp(-k l0/2 l_p), and exactly so in the limit of short segments.
+    bending_rigidity : energy*length
+        Instead of a persistence length: the rigidity a = EI, with K = a/l0 as in Pesek et al. 2016. Tangents then
+        decorrelate over another length than a/k_B T, by the order of l0: ``theory.chain_persistence_length``.
+        ``bending_rigidity=0`` is a freely jointed chain.
+    stretching_stiffness : energy/length^2, or stretching_modulus : force
+        Stiffness k of one segment, or the modulus EA of the material, k = EA/l0.
+    bending_model : {"inscribed-circle", "kratky-porod", "quadratic"}
+        V_b of a joint with c = t1.t2 and the stiffness K: 2K (1-c)/(1+c), eq. (27); K (1-c), eq. (26);
+        (K/2) theta^2.
+    stretching_model : {"harmonic", "fene"}
+        V_el of a segment: (k/2)(l-l0)^2, eq. (7), or -(k/2) D^2 ln(1-((l-l0)/D)^2).
+    maximum_extension : length
+        D of the FENE potential (required by it, refused otherwise): l stays within l0 - D and l0 + D.
+    extension_relaxation_time : time, or extensional_friction : energy*time
+        tau_l of eq. (20), or gamma_def itself. With neither, gamma_def is that of a cylinder that
+        deforms affinely, gamma_par l0^2/12.
+    end_corrections : EndCorrections
+        c_par, c_perp and c_r of eq. (6).
+    friction_length : "segment", "filament", or length
+        What the logarithm of eq. (6) takes: the segment's length, as Pesek et al. 2016; that of the whole filament, as
+        Chandran and Mofrad, Phys. Rev. E 2009, 79, 011906, "the ln term ... determined by the overall filament
+        dimensions"; or a length over which the filament is straight and all of it drags the solvent along, and the
+        segment's where that is longer. With "segment" the friction of a length of filament grows without end as it
+        is cut into shorter segments; with the other two it converges.
+    mass_per_length : mass/length
+        Only for the relaxation times of momenta, eq. (51), and for the masses that OpenMM asks for:
+        the dynamics is overdamped and does not depend on it.
+
+    Raises
+    ------
+    InputError
+        For a value that is missing, given twice, not finite, of the wrong unit, zero or negative.
+
+    Notes
+    -----
+    ``with_segment_length`` changes the segment length and rescales what should rescale.
+
+    A type keeps the persistence length as ``bending_rigidity`` a = l_p k_B T, the rigidity of the continuous filament,
+    with the ``temperature``: the two together mean the same as l_p = a/k_B T with the temperature. So
+    ``dataclasses.replace(kind, temperature=None)`` has joints of a/l0 instead.
+    """
+
+    name: str
+    diameter: float
+    segment_length: float
+    bending_rigidity: float = None
+    persistence_length: float = field(default=None, repr=False)
+    temperature: float = None
+    stretching_stiffness: float = None
+    stretching_modulus: float = None
+    bending_model: str = "inscribed-circle"
+    stretching_model: str = "harmonic"
+    maximum_extension: float = None
+    extension_relaxation_time: float = None
+    extensional_friction: float = None
+    end_corrections: EndCorrections = EndCorrections()
+    friction_length: str = "segment"
+    mass_per_length: float = 3500.0
+
+    def __post_init__(self):
+        self._check_name()
+        for attribute, dimension in (
+            ("diameter", LENGTH),
+            ("segment_length", LENGTH),
+            ("mass_per_length", MASS / LENGTH),
+            ("maximum_extension", LENGTH),
+            ("extension_relaxation_time", TIME),
+            ("extensional_friction", ROTATIONAL_FRICTION),
+            ("stretching_modulus", FORCE),
+            ("stretching_stiffness", STIFFNESS),
+        ):
+            value = getattr(self, attribute)
+            if value is not None:
+                self._set(attribute, positive(value, dimension, f"{attribute} of filament type {self.name!r}"))
+        self._resolve_bending()
+        self._resolve_stretching()
+        self._resolve_extension()
+        self._check_choices()
+        self._check_end_corrections()
+        self._check_segment_length()
+
+    def _set(self, attribute, value):
+        object.__setattr__(self, attribute, value)
+
+    def _fail(self, message):
+        raise InputError(f"Filament type {self.name!r}: {message}")
+
+    def _check_name(self):
+        name = self.name
+        if not (isinstance(name, str) and name.isascii() and name.isalnum() and len(name) <= 5):
+            raise InputError(f"The name of a filament type must be 1 to 5 letters or digits, but is {name!r}.")
+
+    def _resolve_bending(self):
+        name = f"of filament type {self.name!r}"
+        if (self.bending_rigidity is None) == (self.persistence_length is None):
+            self._fail(
+                "give either bending_rigidity or persistence_length (with its temperature). A type that exists has a "
+                "bending_rigidity: set it to None where persistence_length takes its place."
+            )
+        if self.persistence_length is None:
+            rigidity = in_units_of(self.bending_rigidity, BENDING_RIGIDITY, f"bending_rigidity {name}")
+            if not isinstance(rigidity, float) or rigidity < 0:
+                self._fail("bending_rigidity must be a single number that is not negative.")
+        elif self.temperature is None:
+            self._fail("persistence_length needs the temperature at which it holds.")
+        if self.temperature is not None:
+            self._set("temperature", positive(self.temperature, TEMPERATURE, f"temperature {name}"))
+        if self.persistence_length is not None:
+            length = positive(self.persistence_length, LENGTH, f"persistence_length {name}")
+            rigidity = length * thermal_energy(self.temperature)
+        self._set("bending_rigidity", rigidity)
+        self._set("persistence_length", None)
+
+    def _resolve_stretching(self):
+        if (self.stretching_stiffness is None) == (self.stretching_modulus is None):
+            self._fail("give either stretching_stiffness (of one segment) or stretching_modulus (EA).")
+
+    def _resolve_extension(self):
+        if self.extension_relaxation_time is not None and self.extensional_friction is not None:
+            self._fail("give either extension_relaxation_time or extensional_friction, not both.")
+
+    def _check_choices(self):
+        for attribute, choices in (
+            ("bending_model", tuple(BENDING_POTENTIALS)),
+            ("stretching_model", tuple(STRETCHING_POTENTIALS)),
+        ):
+            if getattr(self, attribute) not in choices:
+                self._fail(f"{attribute} must be one of {', '.join(choices)}, but is {getattr(self, attribute)!r}.")
+        if self.friction_length not in ("segment", "filament"):
+            self._check_friction_length()
+        if (self.stretching_model == "fene") != (self.maximum_extension is not None):
+            self._fail("maximum_extension must be given for stretching_model 'fene', and only for it.")
+        if self.maximum_extension is not None and self.maximum_extension > self.segment_length:
+            self._fail("maximum_extension must not exceed segment_length.")
+
+    def _check_friction_length(self):
+        if isinstance(self.friction_length, str):
+            self._fail(f"friction_length must be one of segment, filament, or a length, but is {self.friction_length}.")
+        length = positive(self.friction_length, LENGTH, f"friction_length of filament type {self.name!r}")
+        self._set("friction_length", length)
+
+    def _check_end_corrections(self):
+        if not isinstance(self.end_corrections, EndCorrections):
+            self._fail("end_corrections must be an EndCorrections(parallel, perpendicular, rotational).")
+        for direction in ("parallel", "perpendicular", "rotational"):
+            value = getattr(self.end_corrections, direction)
+            if not isinstance(in_units_of(value, DIMENSIONLESS, f"{direction} end correction"), float):
+                self._fail(f"the {direction} end correction must be a single number.")
+
+    def _check_segment_length(self):
+        if self.friction_length != "filament":
+            try:
+                self.segment_friction(viscosity=1.0, temperature=0.0)
+            except InputError as error:
+                self._fail(str(error))
+
+    @property
+    def segment_stiffness(self):
+        """Stretching stiffness k of one segment in kJ/(mol nm^2): given, or EA/l0."""
+        if self.stretching_stiffness is not None:
+            return self.stretching_stiffness
+        return self.stretching_modulus / self.segment_length
+
+    @property
+    def joint_stiffness(self):
+        """Bending stiffness K of one joint in kJ/mol: of the persistence length, or a/l0 of the bending rigidity."""
+        return self._stiffness_of_joint(self.segment_length)
+
+    @property
+    def clamped_joint_stiffness(self):
+        """Bending stiffness in kJ/mol of a joint next to a segment that is held: as if l0 were half as long, so 2a/l0.
+
+        Only the half segment on the free side bends. Of a persistence length: the direction of the first free segment
+        and that of the held one have ``<t.t'> = exp(-l0/2 l_p)``.
+        """
+        return self._stiffness_of_joint(0.5 * self.segment_length)
+
+    def _stiffness_of_joint(self, length):
+        if self.temperature is None or self.bending_rigidity == 0.0:
+            return self.bending_rigidity / length
+        kT = thermal_energy(self.temperature)
+        return kT * calibrated_stiffness(self.bending_model, length * kT / self.bending_rigidity)
+
+    @property
+    def segment_mass(self):
+        """Mass of one segment in Da."""
+        return self.mass_per_length * self.segment_length
+
+    @property
+    def bending_potential(self):
+        """The BendingPotential that ``bending_model`` names."""
+        return BENDING_POTENTIALS[self.bending_model]
+
+    @property
+    def stretching_potential(self):
+        """The StretchingPotential that ``stretching_model`` names."""
+        return STRETCHING_POTENTIALS[self.stretching_model]
+
+    def stretching_energy(self, length):
+        """Energy of segments of the given lengths (nm) in kJ/mol."""
+        return self.stretching_potential.energy(
+            self.segment_stiffness, self.segment_length, self.maximum_extension, length
+        )
+
+    def stretching_derivative(self, length):
+        """Derivative dV_el/dl at the given lengths (nm) in kJ/(mol nm)."""
+        return self.stretching_potential.derivative(
+            self.segment_stiffness, self.segment_length, self.maximum_extension, length
+        )
+
+    def bending_energy(self, cosine, stiffness=None):
+        """Energy of joints with the given cosines t1.t2 in kJ/mol; ``joint_stiffness`` if no stiffness is given."""
+        if self.bending_rigidity == 0.0:
+            return np.zeros_like(cosine, dtype=float)
+        return self.bending_potential.energy(self.joint_stiffness if stiffness is None else stiffness, cosine)
+
+    def bending_derivative(self, cosine, stiffness=None):
+        """Derivative dV_b/dc at the given cosines t1.t2 in kJ/mol; ``joint_stiffness`` if no stiffness is given."""
+        if self.bending_rigidity == 0.0:
+            return np.zeros_like(cosine, dtype=float)
+        return self.bending_potential.derivative(self.joint_stiffness if stiffness is None else stiffness, cosine)
+
+    def chain_energies(self, nodes, joint_stiffnesses=None, closed=False):
+        """Stretching and bending energy, in kJ/mol, of a chain with node positions (n, 3) in nm.
+
+        Parameters
+        ----------
+        nodes : (n, 3) array
+        joint_stiffnesses : (joints,) array, optional
+            As ``Filament.joint_stiffnesses``; those of a free chain if not given.
+        closed : bool
+            Whether the last node is joined to the first.
+        """
+        segments = segment_vectors(nodes, closed)
+        lengths = np.linalg.norm(segments, axis=1)
+        cosines = joint_cosines(segments / lengths[:, None], closed)
+        bending = self.bending_energy(cosines, joint_stiffnesses)
+        return float(np.sum(self.stretching_energy(lengths))), float(np.sum(bending))
+
+    def persistence_length_at(self, temperature):
+        """Persistence length a/(k_B T) of the continuous filament in nm at a temperature.
+
+        At the temperature for which ``persistence_length`` was given, that of the discrete chain, too, exactly.
+        ``theory.chain_persistence_length`` is that of the discrete chain at any temperature.
+        """
+        kT = thermal_energy(positive(temperature, TEMPERATURE, "temperature"))
+        return self.bending_rigidity / kT
+
+    def segment_friction(self, viscosity, temperature, segments=1):
+        """Friction coefficients of one segment in a solvent, eqs. (6) and (20).
+
+        Parameters
+        ----------
+        viscosity : pressure*time
+            Viscosity of the solvent; a plain number is in kJ ps/(mol nm^3), 602214 of which are 1 Pa s.
+        temperature : temperature
+            Enters eq. (20) only.
+        segments : int
+            Number of segments of the filament; matters only with ``friction_length="filament"``.
+
+        Returns
+        -------
+        SegmentFriction
+        """
+        segments = whole_number(segments, 1, "segments")
+        length, diameter = self.segment_length, self.diameter
+        logarithm_length = self._logarithm_length(segments)
+        corrections = self.end_corrections
+        # The rotational one first: with the usual end corrections it asks for the longest segments.
+        rotational = rotational_friction(length, diameter, viscosity, corrections.rotational, logarithm_length)
+        parallel = translational_friction_parallel(length, diameter, viscosity, corrections.parallel, logarithm_length)
+        perpendicular = translational_friction_perpendicular(
+            length, diameter, viscosity, corrections.perpendicular, logarithm_length
+        )
+        if self.extensional_friction is not None:
+            extensional = self.extensional_friction
+        elif self.extension_relaxation_time is not None:
+            extensional = extensional_friction(
+                self.extension_relaxation_time, self.segment_stiffness, length, temperature
+            )
+        else:
+            extensional = affine_extensional_friction(parallel, length)
+        return SegmentFriction(parallel, perpendicular, rotational, extensional)
+
+    def _logarithm_length(self, segments):
+        if self.friction_length == "filament":
+            return self.segment_length * segments
+        if self.friction_length == "segment":
+            return self.segment_length
+        return max(self.segment_length, self.friction_length)
+
+    def with_segment_length(self, segment_length):
+        """The same filament cut into segments of another length.
+
+        Rescaled: k = EA/l0 if a stretching modulus was given; the stiffness of the joints, so that the persistence
+        length stays, or as a/l0 if a bending rigidity was given; the friction coefficients; maximum_extension, in
+        proportion; extensional_friction, as the friction of length per segment scales, with l0^3. Unchanged:
+        diameter, persistence length or bending rigidity, a stretching
+        stiffness given for one segment (as Pesek et al. do in Table 3, so the filament as a whole
+        becomes softer or stiffer), extension_relaxation_time, end corrections, friction_length, mass per length.
+
+        Raises InputError for segments too short for their friction, see ``friction_length``.
+        """
+        length = positive(segment_length, LENGTH, f"segment_length of filament type {self.name!r}")
+        scale = length / self.segment_length
+        return replace(
+            self,
+            segment_length=length,
+            maximum_extension=None if self.maximum_extension is None else self.maximum_extension * scale,
+            extensional_friction=None if self.extensional_friction is None else self.extensional_friction * scale**3,
+        )
+
+
+_PICONEWTON = unit.piconewton
+_PICONEWTON_PER_NANOMETER = unit.piconewton / unit.nanometer
+
+F_ACTIN = FilamentType(
+    name="ACT",
+    diameter=6 * unit.nanometer,
+    persistence_length=17.2 * unit.micrometer,
+    temperature=310 * unit.kelvin,
+    stretching_stiffness=48.7 * _PICONEWTON_PER_NANOMETER,
+    segment_length=360 * unit.nanometer,
+    extension_relaxation_time=0.1 * unit.microsecond,
+    mass_per_length=3500 * unit.dalton / unit.nanometer,
+)
+"""F-actin as in Table 2 of Pesek et al., Soft Matter 2016, 12, 3360.
+
+d = 6 nm, l_p = 17.2 um at 310 K, k = 48.7 pN/nm for a segment of 360 nm (unchanged by
+``with_segment_length``, as in their Table 3), tau_l = 0.1 us, inscribed-circle bending (27); mass
+1.26 MDa per 360 nm (their Section 5). Tangents decorrelate over l_p; the joints of the paper have the stiffness
+l_p k_B T/l0, 3 % more: ``dataclasses.replace(F_ACTIN, temperature=None)``. Their sources: Yogurtcu et al., Biophys. J.
+2012, 103, 719 (d);
+Nagashima and Asakura 1980, Gittes et al. 1993 (l_p); Kojima et al. 1994 (k).
+"""
+
+DSDNA = FilamentType(
+    name="DNA",
+    diameter=2 * unit.nanometer,
+    persistence_length=43.3 * unit.nanometer,
+    temperature=310 * unit.kelvin,
+    stretching_modulus=1100 * _PICONEWTON,
+    segment_length=8 * unit.nanometer,
+    friction_length=8 * unit.nanometer,
+    mass_per_length=1940 * unit.dalton / unit.nanometer,
+)
+"""Double-stranded DNA, after the footnote on DNA of Pesek et al., Soft Matter 2016, 12, 3360.
+
+d = 2 nm, l_p = 43.3 nm, l0 = 8 nm (their sources: Odijk, Macromolecules 1995, 28, 7016; Wang et al.,
+Biophys. J. 1997, 72, 1335). EA = 1100 pN: the middle of what Wang et al. and Smith, Cui and Bustamante,
+Science 1996, 271, 795 report, 1000 to 1200 pN depending on salt. Affine extensional friction. Mass:
+660 Da per base pair of 0.34 nm. The flexibility holds at 310 K here; the paper does not say.
+
+Tangents decorrelate over 43.3 nm with segments of any length. A segment lengthens by 2 k_B T/EA = 0.008 nm on average
+as it fluctuates, however short it is: by 1 % with segments of 0.8 nm. The friction of a length of DNA is that of the
+paper's segments of 8 nm, or of longer ones, so that shorter segments, down to 1 nm and less, make up the same
+filament. It leaves out the flow that one segment makes at another. Of a whole rod, up to a persistence length or so,
+``friction_length="filament"`` is nearer to what is measured.
+"""
+
+MICROTUBULE = FilamentType(
+    name="MT",
+    diameter=25 * unit.nanometer,
+    bending_rigidity=2.2e7 * _PICONEWTON * unit.nanometer**2,
+    stretching_modulus=2.6e5 * _PICONEWTON,
+    segment_length=1 * unit.micrometer,
+    mass_per_length=1.6e5 * unit.dalton / unit.nanometer,
+)
+"""Microtubule: rigidity measured, stretching modulus estimated.
+
+EI = 2.2e-23 N m^2, that is l_p = 5.2 mm at 37 C: Gittes et al., J. Cell Biol. 1993, 120, 923. EA is an
+estimate, good to some 30 %: Young's modulus 1.2 GPa (same paper, from the same EI) times a wall of about
+220 nm^2. d = 25 nm. Affine extensional friction. Mass: 13 protofilaments of 100 kDa dimers every 8 nm.
+"""

@@ -1,0 +1,57 @@
+"""Stiffness of a joint from the length over which the tangents of the discrete chain decorrelate."""
+
+from functools import lru_cache
+
+import numpy as np
+from scipy.optimize import brentq
+
+from ..mechanics.potentials import BENDING_POTENTIALS
+
+_NODE, _WEIGHT = np.polynomial.legendre.leggauss(400)
+_LARGEST_DECORRELATION = 300.0
+
+
+def tangent_decorrelation(bending_model, reduced_stiffness):
+    """``-ln <c>`` of a joint in space: the average of c = t1.t2 with the weight exp(-V_b/k_B T), by quadrature.
+
+    Parameters
+    ----------
+    bending_model : str
+    reduced_stiffness : float, above zero
+        K/(k_B T), where K takes the place of a/l0 in the bending potential.
+    """
+    # V_b is at least K theta^2 2/pi^2, so that beyond the widest angle exp(-V_b/k_B T) vanishes.
+    widest = min(np.pi, 20.0 / np.sqrt(reduced_stiffness))
+    angle = 0.5 * widest * (_NODE + 1.0)
+    cosine = np.cos(angle)
+    measure = _WEIGHT * np.sin(angle)
+    energy = BENDING_POTENTIALS[bending_model].energy(reduced_stiffness, cosine)
+    norm = measure @ np.exp(-energy)
+    bend = measure @ (2.0 * np.sin(0.5 * angle) ** 2 * np.exp(-energy)) / norm
+    if bend < 0.5:
+        return -np.log1p(-bend)
+    # The average of c itself is zero, so exp(-v) - 1 serves as well as exp(-v) and keeps the digits of weak joints.
+    return -np.log(measure @ (cosine * np.expm1(-energy)) / norm)
+
+
+@lru_cache(maxsize=256)
+def calibrated_stiffness(bending_model, decorrelation):
+    """K/(k_B T) of the joint with ``<t1.t2> = exp(-decorrelation)``, the inverse of ``tangent_decorrelation``.
+
+    It tends to 1/decorrelation for stiff joints, and falls to zero for weak ones, without end: every bending model
+    reaches every mean cosine between 0 and 1.
+
+    Parameters
+    ----------
+    bending_model : str
+    decorrelation : float, above zero
+        l0/l_p.
+    """
+    # exp(-300) is no correlation at all to any precision.
+    decorrelation = min(decorrelation, _LARGEST_DECORRELATION)
+
+    def excess(logarithm):
+        return np.log(tangent_decorrelation(bending_model, np.exp(logarithm)) / decorrelation)
+
+    lowest, highest = np.log(1e-3) - decorrelation, np.log(3.0 / decorrelation + 3.0)
+    return float(np.exp(brentq(excess, lowest, highest, xtol=1e-14, rtol=1e-14)))

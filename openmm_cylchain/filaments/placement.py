@@ -1,0 +1,127 @@
+"""Checks of where filaments are put, before anything is built."""
+
+import numpy as np
+
+from ..errors import InputError
+from ..mechanics.geometry import joined, joint_cosines, segment_vectors
+from ..units.quantities import DIMENSIONLESS, in_units_of, whole_number
+
+_PLANE_TOLERANCE = 1e-9  # Of a segment's length: rounding of positions that were computed.
+
+
+def vector(value, target, name):
+    """Return ``value`` as a (3,) array in the unit ``target``; raise InputError if it has another shape."""
+    components = np.asarray(in_units_of(value, target, name))
+    if components.shape != (3,):
+        raise InputError(f"{name} must have three components, but has the shape {components.shape}.")
+    return components
+
+
+def unit_vector(direction, label, name="direction"):
+    """Return ``direction`` normalised; raise InputError if it is zero or not a vector."""
+    direction = vector(direction, DIMENSIONLESS, f"{label}: {name}")
+    norm = np.linalg.norm(direction)
+    if norm == 0:
+        raise InputError(f"{label}: {name} must not be the zero vector.")
+    return direction / norm
+
+
+def _check_folds(filament_type, vectors, lengths, label, closed):
+    if filament_type.bending_rigidity == 0.0:
+        return
+    cosines = joint_cosines(vectors / lengths[:, None], closed)
+    energies = filament_type.bending_energy(cosines)
+    if not np.all(np.isfinite(energies)) or np.any(cosines < -1.0 + 1e-12):
+        joint = int(np.argmin(cosines)) + (0 if closed else 1)
+        raise InputError(
+            f"{label}: the segments before and after node {joint} are antiparallel, where the bending force is not "
+            "defined; move the node."
+        )
+
+
+def named_nodes(nodes, count, label):
+    """Return nodes, counted from the start and sorted; raise InputError for one that does not exist."""
+    numbers = set()
+    for node in np.atleast_1d(np.asarray(nodes, dtype=object)):
+        number = whole_number(node, -count, f"{label} node")
+        number += count if number < 0 else 0
+        if number >= count:
+            raise InputError(f"{label} node {node} does not exist; there are {count} nodes.")
+        numbers.add(number)
+    return tuple(sorted(numbers))
+
+
+def clamped_nodes(clamped, count, label):
+    """Return the clamped nodes, counted from the start and sorted; raise InputError for one that does not exist."""
+    nodes = named_nodes(clamped, count, f"{label}: clamped")
+    if len(nodes) == count:
+        raise InputError(f"{label} has all of its nodes clamped (mass zero): leave at least one free to move.")
+    return nodes
+
+
+def joint_stiffnesses(filament_type, nodes, clamped, closed=False):
+    """Bending stiffness of every joint of a filament in kJ/mol; that next to a clamped segment differs.
+
+    Half a segment of material on either side of a joint bends. Where a segment is held, because both of its nodes are
+    clamped, and its neighbour is not, only the half on the neighbour's side can: the joint has
+    ``FilamentType.clamped_joint_stiffness``, about twice as much, and the filament is clamped at that node.
+
+    Parameters
+    ----------
+    filament_type : FilamentType
+    nodes : int
+    clamped : sequence of int
+    closed : bool
+
+    Returns
+    -------
+    (joints,) array
+        A ring has a joint at every node; an open filament at all nodes but its ends.
+    """
+    fixed = np.zeros(nodes, dtype=bool)
+    fixed[list(clamped)] = True
+    held = fixed & np.roll(fixed, -1)
+    before, behind = joined(held if closed else held[:-1], closed)
+    return np.where(before != behind, filament_type.clamped_joint_stiffness, filament_type.joint_stiffness)
+
+
+def planar_direction(direction, label):
+    """Return a unit vector in the plane of a planar filament; raise InputError if it leaves it."""
+    if abs(direction[2]) > _PLANE_TOLERANCE:
+        raise InputError(f"{label} is planar, so its direction must lie in the xy plane, but is {direction.tolist()}.")
+    return direction * [1.0, 1.0, 0.0]
+
+
+def check_shape(filament_type, positions, label, closed=False):
+    """Raise InputError for node positions (n, 3) in nm in which a force is not defined."""
+    vectors = segment_vectors(positions, closed)
+    lengths = np.linalg.norm(vectors, axis=1)
+    if np.any(lengths == 0.0):
+        node = int(np.argmax(lengths == 0.0))
+        raise InputError(f"{label}: nodes {node} and {(node + 1) % len(positions)} coincide; move them apart.")
+    if filament_type.maximum_extension is not None:
+        _check_extension(filament_type, lengths, label)
+    _check_folds(filament_type, vectors, lengths, label, closed)
+
+
+def in_one_plane(positions, segment_length, label):
+    """Return positions whose z is the same to the bit; raise InputError if they are not in a plane of constant z."""
+    heights = positions[:, 2]
+    if np.ptp(heights) > _PLANE_TOLERANCE * segment_length:
+        node = int(np.argmax(np.abs(heights - heights[0])))
+        raise InputError(
+            f"{label} is planar, so all of its nodes must have the same z, but node 0 is at z = {heights[0]:g} nm and "
+            f"node {node} at {heights[node]:g} nm."
+        )
+    positions[:, 2] = heights[0]
+    return positions
+
+
+def _check_extension(filament_type, lengths, label):
+    extension = np.abs(lengths - filament_type.segment_length)
+    segment = int(np.argmax(extension))
+    if extension[segment] >= filament_type.maximum_extension:
+        raise InputError(
+            f"{label}: segment {segment} is {lengths[segment]:.4g} nm long, outside the FENE potential's "
+            f"{filament_type.segment_length:g} -/+ {filament_type.maximum_extension:g} nm."
+        )

@@ -1,0 +1,109 @@
+"""Forces of a chain's own potentials on the ends of each segment, as joint tensions need them.
+
+OpenMM reports the total force on a node; the virtual force at a joint depends on how much of it acts
+on the segment before the joint and how much on the one behind it.
+"""
+
+import numpy as np
+
+from .geometry import joined, segment_vectors
+from .redistribution import joint_tensions, segment_forces_to_nodes
+
+
+def segment_end_forces(filament, nodes):
+    """Forces of stretching (8), bending (28) and propulsion on the ends of all segments of one filament.
+
+    A bending torque T on a segment is the pair of forces -T/l and T/l on its ends, with
+    T_i = -dV_b/dc (t_j - c t_i) for each joint with a neighbour j (the print of (28) lacks brackets and
+    a 1/l).
+
+    Parameters
+    ----------
+    filament : Filament
+    nodes : (n, 3) array in nm
+
+    Returns
+    -------
+    (minus, plus) : two (segments, 3) arrays in kJ/(mol nm)
+    """
+    difference = segment_vectors(nodes, filament.closed)
+    length = np.linalg.norm(difference, axis=1)
+    tangent = difference / length[:, None]
+    plus = -filament.type.stretching_derivative(length)[:, None] * tangent
+    if filament.type.bending_rigidity > 0.0 and len(length) > 1:
+        plus += _bending_end_forces(filament, length, tangent)
+    propulsion = 0.5 * filament.propulsion * tangent
+    return propulsion - plus, propulsion + plus
+
+
+def _bending_end_forces(filament, length, tangent):
+    before, behind = joined(np.arange(len(length)), filament.closed)
+    cosine = np.einsum("ij,ij->i", tangent[before], tangent[behind])
+    slope = filament.type.bending_derivative(cosine, filament.joint_stiffnesses)[:, None]
+    cosine = cosine[:, None]
+    plus = np.zeros_like(tangent)
+    plus[before] -= slope * (tangent[behind] - cosine * tangent[before]) / length[before, None]
+    plus[behind] -= slope * (tangent[before] - cosine * tangent[behind]) / length[behind, None]
+    return plus
+
+
+def split_external_forces(chains, forces, minus, plus):
+    """Add what the nodal forces hold beyond ``minus`` and ``plus`` to the ends of the segments.
+
+    Half to each of the two segments at a joint, all of it to the one segment at an end.
+
+    Returns
+    -------
+    (minus, plus) : two (segments, 3) arrays
+    """
+    external = forces - segment_forces_to_nodes(chains, minus, plus)
+    neighbours = np.zeros(chains.node_count)
+    np.add.at(neighbours, chains.first_node, 1.0)
+    np.add.at(neighbours, chains.second_node, 1.0)
+    share = external / neighbours[:, None]
+    return minus + share[chains.first_node], plus + share[chains.second_node]
+
+
+def filament_tensions(filaments, node_indices, chains, positions, forces, flow=None):
+    """Virtual forces Phi at the joints of all filaments, see ``Filaments.joint_tensions``.
+
+    Parameters
+    ----------
+    filaments : sequence of Filament
+    node_indices : sequence of int arrays
+        Particle indices of the nodes of each filament.
+    chains : ChainSet
+        The same filaments.
+    positions, forces : (particles, 3) arrays in nm and kJ/(mol nm)
+    flow : Flow, optional
+
+    Returns
+    -------
+    list of (joints, 3) arrays in kJ/(mol nm), one for each filament
+    """
+    ends = [segment_end_forces(one, positions[nodes]) for one, nodes in zip(filaments, node_indices)]
+    nodes = np.concatenate(node_indices)
+    minus, plus = (np.concatenate(one) for one in zip(*ends))
+    minus, plus = split_external_forces(chains, forces[nodes], minus, plus)
+    tensions = joint_tensions(chains, positions[nodes], minus, plus, flow)
+    boundaries = np.cumsum([filament.segments for filament in filaments])[:-1]
+    parts = np.split(tensions, boundaries)
+    return [part if filament.closed else part[:-1] for filament, part in zip(filaments, parts)]
+
+
+def axial_tensions(nodes, virtual_forces, closed=False):
+    """Components (joints,) of virtual forces (joints, 3) along a chain with nodes (n, 3), positive under tension.
+
+    The direction at a joint is that of the sum of the unit vectors along its two segments. Forces are in the order of
+    ``Filaments.joint_tensions``.
+    """
+    tangents = segment_vectors(nodes, closed)
+    tangents /= np.linalg.norm(tangents, axis=1)[:, None]
+    return components_along(tangents, virtual_forces)
+
+
+def components_along(tangents, virtual_forces):
+    """Components (joints,) of virtual forces (joints, 3) along a chain with unit vectors (segments, 3)."""
+    directions = tangents + np.roll(tangents, -1, axis=0)
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    return np.einsum("ij,ij->i", virtual_forces, directions[: len(virtual_forces)])

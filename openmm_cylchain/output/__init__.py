@@ -1,0 +1,1 @@
+"""What simulations write: reports and structure files."""

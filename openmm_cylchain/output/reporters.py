@@ -1,0 +1,340 @@
+"""Reporters of filaments, their tension, tethers and crosslinks, for ``simulation.reporters`` of OpenMM's app layer.
+
+They write CSV with a line for each filament, joint, tether or crosslink and report, which tables and spreadsheets read
+as it is, and keep what they wrote as NumPy arrays. Positions are taken as they are, not wrapped into a periodic box.
+
+With ``append=True`` they go on with a file that exists; a line that a killed run has left unfinished is cut off. A run
+that goes on from a checkpoint older than its last report writes the reports in between once more, as OpenMM's reporters
+do: of lines with the same step, the last holds.
+"""
+
+from abc import ABC, abstractmethod
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from ..mechanics.geometry import segment_vectors
+from ..mechanics.tension import axial_tensions, filament_tensions
+from ..units.quantities import whole_number
+
+
+class _TableReporter(ABC):
+    # What reporters of a table have in common: a line for each thing and report.
+
+    _columns = ()
+    _thing = ""
+    _include = ("positions",)
+
+    def __init__(self, file, reportInterval, append=False):  # noqa: N803 - OpenMM's name
+        self._interval = whole_number(reportInterval, 1, "reportInterval")
+        self._rows = []
+        self._reports = []
+        self._file = None
+        self._owned = isinstance(file, (str, Path))
+        header = ",".join(("step", "time_ps", self._thing, *self._columns))
+        if self._owned:
+            if append:
+                _cut_unfinished_line(Path(file), header)
+            file = open(file, "a" if append else "w", newline="")  # noqa: SIM115 - closed with the reporter
+        elif file is not None and not hasattr(file, "write"):
+            raise InputError(f"file must be a path, a file that is open for writing, or None, but is {file!r}.")
+        self._file = file
+        if file is not None and not (append and self._owned and file.tell() > 0):
+            print(header, file=file)
+
+    def describeNextReport(self, simulation):  # noqa: N802 - OpenMM's name
+        """When the next report is due, and that it needs positions; as OpenMM asks for it."""
+        steps = self._interval - simulation.currentStep % self._interval
+        return {"steps": steps, "periodic": False, "include": list(self._include)}
+
+    def report(self, simulation, state):
+        """Write a report; OpenMM calls it."""
+        time = state.getTime()._value
+        numbers, values = self._table(simulation, state)
+        self._reports.append((simulation.currentStep, time))
+        self._rows.append(values)
+        if self._file is None:
+            return
+        for number, row in zip(numbers, values):
+            cells = (simulation.currentStep, f"{time:.10g}", number, *(f"{value:.10g}" for value in row))
+            print(",".join(str(cell) for cell in cells), file=self._file)
+        self._file.flush()
+
+    @abstractmethod
+    def _table(self, simulation, state):
+        """What the line of each thing says it is, and a row of values for each."""
+
+    @property
+    def step(self):
+        """The steps of all reports so far."""
+        return np.array([step for step, _ in self._reports], dtype=int)
+
+    @property
+    def time(self):
+        """The times of all reports so far, in ps."""
+        return np.array([time for _, time in self._reports], dtype=float)
+
+    def close(self):
+        """Close the file, if the reporter has opened it."""
+        if self._owned and self._file is not None:
+            self._file.close()
+            self._file = None
+
+    def __del__(self):
+        if getattr(self, "_owned", False):
+            self.close()
+
+
+def _cut_unfinished_line(path, header):
+    if not path.exists():
+        return
+    with open(path, "r+b") as file:
+        end = 0
+        for line in file:
+            if not line.endswith(b"\n"):
+                break
+            if end == 0 and line.decode(errors="replace").strip() != header:
+                raise InputError(f"{path} is not a file of this reporter: its first line is not {header!r}.")
+            end += len(line)
+        file.truncate(end)
+
+
+class FilamentsReporter(_TableReporter):
+    """What reporters of things whose number does not change have in common: arrays (reports, things)."""
+
+    def __init__(self, file, reportInterval, filaments, append=False):  # noqa: N803 - OpenMM's name
+        self._filaments = filaments
+        self._nodes = filaments.node_indices
+        super().__init__(file, reportInterval, append)
+
+    def __getitem__(self, column):
+        """An array (reports, filaments or tethers) of a column."""
+        if column not in self._columns:
+            raise InputError(f"There is no column {column!r}: known are {', '.join(self._columns)}.")
+        table = np.array(self._rows, dtype=float).reshape(len(self._rows), -1, len(self._columns))
+        return table[:, :, self._columns.index(column)]
+
+
+class FilamentReporter(FilamentsReporter):
+    """Reports energies, end-to-end distance and contour length of every filament.
+
+    Columns: ``stretching_energy`` and ``bending_energy`` in kJ/mol, ``end_to_end_distance`` and ``contour_length`` in
+    nm. ``reporter["contour_length"]`` is an array (reports, filaments). The ends of a ring are one, at distance 0.
+
+    Parameters
+    ----------
+    file : str, Path, file object or None
+        None keeps the arrays alone.
+    reportInterval : int
+        In steps.
+    filaments : Filaments
+    append : bool
+        Go on with a file that exists.
+
+    Examples
+    --------
+    >>> simulation.reporters.append(FilamentReporter("filaments.csv", 100, filaments))  # doctest: +SKIP
+    """
+
+    _columns = ("stretching_energy", "bending_energy", "end_to_end_distance", "contour_length")
+    _thing = "filament"
+
+    def _table(self, simulation, state):
+        positions = state.getPositions(asNumpy=True)._value
+        rows = [_describe(filament, positions[nodes]) for filament, nodes in zip(self._filaments, self._nodes)]
+        return range(len(rows)), rows
+
+
+def _describe(filament, nodes):
+    segments = segment_vectors(nodes, filament.closed)
+    contour_length = np.linalg.norm(segments, axis=1).sum()
+    end_to_end_distance = 0.0 if filament.closed else np.linalg.norm(nodes[-1] - nodes[0])
+    return *filament.energies(nodes), end_to_end_distance, contour_length
+
+
+class TensionReporter(FilamentsReporter):
+    """Reports the tension in filaments: the component of the virtual force Phi of a joint along the chain.
+
+    Phi, eqs. (22)-(24), is the force that the segment after a joint exerts on the one before it, of all forces but the
+    random ones; see ``Filaments.joint_tensions``. The direction of the chain at a joint is that of the sum of the unit
+    vectors along its two segments. Tension is positive, compression negative.
+
+    Columns: ``mean_tension``, ``minimum_tension`` and ``maximum_tension`` over the joints of a filament, or with
+    ``joints=True`` a line for each joint with ``tension``, all in kJ/(mol nm); 1 pN is 0.602214 of these. Filaments of
+    one segment have no joints and are left out. ``reporter["mean_tension"]`` is an array (reports, filaments with
+    joints), ``reporter["tension"]`` one of (reports, joints of all filaments), and ``reporter.places`` says which.
+
+    Parameters
+    ----------
+    file : str, Path, file object or None
+        None keeps the arrays alone.
+    reportInterval : int
+        In steps.
+    filaments : Filaments
+    append : bool
+        Go on with a file that exists.
+    joints : bool
+        Report every joint rather than every filament.
+    mean : bool
+        Report tensions as means over the last step, with friction and noise (``Filaments.mean_axial_tensions``), which
+        scheme "implicit" of the compiled engine has; the integrator records them then. By default, they are
+        instantaneous ones without noise, of the configuration. ``mean_tension`` is the mean over joints in both cases.
+
+    Raises
+    ------
+    InputError
+        If no filament has joints; with ``mean=True``, during a run, if the integrator has another scheme.
+
+    Examples
+    --------
+    >>> simulation.reporters.append(TensionReporter("tension.csv", 100, filaments))  # doctest: +SKIP
+    """
+
+    def __init__(
+        self,
+        file,
+        reportInterval,  # noqa: N803 - OpenMM's name
+        filaments,
+        append=False,
+        joints=False,
+        mean=False,
+    ):
+        self._joints = bool(joints)
+        self._mean = bool(mean)
+        self._include = () if mean else ("positions", "forces")
+        if joints:
+            self._thing, self._columns = "filament,joint", ("tension",)
+            self.places = [(f, j) for f, filament in enumerate(filaments) for j in range(_joints(filament))]
+        else:
+            self._thing, self._columns = "filament", ("mean_tension", "minimum_tension", "maximum_tension")
+            self.places = [(number,) for number, filament in enumerate(filaments) if _joints(filament)]
+        if not self.places:
+            raise InputError("There are no tensions to report: filaments of one segment have no joints.")
+        self._chains = None
+        super().__init__(file, reportInterval, filaments, append)
+
+    def describeNextReport(self, simulation):  # noqa: N802 - OpenMM's name
+        if self._mean:
+            self._filaments.record_tensions(simulation.context)
+        return super().describeNextReport(simulation)
+
+    def _table(self, simulation, state):
+        tensions = self._means(simulation) if self._mean else self._present(simulation, state)
+        labels = [",".join(map(str, place)) for place in self.places]
+        if self._joints:
+            return labels, [(tension,) for tension in np.concatenate(tensions)]
+        return labels, [(tension.mean(), tension.min(), tension.max()) for tension in tensions]
+
+    def _means(self, simulation):
+        return [part._value for part in self._filaments.mean_axial_tensions(simulation.context) if len(part)]
+
+    def _present(self, simulation, state):
+        if self._chains is None:
+            self._chains = self._filaments.chain_set(simulation.system)
+        positions, forces = (values._value for values in (state.getPositions(True), state.getForces(True)))
+        flow = self._filaments.flow(simulation.context)
+        virtual = filament_tensions(self._filaments, self._nodes, self._chains, positions, forces, flow)
+        return [
+            axial_tensions(positions[nodes], phi, filament.closed)
+            for filament, nodes, phi in zip(self._filaments, self._nodes, virtual)
+            if len(phi)
+        ]
+
+
+def _joints(filament):
+    return len(filament.joint_stiffnesses)
+
+
+class TetherReporter(FilamentsReporter):
+    """Reports where every tether's point and node are, and the force of the tether on its node, -k (x - point).
+
+    Columns: ``point_x``, ``point_y``, ``point_z``, ``extension_x``, ``extension_y``, ``extension_z`` (x - point) in nm,
+    ``force_x``, ``force_y``, ``force_z`` in kJ/(mol nm). Points and stiffnesses are those of ``Filaments.move_tether``.
+
+    Parameters
+    ----------
+    file : str, Path, file object or None
+        None keeps the arrays alone.
+    reportInterval : int
+        In steps.
+    filaments : Filaments
+    append : bool
+        Go on with a file that exists.
+    """
+
+    _columns = tuple(f"{what}_{axis}" for what in ("point", "extension", "force") for axis in "xyz")
+    _thing = "tether"
+
+    def __init__(self, file, reportInterval, filaments, append=False):  # noqa: N803 - OpenMM's name
+        if not filaments.tethers:
+            raise InputError("There are no tethers to report: call add_tether first.")
+        super().__init__(file, reportInterval, filaments, append)
+
+    def _table(self, simulation, state):
+        positions = state.getPositions(asNumpy=True)._value
+        rows = []
+        for tether in self._filaments.tethers:
+            extension = positions[self._nodes[tether.filament][tether.node]] - tether.point
+            rows.append((*tether.point, *extension, *(-tether.stiffness * extension)))
+        return range(len(rows)), rows
+
+
+class CrosslinkReporter(_TableReporter):
+    """Reports the particles, length, extension and force of every crosslink that there is at a report.
+
+    Columns: ``particle_1``, ``particle_2``, ``length`` d and ``extension`` d - d0 in nm, ``force`` dV/dd in
+    kJ/(mol nm), positive where it pulls. A crosslink is known by its number, which no other one gets when it is
+    removed. Since each report may have more or fewer, ``reporter["force"]`` is an array (lines,) as in the file, beside
+    ``reporter["step"]``, ``reporter["time_ps"]`` and ``reporter["crosslink"]``; ``count`` says how many a report has.
+
+    Parameters
+    ----------
+    file : str, Path, file object or None
+        None keeps the arrays alone.
+    reportInterval : int
+        In steps.
+    crosslinks : Crosslinks
+        In the System that is simulated.
+    append : bool
+        Go on with a file that exists.
+
+    Examples
+    --------
+    >>> reporter = CrosslinkReporter("crosslinks.csv", 100, links)  # doctest: +SKIP
+    >>> simulation.reporters.append(reporter)  # doctest: +SKIP
+    >>> reporter["force"][reporter["crosslink"] == 3]  # doctest: +SKIP
+    """
+
+    _columns = ("particle_1", "particle_2", "length", "extension", "force")
+    _thing = "crosslink"
+
+    def __init__(self, file, reportInterval, crosslinks, append=False):  # noqa: N803 - OpenMM's name
+        self._crosslinks = crosslinks
+        self._numbers = []
+        super().__init__(file, reportInterval, append)
+
+    def _table(self, simulation, state):
+        table, lengths, forces = self._crosslinks.measure(simulation.context, state)
+        self._numbers.append(table.numbers)
+        return table.numbers, list(zip(*table.pairs.T, lengths, lengths - table.rest_length, forces))
+
+    @property
+    def count(self):
+        """How many crosslinks each report has: an array (reports,)."""
+        return np.array([len(numbers) for numbers in self._numbers], dtype=int)
+
+    def __getitem__(self, column):
+        """An array (lines,) of a column of the file."""
+        if column == "step":
+            return np.repeat(self.step, self.count)
+        if column == "time_ps":
+            return np.repeat(self.time, self.count)
+        if column == "crosslink":
+            return np.concatenate([np.zeros(0, dtype=int), *self._numbers])
+        if column not in self._columns:
+            known = ("step", "time_ps", self._thing, *self._columns)
+            raise InputError(f"There is no column {column!r}: known are {', '.join(known)}.")
+        index = self._columns.index(column)
+        kind = int if column.startswith("particle") else float
+        return np.array([row[index] for rows in self._rows for row in rows], dtype=kind)

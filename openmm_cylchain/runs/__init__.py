@@ -1,0 +1,1 @@
+"""The command "run": configuration, simulation, its directory and the summary."""

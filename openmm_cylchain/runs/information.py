@@ -1,0 +1,75 @@
+"""What is installed and what works: versions, engines and platforms."""
+
+import platform
+import sys
+import warnings
+
+import numpy as np
+import openmm
+import scipy
+
+from ..engines import available_engines
+from ..version import __version__
+
+
+def versions():
+    """Versions of this package and of what it stands on.
+
+    Returns
+    -------
+    dict of str
+    """
+    return {
+        "openmm-cylchain": __version__,
+        "openmm": openmm.Platform.getOpenMMVersion(),
+        "numpy": np.__version__,
+        "scipy": scipy.__version__,
+        "python": platform.python_version(),
+    }
+
+
+def platforms():
+    """The OpenMM platforms that are installed.
+
+    Returns
+    -------
+    dict
+        The name of every platform with None if a Context can be created on it, or with the reason why not.
+    """
+    installed = [openmm.Platform.getPlatform(index) for index in range(openmm.Platform.getNumPlatforms())]
+    return {each.getName(): _why_platform_is_unusable(each) for each in installed}
+
+
+def _why_platform_is_unusable(each):
+    system = openmm.System()
+    system.addParticle(1.0)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            openmm.Context(system, openmm.VerletIntegrator(0.001), each)
+    except openmm.OpenMMException as error:
+        return str(error) or type(error).__name__
+    return None
+
+
+def format_information():
+    """Versions, engines, platforms and plugins that failed to load, as text for people."""
+    failures = openmm.Platform.getPluginLoadFailures()
+    sections = [
+        ("Versions", versions()),
+        ("Engines", {name: _availability(reason) for name, reason in available_engines().items()}),
+        ("OpenMM platforms", {name: _availability(reason) for name, reason in platforms().items()}),
+    ]
+    lines = []
+    for title, entries in sections:
+        lines.append(title)
+        lines.extend(f"  {name:<16} {text}" for name, text in entries.items())
+    lines.append(f"OpenMM plugins that failed to load{'' if failures else ': none'}")
+    lines.extend(f"  {failure}" for failure in failures)
+    lines.append(f"OpenMM plugin directory\n  {openmm.Platform.getDefaultPluginsDirectory()}")
+    lines.append(f"Python\n  {sys.executable}")
+    return "\n".join(lines)
+
+
+def _availability(reason):
+    return "available" if reason is None else f"missing: {reason}"

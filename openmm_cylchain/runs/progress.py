@@ -1,0 +1,81 @@
+"""Progress of a run: one line updated in place on a terminal, an occasional line elsewhere."""
+
+import sys
+import time
+
+from ..units.text import format_time, time_unit
+
+_REFRESH_SECONDS = 0.2
+_LINE_FRACTION = 0.1
+
+
+class Progress:
+    """Reports how far a run is, how fast it goes and how long it will take.
+
+    Parameters
+    ----------
+    steps : int
+        Steps of the whole run.
+    first_step : int
+        The step from which this part of it starts.
+    time_step : float
+        In ps.
+    stream : file
+        Standard output if not given.
+    """
+
+    def __init__(self, steps, first_step, time_step, stream=None):
+        self._steps = steps
+        self._first = first_step
+        self._time_step = time_step
+        self._stream = sys.stdout if stream is None else stream
+        self._in_place = self._stream.isatty()
+        self._start = time.monotonic()
+        self._last_refresh = self._start
+        self._next_fraction = first_step / steps + _LINE_FRACTION
+        self._width = 0
+
+    def update(self, step):
+        """Report that the run has come to ``step``, if it is time to report."""
+        now = time.monotonic()
+        if self._in_place:
+            if now - self._last_refresh >= _REFRESH_SECONDS:
+                self._last_refresh = now
+                self._rewrite(self._line(step, now))
+        elif step / self._steps >= self._next_fraction and step < self._steps:
+            self._next_fraction = step / self._steps + _LINE_FRACTION
+            print(self._line(step, now), file=self._stream, flush=True)
+
+    def finish(self, step):
+        """Report the end of the run, or of this part of it."""
+        self._rewrite(self._line(step, time.monotonic()))
+        self._stream.write("\n")
+        self._stream.flush()
+
+    def _rewrite(self, line):
+        if self._in_place:
+            self._stream.write("\r" + line.ljust(self._width))
+            self._width = len(line)
+        else:
+            self._stream.write(line)
+        self._stream.flush()
+
+    def _line(self, step, now):
+        total = self._steps * self._time_step
+        unit, length = time_unit(total)
+        simulated = step * self._time_step
+        line = f"{100.0 * step / self._steps:5.1f} %  {simulated / length:.4g} of {total / length:.6g} {unit}"
+        elapsed = now - self._start
+        done = step - self._first
+        if done == 0 or elapsed <= 0:
+            return line
+        line += f"  {format_time(done * self._time_step / elapsed, 3)}/s"
+        if step == self._steps:
+            return f"{line}  took {_clock(elapsed)}"
+        return f"{line}  {_clock(elapsed * (self._steps - step) / done)} left"
+
+
+def _clock(seconds):
+    minutes, seconds = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{seconds:02}"

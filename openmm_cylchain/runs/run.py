@@ -1,0 +1,418 @@
+"""The run: filaments from a configuration, simulated into a directory, resumable after any interruption."""
+
+import contextlib
+import io
+import signal
+import threading
+import time
+
+import numpy as np
+import openmm
+from openmm import app, unit
+
+from ..dynamics.precision import PRECISIONS
+from ..errors import InputError, InstabilityError
+from ..filaments.equilibrium import draw_chain
+from ..filaments.placement import joint_stiffnesses
+from ..output.structure_files import write_lammps_data, write_psf
+from ..systems.filaments import Filaments
+from ..systems.step_check import check_time_step
+from ..theory import chain_mean_square_end_to_end
+from ..units.quantities import thermal_energy
+from ..units.text import format_time
+from .progress import Progress
+from .run_directory import Checkpoint, EnergyTable, RunDirectory, TrajectoryFile, write_atomically
+
+_SECONDS_BETWEEN_CHECKS = 0.2
+
+
+class RunInterrupted(Exception):  # noqa: N818 - not an error
+    """A run that a signal has ended after a checkpoint: the message says how to go on."""
+
+    def __init__(self, signal_number, message):
+        super().__init__(message)
+        self.signal_number = signal_number
+
+
+def run(configuration, output, resume=False):
+    """Run a configuration, or continue it, until its end.
+
+    Files in the output directory: ``configuration.toml``, ``topology.cif``, the same for VMD (``topology.psf``) and
+    OVITO (``topology.data``), ``trajectory.dcd`` (the initial configuration and one frame per report interval),
+    ``energies.csv`` and ``checkpoint.chk``. A resumed run ends with the same frames, to the bit, as one that was never
+    interrupted.
+
+    Parameters
+    ----------
+    configuration : Configuration
+    output : str or Path
+    resume : bool
+        Continue the run in ``output``; it starts from the beginning if there is no checkpoint yet.
+
+    Raises
+    ------
+    InputError
+        If the configuration cannot be simulated, or the directory is not that of this run.
+    InstabilityError
+        If the simulation blows up. Frames written before are kept.
+    RunInterrupted
+        After SIGINT or SIGTERM.
+    """
+    filaments = create_filaments(configuration)
+    simulation, positions = _create_simulation(configuration, filaments)
+    with RunDirectory(output) as directory:
+        checkpoint = directory.claim(configuration, resume)
+        settings = configuration.simulation
+        if checkpoint is not None and checkpoint.step == settings.steps:
+            print(f"The run in {directory.path} is finished: nothing to resume.")
+            return
+        if checkpoint is None:
+            if resume:
+                print("No checkpoint yet: starting from the beginning.")
+            _write_topology(directory, simulation, positions)
+            simulation.context.setPositions(positions)
+        else:
+            _restore(simulation.context, checkpoint, filaments.engine)
+            print(f"Resuming at step {checkpoint.step}, {format_time(checkpoint.step * settings.time_step)}.")
+        try:
+            _Recorder(configuration, filaments, simulation, directory, checkpoint).run_to_end()
+        except InstabilityError as error:
+            raise type(error)(
+                f"{error} What came before is kept in {directory.path}; run the changed configuration in another "
+                "directory."
+            ) from None
+
+
+def create_filaments(configuration):
+    """Filaments with the initial positions that a configuration asks for.
+
+    Filaments without a position are laid out side by side on a grid in the xy plane, centred on the origin;
+    they do not interact, so that is for the eye and for the digits of the single-precision trajectory.
+
+    Parameters
+    ----------
+    configuration : Configuration
+
+    Returns
+    -------
+    Filaments
+    """
+    solvent = configuration.solvent
+    filaments = Filaments(solvent.viscosity, solvent.temperature, configuration.simulation.engine)
+    centers = _grid_centers(configuration)
+    for group in configuration.filaments:
+        for _ in range(group.count):
+            nodes = _shape(group, configuration, len(filaments))
+            if group.position is None:
+                nodes += next(centers) - nodes.mean(axis=0)
+            else:
+                nodes += group.position
+            filaments.add_nodes(group.type, nodes, group.clamped)
+    return filaments
+
+
+def _shape(group, configuration, number):
+    # Nodes with the first one at the origin. Each filament has a seed of its own.
+    if group.start == "straight":
+        direction = np.array(group.direction or (1.0, 0.0, 0.0))
+        distance = np.arange(group.segments + 1) * group.type.segment_length
+        return distance[:, None] * direction / np.linalg.norm(direction)
+    generator = np.random.default_rng([configuration.simulation.seed, number])
+    return draw_chain(
+        group.type,
+        group.segments,
+        configuration.solvent.temperature,
+        generator,
+        direction=group.direction,
+        stiffnesses=joint_stiffnesses(group.type, group.segments + 1, group.clamped),
+    )
+
+
+def _grid_centers(configuration):
+    groups = [group for group in configuration.filaments if group.position is None]
+    count = sum(group.count for group in groups)
+    spacing = 1.1 * max((_extent(group, configuration.solvent.temperature) for group in groups), default=0.0)
+    columns = int(np.ceil(np.sqrt(count)))
+    rows = int(np.ceil(count / max(columns, 1)))
+    for number in range(count):
+        row, column = divmod(number, columns)
+        yield spacing * np.array([column - 0.5 * (columns - 1), 0.5 * (rows - 1) - row, 0.0])
+
+
+def _extent(group, temperature):
+    if group.start == "straight":
+        return group.segments * group.type.segment_length
+    return np.sqrt(chain_mean_square_end_to_end(group.type, group.segments, temperature))
+
+
+def _create_simulation(configuration, filaments):
+    settings = configuration.simulation
+    topology, system, positions = filaments.build()
+    platform, properties = _platform(settings, filaments.engine)
+    integrator = filaments.create_integrator(
+        system,
+        settings.time_step,
+        scheme=settings.scheme,
+        random_seed=settings.seed,
+        precision=_of_filaments(settings, filaments.engine) or "automatic",
+    )
+    try:
+        return app.Simulation(topology, system, integrator, platform, properties), positions
+    except openmm.OpenMMException as error:
+        raise InputError(
+            f'[simulation] platform = "{settings.platform}" cannot be used: {error}. "Reference" always can.'
+        ) from None
+
+
+def check_step(configuration, seconds=20.0, say=lambda message: None):
+    """Run a configuration for a while with its step and with half of it: see ``step_check.check_time_step``.
+
+    Parameters
+    ----------
+    configuration : Configuration
+    seconds : float
+        Time that it may take.
+    say : callable (str), optional
+        Told how far it is.
+
+    Returns
+    -------
+    StepCheck
+
+    Raises
+    ------
+    InputError
+        If the configuration cannot be simulated.
+    RunInterrupted
+        After SIGINT or SIGTERM.
+    """
+    settings = configuration.simulation
+    filaments = create_filaments(configuration)
+    _, system, positions = filaments.build()
+    platform, properties = _platform(settings, filaments.engine)
+    # An interruption that Python raises within a step may end as an error of OpenMM.
+    with _Signals() as signals:
+        check = check_time_step(
+            filaments,
+            system,
+            positions,
+            settings.time_step,
+            scheme=settings.scheme,
+            seconds=seconds,
+            random_seed=settings.seed,
+            equilibrium=all(group.start == "equilibrium" for group in configuration.filaments),
+            platform=platform,
+            properties=properties,
+            say=say,
+            stop=lambda: signals.received is not None,
+        )
+    if signals.received is not None:
+        raise RunInterrupted(signals.received, "The check has not come to its end: start it again.")
+    return check
+
+
+def _of_filaments(settings, engine):
+    # The precision if it is that of filaments. Others are of the platform, and so is any with the portable engine.
+    return settings.precision if engine == "compiled" and settings.precision in PRECISIONS else None
+
+
+def _platform(settings, engine):
+    names = [openmm.Platform.getPlatform(index).getName() for index in range(openmm.Platform.getNumPlatforms())]
+    if settings.platform not in names:
+        raise InputError(
+            f"[simulation] platform must be one of those that OpenMM has loaded, {', '.join(names)}, but is "
+            f"{settings.platform!r}."
+        )
+    platform = openmm.Platform.getPlatformByName(settings.platform)
+    properties = {}
+    # Forces must be summed in a fixed order for a resumed run to be identical to an unbroken one.
+    if "DeterministicForces" in platform.getPropertyNames():
+        properties["DeterministicForces"] = "true"
+    if settings.precision not in (None, "automatic") and _of_filaments(settings, engine) is None:
+        if "Precision" not in platform.getPropertyNames():
+            raise InputError(
+                f"[simulation] precision cannot be chosen on the platform {settings.platform}: leave it out."
+            )
+        properties["Precision"] = settings.precision
+    return platform, properties
+
+
+def _write_topology(directory, simulation, positions):
+    topology, system = simulation.topology, simulation.system
+    mmcif, psf, data = io.StringIO(), io.StringIO(), io.StringIO()
+    app.PDBxFile.writeFile(topology, positions, mmcif, keepIds=True)
+    write_psf(topology, psf, system)
+    write_lammps_data(topology, positions, data, system)
+    paths = (directory.topology, directory.topology_psf, directory.topology_data)
+    for path, text in zip(paths, (mmcif, psf, data)):
+        write_atomically(path, text.getvalue().encode())
+
+
+def _restore(context, checkpoint, engine):
+    if checkpoint.engine != engine:
+        raise InputError(
+            f"The run was started with the {checkpoint.engine} engine, and this is the {engine} one: resume with that, "
+            "or start it again in another directory."
+        )
+    try:
+        context.loadCheckpoint(checkpoint.state)
+    except openmm.OpenMMException as error:
+        raise InputError(
+            f"The checkpoint cannot be loaded: {error}. Resume on the machine and with the OpenMM version on which "
+            "the run was started."
+        ) from None
+
+
+class _Recorder:
+    # Advances the simulation and writes frames, energies and checkpoints at their times.
+
+    def __init__(self, configuration, filaments, simulation, directory, checkpoint):
+        self._settings = configuration.simulation
+        self._kT = thermal_energy(configuration.solvent.temperature)
+        self._filaments = filaments
+        self._simulation = simulation
+        self._directory = directory
+        self._checkpoint = checkpoint
+        self._step = 0 if checkpoint is None else checkpoint.step
+        self._segments = sum(filament.segments for filament in filaments)
+        self._joints = sum(filament.segments - 1 for filament in filaments)
+
+    def run_to_end(self):
+        settings = self._settings
+        self._trajectory = TrajectoryFile(
+            self._directory.trajectory,
+            self._simulation.topology,
+            settings.time_step,
+            settings.steps_per_report,
+            self._checkpoint,
+        )
+        self._energies = EnergyTable(self._directory.energies, self._checkpoint)
+        with contextlib.closing(self._trajectory), contextlib.closing(self._energies), _Signals() as signals:
+            if self._checkpoint is None:
+                self._report()
+            self._progress = Progress(settings.steps, self._step, settings.time_step)
+            try:
+                self._advance(signals)
+            finally:
+                self._progress.finish(self._step)
+
+    def _advance(self, signals):
+        settings = self._settings
+        chunk = 1
+        while self._step < settings.steps:
+            to_report = settings.steps_per_report - self._step % settings.steps_per_report
+            chunk = self._timed_steps(min(chunk, to_report))
+            if self._step % settings.steps_per_report == 0:
+                self._report()
+            interrupted = signals.received is not None
+            if interrupted or self._step % settings.steps_per_checkpoint == 0 or self._step == settings.steps:
+                self._write_checkpoint()
+            if interrupted:
+                raise RunInterrupted(
+                    signals.received,
+                    f"Interrupted at step {self._step} of {settings.steps}; a checkpoint is written. Continue with the "
+                    "same command and --resume.",
+                )
+            self._progress.update(self._step)
+
+    def _timed_steps(self, steps):
+        # Take some steps and return how many to take before signals are looked at again.
+        start = time.monotonic()
+        self._simulation.step(steps)
+        self._step += steps
+        elapsed = max(time.monotonic() - start, 1e-6)
+        return max(1, min(2 * steps, int(steps * _SECONDS_BETWEEN_CHECKS / elapsed)))
+
+    def _report(self):
+        context = self._simulation.context
+        state = context.getState(positions=True)
+        positions = state.getPositions(asNumpy=True).value_in_unit(unit.nanometer)
+        stretching, bending = self._energies_of(positions)
+        self._check_finite(positions, stretching, bending)
+        self._trajectory.write(positions)
+        self._energies.write(
+            self._step,
+            (
+                self._step * self._settings.time_step,
+                stretching,
+                bending,
+                stretching + bending,
+                stretching / self._segments / self._kT,
+                bending / self._joints / self._kT if self._joints else np.nan,
+                self._mean_end_to_end_distance(positions),
+            ),
+        )
+
+    def _energies_of(self, positions):
+        stretching = bending = 0.0
+        for filament, nodes in zip(self._filaments, self._filaments.node_indices):
+            with np.errstate(all="ignore"):
+                energies = filament.energies(positions[nodes])
+            stretching += energies[0]
+            bending += energies[1]
+        return stretching, bending
+
+    def _mean_end_to_end_distance(self, positions):
+        ends = np.array([(nodes[0], nodes[-1]) for nodes in self._filaments.node_indices])
+        return np.mean(np.linalg.norm(positions[ends[:, 1]] - positions[ends[:, 0]], axis=1))
+
+    def _check_finite(self, positions, stretching, bending):
+        if np.isfinite(stretching) and np.isfinite(bending) and np.all(np.isfinite(positions)):
+            return
+        for number, (filament, nodes) in enumerate(zip(self._filaments, self._filaments.node_indices)):
+            segment = _first_broken_segment(filament.type, positions[nodes])
+            if segment is not None:
+                raise InstabilityError(
+                    f"Filament {number} ({filament.type.name}) has blown up at segment {segment} by step {self._step}: "
+                    "its position or energy is not finite. Use a smaller time step."
+                )
+        raise InstabilityError(f"The energy is not finite in step {self._step}. Use a smaller time step.")
+
+    def _write_checkpoint(self):
+        size, header = self._trajectory.synchronise()
+        self._directory.write_checkpoint(
+            Checkpoint(
+                step=self._step,
+                engine=self._filaments.engine,
+                trajectory_size=size,
+                trajectory_header=header,
+                energies_size=self._energies.synchronise(),
+                state=self._simulation.context.createCheckpoint(),
+            )
+        )
+
+
+def _first_broken_segment(filament_type, nodes):
+    # The first segment of infinite energy or position, counting a joint as part of the segment before it.
+    segments = np.diff(nodes, axis=0)
+    with np.errstate(all="ignore"):
+        lengths = np.linalg.norm(segments, axis=1)
+        tangents = segments / lengths[:, None]
+        energies = np.array(filament_type.stretching_energy(lengths))
+        if filament_type.bending_rigidity > 0:
+            energies[:-1] += filament_type.bending_energy(np.sum(tangents[1:] * tangents[:-1], axis=1))
+    broken = np.flatnonzero(~np.isfinite(energies))
+    return int(broken[0]) if len(broken) else None
+
+
+class _Signals:
+    # Notes SIGINT and SIGTERM instead of dying at once; a second one of either kills as usual.
+
+    def __init__(self):
+        self.received = None
+        self._previous = {}
+
+    def __enter__(self):
+        if threading.current_thread() is threading.main_thread():
+            for number in (signal.SIGINT, signal.SIGTERM):
+                self._previous[number] = signal.signal(number, self._note)
+        return self
+
+    def _note(self, number, frame):
+        self.received = number
+        for either in self._previous:
+            signal.signal(either, signal.SIG_DFL)
+
+    def __exit__(self, *exception):
+        for number, handler in self._previous.items():
+            signal.signal(number, handler)

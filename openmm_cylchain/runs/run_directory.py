@@ -1,0 +1,310 @@
+"""The directory of a run: who may write into it, and files that survive a kill at any moment.
+
+The checkpoint records how long the trajectory and the energies were when it was made. It is replaced in
+one step once they are safely on disk, so whatever is written behind that point can be cut off again.
+"""
+
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from openmm import app
+
+from ..errors import InputError
+from ..version import __version__
+from .configuration import changed_keys, read_configuration
+
+_MAGIC = "openmm-cylchain checkpoint 1"
+_DCD_HEADER_SIZE = 92
+
+
+def write_atomically(path, data):
+    """Replace a file as a whole: after a kill it holds either the old or the new content.
+
+    Parameters
+    ----------
+    path : Path
+    data : bytes
+    """
+    temporary = path.with_name(path.name + ".new")
+    with open(temporary, "wb") as file:
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+    os.replace(temporary, path)
+    _sync_directory(path.parent)
+
+
+def _sync_directory(path):
+    if os.name == "posix":
+        descriptor = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """State of a run after ``step`` steps: OpenMM's checkpoint and the extent of the files at that moment."""
+
+    step: int
+    engine: str
+    trajectory_size: int
+    trajectory_header: bytes
+    energies_size: int
+    state: bytes
+
+
+class RunDirectory:
+    """A directory that one run at a time writes into; a context manager that holds its lock.
+
+    Parameters
+    ----------
+    path : str or Path
+        Made if it does not exist.
+    """
+
+    def __init__(self, path):
+        self.path = Path(path)
+        self.configuration = self.path / "configuration.toml"
+        self.topology = self.path / "topology.cif"
+        self.topology_psf = self.path / "topology.psf"
+        self.topology_data = self.path / "topology.data"
+        self.trajectory = self.path / "trajectory.dcd"
+        self.energies = self.path / "energies.csv"
+        self.checkpoint = self.path / "checkpoint.chk"
+        self.summary = self.path / "summary.json"
+        self.figure = self.path / "summary.png"
+
+    def __enter__(self):
+        if self.path.exists() and not self.path.is_dir():
+            raise InputError(f"The output directory {self.path} is a file: choose another name.")
+        self.path.mkdir(parents=True, exist_ok=True)
+        self._lock = open(self.path / ".lock", "a+b")
+        if not _try_lock(self._lock):
+            self._lock.close()
+            raise InputError(
+                f"Another run is writing into {self.path}: wait until it ends, or choose another output directory."
+            )
+        return self
+
+    def __exit__(self, *exception):
+        # Closing releases the lock; the file stays, because removing it would let two runs in.
+        self._lock.close()
+
+    def claim(self, configuration, resume):
+        """Make the directory that of a run with this configuration.
+
+        Parameters
+        ----------
+        configuration : Configuration
+        resume : bool
+            Whether to continue a run that is there.
+
+        Returns
+        -------
+        Checkpoint or None
+            Where to continue; None to start from the beginning.
+
+        Raises
+        ------
+        InputError
+            If the directory holds a run and ``resume`` is False, or a run of another configuration.
+        """
+        if resume and self.configuration.exists():
+            self._check_same(configuration)
+            return self._read_checkpoint()
+        self._check_vacant(configuration, resume)
+        write_atomically(self.configuration, configuration.text.encode())
+        return None
+
+    def _check_vacant(self, configuration, resume):
+        for path in (self.trajectory, self.checkpoint, self.energies, self.topology, self.summary, self.figure):
+            if path.exists():
+                advice = "but no configuration.toml to resume it with:" if resume else "continue it with --resume, or"
+                raise InputError(
+                    f"The output directory {self.path} already holds a run ({path.name}), {advice} choose another "
+                    "output directory."
+                )
+        if self.configuration.exists() and self.configuration.read_bytes() != configuration.text.encode():
+            raise InputError(
+                f"The output directory {self.path} already holds another configuration.toml: choose another output "
+                "directory."
+            )
+
+    def _check_same(self, configuration):
+        changed = changed_keys(read_configuration(self.configuration), configuration)
+        if changed:
+            raise InputError(
+                f"The configuration differs from the one that the run in {self.path} was started with, in "
+                f"{', '.join(changed)}. Resume with {self.configuration}, or start a new run in another directory."
+            )
+
+    def write_checkpoint(self, checkpoint):
+        """Replace the checkpoint; the trajectory and the energies must be on disk already."""
+        header = {
+            "format": _MAGIC,
+            "version": __version__,
+            "step": checkpoint.step,
+            "engine": checkpoint.engine,
+            "trajectory_size": checkpoint.trajectory_size,
+            "trajectory_header": checkpoint.trajectory_header.hex(),
+            "energies_size": checkpoint.energies_size,
+            "state_size": len(checkpoint.state),
+        }
+        write_atomically(self.checkpoint, json.dumps(header).encode() + b"\n" + checkpoint.state)
+
+    def _read_checkpoint(self):
+        if not self.checkpoint.exists():
+            return None
+        line, _, state = self.checkpoint.read_bytes().partition(b"\n")
+        try:
+            header = json.loads(line)
+            if header["format"] != _MAGIC or header["state_size"] != len(state):
+                raise ValueError
+            version = header["version"]
+            checkpoint = Checkpoint(
+                step=header["step"],
+                engine=header["engine"],
+                trajectory_size=header["trajectory_size"],
+                trajectory_header=bytes.fromhex(header["trajectory_header"]),
+                energies_size=header["energies_size"],
+                state=state,
+            )
+        except (ValueError, KeyError, TypeError):
+            raise InputError(
+                f"{self.checkpoint} is damaged or of another version: the run cannot be resumed. Delete it to start "
+                "from the beginning with --resume."
+            ) from None
+        self._check_version(version)
+        return checkpoint
+
+    def _check_version(self, version):
+        if version != __version__:
+            raise InputError(
+                f"The run in {self.path} was started with openmm_cylchain {version}, and this is {__version__}: resume "
+                "it with that version, or start it again in another directory."
+            )
+
+
+def _try_lock(file):
+    try:
+        import fcntl
+    except ImportError:
+        import msvcrt
+
+        lock, arguments = msvcrt.locking, (msvcrt.LK_NBLCK, 1)
+    else:
+        lock, arguments = fcntl.flock, (fcntl.LOCK_EX | fcntl.LOCK_NB,)
+    try:
+        lock(file.fileno(), *arguments)
+    except (BlockingIOError, PermissionError):
+        return False
+    return True
+
+
+def _open_at(path, size):
+    # Open for appending at a length that the file had at a checkpoint, and forget what was written since.
+    if not path.exists() or path.stat().st_size < size:
+        raise InputError(
+            f"{path} is missing or shorter than at the checkpoint: the run cannot be resumed. Start it again in "
+            "another directory."
+        )
+    file = open(path, "r+b")
+    file.truncate(size)
+    return file
+
+
+class TrajectoryFile:
+    """A DCD file that is written frame by frame and can be continued.
+
+    Parameters
+    ----------
+    path : Path
+    topology : openmm.app.Topology
+    time_step : float
+        In ps.
+    steps_per_frame : int
+    checkpoint : Checkpoint, optional
+        Where to continue; a new file if not given.
+    """
+
+    def __init__(self, path, topology, time_step, steps_per_frame, checkpoint=None):
+        if checkpoint is None:
+            self._file = open(path, "w+b")
+        else:
+            self._file = _open_at(path, checkpoint.trajectory_size)
+            # The number of frames stands in the header, which may be ahead of the checkpoint.
+            self._file.write(checkpoint.trajectory_header)
+        self._dcd = app.DCDFile(self._file, topology, time_step, 0, steps_per_frame, append=checkpoint is not None)
+
+    def write(self, positions):
+        """Append a frame of (particles, 3) positions in nm."""
+        self._dcd.writeModel(positions)
+
+    def synchronise(self):
+        """Bring everything to disk and return the size and the header of the file."""
+        self._file.flush()
+        os.fsync(self._file.fileno())
+        self._file.seek(0)
+        header = self._file.read(_DCD_HEADER_SIZE)
+        return self._file.seek(0, os.SEEK_END), header
+
+    def close(self):
+        """Close the file."""
+        self._file.close()
+
+
+ENERGY_COLUMNS = (
+    "step",
+    "time (ps)",
+    "stretching energy (kJ/mol)",
+    "bending energy (kJ/mol)",
+    "potential energy (kJ/mol)",
+    "stretching energy per segment (kT)",
+    "bending energy per joint (kT)",
+    "mean end-to-end distance (nm)",
+)
+
+
+class EnergyTable:
+    """A table of comma-separated values, a line per report, that can be continued.
+
+    Parameters
+    ----------
+    path : Path
+    checkpoint : Checkpoint, optional
+        Where to continue; a new file if not given.
+    """
+
+    def __init__(self, path, checkpoint=None):
+        if checkpoint is None:
+            self._file = open(path, "w+b")
+            self._file.write((",".join(ENERGY_COLUMNS) + "\n").encode())
+        else:
+            self._file = _open_at(path, checkpoint.energies_size)
+            self._file.seek(0, os.SEEK_END)
+
+    def write(self, step, values):
+        """Append a line: the step and a number for each further column (NaN where it has no meaning)."""
+        self._file.write(",".join([str(step), *(repr(float(value)) for value in values)]).encode() + b"\n")
+        self._file.flush()
+
+    def synchronise(self):
+        """Bring everything to disk and return the size of the file."""
+        self._file.flush()
+        os.fsync(self._file.fileno())
+        return self._file.tell()
+
+    def close(self):
+        """Close the file."""
+        self._file.close()
+
+
+def read_energies(path):
+    """Read an energy table: a dict of arrays by the names of ENERGY_COLUMNS."""
+    values = np.atleast_2d(np.loadtxt(path, delimiter=",", skiprows=1))
+    return dict(zip(ENERGY_COLUMNS, values.T))

@@ -1,0 +1,362 @@
+"""The summary of a run: observables of its trajectory against theory, as JSON, a table and a figure."""
+
+import contextlib
+import ctypes
+import json
+import math
+import os
+import sys
+import warnings
+from dataclasses import asdict, dataclass
+
+import mdtraj
+import numpy as np
+import openmm
+
+from .. import theory
+from ..analysis.statistics import FEWEST_FRAMES_OF_DRIFT, SIGNIFICANT_DRIFT, mean_with_error, statistical_inefficiency
+from ..analysis.trajectories import (
+    bending_drift,
+    end_to_end_vectors,
+    joint_cosines,
+    persistence_length,
+    segment_lengths,
+)
+from ..errors import EquilibrationWarning, InputError
+from ..filaments.equilibrium import SegmentLengthDistribution
+from ..units.quantities import thermal_energy
+from ..units.text import format_time
+from ..version import __version__
+from .run_directory import write_atomically
+
+_WORMLIKE = "the same, theory of the wormlike chain (25)"
+_ENOUGH_FILAMENTS = 8
+_AGREEMENT_SIGMA = 3.0
+_AGREEMENT_FRACTION = 0.05
+
+
+@dataclass(frozen=True)
+class Observable:
+    """An average over a run and what theory says.
+
+    Attributes
+    ----------
+    name, unit : str
+    value, standard_error : float
+    theory : float
+        Exact value for the free discrete chain in equilibrium, unless the name says otherwise.
+    deviation : float or None
+        (value - theory) in standard errors; None without an error.
+    relative_deviation : float or None
+        (value - theory)/theory.
+    verdict : str
+        "agrees" (within 3 standard errors), "within 5 %", "differs", "reference" (theory of another model) or
+        "not comparable".
+    """
+
+    name: str
+    unit: str
+    value: float
+    standard_error: float
+    theory: float
+    deviation: float
+    relative_deviation: float
+    verdict: str
+
+
+@dataclass(frozen=True)
+class GroupSummary:
+    """Observables of the filaments of one [[filament]] table, and remarks on how to read them."""
+
+    label: str
+    type: str
+    filaments: int
+    segments: int
+    start: str
+    in_equilibrium: bool
+    observables: tuple
+    notes: tuple
+
+
+def load_trajectory(configuration, directory):
+    """The trajectory of a run as an mdtraj.Trajectory with its times in ps."""
+    topology = mdtraj.load_topology(str(directory.topology))
+    with _silenced_c_library():
+        trajectory = mdtraj.load_dcd(str(directory.trajectory), top=topology)
+    settings = configuration.simulation
+    trajectory.time = np.arange(trajectory.n_frames) * settings.steps_per_report * settings.time_step
+    return trajectory
+
+
+@contextlib.contextmanager
+def _silenced_c_library():
+    # mdtraj's reader of DCD files prints two lines about the format from C.
+    if os.name != "posix":
+        yield
+        return
+    sys.stdout.flush()
+    standard_output, nowhere = os.dup(1), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 1)
+    try:
+        yield
+    finally:
+        ctypes.CDLL(None).fflush(None)
+        os.dup2(standard_output, 1)
+        os.close(standard_output)
+        os.close(nowhere)
+
+
+def group_members(configuration):
+    """Filament numbers that belong to each [[filament]] table: a list of ranges."""
+    ends = np.cumsum([0] + [group.count for group in configuration.filaments])
+    return [range(first, last) for first, last in zip(ends[:-1], ends[1:])]
+
+
+def group_labels(configuration):
+    """A short name for each [[filament]] table, distinct if there are several."""
+    labels = [
+        f"{group.count} × {group.type.name}, {group.segments} segment{'s' * (group.segments > 1)}"
+        for group in configuration.filaments
+    ]
+    if len(set(labels)) < len(labels):
+        labels = [f"{label} (table {number})" for number, label in enumerate(labels, start=1)]
+    return labels
+
+
+def is_in_equilibrium(group):
+    """Whether the exact averages of the free chain hold for a group from its first frame on.
+
+    One clamped node leaves lengths and angles alone; several hold the chain.
+    """
+    return group.start == "equilibrium" and len(group.clamped) <= 1
+
+
+def summarise(configuration, trajectory):
+    """Observables of a run against theory.
+
+    Parameters
+    ----------
+    configuration : Configuration
+    trajectory : mdtraj.Trajectory
+        See ``load_trajectory``.
+
+    Returns
+    -------
+    list of GroupSummary
+        One for each [[filament]] table.
+    """
+    labels = group_labels(configuration)
+    return [
+        _summarise_group(configuration, group, list(members), label, trajectory)
+        for group, members, label in zip(configuration.filaments, group_members(configuration), labels)
+    ]
+
+
+def _summarise_group(configuration, group, members, label, trajectory):
+    observables, short = [], []
+    comparable = is_in_equilibrium(group)
+    for name, unit, series, exact in _series(group, configuration.solvent.temperature, trajectory, members):
+        value, error = _mean_with_error(series)
+        slow = len(members) < _ENOUGH_FILAMENTS and statistical_inefficiency(series) > len(series) / 10
+        if slow and name != _WORMLIKE:
+            short.append(name)
+        observables.append(_compared(name, unit, value, error, exact, comparable))
+    observables += _persistence_length(group, configuration.solvent.temperature, trajectory, members, comparable)
+    return GroupSummary(
+        label=label,
+        type=group.type.name,
+        filaments=group.count,
+        segments=group.segments,
+        start=group.start,
+        in_equilibrium=comparable,
+        observables=tuple(observables),
+        notes=tuple(_notes(configuration, group, members, trajectory, short)),
+    )
+
+
+def _series(group, temperature, trajectory, members):
+    # (name, unit, (frames, filaments) averages, exact value) of every observable that is a plain average.
+    kT = thermal_energy(temperature)
+    kind = group.type
+    lengths = np.stack(segment_lengths(trajectory, members), axis=1)
+    distribution = SegmentLengthDistribution(kind, temperature)
+    yield (
+        "stretching energy per segment",
+        "kT",
+        kind.stretching_energy(lengths).mean(axis=2) / kT,
+        theory.stretching_energy_mean(kind, temperature) / kT,
+    )
+    yield "segment length", "nm", lengths.mean(axis=2), float(distribution.mean(lambda length: length))
+    if group.segments > 1:
+        cosines = np.stack(joint_cosines(trajectory, members), axis=1)
+        if kind.bending_rigidity > 0:
+            yield (
+                "bending energy per joint",
+                "kT",
+                kind.bending_energy(cosines).mean(axis=2) / kT,
+                theory.bending_energy_mean(kind, temperature) / kT,
+            )
+        yield "cosine of joint angle", "", cosines.mean(axis=2), theory.mean_joint_cosine(kind, temperature)
+    squares = np.sum(end_to_end_vectors(trajectory, members) ** 2, axis=2)
+    name = "mean square end-to-end distance"
+    yield name, "nm^2", squares, theory.chain_mean_square_end_to_end(kind, group.segments, temperature)
+    if kind.bending_rigidity > 0:
+        wormlike = theory.wlc_mean_square_end_to_end(
+            group.segments * kind.segment_length, kind.persistence_length_at(temperature)
+        )
+        yield _WORMLIKE, "nm^2", squares, float(wormlike)
+
+
+def _mean_with_error(series):
+    filaments = series.shape[1]
+    if filaments >= _ENOUGH_FILAMENTS:
+        means = series.mean(axis=0)
+        return float(means.mean()), float(means.std(ddof=1) / math.sqrt(filaments))
+    return mean_with_error(series)
+
+
+def _persistence_length(group, temperature, trajectory, members, comparable):
+    if group.segments < 2 or group.type.bending_rigidity == 0:
+        return []
+    try:
+        with warnings.catch_warnings():
+            # The notes say it.
+            warnings.simplefilter("ignore", EquilibrationWarning)
+            value, error = persistence_length(trajectory, members)
+    except InputError:
+        # The mean cosine of a very flexible or unrelaxed chain need not define one.
+        return []
+    exact = theory.chain_persistence_length(group.type, temperature)
+    return [_compared("persistence length", "nm", value, error, exact, comparable)]
+
+
+def _compared(name, unit, value, error, exact, comparable):
+    difference = value - exact
+    deviation = difference / error if error > 0 else None
+    relative = difference / exact if abs(exact) > 1e-6 else None
+    if not comparable:
+        verdict = "not comparable"
+    elif name == _WORMLIKE:
+        verdict = "reference"
+    elif deviation is not None and abs(deviation) <= _AGREEMENT_SIGMA:
+        verdict = "agrees"
+    elif relative is not None and abs(relative) <= _AGREEMENT_FRACTION:
+        verdict = f"within {100 * _AGREEMENT_FRACTION:.0f} %"
+    else:
+        verdict = "differs"
+    return Observable(name, unit, value, error, exact, deviation, relative, verdict)
+
+
+def _notes(configuration, group, members, trajectory, short):
+    if group.start == "straight":
+        yield (
+            "Started straight, not in equilibrium: the averages contain the relaxation, so they are not compared "
+            "with equilibrium."
+        )
+    bends = group.segments > 1 and trajectory.n_frames >= FEWEST_FRAMES_OF_DRIFT
+    drift = bending_drift(trajectory, members) if bends else 0.0
+    if abs(drift) > SIGNIFICANT_DRIFT:
+        yield (
+            f"Not in equilibrium from the first frame on: joints are {'more' if drift > 0 else 'less'} bent in the "
+            f"last half of the run than in its first quarter, by {abs(drift):.1f} standard errors. Leave out the "
+            "start, or run longer."
+        )
+    if len(group.clamped) > 1:
+        yield "Several nodes are clamped: the exact values are those of free chains, so they are not compared."
+    if group.count >= _ENOUGH_FILAMENTS:
+        yield (
+            f"Errors: standard error of the time averages of {group.count} independent filaments, which holds "
+            "however slowly a filament relaxes (persistence length: from its correlation in time)."
+        )
+    else:
+        yield "Errors: from fluctuations in time, accounting for their correlation, pooled over filaments."
+    if short:
+        yield (
+            f"The run is short against the correlation time of {', '.join(short)}: the error is a lower bound. Run "
+            f"longer, or at least {_ENOUGH_FILAMENTS} filaments."
+        )
+    if configuration.simulation.scheme == "euler":
+        yield 'Scheme "euler" has the drift of free segments: chain averages are biased at any time step.'
+    rounding = _rounding_share(configuration, group, trajectory)
+    if rounding > 0.01:
+        yield (
+            f"The single precision of the trajectory adds about {100 * rounding:.0f} % to the stretching energy here; "
+            "energies.csv is not affected."
+        )
+
+
+def _rounding_share(configuration, group, trajectory):
+    # DCD holds single-precision angstroms and mdtraj single-precision nm; each rounds both ends of a segment.
+    spacing = float(np.spacing(np.float32(10.0 * np.abs(trajectory.xyz).max()))) / 10.0
+    variance = 4.0 * spacing**2 / 12.0
+    return variance * group.type.segment_stiffness / thermal_energy(configuration.solvent.temperature)
+
+
+def write_summary(configuration, directory, groups):
+    """Write the summary as JSON into the directory of the run."""
+    settings = configuration.simulation
+    content = {
+        "title": configuration.title,
+        "openmm_cylchain": __version__,
+        "openmm": openmm.Platform.getOpenMMVersion(),
+        "platform": settings.platform,
+        "scheme": settings.scheme,
+        "temperature (K)": configuration.solvent.temperature,
+        "time step (ps)": settings.time_step,
+        "simulated time (ps)": settings.steps * settings.time_step,
+        "groups": [asdict(group) for group in groups],
+    }
+    write_atomically(directory.summary, (json.dumps(content, indent=2, allow_nan=False) + "\n").encode())
+
+
+_EXPLANATIONS = {
+    "agrees": f"agrees: within {_AGREEMENT_SIGMA:g} standard errors.",
+    f"within {100 * _AGREEMENT_FRACTION:.0f} %": (
+        "within 5 %: a deviation beyond chance, but of the size that a recommended time step may leave; a smaller "
+        "step reduces it."
+    ),
+    "reference": "reference: the continuous chain, to which the discrete one tends for short segments.",
+    "differs": "differs: more than 3 standard errors and 5 %. Try a smaller time step.",
+}
+
+
+def format_summary(configuration, groups):
+    """The summary as text for a terminal."""
+    settings = configuration.simulation
+    lines = [
+        f"{configuration.title or 'Run'}: {format_time(settings.steps * settings.time_step)} in steps of "
+        f"{format_time(settings.time_step)}, scheme {settings.scheme}"
+    ]
+    for group in groups:
+        lines += ["", group.label, *_table(group.observables), *(f"  {note}" for note in group.notes)]
+    verdicts = {observable.verdict for group in groups for observable in group.observables}
+    lines += ["", *(text for verdict, text in _EXPLANATIONS.items() if verdict in verdicts)]
+    return "\n".join(lines).rstrip()
+
+
+def _table(observables):
+    rows = [("", "average", "standard error", "theory", "deviation", "", "")]
+    for observable in observables:
+        deviation = "-" if observable.deviation is None else f"{observable.deviation:+.1f} sigma"
+        relative = observable.relative_deviation
+        if observable.verdict == "not comparable":
+            deviation, relative = "-", None
+        rows.append(
+            (
+                observable.name + (f" ({observable.unit})" if observable.unit else ""),
+                f"{observable.value:.6g}",
+                f"{observable.standard_error:.2g}",
+                f"{observable.theory:.6g}",
+                deviation,
+                "" if relative is None else f"{100 * relative:+.2g} %",
+                observable.verdict,
+            )
+        )
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    left = (0, len(widths) - 1)
+    return [
+        "  ".join(
+            ["", *(cell.ljust(widths[i]) if i in left else cell.rjust(widths[i]) for i, cell in enumerate(row))]
+        ).rstrip()
+        for row in rows
+    ]

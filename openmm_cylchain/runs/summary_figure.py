@@ -1,0 +1,260 @@
+"""The figure of a run: conformations, energies, tangent correlation and joint angles against theory."""
+
+import io
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from scipy.integrate import trapezoid
+
+from .. import theory
+from ..analysis.trajectories import joint_cosines, node_positions, segment_lengths, tangent_correlation
+from ..units.quantities import thermal_energy
+from ..units.text import time_unit
+from .run_directory import read_energies, write_atomically
+from .summary import group_labels, group_members, is_in_equilibrium
+
+_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
+_STRETCHING_COLOUR, _BENDING_COLOUR = "#D55E00", "#0072B2"
+_FONT_SIZE = 11
+
+
+def write_figure(configuration, directory, trajectory):
+    """Draw the figure of a run into its directory as PNG.
+
+    Parameters
+    ----------
+    configuration : Configuration
+    directory : RunDirectory
+    trajectory : mdtraj.Trajectory
+        See ``summary.load_trajectory``.
+    """
+    figure = Figure(figsize=(12, 9.5), layout="constrained")
+    FigureCanvasAgg(figure)
+    figure.get_layout_engine().set(w_pad=0.12, h_pad=0.12, hspace=0.03, wspace=0.03)
+    axes = figure.subplots(2, 2)
+    if configuration.title:
+        figure.suptitle(configuration.title, fontsize=_FONT_SIZE + 3)
+    groups = [
+        (group, list(members), label, _COLOURS[number % len(_COLOURS)])
+        for number, (group, members, label) in enumerate(
+            zip(configuration.filaments, group_members(configuration), group_labels(configuration))
+        )
+    ]
+    temperature = configuration.solvent.temperature
+    _draw_conformations(axes[0, 0], groups, trajectory)
+    _draw_energies(axes[0, 1], groups, temperature, read_energies(directory.energies))
+    _draw_tangent_correlation(axes[1, 0], groups, temperature, trajectory)
+    if any(group.segments > 1 for group, *_ in groups):
+        _draw_joint_angles(axes[1, 1], groups, temperature, trajectory)
+    else:
+        _draw_segment_lengths(axes[1, 1], groups, temperature, trajectory)
+    for axis in axes.flat:
+        axis.title.set_fontsize(_FONT_SIZE + 1)
+        axis.xaxis.label.set_fontsize(_FONT_SIZE)
+        axis.yaxis.label.set_fontsize(_FONT_SIZE)
+        axis.tick_params(labelsize=_FONT_SIZE - 1)
+    image = io.BytesIO()
+    figure.savefig(image, format="png", dpi=130)
+    write_atomically(directory.figure, image.getvalue())
+
+
+def _legend(axis, **options):
+    axis.legend(fontsize=_FONT_SIZE - 1, framealpha=0.85, edgecolor="none", **options)
+
+
+def _draw_histogram(axis, values, label, colour):
+    bins = int(np.clip(2.0 * len(values) ** (1.0 / 3.0), 10, 60))
+    axis.hist(values, bins=bins, density=True, color=colour, alpha=0.35, label=label)
+
+
+def _time_unit(time):
+    name, length = time_unit(time)
+    return name.replace("us", "µs"), length
+
+
+def _length_unit(length):
+    return ("µm", 1e3) if length >= 1e3 else ("nm", 1.0)
+
+
+def _draw_conformations(axis, groups, trajectory):
+    last = trajectory[-1]
+    for _, members, label, colour in groups:
+        for number, positions in enumerate(node_positions(last, members)):
+            nodes = positions[0]
+            axis.plot(
+                nodes[:, 0],
+                nodes[:, 1],
+                color=colour,
+                linewidth=1.8,
+                solid_capstyle="round",
+                label=label if number == 0 else None,
+            )
+    axis.set_aspect("equal", adjustable="datalim")
+    axis.margins(0.08)
+    axis.set_xticks([])
+    axis.set_yticks([])
+    for spine in axis.spines.values():
+        spine.set_color("0.7")
+    name, length = _time_unit(trajectory.time[-1])
+    axis.set_title(f"Filaments at {trajectory.time[-1] / length:.4g} {name}, projected on the xy plane")
+    _legend(axis, loc="upper left", bbox_to_anchor=(0.0, -0.01), borderaxespad=0.0)
+    _draw_scale_bar(axis)
+
+
+def _draw_scale_bar(axis):
+    # As long as a round number that is closest below a quarter of the width, below the frame on the right.
+    axis.apply_aspect()
+    width = np.diff(axis.get_xlim())[0]
+    decade = 10.0 ** np.floor(np.log10(width / 4))
+    length = max(step * decade for step in (1, 2, 5) if step * decade <= width / 4)
+    unit, scale = _length_unit(length)
+    transform = axis.transAxes
+    fraction = length / width
+    axis.plot(
+        [1.0 - fraction, 1.0],
+        [-0.03, -0.03],
+        color="black",
+        linewidth=3,
+        transform=transform,
+        clip_on=False,
+        solid_capstyle="butt",
+    )
+    axis.text(
+        1.0 - fraction / 2,
+        -0.045,
+        f"{length / scale:g} {unit}",
+        transform=transform,
+        ha="center",
+        va="top",
+        fontsize=_FONT_SIZE,
+    )
+
+
+def _draw_energies(axis, groups, temperature, energies):
+    kT = thermal_energy(temperature)
+    name, length = _time_unit(energies["time (ps)"][-1])
+    time = energies["time (ps)"] / length
+    kinds = [group for group, *_ in groups]
+    segments = np.array([group.count * group.segments for group in kinds])
+    joints = np.array([group.count * (group.segments - 1) for group in kinds])
+    stretching = np.array([theory.stretching_energy_mean(group.type, temperature) for group in kinds]) / kT
+    bending = np.array([theory.bending_energy_mean(group.type, temperature) for group in kinds]) / kT
+    curves = [("stretching", "segment", np.average(stretching, weights=segments), _STRETCHING_COLOUR)]
+    if np.any(joints * bending):
+        curves.append(("bending", "joint", np.average(bending, weights=joints), _BENDING_COLOUR))
+    for label, per, exact, colour in curves:
+        values = energies[f"{label} energy per {per} (kT)"]
+        axis.plot(time, values, color=colour, linewidth=1.0, alpha=0.8, label=f"{label}, per {per}")
+        axis.axhline(exact, color=colour, linewidth=1.8, linestyle="--", label=f"exact in equilibrium: {exact:.4g}")
+    axis.set_xlim(time[0], time[-1])
+    bottom, top = axis.get_ylim()
+    axis.set_ylim(min(0.0, bottom), top + 0.28 * (top - min(0.0, bottom)))
+    axis.set_xlabel(f"time ({name})")
+    axis.set_ylabel("energy (kT)")
+    axis.set_title("Energies, averaged over all filaments")
+    _legend(axis, loc="upper center", ncols=len(curves))
+
+
+def _draw_tangent_correlation(axis, groups, temperature, trajectory):
+    axis.set_title("Correlation of tangents along a filament")
+    drawn = [entry for entry in groups if entry[0].segments > 1]
+    unit, scale = _length_unit(max(group.segments * group.type.segment_length for group, *_ in groups))
+    axis.set_xlabel(f"distance s along the filament ({unit})")
+    axis.set_ylabel("⟨t(0)·t(s)⟩")
+    if not drawn:
+        axis.text(0.5, 0.5, "single segments", transform=axis.transAxes, ha="center", fontsize=_FONT_SIZE)
+        return
+    for group, members, label, colour in drawn:
+        correlation = tangent_correlation(trajectory, members)
+        every = slice(None, None, max(1, len(correlation.lag) // 20))
+        axis.errorbar(
+            correlation.contour_distance[every] / scale,
+            correlation.mean[every],
+            correlation.standard_error[every],
+            color=colour,
+            fmt="o",
+            markersize=4,
+            capsize=2.5,
+            linewidth=1.2,
+            label=label,
+        )
+        persistence = theory.chain_persistence_length(group.type, temperature)
+        if persistence > 0:
+            distance = np.linspace(0.0, group.segments * group.type.segment_length, 200)
+            label = f"exp(-s/lp), lp = {_format_length(persistence)}"
+            axis.plot(
+                distance / scale,
+                theory.wlc_tangent_correlation(distance, persistence),
+                color=colour,
+                linestyle="--",
+                linewidth=1.8,
+                label=label,
+            )
+    axis.set_xlim(0.0, max(group.segments * group.type.segment_length for group, *_ in drawn) / scale)
+    if len(drawn) == 1:
+        _legend(axis, loc="best")
+    else:
+        _legend(axis, loc="upper center", bbox_to_anchor=(0.5, -0.15), ncols=2)
+
+
+def _format_length(length):
+    unit, scale = _length_unit(length)
+    return f"{length / scale:.4g} {unit}"
+
+
+def _draw_joint_angles(axis, groups, temperature, trajectory):
+    kT = thermal_energy(temperature)
+    for group, members, label, colour in groups:
+        if group.segments < 2:
+            continue
+        cosines = np.clip(np.concatenate([c.ravel() for c in joint_cosines(trajectory, members)]), -1.0, 1.0)
+        angles = np.degrees(np.arccos(cosines))
+        _draw_histogram(axis, angles, label, colour)
+        angle = np.linspace(0.0, np.pi, 20001)
+        density = np.sin(angle)
+        if group.type.bending_rigidity > 0:
+            with np.errstate(divide="ignore"):
+                density *= np.exp(-group.type.bending_energy(np.cos(angle)) / kT)
+        degrees = np.degrees(angle)
+        density /= trapezoid(density, degrees)
+        widest = degrees[np.flatnonzero(density > 1e-3 * density.max())[-1]]
+        shown = degrees <= max(angles.max(), widest)
+        axis.plot(
+            degrees[shown],
+            density[shown],
+            color=colour,
+            linewidth=1.8,
+            linestyle=_line(group),
+            label=_exact_label(group),
+        )
+    axis.set_xlim(left=0.0)
+    axis.set_xlabel("angle between neighbouring segments (degrees)")
+    axis.set_ylabel("probability density (1/degree)")
+    axis.set_title("Joint angles")
+    _legend(axis, loc="upper right")
+
+
+def _draw_segment_lengths(axis, groups, temperature, trajectory):
+    kT = thermal_energy(temperature)
+    for group, members, label, colour in groups:
+        lengths = np.concatenate([values.ravel() for values in segment_lengths(trajectory, members)])
+        _draw_histogram(axis, lengths, label, colour)
+        width = 6.0 * np.sqrt(kT / group.type.segment_stiffness)
+        length = np.linspace(max(0.0, group.type.segment_length - width), group.type.segment_length + width, 2001)
+        energy = group.type.stretching_energy(length) / kT
+        density = length**2 * np.exp(-(energy - energy.min()))
+        density /= trapezoid(density, length)
+        axis.plot(length, density, color=colour, linewidth=1.8, linestyle=_line(group), label=_exact_label(group))
+    axis.set_xlabel("segment length (nm)")
+    axis.set_ylabel("probability density (1/nm)")
+    axis.set_title("Segment lengths")
+    _legend(axis, loc="best")
+
+
+def _line(group):
+    return "-" if is_in_equilibrium(group) else "--"
+
+
+def _exact_label(group):
+    return "exact" if is_in_equilibrium(group) else "exact for free chains in equilibrium"

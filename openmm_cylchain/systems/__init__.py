@@ -1,0 +1,1 @@
+"""Filaments in an OpenMM System: building it, its integrator, periodic boxes, and the check of a step."""

@@ -1,0 +1,555 @@
+"""Filaments: puts filaments into a Topology, a System and positions, new or existing."""
+
+from dataclasses import replace
+
+import numpy as np
+import openmm
+from openmm import app, unit
+
+from ..couplings.contacts import default_stiffness, filament_diameters, is_contact_force
+from ..dynamics.explicit_forces import ExplicitForces
+from ..dynamics.precision import check_precision
+from ..dynamics.time_step import (
+    as_step,
+    check_scheme,
+    contact_diffusion_step,
+    contact_time_step,
+    recommended_time_step,
+    shortest,
+    warn_if_driven_far,
+    warn_if_far_above,
+    warn_if_fene_is_wrong,
+    warn_if_strained,
+    warn_if_unstable,
+)
+from ..engines import choose_engine, default_scheme, load_engine
+from ..engines.description import describe_chains
+from ..errors import InputError
+from ..filaments.attachments import add_virtual_site, attachment_positions, neighbors
+from ..filaments.collection import FilamentCollection
+from ..filaments.placement import vector
+from ..mechanics.flow import as_flow
+from ..mechanics.tension import components_along, filament_tensions
+from ..units.quantities import FORCE, LENGTH, STIFFNESS, TEMPERATURE, in_units_of, non_negative, positive, whole_number
+from .insertion import (
+    add_nodes_to_system,
+    add_noninteracting_entries,
+    add_to_topology,
+    check_force_groups,
+    check_target,
+)
+
+
+class Filaments(FilamentCollection):
+    """Filaments in a solvent, to be added to an OpenMM System.
+
+    Parameters
+    ----------
+    viscosity : pressure*time
+        Viscosity of the solvent; a plain number is in kJ ps/(mol nm^3), 602214 of which are 1 Pa s.
+    temperature : temperature
+        For eq. (20), equilibrium draws and the default temperature of the integrator.
+    engine : {"compiled", "portable"}, optional
+        What computes the chains: the compiled plugin, which is much faster and runs on the Reference and
+        CPU platforms, or stock OpenMM forces and NumPy, on every platform. The compiled one if it is
+        installed and none is named.
+
+    Examples
+    --------
+    >>> from openmm import unit
+    >>> from openmm_cylchain import F_ACTIN, Filaments
+    >>> filaments = Filaments(viscosity=1.71e-3 * unit.pascal * unit.second, temperature=310 * unit.kelvin)
+    >>> filaments.add_straight(F_ACTIN, segments=10, start=[0, 0, 0], direction=[1, 0, 0])
+    0
+    >>> topology, system, positions = filaments.build()
+    >>> system.getNumParticles()
+    11
+    """
+
+    def __init__(self, viscosity, temperature, engine=None):
+        super().__init__(viscosity, temperature)
+        self._engine_name = choose_engine(engine)
+        self._engine = load_engine(self._engine_name)
+
+    @property
+    def engine(self):
+        """Name of the engine that computes the filaments."""
+        return self._engine_name
+
+    def build(self, box_vectors=None, stretching_force_group=0, bending_force_group=0):
+        """Put the filaments into a new Topology, System and positions.
+
+        Parameters
+        ----------
+        box_vectors : three (3,) lengths, optional
+            Periodic box vectors of the System and the Topology.
+        stretching_force_group, bending_force_group : int
+            Force groups of the chain's own forces. The compiled engine has one force for both, so they must
+            not differ.
+
+        Returns
+        -------
+        topology : openmm.app.Topology
+        system : openmm.System
+        positions : (particles, 3) Quantity in nm
+        """
+        topology, system = app.Topology(), openmm.System()
+        if box_vectors is not None:
+            vectors = [openmm.Vec3(*vector(edge, LENGTH, "box_vectors")) for edge in box_vectors]
+            system.setDefaultPeriodicBoxVectors(*vectors)
+            topology.setPeriodicBoxVectors(vectors * unit.nanometer)
+        positions = self.add_to(
+            topology, system, np.zeros((0, 3)) * unit.nanometer, stretching_force_group, bending_force_group
+        )
+        return topology, system, positions
+
+    def add_to(self, topology, system, positions, stretching_force_group=0, bending_force_group=0):
+        """Put the filaments into an existing Topology and System, behind what is there.
+
+        One filament becomes one chain of the Topology, with a residue and an atom (named "NOD") for each
+        node and bonds along it. Everything that was in the Topology and the System stays as it is.
+
+        Parameters
+        ----------
+        topology : openmm.app.Topology
+            Changed in place.
+        system : openmm.System
+            Changed in place. NonbondedForce and CustomNonbondedForce, which ask for parameters of every
+            particle, are given non-interacting entries for the nodes. (Where they use a long-range dispersion
+            correction, its constant changes, because OpenMM averages it over all particles.)
+        positions : (particles, 3) length
+            Positions of the particles that are there.
+        stretching_force_group, bending_force_group : int
+            Force groups of the chain's own forces. The compiled engine has one force for both, so they must
+            not differ.
+
+        Returns
+        -------
+        (particles, 3) Quantity in nm
+            The positions of everything.
+        """
+        if not self._filaments:
+            raise InputError("There are no filaments to add: call add_straight, add_nodes or add_equilibrium first.")
+        if self._nodes is not None:
+            raise InputError("These filaments are already in a System; make another Filaments for another System.")
+        positions = check_target(topology, system, positions)
+        check_force_groups(stretching_force_group, bending_force_group)
+        self._nodes = []
+        self._attachment_indices = np.zeros(len(self._attachments), dtype=int)
+        everything = [positions]
+        for number, filament in enumerate(self._filaments):
+            self._nodes.append(add_nodes_to_system(system, filament))
+            everything += [filament.positions, self._add_attachments(system, number)]
+            names = [self._attachments[index].name for index in self._attachments_of[number]]
+            add_to_topology(topology, filament, f"F{number}", names)
+        add_noninteracting_entries(system, len(positions), self._coinciding())
+        self._engine.add_forces(
+            system,
+            self._filaments,
+            self._nodes,
+            self._tethers,
+            self._viscosity,
+            self._temperature,
+            stretching_force_group,
+            bending_force_group,
+        )
+        return np.concatenate(everything) * unit.nanometer
+
+    def _add_attachments(self, system, number):
+        # Those of one filament; returns their positions.
+        attachments = [self._attachments[index] for index in self._attachments_of[number]]
+        for index, attachment in zip(self._attachments_of[number], attachments):
+            self._attachment_indices[index] = add_virtual_site(system, attachment, self._nodes[number])
+        return attachment_positions(attachments, self._filaments[number].positions)
+
+    def _coinciding(self):
+        for number, nodes in enumerate(self._nodes):
+            mine = self._attachments_of[number]
+            yield from neighbors([self._attachments[index] for index in mine], self._attachment_indices[mine], nodes)
+
+    def recommended_time_step(
+        self,
+        scheme=None,
+        contact_diameter=None,
+        contact_stiffness=None,
+        confidence=3.0,
+        *,
+        system=None,
+        temperature=None,
+        particle_friction=None,
+        flow=None,
+    ):
+        """The recommended step, and what binds: a TimeStep, which ``create_integrator`` takes.
+
+        It is that of the filament that allows the least (see ``timestep``), and, if a System is given, of its forces:
+        those that are not part of a filament act from the start of a step, and a spring of the stiffness k on a place
+        of the response mu h to a force in a step h has a variance too large by 1/(1 - k mu h/2). mu h is that of the
+        place on the straight filament (see ``mobility``), or h/gamma of a particle. The step leaves 5 % at most, with
+        all forces at once. Known are HarmonicBondForce, crosslinks, walls, contacts, constant forces, tethers, and
+        CustomBondForce and CustomExternalForce that are harmonic; walls as if all their particles were in contact, and
+        contacts of two filaments as if they crossed at their ends, or touched all along with an error of a third.
+        Other forces are listed in ``unknown_forces``.
+
+        Parameters
+        ----------
+        scheme : {"implicit", "implicit-second-order", "midpoint", "euler"}, optional
+            The engine's default if not given.
+        contact_diameter : length, or (filaments,) array of lengths, optional
+            Filaments that touch at this distance must not jump through each other, eq. (56), nor be thrown apart by
+            the contact force: see ``timestep.contact_time_step``. With a System, those of its contact force.
+        contact_stiffness : energy/length^2, optional
+            Of the contact force; that of ``contacts.default_stiffness`` if not given.
+        confidence : float
+            c_sigma of eq. (53): how many standard deviations of a displacement must stay below half the diameter.
+        system : openmm.System, optional
+            That the filaments were put into, with all of its forces.
+        temperature, particle_friction, flow : optional
+            As for ``create_integrator``.
+
+        Returns
+        -------
+        TimeStep
+            Its ``bounds`` have the bounds of filaments by name, and that of each force with the spring that binds, as
+            in "HarmonicBondForce (force 3): bond 12": the step at which it throws the System apart.
+
+        Raises
+        ------
+        InputError
+            If there are no filaments, they are not in the System, or particles lack a friction.
+        """
+        scheme = default_scheme(self._engine_name) if scheme is None else scheme
+        check_scheme(scheme)
+        if not self._filaments:
+            raise InputError("There are no filaments to recommend a time step for.")
+        steps = self._chain_steps(scheme, self._bath(temperature), as_flow(flow))
+        if contact_diameter is not None:
+            steps.append(self._contact_time_step(contact_diameter, contact_stiffness, confidence))
+        elif contact_stiffness is not None:
+            raise InputError("A contact_stiffness needs a contact_diameter.")
+        if system is not None:
+            self._refuse_if_not_in(system)
+            steps += self._contact_diffusion(system, self._bath(temperature), confidence)
+            forces = ExplicitForces(system, self, scheme, particle_friction)
+            steps.append(forces.recommended_step())
+        return shortest(steps)
+
+    def _bath(self, temperature):
+        return self._temperature if temperature is None else non_negative(temperature, TEMPERATURE, "temperature")
+
+    def _chain_steps(self, scheme, temperature, flow):
+        kinds = {(f.type, f.segments, f.closed) for f in self._filaments}
+        # In the order of the filaments, so that the first of equals is named.
+        ordered = sorted(kinds, key=[(f.type, f.segments, f.closed) for f in self._filaments].index)
+        return [
+            recommended_time_step(
+                kind, self._viscosity, temperature, scheme, segments, closed, flow, self._friction(kind, segments)
+            )
+            for kind, segments, closed in ordered
+        ]
+
+    def _friction(self, kind, segments):
+        # At the temperature of the filaments, whatever that of the run is.
+        return kind.segment_friction(self._viscosity, self._temperature, segments)
+
+    def _refuse_if_not_in(self, system):
+        if system.getNumParticles() <= max(nodes.max() for nodes in self.node_indices):
+            raise InputError("This is not the System that the filaments were put into: it has too few particles.")
+
+    def _contact_time_step(self, diameter, stiffness, confidence):
+        diameters = filament_diameters(diameter, len(self))
+        if stiffness is None:
+            if self._temperature == 0.0:
+                raise InputError("At a temperature of zero, contacts need a contact_stiffness.")
+            stiffness = default_stiffness(diameters.min(), self._temperature)
+        solvent = (self._viscosity, self._temperature)
+        steps = []
+        for number, (filament, d) in enumerate(zip(self._filaments, diameters)):
+            density = max(1.0, len(self._beads.get(number, ())) / filament.segments)
+            steps.append(
+                contact_time_step(filament.type, *solvent, d, stiffness, filament.segments, density, confidence)
+            )
+        return shortest(steps)
+
+    def _contact_diffusion(self, system, temperature, confidence):
+        # Of filaments that a contact force of the System keeps apart.
+        found = {}
+        for force in system.getForces():
+            if is_contact_force(force):
+                for filament, beads in zip(self._filaments, self.bead_indices):
+                    diameter = force.getParticleParameters(int(beads[0]))[0] if len(beads) else 0.0
+                    if diameter > 0.0:
+                        found[filament.type, filament.segments, diameter] = True
+        return [
+            contact_diffusion_step(kind, self._friction(kind, segments), temperature, diameter, confidence)
+            for kind, segments, diameter in found
+        ]
+
+    def create_integrator(
+        self,
+        system,
+        step_size,
+        scheme=None,
+        temperature=None,
+        particle_friction=None,
+        random_seed=0,
+        flow=None,
+        checks=True,
+        precision="automatic",
+    ):
+        """Create the integrator that moves the filaments and everything else in the System.
+
+        Call it when all forces and particles are in the System: it also adds to the System the force
+        that redistributes forces along the chains.
+
+        Parameters
+        ----------
+        system : openmm.System
+            The System that the filaments were put into.
+        step_size : time, or TimeStep
+        scheme : {"implicit", "implicit-second-order", "midpoint", "euler"}, optional
+            "implicit", the compiled engine's default, takes stretching, bending and tethers at the end of the step,
+            and steps a thousand times as long as explicit ones. "implicit-second-order" does so in two stages, with
+            decay of bends of second order in the step. "midpoint", the portable engine's default, is Fixman's
+            explicit scheme with the right drift on chains. "euler" is Section 4 of the paper, biased on chains.
+        temperature : temperature, optional
+            That of the filaments if not given.
+        particle_friction : energy*time/length^2, or array of them
+            Friction coefficients of the particles outside filaments, in the order of their indices; a
+            number holds for all of them. Values for massless particles are ignored: those do not move.
+            ``stokes_friction`` computes one.
+        random_seed : int
+            0 draws a fresh seed from the operating system.
+        flow : Flow, optional
+            Flow of the solvent. ``integrator.setFlow(flow)`` changes it during a run.
+        checks : bool
+            Whether to look for a step that is too long, now and while it runs (see ``step_watch``). The attribute
+            ``checks`` of the integrator turns the latter off and on.
+        precision : {"automatic", "mixed", "double"}
+            "mixed" computes what happens within a step in single precision, wherever that changes no result beyond its
+            statistical error: for open filaments with harmonic lengths and an implicit scheme of the compiled engine,
+            above zero temperature, without flow, while 4 h K/gamma_rot is at most 10^4, k l0^2/k_BT at most 10^9, and
+            noise changes lengths by 10^-5 of themselves in a step, or more.
+            Positions and forces are in double precision, and other filaments altogether. "automatic" does so where it
+            is faster as well, about twice as fast: where there are enough filaments of similar length. With the
+            portable engine it is the same as "double". ``integrator.getNumMixedPrecisionChains()`` says for how many
+            filaments the last step did so.
+
+        Returns
+        -------
+        openmm.Integrator
+            Of the engine: a NativeIntegrator or a PortableIntegrator.
+
+        Warns
+        -----
+        TimeStepWarning
+            If the step exceeds a bound of stability, or the recommended step of a filament more than four times; if
+            forces of the System are so stiff that variances double (k mu h > 1, see ``recommended_time_step``); if it
+            is too long for the flow or for self-propelled filaments; or if FENE lengths have too much energy at it
+            (``timestep.fene_steps``).
+
+        Raises
+        ------
+        InputError
+            If the engine does not have the scheme or the precision, or the System does not hold the filaments.
+        """
+        step_size = as_step(step_size)
+        check_precision(precision)
+        self._refuse_if_not_in(system)
+        scheme = default_scheme(self._engine_name) if scheme is None else scheme
+        check_scheme(scheme)
+        flow = as_flow(flow)
+        bath = self._bath(temperature)
+        if checks:
+            self._check_step(system, step_size, scheme, bath, particle_friction, flow)
+        return self._engine.create_integrator(
+            system,
+            self._filaments,
+            self._nodes,
+            self._viscosity,
+            self._temperature,
+            bath,
+            step_size,
+            scheme,
+            particle_friction,
+            random_seed,
+            flow,
+            checks,
+            precision,
+        )
+
+    def _check_step(self, system, step, scheme, bath, particle_friction, flow):
+        warn_if_strained(step, flow)
+        for f in {(f.type, f.segments, f.propulsion, f.closed): f for f in self._filaments}.values():
+            warn_if_driven_far(f.type, self._viscosity, self._temperature, step, f.segments, f.propulsion)
+            if not warn_if_unstable(f.type, self._viscosity, self._temperature, step, f.segments, scheme):
+                friction = self._friction(f.type, f.segments)
+                warn_if_far_above(f.type, self._viscosity, bath, step, f.segments, scheme, f.closed, friction)
+                warn_if_fene_is_wrong(f.type, bath, step, friction, scheme)
+        ExplicitForces(system, self, scheme, particle_friction).warn_if_too_stiff(step)
+
+    def chain_set(self, system):
+        """The filaments as an engine sees them (a ``ChainSet``): friction of segments and fixed nodes."""
+        return describe_chains(system, self._filaments, self.node_indices, self._viscosity, self._temperature)
+
+    def joint_tensions(self, context):
+        """Instantaneous virtual forces Phi at the joints, without noise, in the context's configuration and flow.
+
+        Phi of joint i, eqs. (22)-(24), is the force that segment i + 1 exerts on segment i; its component along the
+        chain is positive under tension. Random forces are left out: this is the mean over the noise of an
+        infinitesimal step that begins here. See ``mean_joint_tensions`` for those of the steps that were taken.
+        Stretching, bending and propulsion belong to their segments; any other force on a shared node is given to the
+        two segments in equal parts.
+
+        Parameters
+        ----------
+        context : openmm.Context
+            Of a System that these filaments were put into.
+
+        Returns
+        -------
+        list of (joints, 3) Quantity in kJ/(mol nm), one for each filament
+            An open filament has segments - 1 joints. A ring has as many as segments: the last is node 0, where the
+            force is that of segment 0 on the last one.
+        """
+        state = context.getState(positions=True, forces=True)
+        positions = state.getPositions(asNumpy=True)._value
+        forces = state.getForces(asNumpy=True)._value
+        chains = self.chain_set(context.getSystem())
+        flow = self._engine.flow_of(context)
+        parts = filament_tensions(self._filaments, self._nodes, chains, positions, forces, flow)
+        return [part * FORCE for part in parts]
+
+    def mean_joint_tensions(self, context):
+        """Virtual forces Phi at the joints as means over the last step, with friction and noise.
+
+        Phi of joint i is the force that segment i + 1 exerts on segment i, as in ``joint_tensions``, but of the step
+        that scheme "implicit" has solved, with all that moved the segments in it, their friction and the random forces.
+        Where the nodes of the joint are free to move, the forces q on the ends of the two segments, which they exert
+        themselves, and those from outside balance, q_plus(i) + q_minus(i+1) + f = 0, and f acts on both in equal parts:
+        Phi = (q_minus(i+1) - q_plus(i))/2. Averages over time are the forces that a filament transmits, such as that
+        of a trap at its end; the noise of a single step is large.
+
+        Parameters
+        ----------
+        context : openmm.Context
+            Of a System that these filaments were put into, in which a step was taken after
+            ``integrator.setRecordsTensions(True)``.
+
+        Returns
+        -------
+        list of (joints, 3) Quantity in kJ/(mol nm), one for each filament
+            In the order of ``joint_tensions``.
+
+        Raises
+        ------
+        InputError
+            With the portable engine or an explicit scheme, or if nothing was recorded.
+        """
+        return [forces * FORCE for _, forces, _ in self._engine.mean_tensions(context, len(self))]
+
+    def mean_tensions(self, context):
+        """Tensions T of the segments as means over the last step, with friction and noise.
+
+        T is the elastic force of the segment's length, its friction against becoming longer and the noise of both, as
+        an implicit scheme has solved for them, along the direction of the segment half-way through the step; it is
+        positive where it pulls the ends together. See ``mean_joint_tensions``.
+
+        Parameters
+        ----------
+        context : openmm.Context
+
+        Returns
+        -------
+        list of (segments,) Quantity in kJ/(mol nm), one for each filament
+
+        Raises
+        ------
+        InputError
+            As for ``mean_joint_tensions``.
+        """
+        return [tensions * FORCE for tensions, _, _ in self._engine.mean_tensions(context, len(self))]
+
+    def mean_axial_tensions(self, context):
+        """Components of ``mean_joint_tensions`` along the filaments, positive under tension.
+
+        The direction of a filament at a joint is that of the sum of the unit vectors along its two segments half-way
+        through the step. (That at its end would be correlated with the noise of the step.)
+
+        Parameters
+        ----------
+        context : openmm.Context
+
+        Returns
+        -------
+        list of (joints,) Quantity in kJ/(mol nm), one for each filament
+
+        Raises
+        ------
+        InputError
+            As for ``mean_joint_tensions``.
+        """
+        recorded = self._engine.mean_tensions(context, len(self))
+        return [components_along(directions, forces) * FORCE for _, forces, directions in recorded]
+
+    def record_tensions(self, context):
+        """Let the integrator of a Context record mean tensions from its next step on; see ``mean_joint_tensions``.
+
+        Raises
+        ------
+        InputError
+            With the portable engine or an explicit scheme.
+        """
+        self._engine.record_tensions(context)
+
+    def flow(self, context):
+        """The Flow of the solvent in a Context, at rest where its integrator knows of none."""
+        return self._engine.flow_of(context)
+
+    def move_tether(self, context, tether, point, stiffness=None):
+        """Move the point of a tether in a Context, and change its stiffness if one is given.
+
+        Parameters
+        ----------
+        context : openmm.Context
+            Of the System that these filaments were put into.
+        tether : int
+            Number of the tether, as ``add_tether`` returned it.
+        point : (3,) length
+        stiffness : energy/length^2, optional
+
+        Raises
+        ------
+        InputError
+            For a tether that does not exist, or a point or a stiffness that is no such thing.
+        """
+        self._change_tethers(context, [self._moved(tether, point, stiffness)])
+
+    def move_tethers(self, context, tethers, points):
+        """Move the points of several tethers in a Context, at hardly more cost than that of one.
+
+        Parameters
+        ----------
+        context : openmm.Context
+        tethers : sequence of int
+        points : (tethers, 3) length
+        """
+        points = np.asarray(in_units_of(points, LENGTH, "points"))
+        if points.shape != (len(tethers), 3):
+            raise InputError(f"points must have the shape ({len(tethers)}, 3), but have {points.shape}.")
+        self._change_tethers(context, [self._moved(tether, point, None) for tether, point in zip(tethers, points)])
+
+    def _moved(self, tether, point, stiffness):
+        tether = whole_number(tether, 0, "tether")
+        if tether >= len(self._tethers):
+            raise InputError(f"Tether {tether} does not exist; there are {len(self._tethers)}.")
+        point = tuple(float(x) for x in vector(point, LENGTH, f"Tether {tether}: point"))
+        old = self._tethers[tether]
+        if stiffness is None:
+            stiffness = old.stiffness
+        stiffness = positive(stiffness, STIFFNESS, f"Tether {tether}: stiffness")
+        return tether, replace(old, point=point, stiffness=stiffness)
+
+    def _change_tethers(self, context, changed):
+        self._engine.move_tethers(context, changed, self.node_indices)
+        for number, tether in changed:
+            self._tethers[number] = tether

@@ -1,0 +1,87 @@
+"""Insertion of filaments into a Topology and a System that may hold other things already."""
+
+import numpy as np
+import openmm
+
+from ..errors import InputError
+from ..units.quantities import LENGTH, in_units_of, whole_number
+
+NODE_NAME = "NOD"
+"""Atom name of a filament node in topologies."""
+
+
+def check_target(topology, system, positions):
+    """Positions (particles, 3) in nm of what is there; raise InputError if they, Topology and System do not match."""
+    positions = np.asarray(in_units_of(positions, LENGTH, "positions"))
+    count = system.getNumParticles()
+    if topology.getNumAtoms() != count:
+        raise InputError(f"The Topology has {topology.getNumAtoms()} atoms, but the System has {count} particles.")
+    if positions.size == 0 and count == 0:
+        positions = np.zeros((0, 3))
+    if positions.shape != (count, 3):
+        raise InputError(f"positions must have the shape ({count}, 3), but have {positions.shape}.")
+    for force in system.getForces():
+        if force.getName().startswith("CylinderChain"):
+            raise InputError("The System already holds filaments: add all of them through one Filaments object.")
+    return positions
+
+
+def check_force_groups(*groups):
+    """Raise InputError unless all numbers are those of force groups."""
+    for group in groups:
+        if whole_number(group, 0, "force group") > 31:
+            raise InputError(f"A force group must be between 0 and 31, but is {group}.")
+
+
+def add_nodes_to_system(system, filament):
+    """Add the nodes of a Filament to a System; return their particle indices."""
+    # Each segment's mass goes to its two ends in equal parts.
+    masses = np.full(len(filament.positions), filament.type.segment_mass)
+    if not filament.closed:
+        masses[[0, -1]] *= 0.5
+    masses[list(filament.clamped)] = 0.0
+    return np.array([system.addParticle(mass) for mass in masses])
+
+
+def add_to_topology(topology, filament, name, attachment_names):
+    """Add a Filament to a Topology: a chain with bonds, and a residue and an atom for each node or attachment point."""
+    chain = topology.addChain(name)
+    nodes = len(filament.positions)
+    atoms = []
+    for particle, atom_name in enumerate([NODE_NAME] * nodes + list(attachment_names)):
+        residue = topology.addResidue(filament.type.name, chain, str(particle + 1))
+        atoms.append(topology.addAtom(atom_name, None, residue))
+    for first, second in zip(atoms, atoms[1:nodes]):
+        topology.addBond(first, second)
+    if filament.closed:
+        topology.addBond(atoms[nodes - 1], atoms[0])
+
+
+def add_noninteracting_entries(system, existing, coinciding):
+    """Give forces that ask for parameters of every particle those of particles that do not interact.
+
+    Parameters
+    ----------
+    system : openmm.System
+    existing : int
+        How many particles have parameters.
+    coinciding : iterable of (int, int)
+        Pairs of new particles that may be in one place.
+    """
+    missing, coinciding = system.getNumParticles() - existing, list(coinciding)
+    for force in system.getForces():
+        if isinstance(force, openmm.NonbondedForce):
+            for _ in range(missing):
+                force.addParticle(0.0, 1.0, 0.0)
+            # Particles in one place would give 0/0, even if they do not interact.
+            for pair in coinciding:
+                force.addException(*pair, 0.0, 1.0, 0.0)
+        elif isinstance(force, openmm.CustomNonbondedForce):
+            _exclude_from_custom_nonbonded(force, existing, missing)
+
+
+def _exclude_from_custom_nonbonded(force, existing, missing):
+    for _ in range(missing):
+        force.addParticle([0.0] * force.getNumPerParticleParameters())
+    if missing and force.getNumInteractionGroups() == 0:
+        force.addInteractionGroup(range(existing), range(existing))

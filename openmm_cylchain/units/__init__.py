@@ -1,0 +1,1 @@
+"""Quantities with and without units, as numbers and as text."""

@@ -1,0 +1,103 @@
+"""Conversion of user input, with or without units, to plain numbers in OpenMM's units."""
+
+import math
+
+import numpy as np
+from openmm import unit
+
+from ..errors import InputError
+
+AVOGADRO = 6.02214076e23
+BOLTZMANN = unit.MOLAR_GAS_CONSTANT_R.value_in_unit(unit.kilojoule_per_mole / unit.kelvin)
+
+LENGTH = unit.nanometer
+TIME = unit.picosecond
+TEMPERATURE = unit.kelvin
+VELOCITY = unit.nanometer / unit.picosecond
+RATE = unit.picosecond**-1
+ENERGY = unit.kilojoule_per_mole
+FORCE = unit.kilojoule_per_mole / unit.nanometer
+STIFFNESS = unit.kilojoule_per_mole / unit.nanometer**2
+BENDING_RIGIDITY = unit.kilojoule_per_mole * unit.nanometer
+FRICTION = unit.kilojoule_per_mole * unit.picosecond / unit.nanometer**2
+ROTATIONAL_FRICTION = unit.kilojoule_per_mole * unit.picosecond
+VISCOSITY = unit.kilojoule_per_mole * unit.picosecond / unit.nanometer**3
+MASS = unit.dalton
+DIMENSIONLESS = unit.dimensionless
+
+
+def in_units_of(value, target, name):
+    """Return ``value`` as a float or float array in the unit ``target``.
+
+    A plain number or array is taken to be in ``target`` already. A quantity is converted; one per
+    particle (pN/nm, Pa s) is turned into one per mole (kJ/mol/nm^2) where ``target`` is molar.
+
+    Raises
+    ------
+    InputError
+        If the value is not a number, not finite, or has the dimension of something else.
+    """
+    if not isinstance(value, unit.Quantity) and isinstance(value, (list, tuple)):
+        if any(isinstance(item, unit.Quantity) for item in value):
+            value = np.array([in_units_of(item, target, name) for item in value])
+    if isinstance(value, unit.Quantity):
+        value = _converted(value, target, name)
+    try:
+        array = np.asarray(value)
+    except ValueError:
+        array = np.asarray(None)
+    if array.dtype.kind not in "iuf" and array.size and value is not None:
+        raise InputError(f"{name} must be a number or an array of numbers, but is {value!r}.")
+    array = array.astype(float)
+    if not np.all(np.isfinite(array)):
+        raise InputError(f"{name} must be finite, but contains NaN or infinity.")
+    return float(array) if array.ndim == 0 else array
+
+
+def _converted(quantity, target, name):
+    if quantity.unit.is_compatible(target):
+        return quantity.value_in_unit(target)
+    molar = quantity.unit / unit.mole
+    if molar.is_compatible(target):
+        per_particle = unit.Quantity(quantity._value, molar).value_in_unit(target)
+        return np.asarray(per_particle) * AVOGADRO
+    raise InputError(f"{name} has the unit {quantity.unit}, which cannot be converted to {target}.")
+
+
+def finite_number(value, target, name):
+    """Return ``value`` as a float in ``target``; raise InputError unless it is one number."""
+    converted = in_units_of(value, target, name)
+    if not isinstance(converted, float):
+        raise InputError(f"{name} must be a single number, but has the shape {converted.shape}.")
+    return converted
+
+
+def positive(value, target, name):
+    """Return ``value`` as a float in ``target``; raise InputError unless it is one number above zero."""
+    converted = finite_number(value, target, name)
+    if converted <= 0:
+        raise InputError(f"{name} must be positive, but is {converted:g}.")
+    return converted
+
+
+def non_negative(value, target, name):
+    """Return ``value`` as a float in ``target``; raise InputError if it is negative or not one number."""
+    converted = finite_number(value, target, name)
+    if converted < 0:
+        raise InputError(f"{name} cannot be negative, but is {converted:g}.")
+    return converted
+
+
+def whole_number(value, minimum, name):
+    """Return ``value`` as an int; raise InputError unless it is a whole number of at least ``minimum``."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
+        if not (isinstance(value, float) and math.isfinite(value) and value == int(value)):
+            raise InputError(f"{name} must be a whole number, but is {value!r}.")
+    if value < minimum:
+        raise InputError(f"{name} must be at least {minimum}, but is {value}.")
+    return int(value)
+
+
+def thermal_energy(temperature):
+    """Return k_B T in kJ/mol for a temperature (zero allowed)."""
+    return BOLTZMANN * non_negative(temperature, TEMPERATURE, "temperature")
