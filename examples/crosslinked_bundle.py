@@ -23,10 +23,7 @@ from matplotlib.collections import LineCollection
 from openmm import app, unit
 from scipy.spatial import cKDTree
 
-from openmm_cylchain import F_ACTIN, Filaments
-from openmm_cylchain.couplings.crosslinks import Crosslinks
-from openmm_cylchain.couplings.pulling import change_constant_force, constant_force
-from openmm_cylchain.output.reporters import CrosslinkReporter
+from openmm_cylchain import F_ACTIN, CrosslinkReporter, Crosslinks, Filaments, change_constant_force, constant_force
 
 FILAMENTS, SEGMENTS, SEGMENT_LENGTH = 6, 30, 100.0  # nm
 SPACING = 35.0  # nm, also the rest length of a crosslink

@@ -20,9 +20,7 @@ import numpy as np
 from mpl_toolkits.mplot3d.art3d import Line3DCollection
 from openmm import Platform, app, unit
 
-from openmm_cylchain import F_ACTIN, Filaments
-from openmm_cylchain.analysis.crossings import CrossingCounter
-from openmm_cylchain.couplings.contacts import contact_force
+from openmm_cylchain import F_ACTIN, Filaments, analysis, contact_force
 
 FILAMENTS = 120
 SEGMENTS = 10
@@ -70,7 +68,7 @@ def current(simulation):
 
 def crossings(filaments, simulation):
     """How often filaments have passed through each other after every step."""
-    counter = CrossingCounter(filaments, current(simulation), box)
+    counter = analysis.CrossingCounter(filaments, current(simulation), box)
     counts = []
     for _ in range(steps):
         simulation.step(1)

@@ -19,9 +19,7 @@ import numpy as np
 import openmm
 from openmm import app, unit
 
-from openmm_cylchain import F_ACTIN, Filaments, stokes_friction
-from openmm_cylchain.couplings.walls import Sphere, wall_force
-from openmm_cylchain.theory import bending_energy_mean
+from openmm_cylchain import F_ACTIN, Filaments, Sphere, stokes_friction, theory, wall_force
 
 RADIUS = 500.0  # nm
 FILAMENTS = 24
@@ -87,7 +85,7 @@ for _ in range(steps // interval):
     bending.append(actin.bending_energy(np.sum(tangents[:, 1:] * tangents[:, :-1], axis=2)).mean())
     distances.append(np.linalg.norm(final[cargo] - final[filaments.attachment_indices], axis=1).mean())
 
-free = bending_energy_mean(actin, TEMPERATURE)
+free = theory.bending_energy_mean(actin, TEMPERATURE)
 print(f"{steps} steps of {STEP}, {(steps * STEP).value_in_unit(unit.millisecond):.3g} ms in all")
 print(f"farthest node from the centre: {np.linalg.norm(final[nodes], axis=1).max():.0f} nm; radius {RADIUS:.0f} nm")
 print(f"distance of cargo from its point: {np.mean(distances):.1f} nm; springs at rest {0.5 * CARGO_DIAMETER:.1f} nm")

@@ -21,10 +21,7 @@ import numpy as np
 import openmm
 from openmm import app, unit
 
-from openmm_cylchain import DSDNA, Filaments
-from openmm_cylchain.couplings.pulling import ConstantVelocityPulling
-from openmm_cylchain.theory import chain_extension, marko_siggia_extension
-from openmm_cylchain.units.quantities import BOLTZMANN
+from openmm_cylchain import DSDNA, ConstantVelocityPulling, Filaments, theory
 
 MOLECULES, SEGMENTS = 24, 20
 PICONEWTON = 0.602214076  # kJ/(mol nm)
@@ -79,9 +76,10 @@ windows = [
     for parts in windows
 )
 grid = np.geomspace(0.2, 20, 120)
-exact = chain_extension(DSDNA, SEGMENTS, grid * PICONEWTON, TEMPERATURE) / length
+exact = theory.chain_extension(DSDNA, SEGMENTS, grid * PICONEWTON, TEMPERATURE) / length
 lp = DSDNA.persistence_length_at(TEMPERATURE)
-across = BOLTZMANN * TEMPERATURE.value_in_unit(unit.kelvin) / PICONEWTON / length
+thermal_energy = (unit.MOLAR_GAS_CONSTANT_R * TEMPERATURE).value_in_unit(unit.kilojoule_per_mole)
+across = thermal_energy / PICONEWTON / length
 trapped = exact + across / grid - across / (grid + STIFFNESS / PICONEWTON * length * exact)
 expected = np.interp(force, grid, trapped)
 
@@ -108,7 +106,11 @@ left.legend(frameon=False, loc="upper right", ncols=2)
 left.set(aspect="equal", xlabel="x (nm)", xlim=(-30, START + TRAVEL + 90), ylim=(-60 * len(shapes) - 10, 80), yticks=[])
 left.set_title("One of the molecules")
 right.plot(
-    marko_siggia_extension(grid * PICONEWTON, lp, TEMPERATURE), grid, "--", color="0.55", label="Marko and Siggia"
+    theory.marko_siggia_extension(grid * PICONEWTON, lp, TEMPERATURE),
+    grid,
+    "--",
+    color="0.55",
+    label="Marko and Siggia",
 )
 right.plot(exact, grid, color="0.2", linewidth=1, label="discrete chain, exact, constant force")
 right.plot(trapped, grid, color="#c0392b", alpha=0.45, linewidth=4, label="the same in the trap")

@@ -21,8 +21,7 @@ import numpy as np
 import openmm
 from openmm import app, unit
 
-from openmm_cylchain import DSDNA, Filaments, stokes_friction
-from openmm_cylchain.theory import bending_energy_mean, stretching_energy_mean
+from openmm_cylchain import DSDNA, Filaments, stokes_friction, theory
 
 BOX = 60.0  # nm
 PARTICLES = 150
@@ -107,7 +106,9 @@ print(f"{steps} steps of {STEP}, {(steps * STEP).value_in_unit(unit.nanosecond):
 print(f"particles moved by {moved:.1f} nm (root mean square)")
 print(f"closest particle to a node: {np.linalg.norm(gaps, axis=2).min():.2f} nm; they touch at {contact:.2f} nm")
 print(f"end-to-end distance of the filament: {np.linalg.norm(nodes[-1] - nodes[0]):.1f} nm")
-exact = SEGMENTS * stretching_energy_mean(DSDNA, TEMPERATURE) + (SEGMENTS - 1) * bending_energy_mean(DSDNA, TEMPERATURE)
+exact = SEGMENTS * theory.stretching_energy_mean(DSDNA, TEMPERATURE) + (SEGMENTS - 1) * theory.bending_energy_mean(
+    DSDNA, TEMPERATURE
+)
 print(f"energy of the filament: {np.mean(energies):.1f} kJ/mol, {exact:.1f} in equilibrium without particles")
 
 

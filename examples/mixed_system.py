@@ -20,11 +20,17 @@ import numpy as np
 import openmm
 from openmm import app, unit
 
-from openmm_cylchain import F_ACTIN, MICROTUBULE, Filaments, stokes_friction
-from openmm_cylchain.couplings.crosslinks import Crosslinks
-from openmm_cylchain.couplings.walls import Slab, wall_force
-from openmm_cylchain.mechanics.flow import Flow
-from openmm_cylchain.output.reporters import TetherReporter
+from openmm_cylchain import (
+    F_ACTIN,
+    MICROTUBULE,
+    Crosslinks,
+    Filaments,
+    Flow,
+    Slab,
+    TetherReporter,
+    stokes_friction,
+    wall_force,
+)
 
 BOX = 1600.0  # nm
 SLIT = 1200.0  # nm between the walls

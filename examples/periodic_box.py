@@ -20,9 +20,7 @@ import numpy as np
 import openmm
 from openmm import app, unit
 
-from openmm_cylchain import F_ACTIN, Filaments, stokes_friction
-from openmm_cylchain.output.structure_files import write_psf
-from openmm_cylchain.systems.periodic import make_whole
+from openmm_cylchain import F_ACTIN, Filaments, make_whole, stokes_friction, write_psf
 
 BOX = 2000.0  # nm
 FILAMENTS = 8

@@ -19,8 +19,7 @@ import numpy as np
 import openmm
 from openmm import app, unit
 
-from openmm_cylchain import F_ACTIN, MICROTUBULE, Filaments
-from openmm_cylchain.theory import chain_persistence_length, chain_tangent_correlation
+from openmm_cylchain import F_ACTIN, MICROTUBULE, Filaments, theory
 
 CONTOUR = 6000  # nm
 FILAMENTS = 16  # of each kind
@@ -90,9 +89,9 @@ for name, filament_type in types.items():
     nodes = np.array([filaments.node_indices[number] for number in members[name]])
     mean, error = tangent_correlation(frames[:, nodes])
     distance = filament_type.segment_length * np.arange(len(mean))
-    exact = chain_tangent_correlation(filament_type, np.arange(len(mean)), TEMPERATURE)
+    exact = theory.chain_tangent_correlation(filament_type, np.arange(len(mean)), TEMPERATURE)
     simulated = -filament_type.segment_length / np.log(mean[1]) / 1000
-    expected = chain_persistence_length(filament_type, TEMPERATURE) / 1000
+    expected = theory.chain_persistence_length(filament_type, TEMPERATURE) / 1000
     print(f"{name:12} {1 - mean[1]:.3e} +/- {error[1]:.0e}   {1 - exact[1]:.3e} {simulated:14.4g} {expected:12.4g}")
     for filament in nodes:
         shapes.plot(

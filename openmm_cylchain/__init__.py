@@ -1,41 +1,91 @@
-"""Filaments for OpenMM: Brownian dynamics of extensible cylinder chains."""
+"""Filaments for OpenMM: Brownian dynamics of extensible cylinder chains.
 
-from .dynamics.time_step import TimeStep, recommended_time_step
-from .errors import (
-    ContactWarning,
-    EquilibrationWarning,
-    InputError,
-    InstabilityError,
-    TimeStepError,
-    TimeStepWarning,
+All that users call is here and in the modules ``analysis``, ``theory``, ``benchmark`` and ``reproduce``; all others are
+private and may change.
+"""
+
+from . import analysis, theory
+from .couplings.contacts import add_exclusions, contact_force, crossing_barrier, excluded_pairs, share_exclusions
+from .couplings.crosslinks import Crosslinks, CrosslinkTable
+from .couplings.pulling import ConstantVelocityPulling, change_constant_force, constant_force, constant_tension
+from .couplings.walls import Box, Cylinder, Ellipsoid, Plane, Slab, Sphere, wall_force
+from .dynamics.time_step import (
+    TimeStep,
+    effective_rate,
+    fene_steps,
+    recommended_time_step,
+    stability_bounds,
+    time_step_bounds,
 )
-from .filaments.collection import Filament
+from .errors import ContactWarning, EquilibrationWarning, InputError, InstabilityError, TimeStepError, TimeStepWarning
+from .filaments.attachments import Attachment
+from .filaments.filament import Filament, Tether
 from .filaments.filament_type import DSDNA, F_ACTIN, MICROTUBULE, FilamentType
 from .mechanics.flow import Flow
 from .mechanics.friction import EndCorrections, SegmentFriction, stokes_friction
+from .output.reporters import CrosslinkReporter, FilamentReporter, TensionReporter, TetherReporter
+from .output.structure_files import write_lammps_data, write_psf
 from .systems.filaments import Filaments
-from .systems.step_check import check_time_step
+from .systems.periodic import make_trajectory_whole, make_whole, remove_jumps
+from .systems.step_check import ObservableCheck, StepCheck, check_time_step
 from .version import __version__
 
 __all__ = [
+    "Attachment",
+    "Box",
+    "ConstantVelocityPulling",
     "ContactWarning",
+    "CrosslinkReporter",
+    "CrosslinkTable",
+    "Crosslinks",
+    "Cylinder",
     "DSDNA",
+    "Ellipsoid",
     "EndCorrections",
     "EquilibrationWarning",
     "F_ACTIN",
     "Filament",
+    "FilamentReporter",
     "FilamentType",
     "Filaments",
     "Flow",
     "InputError",
     "InstabilityError",
     "MICROTUBULE",
+    "ObservableCheck",
+    "Plane",
     "SegmentFriction",
+    "Slab",
+    "Sphere",
+    "StepCheck",
+    "TensionReporter",
+    "Tether",
+    "TetherReporter",
     "TimeStep",
     "TimeStepError",
     "TimeStepWarning",
     "__version__",
+    "add_exclusions",
+    "analysis",
+    "change_constant_force",
     "check_time_step",
+    "constant_force",
+    "constant_tension",
+    "contact_force",
+    "crossing_barrier",
+    "effective_rate",
+    "excluded_pairs",
+    "fene_steps",
+    "make_trajectory_whole",
+    "make_whole",
     "recommended_time_step",
+    "remove_jumps",
+    "share_exclusions",
+    "stability_bounds",
     "stokes_friction",
+    "theory",
+    "time_step_bounds",
+    "wall_force",
+    "write_lammps_data",
+    "write_psf",
 ]

@@ -12,7 +12,7 @@ import warnings
 from dataclasses import replace
 from pathlib import Path
 
-from .engines import ENGINES
+from .engine_choice import ENGINES
 from .errors import InputError, InstabilityError, TimeStepWarning
 from .version import __version__
 

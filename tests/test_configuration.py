@@ -8,9 +8,9 @@ from openmm import unit
 
 from openmm_cylchain import DSDNA, F_ACTIN, MICROTUBULE, EndCorrections, FilamentType, InputError
 from openmm_cylchain.dynamics.time_step import recommended_time_step
-from openmm_cylchain.engines import default_scheme
+from openmm_cylchain.engine_choice import default_scheme
 from openmm_cylchain.runs.configuration import changed_keys, parse_configuration, read_configuration
-from openmm_cylchain.units.text import (
+from openmm_cylchain.units.quantities import (
     BENDING_RIGIDITY,
     FORCE,
     LENGTH,
@@ -20,9 +20,8 @@ from openmm_cylchain.units.text import (
     TEMPERATURE,
     TIME,
     VISCOSITY,
-    format_time,
-    parse_quantity,
 )
+from openmm_cylchain.units.text import format_time, parse_quantity
 
 SOLVENT = '[solvent]\ntemperature = "310 K"\nviscosity = "1.71 mPa*s"\n'
 FILAMENT = '[[filament]]\ntype = "F_ACTIN"\nsegments = 8\n'

@@ -12,8 +12,7 @@ from physics_cases import ENGINE_PLATFORMS, TEMPERATURE, VISCOSITY
 from scipy.integrate import solve_ivp
 from test_redistribution import _bent_chain, _dense_resistance, _virtual_forces
 
-from openmm_cylchain import F_ACTIN, Filaments, Flow, InputError
-from openmm_cylchain.filaments.collection import Filament
+from openmm_cylchain import F_ACTIN, Filament, Filaments, Flow, InputError
 from openmm_cylchain.mechanics.tension import segment_end_forces
 
 RATE = 1e-9  # 1/ps, a thousand per second

@@ -10,8 +10,7 @@ import pytest
 from openmm import unit
 from scipy.spatial.transform import Rotation
 
-from openmm_cylchain import Filaments, FilamentType, InputError
-from openmm_cylchain.filaments.collection import Filament
+from openmm_cylchain import Filament, Filaments, FilamentType, InputError
 from openmm_cylchain.mechanics.potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
 from openmm_cylchain.mechanics.tension import segment_end_forces
 

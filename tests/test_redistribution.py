@@ -8,8 +8,7 @@ import pytest
 from conftest import ENGINES
 from physics_cases import TEMPERATURE, VISCOSITY
 
-from openmm_cylchain import DSDNA, F_ACTIN, Filaments
-from openmm_cylchain.filaments.collection import Filament
+from openmm_cylchain import DSDNA, F_ACTIN, Filament, Filaments
 from openmm_cylchain.mechanics import redistribution
 from openmm_cylchain.mechanics.tension import segment_end_forces
 

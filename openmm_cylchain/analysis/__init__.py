@@ -1,3 +1,47 @@
-"""Analysis of trajectories of filaments with mdtraj."""
+"""Analysis of trajectories of filaments, which mdtraj has read; ``statistics`` has the errors of correlated series."""
 
-from .trajectories import *  # noqa: F403
+from . import statistics
+from .crossings import CrossingCounter, Crossings, find_crossings
+from .trajectories import (
+    MeanSquareDisplacement,
+    TangentCorrelation,
+    bending_drift,
+    bending_mode_amplitudes,
+    centers_of_mass,
+    contour_lengths,
+    end_to_end_vectors,
+    filament_nodes,
+    joint_cosines,
+    mean_square_displacement,
+    node_positions,
+    persistence_length,
+    radii_of_gyration,
+    ring_filaments,
+    segment_lengths,
+    tangent_correlation,
+    tangents,
+)
+
+__all__ = [
+    "CrossingCounter",
+    "Crossings",
+    "MeanSquareDisplacement",
+    "TangentCorrelation",
+    "bending_drift",
+    "bending_mode_amplitudes",
+    "centers_of_mass",
+    "contour_lengths",
+    "end_to_end_vectors",
+    "filament_nodes",
+    "find_crossings",
+    "joint_cosines",
+    "mean_square_displacement",
+    "node_positions",
+    "persistence_length",
+    "radii_of_gyration",
+    "ring_filaments",
+    "segment_lengths",
+    "statistics",
+    "tangent_correlation",
+    "tangents",
+]

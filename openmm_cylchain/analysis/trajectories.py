@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import EquilibrationWarning, InputError
-from ..systems.insertion import NODE_NAME
+from ..filaments.filament import NODE_NAME
 from ..units.quantities import DIMENSIONLESS, LENGTH, TIME, in_units_of, positive, whole_number
 from .statistics import FEWEST_FRAMES_OF_DRIFT, SIGNIFICANT_DRIFT, drift, mean_with_error
 

@@ -15,7 +15,7 @@ import numpy as np
 import openmm
 
 from .. import F_ACTIN
-from ..engines import choose_engine
+from ..engine_choice import choose_engine
 from ..filaments.equilibrium import draw_chain
 from ..filaments.filament_type import FilamentType
 from ..theory import bending_energy_mean, stretching_energy_mean

@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 import openmm
 
-from ..engines import ENGINES, available_engines
+from ..engine_choice import ENGINES, available_engines
 from .measurement import Case, describe_machine, median, processors, ratio, scaled, time_interleaved
 from .report import Report, row
 from .systems import IMPLICIT_TIME_STEP, SCHEME, TIME_STEP, simulate_beads, simulate_filaments

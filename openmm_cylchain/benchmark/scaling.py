@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..engines import available_engines, choose_engine
+from ..engine_choice import available_engines, choose_engine
 from .measurement import Case, describe_machine, difference, median, ratio, scaled, time_interleaved
 from .memory import STOCK, MeasurementError, measure_growth
 from .report import Report, row

@@ -22,7 +22,7 @@ from .. import Filaments
 from ..dynamics.schemes import EXPLICIT_SCHEMES, SCHEMES
 from ..dynamics.step_watch import LARGEST_DIVIDED_SHARE
 from ..dynamics.time_step import recommended_time_step, stability_bounds
-from ..engines import choose_engine
+from ..engine_choice import choose_engine
 from ..errors import InstabilityError
 from ..theory import bending_energy_mean, stretching_energy_mean
 from ..units.text import format_time

@@ -12,11 +12,8 @@ import numpy as np
 import openmm
 
 from ..errors import ContactWarning, InputError
-from ..filaments.attachments import Attachment
+from ..filaments.attachments import SAME_PLACE
 from ..units.quantities import LENGTH, STIFFNESS, in_units_of, non_negative, positive, thermal_energy, whole_number
-
-BEAD_NAME = "BED"
-"""Atom name of beads in topologies."""
 
 CONTACT_NAME = "Contact"
 CONTACT_STIFFNESS = "contact_stiffness"
@@ -36,36 +33,6 @@ _WITH_EXCLUSIONS = (openmm.NonbondedForce, openmm.CustomNonbondedForce, openmm.C
 # OpenMM's CPU platform looks for neighbours within 5/4 of the cutoff, and again when particles have moved by 1/8 of it.
 # Looking is what costs most, so three diameters take a third of the time that one takes.
 _CUTOFF_DIAMETERS = 3.0
-
-# Along a contour, in segments: places that are closer than this are one.
-_SAME_PLACE = 1e-9
-
-
-def distribute_beads(filament, number, spacing):
-    """Attachments at equal distances along segments of rest length, the first and the last node of a chain included.
-
-    Parameters
-    ----------
-    filament : Filament
-    number : int
-        Of the filament.
-    spacing : float
-        The largest distance of two neighbours, in nm.
-
-    Returns
-    -------
-    list of Attachment
-    """
-    contour = filament.segments * filament.type.segment_length
-    intervals = max(1, math.ceil(contour / spacing * (1.0 - 1e-12)))
-    # In a ring, the last place would be the first once more.
-    count = intervals if filament.closed else intervals + 1
-    places = filament.segments * np.arange(count) / intervals
-    nearest = np.rint(places)
-    places = np.where(np.abs(places - nearest) < _SAME_PLACE, nearest, places)
-    segments = np.minimum(np.floor(places).astype(int), filament.segments - 1)
-    fractions = places - segments
-    return [Attachment(number, int(s), float(f), BEAD_NAME) for s, f in zip(segments, fractions)]
 
 
 def excluded_pairs(filaments, distance=0.0):
@@ -110,12 +77,12 @@ def _excluded_in(filament, nodes, points, distance):
     if filament.closed:
         # What lies behind the last place of a ring comes once more.
         place = np.concatenate([place, place + filament.segments])
-    first = np.ceil(place - _SAME_PLACE).astype(int) - 1
-    last = np.floor(place + _SAME_PLACE).astype(int)
+    first = np.ceil(place - SAME_PLACE).astype(int) - 1
+    last = np.floor(place + SAME_PLACE).astype(int)
     if not filament.closed:
         first, last = np.maximum(first, 0), np.minimum(last, filament.segments - 1)
     # Both grow with the place, so those that a place does not see follow it without a gap.
-    reach = place + distance / filament.type.segment_length + _SAME_PLACE
+    reach = place + distance / filament.type.segment_length + SAME_PLACE
     end = np.maximum(np.searchsorted(first, last + 1, side="right"), np.searchsorted(place, reach, side="right"))
     counts = np.minimum(end - np.arange(len(place)) - 1, total - 1)[:total]
     one = np.repeat(np.arange(total), counts)

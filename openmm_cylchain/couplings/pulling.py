@@ -4,9 +4,8 @@ import numpy as np
 import openmm
 
 from ..errors import InputError
-from ..filaments.placement import unit_vector
 from ..output.reporters import FilamentsReporter
-from ..units.quantities import FORCE, LENGTH, TIME, VELOCITY, in_units_of, whole_number
+from ..units.quantities import FORCE, LENGTH, TIME, VELOCITY, in_units_of, unit_vector, whole_number
 
 CONSTANT_FORCE_NAME = "ConstantForce"
 

@@ -10,8 +10,7 @@ import numpy as np
 import openmm
 
 from ..errors import InputError
-from ..filaments.placement import unit_vector, vector
-from ..units.quantities import LENGTH, STIFFNESS, positive
+from ..units.quantities import LENGTH, STIFFNESS, positive, unit_vector, vector
 
 WALL_NAME = "Wall"
 

@@ -21,9 +21,9 @@ from ..couplings.contacts import CONTACT_STIFFNESS, is_contact_force
 from ..couplings.crosslinks import Crosslinks
 from ..couplings.pulling import is_constant_force
 from ..couplings.walls import WALL_NAME
-from ..engines.description import describe_other_particles
 from ..errors import TimeStepWarning
 from .mobility import FilamentResponse
+from .other_particles import describe_other_particles
 from .schemes import EXPLICIT_SCHEMES
 from .time_step import TimeStep
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.optimize import brentq
 
-from ..engines import default_scheme
+from ..engine_choice import default_scheme
 from ..errors import InputError, TimeStepWarning
 from ..units.quantities import (
     BENDING_RIGIDITY,

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import openmm
 
+from ..dynamics.other_particles import describe_other_particles
 from ..dynamics.precision import check_precision
 from ..dynamics.schemes import IMPLICIT_SCHEMES
 from ..dynamics.step_watch import DividedSteps, ExplicitWork
@@ -20,7 +21,6 @@ from ..units.quantities import TEMPERATURE, non_negative, whole_number
 from .description import (
     advice_after_blow_up,
     describe_chains,
-    describe_other_particles,
     filament_label,
     refuse_constraints,
 )

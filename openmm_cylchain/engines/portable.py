@@ -16,6 +16,7 @@ import numpy as np
 import openmm
 from openmm import unit
 
+from ..dynamics.other_particles import describe_other_particles
 from ..dynamics.schemes import EXPLICIT_SCHEMES
 from ..dynamics.step_watch import ExplicitWork, WorkRecorder
 from ..dynamics.time_step import as_step, check_scheme
@@ -28,7 +29,6 @@ from ..units.quantities import BOLTZMANN, TEMPERATURE, non_negative, whole_numbe
 from .description import (
     advice_after_blow_up,
     describe_chains,
-    describe_other_particles,
     filament_label,
     refuse_constraints,
 )

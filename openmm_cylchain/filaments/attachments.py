@@ -20,6 +20,12 @@ from ..units.quantities import DIMENSIONLESS, LENGTH, in_units_of, non_negative,
 ATTACHMENT_NAME = "ATT"
 """Atom name of attachment points in topologies."""
 
+BEAD_NAME = "BED"
+"""Atom name of beads in topologies."""
+
+SAME_PLACE = 1e-9
+"""Places that are closer than this along a contour, in segments, are one."""
+
 
 @dataclass(frozen=True)
 class Attachment:
@@ -127,3 +133,30 @@ def attachment_positions(attachments, positions):
     segments = np.array([one.segment for one in attachments], dtype=int)
     fractions = np.array([one.fraction for one in attachments], dtype=float)[:, None]
     return (1.0 - fractions) * positions[segments] + fractions * positions[(segments + 1) % len(positions)]
+
+
+def distribute_beads(filament, number, spacing):
+    """Attachments at equal distances along segments of rest length, the first and the last node of a chain included.
+
+    Parameters
+    ----------
+    filament : Filament
+    number : int
+        Of the filament.
+    spacing : float
+        The largest distance of two neighbours, in nm.
+
+    Returns
+    -------
+    list of Attachment
+    """
+    contour = filament.segments * filament.type.segment_length
+    intervals = max(1, math.ceil(contour / spacing * (1.0 - 1e-12)))
+    # In a ring, the last place would be the first once more.
+    count = intervals if filament.closed else intervals + 1
+    places = filament.segments * np.arange(count) / intervals
+    nearest = np.rint(places)
+    places = np.where(np.abs(places - nearest) < SAME_PLACE, nearest, places)
+    segments = np.minimum(np.floor(places).astype(int), filament.segments - 1)
+    fractions = places - segments
+    return [Attachment(number, int(s), float(f), BEAD_NAME) for s, f in zip(segments, fractions)]

@@ -4,26 +4,9 @@ import numpy as np
 
 from ..errors import InputError
 from ..mechanics.geometry import joined, joint_cosines, segment_vectors
-from ..units.quantities import DIMENSIONLESS, in_units_of, whole_number
+from ..units.quantities import whole_number
 
 _PLANE_TOLERANCE = 1e-9  # Of a segment's length: rounding of positions that were computed.
-
-
-def vector(value, target, name):
-    """Return ``value`` as a (3,) array in the unit ``target``; raise InputError if it has another shape."""
-    components = np.asarray(in_units_of(value, target, name))
-    if components.shape != (3,):
-        raise InputError(f"{name} must have three components, but has the shape {components.shape}.")
-    return components
-
-
-def unit_vector(direction, label, name="direction"):
-    """Return ``direction`` normalised; raise InputError if it is zero or not a vector."""
-    direction = vector(direction, DIMENSIONLESS, f"{label}: {name}")
-    norm = np.linalg.norm(direction)
-    if norm == 0:
-        raise InputError(f"{label}: {name} must not be the zero vector.")
-    return direction / norm
 
 
 def _check_folds(filament_type, vectors, lengths, label, closed):

@@ -1,1 +1,1 @@
-"""The mechanics of a chain of cylinders: friction, potentials, redistribution of forces, tension, the flow around it."""
+"""The mechanics of a chain of cylinders: friction, potentials, redistribution of forces, tension, flow."""

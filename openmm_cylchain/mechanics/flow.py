@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ..filaments.placement import unit_vector, vector
-from ..units.quantities import LENGTH, RATE, VELOCITY, finite_number, in_units_of
+from ..units.quantities import LENGTH, RATE, VELOCITY, finite_number, in_units_of, unit_vector, vector
 
 _REST = (0.0, 0.0, 0.0)
 _TRACE_TOLERANCE = 1e-9

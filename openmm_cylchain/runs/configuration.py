@@ -17,11 +17,12 @@ from pathlib import Path
 
 from ..dynamics.schemes import SCHEMES
 from ..dynamics.time_step import recommended_time_step
-from ..engines import ENGINES, default_scheme
+from ..engine_choice import ENGINES, default_scheme
 from ..errors import InputError
 from ..filaments.filament_type import DSDNA, F_ACTIN, MICROTUBULE, FilamentType
 from ..mechanics.friction import EndCorrections
-from ..units import text as units
+from ..units import quantities as units
+from ..units.text import example as example_of
 from ..units.text import format_time, parse_quantity
 
 if sys.version_info >= (3, 11):
@@ -184,11 +185,11 @@ class _Table:
             raise InputError(f"There is no [[{key}]] table: add one for every kind of filament.")
         return [_Table(entry, f"[[{key}]] number {number}:", keys) for number, entry in enumerate(entries, start=1)]
 
-    def quantity(self, key, dimension, default=_REQUIRED, zero_allowed=False):
-        text = self.get(key, default, f'"{dimension.example}"')
+    def quantity(self, key, unit, default=_REQUIRED, zero_allowed=False):
+        text = self.get(key, default, f'"{example_of(unit)}"')
         if text is default:
             return default
-        value = parse_quantity(text, dimension, self.name(key))
+        value = parse_quantity(text, unit, self.name(key))
         if value < 0 or (value == 0 and not zero_allowed):
             raise InputError(f'{self.name(key)} must be {"zero or " if zero_allowed else ""}positive, but is "{text}".')
         return value
@@ -347,9 +348,9 @@ def _filament_type(table, solvent):
 
 def _type_properties(table):
     properties = {}
-    for key, dimension in _TYPE_QUANTITIES.items():
+    for key, unit in _TYPE_QUANTITIES.items():
         if key in table:
-            properties[key] = table.quantity(key, dimension, zero_allowed=key == "bending_rigidity")
+            properties[key] = table.quantity(key, unit, zero_allowed=key == "bending_rigidity")
     for key in _TYPE_TEXTS:
         if key in table:
             properties[key] = table.text(key)

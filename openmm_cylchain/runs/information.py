@@ -8,7 +8,7 @@ import numpy as np
 import openmm
 import scipy
 
-from ..engines import available_engines
+from ..engine_choice import available_engines
 from ..version import __version__
 
 

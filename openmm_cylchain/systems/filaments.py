@@ -1,36 +1,37 @@
-"""Filaments: puts filaments into a Topology, a System and positions, new or existing."""
+"""Filaments: what users add, build, integrate and ask; the work is done by the modules that it calls."""
 
+from collections import defaultdict
 from dataclasses import replace
 
 import numpy as np
 import openmm
 from openmm import app, unit
 
-from ..couplings.contacts import default_stiffness, filament_diameters, is_contact_force
-from ..dynamics.explicit_forces import ExplicitForces
 from ..dynamics.precision import check_precision
-from ..dynamics.time_step import (
-    as_step,
-    check_scheme,
-    contact_diffusion_step,
-    contact_time_step,
-    recommended_time_step,
-    shortest,
-    warn_if_driven_far,
-    warn_if_far_above,
-    warn_if_fene_is_wrong,
-    warn_if_strained,
-    warn_if_unstable,
-)
-from ..engines import choose_engine, default_scheme, load_engine
+from ..dynamics.recommended_step import recommended_step_of, warn_of_long_step
+from ..dynamics.time_step import as_step, check_scheme
+from ..engine_choice import choose_engine, default_scheme, load_engine
 from ..engines.description import describe_chains
 from ..errors import InputError
-from ..filaments.attachments import add_virtual_site, attachment_positions, neighbors
-from ..filaments.collection import FilamentCollection
-from ..filaments.placement import vector
+from ..filaments import shapes
+from ..filaments.attachments import add_virtual_site, attachment_positions, distribute_beads, locate, neighbors
+from ..filaments.filament import Tether
+from ..filaments.filament_type import FilamentType
+from ..filaments.placement import named_nodes
 from ..mechanics.flow import as_flow
 from ..mechanics.tension import components_along, filament_tensions
-from ..units.quantities import FORCE, LENGTH, STIFFNESS, TEMPERATURE, in_units_of, non_negative, positive, whole_number
+from ..units.quantities import (
+    FORCE,
+    LENGTH,
+    STIFFNESS,
+    TEMPERATURE,
+    VISCOSITY,
+    in_units_of,
+    non_negative,
+    positive,
+    vector,
+    whole_number,
+)
 from .insertion import (
     add_nodes_to_system,
     add_noninteracting_entries,
@@ -40,7 +41,7 @@ from .insertion import (
 )
 
 
-class Filaments(FilamentCollection):
+class Filaments:
     """Filaments in a solvent, to be added to an OpenMM System.
 
     Parameters
@@ -67,7 +68,16 @@ class Filaments(FilamentCollection):
     """
 
     def __init__(self, viscosity, temperature, engine=None):
-        super().__init__(viscosity, temperature)
+        self._viscosity = positive(viscosity, VISCOSITY, "viscosity")
+        self._temperature = non_negative(temperature, TEMPERATURE, "temperature")
+        self._filaments = []
+        self._tethers = []
+        self._tethered_nodes = set()
+        self._attachments = []
+        self._attachments_of = defaultdict(list)
+        self._attachment_indices = None
+        self._beads = {}
+        self._nodes = None
         self._engine_name = choose_engine(engine)
         self._engine = load_engine(self._engine_name)
 
@@ -75,6 +85,284 @@ class Filaments(FilamentCollection):
     def engine(self):
         """Name of the engine that computes the filaments."""
         return self._engine_name
+
+    def __len__(self):
+        return len(self._filaments)
+
+    def __getitem__(self, index):
+        return self._filaments[index]
+
+    @property
+    def viscosity(self):
+        """Viscosity of the solvent in kJ ps/(mol nm^3)."""
+        return self._viscosity
+
+    @property
+    def temperature(self):
+        """Temperature in K."""
+        return self._temperature
+
+    @property
+    def node_indices(self):
+        """List of arrays: the particle indices of the nodes of every filament, once they are in a System."""
+        self._refuse_unless_built()
+        return self._nodes
+
+    @property
+    def tethers(self):
+        """Tuple of the tethers, in the order of their numbers, with the points to which they were moved last."""
+        return tuple(self._tethers)
+
+    @property
+    def attachments(self):
+        """Tuple of the attachment points, in the order of their numbers."""
+        return tuple(self._attachments)
+
+    @property
+    def attachment_indices(self):
+        """Particle indices of the attachment points, in the order of their numbers, once they are in a System."""
+        self._refuse_unless_built()
+        return self._attachment_indices
+
+    @property
+    def bead_indices(self):
+        """List of arrays: the particle indices of the beads of every filament, once they are in a System."""
+        self._refuse_unless_built()
+        return [self._attachment_indices[self._beads.get(number, [])] for number in range(len(self))]
+
+    def add_straight(self, filament_type, segments, start, direction, clamped=(), *, planar=False, propulsion=0.0):
+        """Add a straight filament with segments of rest length.
+
+        A clamped node alone is a hinge. Two neighbouring ones fix the direction there, too: the joint between a segment
+        with both nodes clamped and one that is free is about twice as stiff as others, because only the half segment of
+        material on its free side can bend. The filament is then clamped exactly at that node.
+
+        Parameters
+        ----------
+        filament_type : FilamentType
+        segments : int
+        start : (3,) length
+            Position of the first node.
+        direction : (3,) array
+            Direction from the first node to the last; need not be normalised.
+        clamped : sequence of int
+            Nodes that do not move; negative numbers count from the end.
+        planar : bool
+            The filament moves in a plane of constant z, as under a cover slip: its nodes keep their z, and no force or
+            noise acts along z.
+        propulsion : force
+            F0 of self-propelled filaments: a force F0 t acts on every segment, half on either end, where t is its
+            tangent, away from the first node. With a negative F0 the filament moves with its first node in front. It is
+            not conservative and has no energy.
+
+        Returns
+        -------
+        int
+            The filament's number.
+        """
+        label = self._label(filament_type)
+        positions = shapes.straight(filament_type, segments, start, direction, label)
+        return self._add(filament_type, positions, clamped, label, planar=planar, propulsion=propulsion)
+
+    def add_nodes(self, filament_type, positions, clamped=(), *, closed=False, planar=False, propulsion=0.0):
+        """Add a filament with given node positions.
+
+        Rest lengths are the type's segment length, whatever the distances between the nodes are.
+
+        Parameters
+        ----------
+        filament_type : FilamentType
+        positions : (n, 3) length
+            At least two nodes, four for a ring.
+        clamped : sequence of int
+            Nodes that do not move; negative numbers count from the end.
+        closed : bool
+            Make a ring: a last segment leads from the last node back to the first.
+        planar, propulsion
+            See ``add_straight``.
+
+        Returns
+        -------
+        int
+            The filament's number.
+        """
+        label = self._label(filament_type)
+        positions = shapes.given(positions, label)
+        return self._add(filament_type, positions, clamped, label, closed, planar, propulsion)
+
+    def add_ring(
+        self, filament_type, segments, center, normal=(0.0, 0.0, 1.0), *, clamped=(), planar=False, propulsion=0.0
+    ):
+        """Add a ring: a regular polygon with segments of rest length.
+
+        Parameters
+        ----------
+        filament_type : FilamentType
+        segments : int
+            At least four.
+        center : (3,) length
+        normal : (3,) array
+            Of the polygon's plane; nodes go counter-clockwise around it. It need not be normalised.
+        clamped, planar, propulsion
+            See ``add_straight``.
+
+        Returns
+        -------
+        int
+            The filament's number.
+        """
+        label = self._label(filament_type)
+        positions = shapes.ring(filament_type, segments, center, normal, label)
+        return self._add(filament_type, positions, clamped, label, True, planar, propulsion)
+
+    def add_equilibrium(
+        self,
+        filament_type,
+        segments,
+        seed,
+        start=(0.0, 0.0, 0.0),
+        direction=None,
+        clamped=(),
+        *,
+        planar=False,
+        propulsion=0.0,
+    ):
+        """Add a filament drawn from the exact equilibrium of the free discrete chain.
+
+        Segment lengths come from rho(l), joint angles from rho(c) (see ``filaments.equilibrium``), or, if the
+        filament is planar, from those of two dimensions.
+
+        Parameters
+        ----------
+        filament_type : FilamentType
+        segments : int
+        seed : int
+            The same seed gives the same chain.
+        start : (3,) length
+            Position of the first node.
+        direction : (3,) array, optional
+            Direction of the first segment; drawn from the sphere, or from the plane's directions, if not given.
+        clamped : sequence of int
+            Nodes that do not move; negative numbers count from the end.
+        planar, propulsion
+            See ``add_straight``.
+
+        Returns
+        -------
+        int
+            The filament's number.
+        """
+        label = self._label(filament_type)
+        positions = shapes.drawn(
+            filament_type, segments, self._temperature, seed, start, direction, clamped, planar, label
+        )
+        return self._add(filament_type, positions, clamped, label, planar=planar, propulsion=propulsion)
+
+    def add_tether(self, filament, node, point, stiffness):
+        """Tether a node to a point by a harmonic spring, such as an optical trap: energy (k/2) |x - point|^2.
+
+        Scheme "implicit" takes tethers at the end of the step, like the filament's own forces, so they may be as stiff
+        as a segment. The explicit schemes, and other OpenMM forces in all schemes, need a step well below
+        2 gamma/k, where gamma is the friction of what the spring pulls, at least a quarter of a segment's parallel
+        friction per segment that meets in the node.
+
+        Parameters
+        ----------
+        filament : int
+            The filament's number.
+        node : int
+            The node's number in the filament; negative numbers count from the end. A node can have one tether.
+        point : (3,) length
+        stiffness : energy/length^2
+
+        Returns
+        -------
+        int
+            The tether's number, for ``move_tether``.
+
+        Raises
+        ------
+        InputError
+            For a filament or node that does not exist, a second tether, or a stiffness that is not positive.
+        """
+        label = f"Tether {len(self._tethers)}"
+        self._refuse_if_built(label)
+        filament = self._filament_number(filament, label)
+        (node,) = named_nodes([node], len(self[filament].positions), f"{label}:")
+        if (filament, node) in self._tethered_nodes:
+            raise InputError(f"{label}: node {node} of filament {filament} has a tether already.")
+        point = tuple(float(x) for x in vector(point, LENGTH, f"{label}: point"))
+        stiffness = positive(stiffness, STIFFNESS, f"{label}: stiffness")
+        self._tethers.append(Tether(filament, node, point, stiffness))
+        self._tethered_nodes.add((filament, node))
+        return len(self._tethers) - 1
+
+    def add_attachment(self, filament, arc_length=None, segment=None, fraction=None):
+        """Add an attachment point: a virtual site on a segment, on which any OpenMM force can act.
+
+        It is at ``(1 - fraction) x_minus + fraction x_plus`` of its segment's ends and follows them in the same
+        step; a force on it acts at that place of the cylinder (step 5 of Section 4 of the paper). It becomes a
+        particle of its own behind the nodes of its filament, in the Topology with the name "ATT";
+        ``attachment_indices`` says which.
+
+        Parameters
+        ----------
+        filament : int
+            The filament's number.
+        arc_length : length, optional
+            Distance from the first node along segments of rest length. Give this, or a segment.
+        segment : int, optional
+            The segment's number; negative numbers count from the end.
+        fraction : float, optional
+            Place on the segment, from 0 at its first node to 1 at its last; 0.5 if not given.
+
+        Returns
+        -------
+        int
+            The attachment point's number.
+
+        Raises
+        ------
+        InputError
+            For a filament, segment or place that does not exist.
+        """
+        label = f"Attachment point {len(self._attachments)}"
+        self._refuse_if_built(label)
+        filament = self._filament_number(filament, label)
+        return self._attach(locate(self[filament], filament, label, arc_length, segment, fraction))
+
+    def add_beads(self, filament, spacing):
+        """Cover a filament evenly with beads, on which contact forces act (see ``openmm_cylchain.couplings.contacts``).
+
+        Beads are attachment points, from the first node to the last at equal distances along the contour, in the
+        Topology with the name "BED". ``bead_indices`` says which particles they are.
+
+        Parameters
+        ----------
+        filament : int
+            The filament's number.
+        spacing : length
+            The largest distance of two neighbours along segments of rest length. Half a contact diameter closes
+            all gaps.
+
+        Returns
+        -------
+        list of int
+            The beads' numbers among the attachment points.
+
+        Raises
+        ------
+        InputError
+            For a filament that does not exist or has beads already, or a spacing that is not positive.
+        """
+        label = f"Beads of filament {filament}"
+        self._refuse_if_built(label)
+        filament = self._filament_number(filament, label)
+        if filament in self._beads:
+            raise InputError(f"{label}: it has beads already.")
+        beads = distribute_beads(self[filament], filament, positive(spacing, LENGTH, f"{label}: spacing"))
+        self._beads[filament] = [self._attach(bead) for bead in beads]
+        return list(self._beads[filament])
 
     def build(self, box_vectors=None, stretching_force_group=0, bending_force_group=0):
         """Put the filaments into a new Topology, System and positions.
@@ -217,72 +505,26 @@ class Filaments(FilamentCollection):
         InputError
             If there are no filaments, they are not in the System, or particles lack a friction.
         """
-        scheme = default_scheme(self._engine_name) if scheme is None else scheme
-        check_scheme(scheme)
-        if not self._filaments:
-            raise InputError("There are no filaments to recommend a time step for.")
-        steps = self._chain_steps(scheme, self._bath(temperature), as_flow(flow))
-        if contact_diameter is not None:
-            steps.append(self._contact_time_step(contact_diameter, contact_stiffness, confidence))
-        elif contact_stiffness is not None:
-            raise InputError("A contact_stiffness needs a contact_diameter.")
         if system is not None:
             self._refuse_if_not_in(system)
-            steps += self._contact_diffusion(system, self._bath(temperature), confidence)
-            forces = ExplicitForces(system, self, scheme, particle_friction)
-            steps.append(forces.recommended_step())
-        return shortest(steps)
+        return recommended_step_of(
+            self,
+            default_scheme(self._engine_name) if scheme is None else scheme,
+            contact_diameter,
+            contact_stiffness,
+            confidence,
+            system=system,
+            temperature=self._bath(temperature),
+            particle_friction=particle_friction,
+            flow=as_flow(flow),
+        )
 
     def _bath(self, temperature):
         return self._temperature if temperature is None else non_negative(temperature, TEMPERATURE, "temperature")
 
-    def _chain_steps(self, scheme, temperature, flow):
-        kinds = {(f.type, f.segments, f.closed) for f in self._filaments}
-        # In the order of the filaments, so that the first of equals is named.
-        ordered = sorted(kinds, key=[(f.type, f.segments, f.closed) for f in self._filaments].index)
-        return [
-            recommended_time_step(
-                kind, self._viscosity, temperature, scheme, segments, closed, flow, self._friction(kind, segments)
-            )
-            for kind, segments, closed in ordered
-        ]
-
-    def _friction(self, kind, segments):
-        # At the temperature of the filaments, whatever that of the run is.
-        return kind.segment_friction(self._viscosity, self._temperature, segments)
-
     def _refuse_if_not_in(self, system):
         if system.getNumParticles() <= max(nodes.max() for nodes in self.node_indices):
             raise InputError("This is not the System that the filaments were put into: it has too few particles.")
-
-    def _contact_time_step(self, diameter, stiffness, confidence):
-        diameters = filament_diameters(diameter, len(self))
-        if stiffness is None:
-            if self._temperature == 0.0:
-                raise InputError("At a temperature of zero, contacts need a contact_stiffness.")
-            stiffness = default_stiffness(diameters.min(), self._temperature)
-        solvent = (self._viscosity, self._temperature)
-        steps = []
-        for number, (filament, d) in enumerate(zip(self._filaments, diameters)):
-            density = max(1.0, len(self._beads.get(number, ())) / filament.segments)
-            steps.append(
-                contact_time_step(filament.type, *solvent, d, stiffness, filament.segments, density, confidence)
-            )
-        return shortest(steps)
-
-    def _contact_diffusion(self, system, temperature, confidence):
-        # Of filaments that a contact force of the System keeps apart.
-        found = {}
-        for force in system.getForces():
-            if is_contact_force(force):
-                for filament, beads in zip(self._filaments, self.bead_indices):
-                    diameter = force.getParticleParameters(int(beads[0]))[0] if len(beads) else 0.0
-                    if diameter > 0.0:
-                        found[filament.type, filament.segments, diameter] = True
-        return [
-            contact_diffusion_step(kind, self._friction(kind, segments), temperature, diameter, confidence)
-            for kind, segments, diameter in found
-        ]
 
     def create_integrator(
         self,
@@ -360,7 +602,7 @@ class Filaments(FilamentCollection):
         flow = as_flow(flow)
         bath = self._bath(temperature)
         if checks:
-            self._check_step(system, step_size, scheme, bath, particle_friction, flow)
+            warn_of_long_step(self, system, step_size, scheme, bath, particle_friction, flow)
         return self._engine.create_integrator(
             system,
             self._filaments,
@@ -376,16 +618,6 @@ class Filaments(FilamentCollection):
             checks,
             precision,
         )
-
-    def _check_step(self, system, step, scheme, bath, particle_friction, flow):
-        warn_if_strained(step, flow)
-        for f in {(f.type, f.segments, f.propulsion, f.closed): f for f in self._filaments}.values():
-            warn_if_driven_far(f.type, self._viscosity, self._temperature, step, f.segments, f.propulsion)
-            if not warn_if_unstable(f.type, self._viscosity, self._temperature, step, f.segments, scheme):
-                friction = self._friction(f.type, f.segments)
-                warn_if_far_above(f.type, self._viscosity, bath, step, f.segments, scheme, f.closed, friction)
-                warn_if_fene_is_wrong(f.type, bath, step, friction, scheme)
-        ExplicitForces(system, self, scheme, particle_friction).warn_if_too_stiff(step)
 
     def chain_set(self, system):
         """The filaments as an engine sees them (a ``ChainSet``): friction of segments and fixed nodes."""
@@ -553,3 +785,41 @@ class Filaments(FilamentCollection):
         self._engine.move_tethers(context, changed, self.node_indices)
         for number, tether in changed:
             self._tethers[number] = tether
+
+    def _attach(self, attachment):
+        self._attachments.append(attachment)
+        self._attachments_of[attachment.filament].append(len(self._attachments) - 1)
+        return len(self._attachments) - 1
+
+    def _refuse_if_built(self, label):
+        if self._nodes is not None:
+            raise InputError(f"{label} comes too late: the filaments are already in a System.")
+
+    def _refuse_unless_built(self):
+        if self._nodes is None:
+            raise InputError("The filaments are not in a System yet: call build or add_to first.")
+
+    def _filament_number(self, filament, label):
+        filament = whole_number(filament, 0, f"{label}: filament")
+        if filament >= len(self):
+            raise InputError(f"{label}: filament {filament} does not exist; there are {len(self)}.")
+        return filament
+
+    def _label(self, filament_type):
+        if not isinstance(filament_type, FilamentType):
+            raise InputError(
+                f"Filament {len(self)}: filament_type must be a FilamentType, such as F_ACTIN, but is "
+                f"{filament_type!r}."
+            )
+        return f"Filament {len(self)} ({filament_type.name})"
+
+    def _add(self, filament_type, positions, clamped, label, closed=False, planar=False, propulsion=0.0):
+        self._refuse_if_built(label)
+        filament = shapes.new_filament(filament_type, positions, clamped, label, closed, planar, propulsion)
+        # Friction is computed now, so that a filament that has none is refused here.
+        try:
+            filament_type.segment_friction(self._viscosity, self._temperature, filament.segments)
+        except InputError as error:
+            raise InputError(f"{label}: {error}") from None
+        self._filaments.append(filament)
+        return len(self) - 1

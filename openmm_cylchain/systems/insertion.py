@@ -4,10 +4,8 @@ import numpy as np
 import openmm
 
 from ..errors import InputError
+from ..filaments.filament import NODE_NAME
 from ..units.quantities import LENGTH, in_units_of, whole_number
-
-NODE_NAME = "NOD"
-"""Atom name of a filament node in topologies."""
 
 
 def check_target(topology, system, positions):

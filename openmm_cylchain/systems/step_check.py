@@ -40,7 +40,7 @@ import openmm
 from ..couplings.pulling import is_constant_force
 from ..dynamics.step_watch import LARGEST_DIVIDED_SHARE
 from ..dynamics.time_step import as_step, check_scheme, implicit_time_step
-from ..engines import default_scheme
+from ..engine_choice import default_scheme
 from ..errors import InputError, InstabilityError
 from ..theory import bending_energy_mean, chain_mean_square_end_to_end, stretching_energy_mean
 from ..units.quantities import DIMENSIONLESS, positive, thermal_energy, whole_number

@@ -23,6 +23,7 @@ FRICTION = unit.kilojoule_per_mole * unit.picosecond / unit.nanometer**2
 ROTATIONAL_FRICTION = unit.kilojoule_per_mole * unit.picosecond
 VISCOSITY = unit.kilojoule_per_mole * unit.picosecond / unit.nanometer**3
 MASS = unit.dalton
+MASS_PER_LENGTH = unit.dalton / unit.nanometer
 DIMENSIONLESS = unit.dimensionless
 
 
@@ -96,6 +97,23 @@ def whole_number(value, minimum, name):
     if value < minimum:
         raise InputError(f"{name} must be at least {minimum}, but is {value}.")
     return int(value)
+
+
+def vector(value, target, name):
+    """Return ``value`` as a (3,) array in the unit ``target``; raise InputError if it has another shape."""
+    components = np.asarray(in_units_of(value, target, name))
+    if components.shape != (3,):
+        raise InputError(f"{name} must have three components, but has the shape {components.shape}.")
+    return components
+
+
+def unit_vector(direction, label, name="direction"):
+    """Return ``direction`` normalised; raise InputError if it is zero or not a vector."""
+    direction = vector(direction, DIMENSIONLESS, f"{label}: {name}")
+    norm = np.linalg.norm(direction)
+    if norm == 0:
+        raise InputError(f"{label}: {name} must not be the zero vector.")
+    return direction / norm
 
 
 def thermal_energy(temperature):

@@ -2,33 +2,41 @@
 
 import functools
 import re
-from dataclasses import dataclass
 
 from ..errors import InputError
-from .quantities import AVOGADRO
+from .quantities import (
+    AVOGADRO,
+    BENDING_RIGIDITY,
+    FORCE,
+    LENGTH,
+    MASS_PER_LENGTH,
+    ROTATIONAL_FRICTION,
+    STIFFNESS,
+    TEMPERATURE,
+    TIME,
+    VISCOSITY,
+)
 
-
-@dataclass(frozen=True)
-class Dimension:
-    """A kind of quantity: what to call it, the unit that OpenMM's plain numbers have, and an example."""
-
-    name: str
-    unit: str
-    example: str
-
-
-LENGTH = Dimension("length", "nm", "360 nm")
-TIME = Dimension("time", "ps", "10 ns")
-TEMPERATURE = Dimension("temperature", "K", "310 K")
-VISCOSITY = Dimension("viscosity", "kJ*ps/mol/nm^3", "1.71 mPa*s")
-STIFFNESS = Dimension("stiffness", "kJ/mol/nm^2", "48.7 pN/nm")
-FORCE = Dimension("force", "kJ/mol/nm", "1100 pN")
-BENDING_RIGIDITY = Dimension("bending rigidity", "kJ/mol*nm", "2.2e7 pN*nm^2")
-ROTATIONAL_FRICTION = Dimension("rotational friction", "kJ*ps/mol", "7e4 pN*nm*us")
-MASS_PER_LENGTH = Dimension("mass per length", "Da/nm", "3500 Da/nm")
+_EXAMPLES = {
+    LENGTH: ("length", "360 nm"),
+    TIME: ("time", "10 ns"),
+    TEMPERATURE: ("temperature", "310 K"),
+    VISCOSITY: ("viscosity", "1.71 mPa*s"),
+    STIFFNESS: ("stiffness", "48.7 pN/nm"),
+    FORCE: ("force", "1100 pN"),
+    BENDING_RIGIDITY: ("bending rigidity", "2.2e7 pN*nm^2"),
+    ROTATIONAL_FRICTION: ("rotational friction", "7e4 pN*nm*us"),
+    MASS_PER_LENGTH: ("mass per length", "3500 Da/nm"),
+}
+"""What to call a quantity with such a unit, and how people write one."""
 
 _NUMBER = r"[-+]?(?:(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?|nan|inf)"
 _NUMBER_AND_UNIT = re.compile(rf"\s*({_NUMBER})\s*(.*?)\s*", re.IGNORECASE)
+
+
+def example(target):
+    """How people write a quantity in the unit ``target``, such as "360 nm"."""
+    return _EXAMPLES[target][1]
 
 
 @functools.cache
@@ -38,15 +46,16 @@ def _registry():
     return pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
 
 
-def parse_quantity(text, dimension, name):
-    """Read a number with a unit, such as "48.7 pN/nm", as a plain number in OpenMM's unit.
+def parse_quantity(text, target, name):
+    """Read a number with a unit, such as "48.7 pN/nm", as a plain number in the unit ``target``.
 
-    Quantities per particle (pN/nm, Pa*s) are turned into quantities per mole where OpenMM's are.
+    Quantities per particle (pN/nm, Pa*s) are turned into quantities per mole where the unit is one.
 
     Parameters
     ----------
     text : str
-    dimension : Dimension
+    target : openmm.unit.Unit
+        LENGTH, TIME and so on of ``quantities``.
     name : str
         What to call the quantity in messages.
 
@@ -55,22 +64,22 @@ def parse_quantity(text, dimension, name):
     InputError
         For text that is not one finite number with a unit of the right dimension.
     """
-    example = f'as in "{dimension.example}"'
+    written = f'as in "{example(target)}"'
     if not isinstance(text, str):
-        raise InputError(f"{name} must be a text with a number and a unit, {example}, but is {text!r}.")
+        raise InputError(f"{name} must be a text with a number and a unit, {written}, but is {text!r}.")
     # pint alone would read "1,71 nm" as 171 nm and "nm" as 1 nm.
     match = _NUMBER_AND_UNIT.fullmatch(text)
     if match is None:
-        raise InputError(f"{name} must be a number and a unit, {example}, but is {text!r}.")
+        raise InputError(f"{name} must be a number and a unit, {written}, but is {text!r}.")
     number, unit = float(match[1]), match[2]
     if number - number != 0:
         raise InputError(f"{name} must be finite, but is {text!r}.")
     if not unit:
-        raise InputError(f"{name} needs a unit, {example}, but is {text!r}.")
-    return _convert(number, _parse_unit(unit, dimension, name), dimension, name)
+        raise InputError(f"{name} needs a unit, {written}, but is {text!r}.")
+    return _convert(number, _parse_unit(unit, target, name), target, name)
 
 
-def _parse_unit(unit, dimension, name):
+def _parse_unit(unit, target, name):
     import pint
 
     try:
@@ -79,24 +88,25 @@ def _parse_unit(unit, dimension, name):
         reason = str(error).replace(" in the unit registry", "")
     except Exception:  # Malformed expressions make pint raise anything from AssertionError to TokenError.
         reason = "it cannot be read"
-    raise InputError(f'{name} has the unit {unit!r}: {reason}. Write a {dimension.name} as in "{dimension.example}".')
+    kind, written = _EXAMPLES[target]
+    raise InputError(f'{name} has the unit {unit!r}: {reason}. Write a {kind} as in "{written}".')
 
 
-def _convert(number, unit, dimension, name):
+def _convert(number, unit, target, name):
     registry = _registry()
+    symbol = target.get_symbol()
     quantity = registry.Quantity(number, unit)
     candidates = [quantity]
-    if "mol" in dimension.unit:
+    if "mol" in symbol:
         candidates.append(quantity.to_base_units() * (AVOGADRO / registry.mole))
-    elif "Da" in dimension.unit:
+    elif "Da" in symbol:
         candidates.append(quantity.to_base_units() * (registry.mole / AVOGADRO))
     for candidate in candidates:
-        if candidate.is_compatible_with(dimension.unit):
+        if candidate.is_compatible_with(symbol):
             # 15 digits drop the rounding noise of the conversion: 10 ns are 10000 ps.
-            return float(f"{candidate.m_as(dimension.unit):.15g}")
-    raise InputError(
-        f'{name} has the unit {unit:~}, which is not one of {dimension.name}: write it as in "{dimension.example}".'
-    )
+            return float(f"{candidate.m_as(symbol):.15g}")
+    kind, written = _EXAMPLES[target]
+    raise InputError(f'{name} has the unit {unit:~}, which is not one of {kind}: write it as in "{written}".')
 
 
 _TIME_UNITS = (("s", 1e12), ("ms", 1e9), ("us", 1e6), ("ns", 1e3), ("ps", 1.0))

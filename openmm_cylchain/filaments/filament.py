@@ -1,0 +1,71 @@
+"""One filament of a type at a place, and tethers of filaments."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .filament_type import FilamentType
+from .placement import joint_stiffnesses
+
+NODE_NAME = "NOD"
+"""Atom name of a filament node in topologies."""
+
+
+@dataclass(frozen=True)
+class Filament:
+    """One filament.
+
+    Attributes
+    ----------
+    type : FilamentType
+    positions : (n, 3) array
+        Initial node positions in nm.
+    clamped : tuple of int
+        Nodes that do not move.
+    closed : bool
+        A ring, whose last node is joined to the first.
+    planar : bool
+        The nodes keep their z.
+    propulsion : float
+        F0 in kJ/(mol nm): the force F0 t on every segment, half on either end, with its tangent t.
+    """
+
+    type: FilamentType
+    positions: np.ndarray
+    clamped: tuple
+    closed: bool = False
+    planar: bool = False
+    propulsion: float = 0.0
+
+    @property
+    def segments(self):
+        """Number of segments."""
+        return len(self.positions) - (0 if self.closed else 1)
+
+    @property
+    def joint_stiffnesses(self):
+        """Bending stiffness of every joint in kJ/mol, see ``placement.joint_stiffnesses``."""
+        return joint_stiffnesses(self.type, len(self.positions), self.clamped, self.closed)
+
+    def energies(self, nodes):
+        """Stretching and bending energy, in kJ/mol, with node positions (n, 3) in nm."""
+        return self.type.chain_energies(nodes, self.joint_stiffnesses, self.closed)
+
+
+@dataclass(frozen=True)
+class Tether:
+    """A harmonic spring between a node and a point: energy (k/2) d^2 for their distance d.
+
+    Attributes
+    ----------
+    filament, node : int
+    point : tuple of three floats
+        In nm.
+    stiffness : float
+        k in kJ/(mol nm^2).
+    """
+
+    filament: int
+    node: int
+    point: tuple
+    stiffness: float

@@ -1,0 +1,83 @@
+"""Node positions of new filaments: straight ones, rings, draws from equilibrium and given ones, checked."""
+
+import numpy as np
+
+from ..errors import InputError
+from ..mechanics.geometry import regular_polygon
+from ..units.quantities import FORCE, LENGTH, finite_number, in_units_of, unit_vector, vector, whole_number
+from .equilibrium import draw_chain
+from .filament import Filament
+from .placement import check_shape, clamped_nodes, in_one_plane, joint_stiffnesses, planar_direction
+
+MINIMUM_RING = 4
+"""Segments that a ring has at least."""
+
+
+def straight(filament_type, segments, start, direction, label):
+    """Positions (segments + 1, 3) in nm of a straight filament with segments of rest length."""
+    segments = whole_number(segments, 1, f"{label}: segments")
+    start = vector(start, LENGTH, f"{label}: start")
+    distance = np.arange(segments + 1) * filament_type.segment_length
+    return start + distance[:, None] * unit_vector(direction, label)
+
+
+def given(positions, label):
+    """A copy of given positions in nm; raise InputError unless they are those of two nodes or more."""
+    positions = np.atleast_1d(in_units_of(positions, LENGTH, f"{label}: positions"))
+    if positions.ndim != 2 or positions.shape[1] != 3:
+        raise InputError(f"{label}: positions must have the shape (n, 3), but have {positions.shape}.")
+    if len(positions) < 2:
+        raise InputError(f"{label} needs at least two nodes (one segment), but has {len(positions)}.")
+    return positions.copy()
+
+
+def ring(filament_type, segments, center, normal, label):
+    """Positions (segments, 3) in nm of a regular polygon with segments of rest length."""
+    segments = whole_number(segments, 1, f"{label}: segments")
+    center = vector(center, LENGTH, f"{label}: center")
+    return regular_polygon(segments, filament_type.segment_length, center, unit_vector(normal, label, "normal"))
+
+
+def drawn(filament_type, segments, temperature, seed, start, direction, clamped, planar, label):
+    """Positions (segments + 1, 3) in nm from the exact equilibrium of the free discrete chain."""
+    segments = whole_number(segments, 1, f"{label}: segments")
+    start = vector(start, LENGTH, f"{label}: start")
+    planar = _flag(planar, f"{label}: planar")
+    if direction is not None:
+        direction = unit_vector(direction, label)
+        direction = planar_direction(direction, label) if planar else direction
+    if temperature == 0:
+        raise InputError(f"{label}: an equilibrium draw needs a temperature above zero.")
+    generator = np.random.default_rng(whole_number(seed, 0, f"{label}: seed"))
+    stiffnesses = joint_stiffnesses(filament_type, segments + 1, clamped_nodes(clamped, segments + 1, label))
+    return draw_chain(filament_type, segments, temperature, generator, start, direction, planar, stiffnesses)
+
+
+def new_filament(filament_type, positions, clamped, label, closed=False, planar=False, propulsion=0.0):
+    """A Filament with node positions (n, 3) in nm.
+
+    Raises
+    ------
+    InputError
+        If forces are not defined there, or the filament is not what it is said to be.
+    """
+    closed, planar = _flag(closed, f"{label}: closed"), _flag(planar, f"{label}: planar")
+    if closed and len(positions) < MINIMUM_RING:
+        raise InputError(f"{label}: a ring needs at least {MINIMUM_RING} segments, but has {len(positions)}.")
+    check_shape(filament_type, positions, label, closed)
+    if planar:
+        positions = in_one_plane(positions, filament_type.segment_length, label)
+    return Filament(
+        filament_type,
+        positions,
+        clamped_nodes(clamped, len(positions), label),
+        closed,
+        planar,
+        finite_number(propulsion, FORCE, f"{label}: propulsion"),
+    )
+
+
+def _flag(value, name):
+    if not isinstance(value, (bool, np.bool_)):
+        raise InputError(f"{name} must be True or False, but is {value!r}.")
+    return bool(value)

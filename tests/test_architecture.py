@@ -1,0 +1,78 @@
+"""The folders of the package lie above each other, and nothing imports upwards or in a circle."""
+
+import ast
+from graphlib import TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).parents[1] / "openmm_cylchain"
+
+# From the lowest to the highest. Modules on one line may import each other, but not in a circle.
+FLOORS = (
+    ("errors", "version"),
+    ("engine_choice",),
+    ("units",),
+    ("mechanics",),
+    ("filaments",),
+    ("theory",),
+    ("output",),
+    ("couplings",),
+    ("dynamics",),
+    ("engines",),
+    ("analysis",),
+    ("systems",),
+    ("",),
+    ("runs",),
+    ("benchmark",),
+    ("reproduce",),
+    ("cli",),
+)
+FLOOR = {name: floor for floor, names in enumerate(FLOORS) for name in names}
+# Written by the build.
+BUILT = {"plugin", "plugin_version"}
+
+
+def module_of(path):
+    parts = path.relative_to(PACKAGE).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+MODULES = {module_of(path): path for path in sorted(PACKAGE.rglob("*.py"))}
+
+
+def imports_of(module):
+    """Modules of the package that one imports, at its top or within functions."""
+    path = MODULES[module]
+    package = module.split(".") if path.name == "__init__.py" else module.split(".")[:-1]
+    for node in ast.walk(ast.parse(path.read_text())):
+        if not isinstance(node, ast.ImportFrom) or node.level == 0:
+            continue
+        base = [part for part in package[: len(package) - node.level + 1] if part]
+        target = ".".join([*base, *([node.module] if node.module else [])])
+        for name in (alias.name for alias in node.names):
+            full = f"{target}.{name}".strip(".")
+            yield full if full in MODULES or full in BUILT else target
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_nothing_imports_upwards(module):
+    floor = FLOOR[module.split(".")[0]]
+    for imported in imports_of(module):
+        if imported not in BUILT:
+            assert FLOOR[imported.split(".")[0]] <= floor, f"{module} imports {imported}"
+
+
+def test_there_is_no_circle_of_imports():
+    graph = {module: [other for other in imports_of(module) if other in MODULES] for module in MODULES}
+    assert len(graph) > 80
+    TopologicalSorter(graph).prepare()
+
+
+def test_no_module_imports_the_package_by_its_name():
+    for module, path in MODULES.items():
+        for node in ast.walk(ast.parse(path.read_text())):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            if isinstance(node, ast.ImportFrom) and node.level == 0:
+                names.append(node.module)
+            assert not any(name.startswith("openmm_cylchain") for name in names), module
