@@ -9,14 +9,9 @@ from .couplings.contacts import add_exclusions, contact_force, crossing_barrier,
 from .couplings.crosslinks import Crosslinks, CrosslinkTable
 from .couplings.pulling import ConstantVelocityPulling, change_constant_force, constant_force, constant_tension
 from .couplings.walls import Box, Cylinder, Ellipsoid, Plane, Slab, Sphere, wall_force
-from .dynamics.time_step import (
-    TimeStep,
-    effective_rate,
-    fene_steps,
-    recommended_time_step,
-    stability_bounds,
-    time_step_bounds,
-)
+from .dynamics.recommended_step import fene_steps, recommended_time_step
+from .dynamics.stability import stability_bounds, time_step_bounds
+from .dynamics.time_step import TimeStep, effective_rate
 from .errors import ContactWarning, EquilibrationWarning, InputError, InstabilityError, TimeStepError, TimeStepWarning
 from .filaments.attachments import Attachment
 from .filaments.filament import Filament, Tether

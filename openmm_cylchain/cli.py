@@ -175,7 +175,8 @@ _BOUND_LABELS = {
 
 
 def _time_step(options):
-    from .dynamics.time_step import recommended_time_step, stability_bounds, time_step_bounds
+    from .dynamics.recommended_step import recommended_time_step
+    from .dynamics.stability import stability_bounds, time_step_bounds
     from .runs.configuration import read_configuration
     from .units.text import format_time
 
@@ -203,15 +204,15 @@ def _time_step(options):
 
 
 def _check_time_step(configuration, options):
-    from .benchmark.report import Progress, check_output_path
+    from .output.files import check_output_path, write_atomically
+    from .output.progress import ProgressMessages
     from .runs.run import RunInterrupted, check_step
-    from .runs.run_directory import write_atomically
 
     if options.json is not None:
         check_output_path(options.json)
     # What is printed already is for the time until the check is done.
     sys.stdout.flush()
-    progress = Progress()
+    progress = ProgressMessages()
     try:
         check = check_step(configuration, _SECONDS_OF_CHECK if options.seconds is None else options.seconds, progress)
     except RunInterrupted as interruption:
@@ -237,10 +238,10 @@ def _information(options):
 
 
 def _reproduce(options):
-    from .benchmark.report import Progress
+    from .output.progress import ProgressMessages
     from .reproduce.reproduction import reproduce, unexplained
 
-    progress = Progress()
+    progress = ProgressMessages()
     try:
         content = reproduce(options.paper, options.output, options.figure, options.quick, options.force, say=progress)
     finally:
@@ -294,11 +295,13 @@ def _benchmark_bead_spring(options):
 
 
 def _benchmark(options, measure):
-    from .benchmark.report import Progress, check_output_path, format_report, write_json
+    from .benchmark.report import format_report, write_json
+    from .output.files import check_output_path
+    from .output.progress import ProgressMessages
 
     if options.json is not None:
         check_output_path(options.json)
-    progress = Progress()
+    progress = ProgressMessages()
     try:
         report = measure(progress)
     finally:

@@ -8,7 +8,7 @@ from conftest import PLATFORMS
 from openmm import unit
 
 from openmm_cylchain import F_ACTIN, Filaments, FilamentType
-from openmm_cylchain.dynamics.time_step import stability_bounds
+from openmm_cylchain.dynamics.stability import stability_bounds
 from openmm_cylchain.filaments.equilibrium import JointAngleDistribution, SegmentLengthDistribution
 from openmm_cylchain.units.quantities import BOLTZMANN
 

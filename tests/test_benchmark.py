@@ -13,6 +13,7 @@ import pytest
 from openmm_cylchain import Filaments, InputError, cli, engines
 from openmm_cylchain.benchmark import engines as engine_benchmark
 from openmm_cylchain.benchmark import measurement, memory, report, scaling, systems
+from openmm_cylchain.output.progress import ProgressMessages
 from openmm_cylchain.runs import information
 
 NATIVE = "openmm_cylchain.engines.compiled"
@@ -321,7 +322,7 @@ def test_values_of_any_size_can_be_shown():
 
 def test_progress_goes_line_by_line_where_there_is_no_terminal():
     stream = io.StringIO()
-    progress = report.Progress(stream)
+    progress = ProgressMessages(stream)
     progress("one")
     progress("two")
     progress.finish()

@@ -9,7 +9,7 @@ import pytest
 from openmm import app, unit
 
 from openmm_cylchain import DSDNA, F_ACTIN, Filaments, InputError, TimeStepWarning
-from openmm_cylchain.dynamics.time_step import stability_bounds
+from openmm_cylchain.dynamics.stability import stability_bounds
 
 VISCOSITY = 1.71e-3 * unit.pascal * unit.second
 TEMPERATURE = 310 * unit.kelvin

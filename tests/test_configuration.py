@@ -7,7 +7,7 @@ import pytest
 from openmm import unit
 
 from openmm_cylchain import DSDNA, F_ACTIN, MICROTUBULE, EndCorrections, FilamentType, InputError
-from openmm_cylchain.dynamics.time_step import recommended_time_step
+from openmm_cylchain.dynamics.recommended_step import recommended_time_step
 from openmm_cylchain.engine_choice import default_scheme
 from openmm_cylchain.runs.configuration import changed_keys, parse_configuration, read_configuration
 from openmm_cylchain.units.quantities import (
@@ -249,9 +249,9 @@ def test_intervals_may_carry_rounding_errors():
         ({"filament": FILAMENT.replace("8", "0")}, ["number 1: segments must be at least 1"]),
         ({"filament": FILAMENT.replace("8", "8.5")}, ["number 1: segments must be a whole number"]),
         ({"filament": FILAMENT + "count = true\n"}, ["number 1: count must be a whole number"]),
-        ({"filament": FILAMENT + "clamped = [9]\n"}, ["number 1: clamped names node 9", "0 to 8"]),
+        ({"filament": FILAMENT + "clamped = [9]\n"}, ["number 1: clamped node 9 does not exist", "there are 9 nodes"]),
         ({"filament": FILAMENT + "clamped = 3\n"}, ["number 1: clamped must be a list"]),
-        ({"filament": FILAMENT.replace("8", "1") + "clamped = [0, 1]\n"}, ["names every node"]),
+        ({"filament": FILAMENT.replace("8", "1") + "clamped = [0, 1]\n"}, ["all of its nodes clamped"]),
         ({"filament": FILAMENT + "direction = [0, 0, 0]\n"}, ["number 1: direction", "zero vector"]),
         ({"filament": FILAMENT + "direction = [1, nan, 0]\n"}, ["number 1: direction[1]", "finite"]),
         ({"filament": FILAMENT + 'position = ["0 nm", "0 nm"]\n'}, ["number 1: position", "list of three"]),

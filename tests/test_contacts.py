@@ -18,7 +18,8 @@ from openmm_cylchain.couplings.contacts import (
     excluded_pairs,
     share_exclusions,
 )
-from openmm_cylchain.dynamics.time_step import contact_stiffness_bound, contact_time_step, diffusion_bound
+from openmm_cylchain.dynamics.recommended_step import contact_time_step
+from openmm_cylchain.dynamics.stability import contact_stiffness_bound, diffusion_bound
 
 ACTIN = F_ACTIN.with_segment_length(100)
 DIAMETER = 30.0

@@ -9,8 +9,8 @@ from openmm import unit
 from physics_cases import CASES, KT, TEMPERATURE, VISCOSITY, Case, exact_means, measured_means
 
 from openmm_cylchain import F_ACTIN, MICROTUBULE, Filaments, InputError, InstabilityError
+from openmm_cylchain.dynamics.recommended_step import recommended_time_step
 from openmm_cylchain.dynamics.schemes import IMPLICIT_SCHEMES
-from openmm_cylchain.dynamics.time_step import recommended_time_step
 
 SIGMAS = 4.0
 # Of the energies, at the recommended step.

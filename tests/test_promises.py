@@ -25,7 +25,8 @@ from openmm_cylchain import (
     recommended_time_step,
 )
 from openmm_cylchain.couplings import walls as confinement
-from openmm_cylchain.dynamics.time_step import effective_rate, fene_steps
+from openmm_cylchain.dynamics.recommended_step import fene_steps
+from openmm_cylchain.dynamics.time_step import effective_rate
 from openmm_cylchain.filaments.equilibrium import JointAngleDistribution, SegmentLengthDistribution
 
 SIGMAS = 4.0

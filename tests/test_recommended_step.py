@@ -25,8 +25,9 @@ from openmm_cylchain.couplings import walls as confinement
 from openmm_cylchain.couplings.crosslinks import Crosslinks
 from openmm_cylchain.dynamics.explicit_forces import ACCURATE
 from openmm_cylchain.dynamics.mobility import FilamentResponse
+from openmm_cylchain.dynamics.recommended_step import fene_steps
 from openmm_cylchain.dynamics.schemes import IMPLICIT_SCHEMES, SCHEMES, amplification_of_second_order
-from openmm_cylchain.dynamics.time_step import as_step, fene_steps
+from openmm_cylchain.dynamics.time_step import as_step
 
 VISCOSITY = 1.71e-3 * unit.pascal * unit.second
 TEMPERATURE = 310.0

@@ -22,7 +22,7 @@ from openmm_cylchain import (
     TimeStepWarning,
     recommended_time_step,
 )
-from openmm_cylchain.dynamics import time_step as timestep
+from openmm_cylchain.dynamics import schemes, stability, step_warnings, time_step
 from openmm_cylchain.mechanics.flow import Flow
 from openmm_cylchain.mechanics.redistribution import STEPS, ChainSet, resistance_bands
 
@@ -57,12 +57,12 @@ def printed(text):
 
 
 def bounds_in_microseconds(filament_type, length):
-    bounds = timestep.time_step_bounds(filament_type.with_segment_length(length), VISCOSITY, TEMPERATURE)
+    bounds = stability.time_step_bounds(filament_type.with_segment_length(length), VISCOSITY, TEMPERATURE)
     return {name: bound / MICROSECOND for name, bound in bounds.items()}
 
 
 def bead_spring_in_microseconds(filament_type):
-    bounds = timestep.bead_spring_bounds(
+    bounds = stability.bead_spring_bounds(
         filament_type.diameter,
         VISCOSITY,
         filament_type.segment_stiffness,
@@ -121,28 +121,28 @@ def test_bounds_of_table_1_by_hand():
     friction = SegmentFriction(parallel=3.0, perpendicular=5.0, rotational=70.0, extensional=11.0)
     d, length, c = 2.0, 8.0, 3.0
     unit_step = d**2 / (8 * c**2 * KT)
-    assert timestep.translation_bound(friction, d, TEMPERATURE) == pytest.approx(unit_step * 3.0, rel=1e-8)
-    assert timestep.rotation_bound(friction, d, length, TEMPERATURE) == pytest.approx(
+    assert stability.translation_bound(friction, d, TEMPERATURE) == pytest.approx(unit_step * 3.0, rel=1e-8)
+    assert stability.rotation_bound(friction, d, length, TEMPERATURE) == pytest.approx(
         d**2 * 70.0 / (2 * c**2 * KT * 64), rel=1e-8
     )
     along, across = 1 / (1 / 3.0 + 16 / 11.0), 1 / (1 / 5.0 + 16 / 70.0)
-    assert timestep.diffusion_bound(friction, d, length, TEMPERATURE) == pytest.approx(
+    assert stability.diffusion_bound(friction, d, length, TEMPERATURE) == pytest.approx(
         unit_step * min(along, across), rel=1e-8
     )
-    assert timestep.stretching_bound(friction, 4.0, length) == pytest.approx(2 * 11.0 / (4.0 * 64), rel=1e-14)
-    assert timestep.bending_bound(friction, 9.0, length) == pytest.approx(2 * 8 * 70.0 / 9.0, rel=1e-14)
+    assert stability.stretching_bound(friction, 4.0, length) == pytest.approx(2 * 11.0 / (4.0 * 64), rel=1e-14)
+    assert stability.bending_bound(friction, 9.0, length) == pytest.approx(2 * 8 * 70.0 / 9.0, rel=1e-14)
 
 
 def test_diffusion_bound_takes_the_faster_direction():
     stiff_rod = SegmentFriction(parallel=3.0, perpendicular=5.0, rotational=1.0, extensional=1e9)
     d, length = 2.0, 8.0
     expected = d**2 / (72 * KT) / (1 / 5.0 + 16 / 1.0)
-    assert timestep.diffusion_bound(stiff_rod, d, length, TEMPERATURE) == pytest.approx(expected, rel=1e-8)
+    assert stability.diffusion_bound(stiff_rod, d, length, TEMPERATURE) == pytest.approx(expected, rel=1e-8)
 
 
 def test_confidence_enters_squared():
-    three = timestep.time_step_bounds(F_ACTIN, VISCOSITY, TEMPERATURE, confidence=3)
-    one = timestep.time_step_bounds(F_ACTIN, VISCOSITY, TEMPERATURE, confidence=1)
+    three = stability.time_step_bounds(F_ACTIN, VISCOSITY, TEMPERATURE, confidence=3)
+    one = stability.time_step_bounds(F_ACTIN, VISCOSITY, TEMPERATURE, confidence=1)
     for name in ("translation", "rotation", "diffusion"):
         assert one[name] == pytest.approx(9 * three[name], rel=1e-12)
     assert (one["stretching"], one["bending"]) == (three["stretching"], three["bending"])
@@ -167,15 +167,15 @@ def test_asymptotics_of_table_1(length):
 
 
 def test_no_diffusion_at_zero_temperature():
-    bounds = timestep.time_step_bounds(F_ACTIN, VISCOSITY, 0)
+    bounds = stability.time_step_bounds(F_ACTIN, VISCOSITY, 0)
     assert bounds["translation"] == bounds["rotation"] == bounds["diffusion"] == math.inf
     assert 0 < bounds["stretching"] < bounds["bending"] < math.inf
 
 
 def test_freely_jointed_chain_has_no_bending_bound():
     free = dataclasses.replace(F_ACTIN, bending_rigidity=0.0)
-    assert timestep.time_step_bounds(free, VISCOSITY, TEMPERATURE)["bending"] == math.inf
-    assert timestep.stability_bounds(free, VISCOSITY, TEMPERATURE, 10)["bending"] == math.inf
+    assert stability.time_step_bounds(free, VISCOSITY, TEMPERATURE)["bending"] == math.inf
+    assert stability.stability_bounds(free, VISCOSITY, TEMPERATURE, 10)["bending"] == math.inf
 
 
 # Stability of whole chains, straight, against the largest eigenvalue of Z^-1 K
@@ -238,7 +238,7 @@ CHAINS = [
 def test_bounds_of_a_chain_are_those_of_its_fastest_modes(filament_type, segments, reference):
     positions, hessian = hessian_from_openmm(filament_type, segments, reference)
     resistance = dense_resistance(chain_set(filament_type, segments), positions)
-    bounds = timestep.stability_bounds(filament_type, VISCOSITY, TEMPERATURE, segments)
+    bounds = stability.stability_bounds(filament_type, VISCOSITY, TEMPERATURE, segments)
     assert set(bounds) == ({"stretching", "bending"} if segments > 1 else {"stretching"})
     for name, bound in bounds.items():
         direction = {"stretching": 0, "bending": 1}[name]
@@ -259,7 +259,7 @@ def test_steps_beyond_the_bound_grow(scheme, name, factor, grows, reference):
     segments = 24
     straight, hessian = hessian_from_openmm(actin, segments, reference)
     chains = chain_set(actin, segments)
-    bounds = timestep.stability_bounds(actin, VISCOSITY, TEMPERATURE, segments)
+    bounds = stability.stability_bounds(actin, VISCOSITY, TEMPERATURE, segments)
     assert min(bounds, key=bounds.get) == name
     step = factor * bounds[name]
     direction = {"stretching": 0, "bending": 1}[name]
@@ -300,7 +300,7 @@ SOFT = FilamentType(
 )
 
 
-@pytest.mark.parametrize("scheme", timestep.EXPLICIT_SCHEMES)
+@pytest.mark.parametrize("scheme", schemes.EXPLICIT_SCHEMES)
 @pytest.mark.parametrize(
     "filament_type, binding, reason",
     [
@@ -388,10 +388,10 @@ def test_unknown_scheme(scheme):
 @pytest.mark.parametrize("name, length", [("stretching", 360), ("bending", 30)])
 def test_warning_names_the_bound_and_a_better_step(name, length):
     actin = F_ACTIN.with_segment_length(length)
-    bound = timestep.stability_bounds(actin, VISCOSITY, TEMPERATURE, 10)[name]
+    bound = stability.stability_bounds(actin, VISCOSITY, TEMPERATURE, 10)[name]
     recommended = recommended_time_step(actin, VISCOSITY, TEMPERATURE, "midpoint", segments=10)
     with pytest.warns(TimeStepWarning, match=re.escape(f"exceeds the {name} bound of {bound:.4g} ps ")) as caught:
-        timestep.warn_if_unstable(actin, VISCOSITY, TEMPERATURE, 1.01 * bound, 10)
+        step_warnings.warn_if_unstable(actin, VISCOSITY, TEMPERATURE, 1.01 * bound, 10)
     assert len(caught) == 1
     assert "'ACT'" in str(caught[0].message)
     assert str(recommended) in str(caught[0].message)
@@ -401,17 +401,17 @@ def test_no_warning_below_the_bounds():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         for filament_type in CHAINS:
-            bounds = timestep.stability_bounds(filament_type, VISCOSITY, TEMPERATURE, 10)
-            timestep.warn_if_unstable(filament_type, VISCOSITY, TEMPERATURE, 0.99 * min(bounds.values()), 10)
+            bounds = stability.stability_bounds(filament_type, VISCOSITY, TEMPERATURE, 10)
+            step_warnings.warn_if_unstable(filament_type, VISCOSITY, TEMPERATURE, 0.99 * min(bounds.values()), 10)
         stiff = F_ACTIN.with_segment_length(30)
-        beyond_bending = 2 * timestep.stability_bounds(stiff, VISCOSITY, TEMPERATURE, 10)["bending"]
-        timestep.warn_if_unstable(stiff, VISCOSITY, TEMPERATURE, beyond_bending, segments=1)
+        beyond_bending = 2 * stability.stability_bounds(stiff, VISCOSITY, TEMPERATURE, 10)["bending"]
+        step_warnings.warn_if_unstable(stiff, VISCOSITY, TEMPERATURE, beyond_bending, segments=1)
 
 
 @pytest.mark.parametrize("step", [0, -1.0, math.nan, 1 * unit.nanometer])
 def test_steps_that_are_none(step):
     with pytest.raises(InputError, match="time step"):
-        timestep.warn_if_unstable(F_ACTIN, VISCOSITY, TEMPERATURE, step)
+        step_warnings.warn_if_unstable(F_ACTIN, VISCOSITY, TEMPERATURE, step)
 
 
 def test_recommended_step_of_a_ring_resolves_how_it_becomes_round():
@@ -472,10 +472,10 @@ def test_warnings_where_drive_is_not_resolved(engine):
 def test_relaxation_times_that_a_step_resolves(scheme, error):
     # Long implicit steps are those of the implicit Euler method.
     fastest = 1e6
-    limit = timestep.resolved_relaxation_time(3.0, scheme, error, fastest)
+    limit = time_step.resolved_relaxation_time(3.0, scheme, error, fastest)
     for longer in (1.001, 3.0, 100.0):
-        assert abs(timestep.effective_rate(3.0, scheme, 1 / (longer * limit), fastest) * longer * limit - 1) < error
-    beyond = timestep.effective_rate(3.0, scheme, 1 / (0.999 * limit), fastest) * 0.999 * limit
+        assert abs(time_step.effective_rate(3.0, scheme, 1 / (longer * limit), fastest) * longer * limit - 1) < error
+    beyond = time_step.effective_rate(3.0, scheme, 1 / (0.999 * limit), fastest) * 0.999 * limit
     assert abs(beyond - 1) > error
     z = 3.0 / limit
     exact = math.log1p(z) / z if scheme == "implicit" else -math.log1p(-z) / z
@@ -487,22 +487,22 @@ def test_rates_of_the_implicit_scheme():
     z, rate = 0.5, 0.25
     for fastest, theta in ((0.0, 0.5), (1.0, 0.5), (5.0, 0.9)):
         expected = -math.log((1 - (1 - theta) * z) / (1 + theta * z)) / 2.0
-        assert timestep.effective_rate(2.0, "implicit", rate, fastest) == pytest.approx(expected, rel=1e-12)
+        assert time_step.effective_rate(2.0, "implicit", rate, fastest) == pytest.approx(expected, rel=1e-12)
     picoseconds = 2.0 * unit.picosecond
-    with_units = timestep.effective_rate(picoseconds, "implicit", rate / unit.picosecond, 5.0 / unit.picosecond)
+    with_units = time_step.effective_rate(picoseconds, "implicit", rate / unit.picosecond, 5.0 / unit.picosecond)
     assert with_units == pytest.approx(expected, rel=1e-12)
-    assert timestep.effective_rate(4.0, "midpoint", 0.3) == math.inf
+    assert time_step.effective_rate(4.0, "midpoint", 0.3) == math.inf
     for wrong in ({"error": 0.0}, {"scheme": "verlet"}, {"step": -1.0}, {"step": 1 * unit.nanometer}):
         with pytest.raises(InputError):
-            timestep.resolved_relaxation_time(**{"step": 1.0, "scheme": "implicit", **wrong})
-    limit = timestep.resolved_relaxation_time(picoseconds, "implicit", 0.05, 5.0 / unit.picosecond)
-    assert limit == timestep.resolved_relaxation_time(2.0, "implicit", 0.05, 5.0)
+            time_step.resolved_relaxation_time(**{"step": 1.0, "scheme": "implicit", **wrong})
+    limit = time_step.resolved_relaxation_time(picoseconds, "implicit", 0.05, 5.0 / unit.picosecond)
+    assert limit == time_step.resolved_relaxation_time(2.0, "implicit", 0.05, 5.0)
 
 
 def test_a_recommended_step_says_which_modes_it_resolves():
     recommended = recommended_time_step(F_ACTIN, VISCOSITY, TEMPERATURE, "implicit", 16)
     fastest = 4 * F_ACTIN.joint_stiffness / F_ACTIN.segment_friction(VISCOSITY, TEMPERATURE).rotational
-    five = timestep.resolved_relaxation_time(recommended.step, "implicit", 0.05, fastest)
+    five = time_step.resolved_relaxation_time(recommended.step, "implicit", 0.05, fastest)
     assert recommended.resolved_relaxation_time() == five > recommended.resolved_relaxation_time(0.10)
     assert re.search(r"relax in [0-9.]+ ms or longer are right to 5 %, in", recommended.describe_dynamics())
     rod = recommended_time_step(F_ACTIN, VISCOSITY, TEMPERATURE, "implicit", 1)

@@ -1,14 +1,11 @@
-"""Rows of a benchmark: as a table, as JSON, and its progress on standard error."""
+"""Rows of a benchmark: as a table and as JSON."""
 
 import json
 import math
-import sys
-import time
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-from ..errors import InputError
-from ..runs.run_directory import write_atomically
+from ..output.files import write_atomically
 
 
 @dataclass(frozen=True)
@@ -84,14 +81,6 @@ def _format_value(value, error):
     return f"{value:.{decimals}f}", "" if error is None else f"± {error:.{decimals}f}"
 
 
-def check_output_path(path):
-    """Raise InputError if a file cannot be written there, before hours are spent on its content."""
-    path = Path(path)
-    if path.is_dir() or not path.parent.is_dir():
-        what = "is a directory" if path.is_dir() else f"is in {path.parent}, which is not a directory"
-        raise InputError(f"{path} {what}: give the path of a file.")
-
-
 def write_json(report, path):
     """Write machine, settings, rows and what is missing to a file."""
     content = {
@@ -101,27 +90,3 @@ def write_json(report, path):
         "missing": report.missing,
     }
     write_atomically(Path(path), (json.dumps(content, indent=2, allow_nan=False) + "\n").encode())
-
-
-class Progress:
-    """Says on standard error what a benchmark is at, in one line that is overwritten if it is a terminal."""
-
-    def __init__(self, stream=None):
-        self._stream = sys.stderr if stream is None else stream
-        self._start = time.monotonic()
-        self._width = 0
-
-    def __call__(self, message):
-        line = f"{time.monotonic() - self._start:6.1f} s  {message}"
-        if self._stream.isatty():
-            self._stream.write("\r" + line.ljust(self._width))
-            self._width = len(line)
-        else:
-            self._stream.write(line + "\n")
-        self._stream.flush()
-
-    def finish(self):
-        """Leave the line that was overwritten."""
-        if self._stream.isatty():
-            self._stream.write("\n")
-            self._stream.flush()

@@ -19,9 +19,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import Filaments
+from ..dynamics.recommended_step import recommended_time_step
 from ..dynamics.schemes import EXPLICIT_SCHEMES, SCHEMES
+from ..dynamics.stability import stability_bounds
 from ..dynamics.step_watch import LARGEST_DIVIDED_SHARE
-from ..dynamics.time_step import recommended_time_step, stability_bounds
 from ..engine_choice import choose_engine
 from ..errors import InstabilityError
 from ..theory import bending_energy_mean, stretching_energy_mean

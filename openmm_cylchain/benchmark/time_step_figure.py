@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from ..dynamics.schemes import SCHEMES
 from ..errors import InputError
-from .report import check_output_path
+from ..output.files import check_output_path
 from .time_step import CRITERIA
 
 _COLORS = {

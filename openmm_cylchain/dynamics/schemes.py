@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 
+from ..errors import InputError
+
 EXPLICIT_SCHEMES = ("euler", "midpoint")
 IMPLICIT_SCHEMES = ("implicit", "implicit-second-order")
 SCHEMES = (*EXPLICIT_SCHEMES, *IMPLICIT_SCHEMES)
@@ -27,3 +29,9 @@ def amplification_of_second_order(z):
     """
     z = np.asarray(z, dtype=float)
     return (1.0 + (2.0 * _DIAGONAL - 1.0) * z) / (1.0 + _DIAGONAL * z) ** 2
+
+
+def check_scheme(scheme):
+    """Raise InputError unless ``scheme`` names an integration scheme."""
+    if scheme not in SCHEMES:
+        raise InputError(f"scheme must be one of {', '.join(SCHEMES)}, but is {scheme!r}.")

@@ -12,9 +12,9 @@ import openmm
 
 from ..dynamics.other_particles import describe_other_particles
 from ..dynamics.precision import check_precision
-from ..dynamics.schemes import IMPLICIT_SCHEMES
+from ..dynamics.schemes import IMPLICIT_SCHEMES, check_scheme
 from ..dynamics.step_watch import DividedSteps, ExplicitWork
-from ..dynamics.time_step import as_step, check_scheme
+from ..dynamics.time_step import as_step
 from ..errors import InputError, InstabilityError
 from ..mechanics.flow import Flow, as_flow
 from ..units.quantities import TEMPERATURE, non_negative, whole_number

@@ -17,9 +17,9 @@ import openmm
 from openmm import unit
 
 from ..dynamics.other_particles import describe_other_particles
-from ..dynamics.schemes import EXPLICIT_SCHEMES
+from ..dynamics.schemes import EXPLICIT_SCHEMES, check_scheme
 from ..dynamics.step_watch import ExplicitWork, WorkRecorder
-from ..dynamics.time_step import as_step, check_scheme
+from ..dynamics.time_step import as_step
 from ..errors import InputError, InstabilityError
 from ..mechanics.flow import Flow, as_flow, flow_velocities
 from ..mechanics.geometry import joined, to_nearest_images

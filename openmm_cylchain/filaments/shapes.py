@@ -38,7 +38,7 @@ def ring(filament_type, segments, center, normal, label):
     return regular_polygon(segments, filament_type.segment_length, center, unit_vector(normal, label, "normal"))
 
 
-def drawn(filament_type, segments, temperature, seed, start, direction, clamped, planar, label):
+def drawn(filament_type, segments, temperature, generator, start, direction, clamped, planar, label):
     """Positions (segments + 1, 3) in nm from the exact equilibrium of the free discrete chain."""
     segments = whole_number(segments, 1, f"{label}: segments")
     start = vector(start, LENGTH, f"{label}: start")
@@ -48,7 +48,6 @@ def drawn(filament_type, segments, temperature, seed, start, direction, clamped,
         direction = planar_direction(direction, label) if planar else direction
     if temperature == 0:
         raise InputError(f"{label}: an equilibrium draw needs a temperature above zero.")
-    generator = np.random.default_rng(whole_number(seed, 0, f"{label}: seed"))
     stiffnesses = joint_stiffnesses(filament_type, segments + 1, clamped_nodes(clamped, segments + 1, label))
     return draw_chain(filament_type, segments, temperature, generator, start, direction, planar, stiffnesses)
 

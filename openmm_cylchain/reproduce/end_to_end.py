@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from ..dynamics.time_step import recommended_time_step
+from ..dynamics.recommended_step import recommended_time_step
 from ..theory import chain_mean_square_end_to_end, chain_persistence_length, wlc_mean_square_end_to_end
 from . import simulation, style
 from .case import Case, Outcome

@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from ..couplings.pulling import constant_tension
-from ..dynamics.time_step import recommended_time_step
+from ..dynamics.recommended_step import recommended_time_step
 from ..theory import (
     chain_extension,
     crossover_force,

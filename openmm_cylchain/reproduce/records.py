@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..runs.run_directory import write_atomically
+from ..output.files import write_atomically
 from ..version import __version__
 
 

@@ -8,7 +8,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from ..errors import InputError
-from ..runs.run_directory import write_atomically
+from ..output.files import write_atomically
 from ..version import __version__
 from . import chandran2009, pesek2016, style
 from .page import format_page

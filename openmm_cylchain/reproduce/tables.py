@@ -6,7 +6,7 @@ Ours is what the software says of a filament; the theory is each formula of the 
 import math
 
 from ..benchmark.measurement import Estimate
-from ..dynamics.time_step import bead_spring_bounds, time_step_bounds
+from ..dynamics.stability import bead_spring_bounds, time_step_bounds
 from ..mechanics.friction import momentum_relaxation_times
 from .case import Case, Outcome
 from .result import ROUNDING, Result, printed

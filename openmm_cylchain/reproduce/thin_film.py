@@ -6,7 +6,7 @@ import numpy as np
 
 from ..analysis.statistics import fit_relaxation_time
 from ..benchmark.measurement import scaled
-from ..dynamics.time_step import recommended_time_step
+from ..dynamics.recommended_step import recommended_time_step
 from ..theory import (
     bending_mode_variance,
     chain_mean_square_end_to_end,

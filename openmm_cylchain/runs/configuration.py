@@ -15,11 +15,12 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..dynamics.recommended_step import recommended_time_step
 from ..dynamics.schemes import SCHEMES
-from ..dynamics.time_step import recommended_time_step
 from ..engine_choice import ENGINES, default_scheme
 from ..errors import InputError
 from ..filaments.filament_type import DSDNA, F_ACTIN, MICROTUBULE, FilamentType
+from ..filaments.placement import clamped_nodes
 from ..mechanics.friction import EndCorrections
 from ..units import quantities as units
 from ..units.text import example as example_of
@@ -316,16 +317,7 @@ def _clamped(table, nodes):
     value = table.get("clamped", [], "[0]")
     if not isinstance(value, list) or any(isinstance(node, bool) or not isinstance(node, int) for node in value):
         raise InputError(f"{table.name('clamped')} must be a list of node numbers, as in [0], but is {value!r}.")
-    for node in value:
-        if not -nodes <= node < nodes:
-            raise InputError(
-                f"{table.name('clamped')} names node {node}, but nodes are numbered 0 to {nodes - 1} "
-                f"(or -1 to {-nodes} from the end)."
-            )
-    clamped = sorted({node % nodes for node in value})
-    if len(clamped) == nodes:
-        raise InputError(f"{table.name('clamped')} names every node: leave at least one free to move.")
-    return tuple(clamped)
+    return clamped_nodes(value, nodes, table.label.rstrip(":"))
 
 
 def _filament_type(table, solvent):

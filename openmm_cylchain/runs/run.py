@@ -12,16 +12,16 @@ from openmm import app, unit
 
 from ..dynamics.precision import PRECISIONS
 from ..errors import InputError, InstabilityError
-from ..filaments.equilibrium import draw_chain
-from ..filaments.placement import joint_stiffnesses
+from ..filaments import shapes
+from ..output.files import write_atomically
+from ..output.progress import RunProgress
 from ..output.structure_files import write_lammps_data, write_psf
 from ..systems.filaments import Filaments
 from ..systems.step_check import check_time_step
 from ..theory import chain_mean_square_end_to_end
 from ..units.quantities import thermal_energy
 from ..units.text import format_time
-from .progress import Progress
-from .run_directory import Checkpoint, EnergyTable, RunDirectory, TrajectoryFile, write_atomically
+from .run_directory import Checkpoint, EnergyTable, RunDirectory, TrajectoryFile
 
 _SECONDS_BETWEEN_CHECKS = 0.2
 
@@ -113,18 +113,13 @@ def create_filaments(configuration):
 
 def _shape(group, configuration, number):
     # Nodes with the first one at the origin. Each filament has a seed of its own.
+    kind, origin, label = group.type, (0.0, 0.0, 0.0), f"Filament {number}"
     if group.start == "straight":
-        direction = np.array(group.direction or (1.0, 0.0, 0.0))
-        distance = np.arange(group.segments + 1) * group.type.segment_length
-        return distance[:, None] * direction / np.linalg.norm(direction)
+        return shapes.straight(kind, group.segments, origin, group.direction or (1.0, 0.0, 0.0), label)
     generator = np.random.default_rng([configuration.simulation.seed, number])
-    return draw_chain(
-        group.type,
-        group.segments,
-        configuration.solvent.temperature,
-        generator,
-        direction=group.direction,
-        stiffnesses=joint_stiffnesses(group.type, group.segments + 1, group.clamped),
+    temperature = configuration.solvent.temperature
+    return shapes.drawn(
+        kind, group.segments, temperature, generator, origin, group.direction, group.clamped, False, label
     )
 
 
@@ -290,7 +285,7 @@ class _Recorder:
         with contextlib.closing(self._trajectory), contextlib.closing(self._energies), _Signals() as signals:
             if self._checkpoint is None:
                 self._report()
-            self._progress = Progress(settings.steps, self._step, settings.time_step)
+            self._progress = RunProgress(settings.steps, self._step, settings.time_step)
             try:
                 self._advance(signals)
             finally:

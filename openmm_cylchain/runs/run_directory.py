@@ -13,37 +13,12 @@ import numpy as np
 from openmm import app
 
 from ..errors import InputError
+from ..output.files import write_atomically
 from ..version import __version__
 from .configuration import changed_keys, read_configuration
 
 _MAGIC = "openmm-cylchain checkpoint 1"
 _DCD_HEADER_SIZE = 92
-
-
-def write_atomically(path, data):
-    """Replace a file as a whole: after a kill it holds either the old or the new content.
-
-    Parameters
-    ----------
-    path : Path
-    data : bytes
-    """
-    temporary = path.with_name(path.name + ".new")
-    with open(temporary, "wb") as file:
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(temporary, path)
-    _sync_directory(path.parent)
-
-
-def _sync_directory(path):
-    if os.name == "posix":
-        descriptor = os.open(path, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
 
 
 @dataclass(frozen=True)

@@ -24,10 +24,10 @@ from ..analysis.trajectories import (
 )
 from ..errors import EquilibrationWarning, InputError
 from ..filaments.equilibrium import SegmentLengthDistribution
+from ..output.files import write_atomically
 from ..units.quantities import thermal_energy
 from ..units.text import format_time
 from ..version import __version__
-from .run_directory import write_atomically
 
 _WORMLIKE = "the same, theory of the wormlike chain (25)"
 _ENOUGH_FILAMENTS = 8

@@ -9,9 +9,10 @@ from scipy.integrate import trapezoid
 
 from .. import theory
 from ..analysis.trajectories import joint_cosines, node_positions, segment_lengths, tangent_correlation
+from ..output.files import write_atomically
 from ..units.quantities import thermal_energy
 from ..units.text import time_unit
-from .run_directory import read_energies, write_atomically
+from .run_directory import read_energies
 from .summary import group_labels, group_members, is_in_equilibrium
 
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")

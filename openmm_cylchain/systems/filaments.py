@@ -8,8 +8,10 @@ import openmm
 from openmm import app, unit
 
 from ..dynamics.precision import check_precision
-from ..dynamics.recommended_step import recommended_step_of, warn_of_long_step
-from ..dynamics.time_step import as_step, check_scheme
+from ..dynamics.schemes import check_scheme
+from ..dynamics.step_of_system import recommended_step_of
+from ..dynamics.step_warnings import warn_of_long_step
+from ..dynamics.time_step import as_step
 from ..engine_choice import choose_engine, default_scheme, load_engine
 from ..engines.description import describe_chains
 from ..errors import InputError
@@ -253,8 +255,9 @@ class Filaments:
             The filament's number.
         """
         label = self._label(filament_type)
+        generator = np.random.default_rng(whole_number(seed, 0, f"{label}: seed"))
         positions = shapes.drawn(
-            filament_type, segments, self._temperature, seed, start, direction, clamped, planar, label
+            filament_type, segments, self._temperature, generator, start, direction, clamped, planar, label
         )
         return self._add(filament_type, positions, clamped, label, planar=planar, propulsion=propulsion)
 

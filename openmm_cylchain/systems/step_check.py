@@ -38,8 +38,10 @@ import numpy as np
 import openmm
 
 from ..couplings.pulling import is_constant_force
+from ..dynamics.recommended_step import implicit_time_step
+from ..dynamics.schemes import check_scheme
 from ..dynamics.step_watch import LARGEST_DIVIDED_SHARE
-from ..dynamics.time_step import as_step, check_scheme, implicit_time_step
+from ..dynamics.time_step import as_step
 from ..engine_choice import default_scheme
 from ..errors import InputError, InstabilityError
 from ..theory import bending_energy_mean, chain_mean_square_end_to_end, stretching_energy_mean

@@ -1,4 +1,4 @@
-"""Progress of a run: one line updated in place on a terminal, an occasional line elsewhere."""
+"""What a long task is at: a line that is overwritten on a terminal, and lines now and then elsewhere."""
 
 import sys
 import time
@@ -9,7 +9,62 @@ _REFRESH_SECONDS = 0.2
 _LINE_FRACTION = 0.1
 
 
-class Progress:
+class StatusLine:
+    """Writes lines, each in place of the last one if the stream is a terminal.
+
+    Parameters
+    ----------
+    stream : file
+
+    Attributes
+    ----------
+    in_place : bool
+        Whether the stream is a terminal.
+    """
+
+    def __init__(self, stream):
+        self._stream = stream
+        self.in_place = stream.isatty()
+        self._width = 0
+
+    def write(self, line):
+        """Write a line."""
+        if self.in_place:
+            self._stream.write("\r" + line.ljust(self._width))
+            self._width = len(line)
+        else:
+            self._stream.write(line + "\n")
+        self._stream.flush()
+
+    def end(self):
+        """Leave the line that was written last."""
+        if self.in_place:
+            self._stream.write("\n")
+            self._stream.flush()
+
+
+class ProgressMessages:
+    """Says what a task is at, with the time since its beginning.
+
+    Parameters
+    ----------
+    stream : file
+        Standard error if not given.
+    """
+
+    def __init__(self, stream=None):
+        self._line = StatusLine(sys.stderr if stream is None else stream)
+        self._start = time.monotonic()
+
+    def __call__(self, message):
+        self._line.write(f"{time.monotonic() - self._start:6.1f} s  {message}")
+
+    def finish(self):
+        """Leave the line that was overwritten."""
+        self._line.end()
+
+
+class RunProgress:
     """Reports how far a run is, how fast it goes and how long it will take.
 
     Parameters
@@ -28,39 +83,28 @@ class Progress:
         self._steps = steps
         self._first = first_step
         self._time_step = time_step
-        self._stream = sys.stdout if stream is None else stream
-        self._in_place = self._stream.isatty()
+        self._line = StatusLine(sys.stdout if stream is None else stream)
         self._start = time.monotonic()
         self._last_refresh = self._start
         self._next_fraction = first_step / steps + _LINE_FRACTION
-        self._width = 0
 
     def update(self, step):
         """Report that the run has come to ``step``, if it is time to report."""
         now = time.monotonic()
-        if self._in_place:
+        if self._line.in_place:
             if now - self._last_refresh >= _REFRESH_SECONDS:
                 self._last_refresh = now
-                self._rewrite(self._line(step, now))
+                self._line.write(self._text(step, now))
         elif step / self._steps >= self._next_fraction and step < self._steps:
             self._next_fraction = step / self._steps + _LINE_FRACTION
-            print(self._line(step, now), file=self._stream, flush=True)
+            self._line.write(self._text(step, now))
 
     def finish(self, step):
         """Report the end of the run, or of this part of it."""
-        self._rewrite(self._line(step, time.monotonic()))
-        self._stream.write("\n")
-        self._stream.flush()
+        self._line.write(self._text(step, time.monotonic()))
+        self._line.end()
 
-    def _rewrite(self, line):
-        if self._in_place:
-            self._stream.write("\r" + line.ljust(self._width))
-            self._width = len(line)
-        else:
-            self._stream.write(line)
-        self._stream.flush()
-
-    def _line(self, step, now):
+    def _text(self, step, now):
         total = self._steps * self._time_step
         unit, length = time_unit(total)
         simulated = step * self._time_step

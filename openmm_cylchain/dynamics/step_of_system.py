@@ -1,0 +1,93 @@
+"""The recommended step of filaments in a System, with all of its forces."""
+
+from collections import Counter
+
+from ..couplings.contacts import default_stiffness, filament_diameters, is_contact_force
+from ..errors import InputError
+from ..filaments.attachments import BEAD_NAME
+from .explicit_forces import ExplicitForces
+from .recommended_step import contact_diffusion_step, contact_time_step, recommended_time_step
+from .schemes import check_scheme
+from .time_step import shortest
+
+
+def recommended_step_of(
+    filaments,
+    scheme,
+    contact_diameter,
+    contact_stiffness,
+    confidence,
+    *,
+    system,
+    temperature,
+    particle_friction,
+    flow,
+):
+    """The TimeStep of filaments and of the forces of their System; see ``Filaments.recommended_time_step``."""
+    check_scheme(scheme)
+    if not len(filaments):
+        raise InputError("There are no filaments to recommend a time step for.")
+    steps = _steps_of_types(filaments, scheme, temperature, flow)
+    if contact_diameter is not None:
+        steps.append(_step_of_contacts(filaments, contact_diameter, contact_stiffness, confidence))
+    elif contact_stiffness is not None:
+        raise InputError("A contact_stiffness needs a contact_diameter.")
+    if system is not None:
+        steps += _steps_of_diffusion(filaments, system, temperature, confidence)
+        steps.append(ExplicitForces(system, filaments, scheme, particle_friction).recommended_step())
+    return shortest(steps)
+
+
+def _steps_of_types(filaments, scheme, temperature, flow):
+    # In the order of the filaments, so that the first of equals is named. Friction is that at the temperature of the
+    # filaments, whatever that of the run is.
+    solvent = filaments.viscosity, filaments.temperature
+    return [
+        recommended_time_step(
+            kind,
+            solvent[0],
+            temperature,
+            scheme,
+            segments,
+            closed,
+            flow,
+            kind.segment_friction(*solvent, segments),
+        )
+        for kind, segments, closed in dict.fromkeys((f.type, f.segments, f.closed) for f in filaments)
+    ]
+
+
+def _step_of_contacts(filaments, diameter, stiffness, confidence):
+    diameters = filament_diameters(diameter, len(filaments))
+    if stiffness is None:
+        if filaments.temperature == 0.0:
+            raise InputError("At a temperature of zero, contacts need a contact_stiffness.")
+        stiffness = default_stiffness(diameters.min(), filaments.temperature)
+    solvent = filaments.viscosity, filaments.temperature
+    beads = Counter(one.filament for one in filaments.attachments if one.name == BEAD_NAME)
+    steps = []
+    for number, (filament, d) in enumerate(zip(filaments, diameters)):
+        density = max(1.0, beads[number] / filament.segments)
+        steps.append(contact_time_step(filament.type, *solvent, d, stiffness, filament.segments, density, confidence))
+    return shortest(steps)
+
+
+def _steps_of_diffusion(filaments, system, temperature, confidence):
+    # Of filaments that a contact force of the System keeps apart.
+    found = {}
+    for force in system.getForces():
+        if is_contact_force(force):
+            for filament, beads in zip(filaments, filaments.bead_indices):
+                diameter = force.getParticleParameters(int(beads[0]))[0] if len(beads) else 0.0
+                if diameter > 0.0:
+                    found[filament.type, filament.segments, diameter] = True
+    return [
+        contact_diffusion_step(
+            kind,
+            kind.segment_friction(filaments.viscosity, filaments.temperature, segments),
+            temperature,
+            diameter,
+            confidence,
+        )
+        for kind, segments, diameter in found
+    ]

@@ -1,0 +1,118 @@
+"""Warnings of a time step that is too long, before it is taken."""
+
+import warnings
+
+from ..errors import TimeStepWarning
+from .explicit_forces import ExplicitForces
+from .recommended_step import RECOMMENDED_STRAIN, fene_steps, recommended_time_step, strain_rate
+from .schemes import EXPLICIT_SCHEMES, IMPLICIT_SCHEMES
+from .stability import stability_bounds
+from .time_step import IDLE, as_step
+
+_LARGEST_STRAIN = 0.06
+_LARGEST_ADVANCE = 0.5
+_FAR_ABOVE = 4.0
+
+
+def warn_of_long_step(filaments, system, step, scheme, temperature, particle_friction, flow):
+    """Warn (TimeStepWarning) of a step in ps that is too long for filaments, a flow or the forces of a System."""
+    warn_if_strained(step, flow)
+    solvent = filaments.viscosity, filaments.temperature
+    for f in {(f.type, f.segments, f.propulsion, f.closed): f for f in filaments}.values():
+        warn_if_driven_far(f.type, *solvent, step, f.segments, f.propulsion)
+        if not warn_if_unstable(f.type, *solvent, step, f.segments, scheme):
+            friction = f.type.segment_friction(*solvent, f.segments)
+            warn_if_far_above(f.type, solvent[0], temperature, step, f.segments, scheme, f.closed, friction)
+            warn_if_fene_is_wrong(f.type, temperature, step, friction, scheme)
+    ExplicitForces(system, filaments, scheme, particle_friction).warn_if_too_stiff(step)
+
+
+def warn_if_unstable(filament_type, viscosity, temperature, step, segments=1, scheme="midpoint"):
+    """Issue a TimeStepWarning, naming the bound, if ``step`` exceeds a stability bound of an explicit scheme.
+
+    Returns whether it does.
+    """
+    step = as_step(step, "time step")
+    if scheme not in EXPLICIT_SCHEMES:
+        return False
+    unstable = False
+    for name, bound in stability_bounds(filament_type, viscosity, temperature, segments).items():
+        if step > bound:
+            unstable = True
+            recommended = recommended_time_step(filament_type, viscosity, temperature, scheme, segments)
+            warnings.warn(
+                f"A time step of {step:.4g} ps exceeds the {name} bound of {bound:.4g} ps of filament type "
+                f"{filament_type.name!r}: the simulation will blow up. Recommended: {recommended}.",
+                TimeStepWarning,
+                stacklevel=4,
+            )
+    return unstable
+
+
+def warn_if_far_above(
+    filament_type, viscosity, temperature, step, segments=1, scheme="midpoint", closed=False, friction=None
+):
+    """Issue a TimeStepWarning if ``step`` exceeds the recommended step of a chain by more than a factor of four.
+
+    Not where nothing but the relaxation of lengths is left to resolve (see ``implicit_time_step``): whatever moves such
+    a filament then is not the chain's own.
+    """
+    step = as_step(step, "time step")
+    recommended = recommended_time_step(
+        filament_type, viscosity, temperature, scheme, segments, closed, friction=friction
+    )
+    if step > _FAR_ABOVE * recommended.step and IDLE not in recommended.bounds:
+        warnings.warn(
+            f"A time step of {step:.4g} ps is {step / recommended.step:.3g} times as long as the recommended one of "
+            f"filament type {filament_type.name!r} with {segments} segments. Recommended: {recommended}.",
+            TimeStepWarning,
+            stacklevel=4,
+        )
+
+
+def warn_if_fene_is_wrong(filament_type, temperature, step, friction, scheme):
+    """Issue a TimeStepWarning if a step of an implicit scheme is between those that keep the energy of FENE lengths."""
+    step = as_step(step, "time step")
+    if filament_type.maximum_extension is None or scheme not in IMPLICIT_SCHEMES:
+        return
+    resolved, drawn = fene_steps(filament_type, friction, temperature)
+    if 1.01 * resolved < step < 0.99 * drawn:
+        warnings.warn(
+            f"A time step of {step:.4g} ps neither resolves the lengths of filament type {filament_type.name!r} within "
+            "their FENE range nor is long enough to draw them anew: their energies are too high. Use a step of at most "
+            f"{resolved:.4g} ps, or of at least {drawn:.4g} ps if the rest allows it.",
+            TimeStepWarning,
+            stacklevel=4,
+        )
+
+
+def warn_if_strained(step, flow):
+    """Issue a TimeStepWarning if a flow strains the solvent in a step by more than 0.06: by ``dt |gradient u|``."""
+    step = as_step(step, "time step")
+    strain = step * strain_rate(flow)
+    if strain > _LARGEST_STRAIN:
+        warnings.warn(
+            f"In a time step of {step:.4g} ps the flow strains the solvent by {strain:.3g}: it is not resolved. Use a "
+            f"step of at most {_LARGEST_STRAIN * step / strain:.4g} ps, or better "
+            f"{RECOMMENDED_STRAIN * step / strain:.4g} ps.",
+            TimeStepWarning,
+            stacklevel=4,
+        )
+
+
+def warn_if_driven_far(filament_type, viscosity, temperature, step, segments=1, propulsion=0.0):
+    """Issue a TimeStepWarning if self-propulsion takes a segment farther in a step than by half its length.
+
+    Beyond ``dt F0/gamma_par = l0/2`` a bent filament cuts its corners.
+    """
+    step = as_step(step, "time step")
+    friction = filament_type.segment_friction(viscosity, temperature, segments)
+    advance = step * abs(propulsion) / friction.parallel / filament_type.segment_length
+    if advance > _LARGEST_ADVANCE:
+        warnings.warn(
+            f"In a time step of {step:.4g} ps a propelled segment of filament type {filament_type.name!r} advances by "
+            f"{advance:.3g} of its length: it is not resolved. Use a step of at most "
+            f"{_LARGEST_ADVANCE * step / advance:.4g} ps.",
+            TimeStepWarning,
+            stacklevel=4,
+        )

@@ -1,0 +1,40 @@
+"""Files that are written as a whole, and paths that can be written to."""
+
+import os
+from pathlib import Path
+
+from ..errors import InputError
+
+
+def write_atomically(path, data):
+    """Replace a file as a whole: after a kill it holds either the old or the new content.
+
+    Parameters
+    ----------
+    path : Path
+    data : bytes
+    """
+    temporary = path.with_name(path.name + ".new")
+    with open(temporary, "wb") as file:
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+    os.replace(temporary, path)
+    _sync_directory(path.parent)
+
+
+def _sync_directory(path):
+    if os.name == "posix":
+        descriptor = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+def check_output_path(path):
+    """Raise InputError if a file cannot be written there, before hours are spent on its content."""
+    path = Path(path)
+    if path.is_dir() or not path.parent.is_dir():
+        what = "is a directory" if path.is_dir() else f"is in {path.parent}, which is not a directory"
+        raise InputError(f"{path} {what}: give the path of a file.")
