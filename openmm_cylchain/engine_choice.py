@@ -30,7 +30,7 @@ def default_scheme(engine=None):
 
 
 def load_engine(name=None):
-    """The module of an engine, with its ``add_forces`` and ``create_integrator``.
+    """The Engine of a name (see ``engines.protocol``).
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def load_engine(name=None):
     InputError
         If there is no such engine, or it is not available.
     """
-    return importlib.import_module(_MODULES[choose_engine(name)])
+    return importlib.import_module(_MODULES[choose_engine(name)]).ENGINE
 
 
 def choose_engine(name=None):

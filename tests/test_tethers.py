@@ -93,6 +93,32 @@ def test_copies_and_xml_keep_tethers():
         assert (chain, node, tuple(point._value), stiffness._value) == (0, 2, (4, 5, 6), STIFFNESS)
 
 
+@pytest.mark.parametrize("engine", ["portable", "compiled"])
+def test_contexts_of_one_system_have_tethers_of_their_own(engine):
+    filaments = _trapped(engine, {0: [0, 0, 0], 3: [1080, 0, 0]})
+    _, system, positions = filaments.build()
+    contexts = []
+    for _ in range(2):
+        context = openmm.Context(system, openmm.VerletIntegrator(1), openmm.Platform.getPlatform("Reference"))
+        context.setPositions(positions)
+        contexts.append(context)
+    rest = _energy(contexts[0])
+    filaments.move_tether(contexts[0], 0, [0, 3, 0])
+    filaments.move_tether(contexts[1], 1, [1080, 4, 0], 2 * STIFFNESS)
+    assert _energy(contexts[0]) - rest == pytest.approx(0.5 * STIFFNESS * 9)
+    assert _energy(contexts[1]) - rest == pytest.approx(STIFFNESS * 16)
+    filaments.move_tether(contexts[0], 1, [1080, 1, 0])
+    assert _energy(contexts[0]) - rest == pytest.approx(0.5 * STIFFNESS * 10)
+    assert [tether.point for tether in filaments.tethers_in(contexts[0])] == [(0, 3, 0), (1080, 1, 0)]
+    assert [tether.point for tether in filaments.tethers_in(contexts[1])] == [(0, 0, 0), (1080, 4, 0)]
+    assert [tether.stiffness for tether in filaments.tethers_in(contexts[1])] == [STIFFNESS, 2 * STIFFNESS]
+    # A new Context begins as the filaments were described.
+    fresh = openmm.Context(system, openmm.VerletIntegrator(1), openmm.Platform.getPlatform("Reference"))
+    fresh.setPositions(positions)
+    assert _energy(fresh) == pytest.approx(rest, abs=1e-9)
+    assert filaments.tethers_in(fresh) == filaments.tethers
+
+
 @pytest.mark.parametrize("step", [0.1, 5, 40])
 def test_equilibrium_in_traps_as_stiff_as_a_segment(step):
     """Straight filaments held at both ends: every node fluctuates as the Hessian says, whatever the step.

@@ -151,8 +151,6 @@ class ConstantVelocityPulling(FilamentsReporter):
     the work done on the System. Its exponential average over runs that begin in equilibrium is exact at any velocity
     and interval (Jarzynski, Phys. Rev. Lett. 1997, 78, 2690).
 
-    The engines hold tethers once for each System: one Simulation of it can be pulled at a time.
-
     Parameters
     ----------
     file : str, Path, file object or None
@@ -164,7 +162,7 @@ class ConstantVelocityPulling(FilamentsReporter):
         Their numbers.
     velocity : (3,) or (tethers, 3) length/time
     start : (3,) or (tethers, 3) length, optional
-        Where the points are until ``start_time``; where they are now if not given.
+        Where the points are until ``start_time``; where the tethers were added if not given.
     start_time : time
         In the time of the Context.
     append : bool
@@ -225,16 +223,17 @@ class ConstantVelocityPulling(FilamentsReporter):
     def _points_at(self, time):
         return self._start + self._velocity * max(0.0, time - self._start_time)
 
-    def _points(self):
-        return np.array([self._filaments.tethers[number].point for number in self._tethers])
+    def _points(self, context):
+        tethers = self._filaments.tethers_in(context)
+        return np.array([tethers[number].point for number in self._tethers])
 
     def _move(self, context, points):
-        if not np.array_equal(points, self._points()):
+        if not np.array_equal(points, self._points(context)):
             self._filaments.move_tethers(context, self._tethers, points)
 
     def _table(self, simulation, state):
         positions = state.getPositions(asNumpy=True)._value
-        before, after = self._points(), self._points_at(state.getTime()._value)
+        before, after = self._points(simulation.context), self._points_at(state.getTime()._value)
         pulled = positions[self._pulled]
         vectors = positions[self._near] - positions[self._far]
         energies = [0.5 * self._stiffness * np.sum((pulled - points) ** 2, axis=1) for points in (before, after)]

@@ -24,6 +24,7 @@ from .description import (
     filament_label,
     refuse_constraints,
 )
+from .protocol import Engine
 
 
 def _load_plugin():
@@ -79,87 +80,95 @@ _OTHER_FRICTION = 1.0
 LARGEST_PATH_LEVEL = 20
 
 
-def add_forces(
-    system, filaments, node_indices, tethers, viscosity, temperature, stretching_force_group, bending_force_group
-):
-    """Add the chains to a System that holds their nodes: one CylinderChainForce.
+class CompiledEngine(Engine):
+    """The compiled engine: a CylinderChainForce and a CylinderChainIntegrator, on the Reference and CPU platforms."""
 
-    Parameters
-    ----------
-    system : openmm.System
-    filaments : sequence of Filament
-    node_indices : sequence of int arrays
-        Particle indices of the nodes of each filament.
-    tethers : sequence of Tether
-    viscosity, temperature : float
-        For the friction of the segments.
-    stretching_force_group, bending_force_group : int
-        One number for both.
+    def add_forces(self, system, placed, stretching_force_group, bending_force_group):
+        """Add one CylinderChainForce, with one force group for stretching and bending."""
+        if stretching_force_group != bending_force_group:
+            raise InputError(
+                "The compiled engine has one force for stretching and bending: give them the same force group. "
+                "CylinderChainForce.computeEnergies tells their energies apart."
+            )
+        force = CylinderChainForce()
+        force.setForceGroup(int(stretching_force_group))
+        for filament, nodes in zip(placed.filaments, placed.node_indices):
+            _add_chain(force, filament, nodes, placed.viscosity, placed.temperature)
+        for tether in placed.tethers:
+            force.addTether(tether.filament, tether.node, openmm.Vec3(*tether.point), tether.stiffness)
+        system.addForce(force)
 
-    Raises
-    ------
-    InputError
-        If the force groups differ.
-    """
-    if stretching_force_group != bending_force_group:
-        raise InputError(
-            "The compiled engine has one force for stretching and bending: give them the same force group. "
-            "CylinderChainForce.computeEnergies tells their energies apart."
+    def create_integrator(self, system, placed, settings):
+        """Create a NativeIntegrator."""
+        refuse_constraints(system, placed)
+        describe_chains(system, placed)
+        others, frictions = describe_other_particles(system, placed.nodes, settings.particle_friction)
+        labels = [filament_label(number, filament) for number, filament in enumerate(placed.filaments)]
+        integrator = NativeIntegrator(
+            settings.temperature,
+            settings.step_size,
+            settings.scheme,
+            settings.random_seed,
+            labels,
+            settings.flow,
+            advice_after_blow_up(system),
+            settings.checks,
+            settings.precision,
         )
-    force = CylinderChainForce()
-    force.setForceGroup(int(stretching_force_group))
-    for filament, nodes in zip(filaments, node_indices):
-        _add_chain(force, filament, nodes, viscosity, temperature)
-    for tether in tethers:
-        force.addTether(tether.filament, tether.node, openmm.Vec3(*tether.point), tether.stiffness)
-    system.addForce(force)
+        for particle, friction in zip(others, frictions):
+            integrator.setParticleFriction(int(particle), float(friction))
+        return integrator
+
+    def flow_of(self, context):
+        """The flow of the solvent in a Context, at rest where its integrator knows of none."""
+        integrator = context.getIntegrator()
+        if not CylinderChainIntegrator.isinstance(integrator):
+            return Flow()
+        return _flow_of_integrator(CylinderChainIntegrator.cast(integrator))
+
+    def set_tethers(self, context, placed, tethers):
+        """Give a Context other tethers, by their numbers."""
+        for force in context.getSystem().getForces():
+            if CylinderChainForce.isinstance(force):
+                force = CylinderChainForce.cast(force)
+                _set_tethers(force, tethers)
+                force.updateParametersInContext(context)
+                _set_tethers(force, {number: placed.tethers[number] for number in tethers})
+
+    def record_tensions(self, context):
+        """See ``NativeIntegrator.setRecordsTensions``."""
+        _recording_integrator(context).setRecordsTensions(True)
+
+    def mean_tensions(self, context, filaments):
+        """Those of the last step that an implicit scheme has taken."""
+        integrator = _recording_integrator(context)
+        try:
+            recorded = [CylinderChainIntegrator.getMeanTensions(integrator, chain) for chain in range(filaments)]
+        except openmm.OpenMMException as error:
+            if "No tensions were recorded" not in str(error):
+                raise
+            raise InputError(
+                "No mean tensions were recorded in the last step: call integrator.setRecordsTensions(True) before it "
+                "is taken."
+            ) from None
+        return [
+            (np.array(tensions._value), np.array(forces._value).reshape(-1, 3), np.array(directions).reshape(-1, 3))
+            for tensions, forces, directions in recorded
+        ]
 
 
-def flow_of(context):
-    """The flow of the solvent in a Context, at rest where its integrator knows of none."""
-    integrator = context.getIntegrator()
-    if not CylinderChainIntegrator.isinstance(integrator):
-        return Flow()
-    return _flow_of_integrator(CylinderChainIntegrator.cast(integrator))
+ENGINE = CompiledEngine()
+
+
+def _set_tethers(force, tethers):
+    for number, tether in tethers.items():
+        point = openmm.Vec3(*tether.point)
+        force.setTetherParameters(number, tether.filament, tether.node, point, tether.stiffness)
 
 
 def _flow_of_integrator(integrator):
     velocity, *gradient, origin = (tuple(vector._value) for vector in CylinderChainIntegrator.getFlow(integrator))
     return Flow(velocity, gradient, origin)
-
-
-def record_tensions(context):
-    """Let the integrator of a Context record mean tensions; see ``NativeIntegrator.setRecordsTensions``."""
-    _recording_integrator(context).setRecordsTensions(True)
-
-
-def mean_tensions(context, chains):
-    """What the integrator of a Context has recorded of the last step, for so many chains.
-
-    Returns
-    -------
-    list of (tensions, joint_forces, directions)
-        For each chain arrays (segments,) and (joints, 3) in kJ/(mol nm), and (segments, 3).
-
-    Raises
-    ------
-    InputError
-        If it has recorded nothing.
-    """
-    integrator = _recording_integrator(context)
-    try:
-        recorded = [CylinderChainIntegrator.getMeanTensions(integrator, chain) for chain in range(chains)]
-    except openmm.OpenMMException as error:
-        if "No tensions were recorded" not in str(error):
-            raise
-        raise InputError(
-            "No mean tensions were recorded in the last step: call integrator.setRecordsTensions(True) before it is "
-            "taken."
-        ) from None
-    return [
-        (np.array(tensions._value), np.array(forces._value).reshape(-1, 3), np.array(directions).reshape(-1, 3))
-        for tensions, forces, directions in recorded
-    ]
 
 
 def _recording_integrator(context):
@@ -177,17 +186,6 @@ def _refuse_unless_implicit(scheme):
             "Mean tensions belong to the implicit schemes: the explicit schemes have those of the configuration alone "
             "(Filaments.joint_tensions)."
         )
-
-
-def move_tethers(context, tethers, node_indices):
-    """Change tethers, pairs of a number and a Tether, in a Context; see ``Filaments.move_tethers``."""
-    for force in context.getSystem().getForces():
-        if CylinderChainForce.isinstance(force):
-            force = CylinderChainForce.cast(force)
-            for index, tether in tethers:
-                point = openmm.Vec3(*tether.point)
-                force.setTetherParameters(index, tether.filament, tether.node, point, tether.stiffness)
-            force.updateParametersInContext(context)
 
 
 def _add_chain(force, filament, nodes, viscosity, temperature):
@@ -212,33 +210,6 @@ def _add_chain(force, filament, nodes, viscosity, temperature):
         force.setSegmentPropulsion(chain, segment, filament.propulsion)
     for joint, stiffness in enumerate(filament.joint_stiffnesses):
         force.setJointParameters(chain, joint, float(stiffness))
-
-
-def create_integrator(
-    system,
-    filaments,
-    node_indices,
-    viscosity,
-    temperature,
-    bath_temperature,
-    step_size,
-    scheme,
-    particle_friction,
-    seed,
-    flow=None,
-    checks=True,
-    precision="automatic",
-):
-    """Create the integrator of a System with filaments; see ``Filaments.create_integrator``."""
-    refuse_constraints(system, filaments, node_indices)
-    describe_chains(system, filaments, node_indices, viscosity, temperature)
-    others, frictions = describe_other_particles(system, np.concatenate(node_indices), particle_friction)
-    labels = [filament_label(number, filament) for number, filament in enumerate(filaments)]
-    advice = advice_after_blow_up(system)
-    integrator = NativeIntegrator(bath_temperature, step_size, scheme, seed, labels, flow, advice, checks, precision)
-    for particle, friction in zip(others, frictions):
-        integrator.setParticleFriction(int(particle), float(friction))
-    return integrator
 
 
 class NativeIntegrator(CylinderChainIntegrator):

@@ -21,19 +21,20 @@ def filament_label(number, filament):
     return f"Filament {number} ({filament.type.name})"
 
 
-def refuse_constraints(system, filaments, node_indices):
+def refuse_constraints(system, placed):
     """Raise InputError if the System has constraints, naming the filament that one is on."""
     if not system.getNumConstraints():
         return
-    owner = {node: number for number, nodes in enumerate(node_indices) for node in nodes}
+    owner = {int(node): number for number, nodes in enumerate(placed.node_indices) for node in nodes}
     for index in range(system.getNumConstraints()):
         first, second, _ = system.getConstraintParameters(index)
         for particle in (first, second):
             if particle in owner:
                 number = owner[particle]
+                node = particle - placed.node_indices[number][0]
                 raise InputError(
-                    f"{filament_label(number, filaments[number])}: node {particle - node_indices[number][0]} has a "
-                    "System constraint. Segments are held by stiff springs, not by constraints: remove it."
+                    f"{filament_label(number, placed.filaments[number])}: node {node} has a System constraint. "
+                    "Segments are held by stiff springs, not by constraints: remove it."
                 )
     raise InputError(
         f"Particles {first} and {second} have a System constraint, which the dynamics of filaments cannot keep: "
@@ -41,7 +42,7 @@ def refuse_constraints(system, filaments, node_indices):
     )
 
 
-def describe_chains(system, filaments, node_indices, viscosity, temperature):
+def describe_chains(system, placed):
     """The filaments as a ChainSet. Nodes of mass zero in the System are fixed.
 
     Raises
@@ -50,7 +51,7 @@ def describe_chains(system, filaments, node_indices, viscosity, temperature):
         If a node is a virtual site, or all nodes of a filament have mass zero.
     """
     fixed = []
-    for number, (filament, nodes) in enumerate(zip(filaments, node_indices)):
+    for number, (filament, nodes) in enumerate(zip(placed.filaments, placed.node_indices)):
         label = filament_label(number, filament)
         virtual = [node for node in nodes if system.isVirtualSite(int(node))]
         if virtual:
@@ -59,7 +60,8 @@ def describe_chains(system, filaments, node_indices, viscosity, temperature):
         if all(massless):
             raise InputError(f"{label} has only nodes of mass zero: leave at least one free to move.")
         fixed.extend(massless)
-    frictions = [filament.type.segment_friction(viscosity, temperature, filament.segments) for filament in filaments]
+    filaments, solvent = placed.filaments, (placed.viscosity, placed.temperature)
+    frictions = [filament.type.segment_friction(*solvent, filament.segments) for filament in filaments]
     segments = [filament.segments for filament in filaments]
     return ChainSet(
         node_counts=np.array([len(filament.positions) for filament in filaments]),

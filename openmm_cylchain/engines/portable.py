@@ -32,6 +32,7 @@ from .description import (
     filament_label,
     refuse_constraints,
 )
+from .protocol import Engine
 
 REDISTRIBUTION_NAME = "CylinderChainRedistribution"
 STRETCHING_NAME = "CylinderChainStretching"
@@ -68,122 +69,103 @@ _STEPPING = threading.Lock()
 _RECORDER = None
 
 
-def add_forces(
-    system, filaments, node_indices, tethers, viscosity, temperature, stretching_force_group, bending_force_group
-):
-    """Add the chains' own forces to a System that holds their nodes.
+class PortableEngine(Engine):
+    """The portable engine: stock OpenMM forces, a CustomIntegrator and a PythonForce, on every platform."""
 
-    Parameters
-    ----------
-    system : openmm.System
-    filaments : sequence of Filament
-    node_indices : sequence of int arrays
-        Particle indices of the nodes of each filament.
-    tethers : sequence of Tether
-        Their force joins the stretching forces' group.
-    viscosity, temperature : float
-        Not used by this engine, whose integrator holds the friction.
-    stretching_force_group, bending_force_group : int
-    """
-    segments, joints = [], []
-    for filament, indices in zip(filaments, node_indices):
-        ends = [(int(indices[node - 1]), int(indices[node])) for node in range(1, len(indices))]
-        ends += [(int(indices[-1]), int(indices[0]))] if filament.closed else []
-        segments += [(filament.type, *pair) for pair in ends]
-        pairs = zip(*joined(np.array(ends), filament.closed))
-        for stiffness, (before, behind) in zip(filament.joint_stiffnesses, pairs):
-            joints.append((filament.type, *map(int, (before[0], *behind)), stiffness))
-    add_stretching_forces(system, segments, stretching_force_group)
-    add_bending_forces(system, joints, bending_force_group)
-    if any(filament.propulsion for filament in filaments):
-        add_propulsion(system, filaments, node_indices, stretching_force_group)
-    if tethers:
-        add_tethers(system, tethers, node_indices, stretching_force_group)
+    def add_forces(self, system, placed, stretching_force_group, bending_force_group):
+        """Add a force for each model of stretching and bending; those of tethers and propulsion join stretching."""
+        segments, joints = [], []
+        for filament, indices in zip(placed.filaments, placed.node_indices):
+            ends = [(int(indices[node - 1]), int(indices[node])) for node in range(1, len(indices))]
+            ends += [(int(indices[-1]), int(indices[0]))] if filament.closed else []
+            segments += [(filament.type, *pair) for pair in ends]
+            pairs = zip(*joined(np.array(ends), filament.closed))
+            for stiffness, (before, behind) in zip(filament.joint_stiffnesses, pairs):
+                joints.append((filament.type, *map(int, (before[0], *behind)), stiffness))
+        add_stretching_forces(system, segments, stretching_force_group)
+        add_bending_forces(system, joints, bending_force_group)
+        if any(filament.propulsion for filament in placed.filaments):
+            add_propulsion(system, placed.filaments, placed.node_indices, stretching_force_group)
+        if placed.tethers:
+            add_tethers(system, placed, stretching_force_group)
+
+    def create_integrator(self, system, placed, settings):
+        """Create a PortableIntegrator, and the PythonForce that it needs."""
+        if settings.precision == "mixed":
+            raise InputError(
+                "The portable engine computes filaments in double precision alone: use the compiled engine, or leave "
+                "precision out."
+            )
+        refuse_constraints(system, placed)
+        filaments = placed.filaments
+        computation = ChainDisplacements(
+            describe_chains(system, placed),
+            placed.nodes,
+            np.concatenate([np.full(one.segments, one.type.segment_length) for one in filaments]),
+            np.concatenate([np.full(one.segments, one.type.maximum_extension or np.inf) for one in filaments]),
+            [filament_label(number, filament) for number, filament in enumerate(filaments)],
+            *describe_other_particles(system, placed.nodes, settings.particle_friction),
+            advice_after_blow_up(system),
+            system.usesPeriodicBoundaryConditions(),
+        )
+        return PortableIntegrator(
+            system,
+            add_redistribution(system, computation),
+            settings.temperature,
+            settings.step_size,
+            settings.scheme,
+            settings.random_seed,
+            settings.flow,
+            settings.checks,
+        )
+
+    def flow_of(self, context):
+        """The flow of the solvent in a Context, at rest where its integrator knows of none."""
+        integrator = context.getIntegrator()
+        if not isinstance(integrator, openmm.CustomIntegrator):
+            return Flow()
+        names = {integrator.getGlobalVariableName(index) for index in range(integrator.getNumGlobalVariables())}
+        return _flow_from_variables(integrator) if names.issuperset(_INTEGRATOR_FLOW) else Flow()
+
+    def set_tethers(self, context, placed, tethers):
+        """Give a Context other tethers, by their numbers."""
+        for force in context.getSystem().getForces():
+            if force.getName() == TETHER_NAME:
+                _set_tethers(force, placed, tethers)
+                force.updateParametersInContext(context)
+                _set_tethers(force, placed, {number: placed.tethers[number] for number in tethers})
+
+    def record_tensions(self, context):
+        """Refused: only the implicit schemes solve for tensions."""
+        self.mean_tensions(context, 0)
+
+    def mean_tensions(self, context, filaments):
+        """Refused: only the implicit schemes solve for tensions."""
+        raise InputError(
+            "Mean tensions belong to the implicit schemes of the compiled engine: the portable engine has those of the "
+            "configuration alone (Filaments.joint_tensions)."
+        )
 
 
-def add_tethers(system, tethers, node_indices, force_group):
+ENGINE = PortableEngine()
+
+
+def add_tethers(system, placed, force_group):
     """Add one CustomExternalForce for all tethers."""
     force = openmm.CustomExternalForce("0.5*tether_stiffness*((x-tether_x)^2+(y-tether_y)^2+(z-tether_z)^2)")
     for name in ("tether_x", "tether_y", "tether_z", "tether_stiffness"):
         force.addPerParticleParameter(name)
     force.setName(TETHER_NAME)
     force.setForceGroup(force_group)
-    for tether in tethers:
-        force.addParticle(int(node_indices[tether.filament][tether.node]), [*tether.point, tether.stiffness])
+    for tether in placed.tethers:
+        force.addParticle(int(placed.node_indices[tether.filament][tether.node]), [*tether.point, tether.stiffness])
     system.addForce(force)
 
 
-def move_tethers(context, tethers, node_indices):
-    """Change tethers, pairs of a number and a Tether, in a Context; see ``Filaments.move_tethers``."""
-    for force in context.getSystem().getForces():
-        if force.getName() == TETHER_NAME:
-            for index, tether in tethers:
-                node = int(node_indices[tether.filament][tether.node])
-                force.setParticleParameters(index, node, [*tether.point, tether.stiffness])
-            force.updateParametersInContext(context)
-
-
-def record_tensions(context):
-    """Refused: only scheme "implicit" solves for tensions."""
-    mean_tensions(context, 0)
-
-
-def mean_tensions(context, chains):
-    """Refused: only scheme "implicit" solves for tensions.
-
-    Raises
-    ------
-    InputError
-        Always.
-    """
-    raise InputError(
-        "Mean tensions belong to the implicit schemes of the compiled engine: the portable engine has those of the "
-        "configuration alone (Filaments.joint_tensions)."
-    )
-
-
-def create_integrator(
-    system,
-    filaments,
-    node_indices,
-    viscosity,
-    temperature,
-    bath_temperature,
-    step_size,
-    scheme,
-    particle_friction,
-    seed,
-    flow=None,
-    checks=True,
-    precision="automatic",
-):
-    """Create the integrator of a System with filaments; see ``Filaments.create_integrator``."""
-    if precision == "mixed":
-        raise InputError(
-            "The portable engine computes filaments in double precision alone: use the compiled engine, or leave "
-            "precision out."
-        )
-    refuse_constraints(system, filaments, node_indices)
-    chains = describe_chains(system, filaments, node_indices, viscosity, temperature)
-    nodes = np.concatenate(node_indices)
-    others, frictions = describe_other_particles(system, nodes, particle_friction)
-    rest_lengths = np.concatenate([np.full(one.segments, one.type.segment_length) for one in filaments])
-    ranges = np.concatenate([np.full(one.segments, one.type.maximum_extension or np.inf) for one in filaments])
-    labels = [filament_label(number, filament) for number, filament in enumerate(filaments)]
-    advice = advice_after_blow_up(system)
-    periodic = system.usesPeriodicBoundaryConditions()
-    computation = ChainDisplacements(chains, nodes, rest_lengths, ranges, labels, others, frictions, advice, periodic)
-    group = add_redistribution(system, computation)
-    return PortableIntegrator(system, group, bath_temperature, step_size, scheme, seed, flow, checks)
-
-
-def flow_of(context):
-    """The flow of the solvent in a Context, at rest where its integrator knows of none."""
-    integrator = context.getIntegrator()
-    if not isinstance(integrator, openmm.CustomIntegrator):
-        return Flow()
-    names = {integrator.getGlobalVariableName(index) for index in range(integrator.getNumGlobalVariables())}
-    return _flow_from_variables(integrator) if names.issuperset(_INTEGRATOR_FLOW) else Flow()
+def _set_tethers(force, placed, tethers):
+    for number, tether in tethers.items():
+        node = int(placed.node_indices[tether.filament][tether.node])
+        force.setParticleParameters(number, node, [*tether.point, tether.stiffness])
 
 
 def _flow_from_variables(integrator):

@@ -274,7 +274,7 @@ class TetherReporter(FilamentsReporter):
     def _table(self, simulation, state):
         positions = state.getPositions(asNumpy=True)._value
         rows = []
-        for tether in self._filaments.tethers:
+        for tether in self._filaments.tethers_in(simulation.context):
             extension = positions[self._nodes[tether.filament][tether.node]] - tether.point
             rows.append((*tether.point, *extension, *(-tether.stiffness * extension)))
         return range(len(rows)), rows

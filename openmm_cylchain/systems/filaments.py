@@ -2,6 +2,7 @@
 
 from collections import defaultdict
 from dataclasses import replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import openmm
@@ -14,6 +15,7 @@ from ..dynamics.step_warnings import warn_of_long_step
 from ..dynamics.time_step import as_step
 from ..engine_choice import choose_engine, default_scheme, load_engine
 from ..engines.description import describe_chains
+from ..engines.protocol import IntegratorSettings, PlacedFilaments
 from ..errors import InputError
 from ..filaments import shapes
 from ..filaments.attachments import add_virtual_site, attachment_positions, distribute_beads, locate, neighbors
@@ -75,6 +77,8 @@ class Filaments:
         self._filaments = []
         self._tethers = []
         self._tethered_nodes = set()
+        # By Context: what has moved there, by number.
+        self._moved_tethers = WeakKeyDictionary()
         self._attachments = []
         self._attachments_of = defaultdict(list)
         self._attachment_indices = None
@@ -112,7 +116,7 @@ class Filaments:
 
     @property
     def tethers(self):
-        """Tuple of the tethers, in the order of their numbers, with the points to which they were moved last."""
+        """Tuple of the tethers, in the order of their numbers, as they were added; see ``tethers_in``."""
         return tuple(self._tethers)
 
     @property
@@ -434,17 +438,12 @@ class Filaments:
             names = [self._attachments[index].name for index in self._attachments_of[number]]
             add_to_topology(topology, filament, f"F{number}", names)
         add_noninteracting_entries(system, len(positions), self._coinciding())
-        self._engine.add_forces(
-            system,
-            self._filaments,
-            self._nodes,
-            self._tethers,
-            self._viscosity,
-            self._temperature,
-            stretching_force_group,
-            bending_force_group,
-        )
+        self._engine.add_forces(system, self._placed(), stretching_force_group, bending_force_group)
         return np.concatenate(everything) * unit.nanometer
+
+    def _placed(self):
+        filaments, tethers = tuple(self._filaments), tuple(self._tethers)
+        return PlacedFilaments(filaments, tuple(self.node_indices), tethers, self._viscosity, self._temperature)
 
     def _add_attachments(self, system, number):
         # Those of one filament; returns their positions.
@@ -606,25 +605,12 @@ class Filaments:
         bath = self._bath(temperature)
         if checks:
             warn_of_long_step(self, system, step_size, scheme, bath, particle_friction, flow)
-        return self._engine.create_integrator(
-            system,
-            self._filaments,
-            self._nodes,
-            self._viscosity,
-            self._temperature,
-            bath,
-            step_size,
-            scheme,
-            particle_friction,
-            random_seed,
-            flow,
-            checks,
-            precision,
-        )
+        settings = IntegratorSettings(step_size, scheme, bath, particle_friction, random_seed, flow, checks, precision)
+        return self._engine.create_integrator(system, self._placed(), settings)
 
     def chain_set(self, system):
         """The filaments as an engine sees them (a ``ChainSet``): friction of segments and fixed nodes."""
-        return describe_chains(system, self._filaments, self.node_indices, self._viscosity, self._temperature)
+        return describe_chains(system, self._placed())
 
     def joint_tensions(self, context):
         """Instantaneous virtual forces Phi at the joints, without noise, in the context's configuration and flow.
@@ -740,8 +726,19 @@ class Filaments:
         """The Flow of the solvent in a Context, at rest where its integrator knows of none."""
         return self._engine.flow_of(context)
 
+    def tethers_in(self, context):
+        """Tuple of the tethers of a Context, in the order of their numbers, where they were moved to.
+
+        A State or a checkpoint does not hold them, and ``context.reinitialize`` brings them back to where they were
+        added: move them again then.
+        """
+        moved = self._moved_tethers.get(context, {})
+        return tuple(moved.get(number, tether) for number, tether in enumerate(self._tethers))
+
     def move_tether(self, context, tether, point, stiffness=None):
         """Move the point of a tether in a Context, and change its stiffness if one is given.
+
+        Other Contexts of the System keep theirs.
 
         Parameters
         ----------
@@ -757,7 +754,7 @@ class Filaments:
         InputError
             For a tether that does not exist, or a point or a stiffness that is no such thing.
         """
-        self._change_tethers(context, [self._moved(tether, point, stiffness)])
+        self._change_tethers(context, [self._moved(context, tether, point, stiffness)])
 
     def move_tethers(self, context, tethers, points):
         """Move the points of several tethers in a Context, at hardly more cost than that of one.
@@ -771,23 +768,23 @@ class Filaments:
         points = np.asarray(in_units_of(points, LENGTH, "points"))
         if points.shape != (len(tethers), 3):
             raise InputError(f"points must have the shape ({len(tethers)}, 3), but have {points.shape}.")
-        self._change_tethers(context, [self._moved(tether, point, None) for tether, point in zip(tethers, points)])
+        self._change_tethers(context, [self._moved(context, *each, None) for each in zip(tethers, points)])
 
-    def _moved(self, tether, point, stiffness):
+    def _moved(self, context, tether, point, stiffness):
         tether = whole_number(tether, 0, "tether")
         if tether >= len(self._tethers):
             raise InputError(f"Tether {tether} does not exist; there are {len(self._tethers)}.")
         point = tuple(float(x) for x in vector(point, LENGTH, f"Tether {tether}: point"))
-        old = self._tethers[tether]
+        old = self._moved_tethers.get(context, {}).get(tether, self._tethers[tether])
         if stiffness is None:
             stiffness = old.stiffness
         stiffness = positive(stiffness, STIFFNESS, f"Tether {tether}: stiffness")
         return tether, replace(old, point=point, stiffness=stiffness)
 
     def _change_tethers(self, context, changed):
-        self._engine.move_tethers(context, changed, self.node_indices)
-        for number, tether in changed:
-            self._tethers[number] = tether
+        moved = {**self._moved_tethers.get(context, {}), **dict(changed)}
+        self._engine.set_tethers(context, self._placed(), moved)
+        self._moved_tethers[context] = moved
 
     def _attach(self, attachment):
         self._attachments.append(attachment)

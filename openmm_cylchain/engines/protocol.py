@@ -1,0 +1,129 @@
+"""What an engine is given, and what it does."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import openmm
+
+from ..filaments.filament import Filament, Tether
+from ..mechanics.flow import Flow
+
+
+@dataclass(frozen=True)
+class PlacedFilaments:
+    """Filaments whose nodes are particles of a System.
+
+    Attributes
+    ----------
+    filaments : tuple of Filament
+    node_indices : tuple of (n,) int arrays
+        Particles of the nodes of each filament.
+    tethers : tuple of Tether
+        As they were added; those of a Context may have moved.
+    viscosity : float
+        Of the solvent, in kJ ps/(mol nm^3).
+    temperature : float
+        For the friction of segments, in K.
+    """
+
+    filaments: tuple[Filament, ...]
+    node_indices: tuple[np.ndarray, ...]
+    tethers: tuple[Tether, ...]
+    viscosity: float
+    temperature: float
+
+    @property
+    def nodes(self) -> np.ndarray:
+        """Particles of the nodes of all filaments, one after the other."""
+        return np.concatenate(self.node_indices)
+
+
+@dataclass(frozen=True)
+class IntegratorSettings:
+    """How the filaments of a System, and everything else in it, are to be moved; see ``Filaments.create_integrator``.
+
+    Attributes
+    ----------
+    step_size : float
+        In ps.
+    scheme : str
+    temperature : float
+        Of the bath, in K.
+    particle_friction : energy*time/length^2, array of them, or None
+    random_seed : int
+    flow : Flow
+    checks : bool
+    precision : str
+    """
+
+    step_size: float
+    scheme: str
+    temperature: float
+    particle_friction: Any
+    random_seed: int
+    flow: Flow
+    checks: bool
+    precision: str
+
+
+class Engine(ABC):
+    """What computes filaments. It keeps nothing of its own: state belongs to the Context."""
+
+    @abstractmethod
+    def add_forces(
+        self, system: openmm.System, placed: PlacedFilaments, stretching_force_group: int, bending_force_group: int
+    ) -> None:
+        """Add the forces of filaments to a System that holds their nodes.
+
+        Raises
+        ------
+        InputError
+            If the engine cannot have these force groups.
+        """
+
+    @abstractmethod
+    def create_integrator(
+        self, system: openmm.System, placed: PlacedFilaments, settings: IntegratorSettings
+    ) -> openmm.Integrator:
+        """Create the integrator of a System with filaments.
+
+        Raises
+        ------
+        InputError
+            If the engine does not have the scheme or the precision, or the System is none that it can move.
+        """
+
+    @abstractmethod
+    def flow_of(self, context: openmm.Context) -> Flow:
+        """The flow of the solvent in a Context, at rest where its integrator knows of none."""
+
+    @abstractmethod
+    def set_tethers(self, context: openmm.Context, placed: PlacedFilaments, tethers: dict[int, Tether]) -> None:
+        """Give a Context other tethers, by their numbers, and those of the description for the rest."""
+
+    @abstractmethod
+    def record_tensions(self, context: openmm.Context) -> None:
+        """Let the integrator of a Context record mean tensions from its next step on.
+
+        Raises
+        ------
+        InputError
+            If it cannot.
+        """
+
+    @abstractmethod
+    def mean_tensions(self, context: openmm.Context, filaments: int) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """What the integrator of a Context has recorded of the last step, for so many filaments.
+
+        Returns
+        -------
+        list of (tensions, joint_forces, directions)
+            For each filament arrays (segments,) and (joints, 3) in kJ/(mol nm), and (segments, 3).
+
+        Raises
+        ------
+        InputError
+            If it has recorded nothing.
+        """
