@@ -1,4 +1,4 @@
-"""The README's Python, run as it stands, and the docstrings' examples."""
+"""The Python of the README and the guide, run as it stands, and the docstrings' examples; links between pages."""
 
 import doctest
 import re
@@ -13,8 +13,15 @@ from physics_cases import VISCOSITY
 from openmm_cylchain import F_ACTIN, Filaments, cli, stokes_friction
 from openmm_cylchain.systems import filaments as build
 
-README = (Path(__file__).parent.parent / "README.md").read_text()
-BUILDING, ADDING, ANALYSING = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
+ROOT = Path(__file__).parent.parent
+PAGES = [ROOT / "README.md", *sorted(ROOT.glob("docs/*.md")), *sorted(ROOT.glob("docs/design/*.md"))]
+PAGES += [ROOT / "ARCHITECTURE.md", ROOT / "CONTRIBUTING.md"]
+PYTHON = [
+    block
+    for page in PAGES[:1] + [ROOT / "docs" / "guide.md"]
+    for block in re.findall(r"```python\n(.*?)```", page.read_text(), flags=re.DOTALL)
+]
+BUILDING, ADDING, ANALYSING = PYTHON
 
 QUICK = """
 [solvent]
@@ -84,6 +91,17 @@ def test_analysing(tmp_path, capsys):
     exec(ANALYSING, {})
     value, error = eval(capsys.readouterr().out.replace("np.float64", ""))
     assert value > 0 and error > 0
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page):
+    text = page.read_text()
+    for target in re.findall(r"\]\(([^)#]+)[^)]*\)", text):
+        assert target.startswith("http") or (page.parent / target).exists(), target
+    # Files that are named in code style.
+    for path in re.findall(r"`([\w-]+/[\w/.-]+\.(?:py|h|cpp|md|toml|i))`", text):
+        found = any((ROOT / folder / path).exists() for folder in ("", "openmm_cylchain", "plugin_src"))
+        assert found or "yours" in path, path
 
 
 def test_docstring_examples():
