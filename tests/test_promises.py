@@ -95,9 +95,11 @@ def exact_energies(kind):
     return stretching, JointAngleDistribution(kind, TEMPERATURE).mean(kind.bending_energy) / KT
 
 
-def assert_energies(kind, filaments, exact, bound, steps, every=4, closed=False, step=None, bending_bound=None):
+def assert_energies(
+    kind, filaments, exact, bound, steps, every=4, closed=False, step=None, bending_bound=None, scheme="implicit"
+):
     """V_el and V_b within a bound, with errors of less than a quarter of it, and hardly a step divided."""
-    context, integrator = context_of(filaments, step, checks=step is None)
+    context, integrator = context_of(filaments, step, checks=step is None, scheme=scheme)
     chains = len(filaments.node_indices)
     integrator.step(steps // 5)
     samples = []
@@ -320,6 +322,17 @@ def test_soft_lengths_are_right_at_the_recommended_step(segments, stiffness):
     assert "soft lengths" in filaments.recommended_time_step("implicit").reason
     steps = {10: 18000, 30: 6000, 100: 6000, 300: 4000}[stiffness]
     assert_energies(kind, filaments, exact_energies(kind), 0.01, steps, every=steps // 800)
+
+
+LONG = [(360.0, 64, 600, "implicit", 0.01), slow(360.0, 64, 1000, "implicit-second-order", 0.01)]
+LONG += [slow(360.0, 256, 200, "implicit", 0.02), slow(120.0, 150, 200, "implicit-second-order", 0.03)]
+
+
+@pytest.mark.parametrize("length, segments, chains, scheme, bound", LONG)
+def test_energies_of_long_filaments(length, segments, chains, scheme, bound):
+    kind = F_ACTIN.with_segment_length(length)
+    filaments = in_equilibrium(kind, segments, chains)
+    assert_energies(kind, filaments, exact_energies(kind), bound, 400, scheme=scheme)
 
 
 STIFF_MATERIALS = {

@@ -36,7 +36,7 @@ _OVAL_MODE = 4.0 * math.pi * math.sqrt(0.75)
 RECOMMENDED_STRAIN = 0.03
 _ACCURACY_MARGIN = 20.0
 _TURNING_ANGLE = 0.1
-_IMPLICIT_TURNING_ANGLE = 0.15
+_IMPLICIT_TURNING_ANGLE = {"implicit": 0.15, "implicit-second-order": 0.1}
 _NOISE_LEAK = 0.1
 _CONTACT_MARGIN = 4.0
 _RANGE_OF_TURNING = 12.0
@@ -213,7 +213,8 @@ def implicit_time_step(
     A segment turns by the mean square of what a free segment does, 2 k_B T dt/gamma_rot, or, if that is less, of what
     its neighbours allow: after dt, waves of up to the length xi = (a dt l0/gamma_perp)^(1/4) have relaxed, which turns
     it by k_B T xi/a, and the filament turns as a whole by 24 k_B T dt l0/(gamma_perp L^3). Either must stay below
-    0.15^2. Measured with ``openmm-cylchain benchmark time-step``, F-actin, microtubules, DNA and chains with free
+    0.15^2, or 0.1^2 for scheme "implicit-second-order", with which bends of long filaments are up to 10 % too large at
+    0.15 rad. Measured with ``openmm-cylchain benchmark time-step``, F-actin, microtubules, DNA and chains with free
     joints keep equilibrium within 5 % and dynamics within 10 % at that step and at several times as much. A step must
     also resolve the slowest relaxation of the filament, by 20 steps, or 2 of scheme "implicit-second-order", which is
     1 % too fast there: gamma_perp/(l0 a) (L/4.73)^4, or that of the mode in which a ring of radius R becomes oval,
@@ -237,7 +238,7 @@ def implicit_time_step(
         friction = filament_type.segment_friction(viscosity, temperature, segments)
     length, rigidity = filament_type.segment_length, filament_type.bending_rigidity
     friction_per_length = friction.perpendicular / length
-    square_angle = _IMPLICIT_TURNING_ANGLE**2
+    square_angle = _IMPLICIT_TURNING_ANGLE[scheme] ** 2
     turning = math.inf
     if kT > 0.0:
         free = square_angle * friction.rotational / (2.0 * kT)
