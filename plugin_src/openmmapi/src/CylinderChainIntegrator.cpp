@@ -1,5 +1,5 @@
 #include "openmm/CylinderChainIntegrator.h"
-#include "ChainEngine.h"
+#include "dynamics/ChainEngine.h"
 #include "openmm/Context.h"
 #include "openmm/CylinderChainKernels.h"
 #include "openmm/OpenMMException.h"

@@ -1,5 +1,5 @@
 #include "ReferenceIntegrateCylinderChainStepKernel.h"
-#include "Noise.h"
+#include "lanes/Noise.h"
 #include "openmm/OpenMMException.h"
 #include "openmm/reference/ReferencePlatform.h"
 #include "openmm/reference/ReferenceVirtualSites.h"
