@@ -35,8 +35,8 @@ const ChainKernels& kernels() {
 
 bool mayShareLanes(const Chain& longest, const Chain& chain) {
     const size_t least = longest.closed ? longest.segments.size() : ceil((1-LARGEST_FILLING)*longest.segments.size());
-    return chain.bending == longest.bending && chain.stretching == longest.stretching && chain.closed == longest.closed &&
-            chain.planar == longest.planar && chain.segments.size() >= least;
+    return chain.bending == longest.bending && chain.stretching == longest.stretching &&
+            chain.closed == longest.closed && chain.planar == longest.planar && chain.segments.size() >= least;
 }
 
 /**
@@ -47,7 +47,8 @@ const double LARGEST_BENDING_RATE = 1e4, LARGEST_STRETCHING = 1e9;
 /** The resistance of a node to its motion. Third powers of it are computed, also for a thousandth of a step. */
 const double LEAST_RESISTANCE = 1e-9, LARGEST_RESISTANCE = 1e8;
 
-template <class Scalar> void setSegment(ChainPack<Scalar>& pack, int lane, int s, const Segment& segment, int dimensions) {
+template <class Scalar> void setSegment(ChainPack<Scalar>& pack, int lane, int s, const Segment& segment,
+        int dimensions) {
     typedef ChainPack<Scalar> Pack;
     const int lanes = pack.lanes;
     Scalar* properties = &pack.properties[(size_t) s*Pack::NumProperties*lanes+lane];
@@ -146,8 +147,9 @@ public:
         const double h = settings.stepSize;
         // A flow needs to know where chains are. Written so that NaN is not right.
         return settings.precision != Precision::Double && isImplicit(settings.scheme) && !settings.flow.present &&
-                settings.kT > 0 && stretching <= LARGEST_STRETCHING*settings.kT && h*bendingRate <= LARGEST_BENDING_RATE &&
-                leastFriction >= LEAST_RESISTANCE*h && largestFriction+h*bending <= LARGEST_RESISTANCE*h;
+                settings.kT > 0 && stretching <= LARGEST_STRETCHING*settings.kT &&
+                h*bendingRate <= LARGEST_BENDING_RATE && leastFriction >= LEAST_RESISTANCE*h &&
+                largestFriction+h*bending <= LARGEST_RESISTANCE*h;
     }
 private:
     /** The largest k l0^2, 4 kappa/gamma_rot, kappa/l0^2 and friction of a node, and the least of the latter. */
@@ -172,26 +174,6 @@ private:
 };
 
 } // namespace
-
-void cylchain::takeToNearestImage(double* displacement, const double* box) {
-    for (int k = 2; k >= 0; k--) {
-        const double images = floor(displacement[k]/box[4*k]+0.5);
-        for (int j = 0; j < 3; j++)
-            displacement[j] -= images*box[3*k+j];
-    }
-}
-
-bool BackgroundFlow::varies() const {
-    return any_of(gradient, gradient+9, [] (double derivative) {return derivative != 0;});
-}
-
-void BackgroundFlow::getVelocity(const double* x, double* result) const {
-    double r[] = {x[0]-origin[0], x[1]-origin[1], x[2]-origin[2]};
-    if (box != NULL)
-        takeToNearestImage(r, box);
-    for (int i = 0; i < 3; i++)
-        result[i] = velocity[i]+gradient[3*i]*r[0]+gradient[3*i+1]*r[1]+gradient[3*i+2]*r[2];
-}
 
 void SegmentForces::add(const SegmentForces& other, double weight) {
     tension += weight*other.tension;
@@ -308,13 +290,13 @@ Instability ChainEngine::step(int pack, const double* positions, const double* f
     return kernels().step(implementation->packs[pack], positions, forces, box, settings, displacements);
 }
 
-void cylchain::drawWords(const NoiseKey& key, NoiseKind kind, uint32_t draw, const uint32_t* chains, const uint32_t* parts,
-            int count, uint32_t* words) {
+void cylchain::drawWords(const NoiseKey& key, NoiseKind kind, uint32_t draw, const uint32_t* chains,
+            const uint32_t* parts, int count, uint32_t* words) {
     kernels().drawWords(key, kind, draw, chains, parts, count, words);
 }
 
-void cylchain::drawNormals(const NoiseKey& key, NoiseKind kind, const uint32_t* chains, const uint32_t* parts, int count,
-            double* normals) {
+void cylchain::drawNormals(const NoiseKey& key, NoiseKind kind, const uint32_t* chains, const uint32_t* parts,
+            int count, double* normals) {
     kernels().drawNormals(key, kind, chains, parts, count, normals);
 }
 

@@ -1,6 +1,7 @@
 #ifndef CYLCHAIN_CHAIN_ENGINE_H_
 #define CYLCHAIN_CHAIN_ENGINE_H_
 
+#include "mechanics/BackgroundFlow.h"
 #include "mechanics/Chain.h"
 #include <cstddef>
 #include <cstdint>
@@ -16,8 +17,8 @@ struct ChainEnergy {
 };
 
 /**
- * Where a step has gone wrong: a segment whose ends would move against each other by more than its rest length, or whose
- * length would be one that its FENE potential does not have.
+ * Where a step has gone wrong: a segment whose ends would move against each other by more than its rest length, or
+ * whose length would be one that its FENE potential does not have.
  */
 struct Instability {
     int chain = -1, segment = -1;
@@ -27,24 +28,6 @@ struct Instability {
     /** The number of iterations that the equations of an implicit step took. */
     int iterations = 0;
 };
-
-/** A fluid that moves with the velocity velocity+gradient (x-origin); friction is relative to it. */
-struct BackgroundFlow {
-    bool present = false;
-    double velocity[3] = {};
-    /** Row by row: the derivatives of the first component of the velocity come first. */
-    double gradient[9] = {};
-    double origin[3] = {};
-    /** The three vectors of a periodic box (nine doubles), to take the image that is nearest to the origin, or NULL. */
-    const double* box = NULL;
-    /** Whether the velocity is not the same everywhere. */
-    bool varies() const;
-    /** The velocity at x. */
-    void getVelocity(const double* x, double* velocity) const;
-};
-
-/** Take a displacement to its nearest image in a box. */
-void takeToNearestImage(double* displacement, const double* box);
 
 /** The particles of a pack, each of them once, in no particular order, with -1 for places that are empty. */
 class ParticleRange {
@@ -69,8 +52,8 @@ struct SegmentForces {
     /** Along the segment, positive where it pulls its ends together. */
     double tension = 0;
     /**
-     * What the segment itself exerts on its ends: friction, noise, tension, the bending of its joints, propulsion and the
-     * drag of a flow.
+     * What the segment itself exerts on its ends: friction, noise, tension, the bending of its joints, propulsion and
+     * the drag of a flow.
      */
     double minus[3] = {}, plus[3] = {};
     /** The direction from the minus to the plus end, half-way through the step. */
@@ -93,14 +76,16 @@ struct StepSettings {
     Scheme scheme;
     double kT, stepSize;
     /**
-     * The noise of a step is a function of the seed, of which 32 bits count, the level, the number of the step at that level,
-     * and the chain's number. Steps of the size h/2^level follow the Brownian path of those of the size h at level 0; levels
-     * go from 0 to LARGEST_LEVEL. See Noise.h.
+     * The noise of a step is a function of the seed, of which 32 bits count, the level, the number of the step at that
+     * level, and the chain's number. Steps of the size h/2^level follow the Brownian path of those of the size h at
+     * level 0; levels go from 0 to LARGEST_LEVEL. See Noise.h.
      */
     std::uint64_t seed, step;
     int level = 0;
     BackgroundFlow flow = {};
-    /** Where to record the forces of segments, for each chain and segment, or NULL. The implicit scheme alone does so. */
+    /**
+     * Where to record the forces of segments, for each chain and segment, or NULL. The implicit scheme alone does so.
+     */
     std::vector<std::vector<SegmentForces> >* segmentForces = NULL;
     Precision precision = Precision::Double;
 };
@@ -127,8 +112,8 @@ public:
      */
     int getNumPacks() const;
     /**
-     * Get the packs that a step with some settings takes: together, they hold each chain once. Those whose number is not
-     * below getNumPacks() are wide ones. This depends on the settings but for seed, step and what is recorded.
+     * Get the packs that a step with some settings takes: together, they hold each chain once. Those whose number is
+     * not below getNumPacks() are wide ones. This depends on the settings but for seed, step and what is recorded.
      */
     std::vector<int> getPacksOfStep(const StepSettings& settings) const;
     /**
@@ -142,7 +127,8 @@ public:
      *                       image, or NULL
      * @param includeEnergy  whether to compute the energies; they are zero otherwise
      */
-    ChainEnergy addForces(int pack, const double* positions, double* forces, const double* box, bool includeEnergy) const;
+    ChainEnergy addForces(int pack, const double* positions, double* forces, const double* box,
+            bool includeEnergy) const;
     /**
      * Get the particles of a pack.
      */

@@ -138,7 +138,7 @@ template <int W> void addRandomForces(const Pack& pack, const Vector<typename La
         forceNoise<Real>(normals, pack.planar, a, b);
         const Real across = property<Real>(pack, s, Pack::RootPerpendicular);
         const Real along = property<Real>(pack, s, Pack::RootParallel);
-        const Vector<Real> force = (a*across+t*((along-across)*t.dot(a)))*(0.5*amplitude+Real{});
+        const Vector<Real> force = (a*across+t*((along-across)*t.dot(a)))*splat<Real>(0.5*amplitude);
         const Real turn = property<Real>(pack, s, Pack::RootRotational);
         const Real stretch = property<Real>(pack, s, Pack::RootExtensional);
         const Real drift = thermal*property<Real>(pack, s, Pack::Drift);
@@ -162,7 +162,7 @@ template <int W> Instability stepPack(const Pack& pack, const double* positions,
         addRandomForces<W>(pack, x, settings, f);
     findVelocities<W>(pack, x, f, settings.flow, v);
     if (settings.scheme == Scheme::Midpoint) {
-        const Real half = 0.5*settings.stepSize+Real{};
+        const Real half = splat<Real>(0.5*settings.stepSize);
         for (int node = 0; node < n; node++)
             x[node] = x[node]+v[node]*half;
         findVelocities<W>(pack, x, f, settings.flow, v);
@@ -176,7 +176,7 @@ template <int W> Instability stepPack(const Pack& pack, const double* positions,
         gatherStart<W>(pack, positions, box, x);
     Instability result;
     for (int s = 0; s < pack.segments; s++) {
-        const Vector<Real> change = (v[s+1]-v[s])*(h+Real{});
+        const Vector<Real> change = (v[s+1]-v[s])*splat<Real>(h);
         Real square = change.dot(change), rest = property<Real>(pack, s, Pack::RestLength), relative = Real{};
         if (ranges) {
             const Vector<Real> after = x[s+1]-x[s]+change;

@@ -1,7 +1,8 @@
 // Included into the namespace of an instruction set. It does not compile alone.
 
 /**
- * The resistance of chains to the motion of their nodes: forces redistributed along chains, in O(N), and the drag of a flow.
+ * The resistance of chains to the motion of their nodes: forces redistributed along chains, in O(N), and the drag of a
+ * flow.
  */
 
 /** What elimination leaves of a node for substitution, and the coupling s 1 + r tt to the next node. */
@@ -121,7 +122,7 @@ template <int W> void redistributeClosed(const Pack& pack, const Vector<typename
             if (s < count-1) {
                 next = next-(other*(inverse*other)).lower();
                 nextRight = nextRight-other*moved;
-                nextCoupling = other*passed*(-1+Real{});
+                nextCoupling = -(other*passed);
             }
         }
         diagonal = next;
@@ -166,7 +167,7 @@ template <int W> void findVelocities(const Pack& pack, const Vector<typename Lan
     if (flow.present) {
         Vector<Real>* dragged = vectors.reserve<Vector<Real>>(pack.nodes);
         std::copy(f, f+pack.nodes, dragged);
-        addDrag<W>(pack, x, LaneFlow<W>(flow, pack, x), dragged);
+        addDrag<W>(pack, x, LaneFlow<W>(flow, pack.planar, x[0]), dragged);
         f = dragged;
     }
     if (pack.closed)

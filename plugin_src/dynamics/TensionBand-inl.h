@@ -30,8 +30,8 @@ template <class Real, bool CLOSED> struct BandRow : ToBorder<Real, CLOSED> {
 };
 
 /**
- * What elimination leaves of a node and of the tension T(-1) of the segment before it, in terms of the next two nodes and
- * of the tension T of the segment behind it. In a ring, y has the term -border[k] y_k as well, and T(-1) the term
+ * What elimination leaves of a node and of the tension T(-1) of the segment before it, in terms of the next two nodes
+ * and of the tension T of the segment behind it. In a ring, y has the term -border[k] y_k as well, and T(-1) the term
  * tensionBorder[k].y_k, for k = 0 and 1.
  *
  *     y = solution-next y(+1)-second y(+2)+pull T,
@@ -53,6 +53,8 @@ template <class Real> struct TensionEquation {
     Real compliance, start;
 };
 
+#include "dynamics/TensionResponses-inl.h"
+
 template <int W, bool CLOSED> class TensionBand {
     typedef typename Lanes<W>::Type Real;
     typedef Vector<Real> Vec;
@@ -72,7 +74,7 @@ public:
     void begin() {
         // There is no tension before the first node.
         link = Link {};
-        link.resistance = 1+Real{};
+        link.resistance = splat<Real>(1);
     }
     /** Set the equation of the tension of a segment, before its first node is eliminated. */
     CYLCHAIN_INLINE void setTension(int s, const Vec& direction, Real compliance, Real start) {
@@ -170,7 +172,7 @@ public:
             else if (node == n-1)
                 return;
             here = next-own.next.transposedTimes(right)-own.first*start;
-            next = (own.second.transposedTimes(right)+own.last*start)*(-1+Real{});
+            next = -(own.second.transposedTimes(right)+own.last*start);
             start = -equations[node].direction.dot(own.solution);
         }
         if constexpr (CLOSED) {
@@ -182,12 +184,10 @@ public:
             nodes[1].tension = nodes[1].reciprocal*start+nodes[1].give.dot(right);
         }
     }
-    /**
-     * For each segment, call a function with its number and with how far a unit force along the segment, which pushes its
-     * ends apart, moves its second end from its first. These are blocks of the inverse, from the last node to the first;
-     * those of A with the tensions in it.
-     */
-    template <class Function> void findResponses(Function use) const;
+    /** See TensionResponses-inl.h. */
+    template <class Function> void findResponses(Function use) const {
+        cylchain::CYLCHAIN_LOOPS::findResponses<W, CLOSED>(n, nodes, equations, use);
+    }
 private:
     const Pack& pack;
     const int n;
@@ -212,7 +212,7 @@ private:
         const Vec raised = inverse*link.first;
         const Real reciprocal = 1/(link.resistance+link.first.dot(raised));
         const Vec give = raised*reciprocal;
-        inverse.addOuter(raised*(-1+Real{}), give);
+        inverse.addOuter(-raised, give);
         const Vec solution = inverse*row.right-give*link.right;
         const Real tension = link.right*reciprocal+give.dot(row.right);
         result.inverse = inverse;
@@ -239,7 +239,7 @@ private:
         link.first = t+toNext.transposedTimes(t);
         if (FOLLOWING > 1) {
             const Mat toSecond = inverse*row.second;
-            const Vec last = row.second.transposedTimes(give)*(-1+Real{});
+            const Vec last = -row.second.transposedTimes(give);
             result.second = toSecond;
             result.last = last;
             link.last = toSecond.transposedTimes(t);
@@ -267,7 +267,7 @@ private:
                 link.resistance = behind.compliance;
                 link.right = behind.compliance*behind.start;
                 link.first = behind.direction;
-                link.border[1] = behind.direction*(-1+Real{});
+                link.border[1] = -behind.direction;
             }
             return;
         }
@@ -295,7 +295,8 @@ private:
             second.border[k] = second.border[k]-row.second.transposedTimes(coupling);
             border[k].diagonal.subtractTransposedProduct(row.border[k], coupling);
             border[k].diagonal.addOuter(before.border[k], ofTension);
-            border[k].right = border[k].right-row.border[k].transposedTimes(result.solution)-before.border[k]*result.tension;
+            border[k].right =
+                    border[k].right-row.border[k].transposedTimes(result.solution)-before.border[k]*result.tension;
             link.border[k] = coupling.transposedTimes(equations[node].direction);
         }
         border[0].upper = border[0].upper-row.border[0].transposedTimes(result.border[1])+
@@ -322,105 +323,3 @@ private:
         next = here;
     }
 };
-
-template <int W, bool CLOSED> template <class Function> void TensionBand<W, CLOSED>::findResponses(Function use) const {
-    // Of the next two nodes: their blocks of the inverse, and what a unit of compliance times start of the tension behind
-    // the node moves them by, and changes that tension by.
-    Sym same = {}, sameAfter = {};
-    Mat other = {};
-    Vec after = {}, afterNext = {};
-    Real own = {};
-    // In a ring, the same for the first two nodes: their own blocks, those of the next two nodes with them.
-    Mat borders[2][2], next[2] = {}, second[2] = {};
-    Vec ofBorder[2] = {};
-    if constexpr (CLOSED) {
-        const EliminatedPair<Real, CLOSED>& node = nodes[0];
-        const Sym last = nodes[1].inverse;
-        const Vec after1 = nodes[1].give*(-1+Real{});
-        const Vec here = node.pull*nodes[1].reciprocal-node.next*after1;
-        use(0, (here-after1)*equations[0].compliance);
-        borders[1][1] = Mat::of(last);
-        borders[0][1] = (node.next*borders[1][1]+Mat::outer(node.pull, after1))*(-1+Real{});
-        borders[1][0] = borders[0][1].transposed();
-        Sym first = node.inverse;
-        first.subtractProductTransposed(node.next, borders[0][1]);
-        first.addOuter(node.pull*(-1+Real{}), here);
-        borders[0][0] = Mat::of(first);
-        const Real mutual = node.first.dot(after1)+node.share*nodes[1].reciprocal;
-        ofBorder[1] = after1*node.share-last*node.first;
-        ofBorder[0] = node.pull*mutual-node.give-node.next*ofBorder[1];
-        own = node.reciprocal+node.first.dot(ofBorder[1])+node.share*mutual;
-    }
-    else {
-        same = nodes[n-1].inverse;
-        after = nodes[n-1].give*(-1+Real{});
-        own = nodes[n-1].reciprocal;
-    }
-    for (int s = CLOSED ? n-1 : n-2; s >= (CLOSED ? 2 : 0); s--) {
-        const EliminatedPair<Real, CLOSED>& node = nodes[s];
-        const Mat full = Mat::of(same), fullAfter = Mat::of(sameAfter);
-        Vec here = node.pull*own-node.next*after-node.second*afterNext;
-        if constexpr (CLOSED) {
-            here = here-node.border[0]*ofBorder[0]-node.border[1]*ofBorder[1];
-            use(s, (here-(s == n-1 ? ofBorder[0] : after))*equations[s].compliance);
-        }
-        else {
-            use(s, (here-after)*equations[s].compliance);
-            if (s == 0)
-                return;
-        }
-        // The node's own block, and those with the next two.
-        Mat newOther = node.next*full+node.second*other.transposed()+Mat::outer(node.pull, after);
-        Mat newSecond = node.next*other+node.second*fullAfter+Mat::outer(node.pull, afterNext);
-        Mat newBorder[2];
-        if constexpr (CLOSED)
-            for (int k = 0; k < 2; k++) {
-                newOther = newOther+node.border[k]*next[k].transposed();
-                newSecond = newSecond+node.border[k]*second[k].transposed();
-                newBorder[k] = (node.next*next[k]+node.second*second[k]+node.border[0]*borders[0][k]+
-                        node.border[1]*borders[1][k]+Mat::outer(node.pull, ofBorder[k]))*(-1+Real{});
-            }
-        newOther = newOther*(-1+Real{});
-        newSecond = newSecond*(-1+Real{});
-        Sym newSame = node.inverse;
-        newSame.subtractProductTransposed(node.next, newOther);
-        newSame.subtractProductTransposed(node.second, newSecond);
-        newSame.addOuter(node.pull*(-1+Real{}), here);
-
-        // The same for the tension before the node.
-        Real mutual = node.first.dot(after)+node.last.dot(afterNext)+node.share*own;
-        Vec newAfterNext = after*node.share-same*node.first-other*node.last;
-        Vec beyond = afterNext*node.share-other.transposedTimes(node.first)-sameAfter*node.last;
-        if constexpr (CLOSED) {
-            Vec newOfBorder[2];
-            for (int k = 0; k < 2; k++) {
-                newSame.subtractProductTransposed(node.border[k], newBorder[k]);
-                mutual = mutual+node.tensionBorder[k].dot(ofBorder[k]);
-                newAfterNext = newAfterNext-next[k]*node.tensionBorder[k];
-                beyond = beyond-second[k]*node.tensionBorder[k];
-                newOfBorder[k] = ofBorder[k]*node.share-next[k].transposedTimes(node.first)-
-                        second[k].transposedTimes(node.last)-borders[k][0]*node.tensionBorder[0]-
-                        borders[k][1]*node.tensionBorder[1];
-            }
-            after = node.pull*mutual-node.give-node.next*newAfterNext-node.second*beyond-node.border[0]*newOfBorder[0]-
-                    node.border[1]*newOfBorder[1];
-            own = node.reciprocal+node.first.dot(newAfterNext)+node.last.dot(beyond)+node.share*mutual+
-                    node.tensionBorder[0].dot(newOfBorder[0])+node.tensionBorder[1].dot(newOfBorder[1]);
-            for (int k = 0; k < 2; k++) {
-                ofBorder[k] = newOfBorder[k];
-                second[k] = next[k];
-                next[k] = newBorder[k];
-            }
-        }
-        else {
-            after = node.pull*mutual-node.give-node.next*newAfterNext-node.second*beyond;
-            own = node.reciprocal+node.first.dot(newAfterNext)+node.last.dot(beyond)+node.share*mutual;
-        }
-        afterNext = newAfterNext;
-        sameAfter = same;
-        same = newSame;
-        other = newOther;
-    }
-    if constexpr (CLOSED)
-        use(1, (ofBorder[1]-after)*equations[1].compliance);
-}

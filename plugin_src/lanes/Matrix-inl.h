@@ -89,6 +89,7 @@ template <class Real> struct Matrix {
     static CYLCHAIN_INLINE Matrix outer(const Vector<Real>& a, const Vector<Real>& b) {
         return {b*a.x, b*a.y, b*a.z};
     }
+    CYLCHAIN_INLINE Matrix operator-() const {return {-x, -y, -z};}
     CYLCHAIN_INLINE Matrix operator+(const Matrix& m) const {return {x+m.x, y+m.y, z+m.z};}
     CYLCHAIN_INLINE Matrix operator-(const Matrix& m) const {return {x-m.x, y-m.y, z-m.z};}
     CYLCHAIN_INLINE Matrix operator*(Real s) const {return {x*s, y*s, z*s};}

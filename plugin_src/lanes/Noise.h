@@ -32,17 +32,17 @@ enum class NoiseKind : std::uint32_t {
  * draw). Each call gives four words w0 to w3 of 32 bits.
  *
  * Two normal numbers come from two words a and b by the method of Box and Muller, Ann. Math. Stat. 1958, 29, 610. Their
- * distance from the origin is r = (-2 ln u)^(1/2) with u = (2 R+1)/2^41, where R is a followed by the upper eight bits of
- * b: up to 7.5. Their direction comes from the other 24 bits of b: the lowest 22, J, make an angle
+ * distance from the origin is r = (-2 ln u)^(1/2) with u = (2 R+1)/2^41, where R is a followed by the upper eight bits
+ * of b: up to 7.5. Their direction comes from the other 24 bits of b: the lowest 22, J, make an angle
  * (2 J+1-2^22) pi/2^24, the next one reverses the x axis and the highest one swaps the axes. The polynomials for all
  * this, in NoiseDouble-inl.h, are good to 10^-11. Draw 0 gives the normal numbers 0 and 1 from w0 and w1, and 2 and 3
  * from w2 and w3; draw 1 gives the next four. All this takes integers and operations that IEEE 754 rounds correctly,
  * without fused multiplication and addition, so that all instruction sets give the same bits, and others can. Single
  * precision has fewer bits of the same numbers.
  *
- * Levels make steps of different sizes follow the same Brownian path, by Levy's construction. A normal number x of a step
- * m at level l > 0 comes from that of the step m/2, rounded down, at the level below, and from another one, e, of that
- * same step which is drawn at level l:
+ * Levels make steps of different sizes follow the same Brownian path, by Levy's construction. A normal number x of a
+ * step m at level l > 0 comes from that of the step m/2, rounded down, at the level below, and from another one, e, of
+ * that same step which is drawn at level l:
  *
  *     x(l, m) = (x(l-1, m/2) + e(l, m/2)) / 2^(1/2)    if m is even,
  *     x(l, m) = (x(l-1, m/2) - e(l, m/2)) / 2^(1/2)    if m is odd.
@@ -67,15 +67,16 @@ void drawWords(const NoiseKey& key, NoiseKind kind, std::uint32_t draw, const st
         const std::uint32_t* parts, int count, std::uint32_t* words);
 
 /** Draw the normal numbers 0 to 3 of places. */
-void drawNormals(const NoiseKey& key, NoiseKind kind, const std::uint32_t* chains, const std::uint32_t* parts, int count,
-        double* normals);
+void drawNormals(const NoiseKey& key, NoiseKind kind, const std::uint32_t* chains, const std::uint32_t* parts,
+        int count, double* normals);
 
 /** The same as wide packs draw them, in single precision. */
 void drawNormalsInSinglePrecision(const NoiseKey& key, NoiseKind kind, const std::uint32_t* chains,
         const std::uint32_t* parts, int count, double* normals);
 
 /**
- * Draw extensions of FENE segments from equilibrium, as coordinates q with the energy k q^2/2 over the maximum extension D.
+ * Draw extensions of FENE segments from equilibrium, as coordinates q with the energy k q^2/2 over the maximum
+ * extension D.
  *
  * @param stiffness  k D^2/k_B T of each segment
  */

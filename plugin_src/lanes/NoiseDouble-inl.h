@@ -32,7 +32,8 @@ template <int W> CYLCHAIN_INLINE typename Lanes<W>::Bits product(typename Lanes<
     return a*(std::uint64_t) b;
 }
 
-template <int W, int DRAWS> CYLCHAIN_INLINE void philox(Words<W, DRAWS>& words, std::uint32_t seed, const std::uint32_t* streams) {
+template <int W, int DRAWS> CYLCHAIN_INLINE void philox(Words<W, DRAWS>& words, std::uint32_t seed,
+        const std::uint32_t* streams) {
     typedef typename Lanes<W>::Bits Bits;
     std::uint32_t key = seed, bump = 0;
     for (int round = 0; round < 10; round++) {
@@ -101,7 +102,8 @@ template <int W> CYLCHAIN_INLINE void normalsOf(typename Lanes<W>::Bits a, typen
 }
 
 /** A number between 0 and 1, neither of which it ever is. */
-template <int W> CYLCHAIN_INLINE typename Lanes<W>::Type uniformOf(typename Lanes<W>::Bits a, typename Lanes<W>::Bits b) {
+template <int W> CYLCHAIN_INLINE typename Lanes<W>::Type uniformOf(typename Lanes<W>::Bits a,
+        typename Lanes<W>::Bits b) {
     typedef typename Lanes<W>::Type Real;
     const typename Lanes<W>::Bits odd = (a<<20)|(b>>12)|1;
     return (reinterpreted<Real>(odd|INTEGER)-TWO_TO_52)*(1/TWO_TO_52);

@@ -15,8 +15,8 @@ template <int W, int PAIRS> void drawNormals(const NoiseKey& key, NoiseKind kind
         typename Lanes<W>::Type* normals);
 
 /**
- * Draw the first candidate of each lane's place: two normal numbers, and one that is uniform between 0 and 1, to accept it
- * or not.
+ * Draw the first candidate of each lane's place: two normal numbers, and one that is uniform between 0 and 1, to accept
+ * it or not.
  */
 template <int W> void drawCandidates(const NoiseKey& key, NoiseKind kind, const NoisePlaces<W>& places,
         typename Lanes<W>::Type* normals, typename Lanes<W>::Type& uniform);
@@ -41,7 +41,7 @@ void drawUniforms(const NoiseKey& key, NoiseKind kind, std::uint32_t chain, std:
 /** The functions of Noise.h. */
 void drawWordsOf(const NoiseKey& key, NoiseKind kind, std::uint32_t draw, const std::uint32_t* chains,
         const std::uint32_t* parts, int count, std::uint32_t* words);
-void drawNormalsOf(const NoiseKey& key, NoiseKind kind, const std::uint32_t* chains, const std::uint32_t* parts, int count,
-        double* normals);
+void drawNormalsOf(const NoiseKey& key, NoiseKind kind, const std::uint32_t* chains, const std::uint32_t* parts,
+        int count, double* normals);
 void drawFeneCoordinatesOf(const NoiseKey& key, const std::uint32_t* chains, const std::uint32_t* segments,
         const double* stiffness, int count, double* coordinates);

@@ -108,9 +108,9 @@ void drawUniforms(const NoiseKey& key, NoiseKind kind, std::uint32_t chain, std:
 }
 
 /**
- * The density of lengths l is exp(-V/k_B T). As one of x = q/D, with l = l0+-D (1-exp(-x^2))^(1/2), it is that of a normal
- * number with the variance 1/(k D^2/k_B T+3/2), times (y/sinh y)^(1/2) with y = x^2/2. At least 97.7 % of candidates are
- * accepted, however soft the segment is.
+ * The density of lengths l is exp(-V/k_B T). As one of x = q/D, with l = l0+-D (1-exp(-x^2))^(1/2), it is that of a
+ * normal number with the variance 1/(k D^2/k_B T+3/2), times (y/sinh y)^(1/2) with y = x^2/2. At least 97.7 % of
+ * candidates are accepted, however soft the segment is.
  */
 template <int W> void drawFeneCoordinates(const NoiseKey& key, const NoisePlaces<W>& places,
         typename Lanes<W>::Type stiffness, typename Lanes<W>::Type& coordinates) {
@@ -127,8 +127,8 @@ template <int W> void drawFeneCoordinates(const NoiseKey& key, const NoisePlaces
         Bits chain = places.chain, part = places.part;
         for (std::uint32_t draw = 1; uniform > std::sqrt(y/std::sinh(y)); draw++) {
             double normals[2];
-            drawCandidate(key, NoiseKind::Length, reinterpret_cast<Word*>(&chain)[i], reinterpret_cast<Word*>(&part)[i], draw,
-                    normals, uniform);
+            drawCandidate(key, NoiseKind::Length, reinterpret_cast<Word*>(&chain)[i], reinterpret_cast<Word*>(&part)[i],
+                    draw, normals, uniform);
             lane(coordinates, i) = normals[0]*lane(deviation, i);
             y = 0.5*lane(coordinates, i)*lane(coordinates, i);
         }
@@ -145,8 +145,8 @@ template <int W> const int SMALLER_LANES = W/2;
 #endif
 
 /** Call a function for places in as many lanes as possible. */
-template <int W, class Function> void forPlaces(const std::uint32_t* chains, const std::uint32_t* parts, int first, int count,
-        Function function) {
+template <int W, class Function> void forPlaces(const std::uint32_t* chains, const std::uint32_t* parts, int first,
+        int count, Function function) {
     for (; first+W <= count; first += W) {
         NoisePlaces<W> places;
         for (int i = 0; i < W; i++) {
@@ -165,8 +165,8 @@ template <int W> std::integral_constant<int, W> lanesOf(const NoisePlaces<W>&) {
 
 } // namespace
 
-void drawNormalsOf(const NoiseKey& key, NoiseKind kind, const std::uint32_t* chains, const std::uint32_t* parts, int count,
-        double* normals) {
+void drawNormalsOf(const NoiseKey& key, NoiseKind kind, const std::uint32_t* chains, const std::uint32_t* parts,
+        int count, double* normals) {
     forPlaces<CYLCHAIN_LANES>(chains, parts, 0, count, [&] (const auto& places, int first) {
         constexpr int W = decltype(lanesOf(places))();
         typename Lanes<W>::Type drawn[4];
@@ -213,7 +213,8 @@ void drawFeneCoordinatesOf(const NoiseKey& key, const std::uint32_t* chains, con
     CYLCHAIN_INSTANTIATE_NORMALS(W, 2) \
     CYLCHAIN_INSTANTIATE_NORMALS(W, 3) \
     CYLCHAIN_INSTANTIATE_NORMALS(W, 4) \
-    template void drawCandidates<W>(const NoiseKey&, NoiseKind, const NoisePlaces<W>&, Lanes<W>::Type*, Lanes<W>::Type&); \
+    template void drawCandidates<W>(const NoiseKey&, NoiseKind, const NoisePlaces<W>&, Lanes<W>::Type*, \
+            Lanes<W>::Type&); \
     template void drawFeneCoordinates<W>(const NoiseKey&, const NoisePlaces<W>&, Lanes<W>::Type, Lanes<W>::Type&);
 
 CYLCHAIN_INSTANTIATE_NOISE(1)

@@ -1,8 +1,8 @@
 // Included into the namespace of an instruction set. It does not compile alone.
 
 /**
- * The words of the random number generator in lanes of 32 bits, and normal numbers of them in single precision: those of
- * NoiseDouble-inl.h but for rounding.
+ * The words of the random number generator in lanes of 32 bits, and normal numbers of them in single precision: those
+ * of NoiseDouble-inl.h but for rounding.
  */
 
 /** Lanes of 64 bits for every other lane of 32 bits. */
@@ -108,14 +108,16 @@ template <int W> CYLCHAIN_INLINE void normalsOf(typename Lanes<W>::Bits a, typen
     // The distance of u from zero or from one, whichever is nearer. A float would round it away where u is near to one.
     const Bits upper = Bits{}-(a>>31), near = a^upper, low = (b>>24)^(upper&0xff);
     const Real distance = converted<W>(near)*2.3283064365386963e-10f+(converted<W>(low)+0.5f)*9.094947017729282e-13f;
-    const Real one = 1+Real{};
-    const Real u = reinterpreted<Real>((reinterpreted<Bits>(distance)&~upper)|(reinterpreted<Bits>(one-distance)&upper));
+    const Real one = splat<Real>(1);
+    const Real u =
+            reinterpreted<Real>((reinterpreted<Bits>(distance)&~upper)|(reinterpreted<Bits>(one-distance)&upper));
     // u = 2^k m
     const Bits shifted = reinterpreted<Bits>(u)-0x3f3504f3u, k = shifted>>23;
     const Real m = reinterpreted<Real>((shifted&0x7fffffu)+0x3f3504f3u);
     // m-1, which is the distance itself where u is its difference from one, and m as well.
     const Bits itself = upper&(Bits{}-(((shifted>>31)^1u)&1u));
-    const Real f = reinterpreted<Real>((reinterpreted<Bits>(m-1)&~itself)|(reinterpreted<Bits>(Real{}-distance)&itself));
+    const Real f =
+            reinterpreted<Real>((reinterpreted<Bits>(m-1)&~itself)|(reinterpreted<Bits>(Real{}-distance)&itself));
     const Real s = f/(2+f), z = s*s;
     const Real series = 4.0f+z*(1.3333334f+z*(0.7999921f+z*0.5764569f));
     // k has nine bits and a sign.

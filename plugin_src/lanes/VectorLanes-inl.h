@@ -16,6 +16,13 @@ typedef double Scalar;
 typedef std::uint64_t Word;
 #endif
 
+/** Added to divisors, or the least of them, so that none is zero. */
+#ifdef CYLCHAIN_SINGLE_PRECISION
+const Scalar LEAST = 1e-6f, TINY = 1e-30f;
+#else
+const Scalar LEAST = 1e-12, TINY = 1e-300;
+#endif
+
 template <int W> struct Lanes {
     typedef Scalar Type __attribute__((vector_size(sizeof(Scalar)*W)));
     typedef Word Bits __attribute__((vector_size(sizeof(Scalar)*W)));
@@ -25,19 +32,35 @@ template <> struct Lanes<1> {
     typedef Word Bits;
 };
 
+template <class Real> constexpr int LANE_COUNT = sizeof(Real)/sizeof(Scalar); // NOLINT(bugprone-sizeof-expression)
+
 template <class Real> CYLCHAIN_INLINE Scalar& lane(Real& value, int i) {
     return reinterpret_cast<Scalar*>(&value)[i];
 }
 
 template <class Real> CYLCHAIN_INLINE Real root(Real value) {
     Real result;
-    for (int i = 0; i < (int) (sizeof(Real)/sizeof(Scalar)); i++)
+    for (int i = 0; i < LANE_COUNT<Real>; i++)
         lane(result, i) = std::sqrt(lane(value, i));
     return result;
 }
 
+/** A number in all lanes. */
+template <class Real> CYLCHAIN_INLINE Real splat(Scalar value) {
+    return value-Real{};
+}
+
+template <class Real> CYLCHAIN_INLINE Real larger(Real a, Real b) {
+    return a > b ? a : b;
+}
+
+template <class Real> CYLCHAIN_INLINE Real lesser(Real a, Real b) {
+    return a < b ? a : b;
+}
+
 template <class Real> struct Vector {
     Real x, y, z;
+    CYLCHAIN_INLINE Vector operator-() const {return {-x, -y, -z};}
     CYLCHAIN_INLINE Vector operator+(const Vector& v) const {return {x+v.x, y+v.y, z+v.z};}
     CYLCHAIN_INLINE Vector operator-(const Vector& v) const {return {x-v.x, y-v.y, z-v.z};}
     CYLCHAIN_INLINE Vector operator*(Real s) const {return {x*s, y*s, z*s};}
@@ -74,7 +97,7 @@ private:
 
 template <class Real> CYLCHAIN_INLINE Real loaded(const std::vector<Scalar>& values, std::size_t index) {
     Real result;
-    for (int i = 0; i < (int) (sizeof(Real)/sizeof(Scalar)); i++)
-        lane(result, i) = values[index*(sizeof(Real)/sizeof(Scalar))+i];
+    for (int i = 0; i < LANE_COUNT<Real>; i++)
+        lane(result, i) = values[index*LANE_COUNT<Real>+i];
     return result;
 }

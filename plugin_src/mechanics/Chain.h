@@ -69,7 +69,10 @@ struct Chain {
     std::vector<int> nodes;
     /** One less than nodes; as many as nodes if the chain is closed. */
     std::vector<Segment> segments;
-    /** Stiffness a/l0 of each joint: joint j is at node j+1, and at node j if the chain is closed, where every node has one. */
+    /**
+     * Stiffness a/l0 of each joint: joint j is at node j+1, and at node j if the chain is closed, where every node has
+     * one.
+     */
     std::vector<double> joints;
     BendingModel bending;
     StretchingModel stretching;

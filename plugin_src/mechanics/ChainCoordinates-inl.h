@@ -4,20 +4,6 @@
  * Lengths and bends as coordinates q with the energy (stiffness/2) q^2, and the distributions of bends in equilibrium.
  */
 
-#ifdef CYLCHAIN_SINGLE_PRECISION
-const Scalar LEAST = 1e-6f, TINY = 1e-30f;
-#else
-const Scalar LEAST = 1e-12, TINY = 1e-300;
-#endif
-
-template <class Real> CYLCHAIN_INLINE Real larger(Real a, Real b) {
-    return a > b ? a : b;
-}
-
-template <class Real> CYLCHAIN_INLINE Real lesser(Real a, Real b) {
-    return a < b ? a : b;
-}
-
 /** A bend b = f (t2-t1), with the energy (stiffness/2) b^2, and df/dc, for the cosine c. */
 template <class Real> struct BendFactor {
     Real f, slope;
@@ -26,14 +12,14 @@ template <class Real> struct BendFactor {
 template <class Real> CYLCHAIN_INLINE BendFactor<Real> bendFactor(BendingModel model, const Vector<Real>& difference) {
     const Real square = difference.dot(difference);
     if (model == BendingModel::KratkyPorod)
-        return {1+Real{}, Real{}};
+        return {splat<Real>(1), Real{}};
     if (model == BendingModel::InscribedCircle) {
-        const Real sum = larger<Real>(4-square, LEAST+Real{});
+        const Real sum = larger<Real>(4-square, splat<Real>(LEAST));
         const Real f = 2/root(sum);
         return {f, f*f*f*Scalar(-0.25)};
     }
     BendFactor<Real> result;
-    for (int i = 0; i < (int) (sizeof(Real)/sizeof(Scalar)); i++) {
+    for (int i = 0; i < LANE_COUNT<Real>; i++) {
         Real copy = square;
         const double chord = std::fmin(std::sqrt(lane(copy, i)), 2.0), half = std::asin(0.5*chord);
         const bool small = chord < 1e-3;
@@ -44,16 +30,16 @@ template <class Real> CYLCHAIN_INLINE BendFactor<Real> bendFactor(BendingModel m
 }
 
 /**
- * The factors of two bends, together with the inverses of two other numbers: with one division for all, which take longer
- * than the rest.
+ * The factors of two bends, together with the inverses of two other numbers: with one division for all, which take
+ * longer than the rest.
  */
 template <class Real> CYLCHAIN_INLINE void bendFactors(BendingModel model, const Vector<Real>& difference1,
-            const Vector<Real>& difference2, BendFactor<Real>& factor1, BendFactor<Real>& factor2, Real number1, Real number2,
-            Real& inverse1, Real& inverse2) {
+            const Vector<Real>& difference2, BendFactor<Real>& factor1, BendFactor<Real>& factor2, Real number1,
+            Real number2, Real& inverse1, Real& inverse2) {
     const Real numbers = number1*number2;
     if (model == BendingModel::InscribedCircle) {
-        const Real root1 = root(larger<Real>(4-difference1.dot(difference1), LEAST+Real{}));
-        const Real root2 = root(larger<Real>(4-difference2.dot(difference2), LEAST+Real{}));
+        const Real root1 = root(larger<Real>(4-difference1.dot(difference1), splat<Real>(LEAST)));
+        const Real root2 = root(larger<Real>(4-difference2.dot(difference2), splat<Real>(LEAST)));
         const Real roots = root1*root2, all = 1/(roots*numbers);
         const Real perRoots = all*numbers, perNumbers = all*roots;
         const Real f1 = 2*perRoots*root2, f2 = 2*perRoots*root1;
@@ -108,13 +94,16 @@ inline void feneCoordinate(double inverse, double e, double& q, double& slope) {
 }
 
 /**
- * The tension of a FENE segment in a step, as a function of its new length: it grows from minus to plus infinity between the
- * shortest and the longest length, so that for every tension there is a length in between.
+ * The tension of a FENE segment in a step, as a function of its new length: it grows from minus to plus infinity
+ * between the shortest and the longest length, so that for every tension there is a length in between.
  */
 struct FeneTension {
     /** 1/D, the rest length, and the length at the start of the step. */
     double stiffness, inverse, rest, before;
-    /** The tension is the slope at the mean length times (stiffness (theta q+constant)), and (drag/l) (l-before), and less noise. */
+    /**
+     * The tension is the slope at the mean length times (stiffness (theta q+constant)), and (drag/l) (l-before), and
+     * less noise.
+     */
     double theta, constant, drag, noise;
     /** The tension for a length, and its derivative but for that of the slope. */
     void evaluate(double length, double& tension, double& response) const {
@@ -147,11 +136,12 @@ struct FeneTension {
 };
 
 /** The length of a segment as a coordinate with the energy (stiffness/2) q^2. */
-template <class Real> CYLCHAIN_INLINE void stretchCoordinate(StretchingModel model, Real inverse, Real e, Real& q, Real& slope) {
+template <class Real> CYLCHAIN_INLINE void stretchCoordinate(StretchingModel model, Real inverse, Real e, Real& q,
+        Real& slope) {
     q = e;
-    slope = 1+Real{};
+    slope = splat<Real>(1);
     if (model == StretchingModel::FENE)
-        for (int i = 0; i < (int) (sizeof(Real)/sizeof(Scalar)); i++) {
+        for (int i = 0; i < LANE_COUNT<Real>; i++) {
             double coordinate, derivative;
             feneCoordinate(lane(inverse, i), lane(e, i), coordinate, derivative);
             lane(q, i) = coordinate;

@@ -35,7 +35,8 @@ static void testStraightAndFoldedChains() {
             const Array x = {0, 0, 0, length[0], 0, 0, length[0]+length[1]*cos(angle), length[1]*sin(angle), 0};
             ChainEngine engine(chains);
             const double stiffness = chains[0].joints[0], half = tan(0.5*angle);
-            const double expected[] = {stiffness*2*pow(sin(0.5*angle), 2), 0.5*stiffness*angle*angle, 2*stiffness*half*half};
+            const double expected[] = {stiffness*2*pow(sin(0.5*angle), 2), 0.5*stiffness*angle*angle,
+                    2*stiffness*half*half};
             const double torque[] = {stiffness*sin(angle), stiffness*angle, 2*stiffness*half*(1+half*half)};
             checkClose(expected[bending], energyOf(engine, x), expected[bending]+1e-20, 1e-9, "bending energy");
             const Array forces = forcesOf(engine, x);
@@ -184,7 +185,8 @@ static void testInstability() {
         Array f(x.size()), displacements(x.size());
         f[3*chains[5].nodes[9]] = force;
         for (int pack = 0; pack < engine.getNumPacks(); pack++) {
-            Instability found = engine.step(pack, x.data(), f.data(), NULL, {Scheme::Euler, 0, 1, 1, 1}, displacements.data());
+            Instability found = engine.step(pack, x.data(), f.data(), NULL, {Scheme::Euler, 0, 1, 1, 1},
+                    displacements.data());
             check(found.chain == -1 || found.chain == 5, "wrong chain");
             if (found.chain == 5)
                 return;

@@ -47,7 +47,8 @@ private:
 };
 
 /** Bent chains of different lengths with different segments; node positions are appended to x. */
-inline vector<Chain> makeChains(const vector<int>& segments, BendingModel bending, StretchingModel stretching, Array& x) {
+inline vector<Chain> makeChains(const vector<int>& segments, BendingModel bending, StretchingModel stretching,
+        Array& x) {
     NormalNumbers normalNumbers(1);
     vector<Chain> chains;
     int particle = 0;
@@ -81,8 +82,8 @@ inline vector<Chain> makeChains(const vector<int>& segments, BendingModel bendin
 }
 
 /** Rings that are neither regular nor flat, unless they are planar; node positions are appended to x. */
-inline vector<Chain> makeRings(const vector<int>& segments, BendingModel bending, StretchingModel stretching, bool planar,
-            Array& x) {
+inline vector<Chain> makeRings(const vector<int>& segments, BendingModel bending, StretchingModel stretching,
+            bool planar, Array& x) {
     NormalNumbers normalNumbers(2);
     vector<Chain> rings;
     for (int count : segments) {
@@ -153,8 +154,8 @@ inline Array stepOf(const ChainEngine& engine, const Array& x, const Array& f, c
 }
 
 /**
- * The resistance of all chains as a dense matrix, with the rows and columns of fixed nodes those of the identity, or with
- * the resistance of fixed nodes as well.
+ * The resistance of all chains as a dense matrix, with the rows and columns of fixed nodes those of the identity, or
+ * with the resistance of fixed nodes as well.
  */
 inline vector<Array> denseResistance(const vector<Chain>& chains, const Array& x, bool ofFixedNodes = false) {
     vector<Array> z(x.size(), Array(x.size()));

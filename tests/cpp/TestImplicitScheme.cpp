@@ -1,6 +1,7 @@
 /**
- * This tests the implicit scheme on its own: steps without noise against a dense solution of its equations, written down
- * independently, that no chain depends on its neighbours in a pack, and that steps that cannot be taken are divided.
+ * This tests the implicit scheme on its own: steps without noise against a dense solution of its equations, written
+ * down independently, that no chain depends on its neighbours in a pack, and that steps that cannot be taken are
+ * divided.
  */
 
 #include "TestChains.h"
@@ -57,7 +58,9 @@ static double stretchOf(StretchingModel model, const Segment& segment, double le
     return copysign(d*sqrt(-log1p(-e*e/(d*d))), e);
 }
 
-/** A stage of a step: all of it, or one of the two of second order, the second of which needs where the first has ended. */
+/**
+ * A stage of a step: all of it, or one of the two of second order, the second of which needs where the first has ended.
+ */
 struct Stage {
     int number = 0;
     Array first = {};
@@ -66,8 +69,8 @@ struct Stage {
 const double DIAGONAL = 1-sqrt(0.5);
 
 /** The residual of a stage's equations for new nodes y. */
-static Array residualOf(const vector<Chain>& chains, const Array& x, const Array& y, const Array& f, double h, bool flows,
-            const Stage& stage = {}) {
+static Array residualOf(const vector<Chain>& chains, const Array& x, const Array& y, const Array& f, double h,
+            bool flows, const Stage& stage = {}) {
     const double share = stage.number == 1 ? DIAGONAL : 1;
     // The weights of what bends and tethers are after the step, before it and after the first stage.
     auto weighted = [&] (double theta, double after, double before, double first) {
@@ -109,13 +112,15 @@ static Array residualOf(const vector<Chain>& chains, const Array& x, const Array
         for (size_t s = 0; s < chain.segments.size(); s++) {
             const Segment& segment = chain.segments[s];
             const Array between2 = nodesFrom(chain, s, 2, middle);
-            const double before = lengthOf(nodesFrom(chain, s, 2, x).data()), after = lengthOf(nodesFrom(chain, s, 2, y).data());
+            const double before = lengthOf(nodesFrom(chain, s, 2, x).data());
+            const double after = lengthOf(nodesFrom(chain, s, 2, y).data());
             const double length = lengthOf(between2.data());
             double stretched = 0;
             for (int i = 0; i < 3 && flows; i++)
                 for (int k = 0; k < 3; k++)
                     stretched += (between2[3+i]-between2[i])/length*FLOW.gradient[3*i+k]*(between2[3+k]-between2[k]);
-            const double own = fmax(0.5, 1-segment.extensional/(h*segment.stiffness*segment.restLength*segment.restLength));
+            const double own = fmax(0.5,
+                    1-segment.extensional/(h*segment.stiffness*segment.restLength*segment.restLength));
             const double theta = stage.number == 1 ? DIAGONAL : own, rest = stage.number == 1 ? 0 : 1-own;
             const double between = 0.5*(before+after);
             const double slope = (stretchOf(chain.stretching, segment, between+width)-
@@ -143,8 +148,8 @@ static Array residualOf(const vector<Chain>& chains, const Array& x, const Array
                 moved[i] -= 2*width;
                 const Array below = bendOf(chain.bending, moved.data());
                 for (int k = 0; k < 3; k++)
-                    residual[componentFrom(chain, start, i)] -= chain.joints[j]*weighted(theta, after[k], before[k], between[k])*
-                            (above[k]-below[k])/(2*width);
+                    residual[componentFrom(chain, start, i)] -= chain.joints[j]*
+                            weighted(theta, after[k], before[k], between[k])*(above[k]-below[k])/(2*width);
             }
         }
         for (const Tether& tether : chain.tethers) {
@@ -297,7 +302,8 @@ static void testChainsDoNotDependOnTheirPack() {
 
 static void testPeriodicImages() {
     Array x;
-    const vector<Chain> chains = tethered(makeChains(SEGMENTS, BendingModel::KratkyPorod, StretchingModel::Harmonic, x), x);
+    const vector<Chain> chains = tethered(makeChains(SEGMENTS, BendingModel::KratkyPorod, StretchingModel::Harmonic, x),
+            x);
     ChainEngine engine(chains);
     const Array wrapped = acrossBox(x);
     const Array f(x.size(), 0.5);
@@ -400,7 +406,9 @@ static Array onNodes(const vector<Chain>& chains, const vector<vector<SegmentFor
     return sum;
 }
 
-/** On every mobile node, forces of segments balance those from outside, in a step that is taken as a whole or in parts. */
+/**
+ * On every mobile node, forces of segments balance those from outside, in a step that is taken as a whole or in parts.
+ */
 static void checkBalance(const vector<Chain>& chains, const Array& x, const StepSettings& given, const Array& f,
         bool divided = false) {
     vector<vector<SegmentForces> > forces = placesFor(chains);
@@ -418,15 +426,18 @@ static void checkBalance(const vector<Chain>& chains, const Array& x, const Step
         for (const Tether& tether : chains[chain].tethers) {
             held[tether.node] = true;
             double total = 0, expected = 0;
-            for (int k = 0; k < (chains[chain].planar ? 2 : 3) && !chains[chain].fixed[tether.node] && given.kT == 0; k++) {
+            for (int k = 0; k < (chains[chain].planar ? 2 : 3) && !chains[chain].fixed[tether.node] &&
+                    given.kT == 0; k++) {
                 const int i = componentFrom(chains[chain], tether.node, k);
                 // Between those at the start and the end of the step.
-                const double before = -tether.stiffness*(x[i]-tether.point[k]), after = before-tether.stiffness*change[i];
+                const double before = -tether.stiffness*(x[i]-tether.point[k]);
+                const double after = before-tether.stiffness*change[i];
                 const double pull = -sum[i]-f[i];
                 total += pow(pull-before, 2);
                 expected += pow(after-before, 2);
                 if (!divided)
-                    checkClose(0, fmin(0, (pull-before)*(after-pull)), 1+after*after+before*before, 0.02, "force of a tether");
+                    checkClose(0, fmin(0, (pull-before)*(after-pull)), 1+after*after+before*before, 0.02,
+                            "force of a tether");
             }
             check(total <= 1.2*expected+1e-9*scale*scale, "force of a tether");
         }
@@ -473,7 +484,8 @@ static void testBalanceOfNodes() {
 }
 
 static void testTensionsOfStraightChains() {
-    // A chain at rest that is held at one end and pulled at the other has one tension, and so has a hanging one at rest.
+    // A chain at rest that is held at one end and pulled at the other has one tension, and so has a hanging one at
+    // rest.
     Chain chain;
     Array x;
     for (int node = 0; node <= 6; node++) {

@@ -1,6 +1,7 @@
 /**
  * This tests random numbers: Philox against published answers, normal numbers against another implementation, their
- * moments, tails and correlations, Brownian paths, and FENE lengths. It passes with one checksum for all instruction sets.
+ * moments, tails and correlations, Brownian paths, and FENE lengths. It passes with one checksum for all instruction
+ * sets.
  */
 
 #include "TestChains.h"
@@ -219,7 +220,8 @@ static void testFeneLengths() {
         }
         // Gamma(kappa/2+1) (kappa/2+3/4)^(1/2)/Gamma(kappa/2+3/2) of them are accepted.
         const double accepted = kappa > 1e4 ? 1 : exp(lgamma(0.5*kappa+1)-lgamma(0.5*kappa+1.5))*sqrt(0.5*kappa+0.75);
-        checkClose(accepted, (double) kept/looked, sqrt(accepted*(1-accepted)/looked)+1e-12, 4.5, "accepted candidates");
+        checkClose(accepted, (double) kept/looked, sqrt(accepted*(1-accepted)/looked)+1e-12, 4.5,
+                "accepted candidates");
     }
 }
 
@@ -302,8 +304,8 @@ static void testDividedStepsFollowTheirPath() {
                     Array parts = start;
                     for (uint64_t part = 0; part < 1ULL<<division && !divided; part++) {
                         Array change(start.size());
-                        divided = engine.step(0, parts.data(), zero.data(), NULL, {Scheme::Implicit, kT, h/(1<<division), 21,
-                                (step<<division)+part, 1+division}, change.data()).divided > 0;
+                        divided = engine.step(0, parts.data(), zero.data(), NULL, {Scheme::Implicit, kT,
+                                h/(1<<division), 21, (step<<division)+part, 1+division}, change.data()).divided > 0;
                         for (size_t i = 0; i < start.size(); i++)
                             parts[i] += change[i];
                     }
