@@ -91,7 +91,8 @@ static void raiseOpenMMException(const std::exception& e) {
     }
 }
 
-%apply int& OUTPUT {int& bendingModel, int& stretchingModel, int& chain, int& node, int& particle, int& steps, int& particles};
+%apply int& OUTPUT {int& bendingModel, int& stretchingModel, int& chain, int& node, int& particle, int& steps,
+        int& particles};
 
 %typemap(in, numinputs=0) Vec3& point (OpenMM::Vec3 value) {
     $1 = &value;
@@ -128,7 +129,8 @@ static void raiseOpenMMException(const std::exception& e) {
         const Vec3& origin};
 %apply double& OUTPUT {double& restLength, double& stretchingStiffness, double& maximumExtension,
         double& parallelFriction, double& perpendicularFriction, double& rotationalFriction,
-        double& extensionalFriction, double& stiffness, double& stretching, double& bending, double& propulsion, double& work};
+        double& extensionalFriction, double& stiffness, double& stretching, double& bending, double& propulsion,
+        double& work};
 
 %pythoncode %{
 import openmm

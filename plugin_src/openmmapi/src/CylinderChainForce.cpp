@@ -28,10 +28,10 @@ static string twoTethers(int chain, int node) {
 CylinderChainForce::CylinderChainForce() : usePeriodic(false) {
 }
 
-int CylinderChainForce::addChain(const vector<int>& particles, BendingModel bendingModel, StretchingModel stretchingModel,
-        double restLength, double stretchingStiffness, double maximumExtension, double jointStiffness,
-        double parallelFriction, double perpendicularFriction, double rotationalFriction, double extensionalFriction,
-        bool closed) {
+int CylinderChainForce::addChain(const vector<int>& particles, BendingModel bendingModel,
+        StretchingModel stretchingModel, double restLength, double stretchingStiffness, double maximumExtension,
+        double jointStiffness, double parallelFriction, double perpendicularFriction, double rotationalFriction,
+        double extensionalFriction, bool closed) {
     if (particles.size() < 2)
         throw OpenMMException("CylinderChainForce: A chain must have at least two particles");
     if (closed && particles.size() < 4)

@@ -27,7 +27,8 @@ void CylinderChainForceImpl::initialize(ContextImpl& context) {
     kernel.getAs<CalcCylinderChainForceKernel>().initialize(system, owner);
 }
 
-double CylinderChainForceImpl::calcForcesAndEnergy(ContextImpl& context, bool includeForces, bool includeEnergy, int groups) {
+double CylinderChainForceImpl::calcForcesAndEnergy(ContextImpl& context, bool includeForces, bool includeEnergy,
+        int groups) {
     if ((groups&(1<<forceGroup)) != 0 && !excluded)
         return kernel.getAs<CalcCylinderChainForceKernel>().execute(context, includeForces, includeEnergy);
     return 0.0;

@@ -1,5 +1,5 @@
 #include "openmm/CylinderChainIntegrator.h"
-#include "ChainEngine.h"
+#include "dynamics/ChainEngine.h"
 #include "openmm/Context.h"
 #include "openmm/CylinderChainKernels.h"
 #include "openmm/OpenMMException.h"
@@ -41,8 +41,9 @@ static CylinderChainForceImpl& findChains(ContextImpl& context) {
 }
 
 CylinderChainIntegrator::CylinderChainIntegrator(double temperature, double frictionCoeff, double stepSize) :
-        scheme(Implicit), precision(Automatic), pathLevel(0), noiseLevel(0), noiseSeed(0), stepsTaken(0), countAfterSteps(0),
-        dividedSteps(0), workWindow(0), positionsHaveChanged(true), followsOn(false), recordsTensions(false), chains(NULL) {
+        scheme(Implicit), precision(Automatic), pathLevel(0), noiseLevel(0), noiseSeed(0), stepsTaken(0),
+        countAfterSteps(0), dividedSteps(0), workWindow(0), positionsHaveChanged(true), followsOn(false),
+        recordsTensions(false), chains(NULL) {
     setTemperature(temperature);
     setFriction(frictionCoeff);
     setStepSize(stepSize);
@@ -76,8 +77,8 @@ void CylinderChainIntegrator::checkSystem(const System& system, const CylinderCh
         int particle1, particle2;
         double distance;
         system.getConstraintParameters(0, particle1, particle2, distance);
-        throw OpenMMException("CylinderChainIntegrator does not support constraints, but there is one between particles "+
-                to_string(particle1)+" and "+to_string(particle2));
+        throw OpenMMException("CylinderChainIntegrator does not support constraints, but there is one between "
+                "particles "+to_string(particle1)+" and "+to_string(particle2));
     }
     const CylinderChainForce& force = chains.getOwner();
     vector<bool> isNode(system.getNumParticles(), false);
@@ -91,7 +92,8 @@ void CylinderChainIntegrator::checkSystem(const System& system, const CylinderCh
             mobile = (mobile || system.getParticleMass(particle) != 0.0);
         }
         if (!mobile)
-            throw OpenMMException("All nodes of chain "+to_string(chain)+" are massless: at least one must be free to move");
+            throw OpenMMException("All nodes of chain "+to_string(chain)+" are massless: "
+                    "at least one must be free to move");
     }
     for (auto& entry : particleFrictions) {
         if (entry.first < 0 || entry.first >= system.getNumParticles())
@@ -147,7 +149,8 @@ void CylinderChainIntegrator::setPathLevel(int level) {
     pathLevel = level;
 }
 
-void CylinderChainIntegrator::getFlow(Vec3& velocity, Vec3& gradientX, Vec3& gradientY, Vec3& gradientZ, Vec3& origin) const {
+void CylinderChainIntegrator::getFlow(Vec3& velocity, Vec3& gradientX, Vec3& gradientY, Vec3& gradientZ,
+        Vec3& origin) const {
     velocity = flowVelocity;
     gradientX = flowGradient[0];
     gradientY = flowGradient[1];
@@ -170,8 +173,8 @@ void CylinderChainIntegrator::setFlow(const Vec3& velocity, const Vec3& gradient
 
 void CylinderChainIntegrator::setWorkWindow(int steps) {
     if (steps < 0)
-        throw OpenMMException("CylinderChainIntegrator: The window for the work of forces must not be negative, but is "+
-                to_string(steps));
+        throw OpenMMException("CylinderChainIntegrator: The window for the work of forces must not be negative, "
+                "but is "+to_string(steps));
     workWindow = steps;
 }
 
@@ -226,8 +229,8 @@ void CylinderChainIntegrator::step(int steps) {
         if (context->updateContextState())
             followsOn = false;
 
-        // Where there are only chains, several steps are taken at once.  The first one is not among them, because OpenMM
-        // checks that positions have been set, nor is one that blows up.
+        // Where there are only chains, several steps are taken at once.  The first one is not among them, because
+        // OpenMM checks that positions have been set, nor is one that blows up.
 
         if (done > 0 && chainsAreAlone && includesChains) {
             const int count = min(steps-done, STEPS_TOGETHER);
@@ -245,8 +248,8 @@ void CylinderChainIntegrator::step(int steps) {
             CylinderChainForceImpl::Exclusion exclusion(*chains, scheme == Implicit || scheme == ImplicitSecondOrder);
             context->calcForcesAndEnergy(true, false, getIntegrationForceGroups());
         }
-        stepKernel.execute(*context, *this, noiseSeed, noiseLevel, stepsTaken, followsOn, recordsTensions && done == steps-1,
-                dividedSteps);
+        stepKernel.execute(*context, *this, noiseSeed, noiseLevel, stepsTaken, followsOn,
+                recordsTensions && done == steps-1, dividedSteps);
         followsOn = true;
         stepsTaken++;
         countAfterSteps = context->getStepCount();
@@ -258,7 +261,8 @@ uint64_t CylinderChainIntegrator::findNextStep() const {
     if (context == NULL || countAfterSteps == -1 || countAfterSteps == context->getStepCount())
         return stepsTaken;
 
-    // The step count was set, by itself or with a State that has no parameters of an Integrator. No noise may come twice.
+    // The step count was set, by itself or with a State that has no parameters of an Integrator. No noise may come
+    // twice.
 
     return max(stepsTaken, (uint64_t) max(0LL, context->getStepCount()));
 }
@@ -284,7 +288,8 @@ void CylinderChainIntegrator::loadCheckpoint(istream& stream) {
     Vec3 flow[5];
     stream.read((char*) flow, sizeof(flow));
     if (!stream || version != 3 || level < 0 || level > LARGEST_PATH_LEVEL)
-        throw OpenMMException("loadCheckpoint: Checkpoint was not created with this version of CylinderChainIntegrator");
+        throw OpenMMException("loadCheckpoint: Checkpoint was not created with this version of "
+                "CylinderChainIntegrator");
     setFlow(flow[0], flow[1], flow[2], flow[3], flow[4]);
     noiseLevel = level;
     noiseSeed = seed;

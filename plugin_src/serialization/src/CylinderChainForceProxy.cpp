@@ -28,9 +28,10 @@ void CylinderChainForceProxy::serialize(const void* object, SerializationNode& n
             particles.createChildNode("Particle").setIntProperty("index", particle);
         SerializationNode& segments = chain.createChildNode("Segments");
         for (int j = 0; j < force.getNumSegments(i); j++) {
-            double restLength, stiffness, maximumExtension, parallel, perpendicular, rotational, extensional, propulsion;
-            force.getSegmentParameters(i, j, restLength, stiffness, maximumExtension, parallel, perpendicular, rotational,
-                    extensional);
+            double restLength, stiffness, maximumExtension, parallel, perpendicular, rotational, extensional,
+                    propulsion;
+            force.getSegmentParameters(i, j, restLength, stiffness, maximumExtension, parallel, perpendicular,
+                    rotational, extensional);
             force.getSegmentPropulsion(i, j, propulsion);
             segments.createChildNode("Segment").setDoubleProperty("restLength", restLength)
                     .setDoubleProperty("stiffness", stiffness).setDoubleProperty("maximumExtension", maximumExtension)
@@ -58,10 +59,10 @@ void CylinderChainForceProxy::serialize(const void* object, SerializationNode& n
 }
 
 static void addSegment(CylinderChainForce& force, int chain, int segment, const SerializationNode& node) {
-    force.setSegmentParameters(chain, segment, node.getDoubleProperty("restLength"), node.getDoubleProperty("stiffness"),
-            node.getDoubleProperty("maximumExtension"), node.getDoubleProperty("parallel"),
-            node.getDoubleProperty("perpendicular"), node.getDoubleProperty("rotational"),
-            node.getDoubleProperty("extensional"));
+    force.setSegmentParameters(chain, segment, node.getDoubleProperty("restLength"),
+            node.getDoubleProperty("stiffness"), node.getDoubleProperty("maximumExtension"),
+            node.getDoubleProperty("parallel"), node.getDoubleProperty("perpendicular"),
+            node.getDoubleProperty("rotational"), node.getDoubleProperty("extensional"));
     force.setSegmentPropulsion(chain, segment, node.getDoubleProperty("propulsion", 0));
 }
 
@@ -79,7 +80,8 @@ static void addChain(CylinderChainForce& force, const SerializationNode& node) {
     // Add a chain of placeholders, and then set the parameters.
 
     const int chain = force.addChain(particles, (CylinderChainForce::BendingModel) node.getIntProperty("bendingModel"),
-            (CylinderChainForce::StretchingModel) node.getIntProperty("stretchingModel"), 1, 1, 1, 0, 1, 1, 1, 1, closed);
+            (CylinderChainForce::StretchingModel) node.getIntProperty("stretchingModel"), 1, 1, 1, 0, 1, 1, 1, 1,
+            closed);
     force.setChainPlanar(chain, node.getBoolProperty("planar", false));
     for (size_t j = 0; j < segments.size(); j++)
         addSegment(force, chain, j, segments[j]);

@@ -20,15 +20,15 @@ namespace OpenMM {
  * addChain() once for each chain.  All segments and joints of a chain begin with the same parameters; call
  * setSegmentParameters() and setJointParameters() for chains that are not uniform.
  *
- * A chain may be closed: a ring, whose last segment joins its last node and its first.  Segments may propel themselves: see
- * setSegmentPropulsion().  A chain may be confined to a plane: see setChainPlanar().  Nodes may be tethered to points, for
- * instance to those of optical traps: see addTether().
+ * A chain may be closed: a ring, whose last segment joins its last node and its first.  Segments may propel themselves:
+ * see setSegmentPropulsion().  A chain may be confined to a plane: see setChainPlanar().  Nodes may be tethered to
+ * points, for instance to those of optical traps: see addTether().
  *
  * The friction coefficients have no influence on forces and energies.  CylinderChainIntegrator reads them here, and
  * moves the chains accordingly.  Every other Integrator takes this class for an ordinary Force.
  *
- * After a Context has been created, parameters of segments, joints and tethers, propulsion and which chains are planar may
- * be changed: call updateParametersInContext() to copy them over.
+ * After a Context has been created, parameters of segments, joints and tethers, propulsion and which chains are planar
+ * may be changed: call updateParametersInContext() to copy them over.
  */
 class CylinderChainForce : public Force {
 public:
@@ -91,8 +91,8 @@ public:
      *                               kJ ps/mol/nm^2
      * @param rotationalFriction     the friction of each segment against rotation, measured in kJ ps/mol
      * @param extensionalFriction    the friction of each segment against a change of its length, measured in kJ ps/mol
-     * @param closed                 whether the last particle is joined to the first by a segment more; there must be at
-     *                               least four particles then
+     * @param closed                 whether the last particle is joined to the first by a segment more; there must be
+     *                               at least four particles then
      * @return the index of the chain that was added
      */
     int addChain(const std::vector<int>& particles, BendingModel bendingModel, StretchingModel stretchingModel,
@@ -127,8 +127,8 @@ public:
      */
     bool isChainPlanar(int chain) const;
     /**
-     * Set whether the nodes of a chain keep their z, which must be the same for all of them.  CylinderChainIntegrator then
-     * moves the chain in two dimensions: forces, noise and flow along z do not act on it.
+     * Set whether the nodes of a chain keep their z, which must be the same for all of them.  CylinderChainIntegrator
+     * then moves the chain in two dimensions: forces, noise and flow along z do not act on it.
      *
      * @param chain   the index of the chain
      * @param planar  whether its nodes keep their z
@@ -187,8 +187,8 @@ public:
      */
     void getSegmentPropulsion(int chain, int segment, double& propulsion) const;
     /**
-     * Let a segment propel itself: a force along it, from its first node to its second, half of it on each.  It belongs to
-     * no energy.  It is zero unless this is called.
+     * Let a segment propel itself: a force along it, from its first node to its second, half of it on each.  It belongs
+     * to no energy.  It is zero unless this is called.
      *
      * @param chain       the index of the chain
      * @param segment     the index of the segment in the chain
@@ -199,8 +199,8 @@ public:
      * Get the parameters of a joint.
      *
      * @param chain           the index of the chain
-     * @param joint           the index of the joint in the chain: joint j is where segments j and j+1 meet, and at node j
-     *                        if the chain is closed
+     * @param joint           the index of the joint in the chain: joint j is where segments j and j+1 meet, and at node
+     *                        j if the chain is closed
      * @param[out] stiffness  the bending stiffness b, measured in kJ/mol
      */
     void getJointParameters(int chain, int joint, double& stiffness) const;
@@ -255,8 +255,8 @@ public:
     void setTetherParameters(int index, int chain, int node, const Vec3& point, double stiffness);
     /**
      * Copy the parameters of segments, joints and tethers to a Context, so that changes made by setSegmentParameters(),
-     * setSegmentPropulsion(), setJointParameters(), setTetherParameters() and setChainPlanar() take effect in it.  Models
-     * and particles cannot be changed in this way, and neither can chains be added; tethers can.
+     * setSegmentPropulsion(), setJointParameters(), setTetherParameters() and setChainPlanar() take effect in it.
+     * Models and particles cannot be changed in this way, and neither can chains be added; tethers can.
      */
     void updateParametersInContext(Context& context);
     /**

@@ -32,14 +32,15 @@ class CylinderChainForceImpl;
  *
  * Motion is overdamped: there is no kinetic energy.  Velocities are displacements divided by the step size.
  *
- * The noise of a step depends only on the random number seed, on the path level, see setPathLevel(), and on the number of
- * steps taken since the Context was created, or the step count of the Context if that is greater: no noise comes twice if
- * the step count is set back, or if a State without parameters of the Integrator is restored.  Checkpoints contain all
- * this and the flow, so a simulation that goes on from a checkpoint is identical to one that was not interrupted.  A State
- * contains the number of steps taken, the path level that they were taken at, and the flow.
+ * The noise of a step depends only on the random number seed, on the path level, see setPathLevel(), and on the number
+ * of steps taken since the Context was created, or the step count of the Context if that is greater: no noise comes
+ * twice if the step count is set back, or if a State without parameters of the Integrator is restored.  Checkpoints
+ * contain all this and the flow, so a simulation that goes on from a checkpoint is identical to one that was not
+ * interrupted.  A State contains the number of steps taken, the path level that they were taken at, and the flow.
  *
- * In a periodic box, positions may have been wrapped particle by particle, which tears chains that cross its faces.  If the
- * CylinderChainForce does not use periodic boundary conditions, step() throws an exception that tells which chain is torn.
+ * In a periodic box, positions may have been wrapped particle by particle, which tears chains that cross its faces.  If
+ * the CylinderChainForce does not use periodic boundary conditions, step() throws an exception that tells which chain
+ * is torn.
  *
  * A chain or a particle may become unstable: because the step is too large, or because a force is.  step() then throws
  * an exception that tells where and when, and leaves the positions as they were before the step that failed.
@@ -60,27 +61,28 @@ public:
          */
         Midpoint = 1,
         /**
-         * The forces of the chains are taken at the end of the step, those of all other Forces at its start.  Stretching,
-         * bending and tethers do not limit the step, and keep their equilibrium.  It is the default.  If the force group
-         * of the CylinderChainForce is not among the integration force groups, this is the same as Midpoint.
+         * The forces of the chains are taken at the end of the step, those of all other Forces at its start.
+         * Stretching, bending and tethers do not limit the step, and keep their equilibrium.  It is the default.  If
+         * the force group of the CylinderChainForce is not among the integration force groups, this is the same as
+         * Midpoint.
          */
         Implicit = 2,
         /**
-         * The same in two stages: the motion of bends, which is of first order in the step otherwise, is right to second
-         * order, for half as much again of work.
+         * The same in two stages: the motion of bends, which is of first order in the step otherwise, is right to
+         * second order, for half as much again of work.
          */
         ImplicitSecondOrder = 3
     };
     /**
-     * The precision that steps of chains are computed in.  Positions, forces and energies are in double precision in any
-     * case.
+     * The precision that steps of chains are computed in.  Positions, forces and energies are in double precision in
+     * any case.
      */
     enum Precision {
         /**
-         * Mixed, where it is right and faster: for open chains with harmonic lengths and a scheme that is implicit, at a
-         * temperature above zero, without a flow, with bends that relax within a step by less than 10^4 of their
-         * relaxation time, lengths of at most 10^9 kT that noise changes by 10^-5 in a step or more, if there are enough
-         * such chains to fill more than half of a vector register.  It is the default.
+         * Mixed, where it is right and faster: for open chains with harmonic lengths and a scheme that is implicit, at
+         * a temperature above zero, without a flow, with bends that relax within a step by less than 10^4 of their
+         * relaxation time, lengths of at most 10^9 kT that noise changes by 10^-5 in a step or more, if there are
+         * enough such chains to fill more than half of a vector register.  It is the default.
          */
         Automatic = 0,
         /**
@@ -157,9 +159,9 @@ public:
         return precision;
     }
     /**
-     * Set the precision that steps of chains are computed in.  In a Context that exists already, this takes effect with the
-     * next step.  The noise is that of the same Brownian path in any precision, so that positions differ by rounding alone
-     * at first.  Checkpoints do not contain the precision.
+     * Set the precision that steps of chains are computed in.  In a Context that exists already, this takes effect with
+     * the next step.  The noise is that of the same Brownian path in any precision, so that positions differ by
+     * rounding alone at first.  Checkpoints do not contain the precision.
      */
     void setPrecision(Precision precision);
     /**
@@ -177,10 +179,10 @@ public:
      */
     void getFlow(Vec3& velocity, Vec3& gradientX, Vec3& gradientY, Vec3& gradientZ, Vec3& origin) const;
     /**
-     * Set the flow of the fluid: its velocity at origin+r is velocity+(gradientX.r, gradientY.r, gradientZ.r).  It carries
-     * segments along, turns them and stretches them, as far as forces let it.  If the System uses periodic boundary
-     * conditions, the velocity is that at the image of a particle which is nearest to the origin; for a chain, the image of
-     * its first node.
+     * Set the flow of the fluid: its velocity at origin+r is velocity+(gradientX.r, gradientY.r, gradientZ.r).  It
+     * carries segments along, turns them and stretches them, as far as forces let it.  If the System uses periodic
+     * boundary conditions, the velocity is that at the image of a particle which is nearest to the origin; for a chain,
+     * the image of its first node.
      *
      * @param velocity   the velocity at the origin of the flow, measured in nm/ps
      * @param gradientX  the derivatives of the x component of the velocity by x, y and z, measured in 1/ps
@@ -205,22 +207,22 @@ public:
         return workWindow;
     }
     /**
-     * Set the number of steps over which the work of explicit forces is averaged, or 0, which is the default, to measure
-     * nothing.
+     * Set the number of steps over which the work of explicit forces is averaged, or 0, which is the default, to
+     * measure nothing.
      *
-     * Forces are explicit if a step takes those of its start: all but those of the chains, with the scheme Implicit, or all
-     * of them.  If a step is too long for them, it shows by the work w = -(f(after)-f(before)).dx that they do on a particle
-     * in a step which moves it by dx: for a harmonic coordinate that relaxes by x = k mu h in a step, w has the mean
-     * 2 kT x/(1-x/2).  The means over the window of dx and of the change of f are taken off first.
+     * Forces are explicit if a step takes those of its start: all but those of the chains, with the scheme Implicit, or
+     * all of them.  If a step is too long for them, it shows by the work w = -(f(after)-f(before)).dx that they do on a
+     * particle in a step which moves it by dx: for a harmonic coordinate that relaxes by x = k mu h in a step, w has
+     * the mean 2 kT x/(1-x/2).  The means over the window of dx and of the change of f are taken off first.
      *
-     * Steps are left out that follow on a change of positions, of parameters of Forces or of the Context, or of the periodic
-     * box.  Nothing is measured at zero temperature, nor where several steps are taken at once because there are no other
-     * forces than those of the chains.
+     * Steps are left out that follow on a change of positions, of parameters of Forces or of the Context, or of the
+     * periodic box.  Nothing is measured at zero temperature, nor where several steps are taken at once because there
+     * are no other forces than those of the chains.
      */
     void setWorkWindow(int steps);
     /**
-     * Get the mean work of explicit forces in the last window of steps that has been finished, for the particle where it is
-     * largest.  Each window can be got once.  See setWorkWindow() for details.
+     * Get the mean work of explicit forces in the last window of steps that has been finished, for the particle where
+     * it is largest.  Each window can be got once.  See setWorkWindow() for details.
      *
      * @param[out] work       the mean, over kT
      * @param[out] particle   the index of the particle
@@ -246,11 +248,13 @@ public:
      * exception.  Checkpoints do not contain it.
      *
      * @param chain             the index of the chain
-     * @param[out] tensions     the tension of each segment, measured in kJ/mol/nm: its elastic force, its friction against
-     *                          becoming longer relative to the fluid and the noise of both, along its mean direction
+     * @param[out] tensions     the tension of each segment, measured in kJ/mol/nm: its elastic force, its friction
+     *                          against becoming longer relative to the fluid and the noise of both, along its mean
+     *                          direction
      * @param[out] jointForces  the force that the segment behind each joint exerts on the one before it, measured in
-     *                          kJ/mol/nm.  Forces of tethers, and all that come from outside the chain, act on both segments
-     *                          of a joint in equal parts.  The last joint of a ring is that of its last segment and the first.
+     *                          kJ/mol/nm.  Forces of tethers, and all that come from outside the chain, act on both
+     *                          segments of a joint in equal parts.  The last joint of a ring is that of its last
+     *                          segment and the first.
      * @param[out] directions   the direction of each segment half-way through the step, a unit vector
      */
     void getMeanTensions(int chain, std::vector<double>& tensions, std::vector<Vec3>& jointForces,
@@ -278,12 +282,14 @@ public:
         return pathLevel;
     }
     /**
-     * Set the path level.  The noise of two simulations with the same seed whose step sizes are h at level 0 and h/2^level
-     * at another level is that of the same Brownian path, so that their difference is the error of the longer step.  The
-     * lengths and bends of the implicit scheme that relax within a step are drawn anew in every step at any level.
+     * Set the path level.  The noise of two simulations with the same seed whose step sizes are h at level 0 and
+     * h/2^level at another level is that of the same Brownian path, so that their difference is the error of the longer
+     * step.  The lengths and bends of the implicit scheme that relax within a step are drawn anew in every step at any
+     * level.
      *
-     * The level is between 0, which is the default, and 20.  In a Context that exists already, a new one takes effect when
-     * the Context is reinitialized.  A State from a simulation at another level is continued at the same time on its path.
+     * The level is between 0, which is the default, and 20.  In a Context that exists already, a new one takes effect
+     * when the Context is reinitialized.  A State from a simulation at another level is continued at the same time on
+     * its path.
      */
     void setPathLevel(int level);
     /**
@@ -315,8 +321,8 @@ protected:
      */
     std::vector<std::string> getKernelNames();
     /**
-     * Note that positions have changed: chains may have been torn.  Whatever has changed, the next step does not follow on
-     * the last one.
+     * Note that positions have changed: chains may have been torn.  Whatever has changed, the next step does not follow
+     * on the last one.
      */
     void stateChanged(State::DataType changed);
     /**

@@ -77,8 +77,8 @@ public:
     virtual void initialize(const System& system, const CylinderChainIntegrator& integrator,
             CalcCylinderChainForceKernel& forceKernel) = 0;
     /**
-     * Throw an exception if positions were wrapped into a periodic box so that a chain is torn: a segment is longer than
-     * half the box and than twice its rest length, while its ends have images that are nearer.
+     * Throw an exception if positions were wrapped into a periodic box so that a chain is torn: a segment is longer
+     * than half the box and than twice its rest length, while its ends have images that are nearer.
      *
      * @param context  the context whose positions to look at
      */

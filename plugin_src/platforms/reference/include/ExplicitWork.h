@@ -8,12 +8,12 @@
 namespace OpenMM {
 
 /**
- * The work that forces do because they are those of the start of a step.  With the forces f on a particle before and after
- * a step that moves it by dx, this is w = -(f(after)-f(before)).dx.  Its means over windows of steps are those of
+ * The work that forces do because they are those of the start of a step.  With the forces f on a particle before and
+ * after a step that moves it by dx, this is w = -(f(after)-f(before)).dx.  Its means over windows of steps are those of
  * CylinderChainIntegrator::setWorkWindow().
  *
- * Of dx and of the changes of forces, their means over the window are taken off: a filament that is dragged along steadily
- * while its tension turns is no sign of a step that is too long.
+ * Of dx and of the changes of forces, their means over the window are taken off: a filament that is dragged along
+ * steadily while its tension turns is no sign of a step that is too long.
  */
 class ExplicitWork {
 public:
@@ -31,7 +31,8 @@ public:
      * @param kT         with zero, nothing is measured
      * @param window     the number of steps to average over, or zero to measure nothing
      */
-    void beginStep(const std::vector<Vec3>& forces, const std::vector<Vec3>& moves, bool followsOn, double kT, int window);
+    void beginStep(const std::vector<Vec3>& forces, const std::vector<Vec3>& moves, bool followsOn, double kT,
+            int window);
     /**
      * Take note that particles have moved by the displacements of the step.
      */

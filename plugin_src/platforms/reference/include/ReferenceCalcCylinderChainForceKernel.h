@@ -1,7 +1,7 @@
 #ifndef OPENMM_REFERENCECALCCYLINDERCHAINFORCEKERNEL_H_
 #define OPENMM_REFERENCECALCCYLINDERCHAINFORCEKERNEL_H_
 
-#include "ChainEngine.h"
+#include "dynamics/ChainEngine.h"
 #include "ParallelLoop.h"
 #include "openmm/CylinderChainKernels.h"
 #include <memory>

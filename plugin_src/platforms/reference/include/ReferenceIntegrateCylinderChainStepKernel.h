@@ -31,8 +31,8 @@ public:
             std::vector<Vec3>& directions) const;
 private:
     cylchain::BackgroundFlow flowOf(ContextImpl& context, const CylinderChainIntegrator& integrator) const;
-    cylchain::StepSettings settingsOf(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed,
-            int level, std::uint64_t step) const;
+    cylchain::StepSettings settingsOf(ContextImpl& context, const CylinderChainIntegrator& integrator,
+            std::uint64_t seed, int level, std::uint64_t step) const;
     void recordForces(cylchain::StepSettings& settings, bool records);
     void displaceChains(ContextImpl& context, const cylchain::StepSettings& settings, long long& divided);
     int advancePack(ContextImpl& context, int pack, cylchain::StepSettings settings, int count, long long& divided);

@@ -10,8 +10,8 @@ using namespace std;
  */
 static const int BLOCK_SIZE = 1024;
 
-ExplicitWork::ExplicitWork(ParallelLoop& loop) : loop(loop), known(false), count(0), largest(0), worst(-1), finishedSteps(0),
-        active(0) {
+ExplicitWork::ExplicitWork(ParallelLoop& loop) : loop(loop), known(false), count(0), largest(0), worst(-1),
+        finishedSteps(0), active(0) {
 }
 
 void ExplicitWork::initialize(const vector<int>& particles) {
@@ -21,7 +21,8 @@ void ExplicitWork::initialize(const vector<int>& particles) {
     count = finishedSteps = 0;
 }
 
-void ExplicitWork::beginStep(const vector<Vec3>& forces, const vector<Vec3>& moves, bool followsOn, double kT, int window) {
+void ExplicitWork::beginStep(const vector<Vec3>& forces, const vector<Vec3>& moves, bool followsOn, double kT,
+        int window) {
     if (window <= 0 || !(kT > 0)) {
         known = false;
         count = 0;

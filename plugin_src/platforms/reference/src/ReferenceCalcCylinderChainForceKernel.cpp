@@ -11,7 +11,8 @@ static ReferencePlatform::PlatformData& extractData(ContextImpl& context) {
 }
 
 ReferenceCalcCylinderChainForceKernel::ReferenceCalcCylinderChainForceKernel(string name, const Platform& platform,
-        ContextImpl& context) : CalcCylinderChainForceKernel(name, platform), loop(context), periodic(false), forceGroup(0) {
+        ContextImpl& context) : CalcCylinderChainForceKernel(name, platform), loop(context), periodic(false),
+        forceGroup(0) {
 }
 
 void ReferenceCalcCylinderChainForceKernel::initialize(const System& system, const CylinderChainForce& force) {
@@ -25,7 +26,8 @@ const double* ReferenceCalcCylinderChainForceKernel::getBox(ContextImpl& context
     return periodic ? &extractData(context).periodicBoxVectors[0][0] : NULL;
 }
 
-ChainEnergy ReferenceCalcCylinderChainForceKernel::addForces(ContextImpl& context, vector<Vec3>& forces, bool includeEnergy) {
+ChainEnergy ReferenceCalcCylinderChainForceKernel::addForces(ContextImpl& context, vector<Vec3>& forces,
+        bool includeEnergy) {
     const double* positions = &(*extractData(context).positions)[0][0];
     const double* box = getBox(context);
     vector<ChainEnergy> energies(engine->getNumPacks());

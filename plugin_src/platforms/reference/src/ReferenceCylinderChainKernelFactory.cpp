@@ -21,7 +21,8 @@ extern "C" void registerKernelFactories() {
     }
 }
 
-KernelImpl* ReferenceCylinderChainKernelFactory::createKernelImpl(string name, const Platform& platform, ContextImpl& context) const {
+KernelImpl* ReferenceCylinderChainKernelFactory::createKernelImpl(string name, const Platform& platform,
+        ContextImpl& context) const {
     if (name == CalcCylinderChainForceKernel::Name())
         return new ReferenceCalcCylinderChainForceKernel(name, platform, context);
     if (name == IntegrateCylinderChainStepKernel::Name())

@@ -1,5 +1,6 @@
 #include "ReferenceIntegrateCylinderChainStepKernel.h"
-#include "Noise.h"
+#include "lanes/Noise.h"
+#include "mechanics/PeriodicBox.h"
 #include "openmm/OpenMMException.h"
 #include "openmm/reference/ReferencePlatform.h"
 #include "openmm/reference/ReferenceVirtualSites.h"
@@ -30,13 +31,13 @@ static bool isFinite(const Vec3& v) {
     return isfinite(v[0]) && isfinite(v[1]) && isfinite(v[2]);
 }
 
-ReferenceIntegrateCylinderChainStepKernel::ReferenceIntegrateCylinderChainStepKernel(string name, const Platform& platform,
-        ContextImpl& context) : IntegrateCylinderChainStepKernel(name, platform), loop(context), explicitWork(loop),
-        chainKernel(NULL), periodic(false), mixedChains(0), recorded(false) {
+ReferenceIntegrateCylinderChainStepKernel::ReferenceIntegrateCylinderChainStepKernel(string name,
+        const Platform& platform, ContextImpl& context) : IntegrateCylinderChainStepKernel(name, platform),
+        loop(context), explicitWork(loop), chainKernel(NULL), periodic(false), mixedChains(0), recorded(false) {
 }
 
-void ReferenceIntegrateCylinderChainStepKernel::initialize(const System& system, const CylinderChainIntegrator& integrator,
-        CalcCylinderChainForceKernel& forceKernel) {
+void ReferenceIntegrateCylinderChainStepKernel::initialize(const System& system,
+        const CylinderChainIntegrator& integrator, CalcCylinderChainForceKernel& forceKernel) {
     chainKernel = &dynamic_cast<ReferenceCalcCylinderChainForceKernel&>(forceKernel);
     periodic = system.usesPeriodicBoundaryConditions();
     const int numParticles = system.getNumParticles();
@@ -148,8 +149,9 @@ void ReferenceIntegrateCylinderChainStepKernel::refuseTornChains(ContextImpl& co
             if (shorter < 0.999*length) {
                 stringstream message;
                 message << "Chain " << chain << " is torn at segment " << s << ": its ends are " << length <<
-                        " nm apart, and " << shorter << " nm as nearest images. Positions were wrapped into the periodic box "
-                        "particle by particle: make chains whole before setting them";
+                        " nm apart, and " << shorter <<
+                        " nm as nearest images. Positions were wrapped into the periodic box particle by particle: "
+                        "make chains whole before setting them";
                 throw OpenMMException(message.str());
             }
         }
@@ -163,8 +165,8 @@ static bool isInRange(const Chain& chain, int segment, double length) {
 
 static string describeRange(const Segment& segment) {
     stringstream text;
-    text << "its FENE potential is finite between " << max(0.0, segment.restLength-segment.maximumExtension) << " and " <<
-            segment.restLength+segment.maximumExtension << " nm alone";
+    text << "its FENE potential is finite between " << max(0.0, segment.restLength-segment.maximumExtension) <<
+            " and " << segment.restLength+segment.maximumExtension << " nm alone";
     return text.str();
 }
 
@@ -194,7 +196,8 @@ void ReferenceIntegrateCylinderChainStepKernel::execute(ContextImpl& context, co
         uint64_t seed, int level, uint64_t step, bool followsOn, bool records, long long& divided) {
     StepSettings settings = settingsOf(context, integrator, seed, level, step);
     recordForces(settings, records);
-    explicitWork.beginStep(*extractData(context).forces, displacements, followsOn, settings.kT, integrator.getWorkWindow());
+    explicitWork.beginStep(*extractData(context).forces, displacements, followsOn, settings.kT,
+            integrator.getWorkWindow());
     displaceChains(context, settings, divided);
     displaceOthers(context, settings, integrator.getFriction());
 
@@ -224,11 +227,11 @@ void ReferenceIntegrateCylinderChainStepKernel::recordForces(StepSettings& setti
     settings.segmentForces = &segmentForces;
 }
 
-void ReferenceIntegrateCylinderChainStepKernel::getMeanTensions(int chain, vector<double>& tensions, vector<Vec3>& jointForces,
-        vector<Vec3>& directions) const {
+void ReferenceIntegrateCylinderChainStepKernel::getMeanTensions(int chain, vector<double>& tensions,
+        vector<Vec3>& jointForces, vector<Vec3>& directions) const {
     if (!recorded)
-        throw OpenMMException("No tensions were recorded in the last step: call setRecordsTensions(true) before it, with "
-                "an implicit scheme");
+        throw OpenMMException("No tensions were recorded in the last step: call setRecordsTensions(true) before it, "
+                "with an implicit scheme");
     if (chain < 0 || chain >= (int) segmentForces.size())
         throw OpenMMException("CylinderChainIntegrator: Illegal chain index: "+to_string(chain));
     const vector<SegmentForces>& forces = segmentForces[chain];
@@ -241,7 +244,8 @@ void ReferenceIntegrateCylinderChainStepKernel::getMeanTensions(int chain, vecto
         directions.push_back(direction/norm(direction));
     }
 
-    // Forces from outside act on both segments of a joint in equal parts, which leaves half the difference of their own.
+    // Forces from outside act on both segments of a joint in equal parts, which leaves half the difference of their
+    // own.
 
     for (size_t joint = 0; joint < chainKernel->getChains()[chain].joints.size(); joint++) {
         const double* before = forces[joint].plus;
@@ -250,12 +254,14 @@ void ReferenceIntegrateCylinderChainStepKernel::getMeanTensions(int chain, vecto
     }
 }
 
-void ReferenceIntegrateCylinderChainStepKernel::takeExplicitWork(double& work, int& particle, int& steps, int& particles) {
+void ReferenceIntegrateCylinderChainStepKernel::takeExplicitWork(double& work, int& particle, int& steps,
+        int& particles) {
     explicitWork.take(work, particle, steps, particles);
 }
 
-int ReferenceIntegrateCylinderChainStepKernel::executeTogether(ContextImpl& context, const CylinderChainIntegrator& integrator,
-        uint64_t seed, int level, uint64_t step, int count, bool records, long long& divided) {
+int ReferenceIntegrateCylinderChainStepKernel::executeTogether(ContextImpl& context,
+        const CylinderChainIntegrator& integrator, uint64_t seed, int level, uint64_t step, int count, bool records,
+        long long& divided) {
     if (!others.empty())
         return 0;
     explicitWork.interrupt();
@@ -291,8 +297,8 @@ int ReferenceIntegrateCylinderChainStepKernel::executeTogether(ContextImpl& cont
     return done;
 }
 
-int ReferenceIntegrateCylinderChainStepKernel::advancePack(ContextImpl& context, int pack, StepSettings settings, int count,
-        long long& divided) {
+int ReferenceIntegrateCylinderChainStepKernel::advancePack(ContextImpl& context, int pack, StepSettings settings,
+        int count, long long& divided) {
     ReferencePlatform::PlatformData& data = extractData(context);
     const ChainEngine& engine = chainKernel->getEngine();
     const double* box = chainKernel->getBox(context);
@@ -369,7 +375,8 @@ void ReferenceIntegrateCylinderChainStepKernel::reportInstability(ContextImpl& c
     while (segment < (int) nodes.size() && isFinite(positions[nodes[segment]]) && isFinite(forces[nodes[segment]]))
         segment++;
     if (segment < (int) nodes.size()) {
-        message << max(segment-1, 0) << " in step " << settings.step+1 << ": the force on it, or its position, is not finite";
+        message << max(segment-1, 0) << " in step " << settings.step+1 <<
+                ": the force on it, or its position, is not finite";
     }
     else {
         // An excessive force moves its neighbors as well, so choose the segment with the greatest.
@@ -400,8 +407,8 @@ void ReferenceIntegrateCylinderChainStepKernel::reportInstability(ContextImpl& c
             if (box != NULL)
                 takeToNearestImage(&between[0], box);
             message.precision(6);
-            message << "it would be " << norm(between+displacements[second]-displacements[first]) << " nm long after it, and " <<
-                    describeRange(culprit.segments[segment]);
+            message << "it would be " << norm(between+displacements[second]-displacements[first]) <<
+                    " nm long after it, and " << describeRange(culprit.segments[segment]);
         }
         else
             message << "its ends would move by " << change << " nm against each other in one step";
@@ -411,7 +418,8 @@ void ReferenceIntegrateCylinderChainStepKernel::reportInstability(ContextImpl& c
     throw OpenMMException(message.str());
 }
 
-void ReferenceIntegrateCylinderChainStepKernel::displaceOthers(ContextImpl& context, const StepSettings& settings, double friction) {
+void ReferenceIntegrateCylinderChainStepKernel::displaceOthers(ContextImpl& context, const StepSettings& settings,
+        double friction) {
     const vector<Vec3>& forces = *extractData(context).forces;
     const int numBlocks = (others.size()+BLOCK_SIZE-1)/BLOCK_SIZE;
     loop.run(numBlocks, [&] (int block) {
@@ -435,8 +443,8 @@ void ReferenceIntegrateCylinderChainStepKernel::displaceBlock(int block, const v
     uint32_t particles[BLOCK_SIZE];
     double gaussian[4*BLOCK_SIZE];
     copy(others.begin()+start, others.begin()+end, particles);
-    drawNormals({(uint32_t) settings.seed, (uint32_t) settings.level, settings.step}, NoiseKind::Particle, noChains, particles,
-            end-start, gaussian);
+    drawNormals({(uint32_t) settings.seed, (uint32_t) settings.level, settings.step}, NoiseKind::Particle, noChains,
+            particles, end-start, gaussian);
     for (int i = start; i < end; i++) {
         const int particle = others[i];
         const double own = particleFrictions[particle];
@@ -446,7 +454,8 @@ void ReferenceIntegrateCylinderChainStepKernel::displaceBlock(int block, const v
         displacements[particle] = forces[particle]*(settings.stepSize*mobility)+Vec3(g[0], g[1], g[2])*noise;
         if (settings.flow.present) {
             // The velocity half-way, so that particles keep to closed streamlines.
-            const Vec3 halfway = positions[particle]+velocityOf(settings.flow, positions[particle])*(0.5*settings.stepSize);
+            const Vec3 halfway = positions[particle]+
+                    velocityOf(settings.flow, positions[particle])*(0.5*settings.stepSize);
             displacements[particle] += velocityOf(settings.flow, halfway)*settings.stepSize;
         }
     }

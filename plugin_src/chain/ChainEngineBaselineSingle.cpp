@@ -1,9 +1,0 @@
-#define CYLCHAIN_SINGLE_PRECISION
-#define CYLCHAIN_LOOPS baseline_single
-#define CYLCHAIN_LANES 4
-#include "ChainLoops.h"
-
-const cylchain::WideKernels& cylchain::baselineWideKernels() {
-    static const WideKernels kernels = {CYLCHAIN_LANES, baseline_single::stepOfPack, baseline_single::drawNormalsOf};
-    return kernels;
-}

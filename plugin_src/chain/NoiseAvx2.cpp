@@ -1,5 +1,0 @@
-#ifdef CYLCHAIN_X86_64
-#define CYLCHAIN_LOOPS avx2
-#define CYLCHAIN_LANES 4
-#include "NoiseLoops.h"
-#endif

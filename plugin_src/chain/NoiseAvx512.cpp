@@ -1,5 +1,0 @@
-#ifdef CYLCHAIN_X86_64
-#define CYLCHAIN_LOOPS avx512
-#define CYLCHAIN_LANES 8
-#include "NoiseLoops.h"
-#endif

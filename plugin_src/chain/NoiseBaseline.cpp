@@ -1,3 +1,0 @@
-#define CYLCHAIN_LOOPS baseline
-#define CYLCHAIN_LANES 2
-#include "NoiseLoops.h"

@@ -1,4 +1,0 @@
-#define CYLCHAIN_SINGLE_PRECISION
-#define CYLCHAIN_LOOPS baseline_single
-#define CYLCHAIN_LANES 4
-#include "NoiseLoops.h"

@@ -1,0 +1,321 @@
+#include "dynamics/ChainEngine.h"
+#include "dynamics/ChainPack.h"
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdlib>
+#include <numeric>
+#include <tuple>
+
+using namespace cylchain;
+using namespace std;
+
+namespace {
+
+/** Chains share a pack if they use the same models and at most a fifth of a lane is filled up. */
+const double LARGEST_FILLING = 0.2;
+
+const ChainKernels& bestKernels() {
+#ifdef CYLCHAIN_X86_64
+    // CYLCHAIN_INSTRUCTION_SET names a lesser instruction set to use, for tests and comparisons.
+    const char* chosen = getenv("CYLCHAIN_INSTRUCTION_SET");
+    const string limit = (chosen == NULL ? "avx512" : chosen);
+    if (limit == "avx512" && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq"))
+        return avx512Kernels();
+    if (limit != "baseline" && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
+        return avx2Kernels();
+#endif
+    return baselineKernels();
+}
+
+const ChainKernels& kernels() {
+    static const ChainKernels& best = bestKernels();
+    return best;
+}
+
+bool mayShareLanes(const Chain& longest, const Chain& chain) {
+    const size_t least = longest.closed ? longest.segments.size() : ceil((1-LARGEST_FILLING)*longest.segments.size());
+    return chain.bending == longest.bending && chain.stretching == longest.stretching &&
+            chain.closed == longest.closed && chain.planar == longest.planar && chain.segments.size() >= least;
+}
+
+/**
+ * Where single precision is right, as measured: see IMPLICIT_SCHEME.md. These are for the step over the relaxation time
+ * of the sharpest bends, 4 h kappa/gamma_rot, and for the stiffness of lengths, k l0^2/k_B T.
+ */
+const double LARGEST_BENDING_RATE = 1e4, LARGEST_STRETCHING = 1e9;
+/** The change of a length by its noise in a step, over the length. Rounding adds to it. */
+const double LEAST_CHANGE = 1e-5;
+/** The resistance of a node to its motion. Third powers of it are computed, also for a thousandth of a step. */
+const double LEAST_RESISTANCE = 1e-9, LARGEST_RESISTANCE = 1e8;
+
+template <class Scalar> void setSegment(ChainPack<Scalar>& pack, int lane, int s, const Segment& segment,
+        int dimensions) {
+    typedef ChainPack<Scalar> Pack;
+    const int lanes = pack.lanes;
+    Scalar* properties = &pack.properties[(size_t) s*Pack::NumProperties*lanes+lane];
+    properties[Pack::RestLength*lanes] = segment.restLength;
+    properties[Pack::InverseRestLength*lanes] = 1/segment.restLength;
+    properties[Pack::Stiffness*lanes] = segment.stiffness;
+    properties[Pack::InverseExtension*lanes] = segment.maximumExtension > 0 ? 1/segment.maximumExtension : 0;
+    properties[Pack::Parallel*lanes] = segment.parallel;
+    properties[Pack::Perpendicular*lanes] = segment.perpendicular;
+    properties[Pack::Rotational*lanes] = segment.rotational;
+    properties[Pack::Extensional*lanes] = segment.extensional;
+    properties[Pack::RootParallel*lanes] = sqrt(segment.parallel);
+    properties[Pack::RootPerpendicular*lanes] = sqrt(segment.perpendicular);
+    properties[Pack::RootRotational*lanes] = sqrt(segment.rotational);
+    properties[Pack::RootExtensional*lanes] = sqrt(segment.extensional);
+    properties[Pack::Drift*lanes] = dimensions == 0 ? 0.0 :
+            dimensions+1-(dimensions-1)*segment.extensional/segment.rotational;
+    if (segment.propulsion != 0) {
+        pack.propulsions.resize((size_t) (pack.nodes-1)*lanes);
+        pack.propulsions[(size_t) s*lanes+lane] = 0.5*segment.propulsion;
+    }
+}
+
+template <class Scalar> void fillLane(ChainPack<Scalar>& pack, int lane, const Chain& chain, int index) {
+    const int lanes = pack.lanes;
+    const size_t own = chain.nodes.size(), unrolled = own+(chain.closed ? 2 : 0);
+    pack.chain[lane] = index;
+    pack.nodesOfLane[lane] = unrolled;
+    pack.segmentsOfLane[lane] = chain.segments.size();
+    for (size_t node = 0; node < unrolled; node++) {
+        pack.particles[node*lanes+lane] = chain.nodes[node%own];
+        pack.mobile[node*lanes+lane] = chain.fixed[node%own] ? 0.0 : 1.0;
+    }
+    pack.free[lane] = any_of(chain.fixed.begin(), chain.fixed.end(), [] (bool fixed) {return fixed;}) ? 0.0 : 1.0;
+    for (size_t node = 1; node < unrolled-1; node++)
+        pack.joints[node*lanes+lane] = chain.joints[chain.closed ? node%own : node-1];
+    for (size_t number = 0; number < chain.tethers.size(); number++)
+        pack.tethers.push_back({chain.tethers[number], lane, (int) number});
+    for (size_t s = 0; s < unrolled-1; s++)
+        setSegment(pack, lane, s, chain.segments[s%chain.segments.size()], chain.planar ? 2 : 3);
+}
+
+template <class Scalar> ChainPack<Scalar> packed(const vector<Chain>& chains, const vector<int>& members, int lanes) {
+    ChainPack<Scalar> pack;
+    const Chain& longest = chains[members[0]];
+    pack.lanes = lanes;
+    pack.nodes = longest.nodes.size()+(longest.closed ? 2 : 0);
+    pack.segments = longest.segments.size();
+    pack.bending = longest.bending;
+    pack.stretching = longest.stretching;
+    pack.closed = longest.closed;
+    pack.planar = longest.planar;
+    pack.chain.resize(lanes, -1);
+    pack.nodesOfLane.resize(lanes);
+    pack.segmentsOfLane.resize(lanes);
+    pack.free.resize(lanes);
+    const size_t places = (size_t) pack.nodes*lanes;
+    pack.particles.resize(places, -1);
+    pack.mobile.resize(places, 0.0);
+    pack.joints.resize(places, 0.0);
+    pack.properties.resize((places-lanes)*ChainPack<Scalar>::NumProperties);
+    // A filling segment that has no inverse length is not looked at when an iteration might end.
+    typedef ChainPack<Scalar> Pack;
+    for (int s = 0; s < pack.nodes-1; s++)
+        for (int lane = 0; lane < lanes; lane++) {
+            setSegment(pack, lane, s, {1, 0, 1, 0, 0, 0, 0}, 0);
+            pack.properties[((size_t) s*Pack::NumProperties+Pack::InverseRestLength)*lanes+lane] = 0;
+        }
+    for (size_t lane = 0; lane < members.size(); lane++)
+        fillLane(pack, lane, chains[members[lane]], members[lane]);
+    stable_sort(pack.tethers.begin(), pack.tethers.end(), [] (const LaneTether& a, const LaneTether& b) {
+        return a.node < b.node;
+    });
+    return pack;
+}
+
+template <class Scalar> ParticleRange particlesOf(const ChainPack<Scalar>& pack) {
+    return {pack.particles.data(), pack.particles.data()+(size_t) pack.ownNodes()*pack.lanes};
+}
+
+/** A pack in single precision, in place of some of those in double precision, and what decides where it is right. */
+class WidePack {
+public:
+    ChainPack<float> pack;
+    /** The packs that it replaces. */
+    int first, last;
+    int chains;
+    WidePack(const vector<Chain>& all, const vector<int>& members, int first, int last) :
+            pack(packed<float>(all, members, kernels().wide.lanes)), first(first), last(last), chains(members.size()) {
+        for (int member : members)
+            include(all[member]);
+    }
+    bool isUsed(const StepSettings& settings) const {
+        if (settings.precision == Precision::Automatic && 2*chains <= pack.lanes)
+            return false;
+        const double h = settings.stepSize;
+        // A flow needs to know where chains are. Written so that NaN is not right.
+        return settings.precision != Precision::Double && isImplicit(settings.scheme) && !settings.flow.present &&
+                settings.kT > 0 && stretching <= LARGEST_STRETCHING*settings.kT &&
+                h*bendingRate <= LARGEST_BENDING_RATE && leastFriction >= LEAST_RESISTANCE*h &&
+                largestFriction+h*bending <= LARGEST_RESISTANCE*h &&
+                2*settings.kT*h >= LEAST_CHANGE*LEAST_CHANGE*lengthFriction;
+    }
+private:
+    /** The largest k l0^2, 4 kappa/gamma_rot, kappa/l0^2 and friction of a node, and the least of the latter. */
+    double stretching = 0, bendingRate = 0, bending = 0, largestFriction = 0, leastFriction = HUGE_VAL;
+    /** The largest friction against a change of a length, times its square. */
+    double lengthFriction = 0;
+    void include(const Chain& chain) {
+        for (const Segment& segment : chain.segments) {
+            const double square = segment.restLength*segment.restLength;
+            stretching = max(stretching, segment.stiffness*square);
+            lengthFriction = max(lengthFriction, segment.extensional+0.25*segment.parallel*square);
+            leastFriction = min(leastFriction, 0.25*min(segment.parallel, segment.perpendicular));
+            largestFriction = max(largestFriction, 0.25*segment.perpendicular+segment.rotational/square);
+        }
+        for (size_t joint = 0; joint < chain.joints.size(); joint++) {
+            const Segment& before = chain.segments[joint];
+            const Segment& behind = chain.segments[joint+1];
+            const double length = min(before.restLength, behind.restLength);
+            bendingRate = max(bendingRate, 4*chain.joints[joint]/min(before.rotational, behind.rotational));
+            bending = max(bending, 4*chain.joints[joint]/(length*length));
+        }
+        for (const Tether& tether : chain.tethers)
+            bending = max(bending, tether.stiffness);
+    }
+};
+
+} // namespace
+
+void SegmentForces::add(const SegmentForces& other, double weight) {
+    tension += weight*other.tension;
+    for (int k = 0; k < 3; k++) {
+        minus[k] += weight*other.minus[k];
+        plus[k] += weight*other.plus[k];
+        direction[k] += weight*other.direction[k];
+    }
+}
+
+struct ChainEngine::Implementation {
+    vector<ChainPack<double> > packs;
+    /** In the order of the packs that they replace. */
+    vector<WidePack> wide;
+    bool isWide(int pack) const {
+        return pack >= (int) packs.size();
+    }
+    const WidePack& getWide(int pack) const {
+        return wide[pack-packs.size()];
+    }
+};
+
+ChainEngine::ChainEngine(const vector<Chain>& chains) : implementation(new Implementation()) {
+    // Chains of similar length come next to each other, the longest first, so that threads end together.
+    vector<int> order(chains.size());
+    iota(order.begin(), order.end(), 0);
+    stable_sort(order.begin(), order.end(), [&] (int a, int b) {
+        auto key = [&] (const Chain& chain) {
+            return make_tuple(-(int) chain.nodes.size(), chain.bending, chain.stretching, chain.closed, chain.planar);
+        };
+        return key(chains[a]) < key(chains[b]);
+    });
+    vector<vector<int> > members;
+    for (size_t first = 0; first < order.size();) {
+        int fitting = 1;
+        while (fitting < kernels().lanes && first+fitting < order.size() &&
+                mayShareLanes(chains[order[first]], chains[order[first+fitting]]))
+            fitting++;
+        int lanes = 1;
+        while (2*lanes <= fitting)
+            lanes *= 2;
+        members.push_back(vector<int>(order.begin()+first, order.begin()+first+lanes));
+        implementation->packs.push_back(packed<double>(chains, members.back(), lanes));
+        first += lanes;
+    }
+
+    // Wide packs are made of those that come next to each other.
+    for (size_t first = 0, last; first < members.size(); first = last) {
+        const Chain& longest = chains[members[first][0]];
+        vector<int> together = members[first];
+        for (last = first+1; last < members.size(); last++) {
+            if (together.size()+members[last].size() > (size_t) kernels().wide.lanes ||
+                    !mayShareLanes(longest, chains[members[last].back()]))
+                break;
+            together.insert(together.end(), members[last].begin(), members[last].end());
+        }
+        if (!longest.closed && longest.stretching == StretchingModel::Harmonic)
+            implementation->wide.push_back(WidePack(chains, together, first, last));
+    }
+}
+
+ChainEngine::~ChainEngine() {
+}
+
+int ChainEngine::getNumPacks() const {
+    return implementation->packs.size();
+}
+
+vector<int> ChainEngine::getPacksOfStep(const StepSettings& settings) const {
+    vector<int> result;
+    int next = 0;
+    for (size_t wide = 0; wide < implementation->wide.size(); wide++) {
+        const WidePack& pack = implementation->wide[wide];
+        if (!pack.isUsed(settings))
+            continue;
+        for (; next < pack.first; next++)
+            result.push_back(next);
+        result.push_back(getNumPacks()+wide);
+        next = pack.last;
+    }
+    for (; next < getNumPacks(); next++)
+        result.push_back(next);
+    return result;
+}
+
+int ChainEngine::getNumMixedChains(const vector<int>& packs) const {
+    int count = 0;
+    for (int pack : packs)
+        if (implementation->isWide(pack))
+            count += implementation->getWide(pack).chains;
+    return count;
+}
+
+ChainEnergy ChainEngine::addForces(int pack, const double* positions, double* forces, const double* box,
+            bool includeEnergy) const {
+    return kernels().addForces(implementation->packs[pack], positions, forces, box, includeEnergy);
+}
+
+ParticleRange ChainEngine::getParticles(int pack) const {
+    return implementation->isWide(pack) ? particlesOf(implementation->getWide(pack).pack) :
+            particlesOf(implementation->packs[pack]);
+}
+
+void ChainEngine::clearForces(int pack, double* forces) const {
+    for (int particle : getParticles(pack))
+        if (particle >= 0)
+            forces[3*particle] = forces[3*particle+1] = forces[3*particle+2] = 0;
+}
+
+Instability ChainEngine::step(int pack, const double* positions, const double* forces, const double* box,
+            const StepSettings& settings, double* displacements) const {
+    if (implementation->isWide(pack))
+        return kernels().wide.step(implementation->getWide(pack).pack, positions, forces, box, settings, displacements);
+    return kernels().step(implementation->packs[pack], positions, forces, box, settings, displacements);
+}
+
+void cylchain::drawWords(const NoiseKey& key, NoiseKind kind, uint32_t draw, const uint32_t* chains,
+            const uint32_t* parts, int count, uint32_t* words) {
+    kernels().drawWords(key, kind, draw, chains, parts, count, words);
+}
+
+void cylchain::drawNormals(const NoiseKey& key, NoiseKind kind, const uint32_t* chains, const uint32_t* parts,
+            int count, double* normals) {
+    kernels().drawNormals(key, kind, chains, parts, count, normals);
+}
+
+void cylchain::drawNormalsInSinglePrecision(const NoiseKey& key, NoiseKind kind, const uint32_t* chains,
+            const uint32_t* parts, int count, double* normals) {
+    kernels().wide.drawNormals(key, kind, chains, parts, count, normals);
+}
+
+void cylchain::drawFeneCoordinates(const NoiseKey& key, const uint32_t* chains, const uint32_t* segments,
+            const double* stiffness, int count, double* coordinates) {
+    kernels().drawFeneCoordinates(key, chains, segments, stiffness, count, coordinates);
+}
+
+string ChainEngine::getInstructionSet() {
+    return kernels().instructionSet;
+}

@@ -1,0 +1,159 @@
+#ifndef CYLCHAIN_CHAIN_ENGINE_H_
+#define CYLCHAIN_CHAIN_ENGINE_H_
+
+#include "mechanics/BackgroundFlow.h"
+#include "mechanics/Chain.h"
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace cylchain {
+
+/** Energies of a pack of chains. */
+struct ChainEnergy {
+    double stretching = 0, bending = 0, tethers = 0;
+};
+
+/**
+ * Where a step has gone wrong: a segment whose ends would move against each other by more than its rest length, or
+ * whose length would be one that its FENE potential does not have.
+ */
+struct Instability {
+    int chain = -1, segment = -1;
+    double change = 0;
+    /** The number of chains for which an implicit step was taken in parts, because its equations were not solved. */
+    int divided = 0;
+    /** The number of iterations that the equations of an implicit step took. */
+    int iterations = 0;
+};
+
+/** The particles of a pack, each of them once, in no particular order, with -1 for places that are empty. */
+class ParticleRange {
+public:
+    ParticleRange(const int* first, const int* last) : first(first), last(last) {
+    }
+    const int* begin() const {
+        return first;
+    }
+    const int* end() const {
+        return last;
+    }
+private:
+    const int *first, *last;
+};
+
+/** The largest level of a step that may be divided. */
+const int LARGEST_LEVEL = 20;
+
+/** Forces of a segment in a step of the implicit scheme: means over its time, with friction and noise. */
+struct SegmentForces {
+    /** Along the segment, positive where it pulls its ends together. */
+    double tension = 0;
+    /**
+     * What the segment itself exerts on its ends: friction, noise, tension, the bending of its joints, propulsion and
+     * the drag of a flow.
+     */
+    double minus[3] = {}, plus[3] = {};
+    /** The direction from the minus to the plus end, half-way through the step. */
+    double direction[3] = {};
+    /** Add those of another time, with a weight. */
+    void add(const SegmentForces& other, double weight);
+};
+
+/** The precision that chains are computed in. Positions, forces and displacements are doubles in any case. */
+enum class Precision {
+    /** Mixed precision where it is right, and faster. */
+    Automatic = 0,
+    /** Single precision within a step, wherever it is right: see IMPLICIT_SCHEME.md. */
+    Mixed = 1,
+    Double = 2
+};
+
+/** What a step needs besides positions and forces. */
+struct StepSettings {
+    Scheme scheme;
+    double kT, stepSize;
+    /**
+     * The noise of a step is a function of the seed, of which 32 bits count, the level, the number of the step at that
+     * level, and the chain's number. Steps of the size h/2^level follow the Brownian path of those of the size h at
+     * level 0; levels go from 0 to LARGEST_LEVEL. See Noise.h.
+     */
+    std::uint64_t seed, step;
+    int level = 0;
+    BackgroundFlow flow = {};
+    /**
+     * Where to record the forces of segments, for each chain and segment, or NULL. The implicit scheme alone does so.
+     */
+    std::vector<std::vector<SegmentForces> >* segmentForces = NULL;
+    Precision precision = Precision::Double;
+};
+
+/**
+ * Forces and displacements of many chains. Chains are gathered into packs that are computed in the lanes of the
+ * processor's vector registers; packs are independent, so they can be given to different threads, and no result
+ * depends on which thread computes what.
+ *
+ * Registers hold twice as many numbers in single precision. Beside the packs that hold all chains, each of them once,
+ * there are wide ones for the chains of several of these. A step takes those that getPacksOfStep() says.
+ *
+ * Positions, forces and displacements are arrays of three doubles for each particle.
+ */
+class ChainEngine {
+public:
+    /**
+     * @param chains   the chains; no particle may be a node of two of them
+     */
+    explicit ChainEngine(const std::vector<Chain>& chains);
+    ~ChainEngine();
+    /**
+     * Get the number of packs in double precision, which hold all chains.
+     */
+    int getNumPacks() const;
+    /**
+     * Get the packs that a step with some settings takes: together, they hold each chain once. Those whose number is
+     * not below getNumPacks() are wide ones. This depends on the settings but for seed, step and what is recorded.
+     */
+    std::vector<int> getPacksOfStep(const StepSettings& settings) const;
+    /**
+     * Get the number of chains that some packs take in mixed precision.
+     */
+    int getNumMixedChains(const std::vector<int>& packs) const;
+    /**
+     * Add the forces on the nodes of a pack, which is not a wide one.
+     *
+     * @param box            the three vectors of a periodic box (nine doubles), to take each segment as its shortest
+     *                       image, or NULL
+     * @param includeEnergy  whether to compute the energies; they are zero otherwise
+     */
+    ChainEnergy addForces(int pack, const double* positions, double* forces, const double* box,
+            bool includeEnergy) const;
+    /**
+     * Get the particles of a pack.
+     */
+    ParticleRange getParticles(int pack) const;
+    /**
+     * Set the forces on the nodes of a pack to zero.
+     */
+    void clearForces(int pack, double* forces) const;
+    /**
+     * Compute the displacements of the nodes of a pack in one step: noise, resistance, redistribution. The forces are
+     * all those on the nodes; for the implicit scheme, all but those of the chains themselves. A wide pack is for the
+     * settings that getPacksOfStep() gives it for.
+     *
+     * @param displacements  receives those of the pack's nodes
+     * @return the first instability found, with chain = -1 if there is none
+     */
+    Instability step(int pack, const double* positions, const double* forces, const double* box,
+            const StepSettings& settings, double* displacements) const;
+    /** The instruction set in use: "avx512", "avx2" or "baseline". */
+    static std::string getInstructionSet();
+private:
+    struct Implementation;
+    std::unique_ptr<Implementation> implementation;
+};
+
+} // namespace cylchain
+
+#endif /*CYLCHAIN_CHAIN_ENGINE_H_*/

@@ -1,0 +1,12 @@
+#ifdef CYLCHAIN_X86_64
+#define CYLCHAIN_LOOPS avx2
+#define CYLCHAIN_LANES 4
+#include "dynamics/ChainLoops-inl.h"
+
+const cylchain::ChainKernels& cylchain::avx2Kernels() {
+    static const ChainKernels kernels = {"avx2", CYLCHAIN_LANES, avx2::addForcesOfPack, avx2::stepOfPack,
+            avx2::drawWordsOf, avx2::drawNormalsOf, avx2::drawFeneCoordinatesOf,
+            avx2WideKernels()};
+    return kernels;
+}
+#endif

@@ -1,0 +1,12 @@
+#ifdef CYLCHAIN_X86_64
+#define CYLCHAIN_LOOPS avx512
+#define CYLCHAIN_LANES 8
+#include "dynamics/ChainLoops-inl.h"
+
+const cylchain::ChainKernels& cylchain::avx512Kernels() {
+    static const ChainKernels kernels = {"avx512", CYLCHAIN_LANES, avx512::addForcesOfPack, avx512::stepOfPack,
+            avx512::drawWordsOf, avx512::drawNormalsOf, avx512::drawFeneCoordinatesOf,
+            avx512WideKernels()};
+    return kernels;
+}
+#endif

@@ -1,0 +1,11 @@
+#ifdef CYLCHAIN_X86_64
+#define CYLCHAIN_SINGLE_PRECISION
+#define CYLCHAIN_LOOPS avx512_single
+#define CYLCHAIN_LANES 16
+#include "dynamics/ChainLoops-inl.h"
+
+const cylchain::WideKernels& cylchain::avx512WideKernels() {
+    static const WideKernels kernels = {CYLCHAIN_LANES, avx512_single::stepOfPack, avx512_single::drawNormalsOf};
+    return kernels;
+}
+#endif

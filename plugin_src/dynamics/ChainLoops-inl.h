@@ -1,0 +1,89 @@
+// Included once for each instruction set and precision, by a file that names them. It does not compile alone.
+
+/**
+ * The loops over the segments of a pack. This file is compiled for each instruction set in double precision and, if
+ * CYLCHAIN_SINGLE_PRECISION is defined, in single precision: into a namespace of its own, CYLCHAIN_LOOPS, so that no
+ * function of one is used by another, and for up to CYLCHAIN_LANES lanes.
+ */
+
+#include "dynamics/ChainPack.h"
+#include "lanes/Noise.h"
+#include "mechanics/PeriodicBox.h"
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <new>
+#include <type_traits>
+
+namespace cylchain {
+namespace CYLCHAIN_LOOPS {
+
+#include "lanes/VectorLanes-inl.h"
+
+typedef ChainPack<Scalar> Pack;
+
+#include "dynamics/PackVectors-inl.h"
+#include "mechanics/LaneFlow-inl.h"
+#include "lanes/NoiseLanes-inl.h"
+#include "dynamics/PackNoise-inl.h"
+#include "mechanics/ChainCoordinates-inl.h"
+#include "dynamics/TensionBand-inl.h"
+#include "dynamics/ImplicitState-inl.h"
+#include "dynamics/ImplicitStages-inl.h"
+#include "dynamics/ImplicitNoise-inl.h"
+#include "dynamics/ImplicitPositions-inl.h"
+#include "dynamics/ImplicitEquations-inl.h"
+#include "dynamics/MetricForces-inl.h"
+#include "dynamics/ImplicitTensions-inl.h"
+#include "dynamics/ImplicitConvergence-inl.h"
+#include "dynamics/ImplicitStep-inl.h"
+#include "dynamics/DividedStep-inl.h"
+
+#ifdef CYLCHAIN_SINGLE_PRECISION
+
+/** All lanes there are, and open chains alone: what is not in single precision need not be compiled for it. */
+Instability stepOfPack(const Pack& pack, const double* positions, const double* forces, const double* box,
+            const StepSettings& settings, double* displacements) {
+    return stepPackImplicitly<CYLCHAIN_LANES, false>(pack, positions, forces, box, settings, displacements);
+}
+
+#else
+
+#include "dynamics/ExplicitLoops-inl.h"
+
+template <int W> Instability stepPackAs(const Pack& pack, const double* positions, const double* forces,
+            const double* box, const StepSettings& settings, double* displacements) {
+    if (isImplicit(settings.scheme))
+        return pack.closed ? stepPackImplicitly<W, true>(pack, positions, forces, box, settings, displacements) :
+                stepPackImplicitly<W, false>(pack, positions, forces, box, settings, displacements);
+    return stepPack<W>(pack, positions, forces, box, settings, displacements);
+}
+
+/** Call a function with as many lanes as a pack has. Those that the instruction set has not are not compiled. */
+template <int W = CYLCHAIN_LANES, class Function> auto withLanesOf(const Pack& pack, Function function) {
+    if constexpr (W > 1)
+        if (pack.lanes < W)
+            return withLanesOf<W/2>(pack, function);
+    return function(std::integral_constant<int, W>());
+}
+
+ChainEnergy addForcesOfPack(const Pack& pack, const double* positions, double* forces, const double* box,
+            bool includeEnergy) {
+    return withLanesOf(pack, [&] (auto lanes) {
+        return addForcesTo<lanes>(pack, positions, forces, box, includeEnergy);
+    });
+}
+
+Instability stepOfPack(const Pack& pack, const double* positions, const double* forces, const double* box,
+            const StepSettings& settings, double* displacements) {
+    return withLanesOf(pack, [&] (auto lanes) {
+        return stepPackAs<lanes>(pack, positions, forces, box, settings, displacements);
+    });
+}
+
+#endif
+
+} // namespace CYLCHAIN_LOOPS
+} // namespace cylchain

@@ -1,0 +1,99 @@
+#ifndef CYLCHAIN_CHAIN_PACK_H_
+#define CYLCHAIN_CHAIN_PACK_H_
+
+#include "dynamics/ChainEngine.h"
+#include "lanes/Noise.h"
+#include <vector>
+
+namespace cylchain {
+
+/** A tether of the chain in a lane, and its number among those of the chain. */
+struct LaneTether : Tether {
+    int lane, number;
+};
+
+/**
+ * Chains side by side: the numbers of all chains for one segment lie next to each other, one in each lane. Chains that
+ * are shorter than the longest one are filled up with segments without friction whose nodes are fixed, and so are lanes
+ * without a chain.
+ *
+ * Closed chains are unrolled: their first two nodes come once more behind the last one, so that the joint of the first
+ * node finds the segment after it there. All closed chains of a pack have the same number of nodes.
+ */
+template <class Scalar> struct ChainPack {
+    /**
+     * The properties of a segment, each of them for all lanes. Drift is the thermal torque (15) over k_B T, which is
+     * d+1-(d-1)gamma_def/gamma_rot in d dimensions.
+     */
+    enum Property {RestLength, InverseRestLength, Stiffness, InverseExtension, Parallel, Perpendicular, Rotational,
+            Extensional, RootParallel, RootPerpendicular, RootRotational, RootExtensional, Drift, NumProperties};
+    /** The number of nodes includes those that come twice; that of segments does not. */
+    int lanes, nodes, segments;
+    BendingModel bending;
+    StretchingModel stretching;
+    bool closed, planar;
+    /** Number of each lane's chain, or -1, of its nodes and of its segments. */
+    std::vector<int> chain, nodesOfLane, segmentsOfLane;
+    /** Particle of each node and lane, [node][lane]; -1 for a node that only fills up. */
+    std::vector<int> particles;
+    /** Properties of segments, [segment][property][lane]. */
+    std::vector<Scalar> properties;
+    /** Stiffness of the joint at each node, [node][lane]; zero at ends. */
+    std::vector<Scalar> joints;
+    /** One for each node that moves, [node][lane]; zero for others. */
+    std::vector<Scalar> mobile;
+    /** One for each lane whose chain has no node that is fixed; zero for others. */
+    std::vector<Scalar> free;
+    /** The tethers of all lanes, by their nodes. */
+    std::vector<LaneTether> tethers;
+    /** Half the propulsion of each segment, [segment][lane], or nothing if there is none. */
+    std::vector<Scalar> propulsions;
+    /** Nodes that do not come twice. */
+    int ownNodes() const {
+        return closed ? nodes-2 : nodes;
+    }
+};
+
+/** The loops over a wide pack of open chains, in single precision. */
+struct WideKernels {
+    /** The number of lanes of all such packs. */
+    int lanes;
+    /** A step of an implicit scheme. */
+    Instability (*step)(const ChainPack<float>& pack, const double* positions, const double* forces, const double* box,
+            const StepSettings& settings, double* displacements);
+    /** See Noise.h. */
+    void (*drawNormals)(const NoiseKey& key, NoiseKind kind, const std::uint32_t* chains, const std::uint32_t* parts,
+            int count, double* normals);
+};
+
+/** The loops over a pack, compiled for one instruction set. */
+struct ChainKernels {
+    const char* instructionSet;
+    /** The largest number of lanes that fits a register. */
+    int lanes;
+    ChainEnergy (*addForces)(const ChainPack<double>& pack, const double* positions, double* forces, const double* box,
+            bool includeEnergy);
+    Instability (*step)(const ChainPack<double>& pack, const double* positions, const double* forces, const double* box,
+            const StepSettings& settings, double* displacements);
+    /** See Noise.h. */
+    void (*drawWords)(const NoiseKey& key, NoiseKind kind, std::uint32_t draw, const std::uint32_t* chains,
+            const std::uint32_t* parts, int count, std::uint32_t* words);
+    void (*drawNormals)(const NoiseKey& key, NoiseKind kind, const std::uint32_t* chains, const std::uint32_t* parts,
+            int count, double* normals);
+    void (*drawFeneCoordinates)(const NoiseKey& key, const std::uint32_t* chains, const std::uint32_t* segments,
+            const double* stiffness, int count, double* coordinates);
+    const WideKernels& wide;
+};
+
+const ChainKernels& baselineKernels();
+const WideKernels& baselineWideKernels();
+#ifdef CYLCHAIN_X86_64
+const ChainKernels& avx2Kernels();
+const WideKernels& avx2WideKernels();
+const ChainKernels& avx512Kernels();
+const WideKernels& avx512WideKernels();
+#endif
+
+} // namespace cylchain
+
+#endif /*CYLCHAIN_CHAIN_PACK_H_*/

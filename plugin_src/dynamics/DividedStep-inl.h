@@ -1,0 +1,139 @@
+// Included into the namespace of an instruction set. It does not compile alone.
+
+/**
+ * Implicit steps of a pack. Chains whose equations were not solved take theirs in parts.
+ */
+
+/** A step that does not converge is cut into at most two to this power. */
+const int LARGEST_DIVISION = 10;
+
+/** Means over the parts of a divided step, for the lanes whose step is divided. */
+template <int W> class MeanOfParts {
+public:
+    /** From now on, the settings record the forces of a part. */
+    MeanOfParts(const Pack& pack, StepSettings& settings) : pack(pack), whole(settings.segmentForces) {
+        if (whole == NULL)
+            return;
+        part.resize(whole->size());
+        for (int chain : pack.chain)
+            if (chain >= 0)
+                part[chain].resize((*whole)[chain].size());
+        settings.segmentForces = &part;
+    }
+    /** Add one of so many parts, the first of which begins anew. */
+    void add(int number, int parts, const bool* divided) const {
+        for (int i = 0; i < W && whole != NULL; i++)
+            for (int s = 0; divided[i] && s < pack.segmentsOfLane[i]; s++) {
+                SegmentForces& mean = (*whole)[pack.chain[i]][s];
+                if (number == 0)
+                    mean = SegmentForces();
+                mean.add(part[pack.chain[i]][s], 1.0/parts);
+            }
+    }
+private:
+    const Pack& pack;
+    std::vector<std::vector<SegmentForces> >* const whole;
+    std::vector<std::vector<SegmentForces> > part;
+};
+
+/** Where a step would begin if its nodes had moved already. */
+template <int W> void moveStart(const Pack& pack, const StepStart<W>& start,
+            const Vector<typename Lanes<W>::Type>* moved, bool needsNodes, const StepStart<W>& result) {
+    for (int node = 0; needsNodes && node < pack.nodes; node++)
+        result.nodes[node] = start.nodes[node]+moved[node];
+    for (int s = 0; s < pack.nodes-1; s++)
+        result.segments[s] = start.segments[s]+(moved[s+1]-moved[s]);
+    for (std::size_t i = 0; i < pack.tethers.size(); i++) {
+        const LaneTether& tether = pack.tethers[i];
+        Vector<typename Lanes<W>::Type> change = moved[tether.node];
+        result.tethers[i].d[0] = start.tethers[i].d[0]+lane(change.x, tether.lane);
+        result.tethers[i].d[1] = start.tethers[i].d[1]+lane(change.y, tether.lane);
+        result.tethers[i].d[2] = start.tethers[i].d[2]+lane(change.z, tether.lane);
+    }
+}
+
+/**
+ * Advance the lanes that failed, from the start, by the same time in more and more parts. They follow the Brownian path
+ * of the step, so that what failed is not left out of the noise.
+ */
+template <int W, bool CLOSED> void divideStep(const Pack& pack, const StepStart<W>& start,
+            const Vector<typename Lanes<W>::Type>* f, StepSettings settings, Vector<typename Lanes<W>::Type>* y,
+            bool* failed, typename ImplicitStep<W, CLOSED>::Memory& memory) {
+    typedef typename Lanes<W>::Type Real;
+    static thread_local Scratch vectors, tethers;
+    const double h = settings.stepSize;
+    const std::uint64_t step = settings.step;
+    const int level = settings.level, n = pack.nodes;
+    const MeanOfParts<W> mean(pack, settings);
+    Vector<Real>* moved = vectors.reserve<Vector<Real> >(4*n);
+    Vector<Real>* change = moved+n;
+    const StepStart<W> from = {moved+2*n, moved+3*n, tethers.reserve<TetherVector>(pack.tethers.size())};
+    for (int division = 1; division <= LARGEST_DIVISION; division++) {
+        const int parts = 1<<division;
+        settings.stepSize = h/parts;
+        settings.level = level+division;
+        bool failedNow[W] = {}, failedPart[W];
+        for (int node = 0; node < n; node++)
+            moved[node] = Vector<Real> {};
+        bool hope = true;
+        for (int part = 0; part < parts && hope; part++) {
+            settings.step = (step<<division)+part;
+            moveStart<W>(pack, start, moved, settings.flow.present, from);
+            ImplicitStep<W, CLOSED>(pack, settings, from, memory).take(f, change, failedPart);
+            for (int node = 0; node < n; node++)
+                moved[node] = moved[node]+change[node];
+            mean.add(part, parts, failed);
+            hope = false;
+            for (int i = 0; i < W; i++) {
+                failedNow[i] |= failedPart[i];
+                hope |= failed[i] && !failedNow[i];
+            }
+        }
+        bool any = false;
+        for (int i = 0; i < W; i++) {
+            if (failed[i] && !failedNow[i]) {
+                failed[i] = false;
+                for (int node = 0; node < n; node++) {
+                    lane(y[node].x, i) = lane(moved[node].x, i);
+                    lane(y[node].y, i) = lane(moved[node].y, i);
+                    lane(y[node].z, i) = lane(moved[node].z, i);
+                }
+            }
+            any |= failed[i];
+        }
+        if (!any)
+            return;
+    }
+}
+
+template <int W, bool CLOSED> Instability stepPackImplicitly(const Pack& pack, const double* positions,
+            const double* forces, const double* box, const StepSettings& settings, double* displacements) {
+    typedef typename Lanes<W>::Type Real;
+    static thread_local typename ImplicitStep<W, CLOSED>::Memory memory;
+    static thread_local Scratch vectors, tethers;
+    const int n = pack.nodes;
+    Vector<Real>* f = vectors.reserve<Vector<Real> >(4*n);
+    Vector<Real>* y = f+n;
+    const StepStart<W> start = {y+n, y+2*n, tethers.reserve<TetherVector>(pack.tethers.size())};
+    if (settings.flow.present)
+        gatherStart<W>(pack, positions, box, start.nodes);
+    gatherSegments<W>(pack, positions, box, start.segments);
+    for (std::size_t i = 0; i < pack.tethers.size(); i++) {
+        tetherVector(pack, pack.tethers[i], positions, box, start.tethers[i].d);
+        if (pack.planar)
+            start.tethers[i].d[2] = 0;
+    }
+    gatherForces<W>(pack, forces, f);
+    bool failed[W];
+    Instability result;
+    result.iterations = ImplicitStep<W, CLOSED>(pack, settings, start, memory).take(f, y, failed);
+    for (int i = 0; i < W; i++)
+        result.divided += failed[i];
+    if (result.divided > 0)
+        divideStep<W, CLOSED>(pack, start, f, settings, y, failed, memory);
+    scatter<W>(pack, y, 1, displacements);
+    for (int i = 0; i < W; i++)
+        if (failed[i] && result.chain < 0)
+            result.chain = pack.chain[i];
+    return result;
+}

@@ -1,0 +1,196 @@
+// Included into the namespace of an instruction set. It does not compile alone.
+
+/**
+ * The forces of chains at given positions, and the steps of the explicit schemes.
+ */
+
+/** The slope dV/dc of the bending energy of a joint with the cosine c and the sine s. */
+template <int W> inline typename Lanes<W>::Type bendingSlope(BendingModel model, typename Lanes<W>::Type stiffness,
+            typename Lanes<W>::Type c, typename Lanes<W>::Type sineSquared) {
+    typedef typename Lanes<W>::Type Real;
+    if (model == BendingModel::InscribedCircle)
+        return -4*stiffness/((1+c)*(1+c));
+    if (model == BendingModel::KratkyPorod)
+        return -stiffness;
+    Real slope;
+    for (int i = 0; i < W; i++) {
+        const double sine = std::sqrt(lane(sineSquared, i)), angle = std::atan2(sine, lane(c, i));
+        lane(slope, i) = -lane(stiffness, i)*(sine > 1e-8 ? angle/sine : 1.0);
+    }
+    return slope;
+}
+
+inline double bendingEnergy(BendingModel model, double stiffness, double c, double sineSquared) {
+    if (model == BendingModel::InscribedCircle)
+        return 2*stiffness*sineSquared/((1+c)*(1+c));
+    if (model == BendingModel::KratkyPorod)
+        return c > 0 ? stiffness*sineSquared/(1+c) : stiffness*(1-c);
+    const double angle = std::atan2(std::sqrt(sineSquared), c);
+    return 0.5*stiffness*angle*angle;
+}
+
+template <int W> ChainEnergy addForcesTo(const Pack& pack, const double* positions, double* forces,
+            const double* box, bool includeEnergy) {
+    typedef typename Lanes<W>::Type Real;
+    static thread_local Scratch scratch;
+    Vector<Real>* x = scratch.reserve<Vector<Real>>(2*pack.nodes);
+    Vector<Real>* f = x+pack.nodes;
+    gatherPositions<W>(pack, positions, box, x);
+    ChainEnergy energy;
+    Vector<Real> before = {}, push = {};
+    Real inverseBefore = {};
+    for (int s = 0; s < pack.nodes-1; s++) {
+        const Vector<Real> difference = x[s+1]-x[s];
+        const Real length = root(difference.dot(difference));
+        const Real inverse = 1/length;
+        const Vector<Real> t = difference*inverse;
+
+        // Stretching.
+        const Real stiffness = property<Real>(pack, s, Pack::Stiffness);
+        const Real extension = length-property<Real>(pack, s, Pack::RestLength);
+        Real tension = stiffness*extension;
+        if (pack.stretching == StretchingModel::FENE) {
+            const Real relative = extension*property<Real>(pack, s, Pack::InverseExtension);
+            tension = tension/(1-relative*relative);
+        }
+        // The last segment of an unrolled chain is there for its joint alone.
+        const bool twice = (s >= pack.segments);
+        Vector<Real> pull = twice ? Vector<Real> {} : t*tension;
+
+        // Bending at the joint with the segment before.
+        if (s > 0) {
+            const Real joint = loaded<Real>(pack.joints, s);
+            const Real c = before.dot(t);
+            const Vector<Real> normal = crossProduct(before, t);
+            const Real sineSquared = normal.dot(normal);
+            const Real slope = bendingSlope<W>(pack.bending, joint, c, sineSquared);
+            const Vector<Real> first = (t-before*c)*(-slope*inverseBefore);
+            const Vector<Real> second = (before-t*c)*(-slope*inverse);
+            f[s-1] = f[s-1]-first;
+            push = push+first-second;
+            f[s] = push+pull;
+            push = second;
+            if (includeEnergy)
+                for (int i = 0; i < W; i++) {
+                    Real k = joint, cosine = c, square = sineSquared;
+                    if (s < pack.nodesOfLane[i]-1)
+                        energy.bending += bendingEnergy(pack.bending, lane(k, i), lane(cosine, i), lane(square, i));
+                }
+        }
+        else
+            f[s] = pull;
+        push = push-pull;
+        if (includeEnergy)
+            for (int i = 0; i < W; i++) {
+                if (s >= pack.segmentsOfLane[i])
+                    continue;
+                Real k = stiffness, e = extension, d = property<Real>(pack, s, Pack::InverseExtension);
+                const double square = lane(e, i)*lane(e, i), relative = lane(d, i)*lane(d, i)*square;
+                energy.stretching += pack.stretching == StretchingModel::Harmonic ? 0.5*lane(k, i)*square :
+                        -0.5*lane(k, i)/(lane(d, i)*lane(d, i))*std::log1p(-relative);
+            }
+        before = t;
+        inverseBefore = inverse;
+    }
+    f[pack.nodes-1] = push;
+    if (!pack.propulsions.empty()) {
+        gatherSegments<W>(pack, positions, box, x);
+        addPropulsion<W>(pack, x, f);
+    }
+    for (const LaneTether& tether : pack.tethers) {
+        double d[3];
+        tetherVector(pack, tether, positions, box, d);
+        lane(f[tether.node].x, tether.lane) -= tether.stiffness*d[0];
+        lane(f[tether.node].y, tether.lane) -= tether.stiffness*d[1];
+        lane(f[tether.node].z, tether.lane) -= tether.stiffness*d[2];
+        energy.tethers += 0.5*tether.stiffness*(d[0]*d[0]+d[1]*d[1]+d[2]*d[2]);
+    }
+    for (int node = 0; node < pack.nodes; node++)
+        for (int i = 0; i < W; i++) {
+            const int particle = pack.particles[node*W+i];
+            if (particle >= 0) {
+                forces[3*particle] += lane(f[node].x, i);
+                forces[3*particle+1] += lane(f[node].y, i);
+                forces[3*particle+2] += lane(f[node].z, i);
+            }
+        }
+    return energy;
+}
+
+#include "dynamics/Redistribution-inl.h"
+
+/** Add the random forces, step (1) of Section 4, and for Euler's scheme the thermal torques (15), step (2). */
+template <int W> void addRandomForces(const Pack& pack, const Vector<typename Lanes<W>::Type>* x,
+            const StepSettings& settings, Vector<typename Lanes<W>::Type>* f) {
+    typedef typename Lanes<W>::Type Real;
+    const NoiseKey key = noiseKey(settings);
+    NoisePlaces<W> places = noisePlaces<W>(pack);
+    const double amplitude = std::sqrt(2*settings.kT/settings.stepSize);
+    const double thermal = (settings.scheme == Scheme::Euler ? settings.kT : 0.0);
+    for (int s = 0; s < pack.segments; s++) {
+        const Vector<Real> difference = x[s+1]-x[s];
+        const Real inverse = 1/root(difference.dot(difference));
+        const Vector<Real> t = difference*inverse;
+        Real normals[6];
+        Vector<Real> a, b;
+        drawNormals<W, 3>(key, NoiseKind::Segment, places, normals);
+        places.part += 1;
+        forceNoise<Real>(normals, pack.planar, a, b);
+        const Real across = property<Real>(pack, s, Pack::RootPerpendicular);
+        const Real along = property<Real>(pack, s, Pack::RootParallel);
+        const Vector<Real> force = (a*across+t*((along-across)*t.dot(a)))*splat<Real>(0.5*amplitude);
+        const Real turn = property<Real>(pack, s, Pack::RootRotational);
+        const Real stretch = property<Real>(pack, s, Pack::RootExtensional);
+        const Real drift = thermal*property<Real>(pack, s, Pack::Drift);
+        const Vector<Real> pair = (b*turn+t*((stretch-turn)*t.dot(b)))*(amplitude*inverse)+t*(drift*inverse);
+        f[s] = f[s]+force-pair;
+        f[s+1] = f[s+1]+force+pair;
+    }
+}
+
+template <int W> Instability stepPack(const Pack& pack, const double* positions, const double* forces,
+            const double* box, const StepSettings& settings, double* displacements) {
+    typedef typename Lanes<W>::Type Real;
+    static thread_local Scratch vectors;
+    const int n = pack.nodes;
+    Vector<Real>* x = vectors.reserve<Vector<Real>>(3*n);
+    Vector<Real>* f = x+n;
+    Vector<Real>* v = f+n;
+    gatherStart<W>(pack, positions, box, x);
+    gatherForces<W>(pack, forces, f);
+    if (settings.kT > 0)
+        addRandomForces<W>(pack, x, settings, f);
+    findVelocities<W>(pack, x, f, settings.flow, v);
+    if (settings.scheme == Scheme::Midpoint) {
+        const Real half = splat<Real>(0.5*settings.stepSize);
+        for (int node = 0; node < n; node++)
+            x[node] = x[node]+v[node]*half;
+        findVelocities<W>(pack, x, f, settings.flow, v);
+    }
+
+    // Write displacements, and look for segments whose ends move apart, or that leave the range of FENE.
+    const double h = settings.stepSize;
+    scatter<W>(pack, v, h, displacements);
+    const bool ranges = pack.stretching == StretchingModel::FENE;
+    if (ranges)
+        gatherStart<W>(pack, positions, box, x);
+    Instability result;
+    for (int s = 0; s < pack.segments; s++) {
+        const Vector<Real> change = (v[s+1]-v[s])*splat<Real>(h);
+        Real square = change.dot(change), rest = property<Real>(pack, s, Pack::RestLength), relative = Real{};
+        if (ranges) {
+            const Vector<Real> after = x[s+1]-x[s]+change;
+            relative = (root(after.dot(after))-rest)*property<Real>(pack, s, Pack::InverseExtension);
+        }
+        for (int i = 0; i < W; i++) {
+            // Written so that NaN counts as unstable.
+            const bool stable = lane(square, i) < lane(rest, i)*lane(rest, i) && std::fabs(lane(relative, i)) < 1;
+            if (!stable && s < pack.segmentsOfLane[i] && result.chain < 0) {
+                result.chain = pack.chain[i];
+                result.segment = s;
+                result.change = std::sqrt(lane(square, i));
+            }
+        }
+    }
+    return result;
+}

@@ -1,0 +1,101 @@
+// Included into the namespace of an instruction set. It does not compile alone.
+
+/**
+ * What an implicit step keeps of segments, of joints and of tethers while it is taken, and the forces of its stages.
+ */
+
+/** What a step keeps of a segment, and of the joint with the segment before. */
+template <class Real> struct ImplicitSegment {
+    // At the start: the vector, its direction and length, the coordinate of the length, and the bend.
+    Vector<Real> difference, tangent, bend, bisector;
+    Real length, inverse, coordinate;
+    // The noise, and theta of the segment and of the joint.
+    Vector<Real> randomBend, randomForce, randomPair, metricForce;
+    Real randomCoordinate, randomTension, theta, jointTheta;
+    // What a stage makes of these: T = k (implicit q(y)+constant), with a part of the bend that turns with the joint.
+    Vector<Real> constantBend, turningBend;
+    Real implicit, constantCoordinate, constantTension, jointImplicit;
+    // Of the last iteration: the direction of the new segment, its tension and how the tension changes.
+    Vector<Real> newTangent;
+    Real tension, response, multiplier, extra, tensionOfFlow;
+    // The part of the response that stays with the nodes; what the direction of the tension lacks of the mean one; and
+    // the tension that it was given.
+    Real shift, multiplierBefore;
+    Vector<Real> turned;
+};
+
+/** The vector from the point of a tether to its node. */
+struct TetherVector {
+    double d[3];
+};
+
+/**
+ * What a step keeps of a tether: the vector from its point to its node at the start, its noise, and the same of a
+ * stage.
+ */
+struct ImplicitTether {
+    double start[3], random[3], theta;
+    double constant[3], implicit;
+};
+
+/**
+ * What a step begins with: the vectors of the segments and those of tethers. In single precision, they say more than
+ * the nodes, which may be far from the origin: only a flow looks at these.
+ */
+template <int W> struct StepStart {
+    Vector<typename Lanes<W>::Type> *nodes, *segments;
+    TetherVector* tethers;
+};
+
+/** The stages that steps are made of: the one of scheme "implicit", and the two of second order. */
+enum class Stage {Only, First, Second};
+/**
+ * The stages of second order are those of the L-stable singly diagonally implicit method, with this on the diagonal.
+ */
+const Scalar DIAGONAL = 1-M_SQRT1_2;
+/** The first stage has this part of the noise, and its end is where that of the second begins. */
+const Scalar NOISE_OF_FIRST = DIAGONAL/(1-DIAGONAL);
+
+/** What the parts of an implicit step share: the start of the step, its unknowns and its forces. */
+template <int W> class ImplicitState {
+    typedef typename Lanes<W>::Type Real;
+    typedef Vector<Real> Vec;
+public:
+    struct Memory {
+        Scratch segments, vectors, tethers;
+    };
+    ImplicitState(const Pack& pack, const StepSettings& settings, const StepStart<W>& start, Memory& memory) :
+            pack(pack), settings(settings), start(start), n(pack.nodes), h(settings.stepSize), kT(settings.kT),
+            twoStages(settings.scheme == Scheme::ImplicitSecondOrder),
+            segments(memory.segments.template reserve<ImplicitSegment<Real> >(n)),
+            tethers(memory.tethers.template reserve<ImplicitTether>(pack.tethers.size())),
+            f(memory.vectors.template reserve<Vec>(7*n)), loads(settings.flow.present ? f+3*n : f), change(f+n),
+            rest(f+2*n), external(twoStages ? f+4*n : f), random(twoStages ? f+5*n : f), drift(twoStages ? f+6*n : f) {
+    }
+    const Pack& pack;
+    const StepSettings& settings;
+    const StepStart<W>& start;
+    const int n;
+    const Scalar h, kT;
+    const bool twoStages;
+    ImplicitSegment<Real>* const segments;
+    ImplicitTether* const tethers;
+    // All forces of a stage, the same with the drag of the flow, the changes of an iteration, and memory of its own.
+    Vec *const f, *const loads, *const change, *const rest;
+    // Forces from outside, of noise and the metric ones; all of them are f if there is one stage alone.
+    Vec *const external, *const random, *const drift;
+    Stage stage = Stage::Only;
+    /** How much of the forces that last for the whole step a stage has. */
+    Scalar shareOfForces() const {
+        return stage == Stage::First ? DIAGONAL : 1;
+    }
+    /** Add the forces of a stage. */
+    void combineForces() {
+        if (!twoStages)
+            return;
+        const Real ofForces = splat<Real>(shareOfForces());
+        const Real ofNoise = splat<Real>(stage == Stage::First ? NOISE_OF_FIRST : 1);
+        for (int node = 0; node < n; node++)
+            f[node] = external[node]*ofForces+random[node]*ofNoise+drift[node]*(ofNoise*ofNoise);
+    }
+};

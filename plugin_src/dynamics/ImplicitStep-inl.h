@@ -1,0 +1,132 @@
+// Included into the namespace of an instruction set. It does not compile alone.
+
+/**
+ * A step of the implicit schemes.
+ *
+ * A step solves, for the new nodes y, with the middle m = (x+y)/2 of the old and the new nodes,
+ *
+ *     Z(m) (y-x)/h = f + f_random(x) + f_drift(x) - sum_a T_a J_a(m)
+ *
+ * where the a are the lengths of segments, the bends of joints and the components of tethers, each with an energy
+ * k q^2/2, J_a(m) is the gradient of q_a, and
+ *
+ *     T_a = k (theta q_a(y) + (1-theta) q_a(x) - (2 theta-1)^(1/2) q_random),    theta = max(1/2, 1-1/z).
+ *
+ * z is the step over the relaxation time of the fastest mode; q_random is drawn afresh from the equilibrium of q_a. For
+ * linear forces and any h, the nodes have exactly the covariance k_B T/k then. The friction g of a length,
+ * gamma_def/l^2, and its noise are parts of T_a rather than of Z and f_random, so that noise along a segment stays
+ * along it when the segment turns. What lengths lack of the drift k_B T div(Z^-1) then is a metric force,
+ *
+ *     f_drift = -k_B T sum_a (k (2 theta-1) + g/h) H_a (Z/h+K)^-1 J_a
+ *
+ * with the second derivatives H_a of the lengths. It takes the blocks of the inverse next to its diagonal, which follow
+ * from those of the elimination. In a flow u, friction is relative to u(m).
+ *
+ * In the scheme of second order, bends and tethers take two such stages. IMPLICIT_SCHEME.md explains all this.
+ */
+
+const int NEWTON_ITERATIONS = 14;
+
+/** A step of open chains or, if CLOSED, of rings. */
+template <int W, bool CLOSED> class ImplicitStep {
+    typedef typename Lanes<W>::Type Real;
+    typedef Vector<Real> Vec;
+public:
+    struct Memory {
+        typename ImplicitState<W>::Memory state;
+        typename ImplicitEquations<W, CLOSED>::Memory equations;
+    };
+    /**
+     * @param start  the chains before the step
+     */
+    ImplicitStep(const Pack& pack, const StepSettings& settings, const StepStart<W>& start, Memory& memory) :
+            step(pack, settings, start, memory.state), stages(step), noise(step), positions(step),
+            equations(step, memory.equations), metricForces(step), tensions(step, equations), convergence(step) {
+    }
+    /**
+     * Take one step.
+     *
+     * @param forces  the forces on nodes, but for those of the chains
+     * @param y       receives how far the nodes move
+     * @param failed  receives true for each lane that has not converged or a segment of which changes by more than a
+     *                quarter of a turn would do
+     * @return the number of iterations
+     */
+    int take(const Vec* forces, Vec* y, bool* failed) {
+        for (int node = 0; node < step.n; node++) {
+            y[node] = Vec {};
+            step.external[node] = forces[node];
+            if (step.twoStages)
+                step.random[node] = step.drift[node] = Vec {};
+        }
+        addPropulsion<W>(step.pack, step.start.segments, step.external);
+        stages.describe();
+        if (step.settings.kT > 0)
+            noise.draw();
+        for (int i = 0; i < W; i++)
+            failed[i] = false;
+        int iterations = 0;
+        if (step.twoStages) {
+            stages.prepare(Stage::First, y);
+            iterations = solve(y, failed);
+            stages.prepare(Stage::Second, y);
+            positions.extrapolate(y);
+        }
+        else
+            stages.prepare(Stage::Only, y);
+        iterations += solve(y, failed);
+        convergence.findExcessiveChanges(y, failed);
+        return iterations;
+    }
+private:
+    ImplicitState<W> step;
+    ImplicitStages<W, CLOSED> stages;
+    ImplicitNoise<W, CLOSED> noise;
+    ImplicitPositions<W, CLOSED> positions;
+    ImplicitEquations<W, CLOSED> equations;
+    MetricForces<W, CLOSED> metricForces;
+    ImplicitTensions<W, CLOSED> tensions;
+    ImplicitConvergence<W, CLOSED> convergence;
+
+    /**
+     * Solve the equations of a stage by Newton's method; returns the number of iterations, and marks lanes that fail.
+     */
+    int solve(Vec* y, bool* failed) {
+        if (step.settings.flow.present && step.stage != Stage::Second)
+            positions.carryAlong(y);
+        // The first iteration has neither metric forces nor tensions along the mean segment, and the second one the
+        // tensions of the first. With two, filaments that relax from straight shorten 2 to 5 % too fast in steps of 1
+        // to 3 us.
+        const bool needsThree = step.stage == Stage::Only || step.settings.flow.varies();
+        const int least = needsThree ? 3 : step.stage == Stage::First ? 2 : 1;
+        Real active = splat<Real>(1);
+        int iterations = 0;
+        while (iterations < NEWTON_ITERATIONS) {
+            equations.eliminate(y);
+            equations.template substitute<false>();
+            if (iterations > 0 || step.stage == Stage::Second) {
+                if (step.settings.segmentForces == NULL || step.stage == Stage::First)
+                    equations.refine();
+                else
+                    tensions.refineAndRecord(y, active);
+            }
+            else if (step.settings.kT > 0) {
+                if (metricForces.stiffenTautSegments()) {
+                    equations.eliminate(y);
+                    equations.template substitute<false>();
+                }
+                metricForces.add(equations);
+            }
+            for (int node = 0; node < step.n; node++)
+                y[node] = y[node]+step.change[node]*active;
+            if (!CLOSED)
+                positions.resetLengths(y);
+            iterations++;
+            if (iterations >= least && !convergence.anyUnfinished(active))
+                break;
+        }
+        for (int i = 0; i < W; i++)
+            failed[i] |= lane(active, i) != 0;
+        return iterations;
+    }
+};

@@ -1,0 +1,325 @@
+// Included into the namespace of an instruction set. It does not compile alone.
+
+/**
+ * Linear equations of the nodes y of chains and of the tensions T of their segments:
+ *
+ *     A y + sum_s T_s (0 ... -t_s t_s ... 0) = right,      t_s.(y_(s+1)-y_s) = compliance_s (T_s-start_s),
+ *
+ * with A symmetric, its 3x3 blocks coupling each node to the next two. Tensions are unknowns of their own, because a
+ * stiff length inside of A would leave nothing of how a chain moves along itself but rounding errors.
+ *
+ * Nodes are eliminated from the first to the last, each with the tension before it: y_0; y_1, T_0; y_2, T_1; ... In a
+ * ring, the first two nodes come last, and all others are coupled to them.
+ */
+
+/** What a node of a ring has besides that of an open chain: a matrix and a vector for each of the first two nodes. */
+template <class Real, bool CLOSED> struct ToBorder {};
+template <class Real> struct ToBorder<Real, true> {
+    Matrix<Real> border[2];
+};
+template <class Real, bool CLOSED> struct TensionToBorder {};
+template <class Real> struct TensionToBorder<Real, true> {
+    Vector<Real> tensionBorder[2];
+};
+
+/** The equations of a node while they are gathered: its own block, and those to the next node and to the one after. */
+template <class Real, bool CLOSED> struct BandRow : ToBorder<Real, CLOSED> {
+    Symmetric<Real> diagonal;
+    Matrix<Real> upper, second;
+    Vector<Real> right;
+};
+
+/**
+ * What elimination leaves of a node and of the tension T(-1) of the segment before it, in terms of the next two nodes
+ * and of the tension T of the segment behind it. In a ring, y has the term -border[k] y_k as well, and T(-1) the term
+ * tensionBorder[k].y_k, for k = 0 and 1.
+ *
+ *     y = solution-next y(+1)-second y(+2)+pull T,
+ *     T(-1) = tension+first.y(+1)+last.y(+2)+share T.
+ *
+ * A force on the node alone moves it by its inverse, and changes T(-1) by its product with give; a unit of
+ * compliance times start of T(-1) moves it by -give, and changes T(-1) by reciprocal.
+ */
+template <class Real, bool CLOSED> struct EliminatedPair : ToBorder<Real, CLOSED>, TensionToBorder<Real, CLOSED> {
+    Symmetric<Real> inverse;
+    Matrix<Real> next, second;
+    Vector<Real> solution, pull, first, last, give;
+    Real tension, share, reciprocal;
+};
+
+/** The equation of the tension of a segment. */
+template <class Real> struct TensionEquation {
+    Vector<Real> direction;
+    Real compliance, start;
+};
+
+#include "dynamics/TensionResponses-inl.h"
+
+template <int W, bool CLOSED> class TensionBand {
+    typedef typename Lanes<W>::Type Real;
+    typedef Vector<Real> Vec;
+    typedef Matrix<Real> Mat;
+    typedef Symmetric<Real> Sym;
+public:
+    typedef BandRow<Real, CLOSED> Row;
+    struct Memory {
+        Scratch nodes, equations, tensions;
+    };
+    TensionBand(const Pack& pack, Memory& memory) : pack(pack), n(pack.ownNodes()) {
+        nodes = memory.nodes.template reserve<EliminatedPair<Real, CLOSED> >(n);
+        equations = memory.equations.template reserve<TensionEquation<Real> >(n);
+        tensions = memory.tensions.template reserve<Real>(n);
+    }
+    /** Begin to eliminate. */
+    void begin() {
+        // There is no tension before the first node.
+        link = Link {};
+        link.resistance = splat<Real>(1);
+    }
+    /** Set the equation of the tension of a segment, before its first node is eliminated. */
+    CYLCHAIN_INLINE void setTension(int s, const Vec& direction, Real compliance, Real start) {
+        equations[s] = {direction, compliance, start};
+    }
+    /**
+     * Eliminate a node from the equations of the next ones. All that belongs to its row has been gathered.
+     *
+     * @param FOLLOWING   how many nodes follow in an open chain, or 2 if there are more
+     */
+    template <int FOLLOWING> CYLCHAIN_INLINE void eliminate(int node, Row& row, Row& next, Row& second) {
+        if constexpr (CLOSED)
+            eliminateOfRing(node, row, next, second);
+        else
+            eliminatePair<FOLLOWING>(node, row, next, second);
+    }
+    /** Eliminate the first two nodes of a ring, whose rows have been begun a second time behind the last node. */
+    void close(const Row& first, const Row& second) {
+        static_assert(CLOSED, "An open chain has no border");
+        border[0].diagonal.add(first.diagonal);
+        border[0].upper = border[0].upper+first.upper;
+        border[0].right = border[0].right+first.right;
+        border[1].diagonal.add(second.diagonal);
+        border[1].right = border[1].right+second.right;
+        link.first = link.first+link.border[0];
+        link.last = link.border[1];
+        Row none;
+        eliminatePair<1>(0, border[0], border[1], none);
+        eliminatePair<0>(1, border[1], none, none);
+    }
+    /**
+     * Find nodes and tensions, or add them to what is there.
+     *
+     * @param y        those of a ring must have place for the first two nodes once more
+     * @param ADD      whether to add to them
+     * @param use      is called with the number of each segment and its tension, when its nodes have been found
+     */
+    template <bool ADD, class Function> CYLCHAIN_INLINE void substitute(Vec* y, Function use) {
+        Vec next = {}, second = {};
+        Real tension = {};
+        if constexpr (CLOSED) {
+            const Vec found1 = nodes[1].solution;
+            const Real tension0 = nodes[1].tension;
+            const Vec found0 = nodes[0].solution-nodes[0].next*found1+nodes[0].pull*tension0;
+            const Real tensionLast = nodes[0].tension+nodes[0].first.dot(found1)+nodes[0].share*tension0;
+            tensions[0] = ADD ? tensions[0]+tension0 : tension0;
+            tensions[n-1] = ADD ? tensions[n-1]+tensionLast : tensionLast;
+            tension = tensionLast;
+            y[0] = ADD ? y[0]+found0 : found0;
+            y[1] = ADD ? y[1]+found1 : found1;
+            y[n] = y[0];
+            y[n+1] = y[1];
+            for (int node = n-1; node > 1; node--) {
+                substitutePair<ADD>(node, found0, found1, next, second, tension, y);
+                use(node, tensions[node]);
+            }
+            use(1, tensions[1]);
+            use(0, tensions[0]);
+        }
+        else {
+            substitutePair<ADD>(n-1, next, next, next, second, tension, y);
+            for (int node = n-2; node >= 0; node--) {
+                substitutePair<ADD>(node, next, next, next, second, tension, y);
+                use(node, tensions[node]);
+            }
+        }
+    }
+    /**
+     * Take new right sides, and none of tensions, with the same elimination.
+     *
+     * @param forceOf   returns the force of each segment on its first node; its second node has the opposite one
+     */
+    template <class Function> CYLCHAIN_INLINE void setForces(Function forceOf) {
+        Vec here = {}, next = {}, borderRight[2] = {};
+        Real start = {};
+        Vec forceBefore = {};
+        if constexpr (CLOSED) {
+            const Vec force0 = forceOf(0), force1 = forceOf(1);
+            borderRight[0] = force0-forceOf(n-1);
+            borderRight[1] = force1-force0;
+            forceBefore = force1;
+        }
+        for (int node = CLOSED ? 2 : 0; node < n; node++) {
+            EliminatedPair<Real, CLOSED>& own = nodes[node];
+            Vec right = here-forceBefore;
+            if (CLOSED || node < n-1) {
+                forceBefore = forceOf(node);
+                right = right+forceBefore;
+            }
+            own.solution = own.inverse*right-own.give*start;
+            own.tension = own.reciprocal*start+own.give.dot(right);
+            if constexpr (CLOSED)
+                for (int k = 0; k < 2; k++)
+                    borderRight[k] = borderRight[k]-own.border[k].transposedTimes(right)-own.tensionBorder[k]*start;
+            else if (node == n-1)
+                return;
+            here = next-own.next.transposedTimes(right)-own.first*start;
+            next = -(own.second.transposedTimes(right)+own.last*start);
+            start = -equations[node].direction.dot(own.solution);
+        }
+        if constexpr (CLOSED) {
+            nodes[0].solution = nodes[0].inverse*borderRight[0]-nodes[0].give*start;
+            nodes[0].tension = nodes[0].reciprocal*start+nodes[0].give.dot(borderRight[0]);
+            const Vec right = borderRight[1]-nodes[0].next.transposedTimes(borderRight[0])-nodes[0].first*start;
+            start = -equations[0].direction.dot(nodes[0].solution);
+            nodes[1].solution = nodes[1].inverse*right-nodes[1].give*start;
+            nodes[1].tension = nodes[1].reciprocal*start+nodes[1].give.dot(right);
+        }
+    }
+    /** See TensionResponses-inl.h. */
+    template <class Function> void findResponses(Function use) const {
+        cylchain::CYLCHAIN_LOOPS::findResponses<W, CLOSED>(n, nodes, equations, use);
+    }
+private:
+    const Pack& pack;
+    const int n;
+    EliminatedPair<Real, CLOSED>* nodes;
+    TensionEquation<Real>* equations;
+    Real* tensions;
+    struct BorderVectors {
+        Vec border[2];
+    };
+    struct NoBorder {};
+    /** The equation of the tension before a node, while it is gathered: resistance T = right+first.y+last.y(+1). */
+    struct Link : std::conditional<CLOSED, BorderVectors, NoBorder>::type {
+        Real resistance, right;
+        Vec first, last;
+    };
+    Link link;
+    Row border[CLOSED ? 2 : 1];
+
+    template <int FOLLOWING> CYLCHAIN_INLINE void eliminatePair(int node, const Row& row, Row& next, Row& second) {
+        EliminatedPair<Real, CLOSED>& result = nodes[node];
+        Sym inverse = inverseOfMobile(row.diagonal, loaded<Real>(pack.mobile, node));
+        const Vec raised = inverse*link.first;
+        const Real reciprocal = 1/(link.resistance+link.first.dot(raised));
+        const Vec give = raised*reciprocal;
+        inverse.addOuter(-raised, give);
+        const Vec solution = inverse*row.right-give*link.right;
+        const Real tension = link.right*reciprocal+give.dot(row.right);
+        result.inverse = inverse;
+        result.give = give;
+        result.reciprocal = reciprocal;
+        result.solution = solution;
+        result.tension = tension;
+        if (FOLLOWING == 0)
+            return;
+        const TensionEquation<Real>& behind = equations[node];
+        const Vec t = behind.direction, lastBefore = link.last;
+        const Vec pull = inverse*t;
+        const Mat toNext = inverse*row.upper+Mat::outer(give, lastBefore);
+        const Vec first = lastBefore*reciprocal-row.upper.transposedTimes(give);
+        result.pull = pull;
+        result.share = give.dot(t);
+        result.next = toNext;
+        result.first = first;
+        next.right = next.right-row.upper.transposedTimes(solution)-lastBefore*tension;
+        next.diagonal.subtractTransposedProduct(row.upper, toNext);
+        next.diagonal.addOuter(lastBefore, first);
+        link.resistance = behind.compliance+t.dot(pull);
+        link.right = behind.compliance*behind.start-t.dot(solution);
+        link.first = t+toNext.transposedTimes(t);
+        if (FOLLOWING > 1) {
+            const Mat toSecond = inverse*row.second;
+            const Vec last = -row.second.transposedTimes(give);
+            result.second = toSecond;
+            result.last = last;
+            link.last = toSecond.transposedTimes(t);
+            next.upper = next.upper-row.upper.transposedTimes(toSecond)+Mat::outer(lastBefore, last);
+            second.diagonal.subtractTransposedProduct(row.second, toSecond);
+            second.right = second.right-row.second.transposedTimes(solution);
+        }
+        else {
+            result.second = Mat {};
+            result.last = Vec {};
+            link.last = Vec {};
+        }
+    }
+    void eliminateOfRing(int node, Row& row, Row& next, Row& second) {
+        if (node < 2) {
+            border[node].diagonal = row.diagonal;
+            border[node].right = row.right;
+            second.border[node] = row.second.transposed();
+            if (node == 0)
+                border[0].upper = row.upper;
+            else {
+                next.border[1] = row.upper.transposed();
+                const TensionEquation<Real>& behind = equations[1];
+                link = Link {};
+                link.resistance = behind.compliance;
+                link.right = behind.compliance*behind.start;
+                link.first = behind.direction;
+                link.border[1] = -behind.direction;
+            }
+            return;
+        }
+        // The nodes behind the last one are the first two.
+        if (node == n-2) {
+            row.border[0] = row.border[0]+row.second;
+            row.second = Mat {};
+        }
+        if (node == n-1) {
+            row.border[0] = row.border[0]+row.upper;
+            row.border[1] = row.border[1]+row.second;
+            row.upper = row.second = Mat {};
+            link.border[0] = link.border[0]+link.last;
+            link.last = Vec {};
+        }
+        const Link before = link;
+        eliminatePair<2>(node, row, next, second);
+        EliminatedPair<Real, CLOSED>& result = nodes[node];
+        for (int k = 0; k < 2; k++) {
+            const Mat coupling = result.inverse*row.border[k]+Mat::outer(result.give, before.border[k]);
+            const Vec ofTension = before.border[k]*result.reciprocal-row.border[k].transposedTimes(result.give);
+            result.border[k] = coupling;
+            result.tensionBorder[k] = ofTension;
+            next.border[k] = next.border[k]-row.upper.transposedTimes(coupling)+Mat::outer(before.last, ofTension);
+            second.border[k] = second.border[k]-row.second.transposedTimes(coupling);
+            border[k].diagonal.subtractTransposedProduct(row.border[k], coupling);
+            border[k].diagonal.addOuter(before.border[k], ofTension);
+            border[k].right =
+                    border[k].right-row.border[k].transposedTimes(result.solution)-before.border[k]*result.tension;
+            link.border[k] = coupling.transposedTimes(equations[node].direction);
+        }
+        border[0].upper = border[0].upper-row.border[0].transposedTimes(result.border[1])+
+                Mat::outer(before.border[0], result.tensionBorder[1]);
+    }
+    template <bool ADD> CYLCHAIN_INLINE void substitutePair(int node, const Vec& found0, const Vec& found1, Vec& next,
+                Vec& second, Real& tension, Vec* y) {
+        const EliminatedPair<Real, CLOSED>& own = nodes[node];
+        Vec here = own.solution;
+        Real found = own.tension;
+        if (CLOSED || node < n-1) {
+            here = here-own.next*next-own.second*second+own.pull*tension;
+            found = found+own.first.dot(next)+own.last.dot(second)+own.share*tension;
+        }
+        if constexpr (CLOSED) {
+            here = here-own.border[0]*found0-own.border[1]*found1;
+            found = found+own.tensionBorder[0].dot(found0)+own.tensionBorder[1].dot(found1);
+        }
+        y[node] = ADD ? y[node]+here : here;
+        if (node > 0)
+            tensions[node-1] = ADD ? tensions[node-1]+found : found;
+        tension = found;
+        second = next;
+        next = here;
+    }
+};

@@ -1,0 +1,5 @@
+#ifdef CYLCHAIN_X86_64
+#define CYLCHAIN_LOOPS avx2
+#define CYLCHAIN_LANES 4
+#include "lanes/NoiseLoops-inl.h"
+#endif

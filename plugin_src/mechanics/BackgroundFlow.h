@@ -1,0 +1,25 @@
+#ifndef CYLCHAIN_BACKGROUND_FLOW_H_
+#define CYLCHAIN_BACKGROUND_FLOW_H_
+
+#include <cstddef>
+
+namespace cylchain {
+
+/** A fluid that moves with the velocity velocity+gradient (x-origin); friction is relative to it. */
+struct BackgroundFlow {
+    bool present = false;
+    double velocity[3] = {};
+    /** Row by row: the derivatives of the first component of the velocity come first. */
+    double gradient[9] = {};
+    double origin[3] = {};
+    /** The three vectors of a periodic box (nine doubles), to take the image that is nearest to the origin, or NULL. */
+    const double* box = NULL;
+    /** Whether the velocity is not the same everywhere. */
+    bool varies() const;
+    /** The velocity at x. */
+    void getVelocity(const double* x, double* velocity) const;
+};
+
+} // namespace cylchain
+
+#endif /*CYLCHAIN_BACKGROUND_FLOW_H_*/

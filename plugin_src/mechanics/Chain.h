@@ -1,0 +1,90 @@
+#ifndef CYLCHAIN_CHAIN_H_
+#define CYLCHAIN_CHAIN_H_
+
+#include <vector>
+
+/**
+ * The mechanics of extensible cylinder chains, with nothing of OpenMM in it.
+ *
+ * Equation numbers refer to Pesek et al., Soft Matter 2016, 12, 3360. Any consistent set of units will do; the
+ * plugin uses nm, ps and kJ/mol.
+ */
+namespace cylchain {
+
+/** Bending energy of a joint whose segments have tangents with the cosine c, for a stiffness a/l0. */
+enum class BendingModel {
+    /** (a/l0) (1-c), eq. (26). */
+    KratkyPorod = 0,
+    /** (a/2 l0) theta^2. */
+    Quadratic = 1,
+    /** (2a/l0) (1-c)/(1+c), eq. (27). */
+    InscribedCircle = 2
+};
+
+/** Stretching energy of a segment of length l. */
+enum class StretchingModel {
+    /** (k/2) (l-l0)^2, eq. (7). */
+    Harmonic = 0,
+    /** -(k/2) D^2 ln(1-((l-l0)/D)^2). */
+    FENE = 1
+};
+
+/** How positions are advanced in a step. */
+enum class Scheme {
+    /** Section 4 of the paper: the thermal torque of a free segment is sent through the constraints. */
+    Euler = 0,
+    /** Fixman's midpoint: the right drift on chains. */
+    Midpoint = 1,
+    /** The chain's own forces at the end of the step, so that they do not limit it. */
+    Implicit = 2,
+    /** The same in two stages, so that the motion of bends is right to second order in the step. */
+    ImplicitSecondOrder = 3
+};
+
+/** Whether a scheme computes the forces of chains itself. */
+inline bool isImplicit(Scheme scheme) {
+    return scheme == Scheme::Implicit || scheme == Scheme::ImplicitSecondOrder;
+}
+
+/** One segment: its potential and its friction (3), kept at the values of the rest length. */
+struct Segment {
+    double restLength, stiffness, maximumExtension;
+    double parallel, perpendicular, rotational, extensional;
+    /** A force along the segment, from its minus end to its plus end, that belongs to no energy. */
+    double propulsion = 0;
+};
+
+/** A spring between a node and a point: its energy is (stiffness/2) d^2 for their distance d. */
+struct Tether {
+    int node;
+    double point[3], stiffness;
+};
+
+/**
+ * A chain of segments that share nodes: segment s joins the nodes s (its minus end) and s+1 (its plus end). The last
+ * segment of a closed chain, a ring, joins the last node and the first.
+ */
+struct Chain {
+    /** Particle of each node. */
+    std::vector<int> nodes;
+    /** One less than nodes; as many as nodes if the chain is closed. */
+    std::vector<Segment> segments;
+    /**
+     * Stiffness a/l0 of each joint: joint j is at node j+1, and at node j if the chain is closed, where every node has
+     * one.
+     */
+    std::vector<double> joints;
+    BendingModel bending;
+    StretchingModel stretching;
+    /** Nodes that do not move. */
+    std::vector<bool> fixed;
+    std::vector<Tether> tethers;
+    /** Whether the last node is joined to the first; there must be at least four nodes then. */
+    bool closed = false;
+    /** Whether nodes keep their z, which must be the same for all of them. */
+    bool planar = false;
+};
+
+} // namespace cylchain
+
+#endif /*CYLCHAIN_CHAIN_H_*/
