@@ -2,11 +2,10 @@
 
 import ast
 from graphlib import TopologicalSorter
-from pathlib import Path
 
 import pytest
 
-PACKAGE = Path(__file__).parents[1] / "openmm_cylchain"
+from support.repository import PACKAGE
 
 # From the lowest to the highest. Modules on one line may import each other, but not in a circle.
 FLOORS = (

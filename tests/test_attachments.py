@@ -5,23 +5,18 @@ import numpy as np
 import openmm
 import pytest
 from openmm import app, unit
-from physics_cases import TEMPERATURE, VISCOSITY
 
 from openmm_cylchain import DSDNA, F_ACTIN, Filaments, InputError
 from openmm_cylchain.analysis import trajectories as analysis
+from support.contexts import new_context, new_simulation, positions_of
+from support.solvent import TEMPERATURE, VISCOSITY
 
 MICROSECOND = 1e6
 
 
 def _context(filaments, system, positions, step, **options):
     integrator = filaments.create_integrator(system, step, **options)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
-    context.setPositions(positions)
-    return context
-
-
-def _positions(context):
-    return context.getState(positions=True).getPositions(asNumpy=True)._value
+    return new_context(system, positions, integrator)
 
 
 def _filaments(engine):
@@ -61,7 +56,7 @@ def test_points_follow_in_the_same_step(engine):
     context = _context(filaments, system, positions, 1.0, scheme="midpoint", random_seed=1)
     for _ in range(3):
         context.getIntegrator().step(1)
-        now = _positions(context)
+        now = positions_of(context)
         assert now[6] == pytest.approx(0.5 * (now[2] + now[3]), abs=1e-9)
         assert now[13] == pytest.approx(0.5 * (now[11] + now[12]), abs=1e-9)
     assert np.abs(now - positions._value).max() > 1e-3
@@ -81,7 +76,7 @@ def test_force_at_a_place_moves_and_turns_a_cylinder(engine, fraction):
     step = 10.0
     context = _context(filaments, system, positions, step, scheme="midpoint", temperature=0)
     context.getIntegrator().step(1)
-    velocity = (_positions(context) - positions._value)[:, 1] / step
+    velocity = (positions_of(context) - positions._value)[:, 1] / step
     friction = F_ACTIN.segment_friction(VISCOSITY, TEMPERATURE)
     middle, turning = 0.1 / friction.perpendicular, 0.1 * (fraction - 0.5) * 360 / friction.rotational
     assert velocity[:2] == pytest.approx([middle - 180 * turning, middle + 180 * turning], rel=1e-5, abs=1e-15)
@@ -91,8 +86,7 @@ def test_points_in_the_trajectory_may_be_hidden(tmp_path):
     filaments = _filaments(None)
     topology, system, positions = filaments.build()
     integrator = filaments.create_integrator(system, 1.0, random_seed=1)
-    simulation = app.Simulation(topology, system, integrator, openmm.Platform.getPlatform("Reference"))
-    simulation.context.setPositions(positions)
+    simulation = new_simulation(topology, system, positions, integrator)
     hidden = [int(index) for index in np.setdiff1d(range(system.getNumParticles()), filaments.attachment_indices)]
     simulation.reporters.append(app.DCDReporter(str(tmp_path / "all.dcd"), 1))
     simulation.reporters.append(app.DCDReporter(str(tmp_path / "nodes.dcd"), 1, atomSubset=hidden))
@@ -123,10 +117,9 @@ def test_filaments_with_points_join_a_system_that_has_other_particles():
     assert filaments.attachment_indices.tolist() == [15, 8, 9, 10]
     assert len(positions) == system.getNumParticles() == nonbonded.getNumParticles() == 16
     integrator = filaments.create_integrator(system, 1.0, particle_friction=1e4, random_seed=1)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
-    context.setPositions(positions)
+    context = new_context(system, positions, integrator)
     integrator.step(2)
-    assert np.isfinite(_positions(context)).all()
+    assert np.isfinite(positions_of(context)).all()
 
 
 def test_bad_places_are_refused():

@@ -14,6 +14,7 @@ from openmm_cylchain import Filaments, InputError, cli, engines
 from openmm_cylchain.benchmark import engines as engine_benchmark
 from openmm_cylchain.benchmark import measurement, memory, report, scaling, systems
 from openmm_cylchain.runs import information
+from support.contexts import positions_of
 
 NATIVE = "openmm_cylchain.engines.compiled"
 TINY_ENGINES = engine_benchmark.Effort(repetitions=2, seconds=1e-3)
@@ -213,7 +214,7 @@ def test_beads_are_as_many_particles_with_stock_forces():
         beads.advance(20)
         filaments.advance(20)
         for simulated in (beads, filaments):
-            positions = simulated.context.getState(positions=True).getPositions(asNumpy=True)._value
+            positions = positions_of(simulated.context)
             lengths = np.linalg.norm(np.diff(positions[:6], axis=0), axis=1)
             np.testing.assert_allclose(lengths, 360.0, rtol=0.2)
 

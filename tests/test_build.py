@@ -9,6 +9,7 @@ import pytest
 from openmm import app, unit
 
 from openmm_cylchain import DSDNA, F_ACTIN, MICROTUBULE, Filaments, stokes_friction
+from support.contexts import forces_of, new_context
 
 PN = 0.602214076  # kJ/(mol nm)
 VISCOSITY = 1.71e-3 * unit.pascal * unit.second
@@ -190,8 +191,7 @@ def lennard_jones_system(kind, count=64, box=6.0):
 
 
 def lennard_jones_state(system, positions, platform):
-    context = openmm.Context(system, openmm.VerletIntegrator(0.001), platform)
-    context.setPositions(positions)
+    context = new_context(system, positions, platform=platform)
     state = context.getState(forces=True, energy=True, groups={LENNARD_JONES_GROUP})
     return state.getForces(asNumpy=True)._value, state.getPotentialEnergy()._value
 
@@ -260,10 +260,9 @@ def test_force_on_a_virtual_site_is_the_force_and_torque_of_step_5(filaments, fr
     force = openmm.CustomExternalForce(f"-({pull[0]}*x+{pull[1]}*y+{pull[2]}*z)")
     force.addParticle(site)
     system.addForce(force)
-    context = openmm.Context(system, openmm.VerletIntegrator(0.001), reference)
-    context.setPositions(np.vstack([nodes, np.zeros(3)]))
+    context = new_context(system, np.vstack([nodes, np.zeros(3)]), platform=reference)
     context.computeVirtualSites()
-    forces = context.getState(forces=True, groups={0}).getForces(asNumpy=True)._value
+    forces = forces_of(context, {0})
 
     minus, plus = forces[1], forces[2]
     segment = nodes[2] - nodes[1]
@@ -285,9 +284,8 @@ def test_particles_outside_diffuse_next_to_a_filament(filaments, reference):
     integrator = filaments.create_integrator(
         system, step, particle_friction=np.full(64, friction), temperature=0, random_seed=1
     )
-    context = openmm.Context(system, integrator, reference)
-    context.setPositions(everything)
-    forces = context.getState(forces=True).getForces(asNumpy=True)._value
+    context = new_context(system, everything, integrator, reference)
+    forces = forces_of(context)
     integrator.step(1)
     moved = nanometers(context.getState(positions=True).getPositions(asNumpy=True)) - nanometers(everything)
     np.testing.assert_allclose(moved[:64], step * forces[:64] / friction, rtol=1e-9, atol=1e-15)
@@ -311,8 +309,7 @@ def tensions_after(filaments, forces, steps, platform):
     for node, force in forces.items():
         pull(system, int(filaments.node_indices[0][node]), np.asarray(force) * PN)
     integrator = filaments.create_integrator(system, 0.02 * unit.microsecond, temperature=0)
-    context = openmm.Context(system, integrator, platform)
-    context.setPositions(positions)
+    context = new_context(system, positions, integrator, platform)
     integrator.step(steps)
     tension = filaments.joint_tensions(context)
     assert len(tension) == len(filaments)

@@ -10,6 +10,7 @@ from openmm import app, unit
 
 from openmm_cylchain import DSDNA, F_ACTIN, Filaments, InputError, TimeStepWarning
 from openmm_cylchain.dynamics.time_step import stability_bounds
+from support.contexts import new_context
 
 VISCOSITY = 1.71e-3 * unit.pascal * unit.second
 TEMPERATURE = 310 * unit.kelvin
@@ -215,8 +216,7 @@ def test_questions_asked_too_early(filaments, reference):
         _ = filaments.node_indices
     with refused("not in a System yet: call build or add_to first"):
         filaments.create_integrator(system, STEP)
-    context = openmm.Context(system, openmm.VerletIntegrator(0.001), reference)
-    context.setPositions(positions)
+    context = new_context(system, positions, platform=reference)
     with refused("not in a System yet: call build or add_to first"):
         filaments.joint_tensions(context)
 

@@ -5,9 +5,6 @@ from dataclasses import replace
 import numpy as np
 import openmm
 import pytest
-from conftest import ENGINES
-from openmm import app
-from physics_cases import KT, TEMPERATURE, VISCOSITY, Case, soft_chain, time_step
 from scipy.integrate import solve_bvp
 
 from openmm_cylchain import F_ACTIN, Filaments, theory
@@ -17,17 +14,15 @@ from openmm_cylchain.filaments.equilibrium import (
     SegmentLengthDistribution,
 )
 from openmm_cylchain.output.reporters import FilamentReporter
+from support.contexts import forces_of, new_context, new_simulation, positions_of
+from support.equilibrium_cases import Case, soft_chain, time_step
+from support.platforms import ENGINES
+from support.solvent import KT, TEMPERATURE, VISCOSITY
 
 SIGMAS = 4.0
 LENGTH = 2000.0  # nm of the cantilevers
 # Joints of a/l0: rods that bend without thermal noise have the rigidity a.
 ACTIN = replace(F_ACTIN, temperature=None)
-
-
-def _context(system, integrator, positions):
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
-    context.setPositions(positions)
-    return context
 
 
 @pytest.mark.parametrize(
@@ -80,8 +75,7 @@ def test_reporter_and_state_have_the_stiffness_of_the_joints(engine, model):
     filaments.add_nodes(kind, nodes, clamped=[0, 1])
     topology, system, positions = filaments.build()
     integrator = filaments.create_integrator(system, 1e-6, temperature=0)
-    simulation = app.Simulation(topology, system, integrator, openmm.Platform.getPlatform("Reference"))
-    simulation.context.setPositions(positions)
+    simulation = new_simulation(topology, system, positions, integrator)
     expected = float(np.sum([2, 1, 1, 1] * kind.bending_energy(np.cos([0.3, 0.2, 0.4, 0.1]))))
     state = simulation.context.getState(energy=True, forces=True)
     assert state.getPotentialEnergy()._value == pytest.approx(expected, rel=1e-9)
@@ -116,7 +110,7 @@ def _cantilever(engine, segments, load):
     for node, force in enumerate(load, start=2):
         pull.addParticle(node, [force])
     system.addForce(pull)
-    context = _context(system, openmm.VerletIntegrator(1.0), positions)
+    context = new_context(system, positions)
     return kind, _at_rest(context, positions._value)
 
 
@@ -127,7 +121,7 @@ def _at_rest(context, positions):
 
     def forces(values):
         context.setPositions(values)
-        all_forces = context.getState(forces=True).getForces(asNumpy=True)._value
+        all_forces = forces_of(context)
         return np.array([all_forces[index] for index in free])
 
     for part in np.linspace(0.1, 1.0, 10):
@@ -273,12 +267,12 @@ def test_dynamics_keep_the_fluctuations_of_clamped_filaments(engine, planar):
     _, system, positions = filaments.build()
     step = time_step(Case(STIFF, 4, 1, 1, 0.02))
     integrator = filaments.create_integrator(system, step, scheme="midpoint", random_seed=2)
-    context = _context(system, integrator, positions)
+    context = new_context(system, positions, integrator)
     integrator.step(100)
     samples = []
     for _ in range(20):
         integrator.step(15)
-        nodes = context.getState(positions=True).getPositions(asNumpy=True)._value.reshape(2500, 5, 3)
+        nodes = positions_of(context).reshape(2500, 5, 3)
         samples.append(_fluctuations(nodes))
     _assert_means(samples, _exact_fluctuations(STIFF, 3, planar))
 

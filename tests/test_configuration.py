@@ -1,7 +1,6 @@
 """Configurations: units, defaults, presets and their overrides, and a message for every mistake."""
 
 import math
-from pathlib import Path
 
 import pytest
 from openmm import unit
@@ -22,6 +21,7 @@ from openmm_cylchain.units.quantities import (
     VISCOSITY,
 )
 from openmm_cylchain.units.text import format_time, parse_quantity
+from support.repository import EXAMPLES
 
 SOLVENT = '[solvent]\ntemperature = "310 K"\nviscosity = "1.71 mPa*s"\n'
 FILAMENT = '[[filament]]\ntype = "F_ACTIN"\nsegments = 8\n'
@@ -310,7 +310,7 @@ def test_changes_are_named():
 
 
 def test_example_is_the_filament_of_table_2():
-    path = Path(__file__).parents[1] / "examples" / "f_actin.toml"
+    path = EXAMPLES / "f_actin.toml"
     configuration = read_configuration(path)
     group, settings = configuration.filaments[0], configuration.simulation
     assert group.type == F_ACTIN

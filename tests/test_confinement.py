@@ -4,10 +4,11 @@ import numpy as np
 import openmm
 import pytest
 from openmm import unit
-from physics_cases import KT, TEMPERATURE, VISCOSITY
 
 from openmm_cylchain import F_ACTIN, Filaments, InputError
 from openmm_cylchain.couplings.walls import Box, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere, wall_force
+from support.contexts import new_context, positions_of
+from support.solvent import KT, TEMPERATURE, VISCOSITY
 
 SHAPES = [
     Plane([0, 0, 1], [1, 2, -2]),
@@ -52,8 +53,7 @@ def test_energy_and_force(shape, platform):
     for _ in points:
         system.addParticle(1.0)
     system.addForce(wall_force(shape, 7 * unit.kilojoule_per_mole / unit.nanometer**2, range(len(points))))
-    context = openmm.Context(system, openmm.VerletIntegrator(1.0), platform)
-    context.setPositions(points)
+    context = new_context(system, points, platform=platform)
     state = context.getState(energy=True, forces=True)
     assert state.getPotentialEnergy()._value == pytest.approx(3.5 * shape.square_depth(points).sum(), rel=1e-5)
     forces = state.getForces(asNumpy=True)._value
@@ -90,13 +90,12 @@ def test_a_segment_in_a_slab_has_the_exact_energy():
     wall.setForceGroup(5)
     system.addForce(wall)
     integrator = filaments.create_integrator(system, 2e5, random_seed=1)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
-    context.setPositions(positions)
+    context = new_context(system, positions, integrator)
     integrator.step(100)
     energies = []
     for _ in range(150):
         integrator.step(60)
-        nodes = context.getState(positions=True).getPositions(asNumpy=True)._value.reshape(chains, 2, 3)
+        nodes = positions_of(context).reshape(chains, 2, 3)
         energies.append(0.5 * stiffness * slab.square_depth(nodes).sum(axis=1))
     energies = np.mean(energies, axis=0)
     error = energies.std(ddof=1) / np.sqrt(chains)

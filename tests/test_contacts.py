@@ -5,9 +5,7 @@ import warnings
 import numpy as np
 import openmm
 import pytest
-from conftest import PLATFORMS
 from openmm import app, unit
-from physics_cases import ENGINE_PLATFORMS, KT, TEMPERATURE, VISCOSITY
 
 from openmm_cylchain import DSDNA, F_ACTIN, ContactWarning, Filaments, InputError
 from openmm_cylchain.couplings.contacts import (
@@ -19,6 +17,9 @@ from openmm_cylchain.couplings.contacts import (
     share_exclusions,
 )
 from openmm_cylchain.dynamics.time_step import contact_stiffness_bound, contact_time_step, diffusion_bound
+from support.contexts import forces_of, new_context
+from support.platforms import ENGINE_PLATFORMS, PLATFORMS
+from support.solvent import KT, TEMPERATURE, VISCOSITY
 
 ACTIN = F_ACTIN.with_segment_length(100)
 DIAMETER = 30.0
@@ -33,13 +34,6 @@ def _crossed(engine=None, height=20.0, box=None):
     for number in range(2):
         filaments.add_beads(number, 15)
     return filaments, *filaments.build(box_vectors=box)
-
-
-def _context(system, positions, platform, integrator=None):
-    integrator = openmm.VerletIntegrator(1.0) if integrator is None else integrator
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform(platform))
-    context.setPositions(positions)
-    return context
 
 
 def _state(context):
@@ -165,7 +159,7 @@ def test_energy_and_forces_of_two_rows(platform, box):
         positions = positions._value + [0, 0, 590.0]
         second = np.concatenate([filaments.node_indices[1], filaments.bead_indices[1]])
         positions[second] += [600.0, -1200.0, 600.0]
-    state = _state(_context(system, positions, platform))
+    state = _state(new_context(system, positions, platform=platform))
     placed = state.getPositions(asNumpy=True)._value
     first, second = (placed[beads] for beads in filaments.bead_indices)
     difference = first[:, None] - second[None]
@@ -196,7 +190,7 @@ def test_a_filament_does_not_see_itself(platform):
     force = contact_force(filaments, system, DIAMETER)
     force.setForceGroup(3)
     system.addForce(force)
-    context = _context(system, positions, platform)
+    context = new_context(system, positions, platform=platform)
     state = context.getState(energy=True, forces=True, groups={3})
     assert state.getPotentialEnergy()._value == 0.0
     assert not state.getForces(asNumpy=True)._value.any()
@@ -295,7 +289,7 @@ def test_beside_forces_that_were_there_before_or_come_after(engine, platform, be
     integrator = filaments.create_integrator(
         system, min(step, 500), scheme="midpoint", particle_friction=1e6, random_seed=1
     )
-    context = _context(system, positions, platform, integrator)
+    context = new_context(system, positions, integrator, platform)
     state = _state(context)
     placed = state.getPositions(asNumpy=True)._value
 
@@ -333,7 +327,7 @@ def test_different_exclusions_are_what_openmm_refuses(platform):
     system.addForce(charges)
     system.addForce(contact_force(filaments, system, DIAMETER))
     with pytest.raises(openmm.OpenMMException, match="identical exc"):
-        _context(system, positions, platform)
+        new_context(system, positions, platform=platform)
 
 
 # The step
@@ -462,8 +456,8 @@ def test_beads_of_a_ring_are_all_alike():
     assert counts[beads[0]] == 20 + 5
     # A force between beads is finite where the ring closes.
     system.addForce(contact_force(filaments, system, 40))
-    context = _context(system, positions, "Reference")
-    assert np.isfinite(context.getState(forces=True).getForces(asNumpy=True)._value).all()
+    context = new_context(system, positions)
+    assert np.isfinite(forces_of(context)).all()
 
 
 def test_small_rings_exclude_everything_once():

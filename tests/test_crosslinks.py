@@ -7,19 +7,22 @@ import subprocess
 import sys
 import threading
 import tracemalloc
-from pathlib import Path
 
 import numpy as np
 import openmm
 import pytest
-from conftest import ENGINE_SCHEMES
 from openmm import app, unit
-from physics_cases import CASES, ENGINE_PLATFORMS, KT, TEMPERATURE, VISCOSITY
 
 from openmm_cylchain import F_ACTIN, Filaments, InputError, InstabilityError
 from openmm_cylchain.couplings import crosslinks
 from openmm_cylchain.couplings.crosslinks import Crosslinks, CrosslinkTable
 from openmm_cylchain.output.reporters import CrosslinkReporter
+from support.contexts import energy_of, forces_of, new_context, new_simulation, positions_of
+from support.crosslinked_filaments import crosslinked_filaments
+from support.equilibrium_cases import CASES
+from support.platforms import ENGINE_PLATFORMS, ENGINE_SCHEMES
+from support.repository import TESTS
+from support.solvent import KT, TEMPERATURE, VISCOSITY
 
 BOX = np.array([[3.0, 0.0, 0.0], [0.5, 3.1, 0.0], [-0.4, 0.6, 2.9]])
 PAIRS = [(0, 1), (0, 2), (0, 1), (4, 0), (3, 4), (2, 5)]
@@ -31,26 +34,6 @@ def _particles(count=6):
         system.addParticle(1.0)
     system.setDefaultPeriodicBoxVectors(*BOX)
     return system
-
-
-def _context(system, positions, platform="Reference", integrator=None):
-    if isinstance(platform, str):
-        platform = openmm.Platform.getPlatform(platform)
-    context = openmm.Context(system, integrator or openmm.VerletIntegrator(0.001), platform)
-    context.setPositions(positions)
-    return context
-
-
-def _energy(context):
-    return context.getState(energy=True).getPotentialEnergy()._value
-
-
-def _forces(context):
-    return context.getState(forces=True).getForces(asNumpy=True)._value
-
-
-def _positions(context):
-    return context.getState(positions=True).getPositions(asNumpy=True)._value
 
 
 def _linked(pairs=PAIRS, model="harmonic", periodic=False, **options):
@@ -80,11 +63,11 @@ def _stock(pairs, model, periodic):
 def test_forces_are_those_of_stock_bonds(model, periodic, platform):
     positions = np.random.default_rng(1).uniform(-4, 4, (6, 3))
     _, system = _linked(model=model, periodic=periodic)
-    linked, stock = (_context(one, positions, platform) for one in (system, _stock(PAIRS, model, periodic)))
+    linked, stock = (new_context(one, positions, platform=platform) for one in (system, _stock(PAIRS, model, periodic)))
     tolerance = {"rel": 1e-5, "abs": 1e-3} if platform.getName() == "OpenCL" else {"rel": 1e-12, "abs": 1e-9}
-    assert np.abs(_forces(stock)).max() > 10
-    assert _forces(linked) == pytest.approx(_forces(stock), **tolerance)
-    assert _energy(linked) == pytest.approx(_energy(stock), **tolerance)
+    assert np.abs(forces_of(stock)).max() > 10
+    assert forces_of(linked) == pytest.approx(forces_of(stock), **tolerance)
+    assert energy_of(linked) == pytest.approx(energy_of(stock), **tolerance)
 
 
 @pytest.mark.parametrize("periodic", [False, True])
@@ -92,8 +75,8 @@ def test_forces_are_those_of_stock_bonds(model, periodic, platform):
 def test_forces_are_derivatives_of_the_energy(model, periodic):
     positions = np.random.default_rng(2).uniform(-4, 4, (6, 3))
     _, system = _linked(model=model, periodic=periodic)
-    context = _context(system, positions)
-    expected = _forces(context)
+    context = new_context(system, positions)
+    expected = forces_of(context)
     step = 1e-5
     for particle in range(6):
         for axis in range(3):
@@ -102,7 +85,7 @@ def test_forces_are_derivatives_of_the_energy(model, periodic):
                 moved = positions.copy()
                 moved[particle, axis] += sign * step
                 context.setPositions(moved)
-                energies.append(_energy(context))
+                energies.append(energy_of(context))
             numerical = -(energies[0] - energies[1]) / (2 * step)
             assert numerical == pytest.approx(expected[particle, axis], rel=1e-6, abs=1e-5)
 
@@ -111,11 +94,11 @@ def test_crosslinks_differ_and_may_have_no_length():
     links, system = _linked([(0, 1)], stiffness=2.0, rest_length=0.0)
     positions = np.zeros((6, 3))
     positions[2] = [0, 0, 3]
-    context = _context(system, positions)
-    assert _energy(context) == 0 and np.all(_forces(context) == 0)
+    context = new_context(system, positions)
+    assert energy_of(context) == 0 and np.all(forces_of(context) == 0)
     links.add(context, 0, 2, rest_length=10 * unit.angstrom, stiffness=1 * unit.piconewton / unit.nanometer)
-    assert _energy(context) == pytest.approx(0.5 * 0.602214076 * 4)
-    assert _forces(context)[2] == pytest.approx([0, 0, -2 * 0.602214076])
+    assert energy_of(context) == pytest.approx(0.5 * 0.602214076 * 4)
+    assert forces_of(context)[2] == pytest.approx([0, 0, -2 * 0.602214076])
     assert links.lengths(context) == pytest.approx([0, 3])
     assert links.extensions(context) == pytest.approx([0, 2])
     assert links.forces(context) == pytest.approx([0, 2 * 0.602214076])
@@ -130,24 +113,24 @@ def test_the_nearest_image_is_taken_where_the_system_is_periodic():
         assert force.usesPeriodicBoundaryConditions() == periodic
         positions = np.zeros((6, 3))
         positions[1] = [2.8, 0, 0]
-        context = _context(system, positions)
+        context = new_context(system, positions)
         assert links.lengths(context) == pytest.approx([0.2 if periodic else 2.8])
-        assert _forces(context)[0, 0] == pytest.approx(0.3 if periodic else 2.3)
+        assert forces_of(context)[0, 0] == pytest.approx(0.3 if periodic else 2.3)
 
 
 def test_force_groups():
     links, system = Crosslinks(1.0, 0.0), _particles()
     links.add(None, 0, 1)
     links.add_to(system, force_group=7)
-    context = _context(system, np.eye(6, 3))
-    assert context.getState(energy=True, groups={7}).getPotentialEnergy()._value == pytest.approx(1.0)
-    assert context.getState(energy=True, groups={0}).getPotentialEnergy()._value == 0
+    context = new_context(system, np.eye(6, 3))
+    assert energy_of(context, {7}) == pytest.approx(1.0)
+    assert energy_of(context, {0}) == 0
 
 
 def test_changes_are_seen_at_once_and_in_their_context_alone():
     links, system = _linked([(0, 1)])
     positions = 2.0 * np.random.default_rng(3).uniform(size=(6, 3))
-    first, second = (_context(system, positions) for _ in range(2))
+    first, second = (new_context(system, positions) for _ in range(2))
     for context in (first, second):
         assert links.pairs(context).tolist() == [[0, 1]] and links.numbers(context).tolist() == [0]
     assert links.add(first, 2, 3) == 1
@@ -158,55 +141,24 @@ def test_changes_are_seen_at_once_and_in_their_context_alone():
     assert links.pairs(first).tolist() == [[0, 1], [3, 4], [3, 2]]
     assert links.pairs(second).tolist() == links.pairs(None).tolist() == [[0, 1]]
     for context, pairs in ((first, [(0, 1), (3, 4), (3, 2)]), (second, [(0, 1)])):
-        expected = _forces(_context(_stock(pairs, "harmonic", False), positions))
-        assert _forces(context) == pytest.approx(expected, abs=1e-12)
+        expected = forces_of(new_context(_stock(pairs, "harmonic", False), positions))
+        assert forces_of(context) == pytest.approx(expected, abs=1e-12)
     links.remove(first, [0, 2])
     assert links.pairs(first).tolist() == [[3, 2]]
     links.set_pairs(first, [(5, 4), (0, 3)])
     assert links.numbers(first).tolist() == [0, 1]
     links.set_pairs(first, [])
-    assert _energy(first) == 0 and len(links.numbers(first)) == 0
+    assert energy_of(first) == 0 and len(links.numbers(first)) == 0
     with pytest.raises(ValueError):
         links.pairs(second)[0, 0] = 3
-
-
-def _network(engine, stock=False, **options):
-    """Two filaments and a particle; a link between nodes, one between attachment points, one to the particle."""
-    filaments = Filaments(VISCOSITY, TEMPERATURE, engine=engine)
-    kind = CASES["kratky-porod"].type
-    topology, system = app.Topology(), openmm.System()
-    topology.addAtom("P", None, topology.addResidue("PRT", topology.addChain()))
-    system.addParticle(1.0)
-    for y in (0, 30):
-        filaments.add_straight(kind, 4, [0, y, 0], [1, 0, 0])
-    for number in (0, 1):
-        filaments.add_attachment(number, arc_length=150)
-    positions = filaments.add_to(topology, system, [[200.0, 60.0, 0.0]])
-    attached = filaments.attachment_indices
-    nodes = filaments.node_indices
-    pairs = [(nodes[0][4], nodes[1][4]), (attached[0], attached[1]), (0, nodes[1][2])]
-    pairs = [(int(first), int(second)) for first, second in pairs]
-    if stock:
-        links = openmm.HarmonicBondForce()
-        for pair in pairs:
-            links.addBond(*pair, 10.0, 0.02)
-        system.addForce(links)
-    else:
-        links = Crosslinks(0.02, 10.0)
-        links.set_pairs(None, pairs)
-        links.add_to(system)
-    integrator = filaments.create_integrator(
-        system, 1e4, particle_friction=1e6, scheme="midpoint", random_seed=3, **options
-    )
-    return links, system, positions, integrator
 
 
 @pytest.mark.parametrize("engine, platform", ENGINE_PLATFORMS)
 def test_a_crosslink_that_goes_during_a_run_is_a_stock_bond_that_is_taken_out(engine, platform):
     ends = []
     for stock in (True, False):
-        links, system, positions, integrator = _network(engine, stock)
-        context = _context(system, positions, platform, integrator)
+        links, system, positions, integrator = crosslinked_filaments(engine, stock)
+        context = new_context(system, positions, integrator, platform)
         integrator.step(10)
         if stock:
             links.setBondParameters(1, *links.getBondParameters(1)[:3], 0.0)
@@ -214,13 +166,13 @@ def test_a_crosslink_that_goes_during_a_run_is_a_stock_bond_that_is_taken_out(en
         else:
             links.remove(context, 1)
         integrator.step(10)
-        ends.append(_positions(context))
+        ends.append(positions_of(context))
     tolerance = 0.002 if platform == "OpenCL" else 1e-9
     assert np.abs(ends[0] - ends[1]).max() < tolerance
-    links, system, positions, integrator = _network(engine)
-    context = _context(system, positions, platform, integrator)
+    links, system, positions, integrator = crosslinked_filaments(engine)
+    context = new_context(system, positions, integrator, platform)
     integrator.step(20)
-    assert np.abs(_positions(context) - ends[1]).max() > 20 * tolerance
+    assert np.abs(positions_of(context) - ends[1]).max() > 20 * tolerance
 
 
 def test_two_contexts_in_two_threads(engine):
@@ -234,11 +186,11 @@ def test_two_contexts_in_two_threads(engine):
     results = []
     for parallel in (False, True):
         contexts, integrators = [], []
-        links, system, positions, first = _network(engine)
+        links, system, positions, first = crosslinked_filaments(engine)
         for displacement in (0.0, 5.0):
             integrator = first if not integrators else openmm.XmlSerializer.clone(first)
             integrators.append(integrator)
-            contexts.append(_context(system, positions._value + [0, 0, displacement], "Reference", integrator))
+            contexts.append(new_context(system, positions._value + [0, 0, displacement], integrator))
         threads = [threading.Thread(target=run, args=pair) for pair in zip(contexts, integrators)]
         for thread in threads:
             thread.start()
@@ -246,7 +198,7 @@ def test_two_contexts_in_two_threads(engine):
                 thread.join()
         for thread in threads:
             thread.join()
-        results.append([_positions(context) for context in contexts])
+        results.append([positions_of(context) for context in contexts])
         assert [len(links.numbers(context)) for context in contexts] == [13, 13]
     assert np.array_equal(results[0], results[1])
 
@@ -254,32 +206,33 @@ def test_two_contexts_in_two_threads(engine):
 def test_going_back_to_a_state_of_this_process():
     links, system = _linked()
     positions = np.random.default_rng(4).uniform(size=(6, 3))
-    context = _context(system, positions)
+    context = new_context(system, positions)
     links.remove(context, [1, 3])
     state = context.getState(positions=True, velocities=True, parameters=True)
     checkpoint = context.createCheckpoint()
-    energy, pairs = _energy(context), links.pairs(context).tolist()
+    energy, pairs = energy_of(context), links.pairs(context).tolist()
     for restore in (lambda: context.setState(state), lambda: context.loadCheckpoint(checkpoint)):
         links.remove(context, links.numbers(context)[0])
         links.add(context, 4, 5)
-        assert _energy(context) != pytest.approx(energy)
+        assert energy_of(context) != pytest.approx(energy)
         restore()
-        assert _energy(context) == energy and links.pairs(context).tolist() == pairs
+        assert energy_of(context) == energy and links.pairs(context).tolist() == pairs
     # Another Context may take the State, and is not touched by what happens in the first.
-    other = _context(system, positions)
+    other = new_context(system, positions)
     other.setState(state)
     for _ in range(2 * crosslinks._RECENT_TABLES):
         links.add(context, 0, 5)
         assert links.pairs(other).tolist() == pairs
-    assert _energy(other) == pytest.approx(energy)
+    assert energy_of(other) == pytest.approx(energy)
 
 
 RUN = """
-import sys
-from tests_of_crosslinks import _context, _network, _positions, CrosslinkTable
 import numpy as np
-links, system, positions, integrator = _network({engine!r})
-context = _context(system, positions, "Reference", integrator)
+from openmm_cylchain import CrosslinkTable
+from support.contexts import new_context, positions_of
+from support.crosslinked_filaments import crosslinked_filaments
+links, system, positions, integrator = crosslinked_filaments({engine!r})
+context = new_context(system, positions, integrator)
 if {restart}:
     {order}
 else:
@@ -292,7 +245,7 @@ else:
 integrator.step(5)
 print(links.add(context, 0, 4))
 integrator.step(5)
-np.save({file!r}, _positions(context))
+np.save({file!r}, positions_of(context))
 """
 
 AFTER = """context.loadCheckpoint(open("checkpoint", "rb").read())
@@ -303,9 +256,7 @@ FORGOTTEN = """context.loadCheckpoint(open("checkpoint", "rb").read())"""
 
 
 def _run_process(folder, **options):
-    here = Path(__file__)
-    (folder / "tests_of_crosslinks.py").write_text(here.read_text())
-    environment = {**os.environ, "PYTHONPATH": f"{folder}{os.pathsep}{here.parent}"}
+    environment = {**os.environ, "PYTHONPATH": str(TESTS)}
     return subprocess.run(
         [sys.executable, "-c", RUN.format(**options)],
         cwd=folder,
@@ -357,7 +308,7 @@ def test_tables_are_kept_in_files(tmp_path):
 
 
 def test_systems_are_written_to_xml_with_their_crosslinks(engine):
-    links, system, positions, integrator = _network(engine)
+    links, system, positions, integrator = crosslinked_filaments(engine)
     more = Crosslinks(0.03, 5.0, "fene", 1000.0)
     more.add(None, 0, 1)
     more.add_to(system)
@@ -367,15 +318,15 @@ def test_systems_are_written_to_xml_with_their_crosslinks(engine):
     assert (read.model, read_more.model) == ("harmonic", "fene")
     ends = []
     for one, two, context in (
-        (links, more, _context(system, positions, integrator=integrator)),
-        (read, read_more, _context(duplicate, positions, integrator=clone)),
+        (links, more, new_context(system, positions, integrator)),
+        (read, read_more, new_context(duplicate, positions, clone)),
     ):
-        assert _energy(context) > 0
+        assert energy_of(context) > 0
         one.remove(context, 0)
         one.add(context, 0, 2)
         two.add(context, 1, 2)
         context.getIntegrator().step(5)
-        ends.append(_positions(context))
+        ends.append(positions_of(context))
         assert one.pairs(context)[-1].tolist() == [0, 2] and two.pairs(context).tolist() == [[0, 1], [1, 2]]
     assert np.array_equal(*ends)
     assert Crosslinks.from_system(_particles()) == []
@@ -389,7 +340,7 @@ def test_fene_crosslinks_that_are_too_long_are_named(engine, tmp_path):
     links = Crosslinks(1.0, 20.0, "fene", 10.0)
     links.add_to(system)
     integrator = filaments.create_integrator(system, 1.0, scheme="midpoint")
-    context = _context(system, positions, integrator=integrator)
+    context = new_context(system, positions, integrator)
     integrator.step(1)
     number = links.add(context, 1, 4, maximum_extension=1000.0)
     integrator.step(1)
@@ -399,7 +350,7 @@ def test_fene_crosslinks_that_are_too_long_are_named(engine, tmp_path):
     with pytest.raises(InstabilityError, match=message):
         integrator.step(1)
     with pytest.raises(openmm.OpenMMException, match=message):
-        _energy(context)
+        energy_of(context)
     with pytest.raises(InputError, match=message):
         links.forces(context)
     links.remove(context, 1)
@@ -408,7 +359,7 @@ def test_fene_crosslinks_that_are_too_long_are_named(engine, tmp_path):
 
 def test_many_changes_take_no_memory():
     links, system = _linked()
-    context = _context(system, np.random.default_rng(5).uniform(size=(6, 3)))
+    context = new_context(system, np.random.default_rng(5).uniform(size=(6, 3)))
 
     def change(times):
         for _ in range(times):
@@ -430,7 +381,7 @@ def test_many_changes_take_no_memory():
 @pytest.mark.slow
 def test_a_hundred_thousand_changes_and_steps_take_no_memory():
     links, system = _linked()
-    context = _context(system, np.random.default_rng(5).uniform(size=(6, 3)))
+    context = new_context(system, np.random.default_rng(5).uniform(size=(6, 3)))
     sizes = []
     for round_ in range(100_000):
         links.remove(context, links.add(context, 0, 5))
@@ -490,7 +441,7 @@ def test_thermal_length_of_a_crosslink(engine, scheme, partner):
     integrator = filaments.create_integrator(
         system, step, scheme=scheme, particle_friction=friction.parallel, random_seed=11
     )
-    context = _context(system, positions, integrator=integrator)
+    context = new_context(system, positions, integrator)
     assert links.lengths(context) == pytest.approx(draws)
     samples = []
     for _ in range(40):
@@ -505,14 +456,13 @@ def test_thermal_length_of_a_crosslink(engine, scheme, partner):
 
 
 def test_reporter(tmp_path):
-    links, system, positions, integrator = _network("compiled")
+    links, system, positions, integrator = crosslinked_filaments("compiled")
     topology = app.Topology()
     chain = topology.addChain()
     for _ in range(system.getNumParticles()):
         topology.addAtom("X", None, topology.addResidue("X", chain))
-    simulation = app.Simulation(topology, system, integrator, openmm.Platform.getPlatform("Reference"))
+    simulation = new_simulation(topology, system, positions, integrator)
     context = simulation.context
-    context.setPositions(positions)
     path = tmp_path / "links.csv"
     reporter = CrosslinkReporter(path, 2, links)
     simulation.reporters.append(reporter)
@@ -565,7 +515,7 @@ def test_bad_input_is_refused():
         with pytest.raises(InputError, match=message):
             Crosslinks(*arguments)
     links, system = _linked()
-    context = _context(system, np.random.default_rng(6).uniform(size=(6, 3)))
+    context = new_context(system, np.random.default_rng(6).uniform(size=(6, 3)))
     for arguments, message in (
         ((0, 0), "Crosslink 6 joins particle 0 to itself"),
         ((0, 6), "Crosslink 6: particle 6 does not exist; the System has 6"),
@@ -617,4 +567,4 @@ def test_bad_input_is_refused():
     with pytest.raises(InputError, match="context must be an openmm.Context"):
         links.add(system, 0, 1)
     with pytest.raises(InputError, match="a System that does not have these crosslinks"):
-        links.pairs(_context(_particles(), np.zeros((6, 3))))
+        links.pairs(new_context(_particles(), np.zeros((6, 3))))

@@ -1,13 +1,13 @@
 """How fast bending modes decay under the implicit schemes, against linear theory."""
 
 import numpy as np
-import openmm
 import pytest
-from physics_cases import KT, TEMPERATURE, VISCOSITY
 from scipy.linalg import eigh
 
 from openmm_cylchain import MICROTUBULE, Filaments
 from openmm_cylchain.dynamics.schemes import IMPLICIT_SCHEMES, amplification_of_second_order
+from support.contexts import new_context, positions_of
+from support.solvent import KT, TEMPERATURE, VISCOSITY
 
 SEGMENTS = 8
 KIND = MICROTUBULE
@@ -48,10 +48,9 @@ def test_a_small_bend_decays_as_linear_theory_of_the_scheme(scheme, mode, z):
     filaments.add_nodes(KIND, nodes)
     _, system, positions = filaments.build()
     integrator = filaments.create_integrator(system, step, scheme=scheme, temperature=0, checks=False)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
-    context.setPositions(positions)
+    context = new_context(system, positions, integrator)
     integrator.step(1)
-    after = context.getState(positions=True).getPositions(asNumpy=True)._value[:, 1]
+    after = positions_of(context)[:, 1]
     friction = KIND.segment_friction(VISCOSITY, TEMPERATURE, SEGMENTS)
     fastest = 4 * step * KIND.joint_stiffness / friction.rotational
     assert after == pytest.approx(_amplification(scheme, z, fastest) * shape, abs=2e-3)
@@ -73,13 +72,12 @@ def test_fluctuations_decay_within_five_percent_up_to_one_over_the_step(slowest)
         filaments.add_equilibrium(KIND, SEGMENTS, seed=chain)
     _, system, positions = filaments.build()
     integrator = filaments.create_integrator(system, step, scheme="implicit-second-order", random_seed=3, checks=False)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
-    context.setPositions(positions)
+    context = new_context(system, positions, integrator)
     nodes = np.array(filaments.node_indices)
     amplitudes = []
     for _ in range(400):
         integrator.step(1)
-        tangents = np.diff(context.getState(positions=True).getPositions(asNumpy=True)._value[nodes], axis=1)
+        tangents = np.diff(positions_of(context)[nodes], axis=1)
         tangents /= np.linalg.norm(tangents, axis=2)[..., None]
         amplitudes.append(np.einsum("ijk,jm->imk", np.diff(tangents, axis=1), bends @ shapes[:, :3]))
     amplitudes = np.array(amplitudes)

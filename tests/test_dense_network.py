@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from dense_network import crosslinked_network, dense_network
 
 from openmm_cylchain.benchmark.memory import resident_and_peak
+from support.dense_network import crosslinked_network, dense_network
 
 
 def test_filaments_cross_only_without_contacts():

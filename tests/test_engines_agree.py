@@ -6,10 +6,13 @@ import numpy as np
 import openmm
 import pytest
 from openmm import app, unit
-from physics_cases import CASES, ENGINE_PLATFORMS, TEMPERATURE, VISCOSITY
-from test_redistribution import _bent_chain
 
 from openmm_cylchain import DSDNA, F_ACTIN, Filaments, stokes_friction
+from support.contexts import energy_of, new_context, positions_of
+from support.dense_mechanics import bent_chain
+from support.equilibrium_cases import CASES
+from support.platforms import ENGINE_PLATFORMS
+from support.solvent import TEMPERATURE, VISCOSITY
 
 SLOW_DNA = replace(DSDNA, extension_relaxation_time=1e5)
 KINDS = [
@@ -34,7 +37,7 @@ def _trajectory(engine, platform, scheme, steps=100):
     positions = np.array([[0.0, 500.0, 0.0], [50.0, 500.0, 0.0], [100.0, 500.0, 0.0]])
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine=engine)
     for seed, (kind, segments, clamped) in enumerate(KINDS):
-        filaments.add_nodes(kind, _bent_chain(kind, segments, seed), clamped)
+        filaments.add_nodes(kind, bent_chain(kind, segments, seed), clamped)
     positions = filaments.add_to(topology, system, positions * unit.nanometer)
     external = openmm.CustomExternalForce("-(fx*x+fy*y+fz*z)")
     for name in ("fx", "fy", "fz"):
@@ -50,12 +53,11 @@ def _trajectory(engine, platform, scheme, steps=100):
     integrator = filaments.create_integrator(
         system, 200.0, scheme=scheme, temperature=0, particle_friction=friction, random_seed=1
     )
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform(platform))
-    context.setPositions(positions)
+    context = new_context(system, positions, integrator, platform)
     tensions = np.concatenate([tension._value for tension in filaments.joint_tensions(context)])
-    energy = context.getState(energy=True).getPotentialEnergy()._value
+    energy = energy_of(context)
     integrator.step(steps)
-    return context.getState(positions=True).getPositions(asNumpy=True)._value - positions._value, tensions, energy
+    return positions_of(context) - positions._value, tensions, energy
 
 
 @pytest.fixture(scope="module", params=["euler", "midpoint"])

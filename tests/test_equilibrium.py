@@ -3,19 +3,11 @@
 from dataclasses import replace
 
 import pytest
-from conftest import ENGINES
-from physics_cases import (
-    CASES,
-    ENGINE_PLATFORMS,
-    KT,
-    TEMPERATURE,
-    Case,
-    exact_means,
-    measured_means,
-    soft_chain,
-)
 
 from openmm_cylchain.theory import chain_mean_square_end_to_end, wlc_mean_square_end_to_end
+from support.equilibrium_cases import CASES, Case, exact_means, measured_means, soft_chain
+from support.platforms import ENGINE_PLATFORMS, ENGINES
+from support.solvent import KT, TEMPERATURE
 
 SIGMAS = 4.0
 # Of the step's own error: an explicit scheme of weak order one makes the variance of a mode of rate lambda too large

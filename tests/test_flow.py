@@ -6,14 +6,15 @@ from dataclasses import replace
 import numpy as np
 import openmm
 import pytest
-from conftest import ENGINES
 from openmm import app, unit
-from physics_cases import ENGINE_PLATFORMS, TEMPERATURE, VISCOSITY
 from scipy.integrate import solve_ivp
-from test_redistribution import _bent_chain, _dense_resistance, _virtual_forces
 
 from openmm_cylchain import F_ACTIN, Filament, Filaments, Flow, InputError
 from openmm_cylchain.mechanics.tension import segment_end_forces
+from support.contexts import forces_of, new_context, positions_of
+from support.dense_mechanics import bent_chain, dense_resistance, virtual_forces
+from support.platforms import ENGINE_PLATFORMS, ENGINES
+from support.solvent import TEMPERATURE, VISCOSITY
 
 RATE = 1e-9  # 1/ps, a thousand per second
 GENERAL = Flow(
@@ -32,16 +33,6 @@ FLOWS = {
 def _velocity(flow, positions):
     gradient = np.array(flow.gradient)
     return np.array([flow.velocity + gradient @ np.subtract(x, flow.origin) for x in positions])
-
-
-def _context(system, integrator, positions, platform="Reference"):
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform(platform))
-    context.setPositions(positions)
-    return context
-
-
-def _positions(context):
-    return context.getState(positions=True).getPositions(asNumpy=True)._value
 
 
 # What a Flow is
@@ -127,9 +118,9 @@ def _segment_in_flow(engine, platform, kind, flow, step, steps):
     filaments.add_straight(kind, 1, [100, 200, 300], [0.8, 0.5, -0.33])
     _, system, positions = filaments.build()
     integrator = filaments.create_integrator(system, step, scheme="midpoint", flow=flow)
-    context = _context(system, integrator, positions, platform)
+    context = new_context(system, positions, integrator, platform)
     integrator.step(steps)
-    return positions._value, _positions(context)
+    return positions._value, positions_of(context)
 
 
 @pytest.mark.parametrize(("engine", "platform", "name"), RUNS)
@@ -177,7 +168,7 @@ def _chains_and_particles(engine, planar=False):
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine=engine)
     shape = [1.0, 1.0, 0.0] if planar else 1.0
     for seed, (segments, clamped) in enumerate([(12, ()), (1, ()), (5, (2,)), (6, (0, 1)), (3, (-1,))]):
-        filaments.add_nodes(F_ACTIN, _bent_chain(F_ACTIN, segments, seed) * shape, clamped, planar=planar)
+        filaments.add_nodes(F_ACTIN, bent_chain(F_ACTIN, segments, seed) * shape, clamped, planar=planar)
     positions = filaments.add_to(topology, system, beads * unit.nanometer)
     pull = openmm.CustomExternalForce("-(fx*x+fy*y+fz*z)")
     for name in ("fx", "fy", "fz"):
@@ -191,7 +182,7 @@ def _chains_and_particles(engine, planar=False):
 
 def _dense_velocities(filament, nodes, forces, flow):
     """v of the mobile degrees of freedom from Z (v - u) = f, with v = 0 for the others."""
-    resistance = _dense_resistance(nodes, filament.type.segment_friction(VISCOSITY, TEMPERATURE), filament.closed)
+    resistance = dense_resistance(nodes, filament.type.segment_friction(VISCOSITY, TEMPERATURE), filament.closed)
     solvent = _velocity(flow, nodes)
     free = np.ones(nodes.shape, dtype=bool)
     free[list(filament.clamped)] = False
@@ -216,11 +207,11 @@ def test_a_step_equals_the_dense_solution(engine, name, scheme, planar):
     integrator = filaments.create_integrator(
         system, step, scheme=scheme, temperature=0, particle_friction=[1e5, 1, 3e5], flow=flow
     )
-    context = _context(system, integrator, positions)
-    start = _positions(context)
-    forces = context.getState(forces=True).getForces(asNumpy=True)._value
+    context = new_context(system, positions, integrator)
+    start = positions_of(context)
+    forces = forces_of(context)
     integrator.step(1)
-    moved = _positions(context) - start
+    moved = positions_of(context) - start
     for filament, indices in zip(filaments, filaments.node_indices):
         nodes, force = start[indices], forces[indices]
         if scheme == "midpoint":
@@ -245,7 +236,7 @@ def test_chains_follow_the_equation_of_motion(engine, name):
     flow = FLOWS[name]
     kind = replace(F_ACTIN, stretching_stiffness=0.1, extension_relaxation_time=None, bending_rigidity=2e4)
     kind = replace(kind, extensional_friction=4 * kind.segment_friction(VISCOSITY, 0).rotational)
-    shape = _bent_chain(kind, 4, 5)
+    shape = bent_chain(kind, 4, 5)
     filament = Filament(kind, shape, ())
 
     def slope(_, flat):
@@ -264,12 +255,12 @@ def test_chains_follow_the_equation_of_motion(engine, name):
     step, steps = 2e6, 500
     # Without noise, the fastest modes are quiet, and need not be resolved.
     integrator = filaments.create_integrator(system, step, scheme="midpoint", flow=flow, checks=False)
-    context = _context(system, integrator, positions)
+    context = new_context(system, positions, integrator)
     integrator.step(steps)
     exact = solve_ivp(slope, (0, steps * step), shape.reshape(-1), method="LSODA", rtol=1e-7, atol=1e-4).y[:, -1]
     moved = np.abs(exact - shape.reshape(-1)).max()
     assert moved > 100
-    assert np.abs(_positions(context).reshape(-1) - exact).max() < 2e-3 * moved
+    assert np.abs(positions_of(context).reshape(-1) - exact).max() < 2e-3 * moved
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -277,9 +268,9 @@ def test_joint_tensions_are_those_in_the_flow(engine):
     """A linear flow changes none of free chains, which it carries along; clamped chains have to hold against it."""
     filaments, system, positions = _chains_and_particles(engine)
     integrator = filaments.create_integrator(system, 1.0, particle_friction=1e5, flow=GENERAL)
-    context = _context(system, integrator, positions)
-    start = _positions(context)
-    forces = context.getState(forces=True).getForces(asNumpy=True)._value
+    context = new_context(system, positions, integrator)
+    start = positions_of(context)
+    forces = forces_of(context)
     tensions = filaments.joint_tensions(context)
     integrator.setFlow(None)
     resting = filaments.joint_tensions(context)
@@ -293,7 +284,7 @@ def test_joint_tensions_are_those_in_the_flow(engine):
         external[1:-1] /= 2
         minus, plus = minus + external[:-1], plus + external[1:]
         if not filament.clamped:
-            _, phi = _virtual_forces(nodes, friction, minus, plus)
+            _, phi = virtual_forces(nodes, friction, minus, plus)
             scale = np.abs(phi).max(initial=1.0)
             assert np.abs(tensions[number]._value - phi).max(initial=0) < 1e-9 * scale
             assert np.abs(resting[number]._value - phi).max(initial=0) < 1e-9 * scale
@@ -302,7 +293,7 @@ def test_joint_tensions_are_those_in_the_flow(engine):
         relative = _dense_velocities(filament, nodes, force, GENERAL) - _velocity(GENERAL, nodes)
         phi = tensions[number]._value
         for segment in range(1, filament.segments - 1):
-            drag = _dense_resistance(nodes[segment : segment + 2], friction) @ relative[segment : segment + 2].reshape(
+            drag = dense_resistance(nodes[segment : segment + 2], friction) @ relative[segment : segment + 2].reshape(
                 -1
             )
             applied = np.concatenate([minus[segment] - phi[segment - 1], plus[segment] + phi[segment]])
@@ -324,9 +315,9 @@ def test_noise_is_that_of_a_resting_solvent(engine):
         filaments.add_equilibrium(F_ACTIN, 6, seed=1)
         _, system, positions = filaments.build()
         integrator = filaments.create_integrator(system, 5e3, random_seed=3, flow=flow)
-        context = _context(system, integrator, positions)
+        context = new_context(system, positions, integrator)
         integrator.step(50)
-        ends.append(_positions(context))
+        ends.append(positions_of(context))
     carried = 50 * 5e3 * velocity
     assert np.abs(ends[1] - ends[0] - carried).max() < 1e-6 * np.abs(carried).max()
     assert np.abs(ends[0] - positions._value).max() > 1.0
@@ -338,29 +329,29 @@ def test_flow_can_change_and_survives_restarts(engine, platform):
     options = {"particle_friction": 1e5, "random_seed": 4}
     integrator = filaments.create_integrator(system, 5e3, flow=GENERAL, **options)
     assert integrator.getFlow() == GENERAL
-    context = _context(system, integrator, positions, platform)
+    context = new_context(system, positions, integrator, platform)
     integrator.step(5)
     checkpoint = context.createCheckpoint()
     integrator.step(5)
-    unbroken = _positions(context)
+    unbroken = positions_of(context)
     other = filaments.create_integrator(system, 5e3, **options)
     assert other.getFlow() == Flow()
-    restarted = _context(system, other, positions, platform)
+    restarted = new_context(system, positions, other, platform)
     restarted.loadCheckpoint(checkpoint)
     assert other.getFlow() == GENERAL
     other.step(5)
-    assert np.array_equal(_positions(restarted), unbroken)
+    assert np.array_equal(positions_of(restarted), unbroken)
 
     context.loadCheckpoint(checkpoint)
     integrator.setFlow(None)
     assert integrator.getFlow().is_at_rest
     integrator.step(5)
-    at_rest = _positions(context)
+    at_rest = positions_of(context)
     assert np.abs(at_rest - unbroken).max() > 1e-3
     context.loadCheckpoint(checkpoint)
     integrator.setFlow(Flow())
     integrator.step(5)
-    assert np.array_equal(_positions(context), at_rest)
+    assert np.array_equal(positions_of(context), at_rest)
     integrator.setFlow(FLOWS["shear"])
     assert integrator.getFlow() == FLOWS["shear"]
 
@@ -371,9 +362,9 @@ def test_copied_integrator_keeps_the_flow(engine):
     integrator = filaments.create_integrator(system, 5e3, particle_friction=1e5, random_seed=4, flow=GENERAL)
     ends = []
     for one in (copy.deepcopy(integrator), integrator):
-        context = _context(system, one, positions)
+        context = new_context(system, positions, one)
         one.step(3)
-        ends.append(_positions(context))
+        ends.append(positions_of(context))
     assert np.array_equal(*ends)
 
 
@@ -391,9 +382,9 @@ def test_noise_does_not_turn_stiff_filaments_faster_in_long_steps(fraction):
     integrator = filaments.create_integrator(
         system, strain / rate / steps, scheme="implicit", random_seed=2, flow=Flow.shear(rate)
     )
-    context = _context(system, integrator, positions, "CPU")
+    context = new_context(system, positions, integrator, "CPU")
     integrator.step(steps)
-    ends = np.array([_positions(context)[[nodes[0], nodes[-1]]] for nodes in filaments.node_indices])
+    ends = np.array([positions_of(context)[[nodes[0], nodes[-1]]] for nodes in filaments.node_indices])
     angles = np.arctan2(*np.diff(ends, axis=1)[:, 0, [2, 0]].T)
     expected = np.arctan2(1.0, 1.0 / np.tan(start) + strain)
     error = angles.std() / np.sqrt(len(angles))

@@ -1,15 +1,15 @@
 """Free segments: rotational relaxation (29) and the passage from anisotropic to isotropic diffusion (30)-(32)."""
 
 import numpy as np
-import openmm
 import pytest
-from conftest import ENGINE_SCHEMES
-from physics_cases import KT, TEMPERATURE, VISCOSITY
 from scipy.optimize import curve_fit
 
 from openmm_cylchain import F_ACTIN, Filaments, FilamentType
 from openmm_cylchain.mechanics.friction import rotational_relaxation_time
 from openmm_cylchain.theory import free_segment_mean_square_displacement, mean_orientation
+from support.contexts import new_context, positions_of
+from support.platforms import ENGINE_SCHEMES
+from support.solvent import KT, TEMPERATURE, VISCOSITY
 
 # Orientation and centre do not depend on the elastic potential, so a soft segment allows long steps.
 SEGMENT = FilamentType(
@@ -32,13 +32,12 @@ def _run(count, engine, scheme, samples=30, duration=2.0, steps_per_sample=32):
     _, system, positions = filaments.build()
     step = duration * TAU / (samples * steps_per_sample)
     integrator = filaments.create_integrator(system, step, scheme=scheme, random_seed=8)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
-    context.setPositions(positions)
+    context = new_context(system, positions, integrator)
     start = positions._value.reshape(count, 2, 3).mean(axis=1)
     times, tangents, displacements = [], [], []
     for sample in range(samples):
         integrator.step(steps_per_sample)
-        ends = context.getState(positions=True).getPositions(asNumpy=True)._value.reshape(count, 2, 3)
+        ends = positions_of(context).reshape(count, 2, 3)
         difference = ends[:, 1] - ends[:, 0]
         times.append((sample + 1) * steps_per_sample * step)
         tangents.append(difference / np.linalg.norm(difference, axis=1)[:, None])

@@ -6,11 +6,13 @@ import numpy as np
 import openmm
 import pytest
 from openmm import unit
-from physics_cases import CASES, KT, TEMPERATURE, VISCOSITY, Case, exact_means, measured_means
 
 from openmm_cylchain import F_ACTIN, MICROTUBULE, Filaments, InputError, InstabilityError
 from openmm_cylchain.dynamics.schemes import IMPLICIT_SCHEMES
 from openmm_cylchain.dynamics.time_step import recommended_time_step
+from support.contexts import energy_of, new_context, positions_of
+from support.equilibrium_cases import CASES, Case, exact_means, measured_means
+from support.solvent import KT, TEMPERATURE, VISCOSITY
 
 SIGMAS = 4.0
 # Of the energies, at the recommended step.
@@ -30,13 +32,7 @@ def _context(
     integrator = filaments.create_integrator(
         system, step, scheme=scheme, temperature=temperature, random_seed=seed, checks=checks
     )
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform(platform), properties or {})
-    context.setPositions(positions)
-    return context
-
-
-def _positions(context):
-    return context.getState(positions=True).getPositions(asNumpy=True)._value
+    return new_context(system, positions, integrator, platform, properties)
 
 
 def _actin(chains=3, segments=8, **options):
@@ -108,7 +104,7 @@ def test_rods_turn_as_they_should_however_stiff(micrometers, segments, scheme):
     ends = np.array(filaments.node_indices)[:, [0, -1]]
     axes = []
     for _ in range(41):
-        first, last = _positions(context)[ends].transpose(1, 0, 2)
+        first, last = positions_of(context)[ends].transpose(1, 0, 2)
         axes.append((last - first) / np.linalg.norm(last - first, axis=1)[:, None])
         context.getIntegrator().step(1)
     missing = 1 - np.sum(np.array(axes[1:]) * axes[:-1], axis=2).ravel()
@@ -130,7 +126,7 @@ def test_relaxation_without_noise_converges_with_order_one():
         filaments.add_nodes(F_ACTIN, nodes)
         context = _context(filaments, 200 * MICROSECOND / steps, temperature=0)
         context.getIntegrator().step(steps)
-        ends.append(_positions(context))
+        ends.append(positions_of(context))
     coarse, fine = (np.abs(end - ends[2]).max() for end in ends[:2])
     assert coarse < 0.02 * np.abs(ends[2] - nodes).max()
     assert fine < 0.6 * coarse
@@ -152,11 +148,10 @@ def test_external_forces_drag_a_filament():
     system.addForce(force)
     step = 10 * MICROSECOND
     integrator = filaments.create_integrator(system, step, scheme="implicit", temperature=0)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
-    context.setPositions(positions)
-    start = _positions(context)
+    context = new_context(system, positions, integrator)
+    start = positions_of(context)
     integrator.step(20)
-    moved = (_positions(context) - start).mean(axis=0) / (20 * step)
+    moved = (positions_of(context) - start).mean(axis=0) / (20 * step)
     friction = F_ACTIN.segment_friction(VISCOSITY, TEMPERATURE)
     assert moved[0] == pytest.approx(0.01 / friction.parallel, rel=1e-3)
     assert moved[1] == pytest.approx(0.01 / friction.perpendicular, rel=1e-3)
@@ -181,16 +176,16 @@ def test_steps_at_once_threads_and_restarts_do_not_matter(platform, scheme):
     for context in contexts[3:]:
         context.getIntegrator().step(40)
     for context in contexts[1:]:
-        assert np.array_equal(_positions(context), _positions(contexts[0]))
+        assert np.array_equal(positions_of(context), positions_of(contexts[0]))
 
 
 def test_fixed_nodes_stay_and_pass_nothing_on(scheme):
     filaments = _actin(chains=1, segments=8, clamped=[3])
     context = _context(filaments, 50 * MICROSECOND, scheme=scheme)
-    start = _positions(context)
+    start = positions_of(context)
     context.getIntegrator().step(30)
-    assert np.array_equal(_positions(context)[3], start[3])
-    assert np.all(np.abs(_positions(context) - start)[[0, 1, 2, 4, 5, 6, 7, 8]].max(axis=1) > 1)
+    assert np.array_equal(positions_of(context)[3], start[3])
+    assert np.all(np.abs(positions_of(context) - start)[[0, 1, 2, 4, 5, 6, 7, 8]].max(axis=1) > 1)
 
 
 def test_shorter_chains_in_a_pack_move_as_they_would_alone():
@@ -204,25 +199,25 @@ def test_shorter_chains_in_a_pack_move_as_they_would_alone():
     alone.add_equilibrium(F_ACTIN, 10, seed=0)
     other = _context(alone, 50 * MICROSECOND)
     other.getIntegrator().step(10)
-    assert np.allclose(_positions(context)[:11], _positions(other), rtol=0, atol=1e-6)
+    assert np.allclose(positions_of(context)[:11], positions_of(other), rtol=0, atol=1e-6)
 
 
 def test_a_hard_pull_is_taken_in_parts(scheme):
     """A node that is moved by two segment lengths between steps: the step is divided, and energy falls."""
     filaments = _actin(chains=1, segments=12)
     context = _context(filaments, 50 * MICROSECOND, temperature=0, scheme=scheme)
-    moved = _positions(context)
+    moved = positions_of(context)
     moved[6] += [0, 0, 700]
     context.setPositions(moved)
-    before = context.getState(energy=True).getPotentialEnergy()._value
+    before = energy_of(context)
     for _ in range(20):
         try:
             context.getIntegrator().step(1)
         except InstabilityError as error:
             assert "Filament 0 (ACT)" in str(error)
             return
-        after = context.getState(energy=True).getPotentialEnergy()._value
-        assert np.isfinite(_positions(context)).all()
+        after = energy_of(context)
+        assert np.isfinite(positions_of(context)).all()
         assert after < before
         before = after
     assert before < 50 * KT
@@ -247,18 +242,17 @@ def test_filaments_that_are_pulled_and_pushed_hard_come_back(direction, nanonewt
     system.addForce(force)
     # Kicked so that steps are divided.
     integrator = filaments.create_integrator(system, 5 * MICROSECOND, scheme="implicit", random_seed=1, checks=False)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
-    context.setPositions(positions)
+    context = new_context(system, positions, integrator)
     try:
         integrator.step(100)
     except InstabilityError as error:
         assert "the equations of the implicit scheme cannot be solved" in str(error)
-        assert np.isfinite(_positions(context)).all()
+        assert np.isfinite(positions_of(context)).all()
         assert nanonewton > 1
         return
     context.setParameter("pull", 0.0)
     integrator.step(2000)
-    energy = context.getState(energy=True).getPotentialEnergy()._value / KT
+    energy = energy_of(context) / KT
     expected = 24 * (0.5 * 16 + 0.98 * 15)
     assert abs(energy - expected) < 4 * np.sqrt(expected)
 
@@ -277,9 +271,9 @@ def test_segments_that_are_folded_back_open_or_stop_the_run(model, angle):
         context.getIntegrator().step(1500)
     except InstabilityError as error:
         assert "Filament 0 (ACT) has blown up" in str(error)
-        assert np.array_equal(_positions(context), nodes)
+        assert np.array_equal(positions_of(context), nodes)
         return
-    tangents = np.diff(_positions(context), axis=0)
+    tangents = np.diff(positions_of(context), axis=0)
     lengths = np.linalg.norm(tangents, axis=1)
     assert np.all(np.abs(lengths - 360) < 10)
     cosines = np.sum(tangents[1:] * tangents[:-1], axis=1) / (lengths[1:] * lengths[:-1])
@@ -294,12 +288,11 @@ def test_forces_that_are_not_finite_are_named_and_nothing_moves():
     force.addParticle(12, [])
     system.addForce(force)
     integrator = filaments.create_integrator(system, MICROSECOND, scheme="implicit", random_seed=1)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
-    context.setPositions(positions)
-    start = _positions(context)
+    context = new_context(system, positions, integrator)
+    start = positions_of(context)
     with pytest.raises(InstabilityError, match=r"Filament 1 \(ACT\) has blown up at segment 2 in step 1"):
         integrator.step(5)
-    assert np.array_equal(_positions(context), start)
+    assert np.array_equal(positions_of(context), start)
 
 
 def test_reported_forces_are_those_of_all_forces():
@@ -308,7 +301,7 @@ def test_reported_forces_are_those_of_all_forces():
     context.getIntegrator().step(3)
     state = context.getState(forces=True, energy=True)
     other = _context(_actin(chains=1), MICROSECOND)
-    other.setPositions(_positions(context))
+    other.setPositions(positions_of(context))
     expected = other.getState(forces=True, energy=True)
     assert np.array_equal(state.getForces(asNumpy=True)._value, expected.getForces(asNumpy=True)._value)
     assert np.abs(expected.getForces(asNumpy=True)._value).max() > 0

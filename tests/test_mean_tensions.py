@@ -5,12 +5,12 @@ import copy
 import numpy as np
 import openmm
 import pytest
-from openmm import app
-from physics_cases import TEMPERATURE, VISCOSITY
 
 from openmm_cylchain import F_ACTIN, Filaments, Flow, InputError
 from openmm_cylchain.mechanics.geometry import regular_polygon, segment_vectors
 from openmm_cylchain.output.reporters import TensionReporter
+from support.contexts import new_context, new_simulation, positions_of
+from support.solvent import TEMPERATURE, VISCOSITY
 
 
 def context_of(filaments, step=None, pull=0.0, recording=True, **options):
@@ -24,8 +24,7 @@ def context_of(filaments, step=None, pull=0.0, recording=True, **options):
         system.addForce(force)
     step = filaments.recommended_time_step(system=system) if step is None else step
     integrator = filaments.create_integrator(system, step, random_seed=3, checks=False, **options)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
-    context.setPositions(positions)
+    context = new_context(system, positions, integrator)
     if recording:
         integrator.setRecordsTensions(True)
     return context, integrator
@@ -89,9 +88,9 @@ def test_without_noise_tension_is_elastic_force_and_friction_of_the_length(what)
     step = 100.0
     filaments, _, pull = filaments_that_are(what)
     context, integrator = context_of(filaments, step, pull, temperature=0.0)
-    before = context.getState(positions=True).getPositions(asNumpy=True)._value
+    before = positions_of(context)
     integrator.step(1)
-    after = context.getState(positions=True).getPositions(asNumpy=True)._value
+    after = positions_of(context)
     for filament, nodes, found in zip(filaments, filaments.node_indices, filaments.mean_tensions(context)):
         friction = filament.type.segment_friction(VISCOSITY, TEMPERATURE, filament.segments).extensional
         start, end = (np.linalg.norm(segment_vectors(x[nodes], filament.closed), axis=1) for x in (before, after))
@@ -130,7 +129,7 @@ def test_joints_between_two_traps_carry_the_force_of_the_traps():
     for _ in range(steps):
         integrator.step(1)
         forces = forces + np.array([part._value for part in filaments.mean_joint_tensions(context)])[:, :, 0] / steps
-        positions = context.getState(positions=True).getPositions(asNumpy=True)._value
+        positions = positions_of(context)
         trap = trap + stiffness * (length + 30 - positions[last, 0]) / steps
     error = standard_error(forces - trap[:, None])
     assert error.max() < 0.0125 * trap.mean()
@@ -146,7 +145,7 @@ def test_recording_changes_no_trajectory_and_ends_with_the_last_step():
         context, integrator = context_of(filaments, recording=recording)
         for steps in calls:
             integrator.step(steps)
-        ends.append(context.getState(positions=True).getPositions(asNumpy=True)._value)
+        ends.append(positions_of(context))
         if recording:
             values.append(np.concatenate([part._value for part in filaments.mean_joint_tensions(context)]))
     assert all(np.array_equal(ends[0], end) for end in ends)
@@ -161,8 +160,7 @@ def test_reporter_of_means(tmp_path):
     topology, system, positions = filaments.build()
     step = filaments.recommended_time_step()
     integrator = filaments.create_integrator(system, step, random_seed=3)
-    simulation = app.Simulation(topology, system, integrator, openmm.Platform.getPlatform("Reference"))
-    simulation.context.setPositions(positions)
+    simulation = new_simulation(topology, system, positions, integrator)
     summary = TensionReporter(tmp_path / "tension.csv", 5, filaments, mean=True)
     joints = TensionReporter(None, 5, filaments, joints=True, mean=True)
     simulation.reporters += [summary, joints]

@@ -12,6 +12,7 @@ from openmm_cylchain import DSDNA, F_ACTIN, Filaments, InputError, InstabilityEr
 from openmm_cylchain.dynamics.schemes import SCHEMES
 from openmm_cylchain.engines import compiled as native
 from openmm_cylchain.engines.compiled import CylinderChainForce, CylinderChainIntegrator
+from support.contexts import energy_of, new_context, positions_of
 
 VISCOSITY = 1029.8
 TEMPERATURE = 310.0
@@ -45,15 +46,9 @@ def context_of(
         particle_friction=5.0e4,
         random_seed=seed,
     )
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatformByName(platform), properties)
     more = np.arange(3.0 * others).reshape(-1, 3)
-    context.setPositions(np.concatenate([positions._value, more]))
-    return context, integrator
-
-
-def positions_of(context):
-    """Positions in nm."""
-    return context.getState(positions=True).getPositions(asNumpy=True)._value
+    positions = np.concatenate([positions._value, more])
+    return new_context(system, positions, integrator, platform, properties), integrator
 
 
 @pytest.mark.parametrize("platform", PLATFORMS)
@@ -205,7 +200,7 @@ def test_threads_and_platforms_do_not_matter():
         filaments = filaments_of("compiled", chains=40)
         context, integrator = context_of(filaments, platform, others=200, **properties)
         integrator.step(20)
-        energy = context.getState(energy=True).getPotentialEnergy()._value
+        energy = energy_of(context)
         results.append((positions_of(context), energy))
     for positions, energy in results[1:]:
         assert np.array_equal(positions, results[0][0])
@@ -232,8 +227,7 @@ def test_virtual_sites_follow_and_massless_particles_stay():
     site, fixed = system.addParticle(0.0), system.addParticle(0.0)
     system.setVirtualSite(site, openmm.TwoParticleAverageSite(0, 1, 0.25, 0.75))
     integrator = filaments.create_integrator(system, STEP["F_ACTIN"], random_seed=1)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatformByName("Reference"))
-    context.setPositions(np.concatenate([positions._value, np.ones((2, 3))]))
+    context = new_context(system, np.concatenate([positions._value, np.ones((2, 3))]), integrator)
     integrator.step(3)
     after = positions_of(context)
     assert after[site] == pytest.approx(0.25 * after[0] + 0.75 * after[1])
@@ -275,8 +269,7 @@ def test_blow_up_names_filament_segment_and_step(scheme, excess):
     force.addParticle(int(filaments.node_indices[1][3]))
     system.addForce(force)
     integrator = filaments.create_integrator(system, STEP["F_ACTIN"], scheme=scheme, random_seed=1)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatformByName("CPU"))
-    context.setPositions(positions)
+    context = new_context(system, positions, integrator, "CPU")
     integrator.step(2)
     before = positions_of(context)
     for pull, what in ((1e12, excess), (np.nan, "not finite")):

@@ -5,10 +5,11 @@ import copy
 import numpy as np
 import openmm
 import pytest
-from conftest import ENGINE_SCHEMES
-from physics_cases import KT, TEMPERATURE, VISCOSITY
 
 from openmm_cylchain import F_ACTIN, Filaments, FilamentType, InputError, stokes_friction
+from support.contexts import new_context, positions_of
+from support.platforms import ENGINE_SCHEMES
+from support.solvent import KT, TEMPERATURE, VISCOSITY
 
 # A segment that turns little and stretches little in a step.
 SOFT = FilamentType(
@@ -34,14 +35,8 @@ def context_of(engine, scheme="midpoint", step=STEP, level=0, seed=5, count=COUN
     integrator = filaments.create_integrator(system, step, scheme=scheme, particle_friction=friction, random_seed=seed)
     if level:
         integrator.setPathLevel(level)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
-    context.setPositions(np.concatenate([positions._value, np.zeros((count, 3))]))
+    context = new_context(system, np.concatenate([positions._value, np.zeros((count, 3))]), integrator)
     return context, integrator
-
-
-def positions_of(context):
-    """Positions in nm."""
-    return context.getState(positions=True).getPositions(asNumpy=True)._value
 
 
 def moves(context, integrator, steps=1):

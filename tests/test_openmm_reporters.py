@@ -5,35 +5,13 @@ import csv
 import mdtraj
 import mdtraj.reporters
 import numpy as np
-import openmm
 import pytest
 from openmm import app, unit
-from test_periodic import CUBIC, TRICLINIC, crossing, particles_of
+
+from support.contexts import close_reporters, energy_of, positions_of
+from support.periodic_systems import CUBIC, STEP_SIZE, TRICLINIC, crossing_simulation, particles_of
 
 STEPS = 4
-STEP_SIZE = 5e3  # ps
-
-
-def simulation_of(engine, vectors=CUBIC, seed=4):
-    filaments, topology, system, positions = crossing(engine, vectors)
-    integrator = filaments.create_integrator(
-        system, STEP_SIZE, scheme="midpoint", particle_friction=5e5, random_seed=seed
-    )
-    simulation = app.Simulation(topology, system, integrator, openmm.Platform.getPlatform("Reference"))
-    # Several boxes away from the origin, and more than a micrometre.
-    simulation.context.setPositions(positions + 4000 * unit.nanometer)
-    return filaments, simulation
-
-
-def frame(simulation, wrapped):
-    state = simulation.context.getState(positions=True, enforcePeriodicBox=wrapped)
-    return state.getPositions(asNumpy=True).value_in_unit(unit.nanometer)
-
-
-def close(simulation):
-    """Remove the reporters so that their files are complete on disk."""
-    while simulation.reporters:
-        getattr(simulation.reporters.pop(), "close", lambda: None)()
 
 
 # What writes the file, and the largest error of a coordinate of up to 10000 nm: half the last digit that the format
@@ -56,9 +34,11 @@ ALWAYS_WRAPPED = ("mdtraj.dcd", "mdtraj.xtc", "mdtraj.nc")  # where forces are p
 @pytest.mark.parametrize("vectors", [CUBIC, TRICLINIC], ids=["cubic", "triclinic"])
 @pytest.mark.parametrize("wrapped", [False, True])
 def test_trajectories_read_back(engine, wrapped, vectors, tmp_path):
-    filaments, simulation = simulation_of(engine, vectors)
+    filaments, simulation = crossing_simulation(engine, vectors)
     with open(tmp_path / "topology.cif", "w") as file:
-        app.PDBxFile.writeFile(simulation.topology, frame(simulation, False) * unit.nanometer, file, keepIds=True)
+        app.PDBxFile.writeFile(
+            simulation.topology, positions_of(simulation.context) * unit.nanometer, file, keepIds=True
+        )
     names = [name for name in TRAJECTORIES if wrapped or name not in ALWAYS_WRAPPED]
     for name in names:
         options = {} if name in ALWAYS_WRAPPED else {"enforcePeriodicBox": wrapped}
@@ -66,8 +46,8 @@ def test_trajectories_read_back(engine, wrapped, vectors, tmp_path):
     expected = []
     for _ in range(STEPS):
         simulation.step(1)
-        expected.append(frame(simulation, wrapped))
-    close(simulation)
+        expected.append(positions_of(simulation.context, wrapped))
+    close_reporters(simulation)
     topology = mdtraj.load(str(tmp_path / "topology.cif")).topology
     for name in names:
         tolerance = TRAJECTORIES[name][1]
@@ -88,15 +68,15 @@ def test_trajectories_read_back(engine, wrapped, vectors, tmp_path):
 
 
 def test_wrapping_is_the_default_where_forces_are_periodic(engine, tmp_path):
-    _, simulation = simulation_of(engine)
+    _, simulation = crossing_simulation(engine)
     names = ["openmm.dcd", "mdtraj.dcd"]
     for name in names:
         simulation.reporters.append(TRAJECTORIES[name][0](str(tmp_path / name), 1))
     simulation.step(1)
-    close(simulation)
+    close_reporters(simulation)
     for name in names:
         read = mdtraj.load(str(tmp_path / name), top=mdtraj.Topology.from_openmm(simulation.topology))
-        assert np.abs(read.xyz[0] - frame(simulation, True)).max() < SINGLE_PRECISION
+        assert np.abs(read.xyz[0] - positions_of(simulation.context, True)).max() < SINGLE_PRECISION
 
 
 @pytest.mark.parametrize("checkpoint", ["binary", "state"])
@@ -110,22 +90,22 @@ def test_files_go_on_after_a_restart(engine, checkpoint, tmp_path):
             app.CheckpointReporter(str(tmp_path / f"{stem}.chk"), 3, writeState=checkpoint == "state"),
         ]
 
-    _, unbroken = simulation_of(engine)
+    _, unbroken = crossing_simulation(engine)
     add_reporters(unbroken, "unbroken")
     unbroken.step(8)
-    close(unbroken)
-    _, first = simulation_of(engine)
+    close_reporters(unbroken)
+    _, first = crossing_simulation(engine)
     add_reporters(first, "parts")
     # Step 5 is lost: the last checkpoint is that of step 3, and the last frame that of step 2.
     first.step(3)
-    close(first)
+    close_reporters(first)
     first.step(2)
-    _, second = simulation_of(engine)
+    _, second = crossing_simulation(engine)
     getattr(second, "loadState" if checkpoint == "state" else "loadCheckpoint")(str(tmp_path / "parts.chk"))
     assert second.currentStep == 3
     add_reporters(second, "parts", append=True)
     second.step(5)
-    close(second)
+    close_reporters(second)
 
     topology = mdtraj.Topology.from_openmm(unbroken.topology)
     for suffix in ("dcd", "xtc"):
@@ -133,18 +113,18 @@ def test_files_go_on_after_a_restart(engine, checkpoint, tmp_path):
         assert len(whole) == 4
         assert np.array_equal(parts.xyz, whole.xyz), suffix
     assert (tmp_path / "parts.csv").read_text() == (tmp_path / "unbroken.csv").read_text()
-    assert np.array_equal(frame(second, False), frame(unbroken, False))
+    assert np.array_equal(positions_of(second.context), positions_of(unbroken.context))
 
 
 def test_state_data(engine, tmp_path):
-    filaments, simulation = simulation_of(engine)
+    filaments, simulation = crossing_simulation(engine)
     names = ["step", "time", "potentialEnergy", "kineticEnergy", "totalEnergy", "temperature", "volume", "density"]
     path = tmp_path / "data.csv"
     simulation.reporters.append(app.StateDataReporter(str(path), 2, **dict.fromkeys(names, True)))
     simulation.step(2)
     (row,) = csv.reader(path.read_text().splitlines()[1:])
     values = dict(zip(names, map(float, row)))
-    energy = simulation.context.getState(energy=True).getPotentialEnergy()._value
+    energy = energy_of(simulation.context)
     assert values["step"] == 2 and values["time"] == 2 * STEP_SIZE
     assert values["potentialEnergy"] == values["totalEnergy"] == pytest.approx(energy)
     assert values["kineticEnergy"] == 0
@@ -156,10 +136,10 @@ def test_state_data(engine, tmp_path):
 
 def test_pdb_files_lose_digits_beyond_a_micrometre_and_fail_beyond_ten_millimetres(tmp_path):
     """README says so: coordinates have eight characters, in angstrom, and OpenMM cuts off what is longer."""
-    _, simulation = simulation_of("portable")
+    _, simulation = crossing_simulation("portable")
     for shift, error in ((0.0, 1e-3), (2e4, 1e-2), (1e6, 0.1)):
         path = tmp_path / f"{shift:.0f}.pdb"
-        positions = frame(simulation, False) + shift
+        positions = positions_of(simulation.context) + shift
         with open(path, "w") as file:
             app.PDBFile.writeFile(simulation.topology, positions * unit.nanometer, file)
         read = app.PDBFile(str(path)).getPositions(asNumpy=True)._value

@@ -4,16 +4,14 @@ import mdtraj
 import numpy as np
 import openmm
 import pytest
-from conftest import ENGINE_SCHEMES
-from openmm import app, unit
-from physics_cases import ENGINE_PLATFORMS, VISCOSITY
+from openmm import unit
 
 from openmm_cylchain import F_ACTIN, Filaments, InputError, InstabilityError
 from openmm_cylchain.systems.periodic import make_trajectory_whole, make_whole, remove_jumps
-
-CUBIC = 1500.0 * np.eye(3)
-TRICLINIC = np.array([[1500.0, 0.0, 0.0], [400.0, 1400.0, 0.0], [-600.0, 500.0, 1600.0]])
-BEADS = 4
+from support.contexts import new_context, positions_of
+from support.periodic_systems import BEADS, CUBIC, TRICLINIC, crossing_filaments, particles_of
+from support.platforms import ENGINE_PLATFORMS, ENGINE_SCHEMES
+from support.solvent import VISCOSITY
 
 
 def wrapped_one_by_one(positions, vectors):
@@ -30,59 +28,18 @@ def lattice_coordinates(differences, vectors):
     return np.linalg.solve(vectors.T, np.asarray(differences).T).T
 
 
-def crossing(engine, vectors):
-    """Three filaments of 2.9 um with attachment points among beads, dragged along x in a box of 1.5 um."""
-    topology, system = app.Topology(), openmm.System()
-    chain = topology.addChain()
-    for _ in range(BEADS):
-        topology.addAtom("B", None, topology.addResidue("BEA", chain))
-        system.addParticle(1e5)
-    system.setDefaultPeriodicBoxVectors(*vectors)
-    topology.setPeriodicBoxVectors(vectors * unit.nanometer)
-    filaments = Filaments(VISCOSITY, 310, engine)
-    for number in range(3):
-        filaments.add_equilibrium(F_ACTIN, 8, seed=number, start=[300 * number, 100, 50])
-        filaments.add_attachment(number, segment=3, fraction=0.3)
-        filaments.add_attachment(number, arc_length=8 * 360)
-    beads = 1400 * np.random.default_rng(2).uniform(size=(BEADS, 3))
-    positions = filaments.add_to(topology, system, beads)
-    repulsion = openmm.CustomNonbondedForce("20*(1-r/100)^2")
-    repulsion.setNonbondedMethod(openmm.CustomNonbondedForce.CutoffPeriodic)
-    repulsion.setCutoffDistance(100.0)
-    for _ in range(system.getNumParticles()):
-        repulsion.addParticle([])
-    repulsion.addInteractionGroup(range(BEADS), range(system.getNumParticles()))
-    system.addForce(repulsion)
-    drift = openmm.CustomExternalForce("-10000*x")
-    for particle in range(system.getNumParticles()):
-        if not system.isVirtualSite(particle):
-            drift.addParticle(particle, [])
-    system.addForce(drift)
-    return filaments, topology, system, positions
-
-
-def new_context(engine, platform, vectors):
-    filaments, topology, system, positions = crossing(engine, vectors)
+def crossing_context(engine, platform, vectors):
+    filaments, topology, system, positions = crossing_filaments(engine, vectors)
     integrator = filaments.create_integrator(system, 5e3, scheme="midpoint", particle_friction=5e5, random_seed=4)
     precision = {"Precision": "mixed"} if platform == "OpenCL" else {}
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform(platform), precision)
-    context.setPositions(positions)
+    context = new_context(system, positions, integrator, platform, precision)
     return filaments, topology, integrator, context
-
-
-def positions_of(context, wrapped=False):
-    return context.getState(positions=True, enforcePeriodicBox=wrapped).getPositions(asNumpy=True)._value
-
-
-def particles_of(filaments):
-    """Particles of each filament, attachment points included."""
-    return [np.arange(nodes[0], nodes[-1] + 3) for nodes in filaments.node_indices]
 
 
 @pytest.mark.parametrize("vectors", [CUBIC, TRICLINIC], ids=["cubic", "triclinic"])
 @pytest.mark.parametrize(("engine", "platform"), ENGINE_PLATFORMS)
 def test_wrapping_shifts_whole_filaments_and_restarts_do_not_jump(engine, platform, vectors):
-    filaments, _, integrator, context = new_context(engine, platform, vectors)
+    filaments, _, integrator, context = crossing_context(engine, platform, vectors)
     start = positions_of(context)
     integrator.step(60)
     checkpoint = context.createCheckpoint()
@@ -99,7 +56,7 @@ def test_wrapping_shifts_whole_filaments_and_restarts_do_not_jump(engine, platfo
     integrator.step(20)
     end = positions_of(context)
     for what, restart in (("wrapped", wrapped), ("one by one", wrapped_one_by_one(wrapped, vectors))):
-        again, _, other, context = new_context(engine, platform, vectors)
+        again, _, other, context = crossing_context(engine, platform, vectors)
         context.loadCheckpoint(checkpoint)
         context.setPositions(make_whole(restart, again, context.getState().getPeriodicBoxVectors()))
         other.step(20)
@@ -108,7 +65,7 @@ def test_wrapping_shifts_whole_filaments_and_restarts_do_not_jump(engine, platfo
             # The drift has no images, but it is the same everywhere.
             assert np.abs(shift[particles] - np.round(shift[particles[0]])).max() < 2e-5, what
     for what in ("checkpoint", "state"):
-        _, _, other, context = new_context(engine, platform, vectors)
+        _, _, other, context = crossing_context(engine, platform, vectors)
         if what == "checkpoint":
             context.loadCheckpoint(checkpoint)
         else:
@@ -119,10 +76,9 @@ def test_wrapping_shifts_whole_filaments_and_restarts_do_not_jump(engine, platfo
 
 @pytest.mark.parametrize("engine, scheme", ENGINE_SCHEMES)
 def test_torn_filaments_are_refused_with_advice(engine, scheme):
-    filaments, _, system, positions = crossing(engine, CUBIC)
+    filaments, _, system, positions = crossing_filaments(engine, CUBIC)
     integrator = filaments.create_integrator(system, 5e3, scheme=scheme, particle_friction=1e4)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
-    context.setPositions(positions)
+    context = new_context(system, positions, integrator)
     integrator.step(1)
     context.setPositions(wrapped_one_by_one(positions._value, CUBIC))
     error, what = (InputError, "is torn") if engine == "compiled" else (InstabilityError, "has blown up")
@@ -134,7 +90,7 @@ def test_torn_filaments_are_refused_with_advice(engine, scheme):
 
 @pytest.mark.parametrize("vectors", [CUBIC, TRICLINIC], ids=["cubic", "triclinic"])
 def test_make_whole(vectors):
-    filaments, topology, system, positions = crossing(None, vectors)
+    filaments, topology, system, positions = crossing_filaments(None, vectors)
     torn = wrapped_one_by_one(positions._value, vectors)
     assert np.linalg.norm(np.diff(torn[filaments.node_indices[0]], axis=0), axis=1).max() > 1000
     for box in (vectors, topology.getPeriodicBoxVectors(), system.getDefaultPeriodicBoxVectors(), vectors.tolist()):
@@ -151,7 +107,7 @@ def test_make_whole(vectors):
 
 
 def test_make_whole_takes_frames_with_boxes_of_their_own():
-    filaments, _, _, positions = crossing(None, CUBIC)
+    filaments, _, _, positions = crossing_filaments(None, CUBIC)
     boxes = np.array([CUBIC, 1.1 * TRICLINIC])
     torn = np.array([wrapped_one_by_one(positions._value, box) for box in boxes])
     whole = make_whole(torn, filaments, boxes)._value
@@ -164,7 +120,7 @@ def test_make_whole_takes_frames_with_boxes_of_their_own():
 
 def _trajectory(vectors, frames):
     # Filaments that fly apart by 400 nm a frame, wrapped one particle after the other; and as they are.
-    filaments, topology, _, positions = crossing(None, vectors)
+    filaments, topology, _, positions = crossing_filaments(None, vectors)
     steps = np.zeros((frames, len(positions), 3))
     for number, particles in enumerate(particles_of(filaments)):
         steps[:, particles] = 400.0 * np.arange(frames)[:, None, None] * np.eye(3)[number]
@@ -192,7 +148,7 @@ def test_trajectories(vectors):
 
 
 def test_bad_input_is_refused():
-    filaments, topology, _, positions = crossing(None, CUBIC)
+    filaments, topology, _, positions = crossing_filaments(None, CUBIC)
     for box, message in (
         (720 * np.eye(3), r"Filament 0 \(ACT\) at rest: segment 0 is 360 nm long, and the box 720 nm wide"),
         (np.diag([1500, 1500, 0]), "The box must be wider than zero"),

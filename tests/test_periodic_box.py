@@ -6,11 +6,12 @@ Noise depends on the seed and the step alone, so platforms can be compared traje
 import numpy as np
 import openmm
 import pytest
-from conftest import PLATFORMS
 from openmm import app, unit
-from physics_cases import VISCOSITY
 
 from openmm_cylchain import F_ACTIN, Filaments, stokes_friction
+from support.contexts import new_context
+from support.platforms import PLATFORMS
+from support.solvent import VISCOSITY
 
 BOX = 1500.0
 STEPS = 600
@@ -54,8 +55,7 @@ def _run(platform, precision, scheme, steps=STEPS):
         system, 5e3, scheme=scheme, particle_friction=stokes_friction(60, VISCOSITY), random_seed=4
     )
     properties = {"Precision": precision} if precision else {}
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform(platform), properties)
-    context.setPositions(positions)
+    context = new_context(system, positions, integrator, platform, properties)
     integrator.step(steps)
     return filaments, positions._value, context.getState(positions=True, energy=True)
 

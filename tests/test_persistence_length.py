@@ -6,7 +6,6 @@ import pickle
 from dataclasses import replace
 
 import numpy as np
-import openmm
 import pytest
 from openmm import unit
 from scipy.integrate import quad
@@ -14,6 +13,7 @@ from scipy.integrate import quad
 from openmm_cylchain import DSDNA, F_ACTIN, MICROTUBULE, EndCorrections, Filaments, FilamentType, InputError, theory
 from openmm_cylchain.filaments.equilibrium import JointAngleDistribution, PlanarJointAngleDistribution, draw_chain
 from openmm_cylchain.filaments.joint_calibration import calibrated_stiffness, tangent_decorrelation
+from support.contexts import new_context, positions_of
 
 TEMPERATURE = 310.0
 KT = 8.31446262e-3 * TEMPERATURE
@@ -253,13 +253,12 @@ def test_simulations_keep_the_persistence_length(kind, length):
     _, system, positions = filaments.build()
     step = filaments.recommended_time_step().step
     integrator = filaments.create_integrator(system, step, random_seed=3)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("CPU"), {"Threads": "1"})
-    context.setPositions(positions)
+    context = new_context(system, positions, integrator, "CPU", {"Threads": "1"})
     integrator.step(100)
     bends = []
     for _ in range(20):
         integrator.step(20)
-        nodes = context.getState(positions=True).getPositions(asNumpy=True)._value.reshape(chains, segments + 1, 3)
+        nodes = positions_of(context).reshape(chains, segments + 1, 3)
         tangents = np.diff(nodes, axis=1)
         tangents /= np.linalg.norm(tangents, axis=2)[..., None]
         bends.append(0.5 * np.sum(np.diff(tangents, axis=1) ** 2, axis=2).mean(axis=1))

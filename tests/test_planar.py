@@ -5,28 +5,20 @@ from dataclasses import replace
 import numpy as np
 import openmm
 import pytest
-from conftest import ENGINES
 from openmm import unit
-from physics_cases import CASES, ENGINE_PLATFORMS, KT, TEMPERATURE, VISCOSITY, time_step
 from scipy.integrate import quad
-from test_redistribution import _bent_chain, _dense_resistance
 
 from openmm_cylchain import F_ACTIN, Filaments, InputError, theory
+from support.contexts import new_context, positions_of
+from support.dense_mechanics import bent_chain, dense_resistance
+from support.equilibrium_cases import CASES, time_step
+from support.platforms import ENGINE_PLATFORMS, ENGINES
+from support.solvent import KT, TEMPERATURE, VISCOSITY
 
 SIGMAS = 4.0
 FRICTION = F_ACTIN.segment_friction(VISCOSITY, TEMPERATURE)
 # The actin filaments of Chandran and Mofrad, Phys. Rev. E 2009, 79, 011906, Section III C: 62 segments, 15.5 um.
 THIN_FILM = replace(F_ACTIN.with_segment_length(250), bending_rigidity=17700 * KT)
-
-
-def _context(system, integrator, positions, platform="Reference"):
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform(platform))
-    context.setPositions(positions)
-    return context
-
-
-def _positions(context):
-    return context.getState(positions=True).getPositions(asNumpy=True)._value
 
 
 def _angles(nodes):
@@ -194,10 +186,10 @@ def test_nodes_keep_their_height_to_the_bit(engine, platform):
     system.addForce(pull)
     for scheme in ("midpoint", "euler"):
         integrator = filaments.create_integrator(system, 5e3, scheme=scheme, random_seed=1)
-        context = _context(system, integrator, positions, platform)
-        start = _positions(context)
+        context = new_context(system, positions, integrator, platform)
+        start = positions_of(context)
         integrator.step(30)
-        end = _positions(context)
+        end = positions_of(context)
         planar = np.concatenate(filaments.node_indices[:2])
         assert np.array_equal(end[planar, 2], start[planar, 2])
         assert np.all(end[planar, :2] != start[planar, :2])
@@ -207,7 +199,7 @@ def test_nodes_keep_their_height_to_the_bit(engine, platform):
 @pytest.mark.parametrize("engine", ENGINES)
 def test_noise_covariance_and_drift_of_a_step(engine):
     """Cov(dx) = 2 k_B T dt M in the plane, with M the inverse of the xy part of Z."""
-    nodes = _bent_chain(F_ACTIN, 2, 3) * [1, 1, 0]
+    nodes = bent_chain(F_ACTIN, 2, 3) * [1, 1, 0]
     copies, draws = 1500, 16
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine=engine)
     for _ in range(copies):
@@ -215,15 +207,15 @@ def test_noise_covariance_and_drift_of_a_step(engine):
     _, system, positions = filaments.build()
     step = 1.0
     integrator = filaments.create_integrator(system, step, scheme="midpoint", random_seed=3)
-    context = _context(system, integrator, positions)
+    context = new_context(system, positions, integrator)
     moves = []
     for _ in range(draws):
         context.setPositions(positions)
         integrator.step(1)
-        moves.append((_positions(context) - positions._value).reshape(copies, 3, 3)[..., :2].reshape(copies, 6))
+        moves.append((positions_of(context) - positions._value).reshape(copies, 3, 3)[..., :2].reshape(copies, 6))
     moves = np.concatenate(moves)
     plane = np.flatnonzero(np.arange(9) % 3 < 2)
-    expected = 2 * KT * step * np.linalg.inv(_dense_resistance(nodes, FRICTION)[np.ix_(plane, plane)])
+    expected = 2 * KT * step * np.linalg.inv(dense_resistance(nodes, FRICTION)[np.ix_(plane, plane)])
     variances = np.diag(expected)
     error = np.sqrt((np.outer(variances, variances) + expected**2) / len(moves))
     assert np.abs((np.cov(moves.T) - expected) / error).max() < 5
@@ -237,12 +229,12 @@ def _simulated(engine, platform, kind, segments, chains, steps, scheme="midpoint
     _, system, positions = filaments.build()
     step = time_step(replace(CASES["kratky-porod"], type=kind, segments=segments, fraction=fraction))
     integrator = filaments.create_integrator(system, step, scheme=scheme, random_seed=7)
-    context = _context(system, integrator, positions, platform)
+    context = new_context(system, positions, integrator, platform)
     integrator.step(steps // 4)
     samples = []
     for _ in range(30):
         integrator.step(steps // 40)
-        samples.append(_positions(context).reshape(chains, segments + 1, 3))
+        samples.append(positions_of(context).reshape(chains, segments + 1, 3))
     return samples
 
 

@@ -3,27 +3,25 @@
 import numpy as np
 import openmm
 import pytest
-from test_integrators import STEP, mixed_integrator, mixed_system
-from test_integrators import _context as context_of
-from test_integrators import _filaments as filaments_of
-from test_integrators import _positions as positions_of
 
 from openmm_cylchain import InputError
+from support.contexts import new_context, positions_of
+from support.filaments_and_beads import STEP, actin_filaments, filaments_and_beads, integrator_of_both
 
 
 def test_force_in_the_engines_group_is_refused():
-    filaments, system, positions = mixed_system("portable")
-    integrator = mixed_integrator(filaments, system)
+    filaments, system, positions = filaments_and_beads("portable")
+    integrator = integrator_of_both(filaments, system)
     late = openmm.CustomExternalForce("x")
     late.setForceGroup(31)
     system.addForce(late)
-    context = context_of(system, integrator, positions)  # noqa: F841 (an integrator does not keep its Context alive)
+    context = new_context(system, positions, integrator)  # noqa: F841 (an integrator does not keep its Context alive)
     with pytest.raises(InputError, match="force group 31"):
         integrator.step(1)
 
 
 def test_engine_takes_a_free_force_group_or_says_that_there_is_none():
-    filaments = filaments_of("portable", (2,))
+    filaments = actin_filaments("portable", (2,))
     _, system, _ = filaments.build()
     for group in range(1, 32):
         force = openmm.CustomExternalForce("0")
@@ -39,16 +37,16 @@ def test_engine_takes_a_free_force_group_or_says_that_there_is_none():
 
 def test_later_integrators_leave_earlier_contexts_alone():
     """Integrators with other friction, created later, change nothing for Contexts that exist."""
-    filaments, system, positions = mixed_system("portable")
-    integrator = mixed_integrator(filaments, system, random_seed=1)
+    filaments, system, positions = filaments_and_beads("portable")
+    integrator = integrator_of_both(filaments, system, random_seed=1)
     forces = system.getNumForces()
-    context = context_of(system, integrator, positions)
+    context = new_context(system, positions, integrator)
     integrator.step(5)
     expected = positions_of(context)
 
-    integrator = mixed_integrator(filaments, system, random_seed=1)
+    integrator = integrator_of_both(filaments, system, random_seed=1)
     assert system.getNumForces() == forces
-    context = context_of(system, integrator, positions)
+    context = new_context(system, positions, integrator)
     others = [
         filaments.create_integrator(system, STEP, particle_friction=friction, random_seed=1)
         for friction in (1e4, 1e5, 1e6)
@@ -56,7 +54,7 @@ def test_later_integrators_leave_earlier_contexts_alone():
     assert system.getNumForces() == forces + 3
     integrator.step(5)
     assert np.array_equal(positions_of(context), expected)
-    context = context_of(system, others[0], positions)
+    context = new_context(system, positions, others[0])
     others[0].step(5)
     moved = positions_of(context)
     assert np.array_equal(moved[3:], expected[3:])
@@ -64,7 +62,7 @@ def test_later_integrators_leave_earlier_contexts_alone():
 
 
 def test_system_that_became_periodic_later_is_refused():
-    filaments = filaments_of("portable", (2,))
+    filaments = actin_filaments("portable", (2,))
     _, system, positions = filaments.build()
     integrator = filaments.create_integrator(system, STEP)
     nonbonded = openmm.NonbondedForce()
@@ -72,6 +70,6 @@ def test_system_that_became_periodic_later_is_refused():
     for _ in range(system.getNumParticles()):
         nonbonded.addParticle(0, 1, 0)
     system.addForce(nonbonded)
-    context = context_of(system, integrator, positions)  # noqa: F841 (an integrator does not keep its Context alive)
+    context = new_context(system, positions, integrator)  # noqa: F841 (an integrator does not keep its Context alive)
     with pytest.raises(InputError, match="periodic"):
         integrator.step(1)

@@ -5,7 +5,6 @@ import itertools
 import math
 
 import numpy as np
-import openmm
 import pytest
 from openmm import unit
 from scipy.spatial.transform import Rotation
@@ -13,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from openmm_cylchain import Filament, Filaments, FilamentType, InputError
 from openmm_cylchain.mechanics.potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
 from openmm_cylchain.mechanics.tension import segment_end_forces
+from support.contexts import forces_of, new_context
 
 ANGLES = (0.0, 1e-4, 0.01, 0.3, 1.0, 2.0, 3.0, 3.1)
 BENDING_GROUP, STRETCHING_GROUP = 1, 2
@@ -147,8 +147,7 @@ def computed(platform):
     for models, angle, lengths, seed in CASES:
         filaments.add_nodes(TYPES[models], nodes_of(angle, lengths, seed))
     _, system, positions = filaments.build(stretching_force_group=STRETCHING_GROUP, bending_force_group=BENDING_GROUP)
-    context = openmm.Context(system, openmm.VerletIntegrator(0.001), platform)
-    context.setPositions(positions)
+    context = new_context(system, positions, platform=platform)
     result = {}
     for name, group in (("bending", BENDING_GROUP), ("stretching", STRETCHING_GROUP)):
         state = context.getState(forces=True, groups={group})
@@ -211,7 +210,7 @@ def energy_of(platform):
     for models in MODELS:
         filaments.add_straight(TYPES[models], 2, [0, 0, 0], [1, 0, 0])
     _, system, rest = filaments.build(stretching_force_group=STRETCHING_GROUP, bending_force_group=BENDING_GROUP)
-    context = openmm.Context(system, openmm.VerletIntegrator(0.001), platform)
+    context = new_context(system, rest, platform=platform)
     rest = rest.value_in_unit(unit.nanometer)
 
     def evaluate(models, nodes):
@@ -258,7 +257,7 @@ def test_reference_forces_are_the_gradient_of_reference_energies(models, referen
     filaments = Filaments(1000.0, 300, "portable")
     filaments.add_nodes(TYPES[models], moved(joint(1.2, (103.0, 98.5)), 3))
     _, system, positions = filaments.build()
-    context = openmm.Context(system, openmm.VerletIntegrator(0.001), reference)
+    context = new_context(system, positions, platform=reference)
 
     def energy(nodes):
         context.setPositions(nodes)
@@ -267,7 +266,7 @@ def test_reference_forces_are_the_gradient_of_reference_energies(models, referen
     nodes = positions.value_in_unit(unit.nanometer)
     by_difference = difference_forces(energy, nodes, 1e-2)
     context.setPositions(nodes)
-    forces = context.getState(forces=True).getForces(asNumpy=True)._value
+    forces = forces_of(context)
     assert np.abs(by_difference - forces).max() <= 1e-6 * np.abs(forces).max()
 
 
@@ -352,9 +351,8 @@ def test_antiparallel_segments_of_a_freely_jointed_chain_are_allowed(reference):
     filaments = Filaments(1000.0, 300, "portable")
     filaments.add_nodes(free, [[0, 0, 0], [100, 0, 0], [0, 0, 0.0]])
     _, system, positions = filaments.build()
-    context = openmm.Context(system, openmm.VerletIntegrator(0.001), reference)
-    context.setPositions(positions)
-    assert np.isfinite(context.getState(forces=True).getForces(asNumpy=True)._value).all()
+    context = new_context(system, positions, platform=reference)
+    assert np.isfinite(forces_of(context)).all()
 
 
 @pytest.mark.parametrize("lengths", [(110.0, 100.0), (100.0, 89.999), (100.0, 130.0)])

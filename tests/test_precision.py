@@ -8,14 +8,15 @@ import numpy as np
 import openmm
 import pytest
 from openmm import unit
-from physics_cases import KT, TEMPERATURE, VISCOSITY
-from test_promises import energies_of, exact_energies, positions_of
 
 from openmm_cylchain import F_ACTIN, Filaments, Flow, InputError
 from openmm_cylchain.dynamics.precision import check_precision
 from openmm_cylchain.engines.compiled import PRECISIONS, CylinderChainIntegrator
 from openmm_cylchain.runs import configuration
 from openmm_cylchain.runs.run import _create_simulation, create_filaments
+from support.chain_energies import energies_of, exact_energies
+from support.contexts import new_context, positions_of
+from support.solvent import KT, TEMPERATURE, VISCOSITY
 
 SIGMAS = 4.0
 # Of these, any vector register of single precision has all lanes filled.
@@ -36,8 +37,7 @@ def context_of(filaments, precision="automatic", scheme="implicit", step=None, p
     integrator = filaments.create_integrator(
         system, step, scheme, random_seed=seed, precision=precision, checks=False, **options
     )
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatformByName(platform), properties)
-    context.setPositions(positions)
+    context = new_context(system, positions, integrator, platform, properties)
     return context, integrator
 
 
@@ -132,8 +132,7 @@ def test_halved_steps_follow_the_same_path():
             system, step / 2**level, random_seed=3, precision="mixed", checks=False
         )
         integrator.setPathLevel(level)
-        context = openmm.Context(system, integrator, openmm.Platform.getPlatformByName("Reference"))
-        context.setPositions(positions)
+        context = new_context(system, positions, integrator)
         middles = displacements_over(context, 20 * 2**level).reshape(5, -1, 3).mean(axis=1)
         assert integrator.getNumMixedPrecisionChains() == 5
         ends.append(middles)

@@ -5,24 +5,15 @@ from dataclasses import replace
 import numpy as np
 import openmm
 import pytest
-from conftest import ENGINES
 from openmm import unit
-from physics_cases import ENGINE_PLATFORMS, KT, TEMPERATURE, VISCOSITY
-from test_redistribution import _bent_chain, _dense_resistance
 
 from openmm_cylchain import F_ACTIN, Filaments, FilamentType, InputError
+from support.contexts import forces_of, new_context, positions_of
+from support.dense_mechanics import bent_chain, dense_resistance
+from support.platforms import ENGINE_PLATFORMS, ENGINES
+from support.solvent import KT, TEMPERATURE, VISCOSITY
 
 FRICTION = F_ACTIN.segment_friction(VISCOSITY, TEMPERATURE)
-
-
-def _context(system, integrator, positions, platform="Reference"):
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform(platform))
-    context.setPositions(positions)
-    return context
-
-
-def _positions(context):
-    return context.getState(positions=True).getPositions(asNumpy=True)._value
 
 
 def _tangents(nodes, closed):
@@ -41,9 +32,9 @@ def test_straight_filament_glides(engine, platform, propulsion):
     _, system, positions = filaments.build()
     step = 1e4
     integrator = filaments.create_integrator(system, step, scheme="midpoint")
-    context = _context(system, integrator, positions, platform)
+    context = new_context(system, positions, integrator, platform)
     integrator.step(20)
-    moved = (_positions(context) - positions._value) / (20 * step)
+    moved = (positions_of(context) - positions._value) / (20 * step)
     force = filaments[0].propulsion
     if isinstance(propulsion, unit.Quantity):
         assert force == pytest.approx(8 * 0.602214076)
@@ -55,7 +46,7 @@ def test_straight_filament_glides(engine, platform, propulsion):
 
 def _propelled_shapes(engine, factor=1.0):
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine=engine)
-    shapes = [(_bent_chain(F_ACTIN, 6, 1), False, 0.7), (_bent_chain(F_ACTIN, 4, 2), False, 0.0)]
+    shapes = [(bent_chain(F_ACTIN, 6, 1), False, 0.7), (bent_chain(F_ACTIN, 4, 2), False, 0.0)]
     ring = Filaments(VISCOSITY, TEMPERATURE, engine="portable")
     ring.add_ring(F_ACTIN, 7, [0, 0, 0], [1, 2, 3])
     shapes.append((ring[0].positions + np.random.default_rng(3).normal(scale=20, size=(7, 3)), True, -0.4))
@@ -70,7 +61,7 @@ def test_state_holds_the_forces_but_no_energy(engine, platform):
     states = []
     for factor in (1.0, 0.0):
         filaments, system, positions = _propelled_shapes(engine, factor)
-        context = _context(system, openmm.VerletIntegrator(1.0), positions, platform)
+        context = new_context(system, positions, platform=platform)
         states.append(context.getState(forces=True, energy=True))
         if factor:
             propelled = filaments
@@ -90,12 +81,12 @@ def test_a_step_equals_the_dense_solution(engine):
     filaments, system, positions = _propelled_shapes(engine)
     step = 100.0
     integrator = filaments.create_integrator(system, step, scheme="euler", temperature=0)
-    context = _context(system, integrator, positions)
-    forces = context.getState(forces=True).getForces(asNumpy=True)._value
+    context = new_context(system, positions, integrator)
+    forces = forces_of(context)
     integrator.step(1)
-    moved = _positions(context) - positions._value
+    moved = positions_of(context) - positions._value
     for filament, indices in zip(filaments, filaments.node_indices):
-        resistance = _dense_resistance(positions._value[indices], FRICTION, filament.closed)
+        resistance = dense_resistance(positions._value[indices], FRICTION, filament.closed)
         expected = step * np.linalg.solve(resistance, forces[indices].reshape(-1)).reshape(-1, 3)
         assert np.abs(moved[indices] - expected).max() < 1e-10 * np.abs(expected).max()
 
@@ -113,7 +104,7 @@ def test_joints_carry_what_the_segments_beyond_push(engine):
             nodes[1:, 1] += np.cumsum(propulsion * (np.arange(5, 0, -1) - 0.5) / F_ACTIN.segment_stiffness)
         filaments.add_nodes(F_ACTIN, nodes, clamped, propulsion=propulsion)
     _, system, positions = filaments.build()
-    context = _context(system, filaments.create_integrator(system, 1.0), positions)
+    context = new_context(system, positions, filaments.create_integrator(system, 1.0))
     free, pulled, pushed = (tensions._value for tensions in filaments.joint_tensions(context))
     assert np.abs(free).max() < 1e-9
     assert pulled[:, 1] == pytest.approx(0.3 * np.arange(4, 0, -1), rel=1e-6)
@@ -138,9 +129,9 @@ def test_gliding_rod_turns_and_diffuses(engine):
     _, system, positions = filaments.build()
     step = tau / steps
     integrator = filaments.create_integrator(system, step, scheme="midpoint", random_seed=5, checks=False)
-    context = _context(system, integrator, positions)
+    context = new_context(system, positions, integrator)
     integrator.step(steps)
-    middles = (_positions(context) - positions._value).reshape(count, 2, 3).mean(axis=1)
+    middles = (positions_of(context) - positions._value).reshape(count, 2, 3).mean(axis=1)
     along = middles[:, 0]
     expected = speed * tau * (1 - np.exp(-1))
     # The step's own error is half a step: the direction is that of its beginning.
@@ -161,8 +152,8 @@ def test_system_survives_xml(engine, platform):
     restored = openmm.XmlSerializer.deserialize(openmm.XmlSerializer.serialize(system))
     forces = []
     for one in (system, restored):
-        context = _context(one, openmm.VerletIntegrator(1.0), positions, platform)
-        forces.append(context.getState(forces=True).getForces(asNumpy=True)._value)
+        context = new_context(one, positions, platform=platform)
+        forces.append(forces_of(context))
     assert np.array_equal(*forces)
 
 

@@ -3,13 +3,10 @@
 import csv
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
-import openmm
 import pytest
-from openmm import app, unit
-from physics_cases import CASES, ENGINE_PLATFORMS, KT, TEMPERATURE, VISCOSITY
+from openmm import unit
 from scipy.integrate import quad
 
 from openmm_cylchain import DSDNA, F_ACTIN, Filaments, InputError, recommended_time_step, theory
@@ -21,36 +18,15 @@ from openmm_cylchain.couplings.pulling import (
     tension_forces,
 )
 from openmm_cylchain.filaments.equilibrium import JointAngleDistribution, SegmentLengthDistribution
+from support.contexts import energy_of, forces_of, new_context, new_simulation, positions_of
+from support.equilibrium_cases import CASES
+from support.platforms import ENGINE_PLATFORMS
+from support.repository import TESTS
+from support.solvent import KT, TEMPERATURE, VISCOSITY
+from support.straight_filaments import straight_filaments
 
 PICONEWTON = 0.602214076
 FREELY_JOINTED = CASES["freely-jointed"].type
-
-
-def _context(system, positions, integrator, platform="Reference"):
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform(platform))
-    context.setPositions(positions)
-    return context
-
-
-def _simulation(topology, system, positions, integrator):
-    simulation = app.Simulation(topology, system, integrator, openmm.Platform.getPlatform("Reference"))
-    simulation.context.setPositions(positions)
-    return simulation
-
-
-def _positions(context):
-    return context.getState(positions=True).getPositions(asNumpy=True)._value
-
-
-def _forces(context):
-    return context.getState(forces=True).getForces(asNumpy=True)._value
-
-
-def _straight(engine, chains=1, segments=2, kind=FREELY_JOINTED, **options):
-    filaments = Filaments(VISCOSITY, TEMPERATURE, engine=engine)
-    for chain in range(chains):
-        filaments.add_straight(kind, segments, [0, 1000 * chain, 0], [1, 0, 0], **options)
-    return filaments
 
 
 def langevin_extension(kind, force):
@@ -129,33 +105,33 @@ def test_theory_is_the_reweighted_mean_of_free_chains(name):
 
 @pytest.mark.parametrize("engine, platform", ENGINE_PLATFORMS)
 def test_constant_forces_act_and_change(engine, platform):
-    filaments = _straight(engine)
+    filaments = straight_filaments(engine)
     filaments.add_attachment(0, segment=0, fraction=0.25)
     _, system, positions = filaments.build()
     point = filaments.attachment_indices[0]
     force = constant_force([2, point], [[1, 2, 3], [4, 0, 0]] * unit.piconewton)
     system.addForce(force)
-    context = _context(system, positions, filaments.create_integrator(system, 1.0, scheme="midpoint"), platform)
-    forces = _forces(context)
+    context = new_context(system, positions, filaments.create_integrator(system, 1.0, scheme="midpoint"), platform)
+    forces = forces_of(context)
     assert forces[2] == pytest.approx(np.array([1, 2, 3]) * PICONEWTON, rel=1e-5)
     assert forces[:2, 0] == pytest.approx(np.array([3, 1]) * PICONEWTON, rel=1e-5)
-    energy = context.getState(energy=True).getPotentialEnergy()._value
+    energy = energy_of(context)
     assert energy == pytest.approx(-(200 * 1 + 25 * 4) * PICONEWTON, rel=1e-5)
     change_constant_force(force, context, [0, 0, 2])
-    assert _forces(context)[2] == pytest.approx([0, 0, 2])
+    assert forces_of(context)[2] == pytest.approx([0, 0, 2])
 
 
 def test_tension_pulls_at_the_ends_of_the_filaments_that_are_named():
-    filaments = _straight("portable", chains=3)
+    filaments = straight_filaments("portable", chains=3)
     _, system, positions = filaments.build()
     force = constant_tension(filaments, [1, 2] * unit.piconewton, [0, 0, 2], numbers=[0, 2])
     system.addForce(force)
-    context = _context(system, positions, openmm.VerletIntegrator(1.0))
+    context = new_context(system, positions)
     expected = np.zeros((9, 3))
     expected[[0, 2, 6, 8], 2] = np.array([-1, 1, -2, 2]) * PICONEWTON
-    assert _forces(context) == pytest.approx(expected, abs=1e-9)
+    assert forces_of(context) == pytest.approx(expected, abs=1e-9)
     change_constant_force(force, context, tension_forces(2, 5, [1, 0, 0]))
-    assert _forces(context)[[0, 2, 6, 8], 0] == pytest.approx([-5, 5, -5, 5])
+    assert forces_of(context)[[0, 2, 6, 8], 0] == pytest.approx([-5, 5, -5, 5])
 
 
 @pytest.mark.parametrize(
@@ -178,11 +154,11 @@ def test_extension_of_freely_jointed_chains_under_constant_tension(engine, platf
     _, system, positions = filaments.build()
     system.addForce(constant_tension(filaments, force, [1, 0, 0]))
     integrator = filaments.create_integrator(system, filaments.recommended_time_step().step, random_seed=7)
-    context = _context(system, positions, integrator, platform)
+    context = new_context(system, positions, integrator, platform)
     samples = []
     for _ in range(30):
         integrator.step(steps)
-        nodes = _positions(context)[np.array(filaments.node_indices)]
+        nodes = positions_of(context)[np.array(filaments.node_indices)]
         samples.append(nodes[:, -1, 0] - nodes[:, 0, 0])
     of_chains = np.mean(samples[5:], axis=0)
     error = of_chains.std(ddof=1) / np.sqrt(chains)
@@ -204,11 +180,11 @@ def _draw_pulled_segments(kind, force, shape, generator):
 
 
 def test_the_motion_of_a_tether_is_recorded(engine, tmp_path):
-    filaments = _straight(engine, chains=2, segments=3)
+    filaments = straight_filaments(engine, chains=2, segments=3)
     filaments.add_tether(0, 3, [300, 0, 0], 0.5)
     filaments.add_tether(1, 0, [0, 1000, 0], 0.25)
     topology, system, positions = filaments.build()
-    simulation = _simulation(
+    simulation = new_simulation(
         topology, system, positions, filaments.create_integrator(system, 10.0, scheme="midpoint", random_seed=1)
     )
     path = tmp_path / "pulling.csv"
@@ -218,7 +194,7 @@ def test_the_motion_of_a_tether_is_recorded(engine, tmp_path):
     seen = [positions._value]
     for _ in range(5):
         simulation.step(4)
-        seen.append(_positions(simulation.context))
+        seen.append(positions_of(simulation.context))
     assert pulling.time == pytest.approx([40, 80, 120, 160, 200])
     points = np.array([[300, 0, 0], [0, 1000, 0]]) + velocity * np.maximum(0, pulling.time - 80)[:, None, None]
     for index, axis in enumerate("xyz"):
@@ -245,12 +221,14 @@ RUN = """
 import sys
 sys.path.insert(0, {tests!r})
 import numpy as np
-from test_pulling import ConstantVelocityPulling, _positions, _simulation, _straight
-filaments = _straight({engine!r}, chains=2, segments=3)
+from openmm_cylchain import ConstantVelocityPulling
+from support.contexts import new_simulation, positions_of
+from support.straight_filaments import straight_filaments
+filaments = straight_filaments({engine!r}, chains=2, segments=3)
 filaments.add_tether(0, 3, [300, 0, 0], 0.05)
 topology, system, positions = filaments.build()
 integrator = filaments.create_integrator(system, 1e4, scheme="midpoint", random_seed=1)
-simulation = _simulation(topology, system, positions, integrator)
+simulation = new_simulation(topology, system, positions, integrator)
 if {restart}:
     simulation.loadCheckpoint("checkpoint")
 pulling = ConstantVelocityPulling("pulling.csv", 4, filaments, 0, [1e-4, 0, 0], append={restart})
@@ -259,7 +237,7 @@ if not {restart}:
     simulation.step({split})
     simulation.saveCheckpoint("checkpoint")
 simulation.step(40 - simulation.currentStep)
-np.save({file!r}, _positions(simulation.context))
+np.save({file!r}, positions_of(simulation.context))
 """
 
 
@@ -267,9 +245,7 @@ np.save({file!r}, _positions(simulation.context))
 def test_a_restart_goes_on_with_the_tether_where_it_was(engine, split, tmp_path):
     ends, tables = [], []
     for restart in (False, True):
-        code = RUN.format(
-            engine=engine, restart=restart, split=split, file=f"{restart}.npy", tests=str(Path(__file__).parent)
-        )
+        code = RUN.format(engine=engine, restart=restart, split=split, file=f"{restart}.npy", tests=str(TESTS))
         if restart:
             lines = (tmp_path / "pulling.csv").read_text().splitlines(keepends=True)
             tables.append(lines)
@@ -306,7 +282,7 @@ def test_slow_pulling_measures_the_force_in_equilibrium(engine):
     step = filaments.recommended_time_step().step
     interval = round(50 * recommended_time_step(kind, VISCOSITY, TEMPERATURE, "implicit", segments).step / step)
     integrator = filaments.create_integrator(system, step, random_seed=3)
-    simulation = _simulation(topology, system, positions, integrator)
+    simulation = new_simulation(topology, system, positions, integrator)
     simulation.step(10 * interval)
     start = simulation.context.getTime()._value
     velocity = [0.4 / (interval * step), 0, 0]
@@ -341,7 +317,7 @@ def test_work_obeys_the_equality_of_jarzynski():
     friction = FREELY_JOINTED.segment_friction(VISCOSITY, TEMPERATURE)
     step = 0.02 * friction.parallel / stiffness
     distance, steps = 11.0, 60
-    simulation = _simulation(topology, system, positions, filaments.create_integrator(system, step, random_seed=2))
+    simulation = new_simulation(topology, system, positions, filaments.create_integrator(system, step, random_seed=2))
     pulling = ConstantVelocityPulling(None, 3, filaments, range(chains), [distance / (steps * step), 0, 0])
     simulation.reporters.append(pulling)
     simulation.step(steps)
@@ -354,7 +330,7 @@ def test_work_obeys_the_equality_of_jarzynski():
 
 
 def test_bad_input_is_refused():
-    filaments = _straight("portable", chains=2)
+    filaments = straight_filaments("portable", chains=2)
     with pytest.raises(InputError, match="not in a System yet"):
         constant_tension(filaments, 1, [1, 0, 0])
     filaments.add_tether(0, 0, [0, 0, 0], 1)
@@ -381,7 +357,7 @@ def test_bad_input_is_refused():
     ):
         with pytest.raises(InputError, match=message):
             constant_tension(filaments, *arguments)
-    context = _context(system, positions, openmm.VerletIntegrator(1.0))
+    context = new_context(system, positions)
     with pytest.raises(InputError, match="must be one that constant_force or constant_tension has made"):
         change_constant_force(system.getForce(0), context, [1, 0, 0])
     for arguments, message in (

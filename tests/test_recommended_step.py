@@ -27,63 +27,15 @@ from openmm_cylchain.dynamics.explicit_forces import ACCURATE
 from openmm_cylchain.dynamics.mobility import FilamentResponse
 from openmm_cylchain.dynamics.schemes import IMPLICIT_SCHEMES, SCHEMES, amplification_of_second_order
 from openmm_cylchain.dynamics.time_step import as_step, fene_steps
+from support.contexts import new_context, positions_of
+from support.dense_mechanics import straight_matrices, straight_resistance
+from support.linked_pairs import PICONEWTON_PER_NANOMETER, linked_pairs, pairs_of_filaments
+from support.solvent import KT, TEMPERATURE, VISCOSITY
 
-VISCOSITY = 1.71e-3 * unit.pascal * unit.second
-TEMPERATURE = 310.0
-KT = 8.31446262e-3 * TEMPERATURE
-PICONEWTON_PER_NANOMETER = 0.602214076
 SIGMAS = 4.0
 
 
-def pairs_of_filaments(kind, segments, count=1, engine=None):
-    """A System with pairs of free filaments in equilibrium, and the middle nodes of each pair."""
-    filaments = Filaments(VISCOSITY, TEMPERATURE, engine=engine)
-    middle = segments // 2
-    for number in range(2 * count):
-        drawn = Filaments(VISCOSITY, TEMPERATURE)
-        drawn.add_equilibrium(kind, segments, seed=number + 1)
-        nodes = drawn[0].positions
-        # Pairs begin with their middles in one place: in equilibrium but for the spring's length.
-        filaments.add_nodes(kind, nodes - nodes[middle])
-    _, system, positions = filaments.build()
-    middles = [int(nodes[middle]) for nodes in filaments.node_indices]
-    return filaments, system, positions, list(zip(middles[::2], middles[1::2]))
-
-
-def linked(kind, segments, stiffness, count=1):
-    filaments, system, positions, pairs = pairs_of_filaments(kind, segments, count)
-    force = openmm.HarmonicBondForce()
-    for first, second in pairs:
-        force.addBond(first, second, 0.0, stiffness * PICONEWTON_PER_NANOMETER)
-    system.addForce(force)
-    return filaments, system, positions, pairs
-
-
 # The theory
-
-
-def straight_resistance(kind, segments, translational, rotational):
-    """Friction of the nodes of a straight filament along one direction, by hand."""
-    resistance = np.zeros((segments + 1, segments + 1))
-    for segment in range(segments):
-        both = np.ix_([segment, segment + 1], [segment, segment + 1])
-        moving, turning = translational / 4, rotational / kind.segment_length**2
-        resistance[both] += [[moving + turning, moving - turning], [moving - turning, moving + turning]]
-    return resistance
-
-
-def straight_matrices(kind, segments, step):
-    """Friction and stiffness of the nodes of a straight filament across it, and theta."""
-    friction = kind.segment_friction(VISCOSITY, TEMPERATURE, segments)
-    nodes = segments + 1
-    resistance = straight_resistance(kind, segments, friction.perpendicular, friction.rotational)
-    stiffness = np.zeros((nodes, nodes))
-    for joint in range(1, segments):
-        bend = np.zeros(nodes)
-        bend[joint - 1 : joint + 2] = 1.0, -2.0, 1.0
-        stiffness += kind.bending_rigidity / kind.segment_length**3 * np.outer(bend, bend)
-    fastest = 4 * step * kind.bending_rigidity / kind.segment_length / friction.rotational
-    return resistance, stiffness, max(0.5, 1 - 1 / fastest)
 
 
 def linear_step(scheme, resistance, stiffness, spring, theta):
@@ -169,17 +121,16 @@ def test_filaments_in_pieces_move_no_less_than_whole_ones():
 
 def link_energies(kind, segments, stiffness, step, count, steps, seed=1):
     """Mean energy of the springs in k_B T and its error, from ``count`` pairs of filaments, and divided steps."""
-    filaments, system, positions, pairs = linked(kind, segments, stiffness, count)
+    filaments, system, positions, pairs = linked_pairs(kind, segments, stiffness, count)
     step = filaments.recommended_time_step("implicit", system=system) if step is None else step
     integrator = filaments.create_integrator(system, step, scheme="implicit", random_seed=seed)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
-    context.setPositions(positions)
+    context = new_context(system, positions, integrator)
     first, second = np.transpose(pairs)
     samples = []
     for block in range(steps // 5):
         integrator.step(5)
         if block >= steps // 25:
-            nodes = context.getState(positions=True).getPositions(asNumpy=True)._value
+            nodes = positions_of(context)
             squares = np.sum((nodes[first] - nodes[second]) ** 2, axis=1)
             samples.append(0.5 * stiffness * PICONEWTON_PER_NANOMETER * squares / KT)
     by_pair = np.mean(samples, axis=0)
@@ -327,7 +278,7 @@ def test_particles_without_friction_are_refused():
 
 
 def test_the_spring_that_binds_is_named():
-    filaments, system, _, pairs = linked(F_ACTIN, 4, 1e-3, count=4)
+    filaments, system, _, pairs = linked_pairs(F_ACTIN, 4, 1e-3, count=4)
     force = system.getForce(system.getNumForces() - 1)
     force.setBondParameters(2, *pairs[2], 0.0, 0.5)
     name = f"HarmonicBondForce (force {system.getNumForces() - 1}): bond 2"
@@ -336,7 +287,7 @@ def test_the_spring_that_binds_is_named():
 
 
 def test_several_springs_add():
-    filaments, system, _, pairs = linked(F_ACTIN, 4, 0.05)
+    filaments, system, _, pairs = linked_pairs(F_ACTIN, 4, 0.05)
     one = filaments.recommended_time_step("implicit", system=system).step
     system.getForce(system.getNumForces() - 1).addBond(*pairs[0], 0.0, 0.05 * PICONEWTON_PER_NANOMETER)
     both = filaments.recommended_time_step("implicit", system=system).step
@@ -587,8 +538,7 @@ def test_fene_energies_at_the_recommended_step(extension):
         filaments.add_equilibrium(kind, segments, seed=number + 1)
     _, system, positions = filaments.build()
     integrator = filaments.create_integrator(system, filaments.recommended_time_step("implicit"), random_seed=1)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
-    context.setPositions(positions)
+    context = new_context(system, positions, integrator)
     width = min(1.0, 12 / np.sqrt(kind.segment_stiffness * extension**2 / KT))
     u = width * (np.arange(20000) + 0.5) / 20000 * np.repeat([[-1], [1]], 20000, axis=1)
     energy = kind.stretching_energy(360 + extension * u) / KT
@@ -597,7 +547,7 @@ def test_fene_energies_at_the_recommended_step(extension):
     samples = []
     for _ in range(400):
         integrator.step(10)
-        nodes = context.getState(positions=True).getPositions(asNumpy=True)._value
+        nodes = positions_of(context)
         samples.append([one.energies(nodes[of])[0] for one, of in zip(filaments, filaments.node_indices)])
     by_chain = np.mean(samples, axis=0) / segments / KT
     error = by_chain.std(ddof=1) / np.sqrt(chains)
@@ -639,7 +589,7 @@ def test_steps_far_above_the_recommended_one_warn(scheme, factor):
 
 
 def test_stiff_forces_warn():
-    filaments, system, _, _ = linked(MICROTUBULE, 8, 0.1)
+    filaments, system, _, _ = linked_pairs(MICROTUBULE, 8, 0.1)
     recommended = filaments.recommended_time_step("implicit")
     with pytest.warns(TimeStepWarning, match=r"HarmonicBondForce \(force \d+\): bond 0.*Recommended") as caught:
         filaments.create_integrator(system, recommended, "implicit")

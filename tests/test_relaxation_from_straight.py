@@ -3,11 +3,11 @@
 from dataclasses import replace
 
 import numpy as np
-import openmm
 import pytest
-from physics_cases import KT, TEMPERATURE, VISCOSITY
 
 from openmm_cylchain import F_ACTIN, Filaments
+from support.contexts import new_context, positions_of
+from support.solvent import KT, TEMPERATURE, VISCOSITY
 
 CHAINS, SEGMENTS = 1600, 64
 # Of the trap, over that of a segment: where it is explicit, too, steps of 0.02 us resolve it.
@@ -24,13 +24,12 @@ def _relax(scheme, step, times, seed, chains=CHAINS, kind=F_ACTIN):
         filaments.add_tether(chain, 0, [0, 0, 0], TRAP * kind.segment_stiffness)
     _, system, positions = filaments.build()
     integrator = filaments.create_integrator(system, step * MICROSECOND, scheme=scheme, random_seed=seed)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("CPU"))
-    context.setPositions(positions)
+    context = new_context(system, positions, integrator, "CPU")
     result, taken = {}, 0
     for moment in times:
         integrator.step(round(moment / step) - taken)
         taken = round(moment / step)
-        nodes = context.getState(positions=True).getPositions(asNumpy=True)._value.reshape(chains, SEGMENTS + 1, 3)
+        nodes = positions_of(context).reshape(chains, SEGMENTS + 1, 3)
         lengths = np.linalg.norm(np.diff(nodes, axis=1), axis=2)
         shortening = SEGMENTS * F_ACTIN.segment_length - (nodes[:, -1, 0] - nodes[:, 0, 0])
         stretching = F_ACTIN.stretching_energy(lengths).mean(axis=1) / KT

@@ -4,13 +4,12 @@ import csv
 import io
 
 import numpy as np
-import openmm
 import pytest
-from openmm import app
-from physics_cases import TEMPERATURE, VISCOSITY
 
 from openmm_cylchain import DSDNA, F_ACTIN, Filaments, InputError
 from openmm_cylchain.output.reporters import FilamentReporter, TetherReporter
+from support.contexts import new_simulation, positions_of
+from support.solvent import TEMPERATURE, VISCOSITY
 
 COLUMNS = ["stretching_energy", "bending_energy", "end_to_end_distance", "contour_length"]
 
@@ -23,9 +22,7 @@ def simulated(request):
     filaments.add_tether(0, -1, [1500, 0, 0], 0.5)
     topology, system, positions = filaments.build()
     integrator = filaments.create_integrator(system, 1.0, scheme="midpoint", random_seed=1)
-    simulation = app.Simulation(topology, system, integrator, openmm.Platform.getPlatform("Reference"))
-    simulation.context.setPositions(positions)
-    return filaments, simulation
+    return filaments, new_simulation(topology, system, positions, integrator)
 
 
 def _read(path):
@@ -63,7 +60,7 @@ def test_tethers(simulated, tmp_path):
     filaments.move_tether(simulation.context, 0, [1600, 0, 10])
     simulation.step(2)
     assert reporter["point_x"].tolist() == [[1500], [1600]] and reporter["point_z"].tolist() == [[0], [10]]
-    node = simulation.context.getState(positions=True).getPositions(asNumpy=True)._value[5]
+    node = positions_of(simulation.context)[5]
     assert reporter["extension_y"][-1, 0] == pytest.approx(node[1])
     assert reporter["force_x"][-1, 0] == pytest.approx(-0.5 * (node[0] - 1600))
     rows = _read(tmp_path / "tethers.csv")

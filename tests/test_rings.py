@@ -4,19 +4,21 @@ import mdtraj
 import numpy as np
 import openmm
 import pytest
-from conftest import ENGINES
 from openmm import app, unit
-from physics_cases import ENGINE_PLATFORMS, KT, TEMPERATURE, VISCOSITY, soft_chain, time_step
-from physics_cases import Case as EquilibriumCase
 from scipy.integrate import simpson
 from scipy.spatial.transform import Rotation
-from test_redistribution import _bent_chain, _dense_resistance
 
 from openmm_cylchain import F_ACTIN, Filaments, InputError
 from openmm_cylchain.analysis import trajectories as analysis
 from openmm_cylchain.filaments.equilibrium import SegmentLengthDistribution
 from openmm_cylchain.mechanics import redistribution
 from openmm_cylchain.output.reporters import FilamentReporter
+from support.contexts import forces_of, new_context, new_simulation, positions_of
+from support.dense_mechanics import bent_chain, dense_resistance
+from support.equilibrium_cases import Case as EquilibriumCase
+from support.equilibrium_cases import soft_chain, time_step
+from support.platforms import ENGINE_PLATFORMS, ENGINES
+from support.solvent import KT, TEMPERATURE, VISCOSITY
 
 FRICTION = F_ACTIN.segment_friction(VISCOSITY, TEMPERATURE)
 SIGMAS = 4.0
@@ -27,16 +29,6 @@ def _polygon(segments, generator, scatter=30.0):
     radius = 180 / np.sin(np.pi / segments)
     nodes = radius * np.stack([np.cos(angles), np.sin(angles), np.zeros(segments)], axis=1)
     return nodes + generator.normal(scale=scatter, size=nodes.shape)
-
-
-def _context(system, integrator, positions, platform="Reference"):
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform(platform))
-    context.setPositions(positions)
-    return context
-
-
-def _positions(context):
-    return context.getState(positions=True).getPositions(asNumpy=True)._value
 
 
 # How they are built
@@ -77,9 +69,9 @@ def test_particles_bonds_and_points_of_a_ring(engine, tmp_path):
     nodes = positions._value
     assert nodes[5] == pytest.approx(0.75 * nodes[4] + 0.25 * nodes[0])
     assert nodes[6] == pytest.approx(0.5 * nodes[4] + 0.5 * nodes[0])
-    context = _context(system, filaments.create_integrator(system, 1.0, random_seed=1), positions)
+    context = new_context(system, positions, filaments.create_integrator(system, 1.0, random_seed=1))
     context.getIntegrator().step(3)
-    after = _positions(context)
+    after = positions_of(context)
     assert after[5] == pytest.approx(0.75 * after[4] + 0.25 * after[0], abs=1e-9)
     with open(tmp_path / "ring.cif", "w") as file:
         app.PDBxFile.writeFile(topology, positions, file, keepIds=True)
@@ -132,8 +124,7 @@ def test_reporter_and_forces_know_the_last_segment(engine):
 
     topology, system, positions = filaments.build()
     integrator = filaments.create_integrator(system, 1e-6, temperature=0)
-    simulation = app.Simulation(topology, system, integrator, openmm.Platform.getPlatform("Reference"))
-    simulation.context.setPositions(positions)
+    simulation = new_simulation(topology, system, positions, integrator)
     state = simulation.context.getState(energy=True, forces=True)
     stretching, bending, contour = energies(nodes.reshape(-1))
     assert state.getPotentialEnergy()._value == pytest.approx(stretching + bending, rel=1e-9)
@@ -204,14 +195,14 @@ def _chain_set(counts, closed, fixed=()):
 def test_redistribution_equals_dense_solution(counts, closed, fixed):
     chains = _chain_set(counts, closed, fixed)
     generator = np.random.default_rng(1)
-    shapes = [_polygon(n, generator) if ring else _bent_chain(F_ACTIN, n - 1, n) for n, ring in zip(counts, closed)]
+    shapes = [_polygon(n, generator) if ring else bent_chain(F_ACTIN, n - 1, n) for n, ring in zip(counts, closed)]
     nodes = np.concatenate(shapes)
     forces = generator.normal(size=nodes.shape)
     velocities = redistribution.redistribute(chains, nodes, forces)
     start = 0
     for shape, ring in zip(shapes, closed):
         mine = slice(start, start + len(shape))
-        resistance = _dense_resistance(shape, FRICTION, ring)
+        resistance = dense_resistance(shape, FRICTION, ring)
         free = np.repeat(~chains.fixed[mine], 3)
         expected = np.zeros(3 * len(shape))
         expected[free] = np.linalg.solve(resistance[np.ix_(free, free)], forces[mine].reshape(-1)[free])
@@ -220,7 +211,7 @@ def test_redistribution_equals_dense_solution(counts, closed, fixed):
 
 
 def test_open_chains_have_the_narrow_band():
-    assert redistribution.resistance_bands(_chain_set((6,), (False,)), _bent_chain(F_ACTIN, 5, 1)).shape == (6, 18)
+    assert redistribution.resistance_bands(_chain_set((6,), (False,)), bent_chain(F_ACTIN, 5, 1)).shape == (6, 18)
     ring = _polygon(6, np.random.default_rng(1))
     assert redistribution.resistance_bands(_chain_set((6,), (True,)), ring).shape == (9, 18)
 
@@ -231,7 +222,7 @@ def mixed_system(request):
     generator = np.random.default_rng(4)
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine=request.param)
     filaments.add_nodes(F_ACTIN, _polygon(9, generator), closed=True)
-    filaments.add_nodes(F_ACTIN, _bent_chain(F_ACTIN, 4, 2))
+    filaments.add_nodes(F_ACTIN, bent_chain(F_ACTIN, 4, 2))
     filaments.add_nodes(F_ACTIN, _polygon(6, generator), clamped=[1, 2], closed=True)
     _, system, positions = filaments.build()
     pull = openmm.CustomExternalForce("-(fx*x+fy*y+fz*z)")
@@ -247,7 +238,7 @@ def _dense_velocities(filament, nodes, forces):
     free = np.ones(nodes.shape, dtype=bool)
     free[list(filament.clamped)] = False
     free = free.reshape(-1)
-    resistance = _dense_resistance(nodes, FRICTION, filament.closed)
+    resistance = dense_resistance(nodes, FRICTION, filament.closed)
     velocities = np.zeros(nodes.size)
     velocities[free] = np.linalg.solve(resistance[np.ix_(free, free)], forces.reshape(-1)[free])
     return velocities.reshape(-1, 3)
@@ -257,11 +248,11 @@ def _dense_velocities(filament, nodes, forces):
 def test_a_step_equals_the_dense_solution(mixed_system, scheme):
     filaments, system, positions = mixed_system
     step = 1000.0
-    context = _context(system, filaments.create_integrator(system, step, scheme=scheme, temperature=0), positions)
-    start = _positions(context)
-    forces = context.getState(forces=True).getForces(asNumpy=True)._value
+    context = new_context(system, positions, filaments.create_integrator(system, step, scheme=scheme, temperature=0))
+    start = positions_of(context)
+    forces = forces_of(context)
     context.getIntegrator().step(1)
-    moved = _positions(context) - start
+    moved = positions_of(context) - start
     for filament, indices in zip(filaments, filaments.node_indices):
         nodes = start[indices]
         if scheme == "midpoint":
@@ -273,9 +264,9 @@ def test_a_step_equals_the_dense_solution(mixed_system, scheme):
 def test_joint_tensions_balance_every_segment(mixed_system):
     """Drag of each segment = its own and the external forces, and those of its two neighbours."""
     filaments, system, positions = mixed_system
-    context = _context(system, filaments.create_integrator(system, 1.0, temperature=0), positions)
-    start = _positions(context)
-    forces = context.getState(forces=True).getForces(asNumpy=True)._value
+    context = new_context(system, positions, filaments.create_integrator(system, 1.0, temperature=0))
+    start = positions_of(context)
+    forces = forces_of(context)
     tensions = filaments.joint_tensions(context)
     assert [phi.shape for phi in tensions] == [(9, 3), (3, 3), (6, 3)]
     for number in (0, 2):
@@ -288,7 +279,7 @@ def test_joint_tensions_balance_every_segment(mixed_system):
             ends = [segment, (segment + 1) % len(nodes)]
             if set(ends) & set(filament.clamped):
                 continue
-            drag = _dense_resistance(nodes[ends], FRICTION) @ velocities[ends].reshape(-1)
+            drag = dense_resistance(nodes[ends], FRICTION) @ velocities[ends].reshape(-1)
             applied = (
                 own[segment] + 0.5 * external[ends].reshape(-1) + np.concatenate([-phi[segment - 1], phi[segment]])
             )
@@ -322,14 +313,14 @@ def test_noise_covariance(engine):
     _, system, positions = filaments.build()
     step = 1.0
     integrator = filaments.create_integrator(system, step, scheme="midpoint", random_seed=3)
-    context = _context(system, integrator, positions)
+    context = new_context(system, positions, integrator)
     moves = []
     for _ in range(draws):
         context.setPositions(positions)
         integrator.step(1)
-        moves.append((_positions(context) - positions._value).reshape(copies, 12))
+        moves.append((positions_of(context) - positions._value).reshape(copies, 12))
     moves = np.concatenate(moves)
-    expected = 2 * KT * step * np.linalg.inv(_dense_resistance(nodes, FRICTION, True))
+    expected = 2 * KT * step * np.linalg.inv(dense_resistance(nodes, FRICTION, True))
     variances = np.diag(expected)
     error = np.sqrt((np.outer(variances, variances) + expected**2) / len(moves))
     assert np.abs((np.cov(moves.T) - expected) / error).max() < 5
@@ -404,12 +395,12 @@ def _simulated(engine, kind, shapes, steps):
     _, system, positions = filaments.build()
     step = time_step(EquilibriumCase(kind, shapes.shape[1], len(shapes), steps, 0.01))
     integrator = filaments.create_integrator(system, step, scheme="midpoint", random_seed=6)
-    context = _context(system, integrator, positions)
+    context = new_context(system, positions, integrator)
     integrator.step(steps // 4)
     samples = []
     for _ in range(30):
         integrator.step(steps // 40)
-        samples.append(_observables(kind, _positions(context).reshape(shapes.shape)))
+        samples.append(_observables(kind, positions_of(context).reshape(shapes.shape)))
     return {name: np.mean([one[name] for one in samples], axis=0) for name in samples[0]}
 
 
@@ -487,8 +478,8 @@ def test_rings_run_on_every_platform(engine, platform):
         filaments.add_equilibrium(F_ACTIN, 5, seed=1)
         _, system, positions = filaments.build()
         integrator = filaments.create_integrator(system, 5e3, random_seed=3)
-        context = _context(system, integrator, positions, where)
+        context = new_context(system, positions, integrator, where)
         integrator.step(20)
-        ends.append(_positions(context))
+        ends.append(positions_of(context))
     assert np.abs(ends[1] - ends[0]).max() < 0.05
     assert np.abs(ends[0] - positions._value).max() > 1.0

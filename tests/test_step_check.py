@@ -17,10 +17,8 @@ from openmm_cylchain.couplings import pulling
 from openmm_cylchain.runs.configuration import parse_configuration
 from openmm_cylchain.runs.run import check_step
 from openmm_cylchain.systems import step_check
+from support.solvent import KT, TEMPERATURE, VISCOSITY
 
-VISCOSITY = 1.71e-3 * unit.pascal * unit.second
-TEMPERATURE = 310.0
-KT = 8.31446262e-3 * TEMPERATURE
 REFERENCE = openmm.Platform.getPlatform("Reference")
 
 

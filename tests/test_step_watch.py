@@ -19,11 +19,8 @@ from openmm_cylchain import (
 from openmm_cylchain.couplings.walls import Slab, wall_force
 from openmm_cylchain.dynamics.step_watch import ERROR_WORK, WARNING_WORK, DividedSteps, ExplicitWork, WorkRecorder
 from openmm_cylchain.engines.compiled import CylinderChainIntegrator
-
-VISCOSITY = 1.71e-3 * unit.pascal * unit.second
-TEMPERATURE = 310.0
-KT = 8.31446262e-3 * TEMPERATURE
-
+from support.contexts import new_context, positions_of
+from support.solvent import KT, TEMPERATURE, VISCOSITY
 
 # Divided steps
 
@@ -191,8 +188,7 @@ def portable(factor, kind=F_ACTIN, segments=8, temperature=None, checks=True):
     step = factor * filaments.recommended_time_step().step
     integrator = filaments.create_integrator(system, step, temperature=temperature, random_seed=3, checks=False)
     integrator.checks = checks
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
-    context.setPositions(positions)
+    context = new_context(system, positions, integrator)
     return context, integrator
 
 
@@ -239,7 +235,7 @@ def test_checks_change_nothing():
     for checks in (True, False):
         context, integrator = portable(1.0, checks=checks)
         integrator.step(300)
-        positions.append(context.getState(positions=True).getPositions(asNumpy=True)._value)
+        positions.append(positions_of(context))
     assert np.array_equal(*positions)
 
 
@@ -259,8 +255,7 @@ def kicked(stiffness, checks=True, filaments_count=1):
         warnings.simplefilter("ignore", TimeStepWarning)
         step = filaments.recommended_time_step()
         integrator = filaments.create_integrator(system, step, random_seed=1, checks=checks)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
-    context.setPositions(positions)
+    context = new_context(system, positions, integrator)
     return context, integrator
 
 
@@ -287,7 +282,7 @@ def test_long_calls_are_the_same_as_short_ones():
         context, integrator = kicked(1e-5)
         for steps in calls:
             integrator.step(steps)
-        positions.append(context.getState(positions=True).getPositions(asNumpy=True)._value)
+        positions.append(positions_of(context))
     assert np.array_equal(positions[0], positions[1]) and np.array_equal(positions[0], positions[2])
 
 
@@ -299,8 +294,7 @@ def context_of(filaments, system, positions, step, scheme="implicit", **options)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", TimeStepWarning)
         integrator = filaments.create_integrator(system, step, scheme, random_seed=5, **options)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
-    context.setPositions(positions)
+    context = new_context(system, positions, integrator)
     return context, integrator
 
 
@@ -531,5 +525,5 @@ def test_measuring_changes_no_trajectory():
     for checks in (True, False):
         context, integrator = context_of(*linked(F_ACTIN, 8, 1e-5), 1e6, checks=checks)
         integrator.step(300)
-        ends.append(context.getState(positions=True).getPositions(asNumpy=True)._value)
+        ends.append(positions_of(context))
     assert np.array_equal(*ends)

@@ -8,10 +8,10 @@ import numpy as np
 import openmm
 import pytest
 from openmm import app, unit
-from physics_cases import TEMPERATURE, VISCOSITY
 
 from openmm_cylchain import DSDNA, F_ACTIN, Filaments, InputError
 from openmm_cylchain.output.structure_files import write_lammps_data, write_psf
+from support.solvent import TEMPERATURE, VISCOSITY
 
 BOX = np.array([[1500.0, 0.0, 0.0], [400.0, 1400.0, 0.0], [-600.0, 500.0, 1600.0]])
 

@@ -7,12 +7,12 @@ import numpy as np
 import openmm
 import pytest
 from openmm import app
-from physics_cases import TEMPERATURE, VISCOSITY
-from test_openmm_reporters import close, simulation_of
-from test_periodic import CUBIC, TRICLINIC
 
 from openmm_cylchain import F_ACTIN, Filaments, InputError
 from openmm_cylchain.output.reporters import FilamentReporter, TensionReporter
+from support.contexts import close_reporters, new_simulation
+from support.periodic_systems import CUBIC, TRICLINIC, crossing_simulation
+from support.solvent import TEMPERATURE, VISCOSITY
 
 
 def pulled(filaments, force, temperature=0, step=1e4):
@@ -24,9 +24,7 @@ def pulled(filaments, force, temperature=0, step=1e4):
     pull.addParticle(int(filaments.node_indices[0][-1]), [])
     system.addForce(pull)
     integrator = filaments.create_integrator(system, step, scheme="euler", temperature=temperature)
-    simulation = app.Simulation(topology, system, integrator, openmm.Platform.getPlatform("Reference"))
-    simulation.context.setPositions(positions)
-    return simulation
+    return new_simulation(topology, system, positions, integrator)
 
 
 @pytest.mark.parametrize("tension", [3.0, -0.02])
@@ -70,7 +68,7 @@ def test_tension_is_what_moves_the_segments_behind_a_joint(engine, tmp_path):
     reporter = TensionReporter(None, 1, filaments, joints=True)
     simulation.reporters += [app.DCDReporter(str(tmp_path / "motion.dcd"), 1), reporter]
     simulation.step(5)
-    close(simulation)
+    close_reporters(simulation)
     frames = mdtraj.load(str(tmp_path / "motion.dcd"), top=mdtraj.Topology.from_openmm(simulation.topology)).xyz
     friction = F_ACTIN.segment_friction(VISCOSITY, TEMPERATURE)
     checked = 0
@@ -97,12 +95,12 @@ def test_tension_is_what_moves_the_segments_behind_a_joint(engine, tmp_path):
 @pytest.mark.parametrize("vectors", [CUBIC, TRICLINIC], ids=["cubic", "triclinic"])
 @pytest.mark.parametrize("wrapped", [False, True])
 def test_numbers_are_those_of_the_trajectory_in_a_periodic_box(engine, wrapped, vectors, tmp_path):
-    filaments, simulation = simulation_of(engine, vectors)
+    filaments, simulation = crossing_simulation(engine, vectors)
     simulation.reporters.append(app.DCDReporter(str(tmp_path / "box.dcd"), 2, enforcePeriodicBox=wrapped))
     reporter, tensions = FilamentReporter(None, 2, filaments), TensionReporter(None, 2, filaments, joints=True)
     simulation.reporters += [reporter, tensions]
     simulation.step(8)
-    close(simulation)
+    close_reporters(simulation)
     frames = mdtraj.load(str(tmp_path / "box.dcd"), top=mdtraj.Topology.from_openmm(simulation.topology)).xyz
     frames = frames.astype(float)
     assert len(frames) == 4

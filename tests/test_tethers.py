@@ -6,9 +6,10 @@ import numpy as np
 import openmm
 import pytest
 from openmm import unit
-from physics_cases import KT, TEMPERATURE, VISCOSITY
 
 from openmm_cylchain import F_ACTIN, Filaments, InputError
+from support.contexts import energy_of, forces_of, new_context, positions_of
+from support.solvent import KT, TEMPERATURE, VISCOSITY
 
 MICROSECOND = 1e6
 STIFFNESS = F_ACTIN.segment_stiffness
@@ -27,13 +28,7 @@ def _trapped(engine, points, stiffness=STIFFNESS, segments=3, chains=1, **option
 def _context(filaments, step=MICROSECOND, **options):
     topology, system, positions = filaments.build()
     integrator = filaments.create_integrator(system, step, **options)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
-    context.setPositions(positions)
-    return context
-
-
-def _energy(context):
-    return context.getState(energy=True).getPotentialEnergy()._value
+    return new_context(system, positions, integrator)
 
 
 @pytest.mark.parametrize("engine", ["portable", "compiled"])
@@ -43,13 +38,13 @@ def test_energy_and_force_of_a_tether_that_is_moved(engine):
     tether = filaments.add_tether(0, -1, [1.08, 0.01, 0] * unit.micrometer, 0.5 * unit.piconewton / unit.nanometer)
     stiffness = 0.5 * 0.602214076
     context = _context(filaments, 1.0, scheme="midpoint")
-    assert _energy(context) == pytest.approx(0.5 * stiffness * 100, rel=1e-6)
-    forces = context.getState(forces=True).getForces(asNumpy=True)._value
+    assert energy_of(context) == pytest.approx(0.5 * stiffness * 100, rel=1e-6)
+    forces = forces_of(context)
     assert forces[3] == pytest.approx([0, 10 * stiffness, 0], rel=1e-6, abs=1e-6)
     filaments.move_tether(context, tether, [1080, 0, -3])
-    assert _energy(context) == pytest.approx(0.5 * stiffness * 9, rel=1e-6)
+    assert energy_of(context) == pytest.approx(0.5 * stiffness * 9, rel=1e-6)
     filaments.move_tether(context, tether, [1080, 0, -3], 2 * stiffness)
-    assert _energy(context) == pytest.approx(stiffness * 9, rel=1e-6)
+    assert energy_of(context) == pytest.approx(stiffness * 9, rel=1e-6)
 
 
 def test_the_nearest_image_of_a_point_counts_in_a_periodic_box():
@@ -60,12 +55,11 @@ def test_the_nearest_image_of_a_point_counts_in_a_periodic_box():
     force = CylinderChainForce.cast(system.getForce(0))
     force.setUsesPeriodicBoundaryConditions(True)
     integrator = filaments.create_integrator(system, MICROSECOND, scheme="implicit", temperature=0)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
-    context.setPositions(positions)
-    assert _energy(context) == pytest.approx(0.5 * STIFFNESS * 100, rel=1e-6)
+    context = new_context(system, positions, integrator)
+    assert energy_of(context) == pytest.approx(0.5 * STIFFNESS * 100, rel=1e-6)
     integrator.step(200)
-    assert _energy(context) < 1e-6
-    assert context.getState(positions=True).getPositions(asNumpy=True)._value[0, 0] == pytest.approx(10, abs=1e-3)
+    assert energy_of(context) < 1e-6
+    assert positions_of(context)[0, 0] == pytest.approx(10, abs=1e-3)
 
 
 def test_both_engines_move_a_trapped_filament_alike():
@@ -74,7 +68,7 @@ def test_both_engines_move_a_trapped_filament_alike():
         filaments = _trapped(engine, {0: [0, 20, 0], 3: [1090, -30, 5]}, 0.01 * STIFFNESS)
         context = _context(filaments, 1e3, scheme="midpoint", temperature=0)
         context.getIntegrator().step(100)
-        ends.append(context.getState(positions=True).getPositions(asNumpy=True)._value)
+        ends.append(positions_of(context))
     assert np.abs(ends[0] - ends[1]).max() < 1e-9 * 1090
     assert np.abs(ends[0][0]).max() > 0.1
 
@@ -109,7 +103,7 @@ def test_equilibrium_in_traps_as_stiff_as_a_segment(step):
     context.getIntegrator().step(max(50, int(20 / step)))
     for _ in range(40):
         context.getIntegrator().step(max(8, int(5 / step)))
-        samples.append(context.getState(positions=True).getPositions(asNumpy=True)._value[nodes])
+        samples.append(positions_of(context)[nodes])
     samples = np.array(samples)
     assert context.getIntegrator().getNumDividedSteps() == 0
     # Longitudinal: five springs in a row, all of the same stiffness.
@@ -139,7 +133,7 @@ def test_a_moving_trap_drags_a_filament_with_a_lag_of_friction_over_stiffness():
     for index in range(1, 401):
         filaments.move_tether(context, 0, [speed * step * (index - 0.5), 0, 0])
         context.getIntegrator().step(1)
-    node = context.getState(positions=True).getPositions(asNumpy=True)._value[0]
+    node = positions_of(context)[0]
     friction = 3 * F_ACTIN.segment_friction(VISCOSITY, TEMPERATURE, 3).parallel
     assert speed * step * 400 - node[0] == pytest.approx(speed * friction / STIFFNESS, rel=0.01)
 

@@ -6,7 +6,6 @@ import re
 import warnings
 
 import numpy as np
-import openmm
 import pytest
 from openmm import unit
 from scipy.linalg import eigh
@@ -25,11 +24,10 @@ from openmm_cylchain import (
 from openmm_cylchain.dynamics import time_step as timestep
 from openmm_cylchain.mechanics.flow import Flow
 from openmm_cylchain.mechanics.redistribution import STEPS, ChainSet, resistance_bands
+from support.contexts import forces_of, new_context, positions_of
+from support.solvent import KT, TEMPERATURE, VISCOSITY
 
 MICROSECOND = 1e6  # ps
-VISCOSITY = 1.71e-3 * unit.pascal * unit.second
-TEMPERATURE = 310.0
-KT = 8.31446262e-3 * TEMPERATURE
 
 # Table 3 as printed, in us.
 LENGTHS = (10, 20, 30, 40, 80, 150, 300, 600, 1200, 2400)
@@ -205,13 +203,13 @@ def hessian_from_openmm(filament_type, segments, platform):
     filaments = Filaments(VISCOSITY, TEMPERATURE)
     filaments.add_straight(filament_type, segments, [0, 0, 0], [1, 0, 0])
     _, system, positions = filaments.build()
-    context = openmm.Context(system, openmm.VerletIntegrator(0.001), platform)
+    context = new_context(system, positions, platform=platform)
     positions = positions.value_in_unit(unit.nanometer)
     step = 1e-4 * filament_type.segment_length
 
     def forces(flat):
         context.setPositions(flat.reshape(-1, 3))
-        return context.getState(forces=True).getForces(asNumpy=True)._value.ravel()
+        return forces_of(context).ravel()
 
     flat = positions.ravel()
     hessian = np.empty((flat.size, flat.size))
@@ -433,12 +431,11 @@ def test_recommended_step_of_a_ring_resolves_how_it_becomes_round():
     filaments.add_nodes(kind, oval, closed=True)
     _, system, positions = filaments.build()
     integrator = filaments.create_integrator(system, relaxation / 400, scheme="implicit")
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
-    context.setPositions(positions)
+    context = new_context(system, positions, integrator)
     amplitudes = []
     for steps in (100, 400):
         integrator.step(steps)
-        nodes = context.getState(positions=True).getPositions(asNumpy=True)._value
+        nodes = positions_of(context)
         amplitudes.append(np.mean(np.sum(nodes * outwards, axis=1) * np.cos(2 * angles)))
     assert np.log(amplitudes[0] / amplitudes[1]) == pytest.approx(1.0, rel=0.03)
 

@@ -3,24 +3,16 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-import openmm
-from conftest import PLATFORMS
 from openmm import unit
 
 from openmm_cylchain import F_ACTIN, Filaments, FilamentType
 from openmm_cylchain.dynamics.time_step import stability_bounds
 from openmm_cylchain.filaments.equilibrium import JointAngleDistribution, SegmentLengthDistribution
-from openmm_cylchain.units.quantities import BOLTZMANN
+from support.contexts import new_context, positions_of
+from support.solvent import KT, TEMPERATURE, VISCOSITY
 
-TEMPERATURE = 310.0
-KT = BOLTZMANN * TEMPERATURE
-VISCOSITY = 1.71e-3 * unit.pascal * unit.second
 PICONEWTON = unit.piconewton
 NANOMETER = unit.nanometer
-
-# The compiled engine has no kernels for GPU platforms yet.
-ENGINE_PLATFORMS = [("portable", platform) for platform in PLATFORMS]
-ENGINE_PLATFORMS += [("compiled", platform) for platform in PLATFORMS if platform in ("Reference", "CPU")]
 
 
 def soft_chain(name, **bending):
@@ -133,14 +125,12 @@ def measured_means(case, engine, platform, scheme, seed=20, step=None):
     _, system, positions = filaments.build()
     step = time_step(case) if step is None else step
     integrator = filaments.create_integrator(system, step, scheme=scheme, random_seed=seed)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform(platform))
-    context.setPositions(positions)
+    context = new_context(system, positions, integrator, platform)
     integrator.step(case.steps // 4)
     samples = []
     for _ in range(50):
         integrator.step(case.steps * 3 // 200)
-        state = context.getState(positions=True)
-        nodes = state.getPositions(asNumpy=True)._value.reshape(case.chains, case.segments + 1, 3)
+        nodes = positions_of(context).reshape(case.chains, case.segments + 1, 3)
         samples.append(_observables(case, nodes))
     result = {}
     for name in samples[0]:

@@ -10,9 +10,9 @@ the places of the inner nodes of held chains, and of l1 .. l4, r and phi of ring
 """
 
 import numpy as np
-from physics_cases import KT
 
 from openmm_cylchain.filaments.equilibrium import SegmentLengthDistribution
+from support.solvent import KT
 
 
 class ClosedShape:

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 import openmm
 from openmm import unit
-from physics_cases import TEMPERATURE, VISCOSITY
 from scipy.spatial import cKDTree
 
 from openmm_cylchain import F_ACTIN, Filaments
@@ -14,6 +13,8 @@ from openmm_cylchain.couplings.contacts import contact_force
 from openmm_cylchain.couplings.crosslinks import Crosslinks
 from openmm_cylchain.couplings.walls import Sphere, wall_force
 from openmm_cylchain.filaments.equilibrium import draw_chain
+from support.contexts import new_context
+from support.solvent import TEMPERATURE, VISCOSITY
 
 DIAMETER = 30 * unit.nanometer
 SPACING = 18 * unit.nanometer
@@ -95,7 +96,6 @@ def _relaxed(filaments, system, positions, box, seed, relaxation):
     # At this step filaments do not cross. Energies of contacts are too high, which integrators warn of.
     step = filaments.recommended_time_step(contact_diameter=DIAMETER).step
     integrator = filaments.create_integrator(system, step, random_seed=seed, checks=False)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("CPU"))
-    context.setPositions(positions)
+    context = new_context(system, positions, integrator, "CPU")
     integrator.step(relaxation)
     return Network(filaments, context, box, step)
