@@ -163,7 +163,7 @@ def test_rods_turn_at_the_exact_rate(kind, micrometers, turn):
     assert abs(rate - 1.0) < 0.01, (rate, error)
 
 
-# B: forces beside filaments (links: test_recommended_step.py)
+# B: forces beside filaments (links: dynamics/test_recommended_step.py)
 
 
 def wall_of(thickness):
