@@ -10,6 +10,7 @@ from openmm_cylchain.reproduce import cantilevers, chromosome, rod_diffusion, ro
 from openmm_cylchain.reproduce.records import Records
 from openmm_cylchain.reproduce.rods_on_string import ACTIN, CHROMOSOME, MICROMETER, ROD, SECOND
 from openmm_cylchain.reproduce.transverse_modes import transverse_modes
+from support.verdicts import verdicts
 
 # Closed forms
 
@@ -90,10 +91,6 @@ def test_amplitudes_of_the_free_chain_have_the_exact_variance():
 
 
 # Cases and planted faults
-
-
-def verdicts(case, folder):
-    return {each.name: each.verdict for each in case.evaluate(Records(folder), True).results}
 
 
 def planted(monkeypatch, column, **changes):
