@@ -148,7 +148,7 @@ def test_relaxation_fits_refuse_what_they_cannot_fit():
 
 def test_statistics_print_nothing():
     program = (
-        "import numpy; from openmm_cylchain import statistics; "
+        "import numpy; from openmm_cylchain.analysis import statistics; "
         "statistics.mean_with_error(numpy.random.default_rng(0).normal(size=(50, 2)))"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
