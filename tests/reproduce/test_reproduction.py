@@ -7,10 +7,7 @@ import numpy as np
 import pytest
 
 from openmm_cylchain import InputError, cli
-from openmm_cylchain.reproduce import (
-    pesek2016,
-    simulation,
-)
+from openmm_cylchain.reproduce import pesek2016, simulation
 from openmm_cylchain.reproduce.case import Case, Outcome
 from openmm_cylchain.reproduce.page import format_number, format_page
 from openmm_cylchain.reproduce.records import Records
