@@ -10,11 +10,11 @@ import pytest
 from openmm import unit
 
 from openmm_cylchain import DSDNA, F_ACTIN, MICROTUBULE, EndCorrections, FilamentType, InputError
+from support.solvent import VISCOSITY
 
 # 1 pN nm = 0.602214076 kJ/mol, so 1 pN/nm = 0.602214076 kJ/(mol nm^2) and so on.
 PN_NM = 0.602214076
 PICONEWTON = unit.piconewton
-VISCOSITY = 1.71e-3 * unit.pascal * unit.second
 BASE = dict(name="ROD", diameter=5.0, segment_length=100.0, bending_rigidity=4e4, stretching_stiffness=3e4)
 
 

@@ -14,10 +14,9 @@ from openmm_cylchain import DSDNA, F_ACTIN, MICROTUBULE, EndCorrections, Filamen
 from openmm_cylchain.filaments.equilibrium import JointAngleDistribution, PlanarJointAngleDistribution, draw_chain
 from openmm_cylchain.filaments.joint_calibration import calibrated_stiffness, tangent_decorrelation
 from support.contexts import new_context, positions_of
+from support.solvent import TEMPERATURE, VISCOSITY
 
-TEMPERATURE = 310.0
 KT = 8.31446262e-3 * TEMPERATURE
-VISCOSITY = 1.71e-3 * unit.pascal * unit.second
 SIGMAS = 4.0
 MODELS = ("inscribed-circle", "kratky-porod", "quadratic")
 # V_b of a joint of unit stiffness against its angle: eqs. (27) and (26) of Pesek et al. 2016, and their case B.

@@ -10,9 +10,9 @@ from openmm import app, unit
 
 from openmm_cylchain import DSDNA, F_ACTIN, MICROTUBULE, Filaments, stokes_friction
 from support.contexts import forces_of, new_context
+from support.solvent import VISCOSITY
 
 PN = 0.602214076  # kJ/(mol nm)
-VISCOSITY = 1.71e-3 * unit.pascal * unit.second
 TEMPERATURE = 310 * unit.kelvin
 LENNARD_JONES_GROUP, CHAIN_GROUP = 0, 1
 

@@ -11,8 +11,8 @@ from openmm import app, unit
 from openmm_cylchain import DSDNA, F_ACTIN, Filaments, InputError, TimeStepWarning
 from openmm_cylchain.dynamics.time_step import stability_bounds
 from support.contexts import new_context
+from support.solvent import VISCOSITY
 
-VISCOSITY = 1.71e-3 * unit.pascal * unit.second
 TEMPERATURE = 310 * unit.kelvin
 STEP = 10 * unit.nanosecond
 ACTIN_0 = r"Filament 0 \(ACT\)"
