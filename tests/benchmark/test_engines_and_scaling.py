@@ -10,7 +10,7 @@ import numpy as np
 import openmm
 import pytest
 
-from openmm_cylchain import Filaments, InputError, cli, engines
+from openmm_cylchain import Filaments, InputError, cli, engine_choice
 from openmm_cylchain.benchmark import engines as engine_benchmark
 from openmm_cylchain.benchmark import measurement, memory, report, scaling, systems
 from openmm_cylchain.runs import information
@@ -382,20 +382,20 @@ def test_interruption(monkeypatch, capsys):
 
 
 def test_engines(without_compiled):
-    reasons = engines.available_engines()
-    assert set(reasons) == set(engines.ENGINES)
+    reasons = engine_choice.available_engines()
+    assert set(reasons) == set(engine_choice.ENGINES)
     assert reasons["portable"] is None and reasons["compiled"] == "it is not part of this installation"
-    assert engines.load_engine() is engines.load_engine("portable")
+    assert engine_choice.load_engine() is engine_choice.load_engine("portable")
     with pytest.raises(InputError, match="compiled engine is missing: it is not part"):
-        engines.load_engine("compiled")
+        engine_choice.load_engine("compiled")
     with pytest.raises(InputError, match="engine must be one of compiled, portable"):
         Filaments(1.0, 300.0, engine="fast")
 
 
 def test_compiled_engine_comes_first(with_compiled):
-    assert engines.available_engines() == {"portable": None, "compiled": None}
-    assert engines.load_engine() is with_compiled
-    assert engines.load_engine("portable") is not with_compiled
+    assert engine_choice.available_engines() == {"portable": None, "compiled": None}
+    assert engine_choice.load_engine() is with_compiled
+    assert engine_choice.load_engine("portable") is not with_compiled
 
 
 @pytest.mark.parametrize("error", [OSError("no such library"), openmm.OpenMMException("no such library")])
@@ -403,8 +403,8 @@ def test_reason_why_a_plugin_does_not_load(error, monkeypatch):
     def fail(name):
         raise error
 
-    monkeypatch.setattr(engines.importlib, "import_module", fail)
-    assert engines.available_engines()["compiled"] == "no such library"
+    monkeypatch.setattr(engine_choice.importlib, "import_module", fail)
+    assert engine_choice.available_engines()["compiled"] == "no such library"
 
 
 def test_information(without_compiled, monkeypatch, capsys):
