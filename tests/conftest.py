@@ -1,27 +1,11 @@
-"""Fixtures that several test modules share."""
+"""Hooks of pytest, and fixtures that several test files share."""
 
 import os
 
 import openmm
 import pytest
 
-from openmm_cylchain.dynamics.schemes import EXPLICIT_SCHEMES
-
-_WANTED = ("Reference", "CPU", "OpenCL")
-
-
-def _usable(name):
-    """Whether a Context can be created on the platform: OpenCL may be installed without a device."""
-    system = openmm.System()
-    system.addParticle(1.0)
-    try:
-        openmm.Context(system, openmm.VerletIntegrator(0.001), openmm.Platform.getPlatformByName(name))
-    except openmm.OpenMMException:
-        return False
-    return True
-
-
-PLATFORMS = [name for name in _WANTED if _usable(name)]
+from support.platforms import ENGINES, PLATFORMS
 
 
 def pytest_configure():
@@ -47,10 +31,6 @@ def platform(request):
 def reference():
     """The Reference platform: slow, but in double precision throughout."""
     return openmm.Platform.getPlatformByName("Reference")
-
-
-ENGINES = ("portable", "compiled")
-ENGINE_SCHEMES = [(engine, scheme) for engine in ENGINES for scheme in EXPLICIT_SCHEMES] + [("compiled", "implicit")]
 
 
 @pytest.fixture(params=ENGINES)

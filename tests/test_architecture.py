@@ -1,12 +1,11 @@
-"""The folders of the package lie above each other, and nothing imports upwards or in a circle."""
+"""Folders of the package lie above each other; nothing imports upwards or in a circle, and no test imports a test."""
 
 import ast
 from graphlib import TopologicalSorter
-from pathlib import Path
 
 import pytest
 
-PACKAGE = Path(__file__).parents[1] / "openmm_cylchain"
+from support.repository import PACKAGE, TESTS
 
 # From the lowest to the highest. Modules on one line may import each other, but not in a circle.
 FLOORS = (
@@ -76,3 +75,19 @@ def test_no_module_imports_the_package_by_its_name():
             if isinstance(node, ast.ImportFrom) and node.level == 0:
                 names.append(node.module)
             assert not any(name.startswith("openmm_cylchain") for name in names), module
+
+
+def test_no_test_file_imports_another():
+    """What they share is public in ``support``. Their names differ."""
+    files = sorted(TESTS.rglob("*.py"))
+    tests = [path.stem for path in files if path.stem.startswith("test_")]
+    assert len(set(tests)) == len(tests) > 50
+    for path in files:
+        for node in ast.walk(ast.parse(path.read_text())):
+            if not isinstance(node, (ast.Import, ast.ImportFrom)):
+                continue
+            module = getattr(node, "module", None) or ""
+            imported = [part for alias in node.names for part in f"{module}.{alias.name}".split(".")]
+            assert not {*tests, "conftest"} & set(imported), path
+            if module.startswith("support"):
+                assert not [name for name in imported if name.startswith("_")], path

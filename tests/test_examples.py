@@ -3,14 +3,13 @@
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import matplotlib.image
 import mdtraj
 import numpy as np
 import pytest
 
-EXAMPLES = Path(__file__).parents[1] / "examples"
+from support.repository import EXAMPLES
 
 # Name, stem of the files, steps of a short run and its frames, particles and bonds.
 CASES = [

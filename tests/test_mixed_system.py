@@ -3,18 +3,16 @@ walls and a trap, at rest and in shear. The System is that of ``examples/mixed_s
 """
 
 import importlib.util
-from pathlib import Path
 
 import numpy as np
-import openmm
 import pytest
-from physics_cases import ENGINE_PLATFORMS
 
 from openmm_cylchain.mechanics.flow import Flow
+from support.contexts import energy_of, forces_of, new_context, positions_of
+from support.platforms import ENGINE_PLATFORMS
+from support.repository import EXAMPLES
 
-_SPECIFICATION = importlib.util.spec_from_file_location(
-    "mixed_system", Path(__file__).parents[1] / "examples" / "mixed_system.py"
-)
+_SPECIFICATION = importlib.util.spec_from_file_location("mixed_system", EXAMPLES / "mixed_system.py")
 example = importlib.util.module_from_spec(_SPECIFICATION)
 _SPECIFICATION.loader.exec_module(example)
 
@@ -30,17 +28,8 @@ def simulate(engine, platform, flow=None, seed=3):
     step = mixed.filaments.recommended_time_step().step if engine == "portable" else example.STEP
     integrator = mixed.integrator(step, flow=flow, random_seed=seed)
     properties = {"OpenCL": {"Precision": "mixed"}, "CPU": {"DeterministicForces": "true"}}.get(platform, {})
-    context = openmm.Context(mixed.system, integrator, openmm.Platform.getPlatformByName(platform), properties)
-    context.setPositions(mixed.positions)
+    context = new_context(mixed.system, mixed.positions, integrator, platform, properties)
     return mixed, context, integrator
-
-
-def positions_in(context):
-    return context.getState(positions=True).getPositions(asNumpy=True)._value
-
-
-def forces_in(context, groups=-1):
-    return context.getState(forces=True, groups=groups).getForces(asNumpy=True)._value
 
 
 @EVERYWHERE
@@ -48,14 +37,14 @@ def test_forces_are_the_sum_of_their_parts(engine, platform):
     mixed, context, integrator = simulate(engine, platform, SHEAR)
     integrator.step(20)
     groups = {force.getForceGroup() for force in mixed.system.getForces()}
-    parts = [forces_in(context, {group}) for group in sorted(groups)]
-    total = forces_in(context)
+    parts = [forces_of(context, {group}) for group in sorted(groups)]
+    total = forces_of(context)
     scale = np.abs(total).max()
     tolerance = 1e-12 if platform == "Reference" else 2e-5
     np.testing.assert_allclose(np.sum(parts, axis=0), total, atol=tolerance * scale)
     assert len([part for part in parts if np.abs(part).max() > 1e-6 * scale]) >= 3
     state = context.getState(energy=True)
-    energies = [context.getState(energy=True, groups={group}).getPotentialEnergy()._value for group in groups]
+    energies = [energy_of(context, {group}) for group in groups]
     np.testing.assert_allclose(sum(energies), state.getPotentialEnergy()._value, rtol=1e-5)
 
 
@@ -63,7 +52,7 @@ def test_forces_are_the_sum_of_their_parts(engine, platform):
 def test_crosslinks_and_trap_pull_as_they_should(engine, platform):
     mixed, context, integrator = simulate(engine, platform)
     integrator.step(20)
-    positions, index = positions_in(context), mixed.filaments.attachment_indices
+    positions, index = positions_of(context), mixed.filaments.attachment_indices
     expected = np.zeros((mixed.system.getNumParticles(), 3))
     for first, second in mixed.crosslinks.pairs(context):
         between = positions[second] - positions[first]
@@ -79,7 +68,7 @@ def test_crosslinks_and_trap_pull_as_they_should(engine, platform):
         for node, share in zip(nodes, (1.0 - attachment.fraction, attachment.fraction)):
             expected[node] += share * expected[index[number]]
     nodes = np.concatenate(mixed.filaments.node_indices)
-    found = forces_in(context, {1})
+    found = forces_of(context, {1})
     tolerance = 1e-9 if platform == "Reference" else 1e-3
     np.testing.assert_allclose(found[nodes], expected[nodes], atol=tolerance)
 
@@ -93,7 +82,7 @@ def test_restart_from_a_checkpoint_is_identical(engine, platform, flow):
     mixed.crosslinks.remove(context, number)
     checkpoint, table = context.createCheckpoint(), mixed.crosslinks.table(context)
     integrator.step(15)
-    uninterrupted = positions_in(context)
+    uninterrupted = positions_of(context)
 
     mixed, context, integrator = simulate(engine, platform, flow)
     mixed.crosslinks.set_table(context, table)
@@ -101,7 +90,7 @@ def test_restart_from_a_checkpoint_is_identical(engine, platform, flow):
     integrator.step(15)
     # A NonbondedForce on the CPU platform adds its pairs in the order of a list that it makes anew after the restart.
     tolerance = 1e-8 if platform == "CPU" else 0
-    np.testing.assert_allclose(positions_in(context), uninterrupted, rtol=0, atol=tolerance)
+    np.testing.assert_allclose(positions_of(context), uninterrupted, rtol=0, atol=tolerance)
     assert len(mixed.crosslinks.pairs(context)) == 19
 
 
@@ -114,7 +103,7 @@ def test_shear_carries_everything_along(engine, platform):
         mixed, context, integrator = simulate(engine, platform)
         integrator.setFlow(flow)
         integrator.step(1)
-        moved.append(positions_in(context))
+        moved.append(positions_of(context))
     start, step = np.array(mixed.positions._value), integrator.getStepSize()._value
     added = (moved[1] - moved[0]) / step
     fluid = SHEAR.at(start)
@@ -137,7 +126,7 @@ def test_platforms_agree(engine):
     for platform in [name for one, name in ENGINE_PLATFORMS if one == engine]:
         mixed, context, integrator = simulate(engine, platform, SHEAR)
         integrator.step(25)
-        ends.append(positions_in(context))
+        ends.append(positions_of(context))
     for end in ends[1:]:
         np.testing.assert_allclose(end, ends[0], rtol=0, atol=0.1)
     assert np.abs(ends[0] - mixed.positions._value).max() > 0.1

@@ -4,14 +4,10 @@ import warnings
 from dataclasses import replace
 
 import numpy as np
-import openmm
 import pytest
-from closed_shapes import ClosedShape
 from openmm import unit
-from physics_cases import KT, TEMPERATURE, VISCOSITY
 from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
-from test_recommended_step import linked, straight_matrices
 
 from openmm_cylchain import (
     DSDNA,
@@ -27,11 +23,15 @@ from openmm_cylchain import (
 from openmm_cylchain.couplings import walls as confinement
 from openmm_cylchain.dynamics.recommended_step import fene_steps
 from openmm_cylchain.dynamics.time_step import effective_rate
-from openmm_cylchain.filaments.equilibrium import JointAngleDistribution, SegmentLengthDistribution
+from support.chain_energies import energies_of, exact_energies
+from support.closed_shapes import ClosedShape
+from support.contexts import new_context, positions_of
+from support.dense_mechanics import straight_matrices
+from support.linked_pairs import PICONEWTON_PER_NANOMETER, linked_pairs
+from support.solvent import KT, TEMPERATURE, VISCOSITY
 
 SIGMAS = 4.0
 LARGEST_DIVIDED_SHARE = 1e-3
-PICONEWTON_PER_NANOMETER = 0.602214076
 MICROMETER = 1e3
 
 
@@ -57,13 +57,8 @@ def context_of(filaments, step=None, checks=True, seed=1, scheme="implicit", sys
         _, system, positions = filaments.build()
     step = filaments.recommended_time_step(scheme, system=system) if step is None else step
     integrator = filaments.create_integrator(system, step, scheme, random_seed=seed, checks=checks, **options)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatform("Reference"))
-    context.setPositions(positions)
+    context = new_context(system, positions, integrator)
     return context, integrator
-
-
-def positions_of(context):
-    return context.getState(positions=True).getPositions(asNumpy=True)._value
 
 
 def in_equilibrium(kind, segments, chains, **options):
@@ -71,28 +66,6 @@ def in_equilibrium(kind, segments, chains, **options):
     for chain in range(chains):
         filaments.add_equilibrium(kind, segments, seed=chain, **options)
     return filaments
-
-
-def energies_of(kind, nodes, closed=False):
-    """Mean energies of the segments and joints of each chain in k_B T; of closed ones, beyond that of a square."""
-    vectors = (np.roll(nodes, -1, axis=1) - nodes) if closed else np.diff(nodes, axis=1)
-    lengths = np.linalg.norm(vectors, axis=2)
-    tangents = vectors / lengths[..., None]
-    before, after = (tangents, np.roll(tangents, -1, axis=1)) if closed else (tangents[:, :-1], tangents[:, 1:])
-    cosines = np.einsum("ijk,ijk->ij", before, after)
-    bending = np.zeros(cosines.shape) if kind.bending_rigidity == 0 else kind.bending_energy(cosines)
-    if closed:
-        bending = bending - kind.bending_energy(0.0)
-    joints = max(1, cosines.shape[1])
-    return np.array([kind.stretching_energy(lengths).mean(axis=1), bending.sum(axis=1) / joints]) / KT
-
-
-def exact_energies(kind):
-    """Of a free chain."""
-    stretching = SegmentLengthDistribution(kind, TEMPERATURE).mean(kind.stretching_energy) / KT
-    if kind.bending_rigidity == 0:
-        return stretching, 0.0
-    return stretching, JointAngleDistribution(kind, TEMPERATURE).mean(kind.bending_energy) / KT
 
 
 def assert_energies(
@@ -193,7 +166,7 @@ def test_rods_turn_at_the_exact_rate(kind, micrometers, turn):
     assert abs(rate - 1.0) < 0.01, (rate, error)
 
 
-# B: forces beside filaments (links: test_recommended_step.py)
+# B: forces beside filaments (links: dynamics/test_recommended_step.py)
 
 
 def wall_of(thickness):
@@ -243,7 +216,7 @@ def test_walls_have_their_energy_at_the_recommended_step():
 
 
 def test_a_link_at_too_long_a_step_warns_and_stops_the_run():
-    filaments, system, positions, _ = linked(MICROTUBULE, 8, 0.1, count=8)
+    filaments, system, positions, _ = linked_pairs(MICROTUBULE, 8, 0.1, count=8)
     step = filaments.recommended_time_step("implicit")
     with pytest.warns(TimeStepWarning, match="HarmonicBondForce"):
         context, integrator = context_of(filaments, step, system=system, positions=positions)

@@ -2,18 +2,18 @@
 
 import doctest
 import re
-from pathlib import Path
 
 import numpy as np
 import openmm
 import pytest
 from openmm import unit
-from physics_cases import VISCOSITY
 
 from openmm_cylchain import F_ACTIN, Filaments, cli, stokes_friction
 from openmm_cylchain.systems import filaments as build
+from support.contexts import new_context, positions_of
+from support.repository import ROOT
+from support.solvent import VISCOSITY
 
-ROOT = Path(__file__).parent.parent
 PAGES = [ROOT / "README.md", *sorted(ROOT.glob("docs/*.md")), *sorted(ROOT.glob("docs/design/*.md"))]
 PAGES += [ROOT / "ARCHITECTURE.md", ROOT / "CONTRIBUTING.md"]
 PYTHON = [
@@ -67,10 +67,9 @@ def test_adding():
         "stokes_friction": stokes_friction,
     }
     exec(ADDING, names)
-    context = openmm.Context(system, names["integrator"], openmm.Platform.getPlatform("Reference"))
-    context.setPositions(names["positions"])
+    context = new_context(system, names["positions"], names["integrator"])
     names["integrator"].step(5)
-    moved = context.getState(positions=True).getPositions(asNumpy=True)._value
+    moved = positions_of(context)
     assert moved.shape == (7, 3)
     assert np.all(np.any(moved != names["positions"]._value, axis=1))
 

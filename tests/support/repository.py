@@ -1,0 +1,8 @@
+"""Where the files of the repository lie."""
+
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = ROOT / "examples"
+PACKAGE = ROOT / "openmm_cylchain"
+TESTS = ROOT / "tests"
