@@ -6,7 +6,8 @@ private and may change.
 
 from . import analysis, theory
 from .couplings.contacts import add_exclusions, contact_force, crossing_barrier, excluded_pairs, share_exclusions
-from .couplings.crosslinks import Crosslinks, CrosslinkTable
+from .couplings.crosslink_tables import CrosslinkTable
+from .couplings.crosslinks import Crosslinks
 from .couplings.pulling import ConstantVelocityPulling, change_constant_force, constant_force, constant_tension
 from .couplings.walls import Box, Cylinder, Ellipsoid, Plane, Slab, Sphere, wall_force
 from .dynamics.recommended_step import fene_steps, recommended_time_step

@@ -17,8 +17,9 @@ from openmm import app, unit
 from physics_cases import CASES, ENGINE_PLATFORMS, KT, TEMPERATURE, VISCOSITY
 
 from openmm_cylchain import F_ACTIN, Filaments, InputError, InstabilityError
-from openmm_cylchain.couplings import crosslinks
-from openmm_cylchain.couplings.crosslinks import Crosslinks, CrosslinkTable
+from openmm_cylchain.couplings import crosslink_tables
+from openmm_cylchain.couplings.crosslink_tables import CrosslinkTable
+from openmm_cylchain.couplings.crosslinks import Crosslinks
 from openmm_cylchain.output.reporters import CrosslinkReporter
 
 BOX = np.array([[3.0, 0.0, 0.0], [0.5, 3.1, 0.0], [-0.4, 0.6, 2.9]])
@@ -268,7 +269,7 @@ def test_going_back_to_a_state_of_this_process():
     # Another Context may take the State, and is not touched by what happens in the first.
     other = _context(system, positions)
     other.setState(state)
-    for _ in range(2 * crosslinks._RECENT_TABLES):
+    for _ in range(2 * crosslink_tables.RECENT_TABLES):
         links.add(context, 0, 5)
         assert links.pairs(other).tolist() == pairs
     assert _energy(other) == pytest.approx(energy)
@@ -416,7 +417,7 @@ def test_many_changes_take_no_memory():
 
     tracemalloc.start()
     try:
-        change(crosslinks._RECENT_TABLES)
+        change(crosslink_tables.RECENT_TABLES)
         before = tracemalloc.take_snapshot()
         change(1000)
         growth = sum(one.size_diff for one in tracemalloc.take_snapshot().compare_to(before, "filename"))
