@@ -23,7 +23,8 @@ from .output.reporters import CrosslinkReporter, FilamentReporter, TensionReport
 from .output.structure_files import write_lammps_data, write_psf
 from .systems.filaments import Filaments
 from .systems.periodic import make_trajectory_whole, make_whole, remove_jumps
-from .systems.step_check import ObservableCheck, StepCheck, check_time_step
+from .systems.step_check import check_time_step
+from .systems.step_check_results import ObservableCheck, StepCheck
 from .version import __version__
 
 __all__ = [
