@@ -1,21 +1,26 @@
 """Statistics of the free discrete chain, exact for the model that is simulated, at any stiffness."""
 
 import numpy as np
+import numpy.typing as npt
 
 from ..errors import InputError
 from ..filaments.equilibrium import JointAngleDistribution, PlanarJointAngleDistribution, SegmentLengthDistribution
+from ..filaments.filament_type import FilamentType
 from ..units.quantities import whole_number
+from ..units.types import FloatOrArray, Scalar
 from .arguments import each_whole_number
 
 
-def mean_joint_cosine(filament_type, temperature, planar=False):
+def mean_joint_cosine(filament_type: FilamentType, temperature: Scalar, planar: bool = False) -> float:
     """Mean cosine <t1.t2> between neighbouring segments of the free discrete chain, in space or in a plane; exact."""
     if planar:
         return float(PlanarJointAngleDistribution(filament_type, temperature).mean(np.cos))
     return float(JointAngleDistribution(filament_type, temperature).mean(lambda cosine: cosine))
 
 
-def chain_tangent_correlation(filament_type, lag, temperature, planar=False):
+def chain_tangent_correlation(
+    filament_type: FilamentType, lag: npt.ArrayLike, temperature: Scalar, planar: bool = False
+) -> FloatOrArray:
     """Correlation of tangents of the free discrete chain, ``<t(i).t(i+k)> = <c>^k``, exact.
 
     Parameters
@@ -30,7 +35,7 @@ def chain_tangent_correlation(filament_type, lag, temperature, planar=False):
     return mean_joint_cosine(filament_type, temperature, planar) ** each_whole_number(lag, 0, "lag")
 
 
-def chain_persistence_length(filament_type, temperature):
+def chain_persistence_length(filament_type: FilamentType, temperature: Scalar) -> float:
     """Length over which tangents of the discrete chain decorrelate, ``-<l>/ln<c>``, in nm; exact.
 
     Of a type given by its ``persistence_length`` it is that length at the temperature given with it, times <l>/l0. Of
@@ -53,7 +58,9 @@ def _subchain_mean_square(filament_type, segments, temperature, planar):
     return np.arange(1, segments + 1) * square + 2.0 * mean**2 * pairs
 
 
-def chain_mean_square_end_to_end(filament_type, segments, temperature, planar=False):
+def chain_mean_square_end_to_end(
+    filament_type: FilamentType, segments: int, temperature: Scalar, planar: bool = False
+) -> float:
     """Mean square end-to-end distance of the free discrete chain in nm^2, exact at any stiffness.
 
     ``<R^2> = N <l^2> + 2 <l>^2 sum_k (N-k) <c>^k``, the averages over (19) and exp(-V_b/k_B T), or over what
@@ -71,7 +78,9 @@ def chain_mean_square_end_to_end(filament_type, segments, temperature, planar=Fa
     return float(_subchain_mean_square(filament_type, segments, temperature, planar)[-1])
 
 
-def chain_mean_square_radius_of_gyration(filament_type, segments, temperature, planar=False):
+def chain_mean_square_radius_of_gyration(
+    filament_type: FilamentType, segments: int, temperature: Scalar, planar: bool = False
+) -> float:
     """Mean square radius of gyration of the N+1 nodes of the free discrete chain in nm^2, exact.
 
     Every node has the same weight: ``<R_g^2> = sum over pairs <R_ij^2> / (N+1)^2``.
@@ -81,7 +90,9 @@ def chain_mean_square_radius_of_gyration(filament_type, segments, temperature, p
     return float(np.arange(segments, 0, -1) @ distances) / (segments + 1) ** 2
 
 
-def chain_bending_mode_variance(filament_type, segments, mode, temperature):
+def chain_bending_mode_variance(
+    filament_type: FilamentType, segments: int, mode: npt.ArrayLike, temperature: Scalar
+) -> FloatOrArray:
     """Variance of the amplitude of a bending mode of the free discrete chain, in nm; exact.
 
     Half of <|A_n|^2> for the vector amplitude that ``analysis.bending_mode_amplitudes`` takes from the
@@ -108,7 +119,9 @@ def chain_bending_mode_variance(filament_type, segments, mode, temperature):
     return np.einsum("...i,ij,...j->...", cosines, decorrelation, cosines)[()] * length / segments
 
 
-def chain_planar_bending_mode_variance(filament_type, segments, mode, temperature):
+def chain_planar_bending_mode_variance(
+    filament_type: FilamentType, segments: int, mode: npt.ArrayLike, temperature: Scalar
+) -> FloatOrArray:
     """Variance of the amplitude of a bending mode of the free discrete chain in a plane, in nm; exact.
 
     For the amplitude ``a_n = sqrt(2/L) l0 sum_i theta_i cos(n pi (i + 1/2)/N)`` of the tangent angles theta_i (i =

@@ -5,10 +5,12 @@ import math
 import numpy as np
 
 from ..filaments.equilibrium import PlanarJointAngleDistribution, SegmentLengthDistribution
+from ..filaments.filament_type import FilamentType
+from ..units.types import Scalar
 from .arguments import thermal_energy_above_zero
 
 
-def bending_energy_mean(filament_type, temperature, planar=False):
+def bending_energy_mean(filament_type: FilamentType, temperature: Scalar, planar: bool = False) -> float:
     """Mean bending energy of one joint at equilibrium, in kJ/mol; exact for every bending model.
 
     Inscribed circle: eq. (40), ``x k_B T (E_1(x)/E_2(x) - 1)`` with x = 2 K/k_B T, the paper's 2 lp/l0. Kratky-Porod:
@@ -30,7 +32,7 @@ def bending_energy_mean(filament_type, temperature, planar=False):
     return kT * _reduced_bending_moments(filament_type, kT)[0]
 
 
-def bending_energy_variance(filament_type, temperature):
+def bending_energy_variance(filament_type: FilamentType, temperature: Scalar) -> float:
     """Variance of the bending energy of one joint, in (kJ/mol)^2; exact for every bending model.
 
     Inscribed circle: eq. (41), ``(x k_B T)^2 (E_0/E_2 - (E_1/E_2)^2)`` at x = 2 K/k_B T. Kratky-Porod:
@@ -86,7 +88,7 @@ def _moments(values, weights):
     return mean, weights @ (values - mean) ** 2 / weights.sum()
 
 
-def stretching_energy_mean(filament_type, temperature, planar=False):
+def stretching_energy_mean(filament_type: FilamentType, temperature: Scalar, planar: bool = False) -> float:
     """Mean stretching energy of one segment at equilibrium, in kJ/mol; exact.
 
     Averages over (19), rho(l) ~ l^2 exp(-V_el/k_B T). Harmonic: ``(k_B T/2)(1 + 2/(s^2 + 1))`` with
@@ -109,7 +111,7 @@ def stretching_energy_mean(filament_type, temperature, planar=False):
     return _stretching_moments(filament_type, temperature)[0]
 
 
-def stretching_energy_variance(filament_type, temperature):
+def stretching_energy_variance(filament_type: FilamentType, temperature: Scalar) -> float:
     """Variance of the stretching energy of one segment, in (kJ/mol)^2; exact, see ``stretching_energy_mean``."""
     return _stretching_moments(filament_type, temperature)[1]
 

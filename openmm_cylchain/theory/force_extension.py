@@ -6,11 +6,13 @@ import numpy as np
 
 from ..errors import InputError
 from ..filaments.equilibrium import JointAngleDistribution
+from ..filaments.filament_type import FilamentType
 from ..units.quantities import DIMENSIONLESS, FORCE, LENGTH, STIFFNESS, in_units_of, positive, whole_number
+from ..units.types import FloatOrArray, Numbers, Scalar
 from .arguments import each_not_negative, thermal_energy_above_zero
 
 
-def marko_siggia_force(relative_extension, persistence_length, temperature):
+def marko_siggia_force(relative_extension: Numbers, persistence_length: Scalar, temperature: Scalar) -> FloatOrArray:
     """Force that holds a WLC at a relative extension, eq. (34), in kJ/(mol nm).
 
     ``F = k_B T/lp (1/(4(1-z)^2) - 1/4 + z)``, z = <R.e>/L: the interpolation of Marko and Siggia, within some
@@ -33,7 +35,7 @@ def _reduced_force(extension):
     return extension + extension * (2.0 - extension) / (4.0 * (1.0 - extension) ** 2)
 
 
-def marko_siggia_extension(force, persistence_length, temperature):
+def marko_siggia_extension(force: Numbers, persistence_length: Scalar, temperature: Scalar) -> FloatOrArray:
     """Relative extension <R.e>/L of a WLC under a force, the inverse of eq. (34); accurate to rounding.
 
     Parameters
@@ -58,7 +60,7 @@ def marko_siggia_extension(force, persistence_length, temperature):
     return np.where(reduced <= 1.0, extension, 1.0 - slack)[()]
 
 
-def chain_extension(filament_type, segments, force, temperature):
+def chain_extension(filament_type: FilamentType, segments: int, force: Numbers, temperature: Scalar) -> FloatOrArray:
     """Mean extension <R.e> in nm of the discrete chain whose ends are pulled apart by a constant force F e; exact.
 
     By transfer: with ``g(c) = int l^2 exp(-V_el/k_B T + F l c/k_B T) dl`` for a segment at the cosine c to e, and the
@@ -94,7 +96,7 @@ def _bending_transfer(filament_type, temperature, force):
     if filament_type.joint_stiffness == 0.0:
         return node, weight, np.full((len(node), len(node)), 0.5)
     coefficients = [
-        cosines.mean(lambda cosine, n=n: np.polynomial.legendre.legval(cosine, np.eye(1, n + 1, n)[0]))
+        cosines.mean(lambda cosine, n=n: np.polynomial.legendre.legval(cosine, np.eye(1, n + 1, n)[0]))  # type: ignore[misc]
         for n in range(order)
     ]
     polynomials = np.polynomial.legendre.legvander(node, order - 1)
@@ -134,7 +136,7 @@ def _extension(filament_type, segments, force, kT, node, weight, bending):
     return (weight @ derivative) / (weight @ partition)
 
 
-def linear_force(extension, contour_length, segment_stiffness, segments):
+def linear_force(extension: Numbers, contour_length: Scalar, segment_stiffness: Scalar, segments: int) -> FloatOrArray:
     """Force of a straight chain of springs, eq. (35): ``F = (k/N)(<R.e> - L)``, in kJ/(mol nm).
 
     Parameters
@@ -150,7 +152,7 @@ def linear_force(extension, contour_length, segment_stiffness, segments):
     return limiting_spring_constant(segment_stiffness, segments) * excess
 
 
-def effective_spring_constant(force, extension, contour_length):
+def effective_spring_constant(force: Numbers, extension: Numbers, contour_length: Scalar) -> FloatOrArray:
     """Effective spring constant of a chain under tension, eq. (36): ``F/|<R.e> - L|``, in kJ/(mol nm^2).
 
     Parameters
@@ -168,12 +170,14 @@ def effective_spring_constant(force, extension, contour_length):
     return force / np.abs(excess)
 
 
-def limiting_spring_constant(segment_stiffness, segments):
+def limiting_spring_constant(segment_stiffness: Scalar, segments: int) -> float:
     """Spring constant of a chain at large force, eq. (37): ``k/N``, in kJ/(mol nm^2)."""
     return positive(segment_stiffness, STIFFNESS, "segment_stiffness") / whole_number(segments, 1, "segments")
 
 
-def marko_siggia_spring_constant(force, contour_length, persistence_length, temperature):
+def marko_siggia_spring_constant(
+    force: Numbers, contour_length: Scalar, persistence_length: Scalar, temperature: Scalar
+) -> FloatOrArray:
     """Effective spring constant (36) where bending rules, eq. (38) with its prefactor, in kJ/(mol nm^2).
 
     ``k_eff = 2 F^(3/2) (lp/k_B T)^(1/2) / L``, from the first term of (34); it holds for k_B T/lp << F << the
@@ -190,7 +194,9 @@ def marko_siggia_spring_constant(force, contour_length, persistence_length, temp
     return 2.0 * force**1.5 * math.sqrt(scale) / positive(contour_length, LENGTH, "contour_length")
 
 
-def crossover_force(contour_length, persistence_length, segment_stiffness, segments, temperature):
+def crossover_force(
+    contour_length: Scalar, persistence_length: Scalar, segment_stiffness: Scalar, segments: int, temperature: Scalar
+) -> float:
     """Force at which the asymptotes (37) and (38) cross: ``(k L/(2N))^(2/3) (k_B T/lp)^(1/3)``, kJ/(mol nm)."""
     spring = limiting_spring_constant(segment_stiffness, segments)
     length = positive(contour_length, LENGTH, "contour_length")

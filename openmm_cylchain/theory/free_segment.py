@@ -2,12 +2,13 @@
 
 import numpy as np
 
-from ..mechanics.friction import rotational_relaxation_time
+from ..mechanics.friction import SegmentFriction, rotational_relaxation_time
 from ..units.quantities import TIME
+from ..units.types import FloatOrArray, Numbers, Scalar
 from .arguments import each_not_negative, thermal_energy_above_zero
 
 
-def mean_orientation(time, friction, temperature):
+def mean_orientation(time: Numbers, friction: SegmentFriction, temperature: Scalar) -> FloatOrArray:
     """Mean orientation of a free segment along its initial one, ``exp(-t/tau_r)`` with tau_r of eq. (29).
 
     Parameters
@@ -20,7 +21,9 @@ def mean_orientation(time, friction, temperature):
     return np.exp(-time / rotational_relaxation_time(friction, temperature))
 
 
-def free_segment_mean_square_displacement(time, friction, temperature):
+def free_segment_mean_square_displacement(
+    time: Numbers, friction: SegmentFriction, temperature: Scalar
+) -> tuple[FloatOrArray, FloatOrArray]:
     """Mean square displacement of the centre of a free segment at any time, eq. (32), in nm^2.
 
     Parameters
@@ -41,13 +44,15 @@ def free_segment_mean_square_displacement(time, friction, temperature):
     return isotropic + 2.0 * anisotropy, isotropic - anisotropy
 
 
-def short_time_mean_square_displacement(time, friction, temperature):
+def short_time_mean_square_displacement(
+    time: Numbers, friction: SegmentFriction, temperature: Scalar
+) -> tuple[FloatOrArray, FloatOrArray]:
     """Mean square displacement of a free segment that has not turned yet, eq. (30): (parallel, perpendicular)."""
     doubled = 2.0 * thermal_energy_above_zero(temperature) * each_not_negative(time, TIME, "time")
     return doubled / friction.parallel, doubled / friction.perpendicular
 
 
-def long_time_mean_square_displacement(time, friction, temperature):
+def long_time_mean_square_displacement(time: Numbers, friction: SegmentFriction, temperature: Scalar) -> FloatOrArray:
     """Mean square displacement of a free segment along any one direction once it has turned, eq. (31), in nm^2.
 
     ``(2 k_B T/3)(1/gamma_par + 2/gamma_perp) t``: the slope of (32) at long times, without its constant.

@@ -3,12 +3,16 @@
 import math
 
 import numpy as np
+import numpy.typing as npt
 
 from ..units.quantities import LENGTH, positive
+from ..units.types import FloatOrArray, Numbers, Scalar
 from .arguments import each_not_negative, each_whole_number
 
 
-def wlc_mean_square_end_to_end(contour_length, persistence_length, planar=False):
+def wlc_mean_square_end_to_end(
+    contour_length: Numbers, persistence_length: Scalar, planar: bool = False
+) -> FloatOrArray:
     """Mean square end-to-end distance of the free WLC, eq. (25), in nm^2.
 
     ``<R^2> = 2 lp^2 (L/lp - 1 + exp(-L/lp))``, accurate to rounding from rods to coils. In a plane, where tangents
@@ -37,7 +41,9 @@ def _correlation_length(persistence_length, planar):
     return (2.0 if planar else 1.0) * positive(persistence_length, LENGTH, "persistence_length")
 
 
-def wlc_tangent_correlation(contour_distance, persistence_length, planar=False):
+def wlc_tangent_correlation(
+    contour_distance: Numbers, persistence_length: Scalar, planar: bool = False
+) -> FloatOrArray:
     """Correlation of tangents of the WLC, ``<t(0).t(s)> = exp(-s/lp)``, in a plane ``exp(-s/2lp)``.
 
     Parameters
@@ -51,7 +57,7 @@ def wlc_tangent_correlation(contour_distance, persistence_length, planar=False):
     return np.exp(-distance / _correlation_length(persistence_length, planar))
 
 
-def bending_mode_variance(mode, contour_length, persistence_length):
+def bending_mode_variance(mode: npt.ArrayLike, contour_length: Scalar, persistence_length: Scalar) -> FloatOrArray:
     """Variance of the amplitude of a bending mode of the free WLC per transverse direction, in nm.
 
     ``<a_n^2> = (L/(n pi))^2 / lp`` for the tangent angle theta(s) = sqrt(2/L) sum_n a_n cos(n pi s/L) in one
@@ -68,7 +74,7 @@ def bending_mode_variance(mode, contour_length, persistence_length):
     return wavelength**2 / positive(persistence_length, LENGTH, "persistence_length")
 
 
-def clamped_angle_variance(contour_distance, persistence_length):
+def clamped_angle_variance(contour_distance: Numbers, persistence_length: Scalar) -> FloatOrArray:
     """Variance of the tangent angle of a WLC that is clamped at one end: ``s/lp`` at the distance s from there.
 
     Eq. (42) of Chandran and Mofrad, Phys. Rev. E 2009, 79, 011906. In space it holds for small angles, in either
@@ -83,7 +89,7 @@ def clamped_angle_variance(contour_distance, persistence_length):
     return distance / positive(persistence_length, LENGTH, "persistence_length")
 
 
-def clamped_deflection_variance(contour_distance, persistence_length):
+def clamped_deflection_variance(contour_distance: Numbers, persistence_length: Scalar) -> FloatOrArray:
     """Variance of the deflection of a WLC that is clamped at one end, ``s^3/(3 lp)``, in nm^2.
 
     It holds for small angles, in either transverse plane. Eq. (43) of Chandran and Mofrad, Phys. Rev. E 2009, 79,
