@@ -1,10 +1,12 @@
 """Energy and forces of crosslinks: what the PythonForce of a System computes."""
 
 import numpy as np
+import openmm
 
 from ..errors import InputError
 from ..mechanics.potentials import STRETCHING_POTENTIALS
-from .crosslink_tables import RECENT_TABLES, TABLES
+from ..units.types import FloatArray
+from .crosslink_tables import RECENT_TABLES, TABLES, CrosslinkTable
 
 
 class CrosslinkComputation:
@@ -24,14 +26,16 @@ class CrosslinkComputation:
         Stiffness, rest length and maximum extension of crosslinks that are given none.
     """
 
-    def __init__(self, parameter, model, initial, periodic, defaults):
+    def __init__(
+        self, parameter: str, model: str, initial: CrosslinkTable, periodic: bool, defaults: tuple[float, float, float]
+    ) -> None:
         self.parameter = parameter
         self.model = model
         self.initial = initial
         self.periodic = periodic
         self.defaults = defaults
 
-    def table(self, identity):
+    def table(self, identity: float) -> CrosslinkTable:
         """The table of an identity; raises InputError if it is not known in this process."""
         if identity == self.initial.identity:
             return self.initial
@@ -44,7 +48,9 @@ class CrosslinkComputation:
             )
         return table
 
-    def geometry(self, table, state, positions):
+    def geometry(
+        self, table: CrosslinkTable, state: openmm.State, positions: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """Lengths (n,) of crosslinks and vectors (n, 3) from their first to their second particles, in nm."""
         box = state.getPeriodicBoxVectors(asNumpy=True)._value if self.periodic else None
         vectors = table.displacements(positions, box)
@@ -53,17 +59,17 @@ class CrosslinkComputation:
             _check_extensions(table, lengths)
         return lengths, vectors
 
-    def slopes(self, table, lengths):
+    def slopes(self, table: CrosslinkTable, lengths: FloatArray) -> FloatArray:
         """Derivatives dV/dd (n,) in kJ/(mol nm)."""
         derivative = STRETCHING_POTENTIALS[self.model].derivative
         return derivative(table.stiffness, table.rest_length, table.maximum_extension, lengths)
 
-    def energy(self, table, lengths):
+    def energy(self, table: CrosslinkTable, lengths: FloatArray) -> float:
         """Energy of all crosslinks in kJ/mol."""
         energy = STRETCHING_POTENTIALS[self.model].energy
         return float(np.sum(energy(table.stiffness, table.rest_length, table.maximum_extension, lengths)))
 
-    def __call__(self, state):
+    def __call__(self, state: openmm.State) -> tuple[float, FloatArray]:
         table = self.table(state.getParameters()[self.parameter])
         positions = state.getPositions(asNumpy=True)._value
         if not len(table):

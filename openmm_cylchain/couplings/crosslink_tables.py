@@ -5,12 +5,16 @@ import threading
 from collections import OrderedDict
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
+from typing import IO, Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
+import openmm
 
 from ..errors import InputError
 from ..mechanics.geometry import to_nearest_images
+from ..units.types import FloatArray, IntArray
 
 RECENT_TABLES = 256
 """Changes of crosslinks that one can go back."""
@@ -42,14 +46,14 @@ class CrosslinkTable:
         The number of the next crosslink.
     """
 
-    numbers: np.ndarray = _empty((), int)
-    pairs: np.ndarray = _empty((2,), int)
-    stiffness: np.ndarray = _empty((), float)
-    rest_length: np.ndarray = _empty((), float)
-    maximum_extension: np.ndarray = _empty((), float)
+    numbers: IntArray = _empty((), int)
+    pairs: IntArray = _empty((2,), int)
+    stiffness: FloatArray = _empty((), float)
+    rest_length: FloatArray = _empty((), float)
+    maximum_extension: FloatArray = _empty((), float)
     next_number: int = 0
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in _COLUMNS:
             kind = np.int64 if name in ("numbers", "pairs") else np.float64
             column = np.array(getattr(self, name), dtype=kind)
@@ -69,20 +73,20 @@ class CrosslinkTable:
         if not (np.all(self.stiffness > 0) and np.all(self.rest_length >= 0) and np.all(self.maximum_extension > 0)):
             raise InputError("A table of crosslinks must hold parameters that are positive (rest_length may be zero).")
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.numbers)
 
-    def __eq__(self, other):
+    def __eq__(self, other: object) -> bool:
         return isinstance(other, CrosslinkTable) and self.identity == other.identity
 
-    def __hash__(self):
+    def __hash__(self) -> int:
         return hash(self.identity)
 
-    def __getstate__(self):
+    def __getstate__(self) -> dict[str, Any]:
         return {name: getattr(self, name) for name in (*_COLUMNS, "next_number")}
 
     @cached_property
-    def identity(self):
+    def identity(self) -> int:
         """A digest of the table: a whole number that a double holds exactly."""
         digest = hashlib.blake2b(np.int64(self.next_number).tobytes(), digest_size=8)
         for name in _COLUMNS:
@@ -90,11 +94,13 @@ class CrosslinkTable:
         return int.from_bytes(digest.digest(), "little") >> 11
 
     @cached_property
-    def particles(self):
+    def particles(self) -> IntArray:
         """The first particles of all crosslinks and then the second."""
         return self.pairs.T.ravel()
 
-    def with_links(self, pairs, stiffness, rest_length, maximum_extension):
+    def with_links(
+        self, pairs: IntArray, stiffness: float, rest_length: float, maximum_extension: float
+    ) -> "CrosslinkTable":
         """This table with further crosslinks of equal parameters, numbered on."""
         count = len(pairs)
         return CrosslinkTable(
@@ -106,7 +112,7 @@ class CrosslinkTable:
             self.next_number + count,
         )
 
-    def without(self, numbers):
+    def without(self, numbers: IntArray) -> "CrosslinkTable":
         """This table without some crosslinks; raises InputError for a number that is not there or named twice."""
         rows = np.searchsorted(self.numbers, numbers)
         known = rows < len(self)
@@ -118,12 +124,12 @@ class CrosslinkTable:
         rest = np.delete(np.arange(len(self)), rows)
         return replace(self, **{name: getattr(self, name)[rest] for name in _COLUMNS})
 
-    def save(self, file):
+    def save(self, file: str | Path | IO[bytes]) -> None:
         """Write the table to a file (.npz), for ``CrosslinkTable.load`` in another process."""
         np.savez(file, **self.__getstate__())
 
     @classmethod
-    def load(cls, file):
+    def load(cls, file: str | Path | IO[bytes]) -> "CrosslinkTable":
         """Read a table that ``save`` has written."""
         with np.load(file) as content:
             missing = {*_COLUMNS, "next_number"} - set(content.files)
@@ -131,7 +137,7 @@ class CrosslinkTable:
                 raise InputError(f"{file} holds no table of crosslinks: it lacks {', '.join(sorted(missing))}.")
             return cls(**{name: content[name] for name in _COLUMNS}, next_number=int(content["next_number"]))
 
-    def displacements(self, positions, box=None):
+    def displacements(self, positions: FloatArray, box: FloatArray | None = None) -> FloatArray:
         """Vectors (n, 3) from first to second particles, to nearest images in a box (3, 3) if one is given."""
         ends = positions[self.particles]
         vectors = ends[len(self) :] - ends[: len(self)]
@@ -142,17 +148,17 @@ class _TableRegistry:
     # The tables of this process: those that Contexts have got through Crosslinks, and those used last by any Context,
     # so that one can go back to a State from before a few changes. More would let memory grow with every change.
 
-    def __init__(self):
-        self._of_context = WeakKeyDictionary()
-        self._recent = OrderedDict()
+    def __init__(self) -> None:
+        self._of_context: WeakKeyDictionary[Any, CrosslinkTable] = WeakKeyDictionary()
+        self._recent: OrderedDict[int, CrosslinkTable] = OrderedDict()
         self._lock = threading.Lock()
 
-    def hold(self, context, table):
+    def hold(self, context: openmm.Context, table: CrosslinkTable) -> None:
         with self._lock:
             self._of_context[context] = table
             self._remember(table)
 
-    def find(self, identity):
+    def find(self, identity: int) -> CrosslinkTable | None:
         with self._lock:
             table = self._recent.get(identity)
             if table is None:

@@ -14,13 +14,16 @@ them, and one that comes from elsewhere cannot be taken for another.
 
 import pickle
 import xml.etree.ElementTree as ElementTree
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import openmm
 
 from ..errors import InputError
 from ..mechanics.potentials import STRETCHING_POTENTIALS
 from ..units.quantities import LENGTH, STIFFNESS, non_negative, positive, thermal_energy, whole_number
+from ..units.types import FloatArray, FloatOrArray, Indices, IntArray, Scalar
 from .crosslink_computation import CrosslinkComputation
 from .crosslink_tables import TABLES, CrosslinkTable
 
@@ -81,7 +84,9 @@ class Crosslinks:
     [[1, 2]]
     """
 
-    def __init__(self, stiffness, rest_length, model="harmonic", maximum_extension=None):
+    def __init__(
+        self, stiffness: Scalar, rest_length: Scalar, model: str = "harmonic", maximum_extension: Scalar | None = None
+    ) -> None:
         if model not in STRETCHING_POTENTIALS:
             raise InputError(f"model must be one of {', '.join(STRETCHING_POTENTIALS)}, but is {model!r}.")
         if (model == "fene") != (maximum_extension is not None):
@@ -89,10 +94,10 @@ class Crosslinks:
         self._model = model
         self._defaults = self._described("Crosslinks:", stiffness, rest_length, maximum_extension)
         self._initial = CrosslinkTable()
-        self._computation = None
+        self._computation: Any = None
 
     @classmethod
-    def from_system(cls, system):
+    def from_system(cls, system: openmm.System) -> "list[Crosslinks]":
         """The Crosslinks of a System that holds some, such as one that was read from XML.
 
         Returns
@@ -104,11 +109,11 @@ class Crosslinks:
         return [links for links in found if links is not None]
 
     @classmethod
-    def of_force(cls, force):
+    def of_force(cls, force: openmm.Force) -> "Crosslinks | None":
         """The Crosslinks of a force of a System, or None if it is no force of crosslinks."""
         if not _parameters_of(force):
             return None
-        content = ElementTree.fromstring(openmm.XmlSerializer.serialize(force)).get("function")
+        content = ElementTree.fromstring(openmm.XmlSerializer.serialize(force)).attrib["function"]
         return cls._of(pickle.loads(bytes.fromhex(content)))
 
     @classmethod
@@ -121,11 +126,11 @@ class Crosslinks:
         return links
 
     @property
-    def model(self):
+    def model(self) -> str:
         """The potential: "harmonic" or "fene"."""
         return self._model
 
-    def add_to(self, system, force_group=0, periodic=None):
+    def add_to(self, system: openmm.System, force_group: int = 0, periodic: bool | None = None) -> openmm.PythonForce:
         """Add the force to a System, when its particles are there and before the integrator is created.
 
         Parameters
@@ -162,7 +167,15 @@ class Crosslinks:
         self._computation = computation
         return force
 
-    def add(self, context, first, second, stiffness=None, rest_length=None, maximum_extension=None):
+    def add(
+        self,
+        context: openmm.Context | None,
+        first: int,
+        second: int,
+        stiffness: Scalar | None = None,
+        rest_length: Scalar | None = None,
+        maximum_extension: Scalar | None = None,
+    ) -> int:
         """Add a crosslink between two particles.
 
         Parameters
@@ -196,7 +209,7 @@ class Crosslinks:
         self._replace(context, table.with_links(pairs, *self._described(f"Crosslink {number}:", *given)))
         return number
 
-    def remove(self, context, numbers):
+    def remove(self, context: openmm.Context | None, numbers: int | Indices) -> None:
         """Remove a crosslink, or several at once.
 
         Parameters
@@ -213,15 +226,15 @@ class Crosslinks:
         numbers = np.array([whole_number(number, 0, "The number of a crosslink") for number in numbers], dtype=int)
         self._replace(context, self.table(context).without(numbers))
 
-    def pairs(self, context):
+    def pairs(self, context: openmm.Context | None) -> IntArray:
         """The particles of all crosslinks of a Context: an int array (n, 2), in the order of ``numbers``."""
         return self.table(context).pairs
 
-    def numbers(self, context):
+    def numbers(self, context: openmm.Context | None) -> IntArray:
         """The numbers of all crosslinks of a Context: an int array (n,), ascending."""
         return self.table(context).numbers
 
-    def set_pairs(self, context, pairs):
+    def set_pairs(self, context: openmm.Context | None, pairs: npt.ArrayLike) -> None:
         """Replace all crosslinks of a Context by others with the common parameters, numbered from 0.
 
         Parameters
@@ -238,7 +251,7 @@ class Crosslinks:
         _check_pairs(pairs, range(len(pairs)), None if context is None else context.getSystem().getNumParticles())
         self._replace(context, CrosslinkTable().with_links(pairs, *self._defaults))
 
-    def table(self, context):
+    def table(self, context: openmm.Context | None) -> CrosslinkTable:
         """All crosslinks of a Context with their numbers and parameters: a CrosslinkTable, which never changes.
 
         Raises
@@ -250,7 +263,7 @@ class Crosslinks:
             return self._initial
         return self._computation_in(context).table(context.getParameter(self._computation.parameter))
 
-    def set_table(self, context, table):
+    def set_table(self, context: openmm.Context | None, table: CrosslinkTable) -> None:
         """Give a Context the crosslinks of a table, with the numbers and parameters that it holds."""
         if not isinstance(table, CrosslinkTable):
             raise InputError(f"table must be a CrosslinkTable, as Crosslinks.table returns it, but is {table!r}.")
@@ -259,20 +272,20 @@ class Crosslinks:
         _check_pairs(table.pairs, table.numbers, None if context is None else context.getSystem().getNumParticles())
         self._replace(context, table)
 
-    def lengths(self, context):
+    def lengths(self, context: openmm.Context) -> FloatArray:
         """Distances d between the particles of all crosslinks of a Context, in nm: an array (n,)."""
         return self._measured(context)[1]
 
-    def extensions(self, context):
+    def extensions(self, context: openmm.Context) -> FloatArray:
         """Extensions d - d0 of all crosslinks of a Context, in nm: an array (n,)."""
         table, lengths, _ = self._measured(context)
         return lengths - table.rest_length
 
-    def forces(self, context):
+    def forces(self, context: openmm.Context) -> FloatArray:
         """Forces dV/dd of all crosslinks of a Context, in kJ/(mol nm): an array (n,), positive where they pull."""
         return self._measured(context)[2]
 
-    def measure(self, context, state):
+    def measure(self, context: openmm.Context, state: openmm.State) -> tuple[CrosslinkTable, FloatArray, FloatArray]:
         """The crosslinks of a Context, their lengths and their forces, in a State of it.
 
         Parameters
@@ -296,7 +309,7 @@ class Crosslinks:
         lengths, _ = self._computation.geometry(table, state, state.getPositions(asNumpy=True)._value)
         return table, lengths, self._computation.slopes(table, lengths)
 
-    def thermal_stiffness(self, table, temperature):
+    def thermal_stiffness(self, table: CrosslinkTable | None, temperature: Scalar) -> FloatOrArray:
         """Stiffness of crosslinks where thermal motion takes them, in kJ/(mol nm^2).
 
         k of harmonic ones. The curvature k (1 + u^2)/(1 - u^2)^2 of a FENE potential at u = (d - d0)/D, for twice the
@@ -364,7 +377,7 @@ def _parameters_of(force):
     return [name for name in dict(force.getGlobalParameters()) if name.startswith(_PARAMETER)]
 
 
-def _as_pairs(pairs):
+def _as_pairs(pairs: npt.ArrayLike) -> IntArray:
     try:
         array = np.asarray(pairs)
     except ValueError:
