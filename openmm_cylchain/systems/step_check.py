@@ -30,17 +30,21 @@ averages, too.
 
 import time
 import warnings
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import openmm
 
 from ..dynamics.recommended_step import implicit_time_step
 from ..dynamics.schemes import check_scheme
-from ..dynamics.time_step import as_step
+from ..dynamics.time_step import TimeStep, as_step
 from ..engine_choice import default_scheme
 from ..errors import InputError, InstabilityError
+from ..mechanics.flow import Flow
 from ..units.quantities import DIMENSIONLESS, positive, thermal_energy, whole_number
 from ..units.text import format_time
+from ..units.types import Numbers, Scalar, Vectors
+from .filaments import Filaments
 from .step_check_comparison import WEIGHTS, ExactAverages, compare
 from .step_check_observables import STEPS_PER_FRAME, Probe
 from .step_check_results import StepCheck
@@ -49,25 +53,25 @@ _RELAXATIONS_OF_FEW = 20.0
 
 
 def check_time_step(
-    filaments,
-    system,
-    positions,
-    step_size,
+    filaments: Filaments,
+    system: openmm.System,
+    positions: Vectors,
+    step_size: Scalar | TimeStep,
     *,
-    scheme=None,
-    temperature=None,
-    particle_friction=None,
-    flow=None,
-    seconds=20.0,
-    frames=None,
-    levels=2,
-    random_seed=1,
-    equilibrium=False,
-    platform=None,
-    properties=None,
-    say=lambda message: None,
-    stop=lambda: False,
-):
+    scheme: str | None = None,
+    temperature: Scalar | None = None,
+    particle_friction: Numbers | None = None,
+    flow: Flow | None = None,
+    seconds: float = 20.0,
+    frames: int | None = None,
+    levels: int = 2,
+    random_seed: int = 1,
+    equilibrium: bool = False,
+    platform: openmm.Platform | None = None,
+    properties: Mapping[str, str] | None = None,
+    say: Callable[[str], object] = lambda message: None,
+    stop: Callable[[], bool] = lambda: False,
+) -> StepCheck:
     """Run a System with a step and with half of it, and say whether the step is right.
 
     Compared are, for each kind of filament, the mean energies of stretching (per segment) and bending (per joint), the

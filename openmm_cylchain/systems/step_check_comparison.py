@@ -1,12 +1,17 @@
 """How runs with several steps are compared: errors of averages, their standard errors, and exact averages."""
 
 import math
+from typing import Any
 
 import numpy as np
+import openmm
 
+from ..filaments.collection import FilamentCollection
+from ..mechanics.flow import Flow
 from ..theory import bending_energy_mean, chain_mean_square_end_to_end, stretching_energy_mean
 from ..units.quantities import thermal_energy
-from .step_check_observables import interacting
+from ..units.types import FloatArray
+from .step_check_observables import Kind, Probe, interacting
 from .step_check_results import ObservableCheck
 
 WEIGHTS = {2: (2.0, -2.0), 3: (2.0 / 3.0, 2.0, -8.0 / 3.0)}
@@ -18,7 +23,8 @@ _WARM_UP = 0.25
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def compare(probe, records, exact, seconds):
+def compare(probe: Probe, records: list[Any], exact: "ExactAverages", seconds: float) -> list[ObservableCheck]:
+    """The ObservableChecks of values (frames, levels, rows) that a Probe has measured."""
     late = records[int(_WARM_UP * len(records)) :]
     checks = []
     for row, (name, unit, kind, what) in enumerate(probe.rows):
@@ -71,14 +77,22 @@ def _standard_error(series):
 
 
 class ExactAverages:
-    # Exact averages of filaments that nothing acts on, and how far others are off.
+    """Exact averages of filaments that nothing acts on, and how far those of a run are off."""
 
-    def __init__(self, filaments, system, flow, temperature, equilibrium, lasting):
+    def __init__(
+        self,
+        filaments: FilamentCollection,
+        system: openmm.System,
+        flow: Flow | None,
+        temperature: float,
+        equilibrium: bool,
+        lasting: bool,
+    ) -> None:
         self._free = not interacting(filaments, system) and flow is None
         self._temperature, self._kT = temperature, thermal_energy(temperature)
         self._equilibrium, self._lasting = equilibrium, lasting
 
-    def compare(self, kind, what, series):
+    def compare(self, kind: Kind | None, what: str, series: FloatArray) -> dict[str, Any]:
         """What an ObservableCheck says of the exact average, with the values (frames, copies) with h."""
         exact = self._average(kind, what)
         if exact is None:

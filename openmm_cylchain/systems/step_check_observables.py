@@ -3,11 +3,15 @@
 import copy
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import openmm
 
 from ..couplings.pulling import is_constant_force
+from ..filaments.collection import FilamentCollection
+from ..filaments.filament import Filament
+from ..units.types import FloatArray, IntArray
 
 STEPS_PER_FRAME = 10
 """Steps h between two looks at both runs."""
@@ -18,39 +22,40 @@ _WITHOUT_ENERGY = (openmm.CMMotionRemover, openmm.MonteCarloBarostat)
 
 
 @dataclass(frozen=True)
-class _Kind:
-    # Filaments that are equal but for their positions.
+class Kind:
+    """Filaments that are equal but for their positions."""
+
     label: str
-    filament: object
-    nodes: np.ndarray
-    joint_stiffnesses: np.ndarray
+    filament: Filament
+    nodes: IntArray
+    joint_stiffnesses: FloatArray
 
 
 def _kinds(filaments):
-    groups = {}
+    groups: dict[Any, list[int]] = {}
     for number, one in enumerate(filaments):
         key = (one.type, one.segments, one.closed, one.planar, one.clamped, one.propulsion)
         groups.setdefault(key, []).append(number)
-    kinds = []
+    kinds: list[Kind] = []
     for numbers in groups.values():
         first = filaments[numbers[0]]
         label = first.type.name if len(groups) == 1 else f"{first.type.name} x {first.segments}"
         if label in [kind.label for kind in kinds]:
             label += f" (filament {numbers[0]})"
         nodes = np.array([filaments.node_indices[number] for number in numbers])
-        kinds.append(_Kind(label, first, nodes, first.joint_stiffnesses))
+        kinds.append(Kind(label, first, nodes, first.joint_stiffnesses))
     return kinds
 
 
 class Probe:
-    # What is looked at in a Context: names, units, and values of one frame.
+    """What is looked at in a Context: names, units, and values of one frame."""
 
-    def __init__(self, filaments, system, kT):
+    def __init__(self, filaments: FilamentCollection, system: openmm.System, kT: float) -> None:
         self._kT = kT
         self._filaments = filaments
         self.kinds = _kinds(filaments)
         self._system = system
-        self._groups = {}
+        self._groups: dict[int, tuple[str, list[int]]] = {}
         for count, (index, force) in enumerate(
             (index, force)
             for index, force in _other_forces(system)
@@ -62,7 +67,8 @@ class Probe:
             self._groups.setdefault(group, (label, []))[1].append(index)
         self.rows = list(self._describe())
 
-    def grouped_system(self):
+    def grouped_system(self) -> openmm.System:
+        """A copy of the System in which each force that is looked at has a group of its own."""
         system = copy.deepcopy(self._system)
         for force in system.getForces():
             force.setForceGroup(0)
@@ -90,7 +96,7 @@ class Probe:
     def _modes(kind):
         return 0 if kind.filament.closed else min(_MODES, kind.filament.segments - 1)
 
-    def measure(self, context, before):
+    def measure(self, context: openmm.Context, before: list[Any] | None) -> tuple[list[FloatArray], list[Any]]:
         """Values, (filaments,) or (1,) each, of this frame, and what the next one needs of it."""
         positions = context.getState(positions=True).getPositions(asNumpy=True)._value
         values, after = [], []
@@ -139,7 +145,8 @@ class Probe:
         return np.array([energy / self._kT])
 
 
-def interacting(filaments, system):
+def interacting(filaments: FilamentCollection, system: openmm.System) -> bool:
+    """Whether anything but their own forces acts on filaments."""
     return bool(filaments.tethers) or any(
         not isinstance(force, openmm.CMMotionRemover) for _, force in _other_forces(system)
     )

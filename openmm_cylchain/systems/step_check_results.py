@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import asdict, dataclass
+from typing import Any, cast
 
 from ..dynamics.step_watch import LARGEST_DIVIDED_SHARE
 from ..units.text import format_time
@@ -37,7 +38,7 @@ class ObservableCheck:
 
     name: str
     unit: str
-    values: tuple
+    values: tuple[float, ...]
     error: float
     standard_error: float
     unpaired_standard_error: float
@@ -48,7 +49,7 @@ class ObservableCheck:
     seconds: float
 
     @property
-    def verdict(self):
+    def verdict(self) -> str:
         """ "right", "wrong" or "not resolved", see ``step_check``."""
         if surely_large(self.error, self.standard_error) or self.off_exact:
             return "wrong"
@@ -56,12 +57,14 @@ class ObservableCheck:
         return "right" if right else "not resolved"
 
     @property
-    def off_exact(self):
+    def off_exact(self) -> bool:
         """Whether the average with h differs from the exact one by more than 5 % for sure."""
-        return self.judged_by_exact and surely_large(self.deviation, self.deviation_standard_error)
+        if not self.judged_by_exact:
+            return False
+        return surely_large(cast(float, self.deviation), cast(float, self.deviation_standard_error))
 
     @property
-    def required_seconds(self):
+    def required_seconds(self) -> float:
         """About how long a check takes that resolves this error; infinite if nothing is known."""
         bar = SIGMAS * self.standard_error
         room = LARGEST_ERROR
@@ -69,14 +72,14 @@ class ObservableCheck:
             room = min(room, max(abs(self.error) - LARGEST_ERROR, 0.2 * LARGEST_ERROR))
         return self.seconds * max(1.0, (bar / room) ** 2)
 
-    def explanation(self):
+    def explanation(self) -> str:
         """The verdict in words."""
         if diverged(self.error):
             return "wrong: it grows without bound"
         if surely_large(self.error, self.standard_error):
             return f"wrong by {percent(self.error)} +- {percent(self.standard_error)}"
         if self.off_exact:
-            return f"wrong: {percent(self.deviation, '+')} off the exact value"
+            return f"wrong: {percent(cast(float, self.deviation), '+')} off the exact value"
         if self.verdict == "right":
             return f"right within {percent(abs(self.error) + SIGMAS * self.standard_error)}"
         bar = f"error bar {percent(SIGMAS * self.standard_error)}"
@@ -113,31 +116,31 @@ class StepCheck:
 
     step: float
     scheme: str
-    steps: tuple
+    steps: tuple[float, ...]
     paired: bool
-    observables: list
-    divided: tuple
+    observables: list[ObservableCheck]
+    divided: tuple[float, ...]
     failure: str | None
     frames: int
     seconds: float
     relaxation: float
 
     @property
-    def verdict(self):
+    def verdict(self) -> str:
         """ "wrong" if anything is wrong, "right" if everything is right, or else "not resolved"."""
         verdicts = [one.verdict for one in self.observables]
         if self.failure is not None or self.divided[0] > LARGEST_DIVIDED_SHARE or "wrong" in verdicts:
             return "wrong"
         return "right" if verdicts and set(verdicts) == {"right"} else "not resolved"
 
-    def __getitem__(self, name):
+    def __getitem__(self, name: str) -> ObservableCheck:
         """The ObservableCheck of a name."""
         for one in self.observables:
             if one.name == name:
                 return one
         raise KeyError(f"{name}; there are {', '.join(one.name for one in self.observables)}")
 
-    def explanation(self):
+    def explanation(self) -> str:
         """The verdict in a sentence."""
         step = format_time(self.step, 4)
         if self.failure is not None:
@@ -163,10 +166,10 @@ class StepCheck:
             f"{percent(LARGEST_ERROR)}; {advice}."
         )
 
-    def __str__(self):
+    def __str__(self) -> str:
         return format_check(self)
 
-    def as_dict(self):
+    def as_dict(self) -> dict[str, Any]:
         """Everything in numbers, texts, lists and dicts, for JSON; None in place of numbers that are not finite."""
         content = asdict(self)
         for entry, one in zip(content["observables"], self.observables):

@@ -10,10 +10,12 @@ SIGMAS = 4.0
 """Standard errors in an error bar."""
 
 
-def surely_large(error, standard_error):
+def surely_large(error: float, standard_error: float) -> bool:
+    """Whether an error is beyond ``LARGEST_ERROR`` by more than chance."""
     return abs(error) - SIGMAS * standard_error > LARGEST_ERROR or diverged(error)
 
 
-def diverged(error):
+def diverged(error: float) -> bool:
+    """Whether an error is beyond what any error bar could explain, or NaN."""
     # Written so that NaN has.
     return not abs(error) <= DIVERGED

@@ -1,6 +1,7 @@
 """The check of a step as text for people."""
 
 import math
+from typing import Any
 
 from ..units.text import format_time
 from .step_check_observables import STEPS_PER_FRAME
@@ -9,7 +10,7 @@ from .step_check_rule import DIVERGED, diverged, surely_large
 _RELAXATIONS = 5.0
 
 
-def format_check(check):
+def format_check(check: Any) -> str:
     """A StepCheck as a table in ASCII, with its verdict below."""
     times = [format_time(step, 3) for step in check.steps]
     simulated = check.frames * STEPS_PER_FRAME * check.step
@@ -84,10 +85,12 @@ def _table_row(one):
     ]
 
 
-def percent(share, sign=""):
+def percent(share: float, sign: str = "") -> str:
+    """A share in percent, with two digits."""
     digits = ".2g" if abs(share) < 0.995 else ".0f" if abs(share) < DIVERGED else ".1e"
     return f"{100.0 * share:{sign}{digits}} %"
 
 
-def two_digits(seconds):
+def two_digits(seconds: float) -> str:
+    """A number with two digits, such as 2400."""
     return f"{float(f'{seconds:.2g}'):.6g}"
