@@ -122,7 +122,8 @@ class ExplicitForces:
         self._scheme = scheme
         self._other_friction = self._frictions(particle_friction)
         self._responses: dict[Any, FilamentResponse] = {}
-        self.springs, unknown = [], []
+        self.springs: list[Springs] = []
+        unknown: list[str] = []
         for index, force in enumerate(system.getForces()):
             found = self._read(force, f"{force.getName()} (force {index})")
             if found is None:
