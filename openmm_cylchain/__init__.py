@@ -6,7 +6,8 @@ private and may change.
 
 from . import analysis, theory
 from .couplings.contacts import add_exclusions, contact_force, crossing_barrier, excluded_pairs, share_exclusions
-from .couplings.crosslinks import Crosslinks, CrosslinkTable
+from .couplings.crosslink_tables import CrosslinkTable
+from .couplings.crosslinks import Crosslinks
 from .couplings.pulling import ConstantVelocityPulling, change_constant_force, constant_force, constant_tension
 from .couplings.walls import Box, Cylinder, Ellipsoid, Plane, Slab, Sphere, wall_force
 from .dynamics.recommended_step import fene_steps, recommended_time_step
@@ -22,7 +23,8 @@ from .output.reporters import CrosslinkReporter, FilamentReporter, TensionReport
 from .output.structure_files import write_lammps_data, write_psf
 from .systems.filaments import Filaments
 from .systems.periodic import make_trajectory_whole, make_whole, remove_jumps
-from .systems.step_check import ObservableCheck, StepCheck, check_time_step
+from .systems.step_check import check_time_step
+from .systems.step_check_results import ObservableCheck, StepCheck
 from .version import __version__
 
 __all__ = [

@@ -1,6 +1,7 @@
 """Which engines there are, which of them work here, and what they do if nothing is asked for."""
 
 import importlib
+from typing import Any
 
 from .errors import InputError
 
@@ -13,7 +14,7 @@ _MODULES = {"compiled": "openmm_cylchain.engines.compiled", "portable": "openmm_
 _DEFAULT_SCHEMES = {"compiled": "implicit", "portable": "midpoint"}
 
 
-def default_scheme(engine=None):
+def default_scheme(engine: str | None = None) -> str:
     """The integration scheme that an engine uses if none is named.
 
     Parameters
@@ -29,7 +30,7 @@ def default_scheme(engine=None):
     return _DEFAULT_SCHEMES[choose_engine(engine)]
 
 
-def load_engine(name=None):
+def load_engine(name: str | None = None) -> Any:
     """The Engine of a name (see ``engines.protocol``).
 
     Parameters
@@ -45,7 +46,7 @@ def load_engine(name=None):
     return importlib.import_module(_MODULES[choose_engine(name)]).ENGINE
 
 
-def choose_engine(name=None):
+def choose_engine(name: str | None = None) -> str:
     """The name of an engine that is available: that which is asked for, or else the fastest.
 
     Raises
@@ -58,12 +59,13 @@ def choose_engine(name=None):
     reasons = available_engines()
     if name is None:
         return next(each for each in ENGINES if reasons[each] is None)
-    if reasons[name] is not None:
-        raise InputError(f"The {name} engine is missing: {reasons[name].rstrip('.')}.")
+    reason = reasons[name]
+    if reason is not None:
+        raise InputError(f"The {name} engine is missing: {reason.rstrip('.')}.")
     return name
 
 
-def available_engines():
+def available_engines() -> dict[str, str | None]:
     """Which engines work here.
 
     Returns

@@ -1,4 +1,4 @@
-"""Closed forms of theory.py against quadrature, brute force, limits and numbers of Pesek et al. 2016."""
+"""Closed forms of theory against quadrature, brute force, limits and numbers of Pesek et al. 2016."""
 
 import math
 from dataclasses import replace

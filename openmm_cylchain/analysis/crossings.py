@@ -5,14 +5,18 @@ with the vector w between their first ends, is a cubic polynomial of time. Where
 one plane, and they cross there if they meet within their lengths. Filaments with contacts that hold do not cross.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from ..errors import InputError
+from ..filaments.collection import FilamentCollection
 from ..units.quantities import LENGTH, in_units_of, positive
+from ..units.types import BoxVectors, FloatArray, IntArray, Scalar, Vectors
 
 # Of the width of a bracket around the time of a crossing: 2^-52.
 _BISECTIONS = 52
@@ -32,16 +36,21 @@ class Crossings:
         When, from 0 in the first configuration to 1 in the second.
     """
 
-    filaments: np.ndarray
-    segments: np.ndarray
-    fractions: np.ndarray
-    times: np.ndarray
+    filaments: IntArray
+    segments: IntArray
+    fractions: FloatArray
+    times: FloatArray
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.times)
 
 
-def find_crossings(chains, start, end, box_vectors=None):
+def find_crossings(
+    chains: FilamentCollection | Iterable[npt.ArrayLike],
+    start: Vectors,
+    end: Vectors,
+    box_vectors: BoxVectors | None = None,
+) -> Crossings:
     """Crossings of segments of different chains, or of one but not neighbours, on the way from start to end.
 
     A pair that crosses and goes back is found twice. One that touches is not found. The number of pairs that are looked
@@ -94,7 +103,13 @@ class CrossingCounter:
     >>> crossings = counter.update(context.getState(positions=True).getPositions(asNumpy=True))  # doctest: +SKIP
     """
 
-    def __init__(self, chains, positions, box_vectors=None, margin=None):
+    def __init__(
+        self,
+        chains: FilamentCollection | Iterable[npt.ArrayLike],
+        positions: Vectors,
+        box_vectors: BoxVectors | None = None,
+        margin: Scalar | None = None,
+    ) -> None:
         self._segments = _Segments(chains)
         self._box = _box(box_vectors)
         self._positions = self._segments.check(positions, "positions")
@@ -109,11 +124,11 @@ class CrossingCounter:
         self._pairs = self._segments.pairs_within(margin, self._positions, self._box)
 
     @property
-    def count(self):
+    def count(self) -> int:
         """Number of crossings so far."""
         return self._count
 
-    def update(self, positions):
+    def update(self, positions: Vectors) -> Crossings:
         """Go on to the next configuration; return the crossings on the way, with times from 0 to 1."""
         positions = self._segments.check(positions, "positions")
         if 2.0 * self._segments.greatest_displacement(self._pairs_at, positions) > self._reach:
@@ -226,22 +241,22 @@ def _pairs_of_points(points, radius, box):
     cells = np.floor(places)
     places -= cells
     copies, shifts = [np.arange(len(points))], [np.zeros((len(points), 3))]
-    for shift in product((-1.0, 0.0, 1.0), repeat=3):
-        image = places + shift
+    for cell in product((-1.0, 0.0, 1.0), repeat=3):
+        image = places + cell
         near = np.flatnonzero(np.all((image >= -reach) & (image <= 1.0 + reach), axis=1))
-        if any(shift):
+        if any(cell):
             copies.append(near)
-            shifts.append(np.broadcast_to(shift, (len(near), 3)))
-    copies, shifts = np.concatenate(copies), np.concatenate(shifts)
-    found = cKDTree((places[copies] + shifts) @ box).query_pairs(radius, output_type="ndarray")
+            shifts.append(np.broadcast_to(cell, (len(near), 3)))
+    copy, shift = np.concatenate(copies), np.concatenate(shifts)
+    found = cKDTree((places[copy] + shift) @ box).query_pairs(radius, output_type="ndarray")
     # Originals come first among the points of the tree, and query_pairs puts the lower number first, but a pair of an
     # original with an image of a lower one comes again as an image of the original with the lower one.
-    found = found[(found[:, 0] < len(points)) & (copies[found[:, 0]] < copies[found[:, 1]])]
-    first, second = copies[found[:, 0]], copies[found[:, 1]]
-    return _Pairs(first, second, (shifts[found[:, 1]] - cells[second] + cells[first]) @ box)
+    found = found[(found[:, 0] < len(points)) & (copy[found[:, 0]] < copy[found[:, 1]])]
+    first, second = copy[found[:, 0]], copy[found[:, 1]]
+    return _Pairs(first, second, (shift[found[:, 1]] - cells[second] + cells[first]) @ box)
 
 
-def segment_distances(p, q, w):
+def segment_distances(p: FloatArray, q: FloatArray, w: FloatArray) -> FloatArray:
     """Smallest distances of pairs of segments.
 
     Parameters

@@ -9,19 +9,21 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from ..errors import InputError
 from ..units.quantities import DIMENSIONLESS, TIME, in_units_of, positive, whole_number
+from ..units.types import FloatArray, Numbers, Scalar
 
 
-def _series(values, name="series"):
+def _series(values: npt.ArrayLike, name: str = "series") -> FloatArray:
     series = np.asarray(in_units_of(values, DIMENSIONLESS, name))
     if series.ndim == 0 or series.shape[0] == 0 or series.size == 0:
         raise InputError(f"{name} must be an array with at least one value.")
     return series
 
 
-def _copies(values, name="series"):
+def _copies(values: npt.ArrayLike, name: str = "series") -> FloatArray:
     series = _series(values, name)
     if series.ndim > 2:
         raise InputError(f"{name} must have the shape (frames,) or (frames, copies), but has {series.shape}.")
@@ -36,7 +38,7 @@ def _pymbar_timeseries():
     return timeseries
 
 
-def statistical_inefficiency(series):
+def statistical_inefficiency(series: npt.ArrayLike) -> float:
     """Number of correlated samples that are worth one independent sample: ``g = 1 + 2 tau`` in frames.
 
     From the normalised correlation function summed up to its first zero (pymbar; Chodera et al., J. Chem.
@@ -66,7 +68,7 @@ def _is_constant(values, axis=None):
     return np.all(np.ptp(values, axis=axis) <= 1e-14 * np.max(np.abs(values), axis=axis))
 
 
-def integrated_autocorrelation_time(series, time_step=1.0):
+def integrated_autocorrelation_time(series: npt.ArrayLike, time_step: Scalar = 1.0) -> float:
     """Integrated correlation time ``tau = (g - 1)/2 * time_step``, in ps; see ``statistical_inefficiency``.
 
     Parameters
@@ -78,7 +80,7 @@ def integrated_autocorrelation_time(series, time_step=1.0):
     return 0.5 * (statistical_inefficiency(series) - 1.0) * positive(time_step, TIME, "time_step")
 
 
-def mean_with_error(series):
+def mean_with_error(series: npt.ArrayLike) -> tuple[float, float]:
     """Mean of correlated samples and its standard error: ``sqrt(variance * g / samples)``.
 
     Parameters
@@ -111,7 +113,7 @@ FEWEST_FRAMES_OF_DRIFT = 8
 _FEWEST_COPIES_OF_DRIFT = 8
 
 
-def drift(series):
+def drift(series: npt.ArrayLike) -> float:
     """How far the last half of a series lies above its first quarter, in standard errors of the difference.
 
     A test of equilibration in the manner of Geweke, in Bayesian Statistics 4 (Oxford, 1992), p. 169: of a series that
@@ -149,7 +151,9 @@ def drift(series):
     return difference / float(error) if error > 0 else math.copysign(math.inf, difference)
 
 
-def autocorrelation(series, mean=None, maximum_lag=None):
+def autocorrelation(
+    series: npt.ArrayLike, mean: npt.ArrayLike | None = None, maximum_lag: int | None = None
+) -> FloatArray:
     """Normalised autocorrelation function ``C(k) = <dx(t).dx(t+k)>/<dx.dx>``, by FFT.
 
     Parameters
@@ -219,7 +223,9 @@ class RelaxationTime:
     amplitude: float
 
 
-def fit_relaxation_time(time, correlation, amplitude=None, fit_above=0.1, blocks=20):
+def fit_relaxation_time(
+    time: Numbers, correlation: npt.ArrayLike, amplitude: float | None = None, fit_above: float = 0.1, blocks: int = 20
+) -> RelaxationTime:
     """Relaxation time of a decaying quantity, by a least-squares fit of ``amplitude * exp(-t/tau)``.
 
     The standard error is a jackknife over groups of copies: it needs no assumption on how the values at
@@ -307,7 +313,14 @@ def _fit(time, correlation, amplitude):
     return float(1.0 / rate), float(fit.x[1] if amplitude is None else amplitude)
 
 
-def relaxation_time(series, time_step, mean=None, amplitude=None, fit_above=0.1, blocks=20):
+def relaxation_time(
+    series: npt.ArrayLike,
+    time_step: Scalar,
+    mean: npt.ArrayLike | None = None,
+    amplitude: float | None = None,
+    fit_above: float = 0.1,
+    blocks: int = 20,
+) -> RelaxationTime:
     """Relaxation time of a stationary series from its autocorrelation function, with a statistical error.
 
     The autocorrelation function is fitted with ``amplitude * exp(-t/tau)``; the error is a jackknife over

@@ -14,15 +14,17 @@ InputError for a trajectory without filaments and for indices out of range.
 import warnings
 from dataclasses import dataclass
 
+import mdtraj
 import numpy as np
 
 from ..errors import EquilibrationWarning, InputError
 from ..filaments.filament import NODE_NAME
 from ..units.quantities import DIMENSIONLESS, LENGTH, TIME, in_units_of, positive, whole_number
+from ..units.types import BoolArray, FloatArray, Indices, IntArray, Scalar
 from .statistics import FEWEST_FRAMES_OF_DRIFT, SIGNIFICANT_DRIFT, drift, mean_with_error
 
 
-def filament_nodes(trajectory_or_topology):
+def filament_nodes(trajectory_or_topology: mdtraj.Trajectory | mdtraj.Topology) -> list[IntArray]:
     """Atom indices of the nodes of every filament, in order along the filament.
 
     Parameters
@@ -51,7 +53,7 @@ def filament_nodes(trajectory_or_topology):
     return filaments
 
 
-def node_positions(trajectory, filaments=None):
+def node_positions(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> list[FloatArray]:
     """Positions of the nodes: a list of (frames, nodes, 3) arrays in nm."""
     nodes = filament_nodes(trajectory)
     return [trajectory.xyz[:, nodes[index]].astype(float) for index in _selection(filaments, len(nodes))]
@@ -70,7 +72,7 @@ def _selection(filaments, count):
     return selected
 
 
-def ring_filaments(trajectory_or_topology):
+def ring_filaments(trajectory_or_topology: mdtraj.Trajectory | mdtraj.Topology) -> BoolArray:
     """Whether each filament is a ring: (filaments,) bool array."""
     topology = getattr(trajectory_or_topology, "topology", trajectory_or_topology)
     bonds = {frozenset((bond.atom1.index, bond.atom2.index)) for bond in topology.bonds}
@@ -94,19 +96,19 @@ def _segment_vectors(trajectory, filaments):
     ]
 
 
-def end_to_end_vectors(trajectory, filaments=None):
+def end_to_end_vectors(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> FloatArray:
     """Vectors from the first to the last node: (frames, filaments, 3) array in nm. Raises InputError for rings."""
     _refuse_rings(trajectory, filaments, "end-to-end vector")
     return np.stack([p[:, -1] - p[:, 0] for p in node_positions(trajectory, filaments)], axis=1)
 
 
-def radii_of_gyration(trajectory, filaments=None):
+def radii_of_gyration(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> FloatArray:
     """Radii of gyration of the nodes, all of one weight: (frames, filaments) array in nm."""
     positions = node_positions(trajectory, filaments)
     return np.stack([np.sqrt(np.var(p, axis=1).sum(axis=-1)) for p in positions], axis=1)
 
 
-def centers_of_mass(trajectory, filaments=None):
+def centers_of_mass(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> FloatArray:
     """Mean of the segments' midpoints, all of one weight: (frames, filaments, 3) array in nm."""
     rings = ring_filaments(trajectory)
     selected = _selection(filaments, len(rings))
@@ -119,17 +121,17 @@ def _center(positions, ring):
     return positions.mean(axis=1) if ring else 0.5 * (positions[:, 1:] + positions[:, :-1]).mean(axis=1)
 
 
-def segment_lengths(trajectory, filaments=None):
+def segment_lengths(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> list[FloatArray]:
     """Lengths of the segments: a list of (frames, segments) arrays in nm."""
     return [np.linalg.norm(vectors, axis=-1) for vectors in _segment_vectors(trajectory, filaments)]
 
 
-def contour_lengths(trajectory, filaments=None):
+def contour_lengths(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> FloatArray:
     """Sums of the segments' lengths: (frames, filaments) array in nm."""
     return np.stack([lengths.sum(axis=1) for lengths in segment_lengths(trajectory, filaments)], axis=1)
 
 
-def tangents(trajectory, filaments=None):
+def tangents(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> list[FloatArray]:
     """Unit vectors along the segments: a list of (frames, segments, 3) arrays.
 
     Raises InputError for a segment of zero length.
@@ -144,7 +146,7 @@ def _normalized(vectors):
     return vectors / norms
 
 
-def joint_cosines(trajectory, filaments=None):
+def joint_cosines(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> list[FloatArray]:
     """Cosines t1.t2 between neighbouring segments: a list of (frames, joints) arrays.
 
     A ring has as many joints as segments, with the one at its first node first.
@@ -173,13 +175,15 @@ class TangentCorrelation:
         Accounts for correlation in time; filaments count as independent.
     """
 
-    lag: np.ndarray
-    contour_distance: np.ndarray
-    mean: np.ndarray
-    standard_error: np.ndarray
+    lag: IntArray
+    contour_distance: FloatArray
+    mean: FloatArray
+    standard_error: FloatArray
 
 
-def tangent_correlation(trajectory, filaments=None, maximum_lag=None):
+def tangent_correlation(
+    trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None, maximum_lag: int | None = None
+) -> TangentCorrelation:
     """Correlation of tangents ``<t(i).t(i+k)>`` against the distance k along the filament.
 
     Parameters
@@ -221,7 +225,7 @@ def _stacked(per_filament):
     return np.stack(per_filament, axis=1)
 
 
-def persistence_length(trajectory, filaments=None):
+def persistence_length(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> tuple[float, float]:
     """Persistence length ``-<l>/ln<c>`` from the joint cosines c, with its standard error, in nm.
 
     In the free discrete chain joints are independent, so that neighbouring tangents hold all there is to know
@@ -263,7 +267,7 @@ def persistence_length(trajectory, filaments=None):
     return float(value), float(value * relative_error)
 
 
-def bending_drift(trajectory, filaments=None):
+def bending_drift(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> float:
     """How far the mean bend 1 - c of the last half of the frames lies above that of the first quarter.
 
     In standard errors, see ``statistics.drift``: beyond ``statistics.SIGNIFICANT_DRIFT``, 4, the filaments have not
@@ -297,7 +301,9 @@ def _warn_of_drift(bends):
         )
 
 
-def bending_mode_amplitudes(trajectory, filament, modes, contour_length=None):
+def bending_mode_amplitudes(
+    trajectory: mdtraj.Trajectory, filament: int, modes: int | Indices, contour_length: Scalar | None = None
+) -> FloatArray:
     """Vector amplitudes of the bending modes of one filament.
 
     ``A_n = sqrt(2/L) (L/N) sum_i t_i cos(n pi (i + 1/2)/N)`` over the tangents t_i, i = 0..N-1: the cosine
@@ -347,18 +353,24 @@ class MeanSquareDisplacement:
         Standard errors over filaments; NaN for a single filament.
     """
 
-    time: np.ndarray
-    nodes: np.ndarray
-    center: np.ndarray
-    parallel: np.ndarray
-    perpendicular: np.ndarray
-    nodes_error: np.ndarray
-    center_error: np.ndarray
-    parallel_error: np.ndarray
-    perpendicular_error: np.ndarray
+    time: FloatArray
+    nodes: FloatArray
+    center: FloatArray
+    parallel: FloatArray
+    perpendicular: FloatArray
+    nodes_error: FloatArray
+    center_error: FloatArray
+    parallel_error: FloatArray
+    perpendicular_error: FloatArray
 
 
-def mean_square_displacement(trajectory, filaments=None, lags=None, window_average=True, time_step=None):
+def mean_square_displacement(
+    trajectory: mdtraj.Trajectory,
+    filaments: int | Indices | None = None,
+    lags: Indices | None = None,
+    window_average: bool = True,
+    time_step: Scalar | None = None,
+) -> MeanSquareDisplacement:
     """Mean square displacement of nodes and centres of mass, also along and across the initial axis, of open filaments.
 
     Parameters
@@ -385,10 +397,10 @@ def mean_square_displacement(trajectory, filaments=None, lags=None, window_avera
     )
     count = len(results)
     errors = results.std(axis=0, ddof=1) / np.sqrt(count) if count > 1 else np.full(results.shape[1:], np.nan)
-    return MeanSquareDisplacement(step * lags, *results.mean(axis=0), *errors)
+    return MeanSquareDisplacement(np.asarray(step * lags, dtype=float), *results.mean(axis=0), *errors)
 
 
-def _checked_lags(lags, frames):
+def _checked_lags(lags: Indices | None, frames: int) -> IntArray:
     if frames < 2:
         raise InputError("A mean square displacement needs at least two frames.")
     if lags is None:

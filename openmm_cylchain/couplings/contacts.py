@@ -9,11 +9,14 @@ import math
 import warnings
 
 import numpy as np
+import numpy.typing as npt
 import openmm
 
 from ..errors import ContactWarning, InputError
 from ..filaments.attachments import SAME_PLACE
+from ..filaments.collection import FilamentCollection
 from ..units.quantities import LENGTH, STIFFNESS, in_units_of, non_negative, positive, thermal_energy, whole_number
+from ..units.types import FloatArray, Indices, IntArray, Numbers, Scalar
 
 CONTACT_NAME = "Contact"
 CONTACT_STIFFNESS = "contact_stiffness"
@@ -35,7 +38,7 @@ _WITH_EXCLUSIONS = (openmm.NonbondedForce, openmm.CustomNonbondedForce, openmm.C
 _CUTOFF_DIAMETERS = 3.0
 
 
-def excluded_pairs(filaments, distance=0.0):
+def excluded_pairs(filaments: FilamentCollection, distance: Scalar = 0.0) -> IntArray:
     """Pairs of particles of one filament that nonbonded forces should leave alone.
 
     A pair has a bead, or another attachment point, and a bead, an attachment point or a node of the same segment, of a
@@ -55,7 +58,7 @@ def excluded_pairs(filaments, distance=0.0):
         Particle indices, the lower first.
     """
     distance = non_negative(distance, LENGTH, "distance")
-    beads_and_points = [[] for _ in range(len(filaments))]
+    beads_and_points: list[list[tuple[int, int, float]]] = [[] for _ in range(len(filaments))]
     for particle, attachment in zip(filaments.attachment_indices, filaments.attachments):
         beads_and_points[attachment.filament].append((int(particle), attachment.segment, attachment.fraction))
     pairs = [np.zeros((0, 2), dtype=int)]
@@ -93,7 +96,7 @@ def _excluded_in(filament, nodes, points, distance):
     return np.unique(pairs, axis=0) if filament.closed else pairs
 
 
-def add_exclusions(force, pairs):
+def add_exclusions(force: openmm.Force, pairs: npt.ArrayLike) -> None:
     """Exclude pairs of particles from a nonbonded force; those that are excluded stay so.
 
     A NonbondedForce gets exceptions without interaction. Those that it has, for instance between third neighbours of a
@@ -139,7 +142,7 @@ def _exclusions(force):
     return {(min(pair), max(pair)) for pair in pairs}
 
 
-def share_exclusions(system):
+def share_exclusions(system: openmm.System) -> None:
     """Give all nonbonded forces of a System the same exclusions: each gets those of all others.
 
     OpenMM's CPU and GPU platforms want that: a Context with a contact force beside a NonbondedForce, a
@@ -160,12 +163,12 @@ def share_exclusions(system):
         add_exclusions(force, np.array(everything, dtype=int))
 
 
-def default_stiffness(diameter, temperature):
+def default_stiffness(diameter: Scalar, temperature: Scalar) -> float:
     """Stiffness of a contact whose energy is 20 k_B T where two beads coincide: k = 40 k_B T/d^2, in kJ/(mol nm^2)."""
     return 2.0 * BARRIER * thermal_energy(temperature) / positive(diameter, LENGTH, "diameter") ** 2
 
 
-def crossing_barrier(diameter, spacing, stiffness):
+def crossing_barrier(diameter: Scalar, spacing: Scalar, stiffness: Scalar) -> float:
     """The least energy, in kJ/mol, that two filaments pay to cross at a right angle.
 
     Their beads are in one plane then, ``(k/2) (d - r)^2`` for each pair at a distance r below d, and the sum depends
@@ -190,7 +193,15 @@ def crossing_barrier(diameter, spacing, stiffness):
     return float(energy.sum(axis=(2, 3)).min())
 
 
-def contact_force(filaments, system, diameter, stiffness=None, particles=(), particle_diameter=None, periodic=None):
+def contact_force(
+    filaments: FilamentCollection,
+    system: openmm.System,
+    diameter: Numbers,
+    stiffness: Scalar | None = None,
+    particles: Indices = (),
+    particle_diameter: Numbers | None = None,
+    periodic: bool | None = None,
+) -> openmm.CustomNonbondedForce:
     """A repulsion between beads of different filaments, and between beads and other particles.
 
     The energy of a pair is ``(k/2) (d - r)^2`` at a distance r below d, the mean of the two diameters, and zero beyond:
@@ -268,7 +279,7 @@ def contact_force(filaments, system, diameter, stiffness=None, particles=(), par
     return force
 
 
-def is_contact_force(force):
+def is_contact_force(force: openmm.Force) -> bool:
     """Whether a force is one that ``contact_force`` has made."""
     return isinstance(force, openmm.CustomNonbondedForce) and force.getName() == CONTACT_NAME
 
@@ -295,7 +306,7 @@ def _warn_of_gaps(filaments, diameters, stiffness):
         )
 
 
-def filament_diameters(diameter, count):
+def filament_diameters(diameter: Numbers, count: int) -> FloatArray:
     """Contact diameters of ``count`` filaments in nm, from one length or one for each."""
     return _positive_array(diameter, count, "diameter")
 

@@ -12,267 +12,24 @@ the table holds. So Contexts of one System have crosslinks of their own, States 
 them, and one that comes from elsewhere cannot be taken for another.
 """
 
-import hashlib
 import pickle
-import threading
 import xml.etree.ElementTree as ElementTree
-from collections import OrderedDict
-from dataclasses import dataclass, field, replace
-from functools import cached_property
-from weakref import WeakKeyDictionary
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import openmm
 
 from ..errors import InputError
-from ..mechanics.geometry import to_nearest_images
 from ..mechanics.potentials import STRETCHING_POTENTIALS
 from ..units.quantities import LENGTH, STIFFNESS, non_negative, positive, thermal_energy, whole_number
+from ..units.types import FloatArray, FloatOrArray, Indices, IntArray, Scalar
+from .crosslink_computation import CrosslinkComputation
+from .crosslink_tables import TABLES, CrosslinkTable
 
 CROSSLINKS_NAME = "Crosslinks"
 
 _PARAMETER = "crosslink_table"
-_RECENT_TABLES = 256
-_COLUMNS = ("numbers", "pairs", "stiffness", "rest_length", "maximum_extension")
-
-
-def _empty(columns, kind):
-    return field(default_factory=lambda: np.zeros((0, *columns), dtype=kind))
-
-
-@dataclass(frozen=True, eq=False)
-class CrosslinkTable:
-    """Crosslinks at one moment, as ``Crosslinks.table`` returns them: immutable, and equal if all they hold is.
-
-    Attributes
-    ----------
-    numbers : (n,) int array
-        The numbers by which crosslinks are known, in ascending order.
-    pairs : (n, 2) int array
-        Their particles.
-    stiffness : (n,) array
-        k in kJ/(mol nm^2).
-    rest_length : (n,) array
-        d0 in nm.
-    maximum_extension : (n,) array
-        D in nm; infinite for harmonic crosslinks.
-    next_number : int
-        The number of the next crosslink.
-    """
-
-    numbers: np.ndarray = _empty((), int)
-    pairs: np.ndarray = _empty((2,), int)
-    stiffness: np.ndarray = _empty((), float)
-    rest_length: np.ndarray = _empty((), float)
-    maximum_extension: np.ndarray = _empty((), float)
-    next_number: int = 0
-
-    def __post_init__(self):
-        for name in _COLUMNS:
-            kind = np.int64 if name in ("numbers", "pairs") else np.float64
-            column = np.array(getattr(self, name), dtype=kind)
-            column.setflags(write=False)
-            object.__setattr__(self, name, column)
-        self._check()
-
-    def _check(self):
-        count = len(self.numbers)
-        shapes = [getattr(self, name).shape for name in _COLUMNS]
-        if shapes != [(count,), (count, 2), (count,), (count,), (count,)]:
-            raise InputError(f"The columns of a table of crosslinks do not have equal lengths: {shapes}.")
-        bounded = np.concatenate([[-1], self.numbers, [self.next_number]])
-        if not np.all(np.diff(bounded) > 0):
-            raise InputError("The numbers of a table of crosslinks must ascend, from 0 to below next_number.")
-        # Written so that NaN is refused.
-        if not (np.all(self.stiffness > 0) and np.all(self.rest_length >= 0) and np.all(self.maximum_extension > 0)):
-            raise InputError("A table of crosslinks must hold parameters that are positive (rest_length may be zero).")
-
-    def __len__(self):
-        return len(self.numbers)
-
-    def __eq__(self, other):
-        return isinstance(other, CrosslinkTable) and self.identity == other.identity
-
-    def __hash__(self):
-        return hash(self.identity)
-
-    def __getstate__(self):
-        return {name: getattr(self, name) for name in (*_COLUMNS, "next_number")}
-
-    @cached_property
-    def identity(self):
-        """A digest of the table: a whole number that a double holds exactly."""
-        digest = hashlib.blake2b(np.int64(self.next_number).tobytes(), digest_size=8)
-        for name in _COLUMNS:
-            digest.update(getattr(self, name).tobytes())
-        return int.from_bytes(digest.digest(), "little") >> 11
-
-    @cached_property
-    def particles(self):
-        """The first particles of all crosslinks and then the second."""
-        return self.pairs.T.ravel()
-
-    def with_links(self, pairs, stiffness, rest_length, maximum_extension):
-        """This table with further crosslinks of equal parameters, numbered on."""
-        count = len(pairs)
-        return CrosslinkTable(
-            np.concatenate([self.numbers, self.next_number + np.arange(count)]),
-            np.concatenate([self.pairs, pairs]),
-            np.concatenate([self.stiffness, np.full(count, stiffness)]),
-            np.concatenate([self.rest_length, np.full(count, rest_length)]),
-            np.concatenate([self.maximum_extension, np.full(count, maximum_extension)]),
-            self.next_number + count,
-        )
-
-    def without(self, numbers):
-        """This table without some crosslinks; raises InputError for a number that is not there or named twice."""
-        rows = np.searchsorted(self.numbers, numbers)
-        known = rows < len(self)
-        known[known] = self.numbers[rows[known]] == numbers[known]
-        if not known.all():
-            raise InputError(f"Crosslink {numbers[~known][0]} does not exist.")
-        if len(np.unique(numbers)) < len(numbers):
-            raise InputError("A crosslink to be removed is named twice.")
-        rest = np.delete(np.arange(len(self)), rows)
-        return replace(self, **{name: getattr(self, name)[rest] for name in _COLUMNS})
-
-    def save(self, file):
-        """Write the table to a file (.npz), for ``CrosslinkTable.load`` in another process."""
-        np.savez(file, **self.__getstate__())
-
-    @classmethod
-    def load(cls, file):
-        """Read a table that ``save`` has written."""
-        with np.load(file) as content:
-            missing = {*_COLUMNS, "next_number"} - set(content.files)
-            if missing:
-                raise InputError(f"{file} holds no table of crosslinks: it lacks {', '.join(sorted(missing))}.")
-            return cls(**{name: content[name] for name in _COLUMNS}, next_number=int(content["next_number"]))
-
-    def displacements(self, positions, box=None):
-        """Vectors (n, 3) from first to second particles, to nearest images in a box (3, 3) if one is given."""
-        ends = positions[self.particles]
-        vectors = ends[len(self) :] - ends[: len(self)]
-        return vectors if box is None else to_nearest_images(vectors, box)
-
-
-class _TableRegistry:
-    # The tables of this process: those that Contexts have got through Crosslinks, and those used last by any Context,
-    # so that one can go back to a State from before a few changes. More would let memory grow with every change.
-
-    def __init__(self):
-        self._of_context = WeakKeyDictionary()
-        self._recent = OrderedDict()
-        self._lock = threading.Lock()
-
-    def hold(self, context, table):
-        with self._lock:
-            self._of_context[context] = table
-            self._remember(table)
-
-    def find(self, identity):
-        with self._lock:
-            table = self._recent.get(identity)
-            if table is None:
-                held = self._of_context.values()
-                table = next((one for one in held if one.identity == identity), None)
-            if table is not None:
-                self._remember(table)
-        return table
-
-    def _remember(self, table):
-        self._recent[table.identity] = table
-        self._recent.move_to_end(table.identity)
-        if len(self._recent) > _RECENT_TABLES:
-            self._recent.popitem(last=False)
-
-
-_TABLES = _TableRegistry()
-
-
-class CrosslinkComputation:
-    """The computation of the PythonForce: energy and forces of the crosslinks that a Context has.
-
-    It can be pickled, so a System that holds it can be serialised to XML.
-
-    Parameters
-    ----------
-    parameter : str
-        Name of the context parameter that holds the identity of the table.
-    model : {"harmonic", "fene"}
-    initial : CrosslinkTable
-        What a new Context begins with.
-    periodic : bool
-    defaults : tuple
-        Stiffness, rest length and maximum extension of crosslinks that are given none.
-    """
-
-    def __init__(self, parameter, model, initial, periodic, defaults):
-        self.parameter = parameter
-        self.model = model
-        self.initial = initial
-        self.periodic = periodic
-        self.defaults = defaults
-
-    def table(self, identity):
-        """The table of an identity; raises InputError if it is not known in this process."""
-        if identity == self.initial.identity:
-            return self.initial
-        table = _TABLES.find(int(identity))
-        if table is None:
-            raise InputError(
-                "The crosslinks of this Context are not known: its State or checkpoint was saved in another process, "
-                f"or more than {_RECENT_TABLES} changes ago. Give the crosslinks that belong to it with "
-                "Crosslinks.set_table (those that Crosslinks.table returned when it was saved) or Crosslinks.set_pairs."
-            )
-        return table
-
-    def geometry(self, table, state, positions):
-        """Lengths (n,) of crosslinks and vectors (n, 3) from their first to their second particles, in nm."""
-        box = state.getPeriodicBoxVectors(asNumpy=True)._value if self.periodic else None
-        vectors = table.displacements(positions, box)
-        lengths = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
-        if self.model == "fene":
-            _check_extensions(table, lengths)
-        return lengths, vectors
-
-    def slopes(self, table, lengths):
-        """Derivatives dV/dd (n,) in kJ/(mol nm)."""
-        derivative = STRETCHING_POTENTIALS[self.model].derivative
-        return derivative(table.stiffness, table.rest_length, table.maximum_extension, lengths)
-
-    def energy(self, table, lengths):
-        """Energy of all crosslinks in kJ/mol."""
-        energy = STRETCHING_POTENTIALS[self.model].energy
-        return float(np.sum(energy(table.stiffness, table.rest_length, table.maximum_extension, lengths)))
-
-    def __call__(self, state):
-        table = self.table(state.getParameters()[self.parameter])
-        positions = state.getPositions(asNumpy=True)._value
-        if not len(table):
-            return 0.0, np.zeros_like(positions)
-        lengths, vectors = self.geometry(table, state, positions)
-        # Where particles coincide the force has no direction and is zero, as OpenMM has it.
-        slopes = np.divide(self.slopes(table, lengths), lengths, out=np.zeros_like(lengths), where=lengths > 0)
-        pulls = slopes[:, None] * vectors
-        pulls = np.concatenate([pulls, -pulls])
-        forces = np.empty_like(positions)
-        for axis in range(3):
-            forces[:, axis] = np.bincount(table.particles, weights=pulls[:, axis], minlength=len(positions))
-        return self.energy(table, lengths), forces
-
-
-def _check_extensions(table, lengths):
-    # Written so that NaN counts as too long.
-    broken = ~(np.abs(lengths - table.rest_length) < table.maximum_extension)
-    if broken.any():
-        row = int(np.argmax(broken))
-        first, second = table.pairs[row]
-        raise InputError(
-            f"Crosslink {table.numbers[row]} between particles {first} and {second} has blown up: its length of "
-            f"{lengths[row]:.6g} nm is outside {table.rest_length[row]:g} -/+ {table.maximum_extension[row]:g} nm of "
-            "the FENE potential. Use a smaller time step, or look for particles that are too far apart."
-        )
 
 
 class Crosslinks:
@@ -327,7 +84,9 @@ class Crosslinks:
     [[1, 2]]
     """
 
-    def __init__(self, stiffness, rest_length, model="harmonic", maximum_extension=None):
+    def __init__(
+        self, stiffness: Scalar, rest_length: Scalar, model: str = "harmonic", maximum_extension: Scalar | None = None
+    ) -> None:
         if model not in STRETCHING_POTENTIALS:
             raise InputError(f"model must be one of {', '.join(STRETCHING_POTENTIALS)}, but is {model!r}.")
         if (model == "fene") != (maximum_extension is not None):
@@ -335,10 +94,10 @@ class Crosslinks:
         self._model = model
         self._defaults = self._described("Crosslinks:", stiffness, rest_length, maximum_extension)
         self._initial = CrosslinkTable()
-        self._computation = None
+        self._computation: Any = None
 
     @classmethod
-    def from_system(cls, system):
+    def from_system(cls, system: openmm.System) -> "list[Crosslinks]":
         """The Crosslinks of a System that holds some, such as one that was read from XML.
 
         Returns
@@ -350,11 +109,11 @@ class Crosslinks:
         return [links for links in found if links is not None]
 
     @classmethod
-    def of_force(cls, force):
+    def of_force(cls, force: openmm.Force) -> "Crosslinks | None":
         """The Crosslinks of a force of a System, or None if it is no force of crosslinks."""
         if not _parameters_of(force):
             return None
-        content = ElementTree.fromstring(openmm.XmlSerializer.serialize(force)).get("function")
+        content = ElementTree.fromstring(openmm.XmlSerializer.serialize(force)).attrib["function"]
         return cls._of(pickle.loads(bytes.fromhex(content)))
 
     @classmethod
@@ -367,11 +126,11 @@ class Crosslinks:
         return links
 
     @property
-    def model(self):
+    def model(self) -> str:
         """The potential: "harmonic" or "fene"."""
         return self._model
 
-    def add_to(self, system, force_group=0, periodic=None):
+    def add_to(self, system: openmm.System, force_group: int = 0, periodic: bool | None = None) -> openmm.PythonForce:
         """Add the force to a System, when its particles are there and before the integrator is created.
 
         Parameters
@@ -408,7 +167,15 @@ class Crosslinks:
         self._computation = computation
         return force
 
-    def add(self, context, first, second, stiffness=None, rest_length=None, maximum_extension=None):
+    def add(
+        self,
+        context: openmm.Context | None,
+        first: int,
+        second: int,
+        stiffness: Scalar | None = None,
+        rest_length: Scalar | None = None,
+        maximum_extension: Scalar | None = None,
+    ) -> int:
         """Add a crosslink between two particles.
 
         Parameters
@@ -442,7 +209,7 @@ class Crosslinks:
         self._replace(context, table.with_links(pairs, *self._described(f"Crosslink {number}:", *given)))
         return number
 
-    def remove(self, context, numbers):
+    def remove(self, context: openmm.Context | None, numbers: int | Indices) -> None:
         """Remove a crosslink, or several at once.
 
         Parameters
@@ -459,15 +226,15 @@ class Crosslinks:
         numbers = np.array([whole_number(number, 0, "The number of a crosslink") for number in numbers], dtype=int)
         self._replace(context, self.table(context).without(numbers))
 
-    def pairs(self, context):
+    def pairs(self, context: openmm.Context | None) -> IntArray:
         """The particles of all crosslinks of a Context: an int array (n, 2), in the order of ``numbers``."""
         return self.table(context).pairs
 
-    def numbers(self, context):
+    def numbers(self, context: openmm.Context | None) -> IntArray:
         """The numbers of all crosslinks of a Context: an int array (n,), ascending."""
         return self.table(context).numbers
 
-    def set_pairs(self, context, pairs):
+    def set_pairs(self, context: openmm.Context | None, pairs: npt.ArrayLike) -> None:
         """Replace all crosslinks of a Context by others with the common parameters, numbered from 0.
 
         Parameters
@@ -484,7 +251,7 @@ class Crosslinks:
         _check_pairs(pairs, range(len(pairs)), None if context is None else context.getSystem().getNumParticles())
         self._replace(context, CrosslinkTable().with_links(pairs, *self._defaults))
 
-    def table(self, context):
+    def table(self, context: openmm.Context | None) -> CrosslinkTable:
         """All crosslinks of a Context with their numbers and parameters: a CrosslinkTable, which never changes.
 
         Raises
@@ -496,7 +263,7 @@ class Crosslinks:
             return self._initial
         return self._computation_in(context).table(context.getParameter(self._computation.parameter))
 
-    def set_table(self, context, table):
+    def set_table(self, context: openmm.Context | None, table: CrosslinkTable) -> None:
         """Give a Context the crosslinks of a table, with the numbers and parameters that it holds."""
         if not isinstance(table, CrosslinkTable):
             raise InputError(f"table must be a CrosslinkTable, as Crosslinks.table returns it, but is {table!r}.")
@@ -505,20 +272,20 @@ class Crosslinks:
         _check_pairs(table.pairs, table.numbers, None if context is None else context.getSystem().getNumParticles())
         self._replace(context, table)
 
-    def lengths(self, context):
+    def lengths(self, context: openmm.Context) -> FloatArray:
         """Distances d between the particles of all crosslinks of a Context, in nm: an array (n,)."""
         return self._measured(context)[1]
 
-    def extensions(self, context):
+    def extensions(self, context: openmm.Context) -> FloatArray:
         """Extensions d - d0 of all crosslinks of a Context, in nm: an array (n,)."""
         table, lengths, _ = self._measured(context)
         return lengths - table.rest_length
 
-    def forces(self, context):
+    def forces(self, context: openmm.Context) -> FloatArray:
         """Forces dV/dd of all crosslinks of a Context, in kJ/(mol nm): an array (n,), positive where they pull."""
         return self._measured(context)[2]
 
-    def measure(self, context, state):
+    def measure(self, context: openmm.Context, state: openmm.State) -> tuple[CrosslinkTable, FloatArray, FloatArray]:
         """The crosslinks of a Context, their lengths and their forces, in a State of it.
 
         Parameters
@@ -542,7 +309,7 @@ class Crosslinks:
         lengths, _ = self._computation.geometry(table, state, state.getPositions(asNumpy=True)._value)
         return table, lengths, self._computation.slopes(table, lengths)
 
-    def thermal_stiffness(self, table, temperature):
+    def thermal_stiffness(self, table: CrosslinkTable | None, temperature: Scalar) -> FloatOrArray:
         """Stiffness of crosslinks where thermal motion takes them, in kJ/(mol nm^2).
 
         k of harmonic ones. The curvature k (1 + u^2)/(1 - u^2)^2 of a FENE potential at u = (d - d0)/D, for twice the
@@ -587,7 +354,7 @@ class Crosslinks:
             self._initial = table
             return
         parameter = self._computation_in(context).parameter
-        _TABLES.hold(context, table)
+        TABLES.hold(context, table)
         # OpenMM drops forces that it may have kept.
         context.setParameter(parameter, float(table.identity))
 
@@ -610,7 +377,7 @@ def _parameters_of(force):
     return [name for name in dict(force.getGlobalParameters()) if name.startswith(_PARAMETER)]
 
 
-def _as_pairs(pairs):
+def _as_pairs(pairs: npt.ArrayLike) -> IntArray:
     try:
         array = np.asarray(pairs)
     except ValueError:

@@ -1,11 +1,17 @@
 """Pulling: constant forces, constant tension, and tethers that move at constant velocity."""
 
+from typing import Any
+
 import numpy as np
 import openmm
+from openmm import app
 
 from ..errors import InputError
+from ..filaments.collection import FilamentCollection
+from ..output.files import TextFile
 from ..output.reporters import FilamentsReporter
 from ..units.quantities import FORCE, LENGTH, TIME, VELOCITY, in_units_of, unit_vector, whole_number
+from ..units.types import FloatArray, Indices, Numbers, Scalar, Vector, Vectors
 
 CONSTANT_FORCE_NAME = "ConstantForce"
 
@@ -13,7 +19,7 @@ _COMPONENTS = ("force_x", "force_y", "force_z")
 _ENERGY = "-(force_x*x+force_y*y+force_z*z)"
 
 
-def constant_force(particles, forces):
+def constant_force(particles: Indices, forces: Vectors) -> openmm.CustomExternalForce:
     """A CustomExternalForce that pulls particles with constant forces: energy -F.x of each.
 
     The energy is that of the position that OpenMM holds. In a periodic box it jumps by F.a whenever a particle is
@@ -46,7 +52,7 @@ def constant_force(particles, forces):
     return force
 
 
-def change_constant_force(force, context, forces):
+def change_constant_force(force: openmm.CustomExternalForce, context: openmm.Context, forces: Vectors) -> None:
     """Change the forces of a ``constant_force`` or ``constant_tension`` in a Context.
 
     Parameters
@@ -65,7 +71,7 @@ def change_constant_force(force, context, forces):
     force.updateParametersInContext(context)
 
 
-def is_constant_force(force):
+def is_constant_force(force: openmm.Force) -> bool:
     """Whether a force is one that ``constant_force`` or ``constant_tension`` has made."""
     if not isinstance(force, openmm.CustomExternalForce) or force.getEnergyFunction() != _ENERGY:
         return False
@@ -85,7 +91,9 @@ def _as_forces(forces, count):
     return np.broadcast_to(forces, (count, 3)).tolist()
 
 
-def constant_tension(filaments, tension, direction, numbers=None):
+def constant_tension(
+    filaments: FilamentCollection, tension: Numbers, direction: Vector, numbers: Indices | None = None
+) -> openmm.CustomExternalForce:
     """A CustomExternalForce that holds filaments under tension: F e on their last nodes and -F e on their first.
 
     The energy is -F R.e for the end-to-end vector R, which is right in a periodic box as long as no node is wrapped on
@@ -121,7 +129,7 @@ def constant_tension(filaments, tension, direction, numbers=None):
     return constant_force(ends, tension_forces(len(numbers), tension, direction))
 
 
-def tension_forces(count, tension, direction):
+def tension_forces(count: int, tension: Numbers, direction: Vector) -> FloatArray:
     """Forces (2 count, 3), in kJ/(mol nm), on the first and the last node of each of ``count`` filaments in turn.
 
     Parameters
@@ -186,15 +194,15 @@ class ConstantVelocityPulling(FilamentsReporter):
 
     def __init__(
         self,
-        file,
-        reportInterval,  # noqa: N803 - OpenMM's name
-        filaments,
-        tethers,
-        velocity,
-        start=None,
-        start_time=0.0,
-        append=False,
-    ):
+        file: TextFile | None,
+        reportInterval: int,  # noqa: N803 - OpenMM's name
+        filaments: FilamentCollection,
+        tethers: int | Indices,
+        velocity: Vectors,
+        start: Vectors | None = None,
+        start_time: Scalar = 0.0,
+        append: bool = False,
+    ) -> None:
         self._tethers = _tether_numbers(tethers, len(filaments.tethers))
         named = [filaments.tethers[number] for number in self._tethers]
         count = len(named)
@@ -214,7 +222,7 @@ class ConstantVelocityPulling(FilamentsReporter):
         ends = (nodes[0], nodes[-1]) if 2 * tether.node >= len(nodes) - 1 else (nodes[-1], nodes[0])
         return nodes[tether.node], *ends
 
-    def describeNextReport(self, simulation):  # noqa: N802 - OpenMM's name
+    def describeNextReport(self, simulation: app.Simulation) -> dict[str, Any]:  # noqa: N802 - OpenMM's name
         """When the next report is due; puts the points where they belong if a run begins or goes on."""
         since = simulation.currentStep % self._interval * simulation.integrator.getStepSize()
         self._move(simulation.context, self._points_at((simulation.context.getTime() - since)._value))

@@ -5,12 +5,15 @@ A wall pushes back what is beyond it, with the energy ``(k/2) d^2`` for the dept
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 import openmm
 
 from ..errors import InputError
 from ..units.quantities import LENGTH, STIFFNESS, positive, unit_vector, vector
+from ..units.types import FloatArray, FloatOrArray, Indices, Scalar, Vector
 
 WALL_NAME = "Wall"
 
@@ -26,11 +29,11 @@ class Shape(ABC):
 
     @property
     @abstractmethod
-    def expression(self):
+    def expression(self) -> str:
         """The square of the depth for OpenMM."""
 
     @abstractmethod
-    def square_depth(self, positions):
+    def square_depth(self, positions: npt.ArrayLike) -> FloatOrArray:
         """The square of the depth, in nm^2, for positions (..., 3); zero inside."""
 
 
@@ -59,18 +62,22 @@ class Plane(Shape):
         Need not be normalised.
     """
 
-    point: tuple
-    normal: tuple
+    point: FloatArray
+    normal: FloatArray
 
-    def __post_init__(self):
+    if TYPE_CHECKING:
+
+        def __init__(self, point: Vector, normal: Vector) -> None: ...
+
+    def __post_init__(self) -> None:
         _set(self, "point", vector(self.point, LENGTH, "Plane: point"))
         _set(self, "normal", unit_vector(self.normal, "Plane"))
 
     @property
-    def expression(self):
+    def expression(self) -> str:
         return _beyond(f"-{_along(self.point, self.normal)}")
 
-    def square_depth(self, positions):
+    def square_depth(self, positions: npt.ArrayLike) -> FloatOrArray:
         return np.maximum(0.0, -((np.asarray(positions) - self.point) @ self.normal)) ** 2
 
 
@@ -86,20 +93,24 @@ class Slab(Shape):
     thickness : length
     """
 
-    point: tuple
-    normal: tuple
+    point: FloatArray
+    normal: FloatArray
     thickness: float
 
-    def __post_init__(self):
+    if TYPE_CHECKING:
+
+        def __init__(self, point: Vector, normal: Vector, thickness: Scalar) -> None: ...
+
+    def __post_init__(self) -> None:
         _set(self, "point", vector(self.point, LENGTH, "Slab: point"))
         _set(self, "normal", unit_vector(self.normal, "Slab"))
         _set(self, "thickness", positive(self.thickness, LENGTH, "Slab: thickness"))
 
     @property
-    def expression(self):
+    def expression(self) -> str:
         return _beyond(f"abs({_along(self.point, self.normal)})-{_number(0.5 * self.thickness)}")
 
-    def square_depth(self, positions):
+    def square_depth(self, positions: npt.ArrayLike) -> FloatOrArray:
         height = np.abs((np.asarray(positions) - self.point) @ self.normal)
         return np.maximum(0.0, height - 0.5 * self.thickness) ** 2
 
@@ -114,19 +125,23 @@ class Sphere(Shape):
     radius : length
     """
 
-    center: tuple
+    center: FloatArray
     radius: float
 
-    def __post_init__(self):
+    if TYPE_CHECKING:
+
+        def __init__(self, center: Vector, radius: Scalar) -> None: ...
+
+    def __post_init__(self) -> None:
         _set(self, "center", vector(self.center, LENGTH, "Sphere: center"))
         _set(self, "radius", positive(self.radius, LENGTH, "Sphere: radius"))
 
     @property
-    def expression(self):
+    def expression(self) -> str:
         squares = "+".join(f"({name}-{_number(c)})^2" for name, c in zip("xyz", self.center))
         return _beyond(f"sqrt({squares}+{_TINY})-{_number(self.radius)}")
 
-    def square_depth(self, positions):
+    def square_depth(self, positions: npt.ArrayLike) -> FloatOrArray:
         distance = np.linalg.norm(np.asarray(positions) - self.center, axis=-1)
         return np.maximum(0.0, distance - self.radius) ** 2
 
@@ -143,11 +158,15 @@ class Cylinder(Shape):
     radius : length
     """
 
-    point: tuple
-    axis: tuple
+    point: FloatArray
+    axis: FloatArray
     radius: float
 
-    def __post_init__(self):
+    if TYPE_CHECKING:
+
+        def __init__(self, point: Vector, axis: Vector, radius: Scalar) -> None: ...
+
+    def __post_init__(self) -> None:
         _set(self, "point", vector(self.point, LENGTH, "Cylinder: point"))
         _set(self, "axis", unit_vector(self.axis, "Cylinder"))
         _set(self, "radius", positive(self.radius, LENGTH, "Cylinder: radius"))
@@ -159,11 +178,11 @@ class Cylinder(Shape):
         return first, np.cross(self.axis, first)
 
     @property
-    def expression(self):
+    def expression(self) -> str:
         first, second = (_along(self.point, direction) for direction in self._across())
         return _beyond(f"sqrt({first}^2+{second}^2+{_TINY})-{_number(self.radius)}")
 
-    def square_depth(self, positions):
+    def square_depth(self, positions: npt.ArrayLike) -> FloatOrArray:
         across = (np.asarray(positions) - self.point) @ np.transpose(self._across())
         return np.maximum(0.0, np.linalg.norm(across, axis=-1) - self.radius) ** 2
 
@@ -178,21 +197,25 @@ class Box(Shape):
         Two opposite corners.
     """
 
-    lower: tuple
-    upper: tuple
+    lower: FloatArray
+    upper: FloatArray
 
-    def __post_init__(self):
+    if TYPE_CHECKING:
+
+        def __init__(self, lower: Vector, upper: Vector) -> None: ...
+
+    def __post_init__(self) -> None:
         _set(self, "lower", vector(self.lower, LENGTH, "Box: lower"))
         _set(self, "upper", vector(self.upper, LENGTH, "Box: upper"))
         if not np.all(self.lower < self.upper):
             raise InputError(f"Box: upper must exceed lower along every axis, but they are {self.upper}, {self.lower}.")
 
     @property
-    def expression(self):
+    def expression(self) -> str:
         pairs = zip("xyz", self.lower, self.upper)
         return "+".join(f"max(0, max({_number(a)}-{name}, {name}-{_number(b)}))^2" for name, a, b in pairs)
 
-    def square_depth(self, positions):
+    def square_depth(self, positions: npt.ArrayLike) -> FloatOrArray:
         positions = np.asarray(positions)
         beyond = np.maximum(0.0, np.maximum(self.lower - positions, positions - self.upper))
         return np.sum(beyond**2, axis=-1)
@@ -211,17 +234,21 @@ class Ellipsoid(Shape):
     semi_axes : (3,) length
     """
 
-    center: tuple
-    semi_axes: tuple
+    center: FloatArray
+    semi_axes: FloatArray
 
-    def __post_init__(self):
+    if TYPE_CHECKING:
+
+        def __init__(self, center: Vector, semi_axes: Vector) -> None: ...
+
+    def __post_init__(self) -> None:
         _set(self, "center", vector(self.center, LENGTH, "Ellipsoid: center"))
         _set(self, "semi_axes", vector(self.semi_axes, LENGTH, "Ellipsoid: semi_axes"))
         if not np.all(self.semi_axes > 0):
             raise InputError(f"Ellipsoid: semi_axes must be positive, but are {self.semi_axes}.")
 
     @property
-    def expression(self):
+    def expression(self) -> str:
         def total(power):
             terms = zip("xyz", self.center, self.semi_axes)
             return "+".join(f"({name}-{_number(c)})^2*{_number(a**-power)}" for name, c, a in terms)
@@ -234,7 +261,7 @@ class Ellipsoid(Shape):
         # Less than anywhere outside, for a quotient that is finite at the center.
         return 0.25 / np.max(self.semi_axes) ** 2
 
-    def square_depth(self, positions):
+    def square_depth(self, positions: npt.ArrayLike) -> FloatOrArray:
         relative = np.asarray(positions) - self.center
         s = np.sqrt(np.sum((relative / self.semi_axes) ** 2, axis=-1))
         steepness = np.sum(relative**2 / self.semi_axes**4, axis=-1)
@@ -245,7 +272,7 @@ def _set(instance, name, value):
     object.__setattr__(instance, name, value)
 
 
-def wall_force(shape, stiffness, particles):
+def wall_force(shape: Shape, stiffness: Scalar, particles: Indices) -> openmm.CustomExternalForce:
     """A CustomExternalForce with the energy (k/2) d^2 of each particle, for its depth d beyond a wall.
 
     It is explicit in every scheme: ``Filaments.recommended_time_step(system=system)`` says which step it allows.

@@ -9,10 +9,13 @@ eigenvalue lambda of response and stiffness (see ``mobility``) says how much too
 import math
 import re
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import openmm
 from scipy.optimize import brentq
 from scipy.sparse import csr_array
@@ -22,6 +25,8 @@ from ..couplings.crosslinks import Crosslinks
 from ..couplings.pulling import is_constant_force
 from ..couplings.walls import WALL_NAME
 from ..errors import TimeStepWarning
+from ..filaments.collection import FilamentCollection
+from ..units.types import FloatArray, Indices, IntArray, Numbers
 from .mobility import FilamentResponse
 from .other_particles import describe_other_particles
 from .schemes import EXPLICIT_SCHEMES
@@ -70,14 +75,14 @@ class Springs:
 
     force: str
     item: str
-    numbers: np.ndarray
-    first: np.ndarray
-    second: np.ndarray
-    stiffness: np.ndarray
+    numbers: IntArray
+    first: IntArray
+    second: IntArray
+    stiffness: FloatArray
     accurate: float = ACCURATE
 
     @classmethod
-    def at_points(cls, force, item, particles, stiffness, **others):
+    def at_points(cls, force: str, item: str, particles: Indices, stiffness: npt.ArrayLike, **others: Any) -> "Springs":
         """Springs to fixed points."""
         particles = np.asarray(particles, dtype=int)
         nowhere = np.full(len(particles), _NOWHERE)
@@ -105,13 +110,20 @@ class ExplicitForces:
         Forces whose stiffness is not known.
     """
 
-    def __init__(self, system, filaments, scheme, particle_friction=None):
+    def __init__(
+        self,
+        system: openmm.System,
+        filaments: FilamentCollection,
+        scheme: str,
+        particle_friction: Numbers | None = None,
+    ) -> None:
         self._system = system
         self._filaments = filaments
         self._scheme = scheme
         self._other_friction = self._frictions(particle_friction)
-        self._responses = {}
-        self.springs, unknown = [], []
+        self._responses: dict[Any, FilamentResponse] = {}
+        self.springs: list[Springs] = []
+        unknown: list[str] = []
         for index, force in enumerate(system.getForces()):
             found = self._read(force, f"{force.getName()} (force {index})")
             if found is None:
@@ -134,7 +146,7 @@ class ExplicitForces:
             for node, particle in enumerate(nodes)
         }
 
-    def recommended_step(self):
+    def recommended_step(self) -> TimeStep:
         """The TimeStep of these forces, one by one and together; an infinite step if there are none."""
         bounds, allowed = {}, {}
         accurate = [one for one in self.springs if one.accurate == ACCURATE]
@@ -147,12 +159,12 @@ class ExplicitForces:
             allowed[_TOGETHER] = self.allowed_step(accurate, ACCURATE)
         if not allowed:
             return TimeStep(math.inf, "no forces beside filaments", {}, {}, self.unknown)
-        binding = min(allowed, key=allowed.get)
+        binding = min(allowed, key=allowed.__getitem__)
         named = f"{self.eigenvalue(accurate, allowed[binding])[1]} most of all, " if binding == _TOGETHER else ""
         reason = f"{binding}: {named}explicit, so its fluctuations may be 5 % too large"
         return TimeStep(allowed[binding], reason, bounds, allowed, self.unknown)
 
-    def warn_if_too_stiff(self, step):
+    def warn_if_too_stiff(self, step: float) -> None:
         """Issue a TimeStepWarning, naming the spring, if variances may be twice too large in a step in ps."""
         accurate = [one for one in self.springs if one.accurate == ACCURATE]
         if not accurate:
@@ -167,7 +179,7 @@ class ExplicitForces:
                 stacklevel=4,
             )
 
-    def allowed_step(self, springs, target):
+    def allowed_step(self, springs: Sequence[Springs], target: float) -> float:
         """The longest step, in ps, in which lambda of some springs does not exceed ``target``."""
         # The response grows no faster than the step.
         start = 1e-9
@@ -185,7 +197,7 @@ class ExplicitForces:
                 return math.inf
         return math.exp(brentq(lambda x: excess(math.exp(x)), math.log(below), math.log(above), xtol=1e-3))
 
-    def eigenvalue(self, springs, step):
+    def eigenvalue(self, springs: Sequence[Springs], step: float) -> tuple[float, str]:
         """lambda of some springs in a step in ps, and the name of the spring that has most part in it.
 
         A spring between two particles with the responses r and s is taken as springs k (r + s)/r and k (r + s)/s to
@@ -202,12 +214,12 @@ class ExplicitForces:
             values = demand[self._free] * step / self._free_friction
             worst = int(np.argmax(values))
             largest, places = float(values[worst]), self._free[[worst]]
-        known = {}
-        for (response, piece), indices, segments, fractions, key in self._clusters:
+        known: dict[Any, float] = {}
+        for (response, piece), indices, segments, fractions, place in self._clusters:
             used = demand[indices] > 0.0
             if not used.any():
                 continue
-            key = (*key, demand[indices].tobytes())
+            key = (*place, demand[indices].tobytes())
             if key not in known:
                 known[key] = response.largest_eigenvalue(
                     piece, segments[used], fractions[used], demand[indices][used], step
@@ -264,7 +276,8 @@ class ExplicitForces:
         # The last entry stands for _NOWHERE.
         self._site_of = np.full(self._system.getNumParticles() + 1, -2)
         self._site_of[_NOWHERE] = _NOWHERE
-        places, rows, columns, weights, unknown = {}, [], [], [], []
+        places: dict[Any, int] = {}
+        rows, columns, weights, unknown = [], [], [], []
         for site, particle in enumerate(particles.tolist()):
             components = self._places_of(particle)
             if components is None:
@@ -319,7 +332,7 @@ class ExplicitForces:
         free = [index for index, place in enumerate(places) if len(place) == 2]
         self._free = np.array(free, dtype=int)
         self._free_friction = np.array([places[index][1] for index in free])
-        groups = {}
+        groups: dict[tuple[int, int], list[int]] = {}
         for index, place in enumerate(places):
             if len(place) == 3:
                 response = self._response(place[0])
@@ -378,7 +391,7 @@ class ExplicitForces:
         table = links.table(None)
         if len(table):
             stiffness = links.thermal_stiffness(table, self._filaments.temperature)
-            return [Springs(label, "crosslink", table.numbers, *table.pairs.T, stiffness)]
+            return [Springs(label, "crosslink", table.numbers, table.pairs[:, 0], table.pairs[:, 1], stiffness)]
         # Those to come may join any two places: ends of filaments move most.
         ends = [int(node) for nodes in self._filaments.node_indices for node in nodes[[0, -1]]]
         first, second = np.array(ends), np.roll(ends, 2)
@@ -398,15 +411,14 @@ class ExplicitForces:
             if force.getGlobalParameterName(index) == CONTACT_STIFFNESS
         )
         diameters = np.array([force.getParticleParameters(index)[0] for index in range(force.getNumParticles())])
-        beads, owners, at_end = [], [], []
+        columns = []
         for number, mine in enumerate(self._filaments.bead_indices):
             mine = mine[diameters[mine] > 0.0]
             if len(mine):
                 spacing = self._filaments[number].segments * self._filaments[number].type.segment_length / len(mine)
-                beads.append(mine)
-                owners.append(np.full(len(mine), number))
-                at_end.append(np.arange(len(mine)) * spacing <= diameters[mine[0]])
-        beads, owners, at_end = map(np.concatenate, (beads, owners, at_end))
+                at_end = np.arange(len(mine)) * spacing <= diameters[mine[0]]
+                columns.append((mine, np.full(len(mine), number), at_end))
+        beads, owners, at_end = map(np.concatenate, zip(*columns))
         nowhere = np.full(len(beads), _NOWHERE)
         # Of two filaments that touch, each moves.
         both = np.full(len(beads), 2.0 * stiffness)
@@ -444,7 +456,7 @@ def _bond_curvatures(force, parameters):
     for index in range(force.getNumPerBondParameters()):
         copy.addPerBondParameter(force.getPerBondParameterName(index))
     distances = np.array([distance for scale in _SCALES for distance in (scale, 1.01 * scale)])
-    positions = []
+    positions: list[Any] = []
     for values in parameters:
         for distance in distances:
             copy.addBond(len(positions), len(positions) + 1, values)
@@ -483,7 +495,7 @@ def _external_curvatures(force, parameters):
         for axis in np.eye(3)
         for side in (-0.5, 0.5)
     ]
-    positions = []
+    positions: list[Any] = []
     for values in parameters:
         for point in points:
             copy.addParticle(len(positions), values)

@@ -19,9 +19,14 @@ keeps its equilibrium and that under a constant force does so with h 2 (1 - R)/(
 scheme "implicit-second-order", R is ``schemes.amplification_of_second_order``.
 """
 
+from typing import Any
+
 import numpy as np
 from scipy.linalg import eigh, eigvalsh
 
+from ..filaments.filament import Filament
+from ..mechanics.friction import SegmentFriction
+from ..units.types import FloatArray, IntArray
 from .schemes import IMPLICIT_SCHEMES, amplification_of_second_order
 
 _LONGEST_PIECE = 128
@@ -40,7 +45,7 @@ class FilamentResponse:
     scheme : str
     """
 
-    def __init__(self, filament, friction, scheme):
+    def __init__(self, filament: Filament, friction: SegmentFriction, scheme: str) -> None:
         self.segments = filament.segments
         self._filament = filament
         self._friction = friction
@@ -48,13 +53,15 @@ class FilamentResponse:
         whole_ring = filament.closed and self.segments <= _LONGEST_PIECE
         self._closed = whole_ring
         self._piece = self.segments if whole_ring else min(self.segments, _LONGEST_PIECE)
-        self._pieces = {}
+        self._pieces: dict[int, list[Any]] = {}
 
-    def piece_of(self, segment):
+    def piece_of(self, segment: int) -> int:
         """The piece that a segment belongs to."""
         return int(segment) // self._piece
 
-    def largest_eigenvalue(self, piece, segments, fractions, stiffness, step):
+    def largest_eigenvalue(
+        self, piece: int, segments: IntArray, fractions: FloatArray, stiffness: FloatArray, step: float
+    ) -> float:
         """lambda, the largest eigenvalue of A^-1 S for springs at places of a piece, in the worst direction.
 
         Parameters
@@ -75,7 +82,7 @@ class FilamentResponse:
             largest = max(largest, float(eigvalsh(gram, subset_by_index=[len(gram) - 1] * 2)[0]))
         return largest
 
-    def at(self, piece, segments, fractions, step):
+    def at(self, piece: int, segments: IntArray, fractions: FloatArray, step: float) -> FloatArray:
         """The response of each place to a force on it, in the worst direction: an array in nm^2 mol/kJ."""
         return np.max([np.sum(one**2, axis=1) for one in self._factors(piece, segments, fractions, step)], axis=0)
 

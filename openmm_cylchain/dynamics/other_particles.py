@@ -1,12 +1,16 @@
 """The particles of a System outside filaments, and their friction."""
 
 import numpy as np
+import openmm
 
 from ..errors import InputError
 from ..units.quantities import FRICTION, in_units_of
+from ..units.types import FloatArray, Indices, IntArray, Numbers
 
 
-def describe_other_particles(system, nodes, particle_friction):
+def describe_other_particles(
+    system: openmm.System, nodes: Indices, particle_friction: Numbers | None
+) -> tuple[IntArray, FloatArray]:
     """Indices and friction coefficients of the mobile particles outside filaments.
 
     Parameters

@@ -5,7 +5,7 @@ from ..errors import InputError
 PRECISIONS = ("automatic", "mixed", "double")
 
 
-def check_precision(precision):
+def check_precision(precision: str) -> None:
     """Raise InputError unless ``precision`` names one of filaments."""
     if precision not in PRECISIONS:
         raise InputError(f"precision must be one of {', '.join(PRECISIONS)}, but is {precision!r}.")

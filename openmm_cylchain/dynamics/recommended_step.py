@@ -1,15 +1,20 @@
 """The recommended step of filaments of one type, alone and in contact."""
 
 import math
+from typing import cast
 
 import numpy as np
 
 from ..engine_choice import default_scheme
+from ..filaments.filament_type import FilamentType
+from ..mechanics.flow import Flow
+from ..mechanics.friction import SegmentFriction
 from ..units.quantities import (
     DIMENSIONLESS,
     positive,
     thermal_energy,
 )
+from ..units.types import Scalar
 from .schemes import IMPLICIT_SCHEMES, check_scheme
 from .stability import bounds_of_chain, contact_stiffness_bound, diffusion_bound
 from .time_step import IDLE, TimeStep
@@ -46,8 +51,15 @@ _LENGTH_DIFFUSION = 0.0008
 
 
 def recommended_time_step(
-    filament_type, viscosity, temperature, scheme=None, segments=2, closed=False, flow=None, friction=None
-):
+    filament_type: FilamentType,
+    viscosity: Scalar,
+    temperature: Scalar,
+    scheme: str | None = None,
+    segments: int = 2,
+    closed: bool = False,
+    flow: Flow | None = None,
+    friction: SegmentFriction | None = None,
+) -> TimeStep:
     """The step at which equilibrium energies of a chain are good to about 5 %.
 
     Explicit schemes of weak order one leave a harmonic mode of rate lambda with a variance too large by
@@ -114,7 +126,7 @@ def _binding(filament_type, friction, temperature, scheme, segments, flow, bound
     if not any(math.isfinite(step) for step in allowed.values()):
         relaxation = friction.extensional / (filament_type.segment_stiffness * filament_type.segment_length**2)
         bounds[IDLE], allowed[IDLE] = relaxation, relaxation / _RELAXATION_STEPS
-    binding = min(allowed, key=allowed.get)
+    binding = min(allowed, key=allowed.__getitem__)
     reason = _REASONS[binding].format(
         margin=_ACCURACY_MARGIN, angle=angle, relaxation_steps=_relaxation_steps(scheme), strain=RECOMMENDED_STRAIN
     )
@@ -123,7 +135,7 @@ def _binding(filament_type, friction, temperature, scheme, segments, flow, bound
     return TimeStep(allowed[binding], reason, bounds, allowed, dynamics=dynamics)
 
 
-def strain_rate(flow):
+def strain_rate(flow: Flow) -> float:
     """The fastest rate, in 1/ps, at which a flow strains the solvent: the norm of its gradient."""
     return float(np.linalg.norm(flow.gradient, 2))
 
@@ -145,7 +157,7 @@ def _length_variance(filament_type, kT):
     return softness / (1.0 + 3.0 * softness) * (extension / filament_type.segment_length) ** 2
 
 
-def fene_bound(filament_type, friction, temperature):
+def fene_bound(filament_type: FilamentType, friction: SegmentFriction, temperature: Scalar) -> float:
     """The step, in ps, of an explicit scheme in which the length of a segment with a FENE potential stays in its range.
 
     With nu = k D^2/k_B T, u = (l - l0)/D has the distribution (1 - u^2)^(nu/2), and relaxes in
@@ -158,7 +170,7 @@ def fene_bound(filament_type, friction, temperature):
     ``fene_steps``.
     """
     kT = thermal_energy(temperature)
-    stiffness, extension = filament_type.segment_stiffness, filament_type.maximum_extension
+    stiffness, extension = filament_type.segment_stiffness, cast(float, filament_type.maximum_extension)
     length = filament_type.segment_length
     tau = friction.extensional / (stiffness * length**2)
     if kT == 0.0:
@@ -170,7 +182,7 @@ def fene_bound(filament_type, friction, temperature):
     return min(noise, 0.1 * tau * narrow**2 / (2.0 - narrow))
 
 
-def fene_steps(filament_type, friction, temperature):
+def fene_steps(filament_type: FilamentType, friction: SegmentFriction, temperature: Scalar) -> tuple[float, float]:
     """Where implicit schemes keep the energy of FENE lengths: up to the first step, in ps, and from the second one on.
 
     With nu = k D^2/k_B T, u = (l - l0)/D has the distribution (1 - u^2)^(nu/2). A length never leaves its range, at any
@@ -186,7 +198,7 @@ def fene_steps(filament_type, friction, temperature):
     0.01 to 100 and steps from 26 ps to 2.6 ns; F-actin with D from 0.1 to 36 nm at 0.4 ms.)
     """
     kT = thermal_energy(temperature)
-    stiffness, extension = filament_type.segment_stiffness, filament_type.maximum_extension
+    stiffness, extension = filament_type.segment_stiffness, cast(float, filament_type.maximum_extension)
     length = filament_type.segment_length
     if kT == 0.0:
         return math.inf, 0.0
@@ -198,15 +210,15 @@ def fene_steps(filament_type, friction, temperature):
 
 
 def implicit_time_step(
-    filament_type,
-    viscosity,
-    temperature,
-    segments=2,
-    closed=False,
-    flow=None,
-    friction=None,
-    scheme="implicit",
-):
+    filament_type: FilamentType,
+    viscosity: Scalar,
+    temperature: Scalar,
+    segments: int = 2,
+    closed: bool = False,
+    flow: Flow | None = None,
+    friction: SegmentFriction | None = None,
+    scheme: str = "implicit",
+) -> TimeStep:
     """The step of an implicit scheme at which equilibrium energies of a chain are good to 2 %, and dynamics to 5 %.
 
     Its equilibrium is exact for linear forces at any step; what is left comes from segments that turn within one.
@@ -265,8 +277,15 @@ def _relaxation_steps(scheme):
 
 
 def contact_time_step(
-    filament_type, viscosity, temperature, diameter, stiffness, segments=2, beads_per_segment=1.0, confidence=3.0
-):
+    filament_type: FilamentType,
+    viscosity: Scalar,
+    temperature: Scalar,
+    diameter: Scalar,
+    stiffness: Scalar,
+    segments: int = 2,
+    beads_per_segment: float = 1.0,
+    confidence: float = 3.0,
+) -> TimeStep:
     """The step at which filaments of one type with contacts do not pass through each other.
 
     It is the lesser of two bounds: (56) with the contact diameter, which keeps ends from diffusing by more than half of
@@ -299,11 +318,17 @@ def contact_time_step(
         "contact stiffness": contact_stiffness_bound(friction, length, stiffness, beads_per_segment),
     }
     allowed = {**bounds, "contact stiffness": bounds["contact stiffness"] / _CONTACT_MARGIN}
-    binding = min(allowed, key=allowed.get)
+    binding = min(allowed, key=allowed.__getitem__)
     return TimeStep(allowed[binding], _REASONS[binding].format(contact_margin=_CONTACT_MARGIN), bounds, allowed)
 
 
-def contact_diffusion_step(filament_type, friction, temperature, diameter, confidence=3.0):
+def contact_diffusion_step(
+    filament_type: FilamentType,
+    friction: SegmentFriction,
+    temperature: Scalar,
+    diameter: Scalar,
+    confidence: float = 3.0,
+) -> TimeStep:
     """The part of ``contact_time_step`` that does not depend on the stiffness of contacts, for segments of a friction.
 
     Returns

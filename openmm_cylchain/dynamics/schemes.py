@@ -3,8 +3,10 @@
 import math
 
 import numpy as np
+import numpy.typing as npt
 
 from ..errors import InputError
+from ..units.types import FloatOrArray
 
 EXPLICIT_SCHEMES = ("euler", "midpoint")
 IMPLICIT_SCHEMES = ("implicit", "implicit-second-order")
@@ -13,7 +15,7 @@ SCHEMES = (*EXPLICIT_SCHEMES, *IMPLICIT_SCHEMES)
 _DIAGONAL = 1.0 - math.sqrt(0.5)
 
 
-def amplification_of_second_order(z):
+def amplification_of_second_order(z: npt.ArrayLike) -> FloatOrArray:
     """What is left in the mean, after one step h, of a mode of the rate z/h under scheme "implicit-second-order".
 
     R = (1 + (2 g - 1) z)/(1 + g z)^2 with g = 1 - 1/sqrt(2): the L-stable singly diagonally implicit Runge-Kutta method
@@ -31,7 +33,7 @@ def amplification_of_second_order(z):
     return (1.0 + (2.0 * _DIAGONAL - 1.0) * z) / (1.0 + _DIAGONAL * z) ** 2
 
 
-def check_scheme(scheme):
+def check_scheme(scheme: str) -> None:
     """Raise InputError unless ``scheme`` names an integration scheme."""
     if scheme not in SCHEMES:
         raise InputError(f"scheme must be one of {', '.join(SCHEMES)}, but is {scheme!r}.")

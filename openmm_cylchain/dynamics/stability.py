@@ -5,7 +5,10 @@ passing through; they say nothing about accuracy, which is why ``recommended_ste
 """
 
 import math
+from typing import cast
 
+from ..filaments.filament_type import FilamentType
+from ..mechanics.friction import SegmentFriction
 from ..units.quantities import (
     BENDING_RIGIDITY,
     DIMENSIONLESS,
@@ -16,9 +19,12 @@ from ..units.quantities import (
     positive,
     thermal_energy,
 )
+from ..units.types import Scalar
 
 
-def translation_bound(friction, diameter, temperature, confidence=3.0):
+def translation_bound(
+    friction: SegmentFriction, diameter: Scalar, temperature: Scalar, confidence: float = 3.0
+) -> float:
     """Largest step, in ps, in which translational diffusion cannot carry segments through each other, eq. (54).
 
     ``dt < d^2 gamma_par / (8 c_sigma^2 k_B T)``
@@ -29,7 +35,9 @@ def translation_bound(friction, diameter, temperature, confidence=3.0):
     return _diffusion_bound(friction.parallel, diameter, temperature, confidence)
 
 
-def rotation_bound(friction, diameter, length, temperature, confidence=3.0):
+def rotation_bound(
+    friction: SegmentFriction, diameter: Scalar, length: Scalar, temperature: Scalar, confidence: float = 3.0
+) -> float:
     """Largest step, in ps, in which rotational diffusion cannot carry segments through each other, eq. (55).
 
     ``dt < d^2 gamma_rot / (2 c_sigma^2 k_B T l^2)``
@@ -38,7 +46,9 @@ def rotation_bound(friction, diameter, length, temperature, confidence=3.0):
     return _diffusion_bound(effective, diameter, temperature, confidence)
 
 
-def diffusion_bound(friction, diameter, length, temperature, confidence=3.0):
+def diffusion_bound(
+    friction: SegmentFriction, diameter: Scalar, length: Scalar, temperature: Scalar, confidence: float = 3.0
+) -> float:
     """Largest step, in ps, for the diffusion of a segment's ends, eq. (56).
 
     ``dt < d^2/(8 c_sigma^2 k_B T) min(1/(1/gamma_par + l^2/4 gamma_def), 1/(1/gamma_perp + l^2/4 gamma_rot))``
@@ -66,7 +76,7 @@ def _diffusion_bound(friction, diameter, temperature, confidence):
     return positive(diameter, LENGTH, "diameter") ** 2 * friction / (8.0 * confidence**2 * kT)
 
 
-def stretching_bound(friction, stiffness, length):
+def stretching_bound(friction: SegmentFriction, stiffness: Scalar, length: Scalar) -> float:
     """Step, in ps, above which an explicit scheme overshoots a change of length, eq. (57).
 
     ``dt < 2 gamma_def / (k l0^2)``
@@ -75,18 +85,18 @@ def stretching_bound(friction, stiffness, length):
     return 2.0 * friction.extensional / (stiffness * positive(length, LENGTH, "length") ** 2)
 
 
-def bending_bound(friction, bending_rigidity, length):
+def bending_bound(friction: SegmentFriction, bending_rigidity: Scalar, length: Scalar) -> float:
     """Step, in ps, above which an explicit scheme overshoots a bend, eq. (58).
 
     ``dt < 2 l0 gamma_rot / a`` (infinite for a = 0)
     """
-    rigidity = in_units_of(bending_rigidity, BENDING_RIGIDITY, "bending_rigidity")
+    rigidity = cast(float, in_units_of(bending_rigidity, BENDING_RIGIDITY, "bending_rigidity"))
     if rigidity == 0.0:
         return math.inf
     return 2.0 * positive(length, LENGTH, "length") * friction.rotational / rigidity
 
 
-def chain_stretching_bound(friction, stiffness, length):
+def chain_stretching_bound(friction: SegmentFriction, stiffness: Scalar, length: Scalar) -> float:
     """Step, in ps, above which an explicit scheme blows up the stiffest longitudinal mode of a chain.
 
     ``dt < 2/lambda``, lambda the largest eigenvalue of Z^-1 K of a long straight chain. A longitudinal
@@ -100,7 +110,7 @@ def chain_stretching_bound(friction, stiffness, length):
     return stretching_bound(friction, stiffness, length)
 
 
-def chain_bending_bound(friction, bending_rigidity, length):
+def chain_bending_bound(friction: SegmentFriction, bending_rigidity: Scalar, length: Scalar) -> float:
     """Step, in ps, above which an explicit scheme blows up the stiffest bending mode of a chain.
 
     ``dt < 2/lambda``, lambda the largest eigenvalue of Z^-1 K of a long straight chain. A transverse
@@ -114,7 +124,14 @@ def chain_bending_bound(friction, bending_rigidity, length):
     return bending_bound(friction, bending_rigidity, length) / 4.0
 
 
-def bead_spring_bounds(diameter, viscosity, stiffness, bending_rigidity, temperature, confidence=3.0):
+def bead_spring_bounds(
+    diameter: Scalar,
+    viscosity: Scalar,
+    stiffness: Scalar,
+    bending_rigidity: Scalar,
+    temperature: Scalar,
+    confidence: float = 3.0,
+) -> dict[str, float]:
     """Bounds, in ps, of a chain of touching beads, eq. (59), with gamma = 3 pi eta d and l0 = d.
 
     Returns a dict with ``translation`` d^2 gamma/(8 c_sigma^2 k_B T), ``stretching`` gamma/k and
@@ -129,7 +146,9 @@ def bead_spring_bounds(diameter, viscosity, stiffness, bending_rigidity, tempera
     }
 
 
-def contact_stiffness_bound(friction, length, stiffness, beads_per_segment=1.0):
+def contact_stiffness_bound(
+    friction: SegmentFriction, length: Scalar, stiffness: Scalar, beads_per_segment: float = 1.0
+) -> float:
     """Step, in ps, above which contacts of stiffness k, which are explicit in every scheme, overshoot and blow up.
 
     ``dt < 2/lambda``, lambda the fastest relaxation of two equal segments that touch. One pair of beads at their ends
@@ -150,7 +169,9 @@ def contact_stiffness_bound(friction, length, stiffness, beads_per_segment=1.0):
     return softest / positive(stiffness, STIFFNESS, "stiffness")
 
 
-def time_step_bounds(filament_type, viscosity, temperature, confidence=3.0, segments=1):
+def time_step_bounds(
+    filament_type: FilamentType, viscosity: Scalar, temperature: Scalar, confidence: float = 3.0, segments: int = 1
+) -> dict[str, float]:
     """The five bounds of Table 1 for a filament type in a solvent, in ps.
 
     Parameters
@@ -179,13 +200,15 @@ def time_step_bounds(filament_type, viscosity, temperature, confidence=3.0, segm
     }
 
 
-def stability_bounds(filament_type, viscosity, temperature, segments=1):
+def stability_bounds(
+    filament_type: FilamentType, viscosity: Scalar, temperature: Scalar, segments: int = 1
+) -> dict[str, float]:
     """Steps, in ps, above which the explicit schemes blow up: ``stretching`` and ``bending`` of a chain."""
     friction = filament_type.segment_friction(viscosity, temperature, segments)
     return bounds_of_chain(filament_type, friction, segments)
 
 
-def bounds_of_chain(filament_type, friction, segments):
+def bounds_of_chain(filament_type: FilamentType, friction: SegmentFriction, segments: int) -> dict[str, float]:
     """The bounds of ``stability_bounds`` for segments of a friction."""
     length = filament_type.segment_length
     bounds = {"stretching": chain_stretching_bound(friction, filament_type.segment_stiffness, length)}

@@ -2,27 +2,32 @@
 
 from collections import Counter
 
+import openmm
+
 from ..couplings.contacts import default_stiffness, filament_diameters, is_contact_force
 from ..errors import InputError
 from ..filaments.attachments import BEAD_NAME
+from ..filaments.collection import FilamentCollection
+from ..mechanics.flow import Flow
+from ..units.types import Numbers, Scalar
 from .explicit_forces import ExplicitForces
 from .recommended_step import contact_diffusion_step, contact_time_step, recommended_time_step
 from .schemes import check_scheme
-from .time_step import shortest
+from .time_step import TimeStep, shortest
 
 
 def recommended_step_of(
-    filaments,
-    scheme,
-    contact_diameter,
-    contact_stiffness,
-    confidence,
+    filaments: FilamentCollection,
+    scheme: str,
+    contact_diameter: Numbers | None,
+    contact_stiffness: Scalar | None,
+    confidence: float,
     *,
-    system,
-    temperature,
-    particle_friction,
-    flow,
-):
+    system: openmm.System | None,
+    temperature: float,
+    particle_friction: Numbers | None,
+    flow: Flow,
+) -> TimeStep:
     """The TimeStep of filaments and of the forces of their System; see ``Filaments.recommended_time_step``."""
     check_scheme(scheme)
     if not len(filaments):

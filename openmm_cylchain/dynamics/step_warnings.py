@@ -2,19 +2,34 @@
 
 import warnings
 
+import openmm
+
 from ..errors import TimeStepWarning
+from ..filaments.collection import FilamentCollection
+from ..filaments.filament_type import FilamentType
+from ..mechanics.flow import Flow
+from ..mechanics.friction import SegmentFriction
+from ..units.types import Numbers, Scalar
 from .explicit_forces import ExplicitForces
 from .recommended_step import RECOMMENDED_STRAIN, fene_steps, recommended_time_step, strain_rate
 from .schemes import EXPLICIT_SCHEMES, IMPLICIT_SCHEMES
 from .stability import stability_bounds
-from .time_step import IDLE, as_step
+from .time_step import IDLE, TimeStep, as_step
 
 _LARGEST_STRAIN = 0.06
 _LARGEST_ADVANCE = 0.5
 _FAR_ABOVE = 4.0
 
 
-def warn_of_long_step(filaments, system, step, scheme, temperature, particle_friction, flow):
+def warn_of_long_step(
+    filaments: FilamentCollection,
+    system: openmm.System,
+    step: float,
+    scheme: str,
+    temperature: float,
+    particle_friction: Numbers | None,
+    flow: Flow,
+) -> None:
     """Warn (TimeStepWarning) of a step in ps that is too long for filaments, a flow or the forces of a System."""
     warn_if_strained(step, flow)
     solvent = filaments.viscosity, filaments.temperature
@@ -27,7 +42,14 @@ def warn_of_long_step(filaments, system, step, scheme, temperature, particle_fri
     ExplicitForces(system, filaments, scheme, particle_friction).warn_if_too_stiff(step)
 
 
-def warn_if_unstable(filament_type, viscosity, temperature, step, segments=1, scheme="midpoint"):
+def warn_if_unstable(
+    filament_type: FilamentType,
+    viscosity: Scalar,
+    temperature: Scalar,
+    step: Scalar | TimeStep,
+    segments: int = 1,
+    scheme: str = "midpoint",
+) -> bool:
     """Issue a TimeStepWarning, naming the bound, if ``step`` exceeds a stability bound of an explicit scheme.
 
     Returns whether it does.
@@ -50,8 +72,15 @@ def warn_if_unstable(filament_type, viscosity, temperature, step, segments=1, sc
 
 
 def warn_if_far_above(
-    filament_type, viscosity, temperature, step, segments=1, scheme="midpoint", closed=False, friction=None
-):
+    filament_type: FilamentType,
+    viscosity: Scalar,
+    temperature: Scalar,
+    step: Scalar | TimeStep,
+    segments: int = 1,
+    scheme: str = "midpoint",
+    closed: bool = False,
+    friction: SegmentFriction | None = None,
+) -> None:
     """Issue a TimeStepWarning if ``step`` exceeds the recommended step of a chain by more than a factor of four.
 
     Not where nothing but the relaxation of lengths is left to resolve (see ``implicit_time_step``): whatever moves such
@@ -70,7 +99,9 @@ def warn_if_far_above(
         )
 
 
-def warn_if_fene_is_wrong(filament_type, temperature, step, friction, scheme):
+def warn_if_fene_is_wrong(
+    filament_type: FilamentType, temperature: Scalar, step: Scalar | TimeStep, friction: SegmentFriction, scheme: str
+) -> None:
     """Issue a TimeStepWarning if a step of an implicit scheme is between those that keep the energy of FENE lengths."""
     step = as_step(step, "time step")
     if filament_type.maximum_extension is None or scheme not in IMPLICIT_SCHEMES:
@@ -86,7 +117,7 @@ def warn_if_fene_is_wrong(filament_type, temperature, step, friction, scheme):
         )
 
 
-def warn_if_strained(step, flow):
+def warn_if_strained(step: Scalar | TimeStep, flow: Flow) -> None:
     """Issue a TimeStepWarning if a flow strains the solvent in a step by more than 0.06: by ``dt |gradient u|``."""
     step = as_step(step, "time step")
     strain = step * strain_rate(flow)
@@ -100,7 +131,14 @@ def warn_if_strained(step, flow):
         )
 
 
-def warn_if_driven_far(filament_type, viscosity, temperature, step, segments=1, propulsion=0.0):
+def warn_if_driven_far(
+    filament_type: FilamentType,
+    viscosity: Scalar,
+    temperature: Scalar,
+    step: Scalar | TimeStep,
+    segments: int = 1,
+    propulsion: float = 0.0,
+) -> None:
     """Issue a TimeStepWarning if self-propulsion takes a segment farther in a step than by half its length.
 
     Beyond ``dt F0/gamma_par = l0/2`` a bent filament cuts its corners.

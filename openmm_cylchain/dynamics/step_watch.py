@@ -7,10 +7,12 @@ TimeStepErrors.
 
 import math
 import warnings
+from typing import Any
 
 import numpy as np
 
 from ..errors import TimeStepError, TimeStepWarning
+from ..units.types import FloatArray
 
 WINDOW = 128
 """Steps over which the work of explicit forces is averaged, and that an integrator takes at once."""
@@ -39,13 +41,13 @@ class DividedSteps:
         Of which every one takes every step; with zero, nothing is watched.
     """
 
-    def __init__(self, chains):
+    def __init__(self, chains: int) -> None:
         self._chains = chains
         self._warning = _Window(1000, 100)
         self._error = _Window(100, 50)
         self._warned = False
 
-    def add(self, steps, divided):
+    def add(self, steps: int, divided: int) -> None:
         """Take note of some steps, in which ``divided`` steps of chains were divided.
 
         Warns
@@ -135,17 +137,17 @@ class ExplicitWork:
     relaxes.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._warned = False
         self._large = self._too_large = 0
-        self._first = []
+        self._first: list[float] = []
 
     @property
-    def window(self):
+    def window(self) -> int:
         """Steps of the next window."""
         return WINDOW if len(self._first) == WINDOWS else FIRST_WINDOW
 
-    def add(self, work, particle, steps, particles):
+    def add(self, work: float, particle: int, steps: int, particles: int) -> None:
         """Take note of a window.
 
         Parameters
@@ -224,20 +226,23 @@ class WorkRecorder:
         May be changed at any time.
     """
 
-    def __init__(self, window=WINDOW):
+    def __init__(self, window: int = WINDOW) -> None:
         self.window = window
         self.clear()
 
-    def clear(self):
+    def clear(self) -> None:
         """Forget everything, as after a pause."""
-        self._number = self._forces = self._arrival = self._moves = None
-        self._finished = None
+        self._number: int | None = None
+        self._forces: Any = None
+        self._arrival: Any = None
+        self._moves: Any = None
+        self._finished: FloatArray | None = None
         self._begin()
 
     def _begin(self):
         self._count, self._work, self._change, self._way = 0, 0.0, 0.0, 0.0
 
-    def record(self, number, positions, forces, moves, kT):
+    def record(self, number: int, positions: FloatArray, forces: FloatArray, moves: FloatArray, kT: float) -> None:
         """Take note of one step.
 
         Parameters
@@ -270,7 +275,7 @@ class WorkRecorder:
         self._moves = np.array(moves)
         self._arrival = positions + moves
 
-    def take(self):
+    def take(self) -> FloatArray | None:
         """The means (particles,) of w_i/k_B T of the last finished window, once; None if there is none."""
         finished, self._finished = self._finished, None
         return finished

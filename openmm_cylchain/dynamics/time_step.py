@@ -1,6 +1,7 @@
 """A time step and why it is not larger, and which relaxation it resolves."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,6 +14,7 @@ from ..units.quantities import (
     positive,
 )
 from ..units.text import format_time
+from ..units.types import Scalar
 from .schemes import amplification_of_second_order, check_scheme
 
 IDLE = "length"
@@ -41,12 +43,12 @@ class TimeStep:
 
     step: float
     reason: str
-    bounds: dict
-    allowed: dict = field(default_factory=dict)
-    unknown_forces: tuple = ()
-    dynamics: tuple = ()
+    bounds: dict[str, float]
+    allowed: dict[str, float] = field(default_factory=dict)
+    unknown_forces: tuple[str, ...] = ()
+    dynamics: tuple[tuple[str, float], ...] = ()
 
-    def resolved_relaxation_time(self, error=0.05):
+    def resolved_relaxation_time(self, error: float = 0.05) -> float:
         """The shortest relaxation time, in ps, of a mode of bending whose rate is right within ``error`` at the step.
 
         See ``resolved_relaxation_time`` of this module. Zero if it holds no filaments.
@@ -54,31 +56,32 @@ class TimeStep:
         times = [resolved_relaxation_time(self.step, scheme, error, fastest) for scheme, fastest in self.dynamics]
         return max(times, default=0.0)
 
-    def describe_dynamics(self):
+    def describe_dynamics(self) -> str:
         """What holds of relaxation at the step, in words; its equilibrium is right for all modes."""
         if not self.dynamics:
             return "no modes of bending"
         five, ten = (format_time(self.resolved_relaxation_time(error), 3) for error in (0.05, 0.10))
         return f"modes of bending that relax in {five} or longer are right to 5 %, in {ten} or longer to 10 %"
 
-    def __str__(self):
+    def __str__(self) -> str:
         unknown = f"; not known: {', '.join(self.unknown_forces)}" if self.unknown_forces else ""
         return f"{self.step:.4g} ps: {self.reason}{unknown}"
 
 
-def as_step(step, name="step_size"):
+def as_step(step: Scalar | TimeStep, name: str = "step_size") -> float:
     """A time step in ps: of a TimeStep, or of a quantity or plain number that must be positive."""
     return step.step if isinstance(step, TimeStep) else positive(step, TIME, name)
 
 
-def shortest(steps):
+def shortest(steps: Iterable[TimeStep]) -> TimeStep:
     """The TimeStep that binds of several, with the bounds of all of them, each at its shortest."""
     steps = list(steps)
     if any(math.isfinite(one.step) and IDLE not in one.bounds for one in steps):
         # The relaxation of lengths counts only where there is nothing else to resolve.
         steps = [one for one in steps if IDLE not in one.bounds]
     least = min(steps, key=lambda one: one.step)
-    bounds, allowed = {}, {}
+    bounds: dict[str, float] = {}
+    allowed: dict[str, float] = {}
     for one in steps:
         for name, value in one.allowed.items():
             if value < allowed.get(name, math.inf) or name not in allowed:
@@ -97,7 +100,7 @@ _DECAYS = {
 }
 
 
-def effective_rate(step, scheme, rate, fastest_rate=0.0):
+def effective_rate(step: Scalar | TimeStep, scheme: str, rate: Scalar, fastest_rate: Scalar = 0.0) -> float:
     """The rate, in 1/ps, at which a mode of bending of the rate ``rate`` relaxes in steps of a length: ``-ln(R)/h``.
 
     R is what is left of the mode after one step, with z = lambda h:
@@ -141,7 +144,9 @@ def _rate_ratio(scheme, z, theta):
     return -math.log(left) / z if left > 0.0 else math.inf
 
 
-def resolved_relaxation_time(step, scheme, error=0.05, fastest_rate=0.0):
+def resolved_relaxation_time(
+    step: Scalar | TimeStep, scheme: str, error: float = 0.05, fastest_rate: Scalar = 0.0
+) -> float:
     """The shortest relaxation time, in ps, of a mode of bending that relaxes at a rate right to within ``error``.
 
     By ``effective_rate``. At long steps of scheme "implicit" it is 9.3 steps for 5 % and 4.3 for 10 %, of scheme

@@ -8,6 +8,7 @@ Pesek et al., Soft Matter 2016, 12, 3360).
 
 import math
 from collections import defaultdict
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -16,6 +17,8 @@ import openmm
 
 from ..errors import InputError
 from ..units.quantities import DIMENSIONLESS, LENGTH, in_units_of, non_negative, whole_number
+from ..units.types import FloatArray, Indices, IntArray, Scalar
+from .filament import Filament
 
 ATTACHMENT_NAME = "ATT"
 """Atom name of attachment points in topologies."""
@@ -46,7 +49,14 @@ class Attachment:
     name: str = ATTACHMENT_NAME
 
 
-def locate(filament, number, label, arc_length=None, segment=None, fraction=None):
+def locate(
+    filament: Filament,
+    number: int,
+    label: str,
+    arc_length: Scalar | None = None,
+    segment: int | None = None,
+    fraction: float | None = None,
+) -> Attachment:
     """An Attachment from an arc length, or from a segment and a fraction of it.
 
     Parameters
@@ -97,7 +107,7 @@ def _fraction(fraction, label):
     return fraction
 
 
-def add_virtual_site(system, attachment, nodes):
+def add_virtual_site(system: openmm.System, attachment: Attachment, nodes: IntArray) -> int:
     """Add the particle of an attachment point to a System that holds the nodes of its filament; return its index."""
     particle = system.addParticle(0.0)
     minus, plus = int(nodes[attachment.segment]), int(nodes[(attachment.segment + 1) % len(nodes)])
@@ -106,7 +116,7 @@ def add_virtual_site(system, attachment, nodes):
     return particle
 
 
-def neighbors(attachments, particles, nodes):
+def neighbors(attachments: Sequence[Attachment], particles: Indices, nodes: Indices) -> Iterator[tuple[int, int]]:
     """Pairs of particles of one filament that may coincide: attachment points, and the ends of their segments.
 
     Parameters
@@ -128,14 +138,14 @@ def neighbors(attachments, particles, nodes):
         yield from ((point, other) for point in points for other in others)
 
 
-def attachment_positions(attachments, positions):
+def attachment_positions(attachments: Sequence[Attachment], positions: FloatArray) -> FloatArray:
     """Where attachment points are on a filament with node positions (n, 3): an array (attachments, 3)."""
     segments = np.array([one.segment for one in attachments], dtype=int)
     fractions = np.array([one.fraction for one in attachments], dtype=float)[:, None]
     return (1.0 - fractions) * positions[segments] + fractions * positions[(segments + 1) % len(positions)]
 
 
-def distribute_beads(filament, number, spacing):
+def distribute_beads(filament: Filament, number: int, spacing: float) -> list[Attachment]:
     """Attachments at equal distances along segments of rest length, the first and the last node of a chain included.
 
     Parameters

@@ -13,12 +13,16 @@ in a plane,
     rho(theta) ~ exp(-V_b(cos theta)/k_B T)         theta in (-pi, pi)
 """
 
+from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
+import numpy.typing as npt
 from scipy.integrate import simpson
 
 from ..units.quantities import TEMPERATURE, positive, thermal_energy
+from ..units.types import FloatArray, Scalar
+from .filament_type import FilamentType
 
 _GRID = 20001
 
@@ -26,7 +30,7 @@ _GRID = 20001
 class _Marginal:
     """A density exp(log_density) on a grid fine enough for both averages and draws."""
 
-    def __init__(self, coordinate, log_density):
+    def __init__(self, coordinate: FloatArray, log_density: FloatArray) -> None:
         weight = np.exp(log_density - np.max(log_density))
         spacing = np.diff(coordinate)
         cumulative = np.concatenate([[0.0], np.cumsum(0.5 * (weight[1:] + weight[:-1]) * spacing)])
@@ -34,16 +38,16 @@ class _Marginal:
         self._weight = weight
         self._cumulative = cumulative / cumulative[-1]
 
-    def mean(self, function):
+    def mean(self, function: Callable[[FloatArray], npt.ArrayLike]) -> float:
         """Average of ``function`` (of the coordinate) by Simpson's rule."""
         values = np.where(self._weight > 0, function(self._coordinate), 0.0)
         return simpson(values * self._weight, x=self._coordinate) / simpson(self._weight, x=self._coordinate)
 
-    def sample(self, generator, size):
+    def sample(self, generator: np.random.Generator, size: int) -> FloatArray:
         """Independent draws by inversion of the cumulative distribution."""
         return self.quantile(generator.random(size))
 
-    def quantile(self, probability):
+    def quantile(self, probability: FloatArray) -> FloatArray:
         """Where the cumulative distribution has the given values."""
         return np.interp(probability, self._cumulative, self._coordinate)
 
@@ -64,10 +68,10 @@ class SegmentLengthDistribution(_Marginal):
         In a plane: rho(l) ~ l exp(-V_el/k_B T).
     """
 
-    def __init__(self, filament_type, temperature, planar=False):
+    def __init__(self, filament_type: FilamentType, temperature: Scalar, planar: bool = False) -> None:
         kT = thermal_energy(positive(temperature, TEMPERATURE, "temperature"))
         rest, stiffness = filament_type.segment_length, filament_type.segment_stiffness
-        if filament_type.stretching_model == "fene":
+        if filament_type.maximum_extension is not None:
             extension = filament_type.maximum_extension * (1.0 - 1e-12)
             low, high = rest - extension, rest + extension
         else:
@@ -92,12 +96,12 @@ class JointAngleDistribution(_Marginal):
         In kJ/mol; the type's if not given.
     """
 
-    def __init__(self, filament_type, temperature, joint_stiffness=None):
+    def __init__(self, filament_type: FilamentType, temperature: Scalar, joint_stiffness: float | None = None) -> None:
         kT = thermal_energy(positive(temperature, TEMPERATURE, "temperature"))
         joint_stiffness = filament_type.joint_stiffness if joint_stiffness is None else joint_stiffness
         cosine = _grid(1.0 - _widest_bend(joint_stiffness / kT), 1.0)
         with np.errstate(divide="ignore", over="ignore"):
-            super().__init__(cosine, -filament_type.bending_energy(cosine, joint_stiffness) / kT)
+            super().__init__(cosine, -np.asarray(filament_type.bending_energy(cosine, joint_stiffness)) / kT)
 
 
 class PlanarJointAngleDistribution(_Marginal):
@@ -111,13 +115,13 @@ class PlanarJointAngleDistribution(_Marginal):
         In kJ/mol; the type's if not given.
     """
 
-    def __init__(self, filament_type, temperature, joint_stiffness=None):
+    def __init__(self, filament_type: FilamentType, temperature: Scalar, joint_stiffness: float | None = None) -> None:
         kT = thermal_energy(positive(temperature, TEMPERATURE, "temperature"))
         joint_stiffness = filament_type.joint_stiffness if joint_stiffness is None else joint_stiffness
         widest = np.arccos(1.0 - _widest_bend(joint_stiffness / kT))
         angle = _grid(-widest, widest)
         with np.errstate(divide="ignore", over="ignore"):
-            super().__init__(angle, -filament_type.bending_energy(np.cos(angle), joint_stiffness) / kT)
+            super().__init__(angle, -np.asarray(filament_type.bending_energy(np.cos(angle), joint_stiffness)) / kT)
 
 
 def _widest_bend(stiffness):
@@ -148,15 +152,15 @@ def _draw_joints(filament_type, temperature, generator, planar, stiffnesses):
 
 
 def draw_chain(
-    filament_type,
-    segments,
-    temperature,
-    generator,
-    start=(0.0, 0.0, 0.0),
-    direction=None,
-    planar=False,
-    stiffnesses=None,
-):
+    filament_type: FilamentType,
+    segments: int,
+    temperature: Scalar,
+    generator: np.random.Generator,
+    start: npt.ArrayLike = (0.0, 0.0, 0.0),
+    direction: FloatArray | None = None,
+    planar: bool = False,
+    stiffnesses: FloatArray | None = None,
+) -> FloatArray:
     """Node positions of a chain drawn from the equilibrium of the free discrete chain.
 
     Parameters

@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
+from ..units.types import FloatArray
 from .filament_type import FilamentType
 from .placement import joint_stiffnesses
 
@@ -31,23 +30,23 @@ class Filament:
     """
 
     type: FilamentType
-    positions: np.ndarray
-    clamped: tuple
+    positions: FloatArray
+    clamped: tuple[int, ...]
     closed: bool = False
     planar: bool = False
     propulsion: float = 0.0
 
     @property
-    def segments(self):
+    def segments(self) -> int:
         """Number of segments."""
         return len(self.positions) - (0 if self.closed else 1)
 
     @property
-    def joint_stiffnesses(self):
+    def joint_stiffnesses(self) -> FloatArray:
         """Bending stiffness of every joint in kJ/mol, see ``placement.joint_stiffnesses``."""
         return joint_stiffnesses(self.type, len(self.positions), self.clamped, self.closed)
 
-    def energies(self, nodes):
+    def energies(self, nodes: FloatArray) -> tuple[float, float]:
         """Stretching and bending energy, in kJ/mol, with node positions (n, 3) in nm."""
         return self.type.chain_energies(nodes, self.joint_stiffnesses, self.closed)
 
@@ -67,5 +66,5 @@ class Tether:
 
     filament: int
     node: int
-    point: tuple
+    point: tuple[float, float, float]
     stiffness: float

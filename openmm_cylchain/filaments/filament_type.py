@@ -1,8 +1,10 @@
 """FilamentType: what a filament is made of, and presets for actin, DNA and microtubules."""
 
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
+import numpy.typing as npt
 from openmm import unit
 
 from ..errors import InputError
@@ -16,7 +18,7 @@ from ..mechanics.friction import (
     translational_friction_perpendicular,
 )
 from ..mechanics.geometry import joint_cosines, segment_vectors
-from ..mechanics.potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
+from ..mechanics.potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS, BendingPotential, StretchingPotential
 from ..units.quantities import (
     BENDING_RIGIDITY,
     DIMENSIONLESS,
@@ -32,6 +34,7 @@ from ..units.quantities import (
     thermal_energy,
     whole_number,
 )
+from ..units.types import FloatArray, FloatOrArray, Scalar
 from .joint_calibration import calibrated_stiffness
 
 
@@ -103,21 +106,44 @@ class FilamentType:
     name: str
     diameter: float
     segment_length: float
-    bending_rigidity: float = None
-    persistence_length: float = field(default=None, repr=False)
-    temperature: float = None
-    stretching_stiffness: float = None
-    stretching_modulus: float = None
+    bending_rigidity: float = None  # type: ignore[assignment]  # None is for the constructor.
+    persistence_length: float | None = field(default=None, repr=False)
+    temperature: float | None = None
+    stretching_stiffness: float | None = None
+    stretching_modulus: float | None = None
     bending_model: str = "inscribed-circle"
     stretching_model: str = "harmonic"
-    maximum_extension: float = None
-    extension_relaxation_time: float = None
-    extensional_friction: float = None
+    maximum_extension: float | None = None
+    extension_relaxation_time: float | None = None
+    extensional_friction: float | None = None
     end_corrections: EndCorrections = EndCorrections()
-    friction_length: str = "segment"
+    friction_length: str | float = "segment"
     mass_per_length: float = 3500.0
 
-    def __post_init__(self):
+    if TYPE_CHECKING:  # What may be given; the attributes hold plain numbers.
+
+        def __init__(
+            self,
+            *,
+            name: str,
+            diameter: Scalar,
+            segment_length: Scalar,
+            bending_rigidity: Scalar | None = None,
+            persistence_length: Scalar | None = None,
+            temperature: Scalar | None = None,
+            stretching_stiffness: Scalar | None = None,
+            stretching_modulus: Scalar | None = None,
+            bending_model: str = "inscribed-circle",
+            stretching_model: str = "harmonic",
+            maximum_extension: Scalar | None = None,
+            extension_relaxation_time: Scalar | None = None,
+            extensional_friction: Scalar | None = None,
+            end_corrections: EndCorrections = ...,
+            friction_length: str | Scalar = "segment",
+            mass_per_length: Scalar = 3500.0,
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
         self._check_name()
         for attribute, dimension in (
             ("diameter", LENGTH),
@@ -215,19 +241,19 @@ class FilamentType:
                 self._fail(str(error))
 
     @property
-    def segment_stiffness(self):
+    def segment_stiffness(self) -> float:
         """Stretching stiffness k of one segment in kJ/(mol nm^2): given, or EA/l0."""
         if self.stretching_stiffness is not None:
             return self.stretching_stiffness
-        return self.stretching_modulus / self.segment_length
+        return cast(float, self.stretching_modulus) / self.segment_length
 
     @property
-    def joint_stiffness(self):
+    def joint_stiffness(self) -> float:
         """Bending stiffness K of one joint in kJ/mol: of the persistence length, or a/l0 of the bending rigidity."""
         return self._stiffness_of_joint(self.segment_length)
 
     @property
-    def clamped_joint_stiffness(self):
+    def clamped_joint_stiffness(self) -> float:
         """Bending stiffness in kJ/mol of a joint next to a segment that is held: as if l0 were half as long, so 2a/l0.
 
         Only the half segment on the free side bends. Of a persistence length: the direction of the first free segment
@@ -242,45 +268,47 @@ class FilamentType:
         return kT * calibrated_stiffness(self.bending_model, length * kT / self.bending_rigidity)
 
     @property
-    def segment_mass(self):
+    def segment_mass(self) -> float:
         """Mass of one segment in Da."""
         return self.mass_per_length * self.segment_length
 
     @property
-    def bending_potential(self):
+    def bending_potential(self) -> BendingPotential:
         """The BendingPotential that ``bending_model`` names."""
         return BENDING_POTENTIALS[self.bending_model]
 
     @property
-    def stretching_potential(self):
+    def stretching_potential(self) -> StretchingPotential:
         """The StretchingPotential that ``stretching_model`` names."""
         return STRETCHING_POTENTIALS[self.stretching_model]
 
-    def stretching_energy(self, length):
+    def stretching_energy(self, length: npt.ArrayLike) -> FloatOrArray:
         """Energy of segments of the given lengths (nm) in kJ/mol."""
         return self.stretching_potential.energy(
             self.segment_stiffness, self.segment_length, self.maximum_extension, length
         )
 
-    def stretching_derivative(self, length):
+    def stretching_derivative(self, length: npt.ArrayLike) -> FloatOrArray:
         """Derivative dV_el/dl at the given lengths (nm) in kJ/(mol nm)."""
         return self.stretching_potential.derivative(
             self.segment_stiffness, self.segment_length, self.maximum_extension, length
         )
 
-    def bending_energy(self, cosine, stiffness=None):
+    def bending_energy(self, cosine: npt.ArrayLike, stiffness: npt.ArrayLike | None = None) -> FloatOrArray:
         """Energy of joints with the given cosines t1.t2 in kJ/mol; ``joint_stiffness`` if no stiffness is given."""
         if self.bending_rigidity == 0.0:
             return np.zeros_like(cosine, dtype=float)
         return self.bending_potential.energy(self.joint_stiffness if stiffness is None else stiffness, cosine)
 
-    def bending_derivative(self, cosine, stiffness=None):
+    def bending_derivative(self, cosine: npt.ArrayLike, stiffness: npt.ArrayLike | None = None) -> FloatOrArray:
         """Derivative dV_b/dc at the given cosines t1.t2 in kJ/mol; ``joint_stiffness`` if no stiffness is given."""
         if self.bending_rigidity == 0.0:
             return np.zeros_like(cosine, dtype=float)
         return self.bending_potential.derivative(self.joint_stiffness if stiffness is None else stiffness, cosine)
 
-    def chain_energies(self, nodes, joint_stiffnesses=None, closed=False):
+    def chain_energies(
+        self, nodes: FloatArray, joint_stiffnesses: npt.ArrayLike | None = None, closed: bool = False
+    ) -> tuple[float, float]:
         """Stretching and bending energy, in kJ/mol, of a chain with node positions (n, 3) in nm.
 
         Parameters
@@ -297,7 +325,7 @@ class FilamentType:
         bending = self.bending_energy(cosines, joint_stiffnesses)
         return float(np.sum(self.stretching_energy(lengths))), float(np.sum(bending))
 
-    def persistence_length_at(self, temperature):
+    def persistence_length_at(self, temperature: Scalar) -> float:
         """Persistence length a/(k_B T) of the continuous filament in nm at a temperature.
 
         At the temperature for which ``persistence_length`` was given, that of the discrete chain, too, exactly.
@@ -306,7 +334,7 @@ class FilamentType:
         kT = thermal_energy(positive(temperature, TEMPERATURE, "temperature"))
         return self.bending_rigidity / kT
 
-    def segment_friction(self, viscosity, temperature, segments=1):
+    def segment_friction(self, viscosity: Scalar, temperature: Scalar, segments: int = 1) -> SegmentFriction:
         """Friction coefficients of one segment in a solvent, eqs. (6) and (20).
 
         Parameters
@@ -349,7 +377,7 @@ class FilamentType:
             return self.segment_length
         return max(self.segment_length, self.friction_length)
 
-    def with_segment_length(self, segment_length):
+    def with_segment_length(self, segment_length: Scalar) -> "FilamentType":
         """The same filament cut into segments of another length.
 
         Rescaled: k = EA/l0 if a stretching modulus was given; the stiffness of the joints, so that the persistence

@@ -11,7 +11,7 @@ _NODE, _WEIGHT = np.polynomial.legendre.leggauss(400)
 _LARGEST_DECORRELATION = 300.0
 
 
-def tangent_decorrelation(bending_model, reduced_stiffness):
+def tangent_decorrelation(bending_model: str, reduced_stiffness: float) -> float:
     """``-ln <c>`` of a joint in space: the average of c = t1.t2 with the weight exp(-V_b/k_B T), by quadrature.
 
     Parameters
@@ -35,7 +35,7 @@ def tangent_decorrelation(bending_model, reduced_stiffness):
 
 
 @lru_cache(maxsize=256)
-def calibrated_stiffness(bending_model, decorrelation):
+def calibrated_stiffness(bending_model: str, decorrelation: float) -> float:
     """K/(k_B T) of the joint with ``<t1.t2> = exp(-decorrelation)``, the inverse of ``tangent_decorrelation``.
 
     It tends to 1/decorrelation for stiff joints, and falls to zero for weak ones, without end: every bending model

@@ -5,6 +5,8 @@ import numpy as np
 from ..errors import InputError
 from ..mechanics.geometry import joined, joint_cosines, segment_vectors
 from ..units.quantities import whole_number
+from ..units.types import FloatArray, Indices
+from .filament_type import FilamentType
 
 _PLANE_TOLERANCE = 1e-9  # Of a segment's length: rounding of positions that were computed.
 
@@ -22,7 +24,7 @@ def _check_folds(filament_type, vectors, lengths, label, closed):
         )
 
 
-def named_nodes(nodes, count, label):
+def named_nodes(nodes: int | Indices, count: int, label: str) -> tuple[int, ...]:
     """Return nodes, counted from the start and sorted; raise InputError for one that does not exist."""
     numbers = set()
     for node in np.atleast_1d(np.asarray(nodes, dtype=object)):
@@ -34,7 +36,7 @@ def named_nodes(nodes, count, label):
     return tuple(sorted(numbers))
 
 
-def clamped_nodes(clamped, count, label):
+def clamped_nodes(clamped: int | Indices, count: int, label: str) -> tuple[int, ...]:
     """Return the clamped nodes, counted from the start and sorted; raise InputError for one that does not exist."""
     nodes = named_nodes(clamped, count, f"{label}: clamped")
     if len(nodes) == count:
@@ -42,7 +44,7 @@ def clamped_nodes(clamped, count, label):
     return nodes
 
 
-def joint_stiffnesses(filament_type, nodes, clamped, closed=False):
+def joint_stiffnesses(filament_type: FilamentType, nodes: int, clamped: Indices, closed: bool = False) -> FloatArray:
     """Bending stiffness of every joint of a filament in kJ/mol; that next to a clamped segment differs.
 
     Half a segment of material on either side of a joint bends. Where a segment is held, because both of its nodes are
@@ -68,14 +70,14 @@ def joint_stiffnesses(filament_type, nodes, clamped, closed=False):
     return np.where(before != behind, filament_type.clamped_joint_stiffness, filament_type.joint_stiffness)
 
 
-def planar_direction(direction, label):
+def planar_direction(direction: FloatArray, label: str) -> FloatArray:
     """Return a unit vector in the plane of a planar filament; raise InputError if it leaves it."""
     if abs(direction[2]) > _PLANE_TOLERANCE:
         raise InputError(f"{label} is planar, so its direction must lie in the xy plane, but is {direction.tolist()}.")
     return direction * [1.0, 1.0, 0.0]
 
 
-def check_shape(filament_type, positions, label, closed=False):
+def check_shape(filament_type: FilamentType, positions: FloatArray, label: str, closed: bool = False) -> None:
     """Raise InputError for node positions (n, 3) in nm in which a force is not defined."""
     vectors = segment_vectors(positions, closed)
     lengths = np.linalg.norm(vectors, axis=1)
@@ -87,7 +89,7 @@ def check_shape(filament_type, positions, label, closed=False):
     _check_folds(filament_type, vectors, lengths, label, closed)
 
 
-def in_one_plane(positions, segment_length, label):
+def in_one_plane(positions: FloatArray, segment_length: float, label: str) -> FloatArray:
     """Return positions whose z is the same to the bit; raise InputError if they are not in a plane of constant z."""
     heights = positions[:, 2]
     if np.ptp(heights) > _PLANE_TOLERANCE * segment_length:

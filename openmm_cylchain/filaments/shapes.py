@@ -5,15 +5,17 @@ import numpy as np
 from ..errors import InputError
 from ..mechanics.geometry import regular_polygon
 from ..units.quantities import FORCE, LENGTH, finite_number, in_units_of, unit_vector, vector, whole_number
+from ..units.types import FloatArray, Indices, Scalar, Vector, Vectors
 from .equilibrium import draw_chain
 from .filament import Filament
+from .filament_type import FilamentType
 from .placement import check_shape, clamped_nodes, in_one_plane, joint_stiffnesses, planar_direction
 
 MINIMUM_RING = 4
 """Segments that a ring has at least."""
 
 
-def straight(filament_type, segments, start, direction, label):
+def straight(filament_type: FilamentType, segments: int, start: Vector, direction: Vector, label: str) -> FloatArray:
     """Positions (segments + 1, 3) in nm of a straight filament with segments of rest length."""
     segments = whole_number(segments, 1, f"{label}: segments")
     start = vector(start, LENGTH, f"{label}: start")
@@ -21,7 +23,7 @@ def straight(filament_type, segments, start, direction, label):
     return start + distance[:, None] * unit_vector(direction, label)
 
 
-def given(positions, label):
+def given(positions: Vectors, label: str) -> FloatArray:
     """A copy of given positions in nm; raise InputError unless they are those of two nodes or more."""
     positions = np.atleast_1d(in_units_of(positions, LENGTH, f"{label}: positions"))
     if positions.ndim != 2 or positions.shape[1] != 3:
@@ -31,14 +33,24 @@ def given(positions, label):
     return positions.copy()
 
 
-def ring(filament_type, segments, center, normal, label):
+def ring(filament_type: FilamentType, segments: int, center: Vector, normal: Vector, label: str) -> FloatArray:
     """Positions (segments, 3) in nm of a regular polygon with segments of rest length."""
     segments = whole_number(segments, 1, f"{label}: segments")
     center = vector(center, LENGTH, f"{label}: center")
     return regular_polygon(segments, filament_type.segment_length, center, unit_vector(normal, label, "normal"))
 
 
-def drawn(filament_type, segments, temperature, generator, start, direction, clamped, planar, label):
+def drawn(
+    filament_type: FilamentType,
+    segments: int,
+    temperature: float,
+    generator: np.random.Generator,
+    start: Vector,
+    direction: Vector | None,
+    clamped: int | Indices,
+    planar: bool,
+    label: str,
+) -> FloatArray:
     """Positions (segments + 1, 3) in nm from the exact equilibrium of the free discrete chain."""
     segments = whole_number(segments, 1, f"{label}: segments")
     start = vector(start, LENGTH, f"{label}: start")
@@ -52,7 +64,15 @@ def drawn(filament_type, segments, temperature, generator, start, direction, cla
     return draw_chain(filament_type, segments, temperature, generator, start, direction, planar, stiffnesses)
 
 
-def new_filament(filament_type, positions, clamped, label, closed=False, planar=False, propulsion=0.0):
+def new_filament(
+    filament_type: FilamentType,
+    positions: FloatArray,
+    clamped: int | Indices,
+    label: str,
+    closed: bool = False,
+    planar: bool = False,
+    propulsion: Scalar = 0.0,
+) -> Filament:
     """A Filament with node positions (n, 3) in nm.
 
     Raises

@@ -1,11 +1,14 @@
 """Flow of the solvent: uniform, shear, extension, and any other that is linear in space."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from ..errors import InputError
 from ..units.quantities import LENGTH, RATE, VELOCITY, finite_number, in_units_of, unit_vector, vector
+from ..units.types import FloatArray, Scalar, Vector, Vectors
 
 _REST = (0.0, 0.0, 0.0)
 _TRACE_TOLERANCE = 1e-9
@@ -42,11 +45,15 @@ class Flow:
     [1e-06, 0.0, 0.0]
     """
 
-    velocity: tuple = _REST
-    gradient: tuple = (_REST, _REST, _REST)
-    origin: tuple = _REST
+    velocity: tuple[float, float, float] = _REST
+    gradient: tuple[tuple[float, float, float], ...] = (_REST, _REST, _REST)
+    origin: tuple[float, float, float] = _REST
 
-    def __post_init__(self):
+    if TYPE_CHECKING:  # What may be given; the attributes hold plain numbers.
+
+        def __init__(self, velocity: Vector = ..., gradient: Vectors = ..., origin: Vector = ...) -> None: ...
+
+    def __post_init__(self) -> None:
         gradient = np.asarray(in_units_of(self.gradient, RATE, "gradient of the flow"))
         if gradient.shape != (3, 3):
             raise InputError(f"gradient of the flow must have the shape (3, 3), but has {gradient.shape}.")
@@ -62,12 +69,14 @@ class Flow:
             object.__setattr__(self, name, tuple(float(component) for component in components))
 
     @classmethod
-    def uniform(cls, velocity):
+    def uniform(cls, velocity: Vector) -> "Flow":
         """A flow with the same velocity everywhere."""
         return cls(velocity)
 
     @classmethod
-    def shear(cls, rate, direction=(1, 0, 0), gradient_direction=(0, 0, 1), origin=_REST):
+    def shear(
+        cls, rate: Scalar, direction: Vector = (1, 0, 0), gradient_direction: Vector = (0, 0, 1), origin: Vector = _REST
+    ) -> "Flow":
         """Simple shear: u = rate (gradient_direction . (x - origin)) direction.
 
         Parameters
@@ -84,7 +93,9 @@ class Flow:
         return cls(gradient=rate * np.outer(along, across), origin=origin)
 
     @classmethod
-    def extension(cls, rate, direction=(1, 0, 0), compression=(0, 1, 0), origin=_REST):
+    def extension(
+        cls, rate: Scalar, direction: Vector = (1, 0, 0), compression: Vector = (0, 1, 0), origin: Vector = _REST
+    ) -> "Flow":
         """Planar extension: u = rate (direction . r) direction - rate (compression . r) compression, r = x - origin.
 
         Parameters
@@ -100,18 +111,18 @@ class Flow:
         return cls(gradient=rate * (np.outer(stretched, stretched) - np.outer(squeezed, squeezed)), origin=origin)
 
     @property
-    def is_at_rest(self):
+    def is_at_rest(self) -> bool:
         """Whether the solvent does not flow at all."""
         return not (np.any(self.velocity) or np.any(self.gradient))
 
-    def at(self, positions):
+    def at(self, positions: Vectors) -> FloatArray:
         """Velocity of the solvent at positions (..., 3): an array of their shape in nm/ps."""
         positions = np.asarray(in_units_of(positions, LENGTH, "positions"))
         if positions.ndim == 0 or positions.shape[-1] != 3:
             raise InputError(f"positions must have the shape (..., 3), but have {positions.shape}.")
         return flow_velocities(self, positions)
 
-    def __add__(self, other):
+    def __add__(self, other: "Flow") -> "Flow":
         """Both flows at once."""
         if not isinstance(other, Flow):
             return NotImplemented
@@ -119,12 +130,12 @@ class Flow:
         return Flow(velocity, np.add(self.gradient, other.gradient), self.origin)
 
 
-def flow_velocities(flow, positions):
+def flow_velocities(flow: Flow, positions: npt.ArrayLike) -> FloatArray:
     """Velocities (n, 3) of the solvent at positions (n, 3), as ``Flow.at`` but without its checks."""
     return np.asarray(flow.velocity) + (np.asarray(positions) - flow.origin) @ np.transpose(flow.gradient)
 
 
-def as_flow(flow):
+def as_flow(flow: Flow | None) -> Flow:
     """Return a Flow, at rest for None; raise InputError for anything else."""
     if flow is None:
         return Flow()

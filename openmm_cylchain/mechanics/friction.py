@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from ..errors import InputError
 from ..units.quantities import LENGTH, MASS, STIFFNESS, TIME, VISCOSITY, positive, thermal_energy
+from ..units.types import Scalar
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,13 @@ def _logarithm(length, diameter, correction, direction):
     return value
 
 
-def translational_friction_parallel(length, diameter, viscosity, correction=-0.114, logarithm_length=None):
+def translational_friction_parallel(
+    length: Scalar,
+    diameter: Scalar,
+    viscosity: Scalar,
+    correction: float = -0.114,
+    logarithm_length: Scalar | None = None,
+) -> float:
     """Friction for translation of a cylinder along its axis, eq. (6).
 
     ``gamma = 2 pi eta l / (ln(L/d) + c)``, with L = l unless ``logarithm_length`` is given.
@@ -64,7 +71,13 @@ def translational_friction_parallel(length, diameter, viscosity, correction=-0.1
     return 2.0 * math.pi * positive(viscosity, VISCOSITY, "viscosity") * length / logarithm
 
 
-def translational_friction_perpendicular(length, diameter, viscosity, correction=0.886, logarithm_length=None):
+def translational_friction_perpendicular(
+    length: Scalar,
+    diameter: Scalar,
+    viscosity: Scalar,
+    correction: float = 0.886,
+    logarithm_length: Scalar | None = None,
+) -> float:
     """Friction for translation of a cylinder across its axis, eq. (6).
 
     ``gamma = 4 pi eta l / (ln(L/d) + c)``, with L = l unless ``logarithm_length`` is given.
@@ -75,7 +88,13 @@ def translational_friction_perpendicular(length, diameter, viscosity, correction
     return 4.0 * math.pi * positive(viscosity, VISCOSITY, "viscosity") * length / logarithm
 
 
-def rotational_friction(length, diameter, viscosity, correction=-0.447, logarithm_length=None):
+def rotational_friction(
+    length: Scalar,
+    diameter: Scalar,
+    viscosity: Scalar,
+    correction: float = -0.447,
+    logarithm_length: Scalar | None = None,
+) -> float:
     """Friction for rotation of a cylinder about an axis across it, eq. (6).
 
     ``gamma = pi eta l^3 / (3 (ln(L/d) + c))``, with L = l unless ``logarithm_length`` is given.
@@ -96,7 +115,7 @@ def _cylinder(length, diameter, correction, logarithm_length, direction):
     return length, _logarithm(logarithm_length, diameter, correction, direction)
 
 
-def extensional_friction(relaxation_time, stiffness, rest_length, temperature):
+def extensional_friction(relaxation_time: Scalar, stiffness: Scalar, rest_length: Scalar, temperature: Scalar) -> float:
     """Friction for extension from the relaxation time of a segment's length, eq. (20).
 
     ``gamma_def = tau (k l0^2 - 4 k_B T)``
@@ -117,7 +136,7 @@ def extensional_friction(relaxation_time, stiffness, rest_length, temperature):
     return tau * energy
 
 
-def affine_extensional_friction(parallel, length):
+def affine_extensional_friction(parallel: float, length: Scalar) -> float:
     """Friction for extension of a cylinder that deforms affinely, ``gamma_def = gamma_par l^2 / 12``.
 
     The parallel friction spread evenly over the segment, sum r^2 dgamma in eq. (3); the default where
@@ -126,12 +145,12 @@ def affine_extensional_friction(parallel, length):
     return parallel * positive(length, LENGTH, "length") ** 2 / 12.0
 
 
-def stokes_friction(diameter, viscosity):
+def stokes_friction(diameter: Scalar, viscosity: Scalar) -> float:
     """Translational friction of a sphere, 3 pi eta d, for particles outside filaments."""
     return 3.0 * math.pi * positive(viscosity, VISCOSITY, "viscosity") * positive(diameter, LENGTH, "diameter")
 
 
-def thermal_torque(friction, temperature):
+def thermal_torque(friction: SegmentFriction, temperature: Scalar) -> float:
     """Thermal effective torque of a free segment along its axis, eq. (15), in kJ/mol.
 
     ``T = 2 k_B T (2 - gamma_def/gamma_rot)``
@@ -142,7 +161,7 @@ def thermal_torque(friction, temperature):
     return 2.0 * thermal_energy(temperature) * (2.0 - friction.extensional / friction.rotational)
 
 
-def rotational_relaxation_time(friction, temperature):
+def rotational_relaxation_time(friction: SegmentFriction, temperature: Scalar) -> float:
     """Relaxation time of the mean orientation of a free segment, eq. (29): gamma_rot/(2 k_B T), in ps."""
     kT = thermal_energy(temperature)
     if kT == 0:
@@ -150,7 +169,9 @@ def rotational_relaxation_time(friction, temperature):
     return friction.rotational / (2.0 * kT)
 
 
-def extension_relaxation_time(friction, stiffness, rest_length, temperature):
+def extension_relaxation_time(
+    friction: SegmentFriction, stiffness: Scalar, rest_length: Scalar, temperature: Scalar
+) -> float:
     """Relaxation time of the length of a segment with a harmonic potential, eq. (20), in ps."""
     stiffness = positive(stiffness, STIFFNESS, "stiffness")
     rest_length = positive(rest_length, LENGTH, "rest_length")
@@ -160,7 +181,7 @@ def extension_relaxation_time(friction, stiffness, rest_length, temperature):
     return friction.extensional / energy
 
 
-def momentum_relaxation_times(friction, mass, length):
+def momentum_relaxation_times(friction: SegmentFriction, mass: Scalar, length: Scalar) -> dict[str, float]:
     """Relaxation times of a segment's momenta, eq. (51), in ps.
 
     Returns a dict with ``parallel`` M/gamma_par, ``perpendicular`` M/gamma_perp, ``rotational``

@@ -5,15 +5,20 @@ node j + 1. A ring has n: its last segment leads back to node 0, and its joint j
 j - 1 and j.
 """
 
+from typing import Any
+
 import numpy as np
+import numpy.typing as npt
+
+from ..units.types import FloatArray
 
 
-def segment_vectors(nodes, closed=False):
+def segment_vectors(nodes: FloatArray, closed: bool = False) -> FloatArray:
     """Vectors from the minus to the plus end of all segments of a chain with node positions (n, 3)."""
     return np.diff(nodes, axis=0, append=nodes[:1]) if closed else np.diff(nodes, axis=0)
 
 
-def to_nearest_images(vectors, box):
+def to_nearest_images(vectors: FloatArray, box: FloatArray) -> FloatArray:
     """Vectors (n, 3) between the nearest images of points in a box with the reduced vectors (3, 3)."""
     nearest = np.array(vectors)
     for axis in (2, 1, 0):
@@ -21,18 +26,18 @@ def to_nearest_images(vectors, box):
     return nearest
 
 
-def joined(segments, closed=False):
+def joined(segments: npt.NDArray[Any], closed: bool = False) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
     """An array of one entry per segment as a pair: the segments before and behind every joint."""
     return (np.roll(segments, 1, axis=0), segments) if closed else (segments[:-1], segments[1:])
 
 
-def joint_cosines(tangents, closed=False):
+def joint_cosines(tangents: FloatArray, closed: bool = False) -> FloatArray:
     """Cosines of the angles at all joints, from the unit vectors (segments, 3) along the segments."""
     before, behind = joined(tangents, closed)
     return np.einsum("ij,ij->i", before, behind)
 
 
-def regular_polygon(segments, segment_length, center, normal):
+def regular_polygon(segments: int, segment_length: float, center: FloatArray, normal: FloatArray) -> FloatArray:
     """Nodes (segments, 3) of a regular polygon, counter-clockwise around the unit vector ``normal``."""
     angles = 2.0 * np.pi * np.arange(segments) / segments
     first = np.cross(np.eye(3)[np.argmin(np.abs(normal))], normal)

@@ -6,6 +6,7 @@ between neighbouring segments for bending, the segment length ``l`` for stretchi
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -26,8 +27,8 @@ class BendingPotential:
     """
 
     name: str
-    energy: Callable
-    derivative: Callable
+    energy: Callable[..., Any]
+    derivative: Callable[..., Any]
     expression: str
 
 
@@ -91,8 +92,8 @@ class StretchingPotential:
     """
 
     name: str
-    energy: Callable
-    derivative: Callable
+    energy: Callable[..., Any]
+    derivative: Callable[..., Any]
     expression: str
 
 

@@ -5,13 +5,14 @@ system are handled at once: nodes are numbered chain after chain, and segment s 
 ``first_node[s]`` (its minus end) and ``second_node[s]`` (its plus end).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.linalg import LinAlgError, solveh_banded
 
 from ..errors import InstabilityError
-from .flow import flow_velocities
+from ..units.types import BoolArray, FloatArray, IntArray
+from .flow import Flow, flow_velocities
 
 _ROW, _COLUMN = np.tril_indices(3)
 
@@ -34,16 +35,23 @@ class ChainSet:
         Chains that lie in a plane of constant z and stay there; none if not given.
     """
 
-    node_counts: np.ndarray
-    parallel: np.ndarray
-    perpendicular: np.ndarray
-    rotational: np.ndarray
-    extensional: np.ndarray
-    fixed: np.ndarray
-    closed: np.ndarray = None
-    planar: np.ndarray = None
+    node_counts: IntArray
+    parallel: FloatArray
+    perpendicular: FloatArray
+    rotational: FloatArray
+    extensional: FloatArray
+    fixed: BoolArray
+    closed: BoolArray = None  # type: ignore[assignment]  # None is for the constructor.
+    planar: BoolArray = None  # type: ignore[assignment]
+    start_of_chain: IntArray = field(init=False, repr=False)
+    first_node: IntArray = field(init=False, repr=False)
+    second_node: IntArray = field(init=False, repr=False)
+    chain_of_segment: IntArray = field(init=False, repr=False)
+    planar_node: BoolArray = field(init=False, repr=False)
+    segment_dimensions: FloatArray = field(init=False, repr=False)
+    place: IntArray | slice = field(init=False, repr=False)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         counts = np.asarray(self.node_counts, dtype=int)
         none = np.zeros(len(counts), dtype=bool)
         closed = none if self.closed is None else np.asarray(self.closed, dtype=bool)
@@ -55,7 +63,7 @@ class ChainSet:
         first = np.flatnonzero(~last | closed[chain])
         second = np.where(last[first], starts[chain[first]], first + 1)
         # Nodes of rings have their places in the banded resistance in the order 0, n - 1, 1, n - 2, ...
-        place = slice(None)
+        place: IntArray | slice = slice(None)
         if closed.any():
             node = np.arange(len(chain))
             from_start, from_end = node - starts[chain], (starts + counts - 1)[chain] - node
@@ -75,22 +83,22 @@ class ChainSet:
             object.__setattr__(self, name, value)
 
     @property
-    def node_count(self):
+    def node_count(self) -> int:
         """Total number of nodes."""
         return int(np.sum(self.node_counts))
 
     @property
-    def segment_count(self):
+    def segment_count(self) -> int:
         """Total number of segments."""
         return len(self.first_node)
 
-    def locate_segment(self, segment):
+    def locate_segment(self, segment: int) -> tuple[int, int]:
         """The chain of a segment and the segment's number within it."""
         chain = int(self.chain_of_segment[segment])
         return chain, int(self.first_node[segment] - self.start_of_chain[chain])
 
 
-def segment_geometry(chains, nodes):
+def segment_geometry(chains: ChainSet, nodes: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Lengths (segments,) and tangents (segments, 3) of all segments."""
     difference = nodes[chains.second_node] - nodes[chains.first_node]
     length = np.sqrt(np.einsum("ij,ij->i", difference, difference))
@@ -99,7 +107,7 @@ def segment_geometry(chains, nodes):
     return length, tangent
 
 
-def resistance_bands(chains, nodes):
+def resistance_bands(chains: ChainSet, nodes: FloatArray) -> FloatArray:
     """The resistance Z of all chains in the lower banded form of ``scipy.linalg.solveh_banded``.
 
     Z = sum_s P_s^T zeta_s P_s with the segment resistance
@@ -162,7 +170,7 @@ def _axial(across, along, tangent):
     return components
 
 
-def redistribute(chains, nodes, forces, flow=None):
+def redistribute(chains: ChainSet, nodes: FloatArray, forces: FloatArray, flow: Flow | None = None) -> FloatArray:
     """Velocities of all nodes under nodal forces (nodes, 3), in O(nodes): Z v = f, or Z (v - u) = f in a flow u.
 
     For a flow that is linear in space, Z u holds all of the drag on resting segments: that of u at their middles, and
@@ -196,7 +204,7 @@ def _flow_at_nodes(chains, nodes, flow):
     return velocities
 
 
-def drag_forces(chains, nodes, velocities):
+def drag_forces(chains: ChainSet, nodes: FloatArray, velocities: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Forces zeta_s v on the ends of all segments whose nodes move with the given velocities (nodes, 3).
 
     Returns
@@ -215,7 +223,7 @@ def _apply(across, along, tangent, vector):
     return across[:, None] * vector + ((along - across) * projection)[:, None] * tangent
 
 
-def segment_forces_to_nodes(chains, minus, plus):
+def segment_forces_to_nodes(chains: ChainSet, minus: FloatArray, plus: FloatArray) -> FloatArray:
     """Nodal forces from the forces (segments, 3) on the minus and plus ends of all segments."""
     forces = np.zeros((chains.node_count, 3))
     forces[chains.first_node] += minus
@@ -223,7 +231,9 @@ def segment_forces_to_nodes(chains, minus, plus):
     return forces
 
 
-def noise_forces(chains, nodes, kT, step, translational, rotational):
+def noise_forces(
+    chains: ChainSet, nodes: FloatArray, kT: float, step: float, translational: FloatArray, rotational: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Random forces on the ends of all segments, step (1) of Section 4.
 
     F = sqrt(2 k_B T/dt) g_trans^(1/2) a, T = sqrt(2 k_B T/dt) g_dr^(1/2) b, f_pm = F/2 pm T/l, so that
@@ -251,7 +261,7 @@ def _apply_root(across, along, tangent, vector):
     return np.sqrt(across)[:, None] * vector + ((np.sqrt(along) - np.sqrt(across)) * projection)[:, None] * tangent
 
 
-def thermal_forces(chains, nodes, kT):
+def thermal_forces(chains: ChainSet, nodes: FloatArray, kT: float) -> tuple[FloatArray, FloatArray]:
     """Forces on the ends of all segments from the thermal torque (15), step (2) of Section 4.
 
     T = 2 k_B T (2 - g_def/g_rot) t, f_pm = pm T/l; in d dimensions, k_B T (d + 1 - (d - 1) g_def/g_rot) t.
@@ -267,7 +277,16 @@ def thermal_forces(chains, nodes, kT):
     return -pair, pair
 
 
-def euler_step(chains, nodes, forces, kT, step, translational, rotational, flow=None):
+def euler_step(
+    chains: ChainSet,
+    nodes: FloatArray,
+    forces: FloatArray,
+    kT: float,
+    step: float,
+    translational: FloatArray,
+    rotational: FloatArray,
+    flow: Flow | None = None,
+) -> FloatArray:
     """Displacements in one step of the paper's scheme, Section 4 (Euler-Maruyama).
 
     dx = dt Z(x)^-1 (f + f_noise + f_thermal), with the thermal torque (15) of a *free* segment sent
@@ -280,7 +299,16 @@ def euler_step(chains, nodes, forces, kT, step, translational, rotational, flow=
     return step * redistribute(chains, nodes, forces + noise + thermal, flow)
 
 
-def midpoint_step(chains, nodes, forces, kT, step, translational, rotational, flow=None):
+def midpoint_step(
+    chains: ChainSet,
+    nodes: FloatArray,
+    forces: FloatArray,
+    kT: float,
+    step: float,
+    translational: FloatArray,
+    rotational: FloatArray,
+    flow: Flow | None = None,
+) -> FloatArray:
     """Displacements in one step of Fixman's midpoint scheme; weak order one, right drift on chains.
 
     x* = x + dt/2 Z(x)^-1 f, dx = dt Z(x*)^-1 f, with the same total force f, noise drawn at x, in both.
@@ -296,7 +324,9 @@ def midpoint_step(chains, nodes, forces, kT, step, translational, rotational, fl
 STEPS = {"euler": euler_step, "midpoint": midpoint_step}
 
 
-def joint_tensions(chains, nodes, minus, plus, flow=None):
+def joint_tensions(
+    chains: ChainSet, nodes: FloatArray, minus: FloatArray, plus: FloatArray, flow: Flow | None = None
+) -> FloatArray:
     """Virtual forces Phi at the joints, eqs. (22)-(24), from the forces on the ends of all segments.
 
     Phi of joint i is the force that segment i + 1 exerts on segment i: parallel to the tangent when the

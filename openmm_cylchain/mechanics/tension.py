@@ -4,13 +4,37 @@ OpenMM reports the total force on a node; the virtual force at a joint depends o
 on the segment before the joint and how much on the one behind it.
 """
 
+from collections.abc import Iterable, Sequence
+from typing import Any, Protocol
+
 import numpy as np
 
+from ..units.types import FloatArray, IntArray
+from .flow import Flow
 from .geometry import joined, segment_vectors
-from .redistribution import joint_tensions, segment_forces_to_nodes
+from .redistribution import ChainSet, joint_tensions, segment_forces_to_nodes
 
 
-def segment_end_forces(filament, nodes):
+class Chain(Protocol):
+    """What the forces of a chain's own potentials depend on: a ``Filament`` has it."""
+
+    @property
+    def type(self) -> Any: ...
+
+    @property
+    def segments(self) -> int: ...
+
+    @property
+    def closed(self) -> bool: ...
+
+    @property
+    def propulsion(self) -> float: ...
+
+    @property
+    def joint_stiffnesses(self) -> FloatArray: ...
+
+
+def segment_end_forces(filament: Chain, nodes: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Forces of stretching (8), bending (28) and propulsion on the ends of all segments of one filament.
 
     A bending torque T on a segment is the pair of forces -T/l and T/l on its ends, with
@@ -47,7 +71,9 @@ def _bending_end_forces(filament, length, tangent):
     return plus
 
 
-def split_external_forces(chains, forces, minus, plus):
+def split_external_forces(
+    chains: ChainSet, forces: FloatArray, minus: FloatArray, plus: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Add what the nodal forces hold beyond ``minus`` and ``plus`` to the ends of the segments.
 
     Half to each of the two segments at a joint, all of it to the one segment at an end.
@@ -64,7 +90,14 @@ def split_external_forces(chains, forces, minus, plus):
     return minus + share[chains.first_node], plus + share[chains.second_node]
 
 
-def filament_tensions(filaments, node_indices, chains, positions, forces, flow=None):
+def filament_tensions(
+    filaments: Iterable[Chain],
+    node_indices: Sequence[IntArray],
+    chains: ChainSet,
+    positions: FloatArray,
+    forces: FloatArray,
+    flow: Flow | None = None,
+) -> list[FloatArray]:
     """Virtual forces Phi at the joints of all filaments, see ``Filaments.joint_tensions``.
 
     Parameters
@@ -91,7 +124,7 @@ def filament_tensions(filaments, node_indices, chains, positions, forces, flow=N
     return [part if filament.closed else part[:-1] for filament, part in zip(filaments, parts)]
 
 
-def axial_tensions(nodes, virtual_forces, closed=False):
+def axial_tensions(nodes: FloatArray, virtual_forces: FloatArray, closed: bool = False) -> FloatArray:
     """Components (joints,) of virtual forces (joints, 3) along a chain with nodes (n, 3), positive under tension.
 
     The direction at a joint is that of the sum of the unit vectors along its two segments. Forces are in the order of
@@ -102,7 +135,7 @@ def axial_tensions(nodes, virtual_forces, closed=False):
     return components_along(tangents, virtual_forces)
 
 
-def components_along(tangents, virtual_forces):
+def components_along(tangents: FloatArray, virtual_forces: FloatArray) -> FloatArray:
     """Components (joints,) of virtual forces (joints, 3) along a chain with unit vectors (segments, 3)."""
     directions = tangents + np.roll(tangents, -1, axis=0)
     directions /= np.linalg.norm(directions, axis=1)[:, None]

@@ -2,11 +2,15 @@
 
 import os
 from pathlib import Path
+from typing import TextIO, TypeAlias
 
 from ..errors import InputError
 
+TextFile: TypeAlias = str | Path | TextIO
+"""A file to write text to: its path, or a file that is open."""
 
-def write_atomically(path, data):
+
+def write_atomically(path: Path, data: bytes) -> None:
     """Replace a file as a whole: after a kill it holds either the old or the new content.
 
     Parameters
@@ -32,7 +36,7 @@ def _sync_directory(path):
             os.close(descriptor)
 
 
-def check_output_path(path):
+def check_output_path(path: str | Path) -> None:
     """Raise InputError if a file cannot be written there, before hours are spent on its content."""
     path = Path(path)
     if path.is_dir() or not path.parent.is_dir():

@@ -2,6 +2,7 @@
 
 import sys
 import time
+from typing import TextIO
 
 from ..units.text import format_time, time_unit
 
@@ -22,12 +23,12 @@ class StatusLine:
         Whether the stream is a terminal.
     """
 
-    def __init__(self, stream):
+    def __init__(self, stream: TextIO) -> None:
         self._stream = stream
         self.in_place = stream.isatty()
         self._width = 0
 
-    def write(self, line):
+    def write(self, line: str) -> None:
         """Write a line."""
         if self.in_place:
             self._stream.write("\r" + line.ljust(self._width))
@@ -36,7 +37,7 @@ class StatusLine:
             self._stream.write(line + "\n")
         self._stream.flush()
 
-    def end(self):
+    def end(self) -> None:
         """Leave the line that was written last."""
         if self.in_place:
             self._stream.write("\n")
@@ -52,14 +53,14 @@ class ProgressMessages:
         Standard error if not given.
     """
 
-    def __init__(self, stream=None):
+    def __init__(self, stream: TextIO | None = None) -> None:
         self._line = StatusLine(sys.stderr if stream is None else stream)
         self._start = time.monotonic()
 
-    def __call__(self, message):
+    def __call__(self, message: str) -> None:
         self._line.write(f"{time.monotonic() - self._start:6.1f} s  {message}")
 
-    def finish(self):
+    def finish(self) -> None:
         """Leave the line that was overwritten."""
         self._line.end()
 
@@ -79,7 +80,7 @@ class RunProgress:
         Standard output if not given.
     """
 
-    def __init__(self, steps, first_step, time_step, stream=None):
+    def __init__(self, steps: int, first_step: int, time_step: float, stream: TextIO | None = None) -> None:
         self._steps = steps
         self._first = first_step
         self._time_step = time_step
@@ -88,7 +89,7 @@ class RunProgress:
         self._last_refresh = self._start
         self._next_fraction = first_step / steps + _LINE_FRACTION
 
-    def update(self, step):
+    def update(self, step: int) -> None:
         """Report that the run has come to ``step``, if it is time to report."""
         now = time.monotonic()
         if self._line.in_place:
@@ -99,7 +100,7 @@ class RunProgress:
             self._next_fraction = step / self._steps + _LINE_FRACTION
             self._line.write(self._text(step, now))
 
-    def finish(self, step):
+    def finish(self, step: int) -> None:
         """Report the end of the run, or of this part of it."""
         self._line.write(self._text(step, time.monotonic()))
         self._line.end()

@@ -10,45 +10,60 @@ do: of lines with the same step, the last holds.
 
 from abc import ABC, abstractmethod
 from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
+import numpy.typing as npt
+import openmm
+from openmm import app
 
 from ..errors import InputError
+from ..filaments.collection import FilamentCollection
 from ..mechanics.geometry import segment_vectors
+from ..mechanics.redistribution import ChainSet
 from ..mechanics.tension import axial_tensions, filament_tensions
 from ..units.quantities import whole_number
+from ..units.types import FloatArray, IntArray
+from .files import TextFile
+
+
+class MeasuredCrosslinks(Protocol):
+    """What a CrosslinkReporter sees of a Crosslinks object."""
+
+    def measure(self, context: openmm.Context, state: openmm.State) -> tuple[Any, FloatArray, FloatArray]: ...
 
 
 class _TableReporter(ABC):
     # What reporters of a table have in common: a line for each thing and report.
 
-    _columns = ()
+    _columns: tuple[str, ...] = ()
     _thing = ""
-    _include = ("positions",)
+    _include: tuple[str, ...] = ("positions",)
 
-    def __init__(self, file, reportInterval, append=False):  # noqa: N803 - OpenMM's name
+    def __init__(self, file: TextFile | None, reportInterval: int, append: bool = False) -> None:  # noqa: N803 - OpenMM's name
         self._interval = whole_number(reportInterval, 1, "reportInterval")
-        self._rows = []
-        self._reports = []
-        self._file = None
+        self._rows: list[Any] = []
+        self._reports: list[tuple[int, float]] = []
+        self._file: Any = None
         self._owned = isinstance(file, (str, Path))
         header = ",".join(("step", "time_ps", self._thing, *self._columns))
-        if self._owned:
+        stream: Any = file
+        if isinstance(file, (str, Path)):
             if append:
                 _cut_unfinished_line(Path(file), header)
-            file = open(file, "a" if append else "w", newline="")  # noqa: SIM115 - closed with the reporter
+            stream = open(file, "a" if append else "w", newline="")  # noqa: SIM115 - closed with the reporter
         elif file is not None and not hasattr(file, "write"):
             raise InputError(f"file must be a path, a file that is open for writing, or None, but is {file!r}.")
-        self._file = file
-        if file is not None and not (append and self._owned and file.tell() > 0):
-            print(header, file=file)
+        self._file = stream
+        if stream is not None and not (append and self._owned and stream.tell() > 0):
+            print(header, file=stream)
 
-    def describeNextReport(self, simulation):  # noqa: N802 - OpenMM's name
+    def describeNextReport(self, simulation: app.Simulation) -> dict[str, Any]:  # noqa: N802 - OpenMM's name
         """When the next report is due, and that it needs positions; as OpenMM asks for it."""
         steps = self._interval - simulation.currentStep % self._interval
         return {"steps": steps, "periodic": False, "include": list(self._include)}
 
-    def report(self, simulation, state):
+    def report(self, simulation: app.Simulation, state: openmm.State) -> None:
         """Write a report; OpenMM calls it."""
         time = state.getTime()._value
         numbers, values = self._table(simulation, state)
@@ -66,22 +81,22 @@ class _TableReporter(ABC):
         """What the line of each thing says it is, and a row of values for each."""
 
     @property
-    def step(self):
+    def step(self) -> IntArray:
         """The steps of all reports so far."""
         return np.array([step for step, _ in self._reports], dtype=int)
 
     @property
-    def time(self):
+    def time(self) -> FloatArray:
         """The times of all reports so far, in ps."""
         return np.array([time for _, time in self._reports], dtype=float)
 
-    def close(self):
+    def close(self) -> None:
         """Close the file, if the reporter has opened it."""
         if self._owned and self._file is not None:
             self._file.close()
             self._file = None
 
-    def __del__(self):
+    def __del__(self) -> None:
         if getattr(self, "_owned", False):
             self.close()
 
@@ -103,12 +118,14 @@ def _cut_unfinished_line(path, header):
 class FilamentsReporter(_TableReporter):
     """What reporters of things whose number does not change have in common: arrays (reports, things)."""
 
-    def __init__(self, file, reportInterval, filaments, append=False):  # noqa: N803 - OpenMM's name
+    def __init__(
+        self, file: TextFile | None, reportInterval: int, filaments: FilamentCollection, append: bool = False
+    ) -> None:  # noqa: N803 - OpenMM's name
         self._filaments = filaments
         self._nodes = filaments.node_indices
         super().__init__(file, reportInterval, append)
 
-    def __getitem__(self, column):
+    def __getitem__(self, column: str) -> FloatArray:
         """An array (reports, filaments or tethers) of a column."""
         if column not in self._columns:
             raise InputError(f"There is no column {column!r}: known are {', '.join(self._columns)}.")
@@ -191,30 +208,34 @@ class TensionReporter(FilamentsReporter):
     >>> simulation.reporters.append(TensionReporter("tension.csv", 100, filaments))  # doctest: +SKIP
     """
 
+    places: list[tuple[int, ...]]
+
     def __init__(
         self,
-        file,
-        reportInterval,  # noqa: N803 - OpenMM's name
-        filaments,
-        append=False,
-        joints=False,
-        mean=False,
-    ):
+        file: TextFile | None,
+        reportInterval: int,  # noqa: N803 - OpenMM's name
+        filaments: FilamentCollection,
+        append: bool = False,
+        joints: bool = False,
+        mean: bool = False,
+    ) -> None:
         self._joints = bool(joints)
         self._mean = bool(mean)
         self._include = () if mean else ("positions", "forces")
         if joints:
             self._thing, self._columns = "filament,joint", ("tension",)
-            self.places = [(f, j) for f, filament in enumerate(filaments) for j in range(_joints(filament))]
+            self.places: list[tuple[int, ...]] = [
+                (f, j) for f, filament in enumerate(filaments) for j in range(_joints(filament))
+            ]
         else:
             self._thing, self._columns = "filament", ("mean_tension", "minimum_tension", "maximum_tension")
             self.places = [(number,) for number, filament in enumerate(filaments) if _joints(filament)]
         if not self.places:
             raise InputError("There are no tensions to report: filaments of one segment have no joints.")
-        self._chains = None
+        self._chains: ChainSet | None = None
         super().__init__(file, reportInterval, filaments, append)
 
-    def describeNextReport(self, simulation):  # noqa: N802 - OpenMM's name
+    def describeNextReport(self, simulation: app.Simulation) -> dict[str, Any]:  # noqa: N802 - OpenMM's name
         if self._mean:
             self._filaments.record_tensions(simulation.context)
         return super().describeNextReport(simulation)
@@ -266,7 +287,9 @@ class TetherReporter(FilamentsReporter):
     _columns = tuple(f"{what}_{axis}" for what in ("point", "extension", "force") for axis in "xyz")
     _thing = "tether"
 
-    def __init__(self, file, reportInterval, filaments, append=False):  # noqa: N803 - OpenMM's name
+    def __init__(
+        self, file: TextFile | None, reportInterval: int, filaments: FilamentCollection, append: bool = False
+    ) -> None:  # noqa: N803 - OpenMM's name
         if not filaments.tethers:
             raise InputError("There are no tethers to report: call add_tether first.")
         super().__init__(file, reportInterval, filaments, append)
@@ -309,9 +332,11 @@ class CrosslinkReporter(_TableReporter):
     _columns = ("particle_1", "particle_2", "length", "extension", "force")
     _thing = "crosslink"
 
-    def __init__(self, file, reportInterval, crosslinks, append=False):  # noqa: N803 - OpenMM's name
+    def __init__(
+        self, file: TextFile | None, reportInterval: int, crosslinks: MeasuredCrosslinks, append: bool = False
+    ) -> None:  # noqa: N803 - OpenMM's name
         self._crosslinks = crosslinks
-        self._numbers = []
+        self._numbers: list[IntArray] = []
         super().__init__(file, reportInterval, append)
 
     def _table(self, simulation, state):
@@ -320,11 +345,11 @@ class CrosslinkReporter(_TableReporter):
         return table.numbers, list(zip(*table.pairs.T, lengths, lengths - table.rest_length, forces))
 
     @property
-    def count(self):
+    def count(self) -> IntArray:
         """How many crosslinks each report has: an array (reports,)."""
         return np.array([len(numbers) for numbers in self._numbers], dtype=int)
 
-    def __getitem__(self, column):
+    def __getitem__(self, column: str) -> npt.NDArray[Any]:
         """An array (lines,) of a column of the file."""
         if column == "step":
             return np.repeat(self.step, self.count)

@@ -12,7 +12,9 @@ from openmm import app, unit
 
 from ..errors import InputError
 from ..units.quantities import LENGTH, MASS, in_units_of
+from ..units.types import BoxVectors, Vectors
 from ..version import __version__
+from .files import TextFile
 
 _PSF_NAME_LENGTH = 7  # The fields have eight columns, of which VMD reads seven.
 _PSF_TYPE_LENGTH = 6
@@ -28,7 +30,7 @@ _PSF_EMPTY_SECTIONS = (
 _ANGSTROM = 10.0  # in a nanometre
 
 
-def write_psf(topology, file, system=None):
+def write_psf(topology: app.Topology, file: TextFile, system: openmm.System | None = None) -> None:
     """Write a PSF file: atoms, masses, charges and bonds, in CHARMM's extended X-PLOR format.
 
     Chains become segments of the file. Names are cut to the seven characters that VMD reads. Where ids of chains are
@@ -76,7 +78,13 @@ def _psf_atoms(topology, system):
                 )
 
 
-def write_lammps_data(topology, positions, file, system=None, box_vectors=None):
+def write_lammps_data(
+    topology: app.Topology,
+    positions: Vectors,
+    file: TextFile,
+    system: openmm.System | None = None,
+    box_vectors: BoxVectors | None = None,
+) -> None:
     """Write a LAMMPS data file of style "molecular": particles, names, masses, positions, box and bonds, in angstrom.
 
     Atom types are the names of atoms, bond types the pairs of them, molecules the chains. Without a periodic box, the

@@ -1,7 +1,9 @@
 """Filaments: what users add, build, integrate and ask; the work is done by the modules that it calls."""
 
 from collections import defaultdict
+from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -12,17 +14,25 @@ from ..dynamics.precision import check_precision
 from ..dynamics.schemes import check_scheme
 from ..dynamics.step_of_system import recommended_step_of
 from ..dynamics.step_warnings import warn_of_long_step
-from ..dynamics.time_step import as_step
+from ..dynamics.time_step import TimeStep, as_step
 from ..engine_choice import choose_engine, default_scheme, load_engine
 from ..engines.description import describe_chains
 from ..engines.protocol import IntegratorSettings, PlacedFilaments
 from ..errors import InputError
 from ..filaments import shapes
-from ..filaments.attachments import add_virtual_site, attachment_positions, distribute_beads, locate, neighbors
-from ..filaments.filament import Tether
+from ..filaments.attachments import (
+    Attachment,
+    add_virtual_site,
+    attachment_positions,
+    distribute_beads,
+    locate,
+    neighbors,
+)
+from ..filaments.filament import Filament, Tether
 from ..filaments.filament_type import FilamentType
 from ..filaments.placement import named_nodes
-from ..mechanics.flow import as_flow
+from ..mechanics.flow import Flow, as_flow
+from ..mechanics.redistribution import ChainSet
 from ..mechanics.tension import components_along, filament_tensions
 from ..units.quantities import (
     FORCE,
@@ -36,6 +46,7 @@ from ..units.quantities import (
     vector,
     whole_number,
 )
+from ..units.types import BoxVectors, Indices, IntArray, Numbers, Scalar, Vector, Vectors
 from .insertion import (
     add_nodes_to_system,
     add_noninteracting_entries,
@@ -71,72 +82,85 @@ class Filaments:
     11
     """
 
-    def __init__(self, viscosity, temperature, engine=None):
+    def __init__(self, viscosity: Scalar, temperature: Scalar, engine: str | None = None) -> None:
         self._viscosity = positive(viscosity, VISCOSITY, "viscosity")
         self._temperature = non_negative(temperature, TEMPERATURE, "temperature")
-        self._filaments = []
-        self._tethers = []
-        self._tethered_nodes = set()
+        self._filaments: list[Filament] = []
+        self._tethers: list[Tether] = []
+        self._tethered_nodes: set[tuple[int, int]] = set()
         # By Context: what has moved there, by number.
-        self._moved_tethers = WeakKeyDictionary()
-        self._attachments = []
-        self._attachments_of = defaultdict(list)
-        self._attachment_indices = None
-        self._beads = {}
-        self._nodes = None
+        self._moved_tethers: WeakKeyDictionary[Any, dict[int, Tether]] = WeakKeyDictionary()
+        self._attachments: list[Attachment] = []
+        self._attachments_of: defaultdict[int, list[int]] = defaultdict(list)
+        self._attachment_indices: Any = None
+        self._beads: dict[int, list[int]] = {}
+        self._nodes: Any = None
         self._engine_name = choose_engine(engine)
         self._engine = load_engine(self._engine_name)
 
     @property
-    def engine(self):
+    def engine(self) -> str:
         """Name of the engine that computes the filaments."""
         return self._engine_name
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self._filaments)
 
-    def __getitem__(self, index):
+    def __getitem__(self, index: int) -> Filament:
         return self._filaments[index]
 
+    def __iter__(self) -> Iterator[Filament]:
+        return iter(self._filaments)
+
     @property
-    def viscosity(self):
+    def viscosity(self) -> float:
         """Viscosity of the solvent in kJ ps/(mol nm^3)."""
         return self._viscosity
 
     @property
-    def temperature(self):
+    def temperature(self) -> float:
         """Temperature in K."""
         return self._temperature
 
     @property
-    def node_indices(self):
+    def node_indices(self) -> list[IntArray]:
         """List of arrays: the particle indices of the nodes of every filament, once they are in a System."""
         self._refuse_unless_built()
         return self._nodes
 
     @property
-    def tethers(self):
+    def tethers(self) -> tuple[Tether, ...]:
         """Tuple of the tethers, in the order of their numbers, as they were added; see ``tethers_in``."""
         return tuple(self._tethers)
 
     @property
-    def attachments(self):
+    def attachments(self) -> tuple[Attachment, ...]:
         """Tuple of the attachment points, in the order of their numbers."""
         return tuple(self._attachments)
 
     @property
-    def attachment_indices(self):
+    def attachment_indices(self) -> IntArray:
         """Particle indices of the attachment points, in the order of their numbers, once they are in a System."""
         self._refuse_unless_built()
         return self._attachment_indices
 
     @property
-    def bead_indices(self):
+    def bead_indices(self) -> list[IntArray]:
         """List of arrays: the particle indices of the beads of every filament, once they are in a System."""
         self._refuse_unless_built()
         return [self._attachment_indices[self._beads.get(number, [])] for number in range(len(self))]
 
-    def add_straight(self, filament_type, segments, start, direction, clamped=(), *, planar=False, propulsion=0.0):
+    def add_straight(
+        self,
+        filament_type: FilamentType,
+        segments: int,
+        start: Vector,
+        direction: Vector,
+        clamped: int | Indices = (),
+        *,
+        planar: bool = False,
+        propulsion: Scalar = 0.0,
+    ) -> int:
         """Add a straight filament with segments of rest length.
 
         A clamped node alone is a hinge. Two neighbouring ones fix the direction there, too: the joint between a segment
@@ -170,7 +194,16 @@ class Filaments:
         positions = shapes.straight(filament_type, segments, start, direction, label)
         return self._add(filament_type, positions, clamped, label, planar=planar, propulsion=propulsion)
 
-    def add_nodes(self, filament_type, positions, clamped=(), *, closed=False, planar=False, propulsion=0.0):
+    def add_nodes(
+        self,
+        filament_type: FilamentType,
+        positions: Vectors,
+        clamped: int | Indices = (),
+        *,
+        closed: bool = False,
+        planar: bool = False,
+        propulsion: Scalar = 0.0,
+    ) -> int:
         """Add a filament with given node positions.
 
         Rest lengths are the type's segment length, whatever the distances between the nodes are.
@@ -197,8 +230,16 @@ class Filaments:
         return self._add(filament_type, positions, clamped, label, closed, planar, propulsion)
 
     def add_ring(
-        self, filament_type, segments, center, normal=(0.0, 0.0, 1.0), *, clamped=(), planar=False, propulsion=0.0
-    ):
+        self,
+        filament_type: FilamentType,
+        segments: int,
+        center: Vector,
+        normal: Vector = (0.0, 0.0, 1.0),
+        *,
+        clamped: int | Indices = (),
+        planar: bool = False,
+        propulsion: Scalar = 0.0,
+    ) -> int:
         """Add a ring: a regular polygon with segments of rest length.
 
         Parameters
@@ -223,16 +264,16 @@ class Filaments:
 
     def add_equilibrium(
         self,
-        filament_type,
-        segments,
-        seed,
-        start=(0.0, 0.0, 0.0),
-        direction=None,
-        clamped=(),
+        filament_type: FilamentType,
+        segments: int,
+        seed: int,
+        start: Vector = (0.0, 0.0, 0.0),
+        direction: Vector | None = None,
+        clamped: int | Indices = (),
         *,
-        planar=False,
-        propulsion=0.0,
-    ):
+        planar: bool = False,
+        propulsion: Scalar = 0.0,
+    ) -> int:
         """Add a filament drawn from the exact equilibrium of the free discrete chain.
 
         Segment lengths come from rho(l), joint angles from rho(c) (see ``filaments.equilibrium``), or, if the
@@ -265,7 +306,7 @@ class Filaments:
         )
         return self._add(filament_type, positions, clamped, label, planar=planar, propulsion=propulsion)
 
-    def add_tether(self, filament, node, point, stiffness):
+    def add_tether(self, filament: int, node: int, point: Vector, stiffness: Scalar) -> int:
         """Tether a node to a point by a harmonic spring, such as an optical trap: energy (k/2) |x - point|^2.
 
         Scheme "implicit" takes tethers at the end of the step, like the filament's own forces, so they may be as stiff
@@ -298,13 +339,15 @@ class Filaments:
         (node,) = named_nodes([node], len(self[filament].positions), f"{label}:")
         if (filament, node) in self._tethered_nodes:
             raise InputError(f"{label}: node {node} of filament {filament} has a tether already.")
-        point = tuple(float(x) for x in vector(point, LENGTH, f"{label}: point"))
+        x, y, z = (float(x) for x in vector(point, LENGTH, f"{label}: point"))
         stiffness = positive(stiffness, STIFFNESS, f"{label}: stiffness")
-        self._tethers.append(Tether(filament, node, point, stiffness))
+        self._tethers.append(Tether(filament, node, (x, y, z), stiffness))
         self._tethered_nodes.add((filament, node))
         return len(self._tethers) - 1
 
-    def add_attachment(self, filament, arc_length=None, segment=None, fraction=None):
+    def add_attachment(
+        self, filament: int, arc_length: Scalar | None = None, segment: int | None = None, fraction: float | None = None
+    ) -> int:
         """Add an attachment point: a virtual site on a segment, on which any OpenMM force can act.
 
         It is at ``(1 - fraction) x_minus + fraction x_plus`` of its segment's ends and follows them in the same
@@ -338,7 +381,7 @@ class Filaments:
         filament = self._filament_number(filament, label)
         return self._attach(locate(self[filament], filament, label, arc_length, segment, fraction))
 
-    def add_beads(self, filament, spacing):
+    def add_beads(self, filament: int, spacing: Scalar) -> list[int]:
         """Cover a filament evenly with beads, on which contact forces act (see ``openmm_cylchain.couplings.contacts``).
 
         Beads are attachment points, from the first node to the last at equal distances along the contour, in the
@@ -371,7 +414,9 @@ class Filaments:
         self._beads[filament] = [self._attach(bead) for bead in beads]
         return list(self._beads[filament])
 
-    def build(self, box_vectors=None, stretching_force_group=0, bending_force_group=0):
+    def build(
+        self, box_vectors: BoxVectors | None = None, stretching_force_group: int = 0, bending_force_group: int = 0
+    ) -> tuple[app.Topology, openmm.System, unit.Quantity]:
         """Put the filaments into a new Topology, System and positions.
 
         Parameters
@@ -398,7 +443,14 @@ class Filaments:
         )
         return topology, system, positions
 
-    def add_to(self, topology, system, positions, stretching_force_group=0, bending_force_group=0):
+    def add_to(
+        self,
+        topology: app.Topology,
+        system: openmm.System,
+        positions: Vectors,
+        stretching_force_group: int = 0,
+        bending_force_group: int = 0,
+    ) -> unit.Quantity:
         """Put the filaments into an existing Topology and System, behind what is there.
 
         One filament becomes one chain of the Topology, with a residue and an atom (named "NOD") for each
@@ -459,16 +511,16 @@ class Filaments:
 
     def recommended_time_step(
         self,
-        scheme=None,
-        contact_diameter=None,
-        contact_stiffness=None,
-        confidence=3.0,
+        scheme: str | None = None,
+        contact_diameter: Numbers | None = None,
+        contact_stiffness: Scalar | None = None,
+        confidence: float = 3.0,
         *,
-        system=None,
-        temperature=None,
-        particle_friction=None,
-        flow=None,
-    ):
+        system: openmm.System | None = None,
+        temperature: Scalar | None = None,
+        particle_friction: Numbers | None = None,
+        flow: Flow | None = None,
+    ) -> TimeStep:
         """The recommended step, and what binds: a TimeStep, which ``create_integrator`` takes.
 
         It is that of the filament that allows the least (see ``timestep``), and, if a System is given, of its forces:
@@ -530,16 +582,16 @@ class Filaments:
 
     def create_integrator(
         self,
-        system,
-        step_size,
-        scheme=None,
-        temperature=None,
-        particle_friction=None,
-        random_seed=0,
-        flow=None,
-        checks=True,
-        precision="automatic",
-    ):
+        system: openmm.System,
+        step_size: Scalar | TimeStep,
+        scheme: str | None = None,
+        temperature: Scalar | None = None,
+        particle_friction: Numbers | None = None,
+        random_seed: int = 0,
+        flow: Flow | None = None,
+        checks: bool = True,
+        precision: str = "automatic",
+    ) -> openmm.Integrator:
         """Create the integrator that moves the filaments and everything else in the System.
 
         Call it when all forces and particles are in the System: it also adds to the System the force
@@ -608,11 +660,11 @@ class Filaments:
         settings = IntegratorSettings(step_size, scheme, bath, particle_friction, random_seed, flow, checks, precision)
         return self._engine.create_integrator(system, self._placed(), settings)
 
-    def chain_set(self, system):
+    def chain_set(self, system: openmm.System) -> ChainSet:
         """The filaments as an engine sees them (a ``ChainSet``): friction of segments and fixed nodes."""
         return describe_chains(system, self._placed())
 
-    def joint_tensions(self, context):
+    def joint_tensions(self, context: openmm.Context) -> list[unit.Quantity]:
         """Instantaneous virtual forces Phi at the joints, without noise, in the context's configuration and flow.
 
         Phi of joint i, eqs. (22)-(24), is the force that segment i + 1 exerts on segment i; its component along the
@@ -640,7 +692,7 @@ class Filaments:
         parts = filament_tensions(self._filaments, self._nodes, chains, positions, forces, flow)
         return [part * FORCE for part in parts]
 
-    def mean_joint_tensions(self, context):
+    def mean_joint_tensions(self, context: openmm.Context) -> list[unit.Quantity]:
         """Virtual forces Phi at the joints as means over the last step, with friction and noise.
 
         Phi of joint i is the force that segment i + 1 exerts on segment i, as in ``joint_tensions``, but of the step
@@ -668,7 +720,7 @@ class Filaments:
         """
         return [forces * FORCE for _, forces, _ in self._engine.mean_tensions(context, len(self))]
 
-    def mean_tensions(self, context):
+    def mean_tensions(self, context: openmm.Context) -> list[unit.Quantity]:
         """Tensions T of the segments as means over the last step, with friction and noise.
 
         T is the elastic force of the segment's length, its friction against becoming longer and the noise of both, as
@@ -690,7 +742,7 @@ class Filaments:
         """
         return [tensions * FORCE for tensions, _, _ in self._engine.mean_tensions(context, len(self))]
 
-    def mean_axial_tensions(self, context):
+    def mean_axial_tensions(self, context: openmm.Context) -> list[unit.Quantity]:
         """Components of ``mean_joint_tensions`` along the filaments, positive under tension.
 
         The direction of a filament at a joint is that of the sum of the unit vectors along its two segments half-way
@@ -712,7 +764,7 @@ class Filaments:
         recorded = self._engine.mean_tensions(context, len(self))
         return [components_along(directions, forces) * FORCE for _, forces, directions in recorded]
 
-    def record_tensions(self, context):
+    def record_tensions(self, context: openmm.Context) -> None:
         """Let the integrator of a Context record mean tensions from its next step on; see ``mean_joint_tensions``.
 
         Raises
@@ -722,11 +774,11 @@ class Filaments:
         """
         self._engine.record_tensions(context)
 
-    def flow(self, context):
+    def flow(self, context: openmm.Context) -> Flow:
         """The Flow of the solvent in a Context, at rest where its integrator knows of none."""
         return self._engine.flow_of(context)
 
-    def tethers_in(self, context):
+    def tethers_in(self, context: openmm.Context) -> tuple[Tether, ...]:
         """Tuple of the tethers of a Context, in the order of their numbers, where they were moved to.
 
         A State or a checkpoint does not hold them, and ``context.reinitialize`` brings them back to where they were
@@ -735,7 +787,7 @@ class Filaments:
         moved = self._moved_tethers.get(context, {})
         return tuple(moved.get(number, tether) for number, tether in enumerate(self._tethers))
 
-    def move_tether(self, context, tether, point, stiffness=None):
+    def move_tether(self, context: openmm.Context, tether: int, point: Vector, stiffness: Scalar | None = None) -> None:
         """Move the point of a tether in a Context, and change its stiffness if one is given.
 
         Other Contexts of the System keep theirs.
@@ -756,7 +808,7 @@ class Filaments:
         """
         self._change_tethers(context, [self._moved(context, tether, point, stiffness)])
 
-    def move_tethers(self, context, tethers, points):
+    def move_tethers(self, context: openmm.Context, tethers: Indices, points: Vectors) -> None:
         """Move the points of several tethers in a Context, at hardly more cost than that of one.
 
         Parameters

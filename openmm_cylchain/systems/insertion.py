@@ -1,14 +1,18 @@
 """Insertion of filaments into a Topology and a System that may hold other things already."""
 
+from collections.abc import Iterable, Sequence
+
 import numpy as np
 import openmm
+from openmm import app
 
 from ..errors import InputError
-from ..filaments.filament import NODE_NAME
+from ..filaments.filament import NODE_NAME, Filament
 from ..units.quantities import LENGTH, in_units_of, whole_number
+from ..units.types import FloatArray, IntArray, Vectors
 
 
-def check_target(topology, system, positions):
+def check_target(topology: app.Topology, system: openmm.System, positions: Vectors) -> FloatArray:
     """Positions (particles, 3) in nm of what is there; raise InputError if they, Topology and System do not match."""
     positions = np.asarray(in_units_of(positions, LENGTH, "positions"))
     count = system.getNumParticles()
@@ -24,14 +28,14 @@ def check_target(topology, system, positions):
     return positions
 
 
-def check_force_groups(*groups):
+def check_force_groups(*groups: int) -> None:
     """Raise InputError unless all numbers are those of force groups."""
     for group in groups:
         if whole_number(group, 0, "force group") > 31:
             raise InputError(f"A force group must be between 0 and 31, but is {group}.")
 
 
-def add_nodes_to_system(system, filament):
+def add_nodes_to_system(system: openmm.System, filament: Filament) -> IntArray:
     """Add the nodes of a Filament to a System; return their particle indices."""
     # Each segment's mass goes to its two ends in equal parts.
     masses = np.full(len(filament.positions), filament.type.segment_mass)
@@ -41,7 +45,7 @@ def add_nodes_to_system(system, filament):
     return np.array([system.addParticle(mass) for mass in masses])
 
 
-def add_to_topology(topology, filament, name, attachment_names):
+def add_to_topology(topology: app.Topology, filament: Filament, name: str, attachment_names: Sequence[str]) -> None:
     """Add a Filament to a Topology: a chain with bonds, and a residue and an atom for each node or attachment point."""
     chain = topology.addChain(name)
     nodes = len(filament.positions)
@@ -55,7 +59,7 @@ def add_to_topology(topology, filament, name, attachment_names):
         topology.addBond(atoms[nodes - 1], atoms[0])
 
 
-def add_noninteracting_entries(system, existing, coinciding):
+def add_noninteracting_entries(system: openmm.System, existing: int, coinciding: Iterable[tuple[int, int]]) -> None:
     """Give forces that ask for parameters of every particle those of particles that do not interact.
 
     Parameters

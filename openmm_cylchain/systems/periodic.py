@@ -10,6 +10,7 @@ least of the diagonal elements of its vectors. So there is one image at most tha
 half that width, and that is the one to take.
 """
 
+import mdtraj
 import numpy as np
 from openmm import unit
 
@@ -17,10 +18,11 @@ from ..analysis.trajectories import filament_nodes
 from ..engines.description import filament_label
 from ..errors import InputError
 from ..units.quantities import LENGTH, in_units_of
+from ..units.types import BoxVectors, Vectors
 from .filaments import Filaments
 
 
-def make_whole(positions, filaments, box_vectors):
+def make_whole(positions: Vectors, filaments: Filaments, box_vectors: BoxVectors) -> unit.Quantity:
     """Positions in which filaments are whole: each node is at the image that is nearest to the node before it.
 
     First nodes and particles outside filaments stay where they are; attachment points go with their segments.
@@ -71,7 +73,7 @@ def make_whole(positions, filaments, box_vectors):
     return frames.reshape(given.shape) * unit.nanometer
 
 
-def make_trajectory_whole(trajectory):
+def make_trajectory_whole(trajectory: mdtraj.Trajectory) -> mdtraj.Trajectory:
     """A copy of an mdtraj trajectory in which filaments are whole in every frame; see ``make_whole``.
 
     Filaments are found by the names of their nodes, see ``analysis``. An attachment point goes to the segment of its
@@ -101,7 +103,7 @@ def make_trajectory_whole(trajectory):
     return _with_positions(trajectory, positions)
 
 
-def remove_jumps(trajectory):
+def remove_jumps(trajectory: mdtraj.Trajectory) -> mdtraj.Trajectory:
     """A copy of an mdtraj trajectory in which filaments are whole and go on from frame to frame without jumps.
 
     A filament's middle is taken to the image that is nearest to where it was in the frame before, so that it may leave

@@ -28,263 +28,50 @@ those of scheme "euler" on chains. For the latter, free filaments that begin in 
 averages, too.
 """
 
-import copy
-import math
 import time
 import warnings
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import openmm
 
-from ..couplings.pulling import is_constant_force
 from ..dynamics.recommended_step import implicit_time_step
 from ..dynamics.schemes import check_scheme
-from ..dynamics.step_watch import LARGEST_DIVIDED_SHARE
-from ..dynamics.time_step import as_step
+from ..dynamics.time_step import TimeStep, as_step
 from ..engine_choice import default_scheme
 from ..errors import InputError, InstabilityError
-from ..theory import bending_energy_mean, chain_mean_square_end_to_end, stretching_energy_mean
+from ..mechanics.flow import Flow
 from ..units.quantities import DIMENSIONLESS, positive, thermal_energy, whole_number
 from ..units.text import format_time
+from ..units.types import Numbers, Scalar, Vectors
+from .filaments import Filaments
+from .step_check_comparison import WEIGHTS, ExactAverages, compare
+from .step_check_observables import STEPS_PER_FRAME, Probe
+from .step_check_results import StepCheck
 
-LARGEST_ERROR = 0.05
-"""Relative error up to which a step is right."""
-
-DIVERGED = 100.0
-"""Relative error from which on a step is wrong, whatever the standard error."""
-
-SIGMAS = 4.0
-"""Standard errors in an error bar."""
-
-STEPS_PER_FRAME = 10
-"""Steps h between two looks at both runs."""
-
-_WEIGHTS = {2: (2.0, -2.0), 3: (2.0 / 3.0, 2.0, -8.0 / 3.0)}
-_BLOCKS = (32, 16)
-_FEWEST_COPIES = 8
-_WARM_UP = 0.25
-_MODES = 3
-_RELAXATIONS = 5.0
 _RELAXATIONS_OF_FEW = 20.0
-_LAST_GROUP = 30
-_WITHOUT_ENERGY = (openmm.CMMotionRemover, openmm.MonteCarloBarostat)
-
-
-@dataclass(frozen=True)
-class ObservableCheck:
-    """One average with the step h and with shorter ones.
-
-    Attributes
-    ----------
-    name, unit : str
-    values : tuple of float
-        With h, h/2 and, of three, h/4.
-    error : float
-        Of the average with h, relative to that with the shortest step, extrapolated.
-    standard_error : float
-        Of ``error``.
-    unpaired_standard_error : float
-        What it would be if the runs had nothing in common.
-    exact : float or None
-        The exact average in equilibrium, where it is known.
-    deviation, deviation_standard_error : float or None
-        Of the average with h from the exact one, relative. The standard error is infinite for fewer than eight
-        filaments in a check that is not long against their relaxation.
-    judged_by_exact : bool
-        Whether the deviation counts for the verdict: the filaments began in equilibrium.
-    seconds : float
-        Time that all of this took.
-    """
-
-    name: str
-    unit: str
-    values: tuple
-    error: float
-    standard_error: float
-    unpaired_standard_error: float
-    exact: float | None
-    deviation: float | None
-    deviation_standard_error: float | None
-    judged_by_exact: bool
-    seconds: float
-
-    @property
-    def verdict(self):
-        """ "right", "wrong" or "not resolved", see ``step_check``."""
-        if _surely_large(self.error, self.standard_error) or self.off_exact:
-            return "wrong"
-        right = abs(self.error) <= LARGEST_ERROR and SIGMAS * self.standard_error <= LARGEST_ERROR
-        return "right" if right else "not resolved"
-
-    @property
-    def off_exact(self):
-        """Whether the average with h differs from the exact one by more than 5 % for sure."""
-        return self.judged_by_exact and _surely_large(self.deviation, self.deviation_standard_error)
-
-    @property
-    def required_seconds(self):
-        """About how long a check takes that resolves this error; infinite if nothing is known."""
-        bar = SIGMAS * self.standard_error
-        room = LARGEST_ERROR
-        if abs(self.error) > LARGEST_ERROR:
-            room = min(room, max(abs(self.error) - LARGEST_ERROR, 0.2 * LARGEST_ERROR))
-        return self.seconds * max(1.0, (bar / room) ** 2)
-
-    def explanation(self):
-        """The verdict in words."""
-        if _diverged(self.error):
-            return "wrong: it grows without bound"
-        if _surely_large(self.error, self.standard_error):
-            return f"wrong by {_percent(self.error)} +- {_percent(self.standard_error)}"
-        if self.off_exact:
-            return f"wrong: {_percent(self.deviation, '+')} off the exact value"
-        if self.verdict == "right":
-            return f"right within {_percent(abs(self.error) + SIGMAS * self.standard_error)}"
-        bar = f"error bar {_percent(SIGMAS * self.standard_error)}"
-        if not math.isfinite(self.standard_error):
-            return "not resolved: too few steps, run longer"
-        return f"not resolved: {bar}, run about {_round(self.required_seconds)} s"
-
-
-@dataclass(frozen=True)
-class StepCheck:
-    """What ``check_time_step`` found. ``print`` shows it as a table.
-
-    Attributes
-    ----------
-    step : float
-        h in ps.
-    scheme : str
-    steps : tuple of float
-        h, h/2 and, of three, h/4.
-    paired : bool
-        Whether the runs followed one Brownian path.
-    observables : list of ObservableCheck
-    divided : tuple of float
-        Shares of steps of filaments that had to be divided, by run.
-    failure : str or None
-        Why a run ended, if one blew up.
-    frames : int
-        Of ten steps h each.
-    seconds : float
-        Time that it took.
-    relaxation : float
-        Of the slowest bends of the filaments, in ps; zero where nothing bends.
-    """
-
-    step: float
-    scheme: str
-    steps: tuple
-    paired: bool
-    observables: list
-    divided: tuple
-    failure: str | None
-    frames: int
-    seconds: float
-    relaxation: float
-
-    @property
-    def verdict(self):
-        """ "wrong" if anything is wrong, "right" if everything is right, or else "not resolved"."""
-        verdicts = [one.verdict for one in self.observables]
-        if self.failure is not None or self.divided[0] > LARGEST_DIVIDED_SHARE or "wrong" in verdicts:
-            return "wrong"
-        return "right" if verdicts and set(verdicts) == {"right"} else "not resolved"
-
-    def __getitem__(self, name):
-        """The ObservableCheck of a name."""
-        for one in self.observables:
-            if one.name == name:
-                return one
-        raise KeyError(f"{name}; there are {', '.join(one.name for one in self.observables)}")
-
-    def explanation(self):
-        """The verdict in a sentence."""
-        step = format_time(self.step, 4)
-        if self.failure is not None:
-            return f"The step of {step} is wrong: {self.failure}"
-        wrong = [one for one in self.observables if one.verdict == "wrong"]
-        if wrong:
-            worst = max(wrong, key=lambda one: abs(one.error))
-            others = f", and {len(wrong) - 1} more" if len(wrong) > 1 else ""
-            text = f"The step of {step} is wrong: {worst.name}{others}."
-            if LARGEST_ERROR < abs(worst.error) < DIVERGED:
-                better = format_time(self.step * LARGEST_ERROR / abs(worst.error), 2)
-                text += f" A step of {better} should do; check it, too."
-            return text
-        if self.divided[0] > LARGEST_DIVIDED_SHARE:
-            return f"The step of {step} is wrong: {_percent(self.divided[0])} of the steps of filaments were divided."
-        if self.verdict == "right":
-            return f"The step of {step} is right."
-        open_ = [one for one in self.observables if one.verdict != "right"]
-        longest = max((one.required_seconds for one in open_), default=math.inf)
-        advice = f"check for about {_round(longest)} s" if math.isfinite(longest) else "check for longer"
-        return (
-            f"Not resolved: {len(open_)} of {len(self.observables)} errors are not known to "
-            f"{_percent(LARGEST_ERROR)}; {advice}."
-        )
-
-    def __str__(self):
-        return format_check(self)
-
-    def as_dict(self):
-        """Everything in numbers, texts, lists and dicts, for JSON; None in place of numbers that are not finite."""
-        content = asdict(self)
-        for entry, one in zip(content["observables"], self.observables):
-            entry.update(verdict=one.verdict, explanation=one.explanation())
-        content.update(verdict=self.verdict, explanation=self.explanation())
-        return _finite(content)
-
-
-def _finite(content):
-    if isinstance(content, dict):
-        return {key: _finite(value) for key, value in content.items()}
-    if isinstance(content, (list, tuple)):
-        return [_finite(value) for value in content]
-    if isinstance(content, float) and not math.isfinite(content):
-        return None
-    return content
-
-
-def _surely_large(error, standard_error):
-    return abs(error) - SIGMAS * standard_error > LARGEST_ERROR or _diverged(error)
-
-
-def _diverged(error):
-    # Written so that NaN has.
-    return not abs(error) <= DIVERGED
-
-
-def _percent(share, sign=""):
-    digits = ".2g" if abs(share) < 0.995 else ".0f" if abs(share) < DIVERGED else ".1e"
-    return f"{100.0 * share:{sign}{digits}} %"
-
-
-def _round(seconds):
-    return f"{float(f'{seconds:.2g}'):.6g}"
 
 
 def check_time_step(
-    filaments,
-    system,
-    positions,
-    step_size,
+    filaments: Filaments,
+    system: openmm.System,
+    positions: Vectors,
+    step_size: Scalar | TimeStep,
     *,
-    scheme=None,
-    temperature=None,
-    particle_friction=None,
-    flow=None,
-    seconds=20.0,
-    frames=None,
-    levels=2,
-    random_seed=1,
-    equilibrium=False,
-    platform=None,
-    properties=None,
-    say=lambda message: None,
-    stop=lambda: False,
-):
+    scheme: str | None = None,
+    temperature: Scalar | None = None,
+    particle_friction: Numbers | None = None,
+    flow: Flow | None = None,
+    seconds: float = 20.0,
+    frames: int | None = None,
+    levels: int = 2,
+    random_seed: int = 1,
+    equilibrium: bool = False,
+    platform: openmm.Platform | None = None,
+    properties: Mapping[str, str] | None = None,
+    say: Callable[[str], object] = lambda message: None,
+    stop: Callable[[], bool] = lambda: False,
+) -> StepCheck:
     """Run a System with a step and with half of it, and say whether the step is right.
 
     Compared are, for each kind of filament, the mean energies of stretching (per segment) and bending (per joint), the
@@ -343,7 +130,7 @@ def check_time_step(
     kT = thermal_energy(bath)
     if kT == 0.0:
         raise InputError("At a temperature of zero there are no averages to compare: check a warmer System.")
-    if levels not in _WEIGHTS:
+    if levels not in WEIGHTS:
         raise InputError(f"levels must be 2 or 3, but is {levels!r}.")
     random_seed = whole_number(random_seed, 1, "random_seed")
     if frames is None:
@@ -351,7 +138,7 @@ def check_time_step(
     else:
         frames = whole_number(frames, 2, "frames")
     settings = {"scheme": scheme, "temperature": temperature, "particle_friction": particle_friction, "flow": flow}
-    probe = _Probe(filaments, system, kT)
+    probe = Probe(filaments, system, kT)
     paired = filaments.engine == "compiled"
     runs = [
         _Run(filaments, probe, positions, step, level, random_seed, paired, settings, platform, properties)
@@ -364,8 +151,8 @@ def check_time_step(
     observables = []
     if failure is None:
         lasting = len(records) * STEPS_PER_FRAME * step >= _RELAXATIONS_OF_FEW * relaxation
-        exact = _Exact(filaments, system, flow, bath, equilibrium, lasting)
-        observables = _compare(probe, records, exact, elapsed)
+        exact = ExactAverages(filaments, system, flow, bath, equilibrium, lasting)
+        observables = compare(probe, records, exact, elapsed)
     return StepCheck(
         step=step,
         scheme=scheme,
@@ -446,182 +233,6 @@ class _Run:
         return divided / max(1, self._chains * self._taken)
 
 
-def _is_chain_force(force):
-    return force.getName().startswith("CylinderChain")
-
-
-def _other_forces(system):
-    return [(index, force) for index, force in enumerate(system.getForces()) if not _is_chain_force(force)]
-
-
-def _interacting(filaments, system):
-    return bool(filaments.tethers) or any(
-        not isinstance(force, openmm.CMMotionRemover) for _, force in _other_forces(system)
-    )
-
-
-@dataclass(frozen=True)
-class _Kind:
-    # Filaments that are equal but for their positions.
-    label: str
-    filament: object
-    nodes: np.ndarray
-    joint_stiffnesses: np.ndarray
-
-
-def _kinds(filaments):
-    groups = {}
-    for number, one in enumerate(filaments):
-        key = (one.type, one.segments, one.closed, one.planar, one.clamped, one.propulsion)
-        groups.setdefault(key, []).append(number)
-    kinds = []
-    for numbers in groups.values():
-        first = filaments[numbers[0]]
-        label = first.type.name if len(groups) == 1 else f"{first.type.name} x {first.segments}"
-        if label in [kind.label for kind in kinds]:
-            label += f" (filament {numbers[0]})"
-        nodes = np.array([filaments.node_indices[number] for number in numbers])
-        kinds.append(_Kind(label, first, nodes, first.joint_stiffnesses))
-    return kinds
-
-
-class _Probe:
-    # What is looked at in a Context: names, units, and values of one frame.
-
-    def __init__(self, filaments, system, kT):
-        self._kT = kT
-        self._filaments = filaments
-        self.kinds = _kinds(filaments)
-        self._system = system
-        self._groups = {}
-        for count, (index, force) in enumerate(
-            (index, force)
-            for index, force in _other_forces(system)
-            if not isinstance(force, _WITHOUT_ENERGY) and not is_constant_force(force)
-        ):
-            name = f"{force.getName()} (force {index})"
-            group = min(count + 1, _LAST_GROUP)
-            label = name if count + 1 < _LAST_GROUP else "further forces"
-            self._groups.setdefault(group, (label, []))[1].append(index)
-        self.rows = list(self._describe())
-
-    def grouped_system(self):
-        system = copy.deepcopy(self._system)
-        for force in system.getForces():
-            force.setForceGroup(0)
-        for group, (_, indices) in self._groups.items():
-            for index in indices:
-                system.getForce(index).setForceGroup(group)
-        return system
-
-    def _describe(self):
-        # Name, unit, kind and what it is, in the order of the values.
-        for kind in self.kinds:
-            yield f"{kind.label} stretching energy", "k_B T", kind, "stretching"
-            yield f"{kind.label} bending energy", "k_B T", kind, "bending"
-            across = "across" if kind.filament.closed else "end to end"
-            yield f"{kind.label} {across}, mean square", "nm^2", kind, "distance"
-            for mode in range(1, self._modes(kind) + 1):
-                yield f"{kind.label} bending mode {mode}, change", "nm", kind, "mode"
-            yield f"{kind.label} middle, displacement", "nm^2", kind, "middle"
-        if self._filaments.tethers:
-            yield "tethers", "k_B T", None, "tethers"
-        for label, _ in self._groups.values():
-            yield label, "k_B T", None, "force"
-
-    @staticmethod
-    def _modes(kind):
-        return 0 if kind.filament.closed else min(_MODES, kind.filament.segments - 1)
-
-    def measure(self, context, before):
-        """Values, (filaments,) or (1,) each, of this frame, and what the next one needs of it."""
-        positions = context.getState(positions=True).getPositions(asNumpy=True)._value
-        values, after = [], []
-        with np.errstate(all="ignore"):
-            for index, kind in enumerate(self.kinds):
-                own, kept = self._measure_kind(kind, positions[kind.nodes], None if before is None else before[index])
-                values += own
-                after.append(kept)
-            if self._filaments.tethers:
-                values.append(self._tether_energy(positions))
-        for group in self._groups:
-            energy = context.getState(energy=True, groups=1 << group).getPotentialEnergy()._value
-            values.append(np.array([energy / self._kT]))
-        return values, after
-
-    def _measure_kind(self, kind, nodes, before):
-        filament, one = kind.filament, kind.filament.type
-        closed = filament.closed
-        vectors = np.diff(nodes, axis=1, append=nodes[:, :1]) if closed else np.diff(nodes, axis=1)
-        lengths = np.linalg.norm(vectors, axis=2)
-        tangents = vectors / lengths[..., None]
-        if closed:
-            cosines = np.einsum("fsk,fsk->fs", np.roll(tangents, 1, axis=1), tangents)
-        else:
-            cosines = np.einsum("fsk,fsk->fs", tangents[:, :-1], tangents[:, 1:])
-        bending = np.zeros(len(nodes))
-        if cosines.shape[1] and one.bending_rigidity > 0.0:
-            bending = one.bending_energy(cosines, kind.joint_stiffnesses).mean(axis=1) / self._kT
-        half = nodes.shape[1] // 2
-        ends = nodes[:, half if closed else -1] - nodes[:, 0]
-        middle = nodes[:, half]
-        modes = np.arange(1, self._modes(kind) + 1)
-        waves = np.cos(np.outer(modes, np.pi * (np.arange(filament.segments) + 0.5) / filament.segments))
-        scale = math.sqrt(2.0 * one.segment_length / filament.segments)
-        amplitudes = scale * np.einsum("ms,fsk->mfk", waves, tangents)
-        moved = [amplitudes, middle] if before is None else [amplitudes - before[0], middle - before[1]]
-        values = [one.stretching_energy(lengths).mean(axis=1) / self._kT, bending, np.sum(ends**2, axis=1)]
-        values += [*np.sum(moved[0] ** 2, axis=2), np.sum(moved[1] ** 2, axis=1)]
-        return values, (amplitudes, middle)
-
-    def _tether_energy(self, positions):
-        energy = 0.0
-        for tether in self._filaments.tethers:
-            node = self._filaments.node_indices[tether.filament][tether.node]
-            energy += 0.5 * tether.stiffness * np.sum((positions[node] - tether.point) ** 2)
-        return np.array([energy / self._kT])
-
-
-class _Exact:
-    # Exact averages of filaments that nothing acts on, and how far others are off.
-
-    def __init__(self, filaments, system, flow, temperature, equilibrium, lasting):
-        self._free = not _interacting(filaments, system) and flow is None
-        self._temperature, self._kT = temperature, thermal_energy(temperature)
-        self._equilibrium, self._lasting = equilibrium, lasting
-
-    def compare(self, kind, what, series):
-        """What an ObservableCheck says of the exact average, with the values (frames, copies) with h."""
-        exact = self._average(kind, what)
-        if exact is None:
-            return {name: None for name in ("exact", "deviation", "deviation_standard_error")} | {
-                "judged_by_exact": False
-            }
-        # Time tells little of a few filaments that keep their shape.
-        known = self._lasting or series.shape[1] >= _FEWEST_COPIES
-        return {
-            "exact": float(exact),
-            "deviation": float(series.mean() / exact - 1.0),
-            "deviation_standard_error": _standard_error(series) / exact if known else math.inf,
-            "judged_by_exact": self._equilibrium,
-        }
-
-    def _average(self, kind, what):
-        if kind is None or not self._free:
-            return None
-        one = kind.filament
-        if one.closed or one.clamped or one.propulsion:
-            return None
-        arguments = self._temperature, one.planar
-        if what == "stretching":
-            return stretching_energy_mean(one.type, *arguments) / self._kT
-        if what == "bending":
-            return bending_energy_mean(one.type, *arguments) / self._kT
-        if what == "distance":
-            return chain_mean_square_end_to_end(one.type, one.segments, *arguments)
-        return None
-
-
 def _slowest_relaxation(kinds, filaments, temperature):
     # In ps.
     longest = 0.0
@@ -629,131 +240,3 @@ def _slowest_relaxation(kinds, filaments, temperature):
         bounds = implicit_time_step(one.type, filaments.viscosity, temperature, one.segments, one.closed).bounds
         longest = max(longest, bounds.get("relaxation", 0.0))
     return longest
-
-
-@np.errstate(over="ignore", invalid="ignore")
-def _compare(probe, records, exact, seconds):
-    late = records[int(_WARM_UP * len(records)) :]
-    checks = []
-    for row, (name, unit, kind, what) in enumerate(probe.rows):
-        # (levels, frames, copies)
-        series = np.array([[level[row] for level in frame] for frame in late]).swapaxes(0, 1)
-        means = series.mean(axis=(1, 2))
-        if not np.any(means):
-            # Nothing of the kind: a single segment does not bend, a clamped middle does not move.
-            continue
-        weights = np.array(_WEIGHTS[len(means)])
-        scale, influence = abs(means[-1]), math.copysign(1.0, means[-1])
-        if kind is None and scale < 1.0:
-            # Energies of forces may have any sign: an error well below k_B T is none.
-            scale, influence = 1.0, 0.0
-        error = float(weights @ means / scale)
-        # How each frame contributes to the ratio.
-        linear = np.tensordot(weights, series, 1) - error * influence * series[-1]
-        unpaired = [weight * _standard_error(one) for weight, one in zip(weights, series)]
-        checks.append(
-            ObservableCheck(
-                name=name,
-                unit=unit,
-                values=tuple(float(mean) for mean in means),
-                error=error,
-                standard_error=_standard_error(linear) / scale,
-                unpaired_standard_error=float(np.linalg.norm(unpaired)) / scale,
-                seconds=seconds,
-                **exact.compare(kind, what, series[0]),
-            )
-        )
-    return checks
-
-
-def _standard_error(series):
-    # Of the mean of (frames, copies): the largest of what blocks of several lengths and copies give.
-    frames, copies = series.shape
-    if frames < _BLOCKS[-1]:
-        return math.inf
-    line = series.mean(axis=1)
-    errors = []
-    for count in _BLOCKS:
-        length = frames // count
-        if length:
-            means = line[frames - count * length :].reshape(count, length).mean(axis=1)
-            # Blocks leave out what is left over of the frames.
-            errors.append(means.std(ddof=1) / math.sqrt(frames / length))
-    if copies >= _FEWEST_COPIES:
-        errors.append(series.mean(axis=0).std(ddof=1) / math.sqrt(copies))
-    return float(max(errors))
-
-
-def format_check(check):
-    """A StepCheck as a table in ASCII, with its verdict below."""
-    times = [format_time(step, 3) for step in check.steps]
-    simulated = check.frames * STEPS_PER_FRAME * check.step
-    path = "the same Brownian path" if check.paired else "independent paths: the portable engine has no common one"
-    lines = [
-        f"{' against '.join(times)} on {path}; scheme {check.scheme}",
-        f"{format_time(simulated, 3)} simulated in {check.seconds:.3g} s; changes and displacements are those in "
-        f"{format_time(STEPS_PER_FRAME * check.step, 3)}; +- one standard error",
-        "",
-    ]
-    if check.observables:
-        lines += [*_table(check, times), ""]
-    lines += _notes(check, simulated)
-    lines.append(check.explanation())
-    return "\n".join(lines)
-
-
-def _table(check, times):
-    header = ["average", "", *times, "error of the step", "exact", "off exact", "verdict"]
-    rows = [header, *(_table_row(one) for one in check.observables)]
-    if all(one.exact is None for one in check.observables):
-        rows = [row[:-3] + row[-1:] for row in rows]
-    widths = [max(map(len, column)) for column in zip(*rows)]
-    left = (0, 1, len(widths) - 1)
-    for row in rows:
-        cells = [
-            text.ljust(width) if column in left else text.rjust(width)
-            for column, (text, width) in enumerate(zip(row, widths))
-        ]
-        yield "  ".join(cells).rstrip()
-
-
-def _notes(check, simulated):
-    if check.divided[0] > 0.0:
-        yield f"{_percent(check.divided[0])} of the steps of filaments were divided."
-    if check.failure is None and simulated < _RELAXATIONS * check.relaxation:
-        yield (
-            f"The slowest bends relax in {format_time(check.relaxation, 3)}: what a longer run would show of them is "
-            "not seen."
-        )
-    off = [
-        one.name
-        for one in check.observables
-        if one.exact is not None
-        and not one.judged_by_exact
-        and _surely_large(one.deviation, one.deviation_standard_error)
-    ]
-    if off:
-        yield (
-            f"Off their exact values are {', '.join(off)}: filaments did not begin in equilibrium, or any step of this "
-            "scheme is wrong."
-        )
-
-
-def _table_row(one):
-    exact = "" if one.exact is None else f"{one.exact:.4g}"
-    off = ""
-    if one.deviation is not None:
-        known = math.isfinite(one.deviation_standard_error)
-        error = f" +- {100.0 * one.deviation_standard_error:.1f}" if known else ""
-        off = f"{100.0 * one.deviation:+.1f}{error} %"
-    return [
-        one.name,
-        one.unit,
-        *(f"{value:.4g}" for value in one.values),
-        _percent(one.error, "+")
-        if _diverged(one.error)
-        else f"{100.0 * one.error:+.2f} +- {100.0 * one.standard_error:.2f} %",
-        exact,
-        off,
-        one.explanation(),
-    ]

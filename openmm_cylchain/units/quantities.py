@@ -1,11 +1,13 @@
 """Conversion of user input, with or without units, to plain numbers in OpenMM's units."""
 
 import math
+from typing import Any
 
 import numpy as np
 from openmm import unit
 
 from ..errors import InputError
+from .types import FloatArray, FloatOrArray, Numbers, Scalar, Vector
 
 AVOGADRO = 6.02214076e23
 BOLTZMANN = unit.MOLAR_GAS_CONSTANT_R.value_in_unit(unit.kilojoule_per_mole / unit.kelvin)
@@ -27,7 +29,7 @@ MASS_PER_LENGTH = unit.dalton / unit.nanometer
 DIMENSIONLESS = unit.dimensionless
 
 
-def in_units_of(value, target, name):
+def in_units_of(value: Numbers, target: unit.Unit, name: str) -> FloatOrArray:
     """Return ``value`` as a float or float array in the unit ``target``.
 
     A plain number or array is taken to be in ``target`` already. A quantity is converted; one per
@@ -65,7 +67,7 @@ def _converted(quantity, target, name):
     raise InputError(f"{name} has the unit {quantity.unit}, which cannot be converted to {target}.")
 
 
-def finite_number(value, target, name):
+def finite_number(value: Scalar, target: unit.Unit, name: str) -> float:
     """Return ``value`` as a float in ``target``; raise InputError unless it is one number."""
     converted = in_units_of(value, target, name)
     if not isinstance(converted, float):
@@ -73,7 +75,7 @@ def finite_number(value, target, name):
     return converted
 
 
-def positive(value, target, name):
+def positive(value: Scalar, target: unit.Unit, name: str) -> float:
     """Return ``value`` as a float in ``target``; raise InputError unless it is one number above zero."""
     converted = finite_number(value, target, name)
     if converted <= 0:
@@ -81,7 +83,7 @@ def positive(value, target, name):
     return converted
 
 
-def non_negative(value, target, name):
+def non_negative(value: Scalar, target: unit.Unit, name: str) -> float:
     """Return ``value`` as a float in ``target``; raise InputError if it is negative or not one number."""
     converted = finite_number(value, target, name)
     if converted < 0:
@@ -89,7 +91,7 @@ def non_negative(value, target, name):
     return converted
 
 
-def whole_number(value, minimum, name):
+def whole_number(value: Any, minimum: int, name: str) -> int:
     """Return ``value`` as an int; raise InputError unless it is a whole number of at least ``minimum``."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
         if not (isinstance(value, float) and math.isfinite(value) and value == int(value)):
@@ -99,7 +101,7 @@ def whole_number(value, minimum, name):
     return int(value)
 
 
-def vector(value, target, name):
+def vector(value: Vector, target: unit.Unit, name: str) -> FloatArray:
     """Return ``value`` as a (3,) array in the unit ``target``; raise InputError if it has another shape."""
     components = np.asarray(in_units_of(value, target, name))
     if components.shape != (3,):
@@ -107,7 +109,7 @@ def vector(value, target, name):
     return components
 
 
-def unit_vector(direction, label, name="direction"):
+def unit_vector(direction: Vector, label: str, name: str = "direction") -> FloatArray:
     """Return ``direction`` normalised; raise InputError if it is zero or not a vector."""
     direction = vector(direction, DIMENSIONLESS, f"{label}: {name}")
     norm = np.linalg.norm(direction)
@@ -116,6 +118,6 @@ def unit_vector(direction, label, name="direction"):
     return direction / norm
 
 
-def thermal_energy(temperature):
+def thermal_energy(temperature: Scalar) -> float:
     """Return k_B T in kJ/mol for a temperature (zero allowed)."""
     return BOLTZMANN * non_negative(temperature, TEMPERATURE, "temperature")

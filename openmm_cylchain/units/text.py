@@ -3,6 +3,8 @@
 import functools
 import re
 
+from openmm import unit
+
 from ..errors import InputError
 from .quantities import (
     AVOGADRO,
@@ -34,7 +36,7 @@ _NUMBER = r"[-+]?(?:(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?|nan|inf)"
 _NUMBER_AND_UNIT = re.compile(rf"\s*({_NUMBER})\s*(.*?)\s*", re.IGNORECASE)
 
 
-def example(target):
+def example(target: unit.Unit) -> str:
     """How people write a quantity in the unit ``target``, such as "360 nm"."""
     return _EXAMPLES[target][1]
 
@@ -46,7 +48,7 @@ def _registry():
     return pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
 
 
-def parse_quantity(text, target, name):
+def parse_quantity(text: str, target: unit.Unit, name: str) -> float:
     """Read a number with a unit, such as "48.7 pN/nm", as a plain number in the unit ``target``.
 
     Quantities per particle (pN/nm, Pa*s) are turned into quantities per mole where the unit is one.
@@ -112,7 +114,7 @@ def _convert(number, unit, target, name):
 _TIME_UNITS = (("s", 1e12), ("ms", 1e9), ("us", 1e6), ("ns", 1e3), ("ps", 1.0))
 
 
-def time_unit(time):
+def time_unit(time: float) -> tuple[str, float]:
     """The name and the length in ps of the largest of s, ms, us, ns and ps that a time in ps reaches."""
     for name, length in _TIME_UNITS:
         if time >= 0.9999999 * length:
@@ -120,7 +122,7 @@ def time_unit(time):
     return _TIME_UNITS[-1]
 
 
-def format_time(time, digits=6):
+def format_time(time: float, digits: int = 6) -> str:
     """Write a time in ps with a unit that suits it: 200e6 is "200 us"."""
     name, length = time_unit(time)
     return f"{time / length:.{digits}g} {name}"

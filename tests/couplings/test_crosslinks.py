@@ -14,8 +14,9 @@ import pytest
 from openmm import app, unit
 
 from openmm_cylchain import F_ACTIN, Filaments, InputError, InstabilityError
-from openmm_cylchain.couplings import crosslinks
-from openmm_cylchain.couplings.crosslinks import Crosslinks, CrosslinkTable
+from openmm_cylchain.couplings import crosslink_tables
+from openmm_cylchain.couplings.crosslink_tables import CrosslinkTable
+from openmm_cylchain.couplings.crosslinks import Crosslinks
 from openmm_cylchain.output.reporters import CrosslinkReporter
 from support.contexts import energy_of, forces_of, new_context, new_simulation, positions_of
 from support.crosslinked_filaments import crosslinked_filaments
@@ -220,7 +221,7 @@ def test_going_back_to_a_state_of_this_process():
     # Another Context may take the State, and is not touched by what happens in the first.
     other = new_context(system, positions)
     other.setState(state)
-    for _ in range(2 * crosslinks._RECENT_TABLES):
+    for _ in range(2 * crosslink_tables.RECENT_TABLES):
         links.add(context, 0, 5)
         assert links.pairs(other).tolist() == pairs
     assert energy_of(other) == pytest.approx(energy)
@@ -367,7 +368,7 @@ def test_many_changes_take_no_memory():
 
     tracemalloc.start()
     try:
-        change(crosslinks._RECENT_TABLES)
+        change(crosslink_tables.RECENT_TABLES)
         before = tracemalloc.take_snapshot()
         change(1000)
         growth = sum(one.size_diff for one in tracemalloc.take_snapshot().compare_to(before, "filename"))

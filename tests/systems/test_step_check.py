@@ -16,7 +16,7 @@ from openmm_cylchain.cli import main
 from openmm_cylchain.couplings import pulling
 from openmm_cylchain.runs.configuration import parse_configuration
 from openmm_cylchain.runs.run import check_step
-from openmm_cylchain.systems import step_check
+from openmm_cylchain.systems.step_check_results import ObservableCheck
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 
 REFERENCE = openmm.Platform.getPlatform("Reference")
@@ -253,9 +253,7 @@ def test_short_check_is_not_resolved():
 def test_rule():
     def observable(error, standard_error, **others):
         unknown = {"exact": None, "deviation": None, "deviation_standard_error": None, "judged_by_exact": False}
-        return step_check.ObservableCheck(
-            "x", "1", (1.0, 1.0), error, standard_error, 1.0, seconds=10.0, **(unknown | others)
-        )
+        return ObservableCheck("x", "1", (1.0, 1.0), error, standard_error, 1.0, seconds=10.0, **(unknown | others))
 
     assert observable(0.04, 0.01).explanation() == "right within 8 %"
     assert observable(-0.20, 0.03).explanation() == "wrong by -20 % +- 3 %"

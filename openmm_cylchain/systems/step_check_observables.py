@@ -1,0 +1,160 @@
+"""What a check of a step looks at: kinds of filaments, and the values of one frame of a Context."""
+
+import copy
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import openmm
+
+from ..couplings.pulling import is_constant_force
+from ..filaments.collection import FilamentCollection
+from ..filaments.filament import Filament
+from ..units.types import FloatArray, IntArray
+
+STEPS_PER_FRAME = 10
+"""Steps h between two looks at both runs."""
+
+_MODES = 3
+_LAST_GROUP = 30
+_WITHOUT_ENERGY = (openmm.CMMotionRemover, openmm.MonteCarloBarostat)
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Filaments that are equal but for their positions."""
+
+    label: str
+    filament: Filament
+    nodes: IntArray
+    joint_stiffnesses: FloatArray
+
+
+def _kinds(filaments):
+    groups: dict[Any, list[int]] = {}
+    for number, one in enumerate(filaments):
+        key = (one.type, one.segments, one.closed, one.planar, one.clamped, one.propulsion)
+        groups.setdefault(key, []).append(number)
+    kinds: list[Kind] = []
+    for numbers in groups.values():
+        first = filaments[numbers[0]]
+        label = first.type.name if len(groups) == 1 else f"{first.type.name} x {first.segments}"
+        if label in [kind.label for kind in kinds]:
+            label += f" (filament {numbers[0]})"
+        nodes = np.array([filaments.node_indices[number] for number in numbers])
+        kinds.append(Kind(label, first, nodes, first.joint_stiffnesses))
+    return kinds
+
+
+class Probe:
+    """What is looked at in a Context: names, units, and values of one frame."""
+
+    def __init__(self, filaments: FilamentCollection, system: openmm.System, kT: float) -> None:
+        self._kT = kT
+        self._filaments = filaments
+        self.kinds = _kinds(filaments)
+        self._system = system
+        self._groups: dict[int, tuple[str, list[int]]] = {}
+        for count, (index, force) in enumerate(
+            (index, force)
+            for index, force in _other_forces(system)
+            if not isinstance(force, _WITHOUT_ENERGY) and not is_constant_force(force)
+        ):
+            name = f"{force.getName()} (force {index})"
+            group = min(count + 1, _LAST_GROUP)
+            label = name if count + 1 < _LAST_GROUP else "further forces"
+            self._groups.setdefault(group, (label, []))[1].append(index)
+        self.rows = list(self._describe())
+
+    def grouped_system(self) -> openmm.System:
+        """A copy of the System in which each force that is looked at has a group of its own."""
+        system = copy.deepcopy(self._system)
+        for force in system.getForces():
+            force.setForceGroup(0)
+        for group, (_, indices) in self._groups.items():
+            for index in indices:
+                system.getForce(index).setForceGroup(group)
+        return system
+
+    def _describe(self):
+        # Name, unit, kind and what it is, in the order of the values.
+        for kind in self.kinds:
+            yield f"{kind.label} stretching energy", "k_B T", kind, "stretching"
+            yield f"{kind.label} bending energy", "k_B T", kind, "bending"
+            across = "across" if kind.filament.closed else "end to end"
+            yield f"{kind.label} {across}, mean square", "nm^2", kind, "distance"
+            for mode in range(1, self._modes(kind) + 1):
+                yield f"{kind.label} bending mode {mode}, change", "nm", kind, "mode"
+            yield f"{kind.label} middle, displacement", "nm^2", kind, "middle"
+        if self._filaments.tethers:
+            yield "tethers", "k_B T", None, "tethers"
+        for label, _ in self._groups.values():
+            yield label, "k_B T", None, "force"
+
+    @staticmethod
+    def _modes(kind):
+        return 0 if kind.filament.closed else min(_MODES, kind.filament.segments - 1)
+
+    def measure(self, context: openmm.Context, before: list[Any] | None) -> tuple[list[FloatArray], list[Any]]:
+        """Values, (filaments,) or (1,) each, of this frame, and what the next one needs of it."""
+        positions = context.getState(positions=True).getPositions(asNumpy=True)._value
+        values, after = [], []
+        with np.errstate(all="ignore"):
+            for index, kind in enumerate(self.kinds):
+                own, kept = self._measure_kind(kind, positions[kind.nodes], None if before is None else before[index])
+                values += own
+                after.append(kept)
+            if self._filaments.tethers:
+                values.append(self._tether_energy(positions))
+        for group in self._groups:
+            energy = context.getState(energy=True, groups=1 << group).getPotentialEnergy()._value
+            values.append(np.array([energy / self._kT]))
+        return values, after
+
+    def _measure_kind(self, kind, nodes, before):
+        filament, one = kind.filament, kind.filament.type
+        closed = filament.closed
+        vectors = np.diff(nodes, axis=1, append=nodes[:, :1]) if closed else np.diff(nodes, axis=1)
+        lengths = np.linalg.norm(vectors, axis=2)
+        tangents = vectors / lengths[..., None]
+        if closed:
+            cosines = np.einsum("fsk,fsk->fs", np.roll(tangents, 1, axis=1), tangents)
+        else:
+            cosines = np.einsum("fsk,fsk->fs", tangents[:, :-1], tangents[:, 1:])
+        bending = np.zeros(len(nodes))
+        if cosines.shape[1] and one.bending_rigidity > 0.0:
+            bending = one.bending_energy(cosines, kind.joint_stiffnesses).mean(axis=1) / self._kT
+        half = nodes.shape[1] // 2
+        ends = nodes[:, half if closed else -1] - nodes[:, 0]
+        middle = nodes[:, half]
+        modes = np.arange(1, self._modes(kind) + 1)
+        waves = np.cos(np.outer(modes, np.pi * (np.arange(filament.segments) + 0.5) / filament.segments))
+        scale = math.sqrt(2.0 * one.segment_length / filament.segments)
+        amplitudes = scale * np.einsum("ms,fsk->mfk", waves, tangents)
+        moved = [amplitudes, middle] if before is None else [amplitudes - before[0], middle - before[1]]
+        values = [one.stretching_energy(lengths).mean(axis=1) / self._kT, bending, np.sum(ends**2, axis=1)]
+        values += [*np.sum(moved[0] ** 2, axis=2), np.sum(moved[1] ** 2, axis=1)]
+        return values, (amplitudes, middle)
+
+    def _tether_energy(self, positions):
+        energy = 0.0
+        for tether in self._filaments.tethers:
+            node = self._filaments.node_indices[tether.filament][tether.node]
+            energy += 0.5 * tether.stiffness * np.sum((positions[node] - tether.point) ** 2)
+        return np.array([energy / self._kT])
+
+
+def interacting(filaments: FilamentCollection, system: openmm.System) -> bool:
+    """Whether anything but their own forces acts on filaments."""
+    return bool(filaments.tethers) or any(
+        not isinstance(force, openmm.CMMotionRemover) for _, force in _other_forces(system)
+    )
+
+
+def _other_forces(system):
+    return [(index, force) for index, force in enumerate(system.getForces()) if not _is_chain_force(force)]
+
+
+def _is_chain_force(force):
+    return force.getName().startswith("CylinderChain")

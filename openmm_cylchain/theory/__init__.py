@@ -1,0 +1,73 @@
+"""Closed forms to hold simulations against: chain statistics, forces, energies and free diffusion.
+
+Equation numbers refer to Pesek et al., Soft Matter 2016, 12, 3360. Arguments are ``openmm.unit``
+quantities or plain numbers in OpenMM's units; results are plain numbers or arrays in OpenMM's units (nm,
+ps, kJ/mol). Every function raises InputError for values that are not finite, have the wrong unit or lie
+outside the stated range. Functions of the discrete chain are exact for the model that is simulated, at
+any stiffness; the others belong to the continuous wormlike chain (WLC).
+"""
+
+from .discrete_chain import (
+    chain_bending_mode_variance,
+    chain_mean_square_end_to_end,
+    chain_mean_square_radius_of_gyration,
+    chain_persistence_length,
+    chain_planar_bending_mode_variance,
+    chain_tangent_correlation,
+    mean_joint_cosine,
+)
+from .energies import bending_energy_mean, bending_energy_variance, stretching_energy_mean, stretching_energy_variance
+from .force_extension import (
+    chain_extension,
+    crossover_force,
+    effective_spring_constant,
+    limiting_spring_constant,
+    linear_force,
+    marko_siggia_extension,
+    marko_siggia_force,
+    marko_siggia_spring_constant,
+)
+from .free_segment import (
+    free_segment_mean_square_displacement,
+    long_time_mean_square_displacement,
+    mean_orientation,
+    short_time_mean_square_displacement,
+)
+from .wormlike_chain import (
+    bending_mode_variance,
+    clamped_angle_variance,
+    clamped_deflection_variance,
+    wlc_mean_square_end_to_end,
+    wlc_tangent_correlation,
+)
+
+__all__ = [
+    "bending_energy_mean",
+    "bending_energy_variance",
+    "bending_mode_variance",
+    "chain_bending_mode_variance",
+    "chain_extension",
+    "chain_mean_square_end_to_end",
+    "chain_mean_square_radius_of_gyration",
+    "chain_persistence_length",
+    "chain_planar_bending_mode_variance",
+    "chain_tangent_correlation",
+    "clamped_angle_variance",
+    "clamped_deflection_variance",
+    "crossover_force",
+    "effective_spring_constant",
+    "free_segment_mean_square_displacement",
+    "limiting_spring_constant",
+    "linear_force",
+    "long_time_mean_square_displacement",
+    "marko_siggia_extension",
+    "marko_siggia_force",
+    "marko_siggia_spring_constant",
+    "mean_joint_cosine",
+    "mean_orientation",
+    "short_time_mean_square_displacement",
+    "stretching_energy_mean",
+    "stretching_energy_variance",
+    "wlc_mean_square_end_to_end",
+    "wlc_tangent_correlation",
+]

@@ -1,0 +1,30 @@
+"""Arguments of closed forms, which may be numbers or arrays, with units or without."""
+
+import numpy as np
+import numpy.typing as npt
+from openmm import unit
+
+from ..errors import InputError
+from ..units.quantities import DIMENSIONLESS, TEMPERATURE, in_units_of, positive, thermal_energy
+from ..units.types import FloatOrArray, Numbers, Scalar
+
+
+def each_not_negative(value: Numbers, dimension: unit.Unit, name: str) -> FloatOrArray:
+    """Numbers in a unit; raise InputError if one is negative."""
+    number = in_units_of(value, dimension, name)
+    if np.any(np.asarray(number) < 0):
+        raise InputError(f"{name} cannot be negative.")
+    return number
+
+
+def thermal_energy_above_zero(temperature: Scalar) -> float:
+    """k_B T in kJ/mol; raise InputError at a temperature of zero."""
+    return thermal_energy(positive(temperature, TEMPERATURE, "temperature"))
+
+
+def each_whole_number(value: npt.ArrayLike, minimum: int, name: str) -> FloatOrArray:
+    """Whole numbers; raise InputError if one is none or below the minimum."""
+    number = in_units_of(value, DIMENSIONLESS, name)
+    if np.any(number != np.floor(number)) or np.any(np.asarray(number) < minimum):
+        raise InputError(f"{name} must be whole numbers of at least {minimum}, but is {value!r}.")
+    return number

@@ -1,0 +1,204 @@
+"""Force and extension: of the wormlike chain, of the discrete chain, and spring constants of chains under tension."""
+
+import math
+
+import numpy as np
+
+from ..errors import InputError
+from ..filaments.equilibrium import JointAngleDistribution
+from ..filaments.filament_type import FilamentType
+from ..units.quantities import DIMENSIONLESS, FORCE, LENGTH, STIFFNESS, in_units_of, positive, whole_number
+from ..units.types import FloatOrArray, Numbers, Scalar
+from .arguments import each_not_negative, thermal_energy_above_zero
+
+
+def marko_siggia_force(relative_extension: Numbers, persistence_length: Scalar, temperature: Scalar) -> FloatOrArray:
+    """Force that holds a WLC at a relative extension, eq. (34), in kJ/(mol nm).
+
+    ``F = k_B T/lp (1/(4(1-z)^2) - 1/4 + z)``, z = <R.e>/L: the interpolation of Marko and Siggia, within some
+    10 % of the exact WLC between its limits.
+
+    Parameters
+    ----------
+    relative_extension : number or array in [0, 1)
+    persistence_length : length, above zero
+    temperature : temperature, above zero
+    """
+    extension = each_not_negative(relative_extension, DIMENSIONLESS, "relative_extension")
+    if np.any(np.asarray(extension) >= 1.0):
+        raise InputError("relative_extension must be below 1: eq. (34) is for an inextensible chain.")
+    scale = thermal_energy_above_zero(temperature) / positive(persistence_length, LENGTH, "persistence_length")
+    return scale * _reduced_force(extension)
+
+
+def _reduced_force(extension):
+    return extension + extension * (2.0 - extension) / (4.0 * (1.0 - extension) ** 2)
+
+
+def marko_siggia_extension(force: Numbers, persistence_length: Scalar, temperature: Scalar) -> FloatOrArray:
+    """Relative extension <R.e>/L of a WLC under a force, the inverse of eq. (34); accurate to rounding.
+
+    Parameters
+    ----------
+    force : force, number or array, not negative
+    persistence_length : length, above zero
+    temperature : temperature, above zero
+    """
+    scale = positive(persistence_length, LENGTH, "persistence_length") / thermal_energy_above_zero(temperature)
+    reduced = np.asarray(each_not_negative(force, FORCE, "force") * scale)
+    weak = np.minimum(reduced, 1.0)
+    root = np.sqrt(4.0 * weak + 1.0)
+    # Both starting points lie beyond the root of a convex function, from where Newton's method cannot overshoot.
+    extension = np.minimum(2.0 * weak / 3.0, 4.0 * weak / (4.0 * weak + 1.0 + root))
+    strong = np.maximum(reduced, 1.0)
+    slack = 1.0 / np.sqrt(4.0 * strong - 3.0)
+    for _ in range(12):
+        slope = 1.0 + 0.5 / (1.0 - extension) ** 3
+        extension = extension - (_reduced_force(extension) - weak) / slope
+        value = slack**2 * (4.0 * slack + 4.0 * strong - 3.0) - 1.0
+        slack = slack - value / (12.0 * slack**2 + 2.0 * slack * (4.0 * strong - 3.0))
+    return np.where(reduced <= 1.0, extension, 1.0 - slack)[()]
+
+
+def chain_extension(filament_type: FilamentType, segments: int, force: Numbers, temperature: Scalar) -> FloatOrArray:
+    """Mean extension <R.e> in nm of the discrete chain whose ends are pulled apart by a constant force F e; exact.
+
+    By transfer: with ``g(c) = int l^2 exp(-V_el/k_B T + F l c/k_B T) dl`` for a segment at the cosine c to e, and the
+    bending weight ``exp(-V_b/k_B T)`` of two neighbours averaged over their azimuth, Z is a product of N - 1 integrals
+    over c and ``<R.e> = k_B T d ln Z/dF``. A freely jointed chain has N times the mean of l (coth u - 1/u) with the
+    weight ``l^2 exp(-V_el/k_B T) sinh(u)/u``, u = F l/k_B T.
+
+    Parameters
+    ----------
+    filament_type : FilamentType
+    segments : int
+    force : force, number or array, not negative
+    temperature : temperature, above zero
+    """
+    segments = whole_number(segments, 1, "segments")
+    kT = thermal_energy_above_zero(temperature)
+    forces = np.asarray(each_not_negative(force, FORCE, "force")) / kT
+    bending = _bending_transfer(filament_type, temperature, float(np.max(forces, initial=0.0)))
+    return np.vectorize(lambda each: _extension(filament_type, segments, each, kT, *bending), otypes=[float])(forces)[
+        ()
+    ]
+
+
+def _bending_transfer(filament_type, temperature, force):
+    # Nodes and weights in c, and the azimuthal average of exp(-V_b/k_B T) between them by Legendre's addition theorem.
+    order = 48
+    cosines = JointAngleDistribution(filament_type, temperature)
+    if filament_type.joint_stiffness > 0.0:
+        # The n-th coefficient falls off as exp(-n^2/2s) for a joint of stiffness s k_B T.
+        bend = cosines.mean(lambda cosine: 1.0 - cosine)
+        order = max(order, int(9.0 / math.sqrt(bend)))
+    node, weight = _cosine_nodes(2 * order, force * filament_type.segment_length)
+    if filament_type.joint_stiffness == 0.0:
+        return node, weight, np.full((len(node), len(node)), 0.5)
+    coefficients = [
+        cosines.mean(lambda cosine, n=n: np.polynomial.legendre.legval(cosine, np.eye(1, n + 1, n)[0]))  # type: ignore[misc]
+        for n in range(order)
+    ]
+    polynomials = np.polynomial.legendre.legvander(node, order - 1)
+    scale = (np.arange(order) + 0.5) * np.array(coefficients)
+    return node, weight, (polynomials * scale) @ polynomials.T
+
+
+def _cosine_nodes(least, alignment):
+    # For exp(u c) with u up to ``alignment``: in s of c = 1 - 2 s^2 it is a Gaussian of the width (4 u)^-1/2, which the
+    # nodes, the denser the nearer to s = 0, divide into several parts.
+    points = max(least, int(30.0 * (1.0 + alignment) ** 0.25))
+    gauss, gauss_weight = np.polynomial.legendre.leggauss(points)
+    root = 0.5 * (gauss + 1.0)
+    return 1.0 - 2.0 * root**2, 2.0 * root * gauss_weight
+
+
+def _extension(filament_type, segments, force, kT, node, weight, bending):
+    width = math.sqrt(kT / filament_type.segment_stiffness)
+    rest = filament_type.segment_length
+    low, high = rest - 12.0 * width, rest + 12.0 * width + force * width**2 + 2.0 * width**2 / rest
+    if filament_type.maximum_extension is not None:
+        low, high = (rest + sign * filament_type.maximum_extension * (1.0 - 1e-12) for sign in (-1.0, 1.0))
+    gauss, gauss_weight = np.polynomial.legendre.leggauss(200)
+    low = max(low, 0.0)
+    length = low + 0.5 * (high - low) * (gauss + 1.0)
+    with np.errstate(divide="ignore"):
+        exponent = 2.0 * np.log(length) - filament_type.stretching_energy(length) / kT + np.outer(node, force * length)
+    density = gauss_weight * np.exp(exponent - exponent.max())
+    # Z and its derivative by F/k_B T together: one vector each, over the cosine of the segment reached.
+    pull, slope = density.sum(axis=1), node * (density @ length)
+    partition, derivative = pull, slope
+    for _ in range(segments - 1):
+        partition, derivative = bending @ (weight * partition), bending @ (weight * derivative)
+        partition, derivative = pull * partition, pull * derivative + slope * partition
+        scale = partition.max()
+        partition, derivative = partition / scale, derivative / scale
+    return (weight @ derivative) / (weight @ partition)
+
+
+def linear_force(extension: Numbers, contour_length: Scalar, segment_stiffness: Scalar, segments: int) -> FloatOrArray:
+    """Force of a straight chain of springs, eq. (35): ``F = (k/N)(<R.e> - L)``, in kJ/(mol nm).
+
+    Parameters
+    ----------
+    extension : length, number or array
+        <R.e>, the end-to-end vector along the force.
+    contour_length : length, above zero
+        Rest length L of the chain.
+    segment_stiffness : stiffness k of one segment, above zero
+    segments : int
+    """
+    excess = in_units_of(extension, LENGTH, "extension") - positive(contour_length, LENGTH, "contour_length")
+    return limiting_spring_constant(segment_stiffness, segments) * excess
+
+
+def effective_spring_constant(force: Numbers, extension: Numbers, contour_length: Scalar) -> FloatOrArray:
+    """Effective spring constant of a chain under tension, eq. (36): ``F/|<R.e> - L|``, in kJ/(mol nm^2).
+
+    Parameters
+    ----------
+    force : force, number or array
+    extension : length, number or array of the same shape
+    contour_length : length, above zero
+
+    Raises InputError where the extension equals the contour length: (36) diverges there.
+    """
+    force = each_not_negative(force, FORCE, "force")
+    excess = in_units_of(extension, LENGTH, "extension") - positive(contour_length, LENGTH, "contour_length")
+    if np.any(np.asarray(excess) == 0):
+        raise InputError("The effective spring constant (36) diverges where the extension equals contour_length.")
+    return force / np.abs(excess)
+
+
+def limiting_spring_constant(segment_stiffness: Scalar, segments: int) -> float:
+    """Spring constant of a chain at large force, eq. (37): ``k/N``, in kJ/(mol nm^2)."""
+    return positive(segment_stiffness, STIFFNESS, "segment_stiffness") / whole_number(segments, 1, "segments")
+
+
+def marko_siggia_spring_constant(
+    force: Numbers, contour_length: Scalar, persistence_length: Scalar, temperature: Scalar
+) -> FloatOrArray:
+    """Effective spring constant (36) where bending rules, eq. (38) with its prefactor, in kJ/(mol nm^2).
+
+    ``k_eff = 2 F^(3/2) (lp/k_B T)^(1/2) / L``, from the first term of (34); it holds for k_B T/lp << F << the
+    ``crossover_force``.
+
+    Parameters
+    ----------
+    force : force, number or array, not negative
+    contour_length, persistence_length : length, above zero
+    temperature : temperature, above zero
+    """
+    force = each_not_negative(force, FORCE, "force")
+    scale = positive(persistence_length, LENGTH, "persistence_length") / thermal_energy_above_zero(temperature)
+    return 2.0 * force**1.5 * math.sqrt(scale) / positive(contour_length, LENGTH, "contour_length")
+
+
+def crossover_force(
+    contour_length: Scalar, persistence_length: Scalar, segment_stiffness: Scalar, segments: int, temperature: Scalar
+) -> float:
+    """Force at which the asymptotes (37) and (38) cross: ``(k L/(2N))^(2/3) (k_B T/lp)^(1/3)``, kJ/(mol nm)."""
+    spring = limiting_spring_constant(segment_stiffness, segments)
+    length = positive(contour_length, LENGTH, "contour_length")
+    scale = thermal_energy_above_zero(temperature) / positive(persistence_length, LENGTH, "persistence_length")
+    return (0.5 * spring * length) ** (2.0 / 3.0) * scale ** (1.0 / 3.0)
