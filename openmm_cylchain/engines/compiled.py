@@ -11,12 +11,15 @@ import numpy as np
 import openmm
 
 from ..dynamics.other_particles import describe_other_particles
+from ..dynamics.precision import PRECISIONS as ALL_PRECISIONS
 from ..dynamics.precision import check_precision
 from ..dynamics.schemes import IMPLICIT_SCHEMES, check_scheme
+from ..dynamics.schemes import SCHEMES as ALL_SCHEMES
 from ..dynamics.step_watch import DividedSteps, ExplicitWork
 from ..dynamics.time_step import as_step
 from ..errors import InputError, InstabilityError
 from ..mechanics.flow import Flow, as_flow
+from ..mechanics.potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
 from ..units.quantities import TEMPERATURE, non_negative, whole_number
 from .description import (
     advice_after_blow_up,
@@ -58,23 +61,21 @@ plugin = _load_plugin()
 CylinderChainForce = plugin.CylinderChainForce
 CylinderChainIntegrator = plugin.CylinderChainIntegrator
 
-BENDING_MODELS = {
-    "kratky-porod": CylinderChainForce.KratkyPorod,
-    "quadratic": CylinderChainForce.Quadratic,
-    "inscribed-circle": CylinderChainForce.InscribedCircle,
-}
-STRETCHING_MODELS = {"harmonic": CylinderChainForce.Harmonic, "fene": CylinderChainForce.FENE}
-SCHEMES = {
-    "euler": CylinderChainIntegrator.Euler,
-    "midpoint": CylinderChainIntegrator.Midpoint,
-    "implicit": CylinderChainIntegrator.Implicit,
-    "implicit-second-order": CylinderChainIntegrator.ImplicitSecondOrder,
-}
-PRECISIONS = {
-    "automatic": CylinderChainIntegrator.Automatic,
-    "mixed": CylinderChainIntegrator.Mixed,
-    "double": CylinderChainIntegrator.Double,
-}
+
+def _numbers(of_plugin, of_package, what):
+    """The numbers by which the plugin knows what the package has names for; ImportError if the names differ."""
+    if set(of_plugin) != set(of_package):
+        raise ImportError(
+            f"the plugin has the {what} {', '.join(of_plugin)}, but the package {', '.join(of_package)}. "
+            "Install openmm_cylchain again."
+        )
+    return {name: number for number, name in enumerate(of_plugin)}
+
+
+BENDING_MODELS = _numbers(CylinderChainForce.getBendingModelNames(), BENDING_POTENTIALS, "bending models")
+STRETCHING_MODELS = _numbers(CylinderChainForce.getStretchingModelNames(), STRETCHING_POTENTIALS, "stretching models")
+SCHEMES = _numbers(CylinderChainIntegrator.getSchemeNames(), ALL_SCHEMES, "schemes")
+PRECISIONS = _numbers(CylinderChainIntegrator.getPrecisionNames(), ALL_PRECISIONS, "precisions")
 
 _OTHER_FRICTION = 1.0
 LARGEST_PATH_LEVEL = 20

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdlib>
 #include <numeric>
+#include <stdexcept>
 #include <tuple>
 
 using namespace cylchain;
@@ -203,6 +204,9 @@ struct ChainEngine::Implementation {
 };
 
 ChainEngine::ChainEngine(const vector<Chain>& chains) : implementation(new Implementation()) {
+    for (size_t i = 0; i < chains.size(); i++)
+        if (!isEntry(chains[i].bending) || !isEntry(chains[i].stretching))
+            throw invalid_argument("Chain "+to_string(i)+" has a model that there is not");
     // Chains of similar length come next to each other, the longest first, so that threads end together.
     vector<int> order(chains.size());
     iota(order.begin(), order.end(), 0);
@@ -236,7 +240,7 @@ ChainEngine::ChainEngine(const vector<Chain>& chains) : implementation(new Imple
                 break;
             together.insert(together.end(), members[last].begin(), members[last].end());
         }
-        if (!longest.closed && longest.stretching == StretchingModel::Harmonic)
+        if (!longest.closed && !hasRange(longest.stretching))
             implementation->wide.push_back(WidePack(chains, together, first, last));
     }
 }

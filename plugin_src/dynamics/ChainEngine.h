@@ -1,6 +1,8 @@
 #ifndef CYLCHAIN_CHAIN_ENGINE_H_
 #define CYLCHAIN_CHAIN_ENGINE_H_
 
+#include "dynamics/Precisions.h"
+#include "dynamics/Schemes.h"
 #include "mechanics/BackgroundFlow.h"
 #include "mechanics/Chain.h"
 #include <cstddef>
@@ -62,15 +64,6 @@ struct SegmentForces {
     void add(const SegmentForces& other, double weight);
 };
 
-/** The precision that chains are computed in. Positions, forces and displacements are doubles in any case. */
-enum class Precision {
-    /** Mixed precision where it is right, and faster. */
-    Automatic = 0,
-    /** Single precision within a step, wherever it is right: see IMPLICIT_SCHEME.md. */
-    Mixed = 1,
-    Double = 2
-};
-
 /** What a step needs besides positions and forces. */
 struct StepSettings {
     Scheme scheme;
@@ -103,7 +96,7 @@ struct StepSettings {
 class ChainEngine {
 public:
     /**
-     * @param chains   the chains; no particle may be a node of two of them
+     * @param chains   the chains; no particle may be a node of two of them. A chain without models is refused.
      */
     explicit ChainEngine(const std::vector<Chain>& chains);
     ~ChainEngine();

@@ -4,31 +4,6 @@
  * The forces of chains at given positions, and the steps of the explicit schemes.
  */
 
-/** The slope dV/dc of the bending energy of a joint with the cosine c and the sine s. */
-template <int W> inline typename Lanes<W>::Type bendingSlope(BendingModel model, typename Lanes<W>::Type stiffness,
-            typename Lanes<W>::Type c, typename Lanes<W>::Type sineSquared) {
-    typedef typename Lanes<W>::Type Real;
-    if (model == BendingModel::InscribedCircle)
-        return -4*stiffness/((1+c)*(1+c));
-    if (model == BendingModel::KratkyPorod)
-        return -stiffness;
-    Real slope;
-    for (int i = 0; i < W; i++) {
-        const double sine = std::sqrt(lane(sineSquared, i)), angle = std::atan2(sine, lane(c, i));
-        lane(slope, i) = -lane(stiffness, i)*(sine > 1e-8 ? angle/sine : 1.0);
-    }
-    return slope;
-}
-
-inline double bendingEnergy(BendingModel model, double stiffness, double c, double sineSquared) {
-    if (model == BendingModel::InscribedCircle)
-        return 2*stiffness*sineSquared/((1+c)*(1+c));
-    if (model == BendingModel::KratkyPorod)
-        return c > 0 ? stiffness*sineSquared/(1+c) : stiffness*(1-c);
-    const double angle = std::atan2(std::sqrt(sineSquared), c);
-    return 0.5*stiffness*angle*angle;
-}
-
 template <int W> ChainEnergy addForcesTo(const Pack& pack, const double* positions, double* forces,
             const double* box, bool includeEnergy) {
     typedef typename Lanes<W>::Type Real;
@@ -48,11 +23,8 @@ template <int W> ChainEnergy addForcesTo(const Pack& pack, const double* positio
         // Stretching.
         const Real stiffness = property<Real>(pack, s, Pack::Stiffness);
         const Real extension = length-property<Real>(pack, s, Pack::RestLength);
-        Real tension = stiffness*extension;
-        if (pack.stretching == StretchingModel::FENE) {
-            const Real relative = extension*property<Real>(pack, s, Pack::InverseExtension);
-            tension = tension/(1-relative*relative);
-        }
+        const Real tension = stretchingTension(pack.stretching, stiffness, extension,
+                property<Real>(pack, s, Pack::InverseExtension));
         // The last segment of an unrolled chain is there for its joint alone.
         const bool twice = (s >= pack.segments);
         Vector<Real> pull = twice ? Vector<Real> {} : t*tension;
@@ -63,7 +35,7 @@ template <int W> ChainEnergy addForcesTo(const Pack& pack, const double* positio
             const Real c = before.dot(t);
             const Vector<Real> normal = crossProduct(before, t);
             const Real sineSquared = normal.dot(normal);
-            const Real slope = bendingSlope<W>(pack.bending, joint, c, sineSquared);
+            const Real slope = bendingSlope(pack.bending, joint, c, sineSquared);
             const Vector<Real> first = (t-before*c)*(-slope*inverseBefore);
             const Vector<Real> second = (before-t*c)*(-slope*inverse);
             f[s-1] = f[s-1]-first;
@@ -85,9 +57,7 @@ template <int W> ChainEnergy addForcesTo(const Pack& pack, const double* positio
                 if (s >= pack.segmentsOfLane[i])
                     continue;
                 Real k = stiffness, e = extension, d = property<Real>(pack, s, Pack::InverseExtension);
-                const double square = lane(e, i)*lane(e, i), relative = lane(d, i)*lane(d, i)*square;
-                energy.stretching += pack.stretching == StretchingModel::Harmonic ? 0.5*lane(k, i)*square :
-                        -0.5*lane(k, i)/(lane(d, i)*lane(d, i))*std::log1p(-relative);
+                energy.stretching += stretchingEnergy(pack.stretching, lane(k, i), lane(e, i), lane(d, i));
             }
         before = t;
         inverseBefore = inverse;
@@ -168,10 +138,10 @@ template <int W> Instability stepPack(const Pack& pack, const double* positions,
         findVelocities<W>(pack, x, f, settings.flow, v);
     }
 
-    // Write displacements, and look for segments whose ends move apart, or that leave the range of FENE.
+    // Write displacements, and look for segments whose ends move apart, or that leave their range.
     const double h = settings.stepSize;
     scatter<W>(pack, v, h, displacements);
-    const bool ranges = pack.stretching == StretchingModel::FENE;
+    const bool ranges = hasRange(pack.stretching);
     if (ranges)
         gatherStart<W>(pack, positions, box, x);
     Instability result;

@@ -48,7 +48,7 @@ public:
         }
         return any;
     }
-    /** Mark lanes a segment of which changes by more than a quarter of a turn would do, or leaves the range of FENE. */
+    /** Mark lanes a segment of which changes by more than a quarter of a turn would do, or leaves its range. */
     void findExcessiveChanges(const Vec* y, bool* failed) const {
         for (int s = 0; s < pack.segments; s++) {
             const Vec difference = y[s+1]-y[s];
@@ -56,7 +56,7 @@ public:
             Real square = 0.5*difference.dot(difference), limit = property<Real>(pack, s, Pack::RestLength);
             for (int i = 0; i < W; i++)
                 failed[i] |= s < pack.segmentsOfLane[i] && !(lane(square, i) < lane(limit, i)*lane(limit, i));
-            if (pack.stretching == StretchingModel::FENE) {
+            if (hasRange(pack.stretching)) {
                 const Vec after = segments[s].difference+(y[s+1]-y[s]);
                 Real relative = (root(after.dot(after))-limit)*property<Real>(pack, s, Pack::InverseExtension);
                 for (int i = 0; i < W; i++)

@@ -148,8 +148,8 @@ public:
 
         // Tension.
         const Real drag = property<Real>(pack, s, Pack::Extensional)*segment.inverse*perStep;
-        if (pack.stretching == StretchingModel::FENE)
-            findFeneTension(s, length, drag);
+        if (hasRange(pack.stretching))
+            findLimitedTension(s, length, drag);
         else {
             const Real stiffness = property<Real>(pack, s, Pack::Stiffness);
             const Real extension = length-property<Real>(pack, s, Pack::RestLength);
@@ -265,10 +265,11 @@ private:
         }
     }
     /**
-     * The tension of a FENE segment and its response. Where the last iteration has given a tension, they are those at
-     * the length that belongs to it, which is never beyond the range, extended to the length that the segment has.
+     * The tension of a segment whose length has a range, and its response. Where the last iteration has given a
+     * tension, they are those at the length that belongs to it, which is never beyond the range, extended to the length
+     * that the segment has.
      */
-    void findFeneTension(int s, Real length, Real drag) {
+    void findLimitedTension(int s, Real length, Real drag) {
         ImplicitSegment<Real>& segment = segments[s];
         Real stiffness = property<Real>(pack, s, Pack::Stiffness), rest = property<Real>(pack, s, Pack::RestLength);
         Real inverse = property<Real>(pack, s, Pack::InverseExtension);

@@ -99,14 +99,18 @@ template <int W, bool CLOSED>
 void ImplicitNoise<W, CLOSED>::drawLength(const NoisePlaces<W>& places, int s, Real normal) {
     ImplicitSegment<Real>& segment = segments[s];
     const Real stiffness = property<Real>(pack, s, Pack::Stiffness);
-    if (pack.stretching == StretchingModel::FENE) {
-        // Segments that fill up a lane have neither stiffness nor a maximum extension.
-        const Real inverse = property<Real>(pack, s, Pack::InverseExtension);
-        drawFeneCoordinates<W>(noiseKey(settings), places, stiffness/(inverse*inverse*kT+TINY), normal);
-        segment.randomCoordinate = normal/(inverse+TINY);
+    switch (pack.stretching) {
+        case StretchingModel::Harmonic:
+            segment.randomCoordinate = normal*root(kT/(stiffness+TINY));
+            break;
+        case StretchingModel::FENE: {
+            // Segments that fill up a lane have neither stiffness nor a maximum extension.
+            const Real inverse = property<Real>(pack, s, Pack::InverseExtension);
+            drawFeneCoordinates<W>(noiseKey(settings), places, stiffness/(inverse*inverse*kT+TINY), normal);
+            segment.randomCoordinate = normal/(inverse+TINY);
+            break;
+        }
     }
-    else
-        segment.randomCoordinate = normal*root(kT/(stiffness+TINY));
 }
 
 template <int W, bool CLOSED>
@@ -118,10 +122,9 @@ void ImplicitNoise<W, CLOSED>::drawBend(const NoisePlaces<W>& places, int s) {
     drawCandidates<W>(key, NoiseKind::Bend, places, normals, acceptance);
     // Nearly all bends of stiff joints are accepted at once.
     Real accepted = Real{};
-    if (pack.bending == BendingModel::InscribedCircle) {
+    if (acceptsBendsInLanes(pack.bending)) {
         const Real deviation = 1/root(stiffness+TINY);
-        const Real density = 1+0.25*(normals[0]*normals[0]+normals[1]*normals[1])*deviation*deviation;
-        accepted = (acceptance*density*density <= 1) & (stiffness > STIFF_JOINT) ? splat<Real>(1) : Real{};
+        accepted = stiffness > STIFF_JOINT ? acceptedBends(pack.bending, normals, deviation, acceptance) : Real{};
         const Real used = step.twoStages ? deviation : (theta > 0.5 ? deviation : Real{});
         for (int k = 0; k < 2; k++)
             normals[k] = normals[k]*(accepted > 0 ? used : splat<Real>(1));
@@ -168,7 +171,7 @@ void ImplicitNoise<W, CLOSED>::drawPlanarBend(const NoisePlaces<W>& places, int 
     Real normals[2], acceptance;
     drawCandidates<W>(key, NoiseKind::Bend, places, normals, acceptance);
     // The energy is that of a Gaussian or more, in the angle.
-    const double floor = pack.bending == BendingModel::KratkyPorod ? 4/(M_PI*M_PI) : 1;
+    const double floor = leastBendSquare(pack.bending);
     for (int i = 0; i < W; i++) {
         const double k = lane(stiffness, i);
         if (k == 0 || (lane(theta, i) == 0.5 && !step.twoStages))

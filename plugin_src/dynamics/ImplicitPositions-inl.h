@@ -49,7 +49,7 @@ public:
         rebuild(y, [&] (int s, const Vec& difference) {
             const ImplicitSegment<Real>& segment = segments[s];
             const Real length = larger<Real>(segment.newTangent.dot(difference), 0.5*segment.length);
-            return pack.stretching == StretchingModel::FENE ? withinRange(s, length) : length;
+            return hasRange(pack.stretching) ? withinRange(s, length) : length;
         });
     }
 private:
@@ -80,7 +80,7 @@ private:
         for (int node = 0; node < n; node++)
             y[node] = y[node]+(rest[node]+back-y[node])*free;
     }
-    /** A length that a FENE segment can have. */
+    /** A length within the range of its segment. */
     CYLCHAIN_INLINE Real withinRange(int s, Real length) const {
         const Real rest = property<Real>(pack, s, Pack::RestLength);
         const Real range = Scalar(1-1e-9)/(property<Real>(pack, s, Pack::InverseExtension)+TINY);

@@ -21,7 +21,7 @@ public:
             segment.tangent = segment.difference*segment.inverse;
             const Real l0 = property<Real>(pack, s, Pack::RestLength);
             Real slope;
-            stretchCoordinate(pack.stretching, property<Real>(pack, s, Pack::InverseExtension), segment.length-l0,
+            stretchCoordinate<Real>(pack.stretching, property<Real>(pack, s, Pack::InverseExtension), segment.length-l0,
                     segment.coordinate, slope);
             const Real stretchRate = h*property<Real>(pack, s, Pack::Stiffness)*l0*l0+TINY;
             segment.theta = larger<Real>(splat<Real>(0.5), 1-property<Real>(pack, s, Pack::Extensional)/stretchRate);
@@ -61,7 +61,7 @@ public:
                 const Vec tangent = difference*(1/root(difference.dot(difference)));
                 const Vec bent = tangent-before;
                 if (s > 0)
-                    segment.constantBend = bent*(bendFactor<Real>(pack.bending, bent).f*(1-DIAGONAL));
+                    segment.constantBend = bent*(bendFactor(pack.bending, bent).f*(1-DIAGONAL));
                 before = tangent;
                 segment.jointImplicit = splat<Real>(DIAGONAL);
                 segment.turningBend = segment.randomBend*splat<Real>(2*DIAGONAL);
@@ -84,7 +84,7 @@ private:
         ImplicitSegment<Real>& segment = segments[s];
         const Vec sum = segments[s-1].tangent+segment.tangent, bent = segment.tangent-segments[s-1].tangent;
         segment.bisector = sum*(1/root(sum.dot(sum)+TINY));
-        segment.bend = bent*bendFactor<Real>(pack.bending, bent).f;
+        segment.bend = bent*bendFactor(pack.bending, bent).f;
         const Real friction = lesser<Real>(property<Real>(pack, s-1, Pack::Rotational),
                 property<Real>(pack, s, Pack::Rotational));
         const Real bendRate = 4*h*loaded<Real>(pack.joints, s)+TINY;

@@ -1,6 +1,8 @@
 #ifndef CYLCHAIN_CHAIN_H_
 #define CYLCHAIN_CHAIN_H_
 
+#include "mechanics/BendingModels.h"
+#include "mechanics/StretchingModels.h"
 #include <vector>
 
 /**
@@ -10,41 +12,6 @@
  * plugin uses nm, ps and kJ/mol.
  */
 namespace cylchain {
-
-/** Bending energy of a joint whose segments have tangents with the cosine c, for a stiffness a/l0. */
-enum class BendingModel {
-    /** (a/l0) (1-c), eq. (26). */
-    KratkyPorod = 0,
-    /** (a/2 l0) theta^2. */
-    Quadratic = 1,
-    /** (2a/l0) (1-c)/(1+c), eq. (27). */
-    InscribedCircle = 2
-};
-
-/** Stretching energy of a segment of length l. */
-enum class StretchingModel {
-    /** (k/2) (l-l0)^2, eq. (7). */
-    Harmonic = 0,
-    /** -(k/2) D^2 ln(1-((l-l0)/D)^2). */
-    FENE = 1
-};
-
-/** How positions are advanced in a step. */
-enum class Scheme {
-    /** Section 4 of the paper: the thermal torque of a free segment is sent through the constraints. */
-    Euler = 0,
-    /** Fixman's midpoint: the right drift on chains. */
-    Midpoint = 1,
-    /** The chain's own forces at the end of the step, so that they do not limit it. */
-    Implicit = 2,
-    /** The same in two stages, so that the motion of bends is right to second order in the step. */
-    ImplicitSecondOrder = 3
-};
-
-/** Whether a scheme computes the forces of chains itself. */
-inline bool isImplicit(Scheme scheme) {
-    return scheme == Scheme::Implicit || scheme == Scheme::ImplicitSecondOrder;
-}
 
 /** One segment: its potential and its friction (3), kept at the values of the rest length. */
 struct Segment {

@@ -13,6 +13,7 @@
 namespace std {
     %template(vectori) vector<int>;
     %template(mapid) map<int, double>;
+    %template(vectors) vector<string>;
 }
 
 %{
@@ -239,5 +240,10 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %ignore OpenMM::CylinderChainForce::SegmentInfo;
 %ignore OpenMM::CylinderChainForce::ChainInfo;
 %ignore OpenMM::CylinderChainForce::TetherInfo;
+%import "mechanics/Enumerators.h"
+%import "mechanics/BendingModels.h"
+%import "mechanics/StretchingModels.h"
+%import "dynamics/Schemes.h"
+%import "dynamics/Precisions.h"
 %include "openmm/CylinderChainForce.h"
 %include "openmm/CylinderChainIntegrator.h"

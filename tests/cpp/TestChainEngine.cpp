@@ -6,8 +6,8 @@
 #include "TestChains.h"
 
 static void testForces() {
-    for (int bending = 0; bending < 3; bending++)
-        for (int stretching = 0; stretching < 2; stretching++) {
+    for (int bending = 0; bending < countOf<BendingModel>(); bending++)
+        for (int stretching = 0; stretching < countOf<StretchingModel>(); stretching++) {
             Array x;
             vector<Chain> chains = makeChains(SEGMENTS, (BendingModel) bending, (StretchingModel) stretching, x);
             for (const Chain& ring : makeRings(RINGS, (BendingModel) bending, (StretchingModel) stretching, false, x))
@@ -27,7 +27,7 @@ static void testForces() {
 }
 
 static void testStraightAndFoldedChains() {
-    for (int bending = 0; bending < 3; bending++)
+    for (int bending = 0; bending < countOf<BendingModel>(); bending++)
         for (double angle : {0.0, 1e-9, 1e-5, 1e-2, 1.0, 3.0, 3.1}) {
             Array unused;
             vector<Chain> chains = makeChains({2}, (BendingModel) bending, StretchingModel::Harmonic, unused);
@@ -177,6 +177,31 @@ static void testChainsDoNotDependOnTheirPack() {
     }
 }
 
+/** The models, schemes and precisions follow from their lists, and there are no others. */
+static void testLists() {
+    check(isEntry(BendingModel::InscribedCircle) && !isEntry<BendingModel>(-1), "entries of bending models");
+    check(namesOf<Scheme>()[(int) Scheme::ImplicitSecondOrder] == "implicit-second-order", "names of schemes");
+    check(isImplicit(Scheme::Implicit) && !isImplicit(Scheme::Midpoint), "implicit schemes");
+    check(hasRange(StretchingModel::FENE) && !hasRange(StretchingModel::Harmonic), "stretching models with a range");
+    Array x;
+    vector<Chain> chains = makeChains({2, 3}, BendingModel::Quadratic, StretchingModel::Harmonic, x);
+    for (bool bending : {true, false}) {
+        vector<Chain> wrong = chains;
+        if (bending)
+            wrong[1].bending = (BendingModel) countOf<BendingModel>();
+        else
+            wrong[1].stretching = (StretchingModel) -1;
+        bool refused = false;
+        try {
+            ChainEngine engine(wrong);
+        }
+        catch (const invalid_argument&) {
+            refused = true;
+        }
+        check(refused, "a model that there is not");
+    }
+}
+
 static void testInstability() {
     Array x;
     const vector<Chain> chains = makeChains(SEGMENTS, BendingModel::InscribedCircle, StretchingModel::Harmonic, x);
@@ -234,6 +259,7 @@ int main() {
         testPeriodicImages,
         testCovarianceOfNoise,
         testChainsDoNotDependOnTheirPack,
+        testLists,
         testInstability,
         testLengthsThatLeaveTheirRange
     });

@@ -21,8 +21,9 @@ static cylchain::Chain describeTopology(const CylinderChainForce& force, int ind
     cylchain::Chain chain;
     int bending, stretching;
     force.getChainModels(index, bending, stretching);
-    chain.bending = (cylchain::BendingModel) bending;
-    chain.stretching = (cylchain::StretchingModel) stretching;
+    // The entries of both enumerations are those of one list.
+    chain.bending = static_cast<cylchain::BendingModel>(bending);
+    chain.stretching = static_cast<cylchain::StretchingModel>(stretching);
     chain.nodes = force.getChainParticles(index);
     chain.closed = force.isChainClosed(index);
     chain.segments.resize(force.getNumSegments(index));

@@ -28,6 +28,14 @@ static string twoTethers(int chain, int node) {
 CylinderChainForce::CylinderChainForce() : usePeriodic(false) {
 }
 
+vector<string> CylinderChainForce::getBendingModelNames() {
+    return cylchain::namesOf<cylchain::BendingModel>();
+}
+
+vector<string> CylinderChainForce::getStretchingModelNames() {
+    return cylchain::namesOf<cylchain::StretchingModel>();
+}
+
 int CylinderChainForce::addChain(const vector<int>& particles, BendingModel bendingModel,
         StretchingModel stretchingModel, double restLength, double stretchingStiffness, double maximumExtension,
         double jointStiffness, double parallelFriction, double perpendicularFriction, double rotationalFriction,
@@ -43,9 +51,9 @@ int CylinderChainForce::addChain(const vector<int>& particles, BendingModel bend
         if (!distinct.insert(particle).second)
             throw OpenMMException("CylinderChainForce: Particle "+to_string(particle)+" appears twice in a chain");
     }
-    if (bendingModel < KratkyPorod || bendingModel > InscribedCircle)
+    if (!cylchain::isEntry<cylchain::BendingModel>(bendingModel))
         throw OpenMMException("CylinderChainForce: Illegal bending model: "+to_string((int) bendingModel));
-    if (stretchingModel < Harmonic || stretchingModel > FENE)
+    if (!cylchain::isEntry<cylchain::StretchingModel>(stretchingModel))
         throw OpenMMException("CylinderChainForce: Illegal stretching model: "+to_string((int) stretchingModel));
     checkStiffness(jointStiffness);
     ChainInfo chain;
@@ -131,7 +139,7 @@ void CylinderChainForce::setSegmentParameters(int chain, int segment, double res
     ASSERT_VALID_INDEX(segment, segments);
     checkPositive(restLength, "The rest length");
     checkPositive(stretchingStiffness, "The stretching stiffness");
-    if (getChain(chain).stretchingModel == FENE)
+    if (cylchain::hasRange(static_cast<cylchain::StretchingModel>(getChain(chain).stretchingModel)))
         checkPositive(maximumExtension, "The maximum extension");
     checkPositive(parallelFriction, "The parallel friction");
     checkPositive(perpendicularFriction, "The perpendicular friction");

@@ -51,6 +51,14 @@ CylinderChainIntegrator::CylinderChainIntegrator(double temperature, double fric
     setRandomNumberSeed(0);
 }
 
+vector<string> CylinderChainIntegrator::getSchemeNames() {
+    return cylchain::namesOf<cylchain::Scheme>();
+}
+
+vector<string> CylinderChainIntegrator::getPrecisionNames() {
+    return cylchain::namesOf<cylchain::Precision>();
+}
+
 void CylinderChainIntegrator::initialize(ContextImpl& contextRef) {
     if (owner != NULL && &contextRef.getOwner() != owner)
         throw OpenMMException("This Integrator is already bound to a context");
@@ -125,13 +133,13 @@ void CylinderChainIntegrator::setParticleFriction(int particle, double coeff) {
 }
 
 void CylinderChainIntegrator::setScheme(Scheme scheme) {
-    if (scheme != Euler && scheme != Midpoint && scheme != Implicit && scheme != ImplicitSecondOrder)
+    if (!cylchain::isEntry<cylchain::Scheme>(scheme))
         throw OpenMMException("CylinderChainIntegrator: Illegal scheme: "+to_string((int) scheme));
     this->scheme = scheme;
 }
 
 void CylinderChainIntegrator::setPrecision(Precision precision) {
-    if (precision != Automatic && precision != Mixed && precision != Double)
+    if (!cylchain::isEntry<cylchain::Precision>(precision))
         throw OpenMMException("CylinderChainIntegrator: Illegal precision: "+to_string((int) precision));
     this->precision = precision;
 }
@@ -245,7 +253,7 @@ void CylinderChainIntegrator::step(int steps) {
         {
             // The implicit scheme computes the forces of the chains itself.
 
-            CylinderChainForceImpl::Exclusion exclusion(*chains, scheme == Implicit || scheme == ImplicitSecondOrder);
+            CylinderChainForceImpl::Exclusion exclusion(*chains, isImplicit(static_cast<cylchain::Scheme>(scheme)));
             context->calcForcesAndEnergy(true, false, getIntegrationForceGroups());
         }
         stepKernel.execute(*context, *this, noiseSeed, noiseLevel, stepsTaken, followsOn,

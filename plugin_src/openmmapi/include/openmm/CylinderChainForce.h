@@ -1,10 +1,13 @@
 #ifndef OPENMM_CYLINDERCHAINFORCE_H_
 #define OPENMM_CYLINDERCHAINFORCE_H_
 
+#include "mechanics/BendingModels.h"
+#include "mechanics/StretchingModels.h"
 #include "openmm/Context.h"
 #include "openmm/Force.h"
 #include "openmm/Vec3.h"
 #include <set>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -33,35 +36,32 @@ namespace OpenMM {
 class CylinderChainForce : public Force {
 public:
     /**
-     * The bending energy of a joint of stiffness b whose segments have the directions t1 and t2, with c = t1.t2.
+     * The bending energy of a joint of stiffness b whose segments have the directions t1 and t2, with c = t1.t2 and the
+     * angle theta between them:
+     *
+     * KratkyPorod: b (1-c), eq. (26).
+     *
+     * Quadratic: (b/2) theta^2.
+     *
+     * InscribedCircle: 2b (1-c)/(1+c), eq. (27), which diverges where a joint folds back.
      */
-    enum BendingModel {
-        /**
-         * b (1-c), eq. (26)
-         */
-        KratkyPorod = 0,
-        /**
-         * (b/2) theta^2, where theta is the angle between t1 and t2
-         */
-        Quadratic = 1,
-        /**
-         * 2b (1-c)/(1+c), eq. (27): it diverges where a joint folds back
-         */
-        InscribedCircle = 2
-    };
+    enum BendingModel : int {CYLCHAIN_BENDING_MODELS(CYLCHAIN_ENUMERATOR)};
     /**
-     * The stretching energy of a segment of length l, rest length l0 and stiffness k.
+     * The stretching energy of a segment of length l, rest length l0 and stiffness k:
+     *
+     * Harmonic: (k/2) (l-l0)^2, eq. (7).
+     *
+     * FENE: -(k/2) D^2 ln(1-((l-l0)/D)^2), so that the length stays within l0-D and l0+D.
      */
-    enum StretchingModel {
-        /**
-         * (k/2) (l-l0)^2, eq. (7)
-         */
-        Harmonic = 0,
-        /**
-         * -(k/2) D^2 ln(1-((l-l0)/D)^2): the length stays within l0-D and l0+D
-         */
-        FENE = 1
-    };
+    enum StretchingModel : int {CYLCHAIN_STRETCHING_MODELS(CYLCHAIN_ENUMERATOR)};
+    /**
+     * Get the names of all bending models, in the order of BendingModel.
+     */
+    static std::vector<std::string> getBendingModelNames();
+    /**
+     * Get the names of all stretching models, in the order of StretchingModel.
+     */
+    static std::vector<std::string> getStretchingModelNames();
     /**
      * Create a CylinderChainForce.
      */

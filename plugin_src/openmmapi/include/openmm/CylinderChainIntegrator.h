@@ -1,6 +1,8 @@
 #ifndef OPENMM_CYLINDERCHAININTEGRATOR_H_
 #define OPENMM_CYLINDERCHAININTEGRATOR_H_
 
+#include "dynamics/Precisions.h"
+#include "dynamics/Schemes.h"
 #include "openmm/Integrator.h"
 #include "openmm/Kernel.h"
 #include "openmm/Vec3.h"
@@ -49,52 +51,43 @@ class CylinderChainIntegrator : public Integrator {
 public:
     /**
      * The ways to advance chains by one step.  All are of weak order one in the step size.
+     *
+     * Euler: Section 4 of Pesek et al. 2016.  Its drift is that of free segments: equilibrium averages of chains are
+     * biased at every step size.
+     *
+     * Midpoint: Fixman's midpoint, which has the right drift.
+     *
+     * Implicit: the forces of the chains are taken at the end of the step, those of all other Forces at its start.
+     * Stretching, bending and tethers do not limit the step, and keep their equilibrium.  It is the default.  If the
+     * force group of the CylinderChainForce is not among the integration force groups, this is the same as Midpoint.
+     *
+     * ImplicitSecondOrder: the same in two stages.  The motion of bends, which is of first order in the step otherwise,
+     * is right to second order, for half as much again of work.
      */
-    enum Scheme {
-        /**
-         * Section 4 of Pesek et al. 2016.  Its drift is that of free segments: equilibrium averages of chains are
-         * biased at every step size.
-         */
-        Euler = 0,
-        /**
-         * Fixman's midpoint, which has the right drift.
-         */
-        Midpoint = 1,
-        /**
-         * The forces of the chains are taken at the end of the step, those of all other Forces at its start.
-         * Stretching, bending and tethers do not limit the step, and keep their equilibrium.  It is the default.  If
-         * the force group of the CylinderChainForce is not among the integration force groups, this is the same as
-         * Midpoint.
-         */
-        Implicit = 2,
-        /**
-         * The same in two stages: the motion of bends, which is of first order in the step otherwise, is right to
-         * second order, for half as much again of work.
-         */
-        ImplicitSecondOrder = 3
-    };
+    enum Scheme : int {CYLCHAIN_SCHEMES(CYLCHAIN_ENUMERATOR)};
     /**
      * The precision that steps of chains are computed in.  Positions, forces and energies are in double precision in
      * any case.
+     *
+     * Automatic: mixed, where it is right and faster: for open chains with harmonic lengths and a scheme that is
+     * implicit, at a temperature above zero, without a flow, with bends that relax within a step by less than 10^4 of
+     * their relaxation time, lengths of at most 10^9 kT that noise changes by 10^-5 in a step or more, if there are
+     * enough such chains to fill more than half of a vector register.  It is the default.
+     *
+     * Mixed: what happens within a step is computed in single precision wherever that is right, for as few chains as
+     * there are.  Chains for which it is not right are computed in double precision.
+     *
+     * Double: everything is computed in double precision.
      */
-    enum Precision {
-        /**
-         * Mixed, where it is right and faster: for open chains with harmonic lengths and a scheme that is implicit, at
-         * a temperature above zero, without a flow, with bends that relax within a step by less than 10^4 of their
-         * relaxation time, lengths of at most 10^9 kT that noise changes by 10^-5 in a step or more, if there are
-         * enough such chains to fill more than half of a vector register.  It is the default.
-         */
-        Automatic = 0,
-        /**
-         * What happens within a step is computed in single precision wherever that is right, for as few chains as there
-         * are.  Chains for which it is not right are computed in double precision.
-         */
-        Mixed = 1,
-        /**
-         * Everything is computed in double precision.
-         */
-        Double = 2
-    };
+    enum Precision : int {CYLCHAIN_PRECISIONS(CYLCHAIN_ENUMERATOR)};
+    /**
+     * Get the names of all schemes, in the order of Scheme.
+     */
+    static std::vector<std::string> getSchemeNames();
+    /**
+     * Get the names of all precisions, in the order of Precision.
+     */
+    static std::vector<std::string> getPrecisionNames();
     /**
      * Create a CylinderChainIntegrator.
      *

@@ -95,37 +95,17 @@ StepSettings ReferenceIntegrateCylinderChainStepKernel::settingsOf(ContextImpl& 
         const CylinderChainIntegrator& integrator, uint64_t seed, int level, uint64_t step) const {
     StepSettings settings;
     const bool includesChains = (integrator.getIntegrationForceGroups()&(1<<chainKernel->getForceGroup())) != 0;
-    switch (integrator.getScheme()) {
-        case CylinderChainIntegrator::Euler:
-            settings.scheme = Scheme::Euler;
-            break;
-        case CylinderChainIntegrator::Midpoint:
-            settings.scheme = Scheme::Midpoint;
-            break;
-        case CylinderChainIntegrator::Implicit:
-            settings.scheme = includesChains ? Scheme::Implicit : Scheme::Midpoint;
-            break;
-        case CylinderChainIntegrator::ImplicitSecondOrder:
-            settings.scheme = includesChains ? Scheme::ImplicitSecondOrder : Scheme::Midpoint;
-            break;
-    }
+    // The entries of both enumerations are those of one list.
+    settings.scheme = static_cast<Scheme>(integrator.getScheme());
+    if (isImplicit(settings.scheme) && !includesChains)
+        settings.scheme = Scheme::Midpoint;
     settings.kT = BOLTZ*integrator.getTemperature();
     settings.stepSize = integrator.getStepSize();
     settings.seed = seed;
     settings.level = level;
     settings.step = step;
     settings.flow = flowOf(context, integrator);
-    switch (integrator.getPrecision()) {
-        case CylinderChainIntegrator::Automatic:
-            settings.precision = Precision::Automatic;
-            break;
-        case CylinderChainIntegrator::Mixed:
-            settings.precision = Precision::Mixed;
-            break;
-        case CylinderChainIntegrator::Double:
-            settings.precision = Precision::Double;
-            break;
-    }
+    settings.precision = static_cast<Precision>(integrator.getPrecision());
     return settings;
 }
 
@@ -160,7 +140,7 @@ void ReferenceIntegrateCylinderChainStepKernel::refuseTornChains(ContextImpl& co
 /** Whether a FENE segment can have a length. NaN counts as such, because it has reasons of its own. */
 static bool isInRange(const Chain& chain, int segment, double length) {
     const Segment& own = chain.segments[segment];
-    return chain.stretching != StretchingModel::FENE || !(fabs(length-own.restLength) >= own.maximumExtension);
+    return !hasRange(chain.stretching) || !(fabs(length-own.restLength) >= own.maximumExtension);
 }
 
 static string describeRange(const Segment& segment) {
@@ -175,7 +155,7 @@ void ReferenceIntegrateCylinderChainStepKernel::refuseInfiniteEnergies(ContextIm
     const double* box = chainKernel->getBox(context);
     const vector<Chain>& chains = chainKernel->getChains();
     for (size_t chain = 0; chain < chains.size(); chain++) {
-        if (chains[chain].stretching != StretchingModel::FENE)
+        if (!hasRange(chains[chain].stretching))
             continue;
         const vector<int>& nodes = chains[chain].nodes;
         for (size_t s = 0; s < chains[chain].segments.size(); s++) {

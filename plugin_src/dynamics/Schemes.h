@@ -1,0 +1,40 @@
+#ifndef CYLCHAIN_SCHEMES_H_
+#define CYLCHAIN_SCHEMES_H_
+
+#include "mechanics/Enumerators.h"
+
+/**
+ * How positions are advanced in a step, and whether the scheme computes the forces of chains itself.
+ *
+ * - Euler: Section 4 of the paper. The thermal torque of a free segment is sent through the constraints.
+ * - Midpoint: Fixman's midpoint, which has the right drift on chains.
+ * - Implicit: the chain's own forces at the end of the step, so that they do not limit it.
+ * - ImplicitSecondOrder: the same in two stages, so that the motion of bends is right to second order in the step.
+ */
+#define CYLCHAIN_SCHEMES(ENTRY) \
+    ENTRY(Euler, "euler", false) \
+    ENTRY(Midpoint, "midpoint", false) \
+    ENTRY(Implicit, "implicit", true) \
+    ENTRY(ImplicitSecondOrder, "implicit-second-order", true)
+
+namespace cylchain {
+
+enum class Scheme {CYLCHAIN_SCHEMES(CYLCHAIN_ENUMERATOR)};
+
+template <> struct Names<Scheme> {
+    static constexpr const char* ALL[] = {CYLCHAIN_SCHEMES(CYLCHAIN_NAME)};
+};
+
+/** Whether a scheme computes the forces of chains itself. */
+constexpr bool isImplicit(Scheme scheme) {
+    switch (scheme) {
+#define CYLCHAIN_CASE(entry, name, implicit) case Scheme::entry: return implicit;
+        CYLCHAIN_SCHEMES(CYLCHAIN_CASE)
+#undef CYLCHAIN_CASE
+    }
+    return false;
+}
+
+} // namespace cylchain
+
+#endif /*CYLCHAIN_SCHEMES_H_*/
