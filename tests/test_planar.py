@@ -12,6 +12,7 @@ from scipy.integrate import quad
 from test_redistribution import _bent_chain, _dense_resistance
 
 from openmm_cylchain import F_ACTIN, Filaments, InputError, theory
+from openmm_cylchain.filaments.equilibrium import SegmentLengthDistribution
 
 SIGMAS = 4.0
 FRICTION = F_ACTIN.segment_friction(VISCOSITY, TEMPERATURE)
@@ -301,7 +302,7 @@ def test_free_segment_has_the_right_drift_with_the_printed_scheme(engine):
     lengths = _mean_over_samples(samples, lambda x: np.linalg.norm(np.diff(x, axis=1), axis=2))
     error = _assert_mean(lengths, _length_average(kind, lambda length: length))
     # With the torque of three dimensions, lengths would be those of rho(l) ~ l^2 exp(-V/k_B T).
-    in_space = theory.SegmentLengthDistribution(kind, TEMPERATURE).mean(lambda length: length)
+    in_space = SegmentLengthDistribution(kind, TEMPERATURE).mean(lambda length: length)
     assert in_space - _length_average(kind, lambda length: length) > 2 * SIGMAS * error
 
 
