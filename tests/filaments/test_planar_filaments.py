@@ -9,6 +9,7 @@ from openmm import unit
 from scipy.integrate import quad
 
 from openmm_cylchain import F_ACTIN, Filaments, InputError, theory
+from openmm_cylchain.filaments.equilibrium import SegmentLengthDistribution
 from support.contexts import new_context, positions_of
 from support.dense_mechanics import bent_chain, dense_resistance
 from support.equilibrium_cases import CASES, time_step
@@ -293,7 +294,7 @@ def test_free_segment_has_the_right_drift_with_the_printed_scheme(engine):
     lengths = _mean_over_samples(samples, lambda x: np.linalg.norm(np.diff(x, axis=1), axis=2))
     error = _assert_mean(lengths, _length_average(kind, lambda length: length))
     # With the torque of three dimensions, lengths would be those of rho(l) ~ l^2 exp(-V/k_B T).
-    in_space = theory.SegmentLengthDistribution(kind, TEMPERATURE).mean(lambda length: length)
+    in_space = SegmentLengthDistribution(kind, TEMPERATURE).mean(lambda length: length)
     assert in_space - _length_average(kind, lambda length: length) > 2 * SIGMAS * error
 
 
