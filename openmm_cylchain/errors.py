@@ -6,7 +6,24 @@ class InputError(ValueError):
 
 
 class InstabilityError(RuntimeError):
-    """A simulation that has blown up: the message names the filament, the segment and the step."""
+    """A simulation that has blown up: the message names the filament, the segment and the step.
+
+    Attributes
+    ----------
+    filament, segment : int or None
+        Which segment of which filament; None where a particle outside filaments is at fault, or it is not known.
+    particle : int or None
+        Which particle outside filaments.
+    step : int or None
+        In which step, counting from 1.
+    """
+
+    def __init__(self, message="", *, filament=None, segment=None, particle=None, step=None):
+        super().__init__(message)
+        self.filament = filament
+        self.segment = segment
+        self.particle = particle
+        self.step = step
 
 
 class TimeStepError(InstabilityError):

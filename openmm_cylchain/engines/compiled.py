@@ -4,7 +4,6 @@ platforms.
 Importing this module loads the plugin into OpenMM. An ImportError says why that cannot be done.
 """
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -145,8 +144,8 @@ class CompiledEngine(Engine):
         integrator = _recording_integrator(context)
         try:
             recorded = [CylinderChainIntegrator.getMeanTensions(integrator, chain) for chain in range(filaments)]
-        except openmm.OpenMMException as error:
-            if "No tensions were recorded" not in str(error):
+        except plugin.CylinderChainException as error:
+            if error.kind != "nothing-recorded":
                 raise
             raise InputError(
                 "No mean tensions were recorded in the last step: call integrator.setRecordsTensions(True) before it "
@@ -314,23 +313,21 @@ class NativeIntegrator(CylinderChainIntegrator):
     def _advance(self, steps):
         try:
             super().step(steps)
-        except openmm.OpenMMException as error:
-            if "is torn" in str(error):
-                raise InputError(
-                    f"{self._with_labels(str(error))} (openmm_cylchain.systems.periodic.make_whole)."
-                ) from None
-            if "is out of range" in str(error):
-                raise InputError(f"{self._with_labels(str(error))}.") from None
-            if "has blown up" in str(error):
-                raise InstabilityError(self._with_labels(str(error)) + self._advice) from None
-            raise
+        except plugin.CylinderChainException as error:
+            raise self._error_of(error) from None
 
-    def _with_labels(self, message):
-        message = message.replace("outside chains", "outside filaments")
-        chain = re.match(r"Chain (\d+)", message)
-        if chain is None or int(chain[1]) >= len(self._labels):
-            return message
-        return self._labels[int(chain[1])] + message[chain.end() :]
+    def _error_of(self, error):
+        message = str(error).replace("outside chains", "outside filaments")
+        if error.chain is not None and error.chain < len(self._labels):
+            message = self._labels[error.chain] + message.removeprefix(f"Chain {error.chain}")
+        if error.kind == "torn-chain":
+            return InputError(f"{message} (openmm_cylchain.make_whole).")
+        if error.kind == "length-out-of-range":
+            return InputError(f"{message}.")
+        if error.kind in ("unstable-chain", "unstable-particle"):
+            place = {"filament": error.chain, "segment": error.segment, "particle": error.particle, "step": error.step}
+            return InstabilityError(message + self._advice, **place)
+        return error
 
     def setRandomNumberSeed(self, seed):
         """Set the seed of the noise; 0 draws one for each Context that is created."""

@@ -68,6 +68,9 @@ _STEPPING = threading.Lock()
 # Of the integrator that is stepping, if it looks for steps that are too long.
 _RECORDER = None
 
+# Where the steps being taken have failed: OpenMM passes on the text of an exception alone.
+_INSTABILITY = None
+
 
 class PortableEngine(Engine):
     """The portable engine: stock OpenMM forces, a CustomIntegrator and a PythonForce, on every platform."""
@@ -403,19 +406,31 @@ class ChainDisplacements:
             )
         else:
             what = f"its ends would move by {change[segment]:.3g} nm against each other in one step"
-        raise InstabilityError(
+        _raise_instability(
             f"{self._labels[chain]} has blown up at segment {number} in step {steps_taken}: {what}. "
             "Positions are those before this step. Use a smaller time step, or look for overlapping particles "
-            f"or excessive forces.{self._advice}"
+            f"or excessive forces.{self._advice}",
+            filament=int(chain),
+            segment=int(number),
+            step=steps_taken,
         )
 
     def _check_others(self, result, steps_taken):
         broken = ~np.isfinite(result[self._others]).all(axis=1)
         if broken.any():
-            raise InstabilityError(
-                f"Particle {self._others[np.argmax(broken)]}, outside filaments, has blown up in step {steps_taken}: "
-                "the force on it is not finite. Use a smaller time step, or look for overlapping particles."
+            particle = int(self._others[np.argmax(broken)])
+            _raise_instability(
+                f"Particle {particle}, outside filaments, has blown up in step {steps_taken}: "
+                "the force on it is not finite. Use a smaller time step, or look for overlapping particles.",
+                particle=particle,
+                step=steps_taken,
             )
+
+
+def _raise_instability(message, **place):
+    global _INSTABILITY
+    _INSTABILITY = place
+    raise InstabilityError(message, **place)
 
 
 def _gaussian_vectors(seed, steps_taken, step_count, count):
@@ -648,18 +663,17 @@ class PortableIntegrator(openmm.CustomIntegrator):
         super().setStepSize(as_step(size))
 
     def _advance(self, steps, recorder):
-        global _RECORDER
-        try:
-            with _STEPPING:
-                _RECORDER = recorder
-                try:
-                    super().step(steps)
-                finally:
-                    _RECORDER = None
-        except openmm.OpenMMException as error:
-            if "has blown up" in str(error):
-                raise InstabilityError(str(error)) from None
-            raise
+        global _RECORDER, _INSTABILITY
+        with _STEPPING:
+            _RECORDER, _INSTABILITY = recorder, None
+            try:
+                super().step(steps)
+            except openmm.OpenMMException as error:
+                if _INSTABILITY is not None:
+                    raise InstabilityError(str(error), **_INSTABILITY) from None
+                raise
+            finally:
+                _RECORDER = None
 
     def getScheme(self):
         """The name of the integration scheme."""

@@ -17,6 +17,7 @@ namespace std {
 }
 
 %{
+#include "openmm/CylinderChainException.h"
 #include "openmm/CylinderChainForce.h"
 #include "openmm/CylinderChainIntegrator.h"
 #include "OpenMM.h"
@@ -34,15 +35,37 @@ using namespace OpenMM;
 %nodefaultctor;
 
 /*
- * Exceptions keep their text and become openmm.OpenMMException.
+ * Exceptions keep their text and become openmm.OpenMMException.  Those that say where chains are wrong become
+ * CylinderChainException, with that as attributes.
  */
 
 %{
-static void raiseOpenMMException(const std::exception& e) {
-    PyObject* module = PyImport_ImportModule("openmm");
-    PyObject* type = (module == NULL ? NULL : PyObject_GetAttrString(module, "OpenMMException"));
-    if (type != NULL)
-        PyErr_SetString(type, e.what());
+static PyObject* newNumber(long long number) {
+    if (number >= 0)
+        return PyLong_FromLongLong(number);
+    Py_INCREF(Py_None);
+    return Py_None;
+}
+
+static PyObject* newException(PyObject* type, const std::exception& e) {
+    const CylinderChainException* own = dynamic_cast<const CylinderChainException*>(&e);
+    if (own == NULL)
+        return PyObject_CallFunction(type, "s", e.what());
+    const CylinderChainException::Place& place = own->getPlace();
+    return PyObject_CallFunction(type, "ssNNNN", e.what(), own->getKindName(), newNumber(place.chain),
+            newNumber(place.segment), newNumber(place.particle), newNumber(place.step));
+}
+
+static void raiseException(const std::exception& e) {
+    const bool own = (dynamic_cast<const CylinderChainException*>(&e) != NULL);
+    PyObject* module = PyImport_ImportModule(own ? "openmm_cylchain.plugin" : "openmm");
+    PyObject* type = NULL;
+    if (module != NULL)
+        type = PyObject_GetAttrString(module, own ? "CylinderChainException" : "OpenMMException");
+    PyObject* exception = (type == NULL ? NULL : newException(type, e));
+    if (exception != NULL)
+        PyErr_SetObject(type, exception);
+    Py_XDECREF(exception);
     Py_XDECREF(type);
     Py_XDECREF(module);
 }
@@ -53,7 +76,7 @@ static void raiseOpenMMException(const std::exception& e) {
         $action
     }
     catch (std::exception& e) {
-        raiseOpenMMException(e);
+        raiseException(e);
         SWIG_fail;
     }
 }
@@ -65,7 +88,7 @@ static void raiseOpenMMException(const std::exception& e) {
     }
     catch (std::exception& e) {
         PyEval_RestoreThread(threadState);
-        raiseOpenMMException(e);
+        raiseException(e);
         SWIG_fail;
     }
     PyEval_RestoreThread(threadState);
@@ -136,6 +159,26 @@ static void raiseOpenMMException(const std::exception& e) {
 %pythoncode %{
 import openmm
 from openmm import unit
+
+
+class CylinderChainException(openmm.OpenMMException):
+    """Chains cannot be advanced: what is wrong, and where.
+
+    Attributes
+    ----------
+    kind : {"torn-chain", "length-out-of-range", "unstable-chain", "unstable-particle", "nothing-recorded"}
+    chain, segment, particle, step : int or None
+        None where it is not known. Steps count from 1.
+    """
+
+    def __init__(self, message="", kind=None, chain=None, segment=None, particle=None, step=None):
+        super().__init__(message)
+        self.kind = kind
+        self.chain = chain
+        self.segment = segment
+        self.particle = particle
+        self.step = step
+
 
 _LENGTH = unit.nanometer
 _ENERGY = unit.kilojoule_per_mole

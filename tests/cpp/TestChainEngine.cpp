@@ -4,6 +4,7 @@
  */
 
 #include "TestChains.h"
+#include "mechanics/BrokenSegment.h"
 
 static void testForces() {
     for (int bending = 0; bending < countOf<BendingModel>(); bending++)
@@ -220,6 +221,33 @@ static void testInstability() {
     throw runtime_error("instability not found");
 }
 
+static void testBrokenSegments() {
+    Array x;
+    const vector<Chain> chains = makeRings({5}, BendingModel::Quadratic, StretchingModel::Harmonic, false, x);
+    const Chain& ring = chains[0];
+    auto find = [&] (const Array& f, const Array& displacements, bool implicit) {
+        return findBrokenSegment(ring, x.data(), f.data(), displacements.data(), NULL, implicit);
+    };
+    Array f(x.size()), displacements(x.size());
+
+    // The last segment joins the last node and the first.
+    f[3*ring.nodes[0]] = f[3*ring.nodes[4]] = 10;
+    displacements[3*ring.nodes[0]+1] = 1000;
+    for (bool implicit : {false, true}) {
+        const BrokenSegment broken = find(f, displacements, implicit);
+        check(broken.segment == 4, "segment of the greatest force");
+        check(broken.reason == (implicit ? BrokenSegment::NotSolved : BrokenSegment::MovesTooFar), "reason");
+        checkClose(1000, broken.value, 1, 1e-9, "change");
+    }
+    const BrokenSegment unmoved = find(f, Array(x.size()), true);
+    check(unmoved.segment < 5 && unmoved.reason == BrokenSegment::NotSolved, "equations that were not solved");
+
+    // A force that is not finite spoils the displacements of all nodes.
+    f[3*ring.nodes[3]+2] = INFINITY;
+    const BrokenSegment broken = find(f, Array(x.size(), NAN), false);
+    check(broken.segment == 2 && broken.reason == BrokenSegment::NotFinite, "a force that is not finite");
+}
+
 static void testLengthsThatLeaveTheirRange() {
     Array x;
     vector<Chain> chains = makeChains(SEGMENTS, BendingModel::InscribedCircle, StretchingModel::FENE, x);
@@ -241,7 +269,13 @@ static void testLengthsThatLeaveTheirRange() {
             for (int pack = 0; pack < engine.getNumPacks(); pack++) {
                 const Instability one = engine.step(pack, x.data(), f.data(), NULL, {Scheme::Midpoint, 0, 1e-4, 1, 1},
                         displacements.data());
-                check(one.chain == -1 || (fene && one.chain == 5 && one.segment == 7), "wrong chain or segment");
+                check(one.chain == -1 || (fene && one.chain == 5), "wrong chain");
+                if (one.chain == 5) {
+                    const BrokenSegment broken = findBrokenSegment(chains[5], x.data(), f.data(), displacements.data(),
+                            NULL, false);
+                    check(broken.segment == 7 && broken.reason == BrokenSegment::LeavesRange, "wrong segment");
+                    checkClose(segment.restLength+extension, broken.value, 1, 1, "length after the step");
+                }
                 found |= one.chain == 5;
             }
         }
@@ -261,6 +295,7 @@ int main() {
         testChainsDoNotDependOnTheirPack,
         testLists,
         testInstability,
+        testBrokenSegments,
         testLengthsThatLeaveTheirRange
     });
 }

@@ -45,8 +45,8 @@ static void copyTethers(const CylinderChainForce& force, vector<cylchain::Chain>
     }
 }
 
-vector<cylchain::Chain> describeChains(const System& system, const CylinderChainForce& force) {
-    vector<cylchain::Chain> chains;
+CylinderChainDescription::CylinderChainDescription(const System& system, const CylinderChainForce& force) :
+        forceGroup(force.getForceGroup()), periodic(force.usesPeriodicBoundaryConditions()) {
     for (int i = 0; i < force.getNumChains(); i++) {
         cylchain::Chain chain = describeTopology(force, i);
         for (int node : chain.nodes)
@@ -55,10 +55,9 @@ vector<cylchain::Chain> describeChains(const System& system, const CylinderChain
         chains.push_back(chain);
     }
     copyTethers(force, chains);
-    return chains;
 }
 
-void updateChains(vector<cylchain::Chain>& chains, const CylinderChainForce& force) {
+void CylinderChainDescription::update(const CylinderChainForce& force) {
     if (force.getNumChains() != (int) chains.size())
         throw OpenMMException("updateParametersInContext: The number of chains has changed");
     for (int i = 0; i < force.getNumChains(); i++) {

@@ -24,7 +24,8 @@ void CylinderChainForceImpl::initialize(ContextImpl& context) {
             chainOfParticle[particle] = chain;
         }
     kernel = context.getPlatform().createKernel(CalcCylinderChainForceKernel::Name(), context);
-    kernel.getAs<CalcCylinderChainForceKernel>().initialize(system, owner);
+    description.reset(new CylinderChainDescription(system, owner));
+    kernel.getAs<CalcCylinderChainForceKernel>().initialize(system, *description);
 }
 
 double CylinderChainForceImpl::calcForcesAndEnergy(ContextImpl& context, bool includeForces, bool includeEnergy,
@@ -53,7 +54,8 @@ vector<pair<int, int> > CylinderChainForceImpl::getBondedParticles() const {
 }
 
 void CylinderChainForceImpl::updateParametersInContext(ContextImpl& context) {
-    kernel.getAs<CalcCylinderChainForceKernel>().copyParametersToContext(context, owner);
+    description->update(owner);
+    kernel.getAs<CalcCylinderChainForceKernel>().copyParametersToContext(context);
     context.systemChanged();
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include "openmm/internal/ContextImpl.h"
 #include "openmm/internal/CylinderChainForceImpl.h"
+#include "openmm/internal/CylinderChainStepper.h"
 #include "openmm/internal/OSRngSeed.h"
 #include "openmm/serialization/SerializationNode.h"
 #include <cmath>
@@ -67,9 +68,7 @@ void CylinderChainIntegrator::initialize(ContextImpl& contextRef) {
     checkSystem(system, *chains);
     context = &contextRef;
     owner = &contextRef.getOwner();
-    kernel = context->getPlatform().createKernel(IntegrateCylinderChainStepKernel::Name(), contextRef);
-    kernel.getAs<IntegrateCylinderChainStepKernel>().initialize(system, *this,
-            chains->getKernel().getAs<CalcCylinderChainForceKernel>());
+    stepper.reset(new CylinderChainStepper(contextRef, *this, *chains));
     chainsAreAlone = (contextRef.getForceImpls().size() == 1);
     noiseSeed = (uint32_t) (randomNumberSeed == 0 ? osrngseed() : randomNumberSeed);
     noiseLevel = pathLevel;
@@ -147,7 +146,7 @@ void CylinderChainIntegrator::setPrecision(Precision precision) {
 int CylinderChainIntegrator::getNumMixedPrecisionChains() const {
     if (context == NULL)
         throw OpenMMException("This Integrator is not bound to a context!");
-    return kernel.getAs<IntegrateCylinderChainStepKernel>().getNumMixedPrecisionChains();
+    return stepper->getNumMixedPrecisionChains();
 }
 
 void CylinderChainIntegrator::setPathLevel(int level) {
@@ -189,14 +188,14 @@ void CylinderChainIntegrator::setWorkWindow(int steps) {
 void CylinderChainIntegrator::takeExplicitWork(double& work, int& particle, int& steps, int& particles) {
     if (context == NULL)
         throw OpenMMException("This Integrator is not bound to a context!");
-    kernel.getAs<IntegrateCylinderChainStepKernel>().takeExplicitWork(work, particle, steps, particles);
+    stepper->takeExplicitWork(work, particle, steps, particles);
 }
 
 void CylinderChainIntegrator::getMeanTensions(int chain, vector<double>& tensions, vector<Vec3>& jointForces,
         vector<Vec3>& directions) const {
     if (context == NULL)
         throw OpenMMException("This Integrator is not bound to a context!");
-    kernel.getAs<IntegrateCylinderChainStepKernel>().getMeanTensions(chain, tensions, jointForces, directions);
+    stepper->getMeanTensions(chain, tensions, jointForces, directions);
 }
 
 void CylinderChainIntegrator::stateChanged(State::DataType changed) {
@@ -206,7 +205,7 @@ void CylinderChainIntegrator::stateChanged(State::DataType changed) {
 }
 
 void CylinderChainIntegrator::cleanup() {
-    kernel = Kernel();
+    stepper.reset();
 }
 
 vector<string> CylinderChainIntegrator::getKernelNames() {
@@ -224,10 +223,9 @@ bool CylinderChainIntegrator::kineticEnergyRequiresForce() const {
 void CylinderChainIntegrator::step(int steps) {
     if (context == NULL)
         throw OpenMMException("This Integrator is not bound to a context!");
-    IntegrateCylinderChainStepKernel& stepKernel = kernel.getAs<IntegrateCylinderChainStepKernel>();
     if (positionsHaveChanged) {
-        stepKernel.refuseTornChains(*context);
-        stepKernel.refuseInfiniteEnergies(*context);
+        stepper->refuseTornChains();
+        stepper->refuseInfiniteEnergies();
         positionsHaveChanged = false;
     }
     stepsTaken = findNextStep();
@@ -242,7 +240,7 @@ void CylinderChainIntegrator::step(int steps) {
 
         if (done > 0 && chainsAreAlone && includesChains) {
             const int count = min(steps-done, STEPS_TOGETHER);
-            const int taken = stepKernel.executeTogether(*context, *this, noiseSeed, noiseLevel, stepsTaken, count,
+            const int taken = stepper->stepTogether(noiseSeed, noiseLevel, stepsTaken, count,
                     recordsTensions && done+count == steps, dividedSteps);
             stepsTaken += taken;
             countAfterSteps = context->getStepCount();
@@ -256,8 +254,7 @@ void CylinderChainIntegrator::step(int steps) {
             CylinderChainForceImpl::Exclusion exclusion(*chains, isImplicit(static_cast<cylchain::Scheme>(scheme)));
             context->calcForcesAndEnergy(true, false, getIntegrationForceGroups());
         }
-        stepKernel.execute(*context, *this, noiseSeed, noiseLevel, stepsTaken, followsOn,
-                recordsTensions && done == steps-1, dividedSteps);
+        stepper->step(noiseSeed, noiseLevel, stepsTaken, followsOn, recordsTensions && done == steps-1, dividedSteps);
         followsOn = true;
         stepsTaken++;
         countAfterSteps = context->getStepCount();

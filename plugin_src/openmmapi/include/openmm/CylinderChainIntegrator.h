@@ -4,17 +4,18 @@
 #include "dynamics/Precisions.h"
 #include "dynamics/Schemes.h"
 #include "openmm/Integrator.h"
-#include "openmm/Kernel.h"
 #include "openmm/Vec3.h"
 #include <cstdint>
 #include <iosfwd>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
 namespace OpenMM {
 
 class CylinderChainForceImpl;
+class CylinderChainStepper;
 
 /**
  * This is an Integrator which simulates a System that contains filaments, described by a CylinderChainForce, using
@@ -359,7 +360,7 @@ private:
     int workWindow;
     bool chainsAreAlone, positionsHaveChanged, followsOn, recordsTensions;
     CylinderChainForceImpl* chains;
-    Kernel kernel;
+    std::shared_ptr<CylinderChainStepper> stepper;
 };
 
 } // namespace OpenMM

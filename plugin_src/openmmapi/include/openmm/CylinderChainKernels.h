@@ -1,13 +1,15 @@
 #ifndef OPENMM_CYLINDERCHAINKERNELS_H_
 #define OPENMM_CYLINDERCHAINKERNELS_H_
 
-#include "openmm/CylinderChainForce.h"
-#include "openmm/CylinderChainIntegrator.h"
+#include "dynamics/ChainEngine.h"
 #include "openmm/KernelImpl.h"
 #include "openmm/Platform.h"
 #include "openmm/System.h"
+#include "openmm/Vec3.h"
 #include "openmm/internal/ContextImpl.h"
-#include <cstdint>
+#include "openmm/internal/CylinderChainDescription.h"
+#include "openmm/internal/OtherParticles.h"
+#include "openmm/internal/ParallelLoop.h"
 #include <string>
 #include <vector>
 
@@ -28,9 +30,9 @@ public:
      * Initialize the kernel.
      *
      * @param system  the System this kernel will be applied to
-     * @param force   the CylinderChainForce this kernel will be used for
+     * @param chains  the chains, which exist for as long as the kernel
      */
-    virtual void initialize(const System& system, const CylinderChainForce& force) = 0;
+    virtual void initialize(const System& system, const CylinderChainDescription& chains) = 0;
     /**
      * Execute the kernel to calculate the forces and/or energy.
      *
@@ -49,16 +51,16 @@ public:
      */
     virtual void computeEnergies(ContextImpl& context, double& stretching, double& bending) = 0;
     /**
-     * Copy changed parameters over to a context.
+     * Take over the parameters of the chains, which have changed.
      *
      * @param context  the context to copy parameters to
-     * @param force    the CylinderChainForce to copy the parameters from
      */
-    virtual void copyParametersToContext(ContextImpl& context, const CylinderChainForce& force) = 0;
+    virtual void copyParametersToContext(ContextImpl& context) = 0;
 };
 
 /**
- * This kernel is invoked by CylinderChainIntegrator to take one time step.
+ * This kernel is invoked by CylinderChainIntegrator to move particles.  When to do so, and what to say if it goes
+ * wrong, is the matter of CylinderChainStepper.
  */
 class IntegrateCylinderChainStepKernel : public KernelImpl {
 public:
@@ -71,64 +73,73 @@ public:
      * Initialize the kernel.
      *
      * @param system       the System this kernel will be applied to
-     * @param integrator   the CylinderChainIntegrator this kernel will be used for
-     * @param forceKernel  the kernel that holds the chains of the context
+     * @param chains       the chains, which exist for as long as the kernel
+     * @param others       the particles outside chains, which exist for as long as the kernel
+     * @param forceKernel  the kernel of the same platform that computes the forces of the chains
      */
-    virtual void initialize(const System& system, const CylinderChainIntegrator& integrator,
+    virtual void initialize(const System& system, const CylinderChainDescription& chains, const OtherParticles& others,
             CalcCylinderChainForceKernel& forceKernel) = 0;
     /**
-     * Throw an exception if positions were wrapped into a periodic box so that a chain is torn: a segment is longer
-     * than half the box and than twice its rest length, while its ends have images that are nearer.
-     *
-     * @param context  the context whose positions to look at
+     * Get the loop over particles that this platform has for its host.
      */
-    virtual void refuseTornChains(ContextImpl& context) const = 0;
+    virtual ParallelLoop& getLoop() = 0;
     /**
-     * Throw an exception if a segment has a length at which its FENE potential is infinite.
+     * Get the forces on all particles, as they were last computed.
      *
-     * @param context  the context whose positions to look at
+     * @param context  the context in which to execute this kernel
      */
-    virtual void refuseInfiniteEnergies(ContextImpl& context) const = 0;
+    virtual const std::vector<Vec3>& getForces(ContextImpl& context) = 0;
     /**
-     * Execute the kernel.  If a chain or a particle blows up, an exception is thrown and nothing has moved.
+     * Get the displacements of all particles in the last step, whether they have been moved by them or not.
+     */
+    virtual const std::vector<Vec3>& getDisplacements() = 0;
+    /**
+     * Compute the displacements of chains in one step.  Positions do not change.
      *
-     * @param context     the context in which to execute this kernel
-     * @param integrator  the CylinderChainIntegrator this kernel is being used for
-     * @param seed        the seed of the noise
-     * @param level       the level of the noise, see CylinderChainIntegrator::setPathLevel()
-     * @param step        the number of the step.  The noise depends on this, the seed and the level alone.
-     * @param followsOn   whether nothing else than the step before has changed positions, forces and parameters
-     * @param records     whether to record tensions, see getMeanTensions()
-     * @param divided     increased by the number of chains whose step was taken in parts
+     * @param context   the context in which to execute this kernel
+     * @param settings  the settings of the step
+     * @return the first chain by which the step has gone wrong, or the number of chains whose step was divided
      */
-    virtual void execute(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed,
-            int level, std::uint64_t step, bool followsOn, bool records, long long& divided) = 0;
+    virtual cylchain::Instability displaceChains(ContextImpl& context, const cylchain::StepSettings& settings) = 0;
     /**
-     * Get the work of explicit forces in the last window of steps, see CylinderChainIntegrator::takeExplicitWork().
-     */
-    virtual void takeExplicitWork(double& work, int& particle, int& steps, int& particles) = 0;
-    /**
-     * Take several steps where there are no other forces than those of the chains, which are computed here.  Chains
-     * do not know of each other then, so each can be advanced by all steps at once.
+     * Compute the displacements of the particles outside chains in one step.  Positions do not change.
      *
-     * @param step        the number of the first step
-     * @param count       the number of steps
-     * @param records     whether to record tensions in the last of them, see getMeanTensions()
-     * @param divided     increased by the number of steps of a chain that were taken in parts
-     * @return the number of steps that were taken: fewer than count if the one after them would blow up, or 0 if this
-     *         cannot be done for the context
+     * @param context   the context in which to execute this kernel
+     * @param settings  the settings of the step
+     * @param friction  the friction of particles that have none of their own, divided by their mass
+     * @return the first particle whose displacement is not finite, or -1
      */
-    virtual int executeTogether(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed,
-            int level, std::uint64_t step, int count, bool records, long long& divided) = 0;
+    virtual int displaceOthers(ContextImpl& context, const cylchain::StepSettings& settings, double friction) = 0;
+    /**
+     * Move all particles by their displacements, and advance the time by one step.
+     *
+     * @param context   the context in which to execute this kernel
+     * @param settings  the settings of the step
+     */
+    virtual void move(ContextImpl& context, const cylchain::StepSettings& settings) = 0;
+    /**
+     * Compute where several steps take chains if there are no other forces than their own.  Positions do not change.
+     *
+     * @param context       the context in which to execute this kernel
+     * @param settings      the settings of the first step.  Only the last one records forces of segments.
+     * @param count         the number of steps
+     * @param[out] divided  the number of steps of a chain that were taken in parts
+     * @return the number of steps that could be taken: fewer than count if a chain blows up in the one after them
+     */
+    virtual int advanceChains(ContextImpl& context, const cylchain::StepSettings& settings, int count,
+            long long& divided) = 0;
+    /**
+     * Move chains to where advanceChains() has taken them, and advance the time.
+     *
+     * @param context   the context in which to execute this kernel
+     * @param settings  the settings of the first step
+     * @param count     the number of steps
+     */
+    virtual void moveAdvanced(ContextImpl& context, const cylchain::StepSettings& settings, int count) = 0;
     /**
      * Get the number of chains that the last step has computed in mixed precision.
      */
     virtual int getNumMixedPrecisionChains() const = 0;
-    /**
-     * Get the tensions of a chain in the last step, see CylinderChainIntegrator::getMeanTensions().
-     */
-    virtual void getMeanTensions(int chain, std::vector<double>& tensions, std::vector<Vec3>& jointForces,
-            std::vector<Vec3>& directions) const = 0;
 };
 
 } // namespace OpenMM

@@ -1,8 +1,8 @@
 #ifndef OPENMM_REFERENCECALCCYLINDERCHAINFORCEKERNEL_H_
 #define OPENMM_REFERENCECALCCYLINDERCHAINFORCEKERNEL_H_
 
+#include "ReferenceParallelLoop.h"
 #include "dynamics/ChainEngine.h"
-#include "ParallelLoop.h"
 #include "openmm/CylinderChainKernels.h"
 #include <memory>
 #include <vector>
@@ -11,27 +11,15 @@ namespace OpenMM {
 
 /**
  * This kernel is invoked by CylinderChainForce to calculate the forces acting on the system and the energy of the
- * system.  It also holds the chains for the integrator.
+ * system.  It also holds the engine for the integrator.
  */
 class ReferenceCalcCylinderChainForceKernel : public CalcCylinderChainForceKernel {
 public:
     ReferenceCalcCylinderChainForceKernel(std::string name, const Platform& platform, ContextImpl& context);
-    void initialize(const System& system, const CylinderChainForce& force);
+    void initialize(const System& system, const CylinderChainDescription& chains);
     double execute(ContextImpl& context, bool includeForces, bool includeEnergy);
     void computeEnergies(ContextImpl& context, double& stretching, double& bending);
-    void copyParametersToContext(ContextImpl& context, const CylinderChainForce& force);
-    /**
-     * Get the chains.
-     */
-    const std::vector<cylchain::Chain>& getChains() const {
-        return chains;
-    }
-    /**
-     * Get the force group of the chains.
-     */
-    int getForceGroup() const {
-        return forceGroup;
-    }
+    void copyParametersToContext(ContextImpl& context);
     /**
      * Get the engine that computes with the present parameters of the chains.
      */
@@ -45,11 +33,9 @@ public:
     const double* getBox(ContextImpl& context) const;
 private:
     cylchain::ChainEnergy addForces(ContextImpl& context, std::vector<Vec3>& forces, bool includeEnergy);
-    ParallelLoop loop;
-    std::vector<cylchain::Chain> chains;
+    ReferenceParallelLoop loop;
+    const CylinderChainDescription* chains;
     std::unique_ptr<cylchain::ChainEngine> engine;
-    bool periodic;
-    int forceGroup;
 };
 
 } // namespace OpenMM

@@ -1,61 +1,46 @@
 #ifndef OPENMM_REFERENCEINTEGRATECYLINDERCHAINSTEPKERNEL_H_
 #define OPENMM_REFERENCEINTEGRATECYLINDERCHAINSTEPKERNEL_H_
 
-#include "ExplicitWork.h"
-#include "ParallelLoop.h"
 #include "ReferenceCalcCylinderChainForceKernel.h"
+#include "ReferenceParallelLoop.h"
 #include "openmm/CylinderChainKernels.h"
 #include <vector>
 
 namespace OpenMM {
 
 /**
- * This kernel is invoked by CylinderChainIntegrator to take one time step.
+ * This kernel is invoked by CylinderChainIntegrator to move particles.
  */
 class ReferenceIntegrateCylinderChainStepKernel : public IntegrateCylinderChainStepKernel {
 public:
     ReferenceIntegrateCylinderChainStepKernel(std::string name, const Platform& platform, ContextImpl& context);
-    void initialize(const System& system, const CylinderChainIntegrator& integrator,
+    void initialize(const System& system, const CylinderChainDescription& chains, const OtherParticles& others,
             CalcCylinderChainForceKernel& forceKernel);
-    void execute(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed, int level,
-            std::uint64_t step, bool followsOn, bool records, long long& divided);
-    void takeExplicitWork(double& work, int& particle, int& steps, int& particles);
-    void refuseTornChains(ContextImpl& context) const;
-    void refuseInfiniteEnergies(ContextImpl& context) const;
-    int executeTogether(ContextImpl& context, const CylinderChainIntegrator& integrator, std::uint64_t seed, int level,
-            std::uint64_t step, int count, bool records, long long& divided);
+    ParallelLoop& getLoop() {
+        return loop;
+    }
+    const std::vector<Vec3>& getForces(ContextImpl& context);
+    const std::vector<Vec3>& getDisplacements() {
+        return displacements;
+    }
+    cylchain::Instability displaceChains(ContextImpl& context, const cylchain::StepSettings& settings);
+    int displaceOthers(ContextImpl& context, const cylchain::StepSettings& settings, double friction);
+    void move(ContextImpl& context, const cylchain::StepSettings& settings);
+    int advanceChains(ContextImpl& context, const cylchain::StepSettings& settings, int count, long long& divided);
+    void moveAdvanced(ContextImpl& context, const cylchain::StepSettings& settings, int count);
     int getNumMixedPrecisionChains() const {
         return mixedChains;
     }
-    void getMeanTensions(int chain, std::vector<double>& tensions, std::vector<Vec3>& jointForces,
-            std::vector<Vec3>& directions) const;
 private:
-    cylchain::BackgroundFlow flowOf(ContextImpl& context, const CylinderChainIntegrator& integrator) const;
-    cylchain::StepSettings settingsOf(ContextImpl& context, const CylinderChainIntegrator& integrator,
-            std::uint64_t seed, int level, std::uint64_t step) const;
-    void recordForces(cylchain::StepSettings& settings, bool records);
-    void displaceChains(ContextImpl& context, const cylchain::StepSettings& settings, long long& divided);
     int advancePack(ContextImpl& context, int pack, cylchain::StepSettings settings, int count, long long& divided);
-    void displaceOthers(ContextImpl& context, const cylchain::StepSettings& settings, double friction);
     void displaceBlock(int block, const std::vector<Vec3>& positions, const std::vector<Vec3>& forces,
             const cylchain::StepSettings& settings, double friction);
-    void reportInstability(ContextImpl& context, const cylchain::Instability& found,
-            const cylchain::StepSettings& settings) const;
-    void checkOthers(std::uint64_t step) const;
-    ParallelLoop loop;
-    ExplicitWork explicitWork;
+    void exchangePositions(ContextImpl& context, double time, int steps);
+    ReferenceParallelLoop loop;
     ReferenceCalcCylinderChainForceKernel* chainKernel;
-    bool periodic;
+    const OtherParticles* others;
     int mixedChains;
-    // Particles outside chains, and those of them that can move.
-
-    std::vector<int> outside, others;
-    std::vector<double> masses, particleFrictions;
     std::vector<Vec3> displacements, newPositions;
-    // The forces of all segments in the last step, if it was recorded.
-
-    std::vector<std::vector<cylchain::SegmentForces> > segmentForces;
-    bool recorded;
 };
 
 } // namespace OpenMM

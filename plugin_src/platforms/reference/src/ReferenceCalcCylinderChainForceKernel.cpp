@@ -1,5 +1,4 @@
 #include "ReferenceCalcCylinderChainForceKernel.h"
-#include "openmm/internal/CylinderChainDescription.h"
 #include "openmm/reference/ReferencePlatform.h"
 
 using namespace OpenMM;
@@ -11,19 +10,16 @@ static ReferencePlatform::PlatformData& extractData(ContextImpl& context) {
 }
 
 ReferenceCalcCylinderChainForceKernel::ReferenceCalcCylinderChainForceKernel(string name, const Platform& platform,
-        ContextImpl& context) : CalcCylinderChainForceKernel(name, platform), loop(context), periodic(false),
-        forceGroup(0) {
+        ContextImpl& context) : CalcCylinderChainForceKernel(name, platform), loop(context), chains(NULL) {
 }
 
-void ReferenceCalcCylinderChainForceKernel::initialize(const System& system, const CylinderChainForce& force) {
-    chains = describeChains(system, force);
-    engine.reset(new ChainEngine(chains));
-    forceGroup = force.getForceGroup();
-    periodic = force.usesPeriodicBoundaryConditions();
+void ReferenceCalcCylinderChainForceKernel::initialize(const System&, const CylinderChainDescription& chains) {
+    this->chains = &chains;
+    engine.reset(new ChainEngine(chains.getChains()));
 }
 
 const double* ReferenceCalcCylinderChainForceKernel::getBox(ContextImpl& context) const {
-    return periodic ? &extractData(context).periodicBoxVectors[0][0] : NULL;
+    return chains->usesPeriodicBoundaryConditions() ? &extractData(context).periodicBoxVectors[0][0] : NULL;
 }
 
 ChainEnergy ReferenceCalcCylinderChainForceKernel::addForces(ContextImpl& context, vector<Vec3>& forces,
@@ -61,7 +57,6 @@ void ReferenceCalcCylinderChainForceKernel::computeEnergies(ContextImpl& context
     bending = energy.bending;
 }
 
-void ReferenceCalcCylinderChainForceKernel::copyParametersToContext(ContextImpl&, const CylinderChainForce& force) {
-    updateChains(chains, force);
-    engine.reset(new ChainEngine(chains));
+void ReferenceCalcCylinderChainForceKernel::copyParametersToContext(ContextImpl&) {
+    engine.reset(new ChainEngine(chains->getChains()));
 }

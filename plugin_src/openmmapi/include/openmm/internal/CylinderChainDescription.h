@@ -9,15 +9,36 @@
 namespace OpenMM {
 
 /**
- * Describe the chains of a CylinderChainForce in a System.  Nodes that have no mass are fixed.
+ * The chains of a CylinderChainForce in a System, as the kernels of a Context know them.  Nodes that have no mass are
+ * fixed.
  */
-std::vector<cylchain::Chain> describeChains(const System& system, const CylinderChainForce& force);
-
-/**
- * Copy the parameters of segments, joints and tethers to a description that exists already, for
- * CylinderChainForce::updateParametersInContext().
- */
-void updateChains(std::vector<cylchain::Chain>& chains, const CylinderChainForce& force);
+class CylinderChainDescription {
+public:
+    CylinderChainDescription(const System& system, const CylinderChainForce& force);
+    /**
+     * Copy the parameters of segments, joints and tethers, for CylinderChainForce::updateParametersInContext().
+     */
+    void update(const CylinderChainForce& force);
+    const std::vector<cylchain::Chain>& getChains() const {
+        return chains;
+    }
+    /**
+     * Get the force group of the chains.
+     */
+    int getForceGroup() const {
+        return forceGroup;
+    }
+    /**
+     * Get whether segments are taken as their shortest images.
+     */
+    bool usesPeriodicBoundaryConditions() const {
+        return periodic;
+    }
+private:
+    std::vector<cylchain::Chain> chains;
+    int forceGroup;
+    bool periodic;
+};
 
 } // namespace OpenMM
 

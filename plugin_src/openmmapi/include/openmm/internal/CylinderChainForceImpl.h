@@ -3,8 +3,10 @@
 
 #include "openmm/CylinderChainForce.h"
 #include "openmm/Kernel.h"
+#include "openmm/internal/CylinderChainDescription.h"
 #include "openmm/internal/ForceImpl.h"
 #include <map>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -47,13 +49,20 @@ public:
     void updateParametersInContext(ContextImpl& context);
     void computeEnergies(ContextImpl& context, double& stretching, double& bending);
     /**
-     * Get the Kernel that holds the chains of the Context, which CylinderChainIntegrator moves.
+     * Get the chains of the Context.
+     */
+    const CylinderChainDescription& getDescription() const {
+        return *description;
+    }
+    /**
+     * Get the Kernel that computes their forces.
      */
     Kernel& getKernel() {
         return kernel;
     }
 private:
     const CylinderChainForce& owner;
+    std::unique_ptr<CylinderChainDescription> description;
     Kernel kernel;
     bool excluded;
 };

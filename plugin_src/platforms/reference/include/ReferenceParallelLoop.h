@@ -1,9 +1,9 @@
-#ifndef OPENMM_CYLINDERCHAIN_PARALLELLOOP_H_
-#define OPENMM_CYLINDERCHAIN_PARALLELLOOP_H_
+#ifndef OPENMM_REFERENCEPARALLELLOOP_H_
+#define OPENMM_REFERENCEPARALLELLOOP_H_
 
 #include "openmm/internal/ContextImpl.h"
+#include "openmm/internal/ParallelLoop.h"
 #include "openmm/internal/ThreadPool.h"
-#include <functional>
 
 namespace OpenMM {
 
@@ -11,12 +11,9 @@ namespace OpenMM {
  * This class spreads the iterations of a loop over the threads of a Context: as many as its property "Threads" says,
  * or one if its platform has no such property.
  */
-class ParallelLoop {
+class ReferenceParallelLoop : public ParallelLoop {
 public:
-    explicit ParallelLoop(ContextImpl& context);
-    /**
-     * Call a function with each number from 0 to count-1, in any order.  It must not throw exceptions.
-     */
+    explicit ReferenceParallelLoop(ContextImpl& context);
     void run(int count, const std::function<void(int)>& iteration);
 private:
     ThreadPool* threads;
@@ -24,4 +21,4 @@ private:
 
 } // namespace OpenMM
 
-#endif /*OPENMM_CYLINDERCHAIN_PARALLELLOOP_H_*/
+#endif /*OPENMM_REFERENCEPARALLELLOOP_H_*/

@@ -1,4 +1,4 @@
-#include "ParallelLoop.h"
+#include "ReferenceParallelLoop.h"
 #include "openmm/Platform.h"
 #include "openmm/reference/ReferencePlatform.h"
 #include <algorithm>
@@ -7,13 +7,13 @@
 using namespace OpenMM;
 using namespace std;
 
-ParallelLoop::ParallelLoop(ContextImpl& context) : threads(NULL) {
+ReferenceParallelLoop::ReferenceParallelLoop(ContextImpl& context) : threads(NULL) {
     const vector<string>& properties = context.getPlatform().getPropertyNames();
     if (find(properties.begin(), properties.end(), "Threads") != properties.end())
         threads = &reinterpret_cast<ReferencePlatform::PlatformData*>(context.getPlatformData())->threads;
 }
 
-void ParallelLoop::run(int count, const function<void(int)>& iteration) {
+void ReferenceParallelLoop::run(int count, const function<void(int)>& iteration) {
     if (threads == NULL || threads->getNumThreads() == 1 || count < 2) {
         for (int i = 0; i < count; i++)
             iteration(i);

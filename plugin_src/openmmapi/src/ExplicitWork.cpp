@@ -1,4 +1,4 @@
-#include "ExplicitWork.h"
+#include "openmm/internal/ExplicitWork.h"
 #include <algorithm>
 #include <cmath>
 
@@ -23,12 +23,6 @@ void ExplicitWork::initialize(const vector<int>& particles) {
 
 void ExplicitWork::beginStep(const vector<Vec3>& forces, const vector<Vec3>& moves, bool followsOn, double kT,
         int window) {
-    if (window <= 0 || !(kT > 0)) {
-        known = false;
-        count = 0;
-        sums.clear();
-        return;
-    }
     const bool pair = (known && followsOn);
     forcesBefore.resize(particles.size());
     if (pair)
@@ -46,6 +40,12 @@ void ExplicitWork::beginStep(const vector<Vec3>& forces, const vector<Vec3>& mov
     known = false;
     if (pair && ++count >= window)
         finish();
+}
+
+void ExplicitWork::stop() {
+    known = false;
+    count = 0;
+    sums.clear();
 }
 
 void ExplicitWork::add(int particle, const Vec3& force, const Vec3& move, double perEnergy) {

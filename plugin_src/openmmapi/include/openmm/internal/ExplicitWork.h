@@ -1,8 +1,8 @@
 #ifndef OPENMM_EXPLICITWORK_H_
 #define OPENMM_EXPLICITWORK_H_
 
-#include "ParallelLoop.h"
 #include "openmm/Vec3.h"
+#include "openmm/internal/ParallelLoop.h"
 #include <vector>
 
 namespace OpenMM {
@@ -28,11 +28,15 @@ public:
      * @param forces     the forces on all particles
      * @param moves      the displacements of all particles in the step before
      * @param followsOn  whether nothing else than that step has changed positions and forces
-     * @param kT         with zero, nothing is measured
-     * @param window     the number of steps to average over, or zero to measure nothing
+     * @param kT         a temperature, which is not zero
+     * @param window     the number of steps to average over
      */
     void beginStep(const std::vector<Vec3>& forces, const std::vector<Vec3>& moves, bool followsOn, double kT,
             int window);
+    /**
+     * Measure nothing in this step, and begin anew after it.
+     */
+    void stop();
     /**
      * Take note that particles have moved by the displacements of the step.
      */

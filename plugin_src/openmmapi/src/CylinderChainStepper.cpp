@@ -1,0 +1,300 @@
+#include "openmm/internal/CylinderChainStepper.h"
+#include "mechanics/BrokenSegment.h"
+#include "mechanics/PeriodicBox.h"
+#include "openmm/CylinderChainException.h"
+#include "openmm/CylinderChainKernels.h"
+#include "openmm/reference/SimTKOpenMMRealType.h"
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+using namespace OpenMM;
+using namespace cylchain;
+using namespace std;
+
+static double norm(const Vec3& v) {
+    return sqrt(v.dot(v));
+}
+
+static Kernel createKernel(ContextImpl& context, CylinderChainForceImpl& force, const OtherParticles& others) {
+    Kernel kernel = context.getPlatform().createKernel(IntegrateCylinderChainStepKernel::Name(), context);
+    kernel.getAs<IntegrateCylinderChainStepKernel>().initialize(context.getSystem(), force.getDescription(),
+            others, force.getKernel().getAs<CalcCylinderChainForceKernel>());
+    return kernel;
+}
+
+static vector<int> findMobileParticles(const CylinderChainDescription& chains, const OtherParticles& others) {
+    vector<int> mobile = others.getMobile();
+    for (const Chain& chain : chains.getChains())
+        for (size_t node = 0; node < chain.nodes.size(); node++)
+            if (!chain.fixed[node])
+                mobile.push_back(chain.nodes[node]);
+    sort(mobile.begin(), mobile.end());
+    return mobile;
+}
+
+CylinderChainStepper::CylinderChainStepper(ContextImpl& context, const CylinderChainIntegrator& integrator,
+        CylinderChainForceImpl& force) : context(context), integrator(integrator), chains(force.getDescription()),
+        others(context.getSystem(), integrator, chains), kernel(createKernel(context, force, others)),
+        explicitWork(getKernel().getLoop()), periodic(context.getSystem().usesPeriodicBoundaryConditions()),
+        recorded(false) {
+    explicitWork.initialize(findMobileParticles(chains, others));
+}
+
+IntegrateCylinderChainStepKernel& CylinderChainStepper::getKernel() {
+    return kernel.getAs<IntegrateCylinderChainStepKernel>();
+}
+
+vector<Vec3> CylinderChainStepper::getPositions() const {
+    vector<Vec3> positions;
+    context.getPositions(positions);
+    return positions;
+}
+
+void CylinderChainStepper::getBox(double* box) const {
+    Vec3 vectors[3];
+    context.getPeriodicBoxVectors(vectors[0], vectors[1], vectors[2]);
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++)
+            box[3*i+k] = vectors[i][k];
+}
+
+BackgroundFlow CylinderChainStepper::describeFlow() {
+    BackgroundFlow flow;
+    Vec3 velocity, rows[3], origin;
+    integrator.getFlow(velocity, rows[0], rows[1], rows[2], origin);
+    for (int i = 0; i < 3; i++) {
+        flow.velocity[i] = velocity[i];
+        flow.origin[i] = origin[i];
+        for (int k = 0; k < 3; k++)
+            flow.gradient[3*i+k] = rows[i][k];
+        flow.present |= (velocity[i] != 0 || rows[i] != Vec3());
+    }
+    if (periodic && flow.present) {
+        getBox(box);
+        flow.box = box;
+    }
+    return flow;
+}
+
+StepSettings CylinderChainStepper::describeStep(uint64_t seed, int level, uint64_t step) {
+    StepSettings settings;
+    const bool includesChains = (integrator.getIntegrationForceGroups()&(1<<chains.getForceGroup())) != 0;
+    // The entries of both enumerations are those of one list.
+    settings.scheme = static_cast<Scheme>(integrator.getScheme());
+    if (isImplicit(settings.scheme) && !includesChains)
+        settings.scheme = Scheme::Midpoint;
+    settings.kT = BOLTZ*integrator.getTemperature();
+    settings.stepSize = integrator.getStepSize();
+    settings.seed = seed;
+    settings.level = level;
+    settings.step = step;
+    settings.flow = describeFlow();
+    settings.precision = static_cast<Precision>(integrator.getPrecision());
+    return settings;
+}
+
+void CylinderChainStepper::refuseTornChains() const {
+    if (!periodic || chains.usesPeriodicBoundaryConditions())
+        return;
+    const vector<Vec3> positions = getPositions();
+    double box[9];
+    getBox(box);
+    const double half = 0.5*min({box[0], box[4], box[8]});
+    for (size_t chain = 0; chain < chains.getChains().size(); chain++) {
+        const vector<int>& nodes = chains.getChains()[chain].nodes;
+        const vector<Segment>& segments = chains.getChains()[chain].segments;
+        for (size_t s = 0; s < segments.size(); s++) {
+            const Vec3 between = positions[nodes[(s+1)%nodes.size()]]-positions[nodes[s]];
+            const double length = norm(between);
+            if (length <= max(half, 2*segments[s].restLength))
+                continue;
+            double nearest[] = {between[0], between[1], between[2]};
+            takeToNearestImage(nearest, box);
+            const double shorter = norm(Vec3(nearest[0], nearest[1], nearest[2]));
+            if (shorter < 0.999*length) {
+                stringstream message;
+                message << "Chain " << chain << " is torn at segment " << s << ": its ends are " << length <<
+                        " nm apart, and " << shorter <<
+                        " nm as nearest images. Positions were wrapped into the periodic box particle by particle: "
+                        "make chains whole before setting them";
+                throw CylinderChainException(CylinderChainException::TornChain, {(int) chain, (int) s}, message.str());
+            }
+        }
+    }
+}
+
+/** Whether a segment can have a length. NaN counts as such, because it has reasons of its own. */
+static bool isInRange(const Segment& segment, double length) {
+    return !(fabs(length-segment.restLength) >= segment.maximumExtension);
+}
+
+static string describeRange(const Segment& segment) {
+    stringstream text;
+    text << "its FENE potential is finite between " << max(0.0, segment.restLength-segment.maximumExtension) <<
+            " and " << segment.restLength+segment.maximumExtension << " nm alone";
+    return text.str();
+}
+
+static bool anyHasRange(const vector<Chain>& chains) {
+    return any_of(chains.begin(), chains.end(), [] (const Chain& chain) {return hasRange(chain.stretching);});
+}
+
+void CylinderChainStepper::refuseInfiniteEnergies() const {
+    if (!anyHasRange(chains.getChains()))
+        return;
+    const vector<Vec3> positions = getPositions();
+    double box[9];
+    getBox(box);
+    for (size_t chain = 0; chain < chains.getChains().size(); chain++) {
+        const Chain& own = chains.getChains()[chain];
+        for (size_t s = 0; s < own.segments.size() && hasRange(own.stretching); s++) {
+            Vec3 between = positions[own.nodes[(s+1)%own.nodes.size()]]-positions[own.nodes[s]];
+            if (chains.usesPeriodicBoundaryConditions())
+                takeToNearestImage(&between[0], box);
+            if (isInRange(own.segments[s], norm(between)))
+                continue;
+            stringstream message;
+            message << "Chain " << chain << " is out of range at segment " << s << ": it is " << norm(between) <<
+                    " nm long, and " << describeRange(own.segments[s]) << ". Set other positions";
+            throw CylinderChainException(CylinderChainException::LengthOutOfRange, {(int) chain, (int) s},
+                    message.str());
+        }
+    }
+}
+
+void CylinderChainStepper::takeNoteOfForces(const StepSettings& settings, bool followsOn) {
+    const int window = integrator.getWorkWindow();
+    if (window > 0 && settings.kT > 0)
+        explicitWork.beginStep(getKernel().getForces(context), getKernel().getDisplacements(), followsOn, settings.kT,
+                window);
+    else
+        explicitWork.stop();
+}
+
+void CylinderChainStepper::step(uint64_t seed, int level, uint64_t step, bool followsOn, bool records,
+        long long& divided) {
+    StepSettings settings = describeStep(seed, level, step);
+    recordForces(settings, records);
+    takeNoteOfForces(settings, followsOn);
+    const Instability found = getKernel().displaceChains(context, settings);
+    if (found.chain != -1)
+        reportInstability(found.chain, settings);
+    divided += found.divided;
+    const int particle = getKernel().displaceOthers(context, settings, integrator.getFriction());
+    if (particle != -1)
+        reportParticle(particle, settings);
+
+    // Nothing has blown up, so the new positions replace the old ones.
+
+    getKernel().move(context, settings);
+    explicitWork.endStep();
+    recorded = (settings.segmentForces != NULL);
+}
+
+int CylinderChainStepper::stepTogether(uint64_t seed, int level, uint64_t step, int count, bool records,
+        long long& divided) {
+    if (!others.getMobile().empty())
+        return 0;
+    explicitWork.interrupt();
+    StepSettings settings = describeStep(seed, level, step);
+    recordForces(settings, records);
+
+    // If a chain blows up, all of them are taken to the step before.
+
+    long long parts = 0;
+    int done = getKernel().advanceChains(context, settings, count, parts);
+    if (done < count)
+        done = getKernel().advanceChains(context, settings, done, parts);
+    divided += parts;
+    getKernel().moveAdvanced(context, settings, done);
+    recorded = (settings.segmentForces != NULL && done == count);
+    return done;
+}
+
+void CylinderChainStepper::recordForces(StepSettings& settings, bool records) {
+    recorded = false;
+    if (!records || !isImplicit(settings.scheme))
+        return;
+    segmentForces.resize(chains.getChains().size());
+    for (size_t chain = 0; chain < segmentForces.size(); chain++)
+        segmentForces[chain].resize(chains.getChains()[chain].segments.size());
+    settings.segmentForces = &segmentForces;
+}
+
+void CylinderChainStepper::getMeanTensions(int chain, vector<double>& tensions, vector<Vec3>& jointForces,
+        vector<Vec3>& directions) const {
+    if (!recorded)
+        throw CylinderChainException(CylinderChainException::NothingRecorded, {chain},
+                "No tensions were recorded in the last step: call setRecordsTensions(true) before it, "
+                "with an implicit scheme");
+    if (chain < 0 || chain >= (int) segmentForces.size())
+        throw OpenMMException("CylinderChainIntegrator: Illegal chain index: "+to_string(chain));
+    const vector<SegmentForces>& forces = segmentForces[chain];
+    tensions.clear();
+    jointForces.clear();
+    directions.clear();
+    for (const SegmentForces& one : forces) {
+        tensions.push_back(one.tension);
+        const Vec3 direction(one.direction[0], one.direction[1], one.direction[2]);
+        directions.push_back(direction/norm(direction));
+    }
+
+    // Forces from outside act on both segments of a joint in equal parts, which leaves half the difference of their
+    // own.
+
+    for (size_t joint = 0; joint < chains.getChains()[chain].joints.size(); joint++) {
+        const double* before = forces[joint].plus;
+        const double* behind = forces[(joint+1)%forces.size()].minus;
+        jointForces.push_back(Vec3(behind[0]-before[0], behind[1]-before[1], behind[2]-before[2])*0.5);
+    }
+}
+
+void CylinderChainStepper::takeExplicitWork(double& work, int& particle, int& steps, int& particles) {
+    explicitWork.take(work, particle, steps, particles);
+}
+
+int CylinderChainStepper::getNumMixedPrecisionChains() const {
+    return kernel.getAs<IntegrateCylinderChainStepKernel>().getNumMixedPrecisionChains();
+}
+
+void CylinderChainStepper::reportInstability(int chain, const StepSettings& settings) {
+    const Chain& culprit = chains.getChains()[chain];
+    vector<Vec3> positions = getPositions(), forces = getKernel().getForces(context);
+    vector<Vec3> displacements = getKernel().getDisplacements();
+    double box[9];
+    getBox(box);
+    const BrokenSegment broken = findBrokenSegment(culprit, &positions[0][0], &forces[0][0], &displacements[0][0],
+            chains.usesPeriodicBoundaryConditions() ? box : NULL, isImplicit(settings.scheme));
+    const long long step = settings.step+1;
+    stringstream message;
+    message << "Chain " << chain << " has blown up at segment " << broken.segment << " in step " << step << ": ";
+    switch (broken.reason) {
+        case BrokenSegment::NotFinite:
+            message << "the force on it, or its position, is not finite";
+            break;
+        case BrokenSegment::NotSolved:
+            message << "the equations of the implicit scheme cannot be solved";
+            break;
+        case BrokenSegment::LeavesRange:
+            message << "it would be " << broken.value << " nm long after it, and " <<
+                    describeRange(culprit.segments[broken.segment]);
+            break;
+        case BrokenSegment::MovesTooFar:
+            message.precision(3);
+            message << "its ends would move by " << broken.value << " nm against each other in one step";
+            break;
+    }
+    message << ". Positions are those before this step. "
+            "Use a smaller time step, or look for overlapping particles or excessive forces.";
+    throw CylinderChainException(CylinderChainException::UnstableChain, {chain, broken.segment, -1, step},
+            message.str());
+}
+
+void CylinderChainStepper::reportParticle(int particle, const StepSettings& settings) const {
+    const long long step = settings.step+1;
+    throw CylinderChainException(CylinderChainException::UnstableParticle, {-1, -1, particle, step},
+            "Particle "+to_string(particle)+", outside chains, has blown up in step "+to_string(step)+
+            ": the force on it is not finite. Positions are those before this step. "
+            "Use a smaller time step, or look for overlapping particles.");
+}

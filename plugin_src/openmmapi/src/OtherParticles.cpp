@@ -1,0 +1,25 @@
+#include "openmm/internal/OtherParticles.h"
+
+using namespace OpenMM;
+using namespace std;
+
+OtherParticles::OtherParticles(const System& system, const CylinderChainIntegrator& integrator,
+        const CylinderChainDescription& chains) {
+    const int numParticles = system.getNumParticles();
+    vector<bool> isNode(numParticles, false);
+    for (const cylchain::Chain& chain : chains.getChains())
+        for (int node : chain.nodes)
+            isNode[node] = true;
+    masses.resize(numParticles);
+    for (int i = 0; i < numParticles; i++) {
+        masses[i] = system.getParticleMass(i);
+        if (isNode[i])
+            continue;
+        particles.push_back(i);
+        if (masses[i] != 0.0)
+            mobile.push_back(i);
+    }
+    frictions.assign(numParticles, 0.0);
+    for (auto& entry : integrator.getParticleFrictions())
+        frictions[entry.first] = entry.second;
+}
