@@ -12,7 +12,7 @@ def advice_after_blow_up(system):
         return ""
     return (
         " If positions were wrapped into the periodic box particle by particle, make filaments whole first with "
-        "openmm_cylchain.systems.periodic.make_whole."
+        "openmm_cylchain.make_whole."
     )
 
 

@@ -41,8 +41,8 @@ bool mayShareLanes(const Chain& longest, const Chain& chain) {
 }
 
 /**
- * Where single precision is right, as measured: see IMPLICIT_SCHEME.md. These are for the step over the relaxation time
- * of the sharpest bends, 4 h kappa/gamma_rot, and for the stiffness of lengths, k l0^2/k_B T.
+ * Where single precision is right, as measured: see docs/design/implicit_scheme.md. These are for the step over the
+ * relaxation time of the sharpest bends, 4 h kappa/gamma_rot, and for the stiffness of lengths, k l0^2/k_B T.
  */
 const double LARGEST_BENDING_RATE = 1e4, LARGEST_STRETCHING = 1e9;
 /** The change of a length by its noise in a step, over the length. Rounding adds to it. */

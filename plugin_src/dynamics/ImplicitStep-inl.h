@@ -22,7 +22,8 @@
  * with the second derivatives H_a of the lengths. It takes the blocks of the inverse next to its diagonal, which follow
  * from those of the elimination. In a flow u, friction is relative to u(m).
  *
- * In the scheme of second order, bends and tethers take two such stages. IMPLICIT_SCHEME.md explains all this.
+ * In the scheme of second order, bends and tethers take two such stages. All this is explained in
+ * docs/design/implicit_scheme.md.
  */
 
 const int NEWTON_ITERATIONS = 14;

@@ -7,7 +7,7 @@
  * The precision that chains are computed in. Positions, forces and displacements are doubles in any case.
  *
  * - Automatic: mixed precision where it is right, and faster.
- * - Mixed: single precision within a step, wherever it is right: see IMPLICIT_SCHEME.md.
+ * - Mixed: single precision within a step, wherever it is right: see docs/design/implicit_scheme.md.
  * - Double: double precision.
  */
 #define CYLCHAIN_PRECISIONS(ENTRY) \

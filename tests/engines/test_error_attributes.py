@@ -5,10 +5,10 @@ import pickle
 import numpy as np
 import openmm
 import pytest
-from openmm_cylchain.engines.native import CylinderChainForce, CylinderChainIntegrator
 
 from openmm_cylchain import DSDNA, F_ACTIN, Filaments, InstabilityError
-from openmm_cylchain.engines import native
+from openmm_cylchain.engines import compiled
+from openmm_cylchain.engines.compiled import CylinderChainForce, CylinderChainIntegrator
 
 VISCOSITY = 1029.8
 TEMPERATURE = 310.0
@@ -71,7 +71,7 @@ def chain_in(system, positions, stretching=CylinderChainForce.Harmonic):
 
 
 def test_exceptions_of_the_plugin():
-    exception = native.plugin.CylinderChainException
+    exception = compiled.plugin.CylinderChainException
     assert issubclass(exception, openmm.OpenMMException)
 
     periodic = openmm.System()
