@@ -51,8 +51,19 @@ def _reduced_bending_moments(filament_type, kT):
         "kratky-porod": _kratky_porod_moments,
         "quadratic": _quadratic_moments,
     }
-    mean, variance = moments[filament_type.bending_model](stiffness)
+    if filament_type.bending_model in moments:
+        mean, variance = moments[filament_type.bending_model](stiffness)
+    else:
+        mean, variance = _moments_by_quadrature(filament_type.bending_potential, stiffness)
     return float(mean), float(variance)
+
+
+def _moments_by_quadrature(potential, stiffness):
+    # Of any model, with angles from zero to where its energy is 40 k_B T.
+    angle = np.linspace(0.0, np.pi, 20_001)[1:-1]
+    angle = np.linspace(0.0, angle[potential.energy(stiffness, np.cos(angle)) < 40.0].max(initial=1e-3), 20_001)[1:-1]
+    energy = potential.energy(stiffness, np.cos(angle))
+    return _moments(energy, np.sin(angle) * np.exp(-energy))
 
 
 def _inscribed_circle_moments(stiffness):

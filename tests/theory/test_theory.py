@@ -12,6 +12,7 @@ from openmm_cylchain import theory
 from openmm_cylchain.errors import InputError
 from openmm_cylchain.filaments.equilibrium import draw_chain
 from openmm_cylchain.filaments.filament_type import DSDNA, F_ACTIN, FilamentType
+from openmm_cylchain.theory import energies
 from openmm_cylchain.units.quantities import thermal_energy
 
 TEMPERATURE = 310.0
@@ -392,3 +393,12 @@ def test_joints_stiffen_against_k_t_as_the_temperature_falls():
     cold = theory.bending_energy_mean(actin, 155.0) / thermal_energy(155.0)
     stiffer = replace(actin, bending_rigidity=2 * actin.bending_rigidity)
     assert cold == pytest.approx(theory.bending_energy_mean(stiffer, 310.0) / KT, rel=1e-12)
+
+
+@pytest.mark.parametrize("model", ["kratky-porod", "quadratic", "inscribed-circle"])
+@pytest.mark.parametrize("stiffness", [0.3, 10.0, 1e3, 1e8])
+def test_moments_of_any_bending_model_by_quadrature(model, stiffness):
+    kind = filament(stiffness, bending_model=model)
+    mean, variance = energies._moments_by_quadrature(kind.bending_potential, stiffness)
+    assert mean * KT == pytest.approx(theory.bending_energy_mean(kind, TEMPERATURE), rel=1e-5)
+    assert variance * KT**2 == pytest.approx(theory.bending_energy_variance(kind, TEMPERATURE), rel=1e-4)
