@@ -18,13 +18,13 @@ struct ChainEnergy {
     double stretching = 0, bending = 0, tethers = 0;
 };
 
-/**
- * Where a step has gone wrong: a segment whose ends would move against each other by more than its rest length, or
- * whose length would be one that its FENE potential does not have.
- */
+/** What has happened in a step. */
 struct Instability {
-    int chain = -1, segment = -1;
-    double change = 0;
+    /**
+     * A chain by which the step has gone wrong, or -1: its equations were not solved, a segment would change by more
+     * than its rest length, or leave the range of its potential. See findBrokenSegment().
+     */
+    int chain = -1;
     /** The number of chains for which an implicit step was taken in parts, because its equations were not solved. */
     int divided = 0;
     /** The number of iterations that the equations of an implicit step took. */

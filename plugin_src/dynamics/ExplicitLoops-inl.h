@@ -155,11 +155,8 @@ template <int W> Instability stepPack(const Pack& pack, const double* positions,
         for (int i = 0; i < W; i++) {
             // Written so that NaN counts as unstable.
             const bool stable = lane(square, i) < lane(rest, i)*lane(rest, i) && std::fabs(lane(relative, i)) < 1;
-            if (!stable && s < pack.segmentsOfLane[i] && result.chain < 0) {
+            if (!stable && s < pack.segmentsOfLane[i] && result.chain < 0)
                 result.chain = pack.chain[i];
-                result.segment = s;
-                result.change = std::sqrt(lane(square, i));
-            }
         }
     }
     return result;
