@@ -13,7 +13,7 @@ template <class Real> struct BendFactor {
 };
 
 /** What a model has unless it has something better. */
-template <class Model> struct BendingFormulas {
+struct BendingFormulas {
     /** Whether factors() finds what bendFactors() does, with fewer divisions. */
     static constexpr bool SHARES_DIVISIONS = false;
     template <class Real> static CYLCHAIN_INLINE void factors(const Vector<Real>&, const Vector<Real>&,
@@ -32,7 +32,7 @@ template <class Model> struct BendingFormulas {
 };
 
 /** The energy b (1-c). */
-struct KratkyPorod : BendingFormulas<KratkyPorod> {
+struct KratkyPorod : BendingFormulas {
     /** The slope dV/dc of the energy of a joint with the cosine c and the sine s. */
     template <class Real> static CYLCHAIN_INLINE Real slope(Real stiffness, Real, Real) {
         return -stiffness;
@@ -60,7 +60,7 @@ struct KratkyPorod : BendingFormulas<KratkyPorod> {
 };
 
 /** The energy (b/2) theta^2. */
-struct Quadratic : BendingFormulas<Quadratic> {
+struct Quadratic : BendingFormulas {
     template <class Real> static CYLCHAIN_INLINE Real slope(Real stiffness, Real c, Real sineSquared) {
         Real result;
         for (int i = 0; i < LANE_COUNT<Real>; i++) {
@@ -96,7 +96,7 @@ struct Quadratic : BendingFormulas<Quadratic> {
 };
 
 /** The energy 2b (1-c)/(1+c). */
-struct InscribedCircle : BendingFormulas<InscribedCircle> {
+struct InscribedCircle : BendingFormulas {
     template <class Real> static CYLCHAIN_INLINE Real slope(Real stiffness, Real c, Real) {
         return -4*stiffness/((1+c)*(1+c));
     }
