@@ -77,9 +77,11 @@ def run(configuration, output, resume=False):
         try:
             _Recorder(configuration, filaments, simulation, directory, checkpoint).run_to_end()
         except InstabilityError as error:
+            place = {name: getattr(error, name) for name in ("filament", "segment", "particle", "step")}
             raise type(error)(
                 f"{error} What came before is kept in {directory.path}; run the changed configuration in another "
-                "directory."
+                "directory.",
+                **place,
             ) from None
 
 
@@ -359,7 +361,10 @@ class _Recorder:
             if segment is not None:
                 raise InstabilityError(
                     f"Filament {number} ({filament.type.name}) has blown up at segment {segment} by step {self._step}: "
-                    "its position or energy is not finite. Use a smaller time step."
+                    "its position or energy is not finite. Use a smaller time step.",
+                    filament=number,
+                    segment=segment,
+                    step=self._step,
                 )
         raise InstabilityError(f"The energy is not finite in step {self._step}. Use a smaller time step.")
 
