@@ -26,6 +26,21 @@ class InstabilityError(RuntimeError):
         self.step = step
 
 
+# The last error of a PythonForce. OpenMM hands on nothing but its text, as that of an OpenMMException.
+_raised_in_force: Exception | None = None
+
+
+def note_raised_in_force(error: Exception) -> None:
+    """Keep an error that the computation of a PythonForce is about to raise, for ``is_raised_in_force``."""
+    global _raised_in_force
+    _raised_in_force = error
+
+
+def is_raised_in_force(exception: Exception) -> bool:
+    """Whether an exception of OpenMM is the error of a PythonForce that was kept last."""
+    return _raised_in_force is not None and str(_raised_in_force) in str(exception)
+
+
 class TimeStepError(InstabilityError):
     """A time step that is far too long for what happens in it: the message says by what it shows and what to do."""
 

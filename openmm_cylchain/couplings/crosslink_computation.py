@@ -3,7 +3,7 @@
 import numpy as np
 import openmm
 
-from ..errors import InputError
+from ..errors import InputError, note_raised_in_force
 from ..mechanics.potentials import STRETCHING_POTENTIALS
 from ..units.types import FloatArray
 from .crosslink_tables import RECENT_TABLES, TABLES, CrosslinkTable
@@ -91,8 +91,10 @@ def _check_extensions(table, lengths):
     if broken.any():
         row = int(np.argmax(broken))
         first, second = table.pairs[row]
-        raise InputError(
+        error = InputError(
             f"Crosslink {table.numbers[row]} between particles {first} and {second} has blown up: its length of "
             f"{lengths[row]:.6g} nm is outside {table.rest_length[row]:g} -/+ {table.maximum_extension[row]:g} nm of "
             "the FENE potential. Use a smaller time step, or look for particles that are too far apart."
         )
+        note_raised_in_force(error)
+        raise error

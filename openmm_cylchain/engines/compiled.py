@@ -16,7 +16,7 @@ from ..dynamics.schemes import IMPLICIT_SCHEMES, check_scheme
 from ..dynamics.schemes import SCHEMES as ALL_SCHEMES
 from ..dynamics.step_watch import DividedSteps, ExplicitWork
 from ..dynamics.time_step import as_step
-from ..errors import InputError, InstabilityError
+from ..errors import InputError, InstabilityError, is_raised_in_force
 from ..mechanics.flow import Flow, as_flow
 from ..mechanics.potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
 from ..units.quantities import TEMPERATURE, non_negative, whole_number
@@ -315,6 +315,10 @@ class NativeIntegrator(CylinderChainIntegrator):
             super().step(steps)
         except plugin.CylinderChainException as error:
             raise self._error_of(error) from None
+        except openmm.OpenMMException as error:
+            if is_raised_in_force(error):
+                raise InstabilityError(str(error) + self._advice) from None
+            raise
 
     def _error_of(self, error):
         message = str(error).replace("outside chains", "outside filaments")

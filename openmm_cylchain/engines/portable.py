@@ -20,7 +20,7 @@ from ..dynamics.other_particles import describe_other_particles
 from ..dynamics.schemes import EXPLICIT_SCHEMES, check_scheme
 from ..dynamics.step_watch import ExplicitWork, WorkRecorder
 from ..dynamics.time_step import as_step
-from ..errors import InputError, InstabilityError
+from ..errors import InputError, InstabilityError, is_raised_in_force
 from ..mechanics.flow import Flow, as_flow, flow_velocities
 from ..mechanics.geometry import joined, to_nearest_images
 from ..mechanics.potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
@@ -671,6 +671,8 @@ class PortableIntegrator(openmm.CustomIntegrator):
             except openmm.OpenMMException as error:
                 if _INSTABILITY is not None:
                     raise InstabilityError(str(error), **_INSTABILITY) from None
+                if is_raised_in_force(error):
+                    raise InstabilityError(str(error)) from None
                 raise
             finally:
                 _RECORDER = None
