@@ -25,20 +25,27 @@ class InstabilityError(RuntimeError):
         self.particle = particle
         self.step = step
 
+    @property
+    def place(self) -> dict[str, int | None]:
+        """The attributes by their names, for an error with another text."""
+        return {"filament": self.filament, "segment": self.segment, "particle": self.particle, "step": self.step}
 
-# The last error of a PythonForce. OpenMM hands on nothing but its text, as that of an OpenMMException.
-_raised_in_force: Exception | None = None
+
+# Text and place of the last error of a PythonForce. OpenMM hands on the text alone, as that of an OpenMMException.
+_raised_in_force: tuple[str, dict[str, int | None]] | None = None
 
 
 def note_raised_in_force(error: Exception) -> None:
-    """Keep an error that the computation of a PythonForce is about to raise, for ``is_raised_in_force``."""
+    """Keep what the computation of a PythonForce is about to raise, for ``instability_in_force``."""
     global _raised_in_force
-    _raised_in_force = error
+    _raised_in_force = str(error), error.place if isinstance(error, InstabilityError) else {}
 
 
-def is_raised_in_force(exception: Exception) -> bool:
-    """Whether an exception of OpenMM is the error of a PythonForce that was kept last."""
-    return _raised_in_force is not None and str(_raised_in_force) in str(exception)
+def instability_in_force(exception: Exception, advice: str = "") -> InstabilityError | None:
+    """The InstabilityError behind an exception of OpenMM, with advice, or None if no PythonForce has raised it."""
+    if _raised_in_force is None or _raised_in_force[0] not in str(exception):
+        return None
+    return InstabilityError(f"{exception}{advice}", **_raised_in_force[1])
 
 
 class TimeStepError(InstabilityError):

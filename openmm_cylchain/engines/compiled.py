@@ -16,7 +16,7 @@ from ..dynamics.schemes import IMPLICIT_SCHEMES, check_scheme
 from ..dynamics.schemes import SCHEMES as ALL_SCHEMES
 from ..dynamics.step_watch import DividedSteps, ExplicitWork
 from ..dynamics.time_step import as_step
-from ..errors import InputError, InstabilityError, is_raised_in_force
+from ..errors import InputError, InstabilityError, instability_in_force
 from ..mechanics.flow import Flow, as_flow
 from ..mechanics.potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
 from ..units.quantities import TEMPERATURE, non_negative, whole_number
@@ -316,9 +316,10 @@ class NativeIntegrator(CylinderChainIntegrator):
         except plugin.CylinderChainException as error:
             raise self._error_of(error) from None
         except openmm.OpenMMException as error:
-            if is_raised_in_force(error):
-                raise InstabilityError(str(error) + self._advice) from None
-            raise
+            instability = instability_in_force(error, self._advice)
+            if instability is None:
+                raise
+            raise instability from None
 
     def _error_of(self, error):
         message = str(error).replace("outside chains", "outside filaments")

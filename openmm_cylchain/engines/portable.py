@@ -20,7 +20,7 @@ from ..dynamics.other_particles import describe_other_particles
 from ..dynamics.schemes import EXPLICIT_SCHEMES, check_scheme
 from ..dynamics.step_watch import ExplicitWork, WorkRecorder
 from ..dynamics.time_step import as_step
-from ..errors import InputError, InstabilityError, is_raised_in_force
+from ..errors import InputError, InstabilityError, instability_in_force, note_raised_in_force
 from ..mechanics.flow import Flow, as_flow, flow_velocities
 from ..mechanics.geometry import joined, to_nearest_images
 from ..mechanics.potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
@@ -67,9 +67,6 @@ _STEPPING = threading.Lock()
 
 # Of the integrator that is stepping, if it looks for steps that are too long.
 _RECORDER = None
-
-# Where the steps being taken have failed: OpenMM passes on the text of an exception alone.
-_INSTABILITY = None
 
 
 class PortableEngine(Engine):
@@ -428,9 +425,9 @@ class ChainDisplacements:
 
 
 def _raise_instability(message, **place):
-    global _INSTABILITY
-    _INSTABILITY = place
-    raise InstabilityError(message, **place)
+    error = InstabilityError(message, **place)
+    note_raised_in_force(error)
+    raise error
 
 
 def _gaussian_vectors(seed, steps_taken, step_count, count):
@@ -663,17 +660,16 @@ class PortableIntegrator(openmm.CustomIntegrator):
         super().setStepSize(as_step(size))
 
     def _advance(self, steps, recorder):
-        global _RECORDER, _INSTABILITY
+        global _RECORDER
         with _STEPPING:
-            _RECORDER, _INSTABILITY = recorder, None
+            _RECORDER = recorder
             try:
                 super().step(steps)
             except openmm.OpenMMException as error:
-                if _INSTABILITY is not None:
-                    raise InstabilityError(str(error), **_INSTABILITY) from None
-                if is_raised_in_force(error):
-                    raise InstabilityError(str(error)) from None
-                raise
+                instability = instability_in_force(error)
+                if instability is None:
+                    raise
+                raise instability from None
             finally:
                 _RECORDER = None
 

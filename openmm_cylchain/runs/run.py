@@ -77,11 +77,10 @@ def run(configuration, output, resume=False):
         try:
             _Recorder(configuration, filaments, simulation, directory, checkpoint).run_to_end()
         except InstabilityError as error:
-            place = {name: getattr(error, name) for name in ("filament", "segment", "particle", "step")}
             raise type(error)(
                 f"{error} What came before is kept in {directory.path}; run the changed configuration in another "
                 "directory.",
-                **place,
+                **error.place,
             ) from None
 
 
