@@ -13,6 +13,7 @@ from openmm_cylchain.filaments.equilibrium import SegmentLengthDistribution
 from support.contexts import new_context, positions_of
 from support.dense_mechanics import bent_chain, dense_resistance
 from support.equilibrium_cases import CASES, time_step
+from support.noise_covariance import assert_covariance, moves_of_a_step
 from support.platforms import ENGINE_PLATFORMS, ENGINES
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 
@@ -205,22 +206,11 @@ def test_noise_covariance_and_drift_of_a_step(engine):
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine=engine)
     for _ in range(copies):
         filaments.add_nodes(F_ACTIN, nodes, planar=True)
-    _, system, positions = filaments.build()
     step = 1.0
-    integrator = filaments.create_integrator(system, step, scheme="midpoint", random_seed=3)
-    context = new_context(system, positions, integrator)
-    moves = []
-    for _ in range(draws):
-        context.setPositions(positions)
-        integrator.step(1)
-        moves.append((positions_of(context) - positions._value).reshape(copies, 3, 3)[..., :2].reshape(copies, 6))
-    moves = np.concatenate(moves)
+    moves = moves_of_a_step(filaments, step, draws)[..., :2].reshape(-1, 6)
     plane = np.flatnonzero(np.arange(9) % 3 < 2)
     expected = 2 * KT * step * np.linalg.inv(dense_resistance(nodes, FRICTION)[np.ix_(plane, plane)])
-    variances = np.diag(expected)
-    error = np.sqrt((np.outer(variances, variances) + expected**2) / len(moves))
-    assert np.abs((np.cov(moves.T) - expected) / error).max() < 5
-    assert np.all(0.05 * variances > 5 * np.diag(error))
+    assert_covariance(moves, expected)
 
 
 def _simulated(engine, platform, kind, segments, chains, steps, scheme="midpoint", fraction=0.01):

@@ -17,6 +17,7 @@ from support.contexts import forces_of, new_context, new_simulation, positions_o
 from support.dense_mechanics import bent_chain, dense_resistance
 from support.equilibrium_cases import Case as EquilibriumCase
 from support.equilibrium_cases import soft_chain, time_step
+from support.noise_covariance import assert_covariance, moves_of_a_step
 from support.platforms import ENGINE_PLATFORMS, ENGINES
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 
@@ -310,21 +311,10 @@ def test_noise_covariance(engine):
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine=engine)
     for _ in range(copies):
         filaments.add_nodes(F_ACTIN, nodes, closed=True)
-    _, system, positions = filaments.build()
     step = 1.0
-    integrator = filaments.create_integrator(system, step, scheme="midpoint", random_seed=3)
-    context = new_context(system, positions, integrator)
-    moves = []
-    for _ in range(draws):
-        context.setPositions(positions)
-        integrator.step(1)
-        moves.append((positions_of(context) - positions._value).reshape(copies, 12))
-    moves = np.concatenate(moves)
+    moves = moves_of_a_step(filaments, step, draws).reshape(-1, 12)
     expected = 2 * KT * step * np.linalg.inv(dense_resistance(nodes, FRICTION, True))
-    variances = np.diag(expected)
-    error = np.sqrt((np.outer(variances, variances) + expected**2) / len(moves))
-    assert np.abs((np.cov(moves.T) - expected) / error).max() < 5
-    assert np.all(0.05 * variances > 5 * np.diag(error))
+    assert_covariance(moves, expected)
 
 
 # Equilibrium
