@@ -19,7 +19,7 @@ def moves_of_a_step(filaments, step, draws):
 
 
 def assert_covariance(moves, expected):
-    """The covariance of moves (samples, n) is as expected within five standard errors, of which five are below 5 % of a variance."""
+    """The covariance of moves (samples, n) is as expected within five standard errors, five of which are below 5 %."""
     variances = np.diag(expected)
     error = np.sqrt((np.outer(variances, variances) + expected**2) / len(moves))
     assert np.abs((np.cov(moves.T) - expected) / error).max() < 5
