@@ -18,7 +18,8 @@ from ..dynamics.step_watch import DividedSteps, ExplicitWork
 from ..dynamics.time_step import as_step
 from ..errors import InputError, InstabilityError, instability_in_force
 from ..mechanics.flow import Flow, as_flow
-from ..mechanics.potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
+from ..mechanics.potentials import BENDING_MODELS as ALL_BENDING_MODELS
+from ..mechanics.potentials import STRETCHING_POTENTIALS
 from ..units.quantities import TEMPERATURE, non_negative, whole_number
 from .description import (
     advice_after_blow_up,
@@ -71,7 +72,7 @@ def _numbers(of_plugin, of_package, what):
     return {name: number for number, name in enumerate(of_plugin)}
 
 
-BENDING_MODELS = _numbers(CylinderChainForce.getBendingModelNames(), BENDING_POTENTIALS, "bending models")
+BENDING_MODELS = _numbers(CylinderChainForce.getBendingModelNames(), ALL_BENDING_MODELS, "bending models")
 STRETCHING_MODELS = _numbers(CylinderChainForce.getStretchingModelNames(), STRETCHING_POTENTIALS, "stretching models")
 SCHEMES = _numbers(CylinderChainIntegrator.getSchemeNames(), ALL_SCHEMES, "schemes")
 PRECISIONS = _numbers(CylinderChainIntegrator.getPrecisionNames(), ALL_PRECISIONS, "precisions")

@@ -40,6 +40,7 @@ public:
         Geometry previous = {}, current, ahead;
         JointGeometry joint = {}, jointAhead = {};
         std::size_t tether = 0;
+        const bool linear = isLinear(pack.bending);
         band.begin();
         *here = Row {};
         here->right = loads[0];
@@ -58,11 +59,16 @@ public:
                 after->right = loads[s+1];
             }
             addTethers(y, s, tether, *here);
-            if (s > 0)
+            if (pack.hasNodeFriction && s < pack.ownNodes())
+                addNodeFriction(y, s, *here);
+            if (s > 0 && linear)
+                addLinearBend(s, previous, current, *before, *here, *after);
+            else if (s > 0)
                 addJoint(s, joint, previous, current, *before, *here, *after);
             if (s < n-2) {
                 describeNew(y, s+1, ahead);
-                describeNewJoint(s+1, current, ahead, jointAhead);
+                if (!linear)
+                    describeNewJoint(s+1, current, ahead, jointAhead);
             }
             if (s > 0)
                 band.template eliminate<2>(s-1, *before, *here, *after);
@@ -76,6 +82,8 @@ public:
             band.close(*before, *here);
         else {
             addTethers(y, n-1, tether, *here);
+            if (pack.hasNodeFriction)
+                addNodeFriction(y, n-1, *here);
             band.template eliminate<1>(n-2, *before, *here, *after);
             band.template eliminate<0>(n-1, *here, *after, *before);
         }
@@ -238,6 +246,24 @@ public:
         before.upper = before.upper+mixed-Mat::of(first);
         here.upper = here.upper+mixed-Mat::of(last);
     }
+    /** Add a bend that is linear in the nodes to their equations. */
+    CYLCHAIN_INLINE void addLinearBend(int s, const Geometry& geometry1, const Geometry& geometry2, Row& before,
+                Row& here, Row& after) {
+        const ImplicitSegment<Real>& segment = segments[s];
+        const Real stiffness = loaded<Real>(pack.joints, s);
+        const Vec bend = geometry2.difference-geometry1.difference;
+        const Vec force = (bend*segment.jointImplicit+segment.constantBend-segment.turningBend)*stiffness;
+        before.right = before.right-force;
+        here.right = here.right+force+force;
+        after.right = after.right-force;
+        const Real scale = stiffness*segment.jointImplicit, twice = scale+scale;
+        before.diagonal.addDiagonal(scale);
+        here.diagonal.addDiagonal(twice+twice);
+        after.diagonal.addDiagonal(scale);
+        before.second = Mat::diagonal(scale);
+        before.upper = before.upper-Mat::diagonal(twice);
+        here.upper = here.upper-Mat::diagonal(twice);
+    }
 private:
     const ImplicitState<W>& step;
     const Pack& pack;
@@ -255,8 +281,12 @@ private:
     void addDragOfFlow(const Vec* y) {
         const LaneFlow<W> flow(settings.flow, pack.planar, x[0]);
         const Real share = splat<Real>(step.shareOfForces());
-        for (int node = 0; node < n; node++)
+        const Real ofNode = loaded<Real>(pack.nodeFriction, 0)*share;
+        for (int node = 0; node < n; node++) {
             loads[node] = step.f[node];
+            if (node < pack.ownNodes())
+                loads[node] = loads[node]+flow.at(x[node]+y[node]*splat<Real>(0.5))*ofNode;
+        }
         for (int s = 0; s < pack.segments; s++) {
             Vec carried, pair;
             findDragOfFlow(flow, y, s, carried, pair);
@@ -297,6 +327,11 @@ private:
         const ImplicitSegment<Real>& segment = segments[s];
         const Real squareOfSine = 0.5-0.5*segment.tangent.dot(geometry.tangent);
         return (1-squareOfSine*(0.25+0.09375*squareOfSine))*(segment.inverse*geometry.inverse);
+    }
+    CYLCHAIN_INLINE void addNodeFriction(const Vec* y, int node, Row& row) {
+        const Real friction = loaded<Real>(pack.nodeFriction, 0)*(1/h);
+        row.diagonal.addDiagonal(friction);
+        row.right = row.right-y[node]*friction;
     }
     /** Add the tethers of a node, the next ones, to its equations. */
     void addTethers(const Vec* y, int node, std::size_t& next, Row& row) {

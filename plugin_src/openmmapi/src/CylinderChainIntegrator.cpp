@@ -249,9 +249,10 @@ void CylinderChainIntegrator::step(int steps) {
                 continue;
         }
         {
-            // The implicit scheme computes the forces of the chains itself.
+            // Most schemes compute the forces of the chains themselves.
 
-            CylinderChainForceImpl::Exclusion exclusion(*chains, isImplicit(static_cast<cylchain::Scheme>(scheme)));
+            const bool excluded = computesChainForces(static_cast<cylchain::Scheme>(scheme));
+            CylinderChainForceImpl::Exclusion exclusion(*chains, excluded);
             context->calcForcesAndEnergy(true, false, getIntegrationForceGroups());
         }
         stepper->step(noiseSeed, noiseLevel, stepsTaken, followsOn, recordsTensions && done == steps-1, dividedSteps);
