@@ -21,6 +21,7 @@ from ..dynamics.schemes import EXPLICIT_SCHEMES, check_scheme
 from ..dynamics.step_watch import ExplicitWork, WorkRecorder
 from ..dynamics.time_step import as_step
 from ..errors import InputError, InstabilityError, instability_in_force, note_raised_in_force
+from ..mechanics.broken_segment import find_broken_segment
 from ..mechanics.flow import Flow, as_flow, flow_velocities
 from ..mechanics.geometry import joined, to_nearest_images
 from ..mechanics.potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
@@ -29,6 +30,7 @@ from ..units.quantities import BOLTZMANN, TEMPERATURE, non_negative, whole_numbe
 from .description import (
     advice_after_blow_up,
     describe_chains,
+    describe_lengths,
     filament_label,
     refuse_constraints,
 )
@@ -101,8 +103,7 @@ class PortableEngine(Engine):
         computation = ChainDisplacements(
             describe_chains(system, placed),
             placed.nodes,
-            np.concatenate([np.full(one.segments, one.type.segment_length) for one in filaments]),
-            np.concatenate([np.full(one.segments, one.type.maximum_extension or np.inf) for one in filaments]),
+            *describe_lengths(filaments),
             [filament_label(number, filament) for number, filament in enumerate(filaments)],
             *describe_other_particles(system, placed.nodes, settings.particle_friction),
             advice_after_blow_up(system),
@@ -374,41 +375,16 @@ class ChainDisplacements:
         self._check_others(result, steps_taken)
 
     def _check_chains(self, displacements, nodes, forces, steps_taken):
-        first, second = self._chains.first_node, self._chains.second_node
-        with np.errstate(all="ignore"):
-            changes = displacements[second] - displacements[first]
-            change = np.linalg.norm(changes, axis=1)
-            length = np.linalg.norm(nodes[second] - nodes[first] + changes, axis=1)
-            # Written so that NaN counts as unstable.
-            leaves_range = ~(np.abs(length - self._rest_lengths) < self._ranges)
-            unstable = ~(change < self._rest_lengths) | leaves_range
-        if not unstable.any():
+        broken = find_broken_segment(self._chains, self._rest_lengths, self._ranges, nodes, forces, displacements)
+        if broken is None:
             return
-        # A singular resistance spoils every chain, so the culprit is looked for in what went in.
-        finite = np.isfinite(nodes).all(axis=1) & np.isfinite(forces).all(axis=1)
-        culprits = np.flatnonzero(~(finite[first] & finite[second]))
-        if not len(culprits):
-            culprits = np.flatnonzero(unstable)
-            scale = np.linalg.norm(forces[first], axis=1) + np.linalg.norm(forces[second], axis=1)
-            culprits = culprits[np.argsort(-scale[culprits], kind="stable")]
-        segment = culprits[0]
-        chain, number = self._chains.locate_segment(segment)
-        if not (finite[first[segment]] and finite[second[segment]]):
-            what = "the force on it, or its position, is not finite"
-        elif change[segment] < self._rest_lengths[segment]:
-            rest, extension = self._rest_lengths[segment], self._ranges[segment]
-            what = (
-                f"it would be {length[segment]:.6g} nm long after it, and its FENE potential is finite between "
-                f"{max(0.0, rest - extension):.6g} and {rest + extension:.6g} nm alone"
-            )
-        else:
-            what = f"its ends would move by {change[segment]:.3g} nm against each other in one step"
         _raise_instability(
-            f"{self._labels[chain]} has blown up at segment {number} in step {steps_taken}: {what}. "
+            f"{self._labels[broken.chain]} has blown up at segment {broken.segment} in step {steps_taken}: "
+            f"{broken.what}. "
             "Positions are those before this step. Use a smaller time step, or look for overlapping particles "
             f"or excessive forces.{self._advice}",
-            filament=int(chain),
-            segment=int(number),
+            filament=broken.chain,
+            segment=broken.segment,
             step=steps_taken,
         )
 
