@@ -78,7 +78,6 @@ SCHEMES = _numbers(CylinderChainIntegrator.getSchemeNames(), ALL_SCHEMES, "schem
 PRECISIONS = _numbers(CylinderChainIntegrator.getPrecisionNames(), ALL_PRECISIONS, "precisions")
 
 _OTHER_FRICTION = 1.0
-LARGEST_PATH_LEVEL = 20
 
 
 class CompiledEngine(Engine):
@@ -349,11 +348,11 @@ class NativeIntegrator(CylinderChainIntegrator):
         Raises
         ------
         InputError
-            If it is not a whole number between 0 and 20.
+            If it is not a whole number between 0 and ``getLargestPathLevel()``.
         """
-        level = whole_number(level, 0, "path level")
-        if level > LARGEST_PATH_LEVEL:
-            raise InputError(f"path level must be at most {LARGEST_PATH_LEVEL}, but is {level}.")
+        level, largest = whole_number(level, 0, "path level"), self.getLargestPathLevel()
+        if level > largest:
+            raise InputError(f"path level must be at most {largest}, but is {level}.")
         super().setPathLevel(level)
 
     def setRecordsTensions(self, records):
