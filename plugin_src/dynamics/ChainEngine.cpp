@@ -45,6 +45,8 @@ bool mayShareLanes(const Chain& longest, const Chain& chain) {
  * relaxation time of the sharpest bends, 4 h kappa/gamma_rot, and for the stiffness of lengths, k l0^2/k_B T.
  */
 const double LARGEST_BENDING_RATE = 1e4, LARGEST_STRETCHING = 1e9;
+/** The same for bends that are linear in the nodes, 16 h kappa/xi. */
+const double LARGEST_RATE_OF_LINEAR_BENDS = 1e6;
 /** The change of a length by its noise in a step, over the length. Rounding adds to it. */
 const double LEAST_CHANGE = 1e-5;
 /** The resistance of a node to its motion. Third powers of it are computed, also for a thousandth of a step. */
@@ -163,12 +165,15 @@ public:
         // A flow needs to know where chains are. Written so that NaN is not right.
         return settings.precision != Precision::Double && isImplicit(settings.scheme) && !settings.flow.present &&
                 settings.kT > 0 && stretching <= LARGEST_STRETCHING*settings.kT &&
-                h*bendingRate <= LARGEST_BENDING_RATE && leastFriction >= LEAST_RESISTANCE*h &&
+                h*bendingRate <= 1 && leastFriction >= LEAST_RESISTANCE*h &&
                 largestFriction+h*bending <= LARGEST_RESISTANCE*h &&
                 2*settings.kT*h >= LEAST_CHANGE*LEAST_CHANGE*lengthFriction;
     }
 private:
-    /** The largest k l0^2, 4 kappa/gamma_rot, kappa/l0^2 and friction of a node, and the least of the latter. */
+    /**
+     * The largest k l0^2, 4 kappa/gamma_rot over what a step may have, kappa/l0^2 and friction of a node, and the least
+     * of the latter.
+     */
     double stretching = 0, bendingRate = 0, bending = 0, largestFriction = 0, leastFriction = HUGE_VAL;
     /** The largest friction against a change of a length, times its square. */
     double lengthFriction = 0;
@@ -190,7 +195,8 @@ private:
             // The stiffness of a bend against turning its segments.
             const double stiffness = chain.joints[joint]*(isLinear(chain.bending) ? length*length : 1);
             const double friction = min(before.rotational, behind.rotational)+0.25*length*length*chain.nodeFriction;
-            bendingRate = max(bendingRate, 4*stiffness/friction);
+            bendingRate = max(bendingRate, 4*stiffness/friction/
+                    (isLinear(chain.bending) ? LARGEST_RATE_OF_LINEAR_BENDS : LARGEST_BENDING_RATE));
             bending = max(bending, 4*stiffness/(length*length));
         }
         for (const Tether& tether : chain.tethers)
