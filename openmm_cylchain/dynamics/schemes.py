@@ -10,7 +10,9 @@ from ..units.types import FloatOrArray
 
 EXPLICIT_SCHEMES = ("euler", "midpoint")
 IMPLICIT_SCHEMES = ("implicit", "implicit-second-order")
-SCHEMES = (*EXPLICIT_SCHEMES, *IMPLICIT_SCHEMES)
+MODES = "modes"
+"""The scheme that advances the normal modes of chains of beads, each as if it were alone."""
+SCHEMES = (*EXPLICIT_SCHEMES, *IMPLICIT_SCHEMES, MODES)
 
 _DIAGONAL = 1.0 - math.sqrt(0.5)
 

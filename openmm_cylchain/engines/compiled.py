@@ -18,7 +18,8 @@ from ..dynamics.step_watch import DividedSteps, ExplicitWork
 from ..dynamics.time_step import as_step
 from ..errors import InputError, InstabilityError, instability_in_force
 from ..mechanics.flow import Flow, as_flow
-from ..mechanics.potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
+from ..mechanics.potentials import BENDING_MODELS as ALL_BENDING_MODELS
+from ..mechanics.potentials import STRETCHING_POTENTIALS
 from ..units.quantities import TEMPERATURE, non_negative, whole_number
 from .description import (
     advice_after_blow_up,
@@ -71,13 +72,12 @@ def _numbers(of_plugin, of_package, what):
     return {name: number for number, name in enumerate(of_plugin)}
 
 
-BENDING_MODELS = _numbers(CylinderChainForce.getBendingModelNames(), BENDING_POTENTIALS, "bending models")
+BENDING_MODELS = _numbers(CylinderChainForce.getBendingModelNames(), ALL_BENDING_MODELS, "bending models")
 STRETCHING_MODELS = _numbers(CylinderChainForce.getStretchingModelNames(), STRETCHING_POTENTIALS, "stretching models")
 SCHEMES = _numbers(CylinderChainIntegrator.getSchemeNames(), ALL_SCHEMES, "schemes")
 PRECISIONS = _numbers(CylinderChainIntegrator.getPrecisionNames(), ALL_PRECISIONS, "precisions")
 
 _OTHER_FRICTION = 1.0
-LARGEST_PATH_LEVEL = 20
 
 
 class CompiledEngine(Engine):
@@ -348,11 +348,11 @@ class NativeIntegrator(CylinderChainIntegrator):
         Raises
         ------
         InputError
-            If it is not a whole number between 0 and 20.
+            If it is not a whole number between 0 and ``getLargestPathLevel()``.
         """
-        level = whole_number(level, 0, "path level")
-        if level > LARGEST_PATH_LEVEL:
-            raise InputError(f"path level must be at most {LARGEST_PATH_LEVEL}, but is {level}.")
+        level, largest = whole_number(level, 0, "path level"), self.getLargestPathLevel()
+        if level > largest:
+            raise InputError(f"path level must be at most {largest}, but is {level}.")
         super().setPathLevel(level)
 
     def setRecordsTensions(self, records):

@@ -75,5 +75,13 @@ def describe_chains(system, placed):
     )
 
 
+def describe_lengths(filaments):
+    """Rest lengths of all segments, and by how much each may be longer or shorter: two (segments,) arrays in nm."""
+    segments = [filament.segments for filament in filaments]
+    rest_lengths = [filament.type.segment_length for filament in filaments]
+    ranges = [filament.type.maximum_extension or np.inf for filament in filaments]
+    return np.repeat(rest_lengths, segments), np.repeat(ranges, segments)
+
+
 def _mass(system, particle):
     return system.getParticleMass(int(particle))._value

@@ -76,6 +76,10 @@ BENDING_POTENTIALS = {
     )
 }
 
+BOND_DIFFERENCE = "bond-difference"
+"""The bending model (K/2) |u2 - u1|^2 of the vectors of two segments, which is no function of their angle alone."""
+BENDING_MODELS = (*BENDING_POTENTIALS, BOND_DIFFERENCE)
+
 
 @dataclass(frozen=True)
 class StretchingPotential:

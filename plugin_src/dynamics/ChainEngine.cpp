@@ -45,10 +45,16 @@ bool mayShareLanes(const Chain& longest, const Chain& chain) {
  * relaxation time of the sharpest bends, 4 h kappa/gamma_rot, and for the stiffness of lengths, k l0^2/k_B T.
  */
 const double LARGEST_BENDING_RATE = 1e4, LARGEST_STRETCHING = 1e9;
+/** The same for bends that are linear in the nodes, 16 h kappa/xi. */
+const double LARGEST_RATE_OF_LINEAR_BENDS = 1e6;
 /** The change of a length by its noise in a step, over the length. Rounding adds to it. */
 const double LEAST_CHANGE = 1e-5;
 /** The resistance of a node to its motion. Third powers of it are computed, also for a thousandth of a step. */
 const double LEAST_RESISTANCE = 1e-9, LARGEST_RESISTANCE = 1e8;
+
+bool hasFriction(const Segment& segment) {
+    return segment.parallel > 0 || segment.perpendicular > 0 || segment.rotational > 0 || segment.extensional > 0;
+}
 
 template <class Scalar> void setSegment(ChainPack<Scalar>& pack, int lane, int s, const Segment& segment,
         int dimensions) {
@@ -67,7 +73,7 @@ template <class Scalar> void setSegment(ChainPack<Scalar>& pack, int lane, int s
     properties[Pack::RootPerpendicular*lanes] = sqrt(segment.perpendicular);
     properties[Pack::RootRotational*lanes] = sqrt(segment.rotational);
     properties[Pack::RootExtensional*lanes] = sqrt(segment.extensional);
-    properties[Pack::Drift*lanes] = dimensions == 0 ? 0.0 :
+    properties[Pack::Drift*lanes] = dimensions == 0 || segment.rotational == 0 ? 0.0 :
             dimensions+1-(dimensions-1)*segment.extensional/segment.rotational;
     if (segment.propulsion != 0) {
         pack.propulsions.resize((size_t) (pack.nodes-1)*lanes);
@@ -86,12 +92,18 @@ template <class Scalar> void fillLane(ChainPack<Scalar>& pack, int lane, const C
         pack.mobile[node*lanes+lane] = chain.fixed[node%own] ? 0.0 : 1.0;
     }
     pack.free[lane] = any_of(chain.fixed.begin(), chain.fixed.end(), [] (bool fixed) {return fixed;}) ? 0.0 : 1.0;
+    pack.nodeFriction[lane] = chain.nodeFriction;
+    pack.rootNodeFriction[lane] = sqrt(chain.nodeFriction);
+    pack.hasNodeFriction |= chain.nodeFriction > 0;
     for (size_t node = 1; node < unrolled-1; node++)
         pack.joints[node*lanes+lane] = chain.joints[chain.closed ? node%own : node-1];
     for (size_t number = 0; number < chain.tethers.size(); number++)
         pack.tethers.push_back({chain.tethers[number], lane, (int) number});
-    for (size_t s = 0; s < unrolled-1; s++)
-        setSegment(pack, lane, s, chain.segments[s%chain.segments.size()], chain.planar ? 2 : 3);
+    for (size_t s = 0; s < unrolled-1; s++) {
+        const Segment& segment = chain.segments[s%chain.segments.size()];
+        setSegment(pack, lane, s, segment, chain.planar ? 2 : 3);
+        pack.hasSegmentFriction |= hasFriction(segment);
+    }
 }
 
 template <class Scalar> ChainPack<Scalar> packed(const vector<Chain>& chains, const vector<int>& members, int lanes) {
@@ -108,6 +120,8 @@ template <class Scalar> ChainPack<Scalar> packed(const vector<Chain>& chains, co
     pack.nodesOfLane.resize(lanes);
     pack.segmentsOfLane.resize(lanes);
     pack.free.resize(lanes);
+    pack.nodeFriction.resize(lanes);
+    pack.rootNodeFriction.resize(lanes);
     const size_t places = (size_t) pack.nodes*lanes;
     pack.particles.resize(places, -1);
     pack.mobile.resize(places, 0.0);
@@ -151,12 +165,15 @@ public:
         // A flow needs to know where chains are. Written so that NaN is not right.
         return settings.precision != Precision::Double && isImplicit(settings.scheme) && !settings.flow.present &&
                 settings.kT > 0 && stretching <= LARGEST_STRETCHING*settings.kT &&
-                h*bendingRate <= LARGEST_BENDING_RATE && leastFriction >= LEAST_RESISTANCE*h &&
+                h*bendingRate <= 1 && leastFriction >= LEAST_RESISTANCE*h &&
                 largestFriction+h*bending <= LARGEST_RESISTANCE*h &&
                 2*settings.kT*h >= LEAST_CHANGE*LEAST_CHANGE*lengthFriction;
     }
 private:
-    /** The largest k l0^2, 4 kappa/gamma_rot, kappa/l0^2 and friction of a node, and the least of the latter. */
+    /**
+     * The largest k l0^2, 4 kappa/gamma_rot over what a step may have, kappa/l0^2 and friction of a node, and the least
+     * of the latter.
+     */
     double stretching = 0, bendingRate = 0, bending = 0, largestFriction = 0, leastFriction = HUGE_VAL;
     /** The largest friction against a change of a length, times its square. */
     double lengthFriction = 0;
@@ -164,16 +181,23 @@ private:
         for (const Segment& segment : chain.segments) {
             const double square = segment.restLength*segment.restLength;
             stretching = max(stretching, segment.stiffness*square);
-            lengthFriction = max(lengthFriction, segment.extensional+0.25*segment.parallel*square);
-            leastFriction = min(leastFriction, 0.25*min(segment.parallel, segment.perpendicular));
-            largestFriction = max(largestFriction, 0.25*segment.perpendicular+segment.rotational/square);
+            lengthFriction = max(lengthFriction,
+                    segment.extensional+0.25*(segment.parallel+chain.nodeFriction)*square);
+            leastFriction = min(leastFriction,
+                    0.25*min(segment.parallel, segment.perpendicular)+chain.nodeFriction);
+            largestFriction = max(largestFriction,
+                    0.25*segment.perpendicular+segment.rotational/square+chain.nodeFriction);
         }
         for (size_t joint = 0; joint < chain.joints.size(); joint++) {
             const Segment& before = chain.segments[joint];
             const Segment& behind = chain.segments[joint+1];
             const double length = min(before.restLength, behind.restLength);
-            bendingRate = max(bendingRate, 4*chain.joints[joint]/min(before.rotational, behind.rotational));
-            bending = max(bending, 4*chain.joints[joint]/(length*length));
+            // The stiffness of a bend against turning its segments.
+            const double stiffness = chain.joints[joint]*(isLinear(chain.bending) ? length*length : 1);
+            const double friction = min(before.rotational, behind.rotational)+0.25*length*length*chain.nodeFriction;
+            bendingRate = max(bendingRate, 4*stiffness/friction/
+                    (isLinear(chain.bending) ? LARGEST_RATE_OF_LINEAR_BENDS : LARGEST_BENDING_RATE));
+            bending = max(bending, 4*stiffness/(length*length));
         }
         for (const Tether& tether : chain.tethers)
             bending = max(bending, tether.stiffness);

@@ -44,6 +44,11 @@ template <class Scalar> struct ChainPack {
     std::vector<Scalar> mobile;
     /** One for each lane whose chain has no node that is fixed; zero for others. */
     std::vector<Scalar> free;
+    /** Friction of nodes and its square root, [lane], and whether any chain has some. */
+    std::vector<Scalar> nodeFriction, rootNodeFriction;
+    bool hasNodeFriction = false;
+    /** Whether any segment has friction. */
+    bool hasSegmentFriction = false;
     /** The tethers of all lanes, by their nodes. */
     std::vector<LaneTether> tethers;
     /** Half the propulsion of each segment, [segment][lane], or nothing if there is none. */

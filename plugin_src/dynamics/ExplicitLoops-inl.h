@@ -12,7 +12,8 @@ template <int W> ChainEnergy addForcesTo(const Pack& pack, const double* positio
     Vector<Real>* f = x+pack.nodes;
     gatherPositions<W>(pack, positions, box, x);
     ChainEnergy energy;
-    Vector<Real> before = {}, push = {};
+    const bool linear = isLinear(pack.bending);
+    Vector<Real> before = {}, push = {}, vectorBefore = {};
     Real inverseBefore = {};
     for (int s = 0; s < pack.nodes-1; s++) {
         const Vector<Real> difference = x[s+1]-x[s];
@@ -30,7 +31,20 @@ template <int W> ChainEnergy addForcesTo(const Pack& pack, const double* positio
         Vector<Real> pull = twice ? Vector<Real> {} : t*tension;
 
         // Bending at the joint with the segment before.
-        if (s > 0) {
+        if (s > 0 && linear) {
+            const Real joint = loaded<Real>(pack.joints, s);
+            const Vector<Real> bend = difference-vectorBefore, force = bend*joint;
+            f[s-1] = f[s-1]-force;
+            f[s] = push+pull+force+force;
+            push = -force;
+            if (includeEnergy)
+                for (int i = 0; i < W; i++) {
+                    Real own = bend.dot(force);
+                    if (s < pack.nodesOfLane[i]-1)
+                        energy.bending += 0.5*lane(own, i);
+                }
+        }
+        else if (s > 0) {
             const Real joint = loaded<Real>(pack.joints, s);
             const Real c = before.dot(t);
             const Vector<Real> normal = crossProduct(before, t);
@@ -60,6 +74,7 @@ template <int W> ChainEnergy addForcesTo(const Pack& pack, const double* positio
                 energy.stretching += stretchingEnergy(pack.stretching, lane(k, i), lane(e, i), lane(d, i));
             }
         before = t;
+        vectorBefore = difference;
         inverseBefore = inverse;
     }
     f[pack.nodes-1] = push;
@@ -89,6 +104,20 @@ template <int W> ChainEnergy addForcesTo(const Pack& pack, const double* positio
 
 #include "dynamics/Redistribution-inl.h"
 
+/** Add the random forces that go with the friction of nodes. Those of a ring come once. */
+template <int W> void addRandomForcesOnNodes(const Pack& pack, const StepSettings& settings,
+            Vector<typename Lanes<W>::Type>* f) {
+    typedef typename Lanes<W>::Type Real;
+    const NoiseKey key = noiseKey(settings);
+    NoisePlaces<W> places = noisePlaces<W>(pack);
+    const Real amplitude = loaded<Real>(pack.rootNodeFriction, 0)*Scalar(std::sqrt(2*settings.kT/settings.stepSize));
+    for (int node = 0; node < pack.ownNodes(); node++, places.part += 1) {
+        Real normals[4];
+        drawNormals<W, 2>(key, NoiseKind::Node, places, normals);
+        f[node] = f[node]+nodeNoise<Real>(normals, pack.planar)*amplitude;
+    }
+}
+
 /** Add the random forces, step (1) of Section 4, and for Euler's scheme the thermal torques (15), step (2). */
 template <int W> void addRandomForces(const Pack& pack, const Vector<typename Lanes<W>::Type>* x,
             const StepSettings& settings, Vector<typename Lanes<W>::Type>* f) {
@@ -97,6 +126,8 @@ template <int W> void addRandomForces(const Pack& pack, const Vector<typename La
     NoisePlaces<W> places = noisePlaces<W>(pack);
     const double amplitude = std::sqrt(2*settings.kT/settings.stepSize);
     const double thermal = (settings.scheme == Scheme::Euler ? settings.kT : 0.0);
+    if (pack.hasNodeFriction)
+        addRandomForcesOnNodes<W>(pack, settings, f);
     for (int s = 0; s < pack.segments; s++) {
         const Vector<Real> difference = x[s+1]-x[s];
         const Real inverse = 1/root(difference.dot(difference));

@@ -6,6 +6,13 @@
 
 /** The part of the friction against turning that compression may take away in the iteration's matrix. */
 const Scalar COMPRESSION = 0.9;
+/**
+ * Bends that are linear in the nodes leave the matrix regular under nearly all compression, so that Newton's method may
+ * have all of it. Where that has not converged after so many iterations, compression counts no more.
+ */
+const int ITERATIONS_WITH_COMPRESSION = 6;
+/** More than any tension over a length. */
+const Scalar UNBOUNDED = 1e30;
 
 template <int W, bool CLOSED> class ImplicitEquations {
     typedef typename Lanes<W>::Type Real;
@@ -30,8 +37,13 @@ public:
             settings(step.settings), n(step.n), h(step.h), segments(step.segments), x(step.start.nodes),
             loads(step.loads), change(step.change), band(pack, memory) {
     }
-    /** Linearise the equations around y, and eliminate the nodes from first to last. */
-    void eliminate(const Vec* y) {
+    /**
+     * Linearise the equations around y, and eliminate the nodes from first to last.
+     *
+     * @param iteration  how many there were before
+     */
+    void eliminate(const Vec* y, int iteration) {
+        allowsCompression = isLinear(pack.bending) && iteration < ITERATIONS_WITH_COMPRESSION;
         if (settings.flow.present)
             addDragOfFlow(y);
         Row rows[3];
@@ -40,6 +52,7 @@ public:
         Geometry previous = {}, current, ahead;
         JointGeometry joint = {}, jointAhead = {};
         std::size_t tether = 0;
+        const bool linear = isLinear(pack.bending);
         band.begin();
         *here = Row {};
         here->right = loads[0];
@@ -58,11 +71,16 @@ public:
                 after->right = loads[s+1];
             }
             addTethers(y, s, tether, *here);
-            if (s > 0)
+            if (pack.hasNodeFriction && s < pack.ownNodes())
+                addNodeFriction(y, s, *here);
+            if (s > 0 && linear)
+                addLinearBend(s, previous, current, *before, *here, *after);
+            else if (s > 0)
                 addJoint(s, joint, previous, current, *before, *here, *after);
             if (s < n-2) {
                 describeNew(y, s+1, ahead);
-                describeNewJoint(s+1, current, ahead, jointAhead);
+                if (!linear)
+                    describeNewJoint(s+1, current, ahead, jointAhead);
             }
             if (s > 0)
                 band.template eliminate<2>(s-1, *before, *here, *after);
@@ -76,6 +94,8 @@ public:
             band.close(*before, *here);
         else {
             addTethers(y, n-1, tether, *here);
+            if (pack.hasNodeFriction)
+                addNodeFriction(y, n-1, *here);
             band.template eliminate<1>(n-2, *before, *here, *after);
             band.template eliminate<0>(n-1, *here, *after, *before);
         }
@@ -171,7 +191,8 @@ public:
         segment.shift = lesser<Real>(0.5*segment.response, along);
         band.setTension(s, t, 1/(segment.response-segment.shift+TINY), segment.tension);
 
-        const Real turning = 0.5*larger<Real>(segment.multiplier*geometry.inverse, acrossTurn*(-COMPRESSION*perStep));
+        const Real least = allowsCompression ? splat<Real>(-UNBOUNDED) : acrossTurn*(-COMPRESSION*perStep);
+        const Real turning = 0.5*larger<Real>(segment.multiplier*geometry.inverse, least);
         after.diagonal = Symmetric<Real> {};
         after.diagonal.addAxial(sameAcross, along-sameAcross, direction);
         after.diagonal.addAxial(turning, segment.shift-turning, t);
@@ -238,6 +259,24 @@ public:
         before.upper = before.upper+mixed-Mat::of(first);
         here.upper = here.upper+mixed-Mat::of(last);
     }
+    /** Add a bend that is linear in the nodes to their equations. */
+    CYLCHAIN_INLINE void addLinearBend(int s, const Geometry& geometry1, const Geometry& geometry2, Row& before,
+                Row& here, Row& after) {
+        const ImplicitSegment<Real>& segment = segments[s];
+        const Real stiffness = loaded<Real>(pack.joints, s);
+        const Vec bend = geometry2.difference-geometry1.difference;
+        const Vec force = (bend*segment.jointImplicit+segment.constantBend-segment.turningBend)*stiffness;
+        before.right = before.right-force;
+        here.right = here.right+force+force;
+        after.right = after.right-force;
+        const Real scale = stiffness*segment.jointImplicit, twice = scale+scale;
+        before.diagonal.addDiagonal(scale);
+        here.diagonal.addDiagonal(twice+twice);
+        after.diagonal.addDiagonal(scale);
+        before.second = Mat::diagonal(scale);
+        before.upper = before.upper-Mat::diagonal(twice);
+        here.upper = here.upper-Mat::diagonal(twice);
+    }
 private:
     const ImplicitState<W>& step;
     const Pack& pack;
@@ -247,6 +286,7 @@ private:
     ImplicitSegment<Real>* const segments;
     const Vec* const x;
     Vec *const loads, *const change;
+    bool allowsCompression = false;
     Band band;
 
     /**
@@ -255,8 +295,12 @@ private:
     void addDragOfFlow(const Vec* y) {
         const LaneFlow<W> flow(settings.flow, pack.planar, x[0]);
         const Real share = splat<Real>(step.shareOfForces());
-        for (int node = 0; node < n; node++)
+        const Real ofNode = loaded<Real>(pack.nodeFriction, 0)*share;
+        for (int node = 0; node < n; node++) {
             loads[node] = step.f[node];
+            if (node < pack.ownNodes())
+                loads[node] = loads[node]+flow.at(x[node]+y[node]*splat<Real>(0.5))*ofNode;
+        }
         for (int s = 0; s < pack.segments; s++) {
             Vec carried, pair;
             findDragOfFlow(flow, y, s, carried, pair);
@@ -297,6 +341,11 @@ private:
         const ImplicitSegment<Real>& segment = segments[s];
         const Real squareOfSine = 0.5-0.5*segment.tangent.dot(geometry.tangent);
         return (1-squareOfSine*(0.25+0.09375*squareOfSine))*(segment.inverse*geometry.inverse);
+    }
+    CYLCHAIN_INLINE void addNodeFriction(const Vec* y, int node, Row& row) {
+        const Real friction = loaded<Real>(pack.nodeFriction, 0)*(1/h);
+        row.diagonal.addDiagonal(friction);
+        row.right = row.right-y[node]*friction;
     }
     /** Add the tethers of a node, the next ones, to its equations. */
     void addTethers(const Vec* y, int node, std::size_t& next, Row& row) {

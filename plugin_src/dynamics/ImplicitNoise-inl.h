@@ -40,9 +40,19 @@ private:
     ImplicitSegment<Real>* const segments;
     Vec* const random;
 
+    void drawForceOnNode(const Real* normals, int node, Scalar amplitude) {
+        const Real size = loaded<Real>(pack.rootNodeFriction, 0)*amplitude;
+        random[node] = random[node]+nodeNoise<Real>(normals, pack.planar)*size;
+    }
     void drawForces(const Real* normals, int s, Scalar amplitude);
     void drawLength(const NoisePlaces<W>& places, int s, Real normal);
     void drawBend(const NoisePlaces<W>& places, int s);
+    /** A bend that is linear in the nodes is Gaussian. */
+    void drawLinearBend(const Real* normals, int s) {
+        const Real stiffness = loaded<Real>(pack.joints, s);
+        const Real deviation = stiffness > 0 ? root(kT/(stiffness+TINY)) : Real{};
+        segments[s].randomBend = nodeNoise<Real>(normals, pack.planar)*deviation;
+    }
     /** In a plane, a bend has one component, and its angle a uniform measure. */
     void drawPlanarBend(const NoisePlaces<W>& places, int s);
 };
@@ -53,18 +63,32 @@ void ImplicitNoise<W, CLOSED>::draw() {
     NoisePlaces<W> places = noisePlaces<W>(pack);
     const Scalar amplitude = std::sqrt(2*settings.kT/step.h);
     for (int s = 0; s < step.n-1; s++, places.part += 1) {
-        if (!CLOSED || s < pack.segments) {
+        Real ofNode[8];
+        if (pack.hasNodeFriction || isLinear(pack.bending))
+            drawNormals<W, 4>(key, NoiseKind::Node, places, ofNode);
+        if (pack.hasNodeFriction && s < pack.ownNodes())
+            drawForceOnNode(ofNode, s, amplitude);
+        if (pack.hasSegmentFriction && s < pack.segments) {
             Real normals[8];
             drawNormals<W, 4>(key, NoiseKind::Segment, places, normals);
             drawForces(normals, s, amplitude);
             drawLength(places, s, normals[6]);
         }
-        if (s > 0) {
+        else if (s < pack.segments)
+            drawLength(places, s, ofNode[3]);
+        if (s > 0 && isLinear(pack.bending))
+            drawLinearBend(ofNode+4, s);
+        else if (s > 0) {
             if (pack.planar)
                 drawPlanarBend(places, s);
             else
                 drawBend(places, s);
         }
+    }
+    if (pack.hasNodeFriction && step.n-1 < pack.ownNodes()) {
+        Real normals[8];
+        drawNormals<W, 4>(key, NoiseKind::Node, places, normals);
+        drawForceOnNode(normals, step.n-1, amplitude);
     }
     for (std::size_t i = 0; i < pack.tethers.size(); i++) {
         const LaneTether& tether = pack.tethers[i];

@@ -13,6 +13,7 @@ public:
     }
     /** Describe the start of a step, without noise. */
     void describe() {
+        const Real ofNode = loaded<Real>(pack.nodeFriction, 0);
         for (int s = 0; s < n-1; s++) {
             ImplicitSegment<Real>& segment = segments[s];
             segment.difference = step.start.segments[s];
@@ -24,10 +25,13 @@ public:
             stretchCoordinate<Real>(pack.stretching, property<Real>(pack, s, Pack::InverseExtension), segment.length-l0,
                     segment.coordinate, slope);
             const Real stretchRate = h*property<Real>(pack, s, Pack::Stiffness)*l0*l0+TINY;
-            segment.theta = larger<Real>(splat<Real>(0.5), 1-property<Real>(pack, s, Pack::Extensional)/stretchRate);
+            const Real friction = property<Real>(pack, s, Pack::Extensional)+ofNode*(0.25*l0*l0);
+            segment.theta = larger<Real>(splat<Real>(0.5), 1-friction/stretchRate);
             segment.randomCoordinate = segment.randomTension = segment.multiplier = segment.extra = Real{};
             segment.randomBend = segment.randomForce = segment.randomPair = segment.metricForce = Vec {};
-            if (s > 0)
+            if (s > 0 && isLinear(pack.bending))
+                describeLinearBend(s);
+            else if (s > 0)
                 describeJoint(s);
         }
         for (std::size_t i = 0; i < pack.tethers.size(); i++)
@@ -58,10 +62,12 @@ public:
             }
             else {
                 const Vec difference = segment.difference+(y[s+1]-y[s]);
-                const Vec tangent = difference*(1/root(difference.dot(difference)));
+                const bool linear = isLinear(pack.bending);
+                const Vec tangent = linear ? difference : difference*(1/root(difference.dot(difference)));
                 const Vec bent = tangent-before;
                 if (s > 0)
-                    segment.constantBend = bent*(bendFactor(pack.bending, bent).f*(1-DIAGONAL));
+                    segment.constantBend = bent*((linear ? splat<Real>(1) : bendFactor(pack.bending, bent).f)*
+                            (1-DIAGONAL));
                 before = tangent;
                 segment.jointImplicit = splat<Real>(DIAGONAL);
                 segment.turningBend = segment.randomBend*splat<Real>(2*DIAGONAL);
@@ -85,14 +91,25 @@ private:
         const Vec sum = segments[s-1].tangent+segment.tangent, bent = segment.tangent-segments[s-1].tangent;
         segment.bisector = sum*(1/root(sum.dot(sum)+TINY));
         segment.bend = bent*bendFactor(pack.bending, bent).f;
+        const Real l0 = property<Real>(pack, s, Pack::RestLength);
         const Real friction = lesser<Real>(property<Real>(pack, s-1, Pack::Rotational),
-                property<Real>(pack, s, Pack::Rotational));
+                property<Real>(pack, s, Pack::Rotational))+loaded<Real>(pack.nodeFriction, 0)*(0.25*l0*l0);
         const Real bendRate = 4*h*loaded<Real>(pack.joints, s)+TINY;
+        segment.jointTheta = larger<Real>(splat<Real>(0.5), 1-friction/bendRate);
+    }
+    /** The bend that alternates from node to node has four times the bend of a node, and relaxes as sixteen of them. */
+    void describeLinearBend(int s) {
+        ImplicitSegment<Real>& segment = segments[s];
+        segment.bend = segment.difference-segments[s-1].difference;
+        const Real inverse = property<Real>(pack, s, Pack::InverseRestLength);
+        const Real friction = loaded<Real>(pack.nodeFriction, 0)+
+                4*inverse*inverse*property<Real>(pack, s, Pack::Rotational);
+        const Real bendRate = 16*h*loaded<Real>(pack.joints, s)+TINY;
         segment.jointTheta = larger<Real>(splat<Real>(0.5), 1-friction/bendRate);
     }
     void describeTether(const LaneTether& tether, const TetherVector& start, ImplicitTether& result) {
         std::copy(start.d, start.d+3, result.start);
-        double friction = 0;
+        double friction = pack.nodeFriction[tether.lane];
         for (int side = tether.node-1; side <= tether.node; side++) {
             const int s = CLOSED && side < 0 ? pack.segments-1 : side;
             if (s >= 0 && s < pack.segmentsOfLane[tether.lane]) {

@@ -18,6 +18,11 @@ template <int W> inline NoisePlaces<W> noisePlaces(const Pack& pack) {
     return places;
 }
 
+/** The random force on a node, before friction colours it. */
+template <class Real> CYLCHAIN_INLINE Vector<Real> nodeNoise(const Real* normals, bool planar) {
+    return {normals[0], normals[1], planar ? Real{} : normals[2]};
+}
+
 /** The random forces of a segment: that on its middle and that on its ends, before friction colours them. */
 template <class Real> CYLCHAIN_INLINE void forceNoise(const Real* normals, bool planar, Vector<Real>& a,
         Vector<Real>& b) {

@@ -32,7 +32,9 @@ template <int W> void redistribute(const Pack& pack, const Vector<typename Lanes
             const Vector<typename Lanes<W>::Type>* f, Eliminated<typename Lanes<W>::Type>* nodes,
             Vector<typename Lanes<W>::Type>* v) {
     typedef typename Lanes<W>::Type Real;
-    Symmetric<Real> diagonal = {};
+    Symmetric<Real> ofNode = {};
+    ofNode.addDiagonal(loaded<Real>(pack.nodeFriction, 0));
+    Symmetric<Real> diagonal = ofNode;
     Vector<Real> right = f[0];
     const int last = pack.nodes-1;
     for (int s = 0; s < last; s++) {
@@ -65,6 +67,7 @@ template <int W> void redistribute(const Pack& pack, const Vector<typename Lanes
         next.zz = -(square*inverse.zz+2*cross*t.z*g.z+axial*t.z*t.z);
         next.addAxial(same, sameAxial, t);
         diagonal = next;
+        diagonal.add(ofNode);
         const Vector<Real> moved = node.inverse*right;
         right = f[s+1]-moved*other-t*(otherAxial*t.dot(moved));
     }
@@ -85,7 +88,9 @@ template <int W> void redistributeClosed(const Pack& pack, const Vector<typename
     typedef typename Lanes<W>::Type Real;
     typedef Matrix<Real> Mat;
     const int count = pack.segments;
-    Symmetric<Real> diagonal = {}, first = {};
+    Symmetric<Real> ofNode = {};
+    ofNode.addDiagonal(loaded<Real>(pack.nodeFriction, 0));
+    Symmetric<Real> diagonal = {}, first = ofNode;
     Vector<Real> right = {}, rightOfFirst = f[0]+f[count];
     Mat coupling = {};
     for (int s = 0; s < count; s++) {
@@ -126,6 +131,7 @@ template <int W> void redistributeClosed(const Pack& pack, const Vector<typename
             }
         }
         diagonal = next;
+        diagonal.add(ofNode);
         right = nextRight;
         coupling = nextCoupling;
     }
@@ -145,6 +151,9 @@ template <int W> void redistributeClosed(const Pack& pack, const Vector<typename
 template <int W> void addDrag(const Pack& pack, const Vector<typename Lanes<W>::Type>* x, const LaneFlow<W>& flow,
             Vector<typename Lanes<W>::Type>* f) {
     typedef typename Lanes<W>::Type Real;
+    const Real ofNode = loaded<Real>(pack.nodeFriction, 0);
+    for (int node = 0; node < pack.ownNodes() && pack.hasNodeFriction; node++)
+        f[node] = f[node]+flow.at(x[node])*ofNode;
     for (int s = 0; s < pack.segments; s++) {
         const Vector<Real> difference = x[s+1]-x[s];
         const Real inverseSquare = 1/difference.dot(difference);

@@ -10,12 +10,15 @@
  * - Midpoint: Fixman's midpoint, which has the right drift on chains.
  * - Implicit: the chain's own forces at the end of the step, so that they do not limit it.
  * - ImplicitSecondOrder: the same in two stages, so that the motion of bends is right to second order in the step.
+ * - Modes: the normal modes of chains of beads, each advanced as if it were alone: Panja, Barkema and van Leeuwen, Phys.
+ *   Rev. E 2015, 92, 032603, Section IV.
  */
 #define CYLCHAIN_SCHEMES(ENTRY) \
     ENTRY(Euler, "euler", false) \
     ENTRY(Midpoint, "midpoint", false) \
     ENTRY(Implicit, "implicit", true) \
-    ENTRY(ImplicitSecondOrder, "implicit-second-order", true)
+    ENTRY(ImplicitSecondOrder, "implicit-second-order", true) \
+    ENTRY(Modes, "modes", true)
 
 namespace cylchain {
 
@@ -25,10 +28,15 @@ template <> struct Names<Scheme> {
     static constexpr const char* ALL[] = {CYLCHAIN_SCHEMES(CYLCHAIN_NAME)};
 };
 
-/** Whether a scheme computes the forces of chains itself. */
+/** Whether a scheme is one of the implicit ones, which solve equations in each step. */
 constexpr bool isImplicit(Scheme scheme) {
+    return scheme == Scheme::Implicit || scheme == Scheme::ImplicitSecondOrder;
+}
+
+/** Whether a scheme computes the forces of chains itself. */
+constexpr bool computesChainForces(Scheme scheme) {
     switch (scheme) {
-#define CYLCHAIN_CASE(entry, name, implicit) case Scheme::entry: return implicit;
+#define CYLCHAIN_CASE(entry, name, computes) case Scheme::entry: return computes;
         CYLCHAIN_SCHEMES(CYLCHAIN_CASE)
 #undef CYLCHAIN_CASE
     }

@@ -26,6 +26,12 @@ template <class Real> struct Symmetric {
         zy += m.zy;
         zz += m.zz;
     }
+    /** Add s 1. */
+    CYLCHAIN_INLINE void addDiagonal(Real s) {
+        xx += s;
+        yy += s;
+        zz += s;
+    }
     /** Add s 1 + r tt. */
     CYLCHAIN_INLINE void addAxial(Real s, Real r, const Vector<Real>& t) {
         addOuter(t*r, t);
@@ -82,6 +88,9 @@ template <class Real> struct Matrix {
     static CYLCHAIN_INLINE Matrix axial(Real s, Real r, const Vector<Real>& t) {
         const Vector<Real> v = t*r;
         return {{s+v.x*t.x, v.x*t.y, v.x*t.z}, {v.y*t.x, s+v.y*t.y, v.y*t.z}, {v.z*t.x, v.z*t.y, s+v.z*t.z}};
+    }
+    static CYLCHAIN_INLINE Matrix diagonal(Real s) {
+        return {{s, Real{}, Real{}}, {Real{}, s, Real{}}, {Real{}, Real{}, s}};
     }
     static CYLCHAIN_INLINE Matrix of(const Symmetric<Real>& s) {
         return {{s.xx, s.yx, s.zx}, {s.yx, s.yy, s.zy}, {s.zx, s.zy, s.zz}};

@@ -19,7 +19,9 @@ enum class NoiseKind : std::uint32_t {
     /** Of a tether, by its number among those of its chain. */
     Tether = 3,
     /** Of a particle outside chains, by its index, with zero for the chain. */
-    Particle = 4
+    Particle = 4,
+    /** Of a node: three for the force on it, one for the length behind it if segments have none, three for its bend. */
+    Node = 5
 };
 
 /**

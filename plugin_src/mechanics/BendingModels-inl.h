@@ -4,7 +4,8 @@
  * Bends of joints as coordinates b = f (t2-t1) with the energy (stiffness/2) b^2, and their distribution in
  * equilibrium.
  *
- * Each entry of CYLCHAIN_BENDING_MODELS has a struct of its name with its formulas.
+ * Each entry of CYLCHAIN_ANGULAR_BENDING_MODELS has a struct of its name with its formulas. Bends that are linear in the
+ * nodes need none: see LinearBends-inl.h.
  */
 
 /** f of a bend b = f (t2-t1), and df/dc, for the cosine c. */
@@ -138,11 +139,11 @@ struct InscribedCircle : BendingFormulas {
     static constexpr bool ACCEPTS_IN_LANES = true;
 };
 
-// A formula of a model. Chains have no other models than those of the list: ChainEngine has seen to it.
+// A formula of a model of an angle. Callers have no other ones.
 #define CYLCHAIN_CASE(entry, ...) \
-    if (model == BendingModel::entry || isLast(BendingModel::entry)) \
+    if (model == BendingModel::entry || isLastAngular(BendingModel::entry)) \
         return entry::CYLCHAIN_FORMULA;
-#define CYLCHAIN_DISPATCH CYLCHAIN_BENDING_MODELS(CYLCHAIN_CASE)
+#define CYLCHAIN_DISPATCH CYLCHAIN_ANGULAR_BENDING_MODELS(CYLCHAIN_CASE)
 
 template <class Real> inline Real bendingSlope(BendingModel model, Real stiffness, Real c, Real sineSquared) {
 #define CYLCHAIN_FORMULA slope(stiffness, c, sineSquared)
@@ -175,7 +176,7 @@ template <class Real> CYLCHAIN_INLINE void bendFactors(BendingModel model, const
     if (entry::SHARES_DIVISIONS && model == BendingModel::entry) \
         return entry::factors(difference1, difference2, factor1, factor2, numbers, number1, number2, inverse1, \
                 inverse2);
-    CYLCHAIN_BENDING_MODELS(CYLCHAIN_SHARING_CASE)
+    CYLCHAIN_ANGULAR_BENDING_MODELS(CYLCHAIN_SHARING_CASE)
 #undef CYLCHAIN_SHARING_CASE
     factor1 = bendFactor(model, difference1);
     factor2 = bendFactor(model, difference2);

@@ -12,14 +12,35 @@
  * - Quadratic: (b/2) theta^2
  * - InscribedCircle: 2b (1-c)/(1+c), eq. (27), which diverges where a joint folds back
  */
-#define CYLCHAIN_BENDING_MODELS(ENTRY) \
+#define CYLCHAIN_ANGULAR_BENDING_MODELS(ENTRY) \
     ENTRY(KratkyPorod, "kratky-porod") \
     ENTRY(Quadratic, "quadratic") \
     ENTRY(InscribedCircle, "inscribed-circle")
 
+/**
+ * All bending energies: those of an angle, and one of the vectors u1 and u2 of the segments, whose force is linear in
+ * the nodes.
+ *
+ * - BondDifference: (b/2) |u2-u1|^2, with b per square of a length: Panja, Barkema and van Leeuwen, Phys. Rev. E 2015,
+ *   92, 032603, eq. (8)
+ */
+#define CYLCHAIN_BENDING_MODELS(ENTRY) \
+    CYLCHAIN_ANGULAR_BENDING_MODELS(ENTRY) \
+    ENTRY(BondDifference, "bond-difference")
+
 namespace cylchain {
 
 enum class BendingModel {CYLCHAIN_BENDING_MODELS(CYLCHAIN_ENUMERATOR)};
+
+/** Whether the force of a joint is linear in its nodes. */
+constexpr bool isLinear(BendingModel model) {
+    return model == BendingModel::BondDifference;
+}
+
+/** Whether a model is the last of those of an angle. */
+constexpr bool isLastAngular(BendingModel model) {
+    return static_cast<int>(model)+1 == static_cast<int>(BendingModel::BondDifference);
+}
 
 template <> struct Names<BendingModel> {
     static constexpr const char* ALL[] = {CYLCHAIN_BENDING_MODELS(CYLCHAIN_NAME)};

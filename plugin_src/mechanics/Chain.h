@@ -43,6 +43,11 @@ struct Chain {
     std::vector<double> joints;
     BendingModel bending;
     StretchingModel stretching;
+    /**
+     * Friction of each node against its motion, the same in all directions, besides that of segments: a chain of beads
+     * has this one alone.
+     */
+    double nodeFriction = 0;
     /** Nodes that do not move. */
     std::vector<bool> fixed;
     std::vector<Tether> tethers;

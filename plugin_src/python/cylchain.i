@@ -197,8 +197,12 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %pythonappend OpenMM::CylinderChainForce::getSegmentPropulsion(int, int, double&) const %{
     val = unit.Quantity(val, _FORCE)
 %}
+%pythonappend OpenMM::CylinderChainForce::getChainNodeFriction(int) const %{
+    val = unit.Quantity(val, _FRICTION)
+%}
 %pythonappend OpenMM::CylinderChainForce::getJointParameters(int, int, double&) const %{
-    val = unit.Quantity(val, _ENERGY)
+    linear = self.getChainModels(args[0])[0] == CylinderChainForce.BondDifference
+    val = unit.Quantity(val, _STIFFNESS if linear else _ENERGY)
 %}
 %pythonappend OpenMM::CylinderChainForce::getTetherParameters(int, int&, int&, Vec3&, double&) const %{
     val[2] = unit.Quantity(val[2], _LENGTH)

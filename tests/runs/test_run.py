@@ -14,6 +14,7 @@ import time
 import mdtraj
 import numpy as np
 import pytest
+from openmm import app
 
 from openmm_cylchain import F_ACTIN, InputError
 from openmm_cylchain.cli import main
@@ -21,6 +22,7 @@ from openmm_cylchain.runs.configuration import parse_configuration, read_configu
 from openmm_cylchain.runs.run import create_filaments, run
 from openmm_cylchain.runs.run_directory import RunDirectory, read_energies
 from openmm_cylchain.runs.summary import format_summary, load_trajectory, summarise
+from support.contexts import positions_of
 
 SHORT = """
 title = "short"
@@ -392,6 +394,27 @@ def test_infinite_energy_is_not_written(tmp_path, capsys):
     assert re.search(r"error: Filament \d \(ACT\) has blown up at segment \d in step \d+", capsys.readouterr().err)
     energies = read_energies(output / "energies.csv")
     assert all(np.all(np.isfinite(column)) for column in energies.values())
+
+
+@pytest.mark.parametrize("moved", [[0.0, 0.0, 2.0], [0.0, 0.0, np.nan]], ids=["beyond its range", "not a number"])
+def test_configuration_without_an_energy_is_traced_to_its_segment(tmp_path, monkeypatch, capsys, moved):
+    """Where an engine has not stopped before."""
+    text = SHORT.replace(
+        'start = "straight"',
+        'start = "straight"\ndirection = [0, 0, 1]\nstretching_model = "fene"\nmaximum_extension = "1 nm"',
+    )
+
+    def step(simulation, steps):
+        positions = positions_of(simulation.context)
+        # The last node of the last filament, whose fourth segment it ends.
+        positions[-1] += moved
+        simulation.context.setPositions(positions)
+
+    monkeypatch.setattr(app.Simulation, "step", step)
+    assert main(["run", configured(tmp_path, text), "--output", str(tmp_path / "out")]) == 1
+    error = capsys.readouterr().err
+    assert "Filament 3 (ACT) has blown up at segment 3 by step" in error and "its position or energy is not" in error
+    assert np.all(np.isfinite(read_energies(tmp_path / "out" / "energies.csv")["stretching energy (kJ/mol)"]))
 
 
 @pytest.mark.parametrize(

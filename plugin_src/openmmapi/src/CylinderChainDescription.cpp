@@ -5,6 +5,20 @@ using namespace std;
 
 namespace OpenMM {
 
+/**
+ * Every node needs some friction: its own, or that of its segments, which must be complete then.
+ */
+static void checkFriction(const cylchain::Chain& chain, int index) {
+    if (chain.nodeFriction > 0)
+        return;
+    for (size_t i = 0; i < chain.segments.size(); i++) {
+        const cylchain::Segment& segment = chain.segments[i];
+        if (segment.parallel <= 0 || segment.perpendicular <= 0 || segment.rotational <= 0 || segment.extensional <= 0)
+            throw OpenMMException("CylinderChainForce: Segment "+to_string(i)+" of chain "+to_string(index)+
+                    " lacks friction. Its four frictions must be positive unless the nodes of the chain have some");
+    }
+}
+
 static void copyParameters(const CylinderChainForce& force, int index, cylchain::Chain& chain) {
     for (size_t i = 0; i < chain.segments.size(); i++) {
         cylchain::Segment& segment = chain.segments[i];
@@ -15,6 +29,8 @@ static void copyParameters(const CylinderChainForce& force, int index, cylchain:
     for (size_t i = 0; i < chain.joints.size(); i++)
         force.getJointParameters(index, i, chain.joints[i]);
     chain.planar = force.isChainPlanar(index);
+    chain.nodeFriction = force.getChainNodeFriction(index);
+    checkFriction(chain, index);
 }
 
 static cylchain::Chain describeTopology(const CylinderChainForce& force, int index) {

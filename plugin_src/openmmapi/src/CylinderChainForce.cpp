@@ -16,6 +16,11 @@ static void checkPositive(double value, const char* name) {
         throw OpenMMException(string("CylinderChainForce: ")+name+" must be positive and finite");
 }
 
+static void checkNotNegative(double value, const char* name) {
+    if (!(value >= 0 && isfinite(value)))
+        throw OpenMMException(string("CylinderChainForce: ")+name+" cannot be negative and must be finite");
+}
+
 static void checkStiffness(double stiffness) {
     if (!(stiffness >= 0 && isfinite(stiffness)))
         throw OpenMMException("CylinderChainForce: The stiffness of a joint cannot be negative and must be finite");
@@ -62,6 +67,7 @@ int CylinderChainForce::addChain(const vector<int>& particles, BendingModel bend
     chain.stretchingModel = stretchingModel;
     chain.closed = closed;
     chain.planar = false;
+    chain.nodeFriction = 0;
     chain.segments.resize(closed ? particles.size() : particles.size()-1);
     chain.joints.assign(closed ? particles.size() : particles.size()-2, jointStiffness);
     chains.push_back(chain);
@@ -109,6 +115,15 @@ void CylinderChainForce::setChainPlanar(int chain, bool planar) {
     getChain(chain).planar = planar;
 }
 
+double CylinderChainForce::getChainNodeFriction(int chain) const {
+    return getChain(chain).nodeFriction;
+}
+
+void CylinderChainForce::setChainNodeFriction(int chain, double friction) {
+    checkNotNegative(friction, "The friction of nodes");
+    getChain(chain).nodeFriction = friction;
+}
+
 int CylinderChainForce::getNumSegments(int chain) const {
     return getChain(chain).segments.size();
 }
@@ -141,10 +156,11 @@ void CylinderChainForce::setSegmentParameters(int chain, int segment, double res
     checkPositive(stretchingStiffness, "The stretching stiffness");
     if (cylchain::hasRange(static_cast<cylchain::StretchingModel>(getChain(chain).stretchingModel)))
         checkPositive(maximumExtension, "The maximum extension");
-    checkPositive(parallelFriction, "The parallel friction");
-    checkPositive(perpendicularFriction, "The perpendicular friction");
-    checkPositive(rotationalFriction, "The rotational friction");
-    checkPositive(extensionalFriction, "The extensional friction");
+    // Nodes may have the friction that a segment lacks: CylinderChainForceImpl looks at both.
+    checkNotNegative(parallelFriction, "The parallel friction");
+    checkNotNegative(perpendicularFriction, "The perpendicular friction");
+    checkNotNegative(rotationalFriction, "The rotational friction");
+    checkNotNegative(extensionalFriction, "The extensional friction");
     segments[segment] = {restLength, stretchingStiffness, maximumExtension, parallelFriction, perpendicularFriction,
             rotationalFriction, extensionalFriction, segments[segment].propulsion};
 }

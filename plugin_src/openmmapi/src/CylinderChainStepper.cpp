@@ -82,7 +82,7 @@ StepSettings CylinderChainStepper::describeStep(uint64_t seed, int level, uint64
     const bool includesChains = (integrator.getIntegrationForceGroups()&(1<<chains.getForceGroup())) != 0;
     // The entries of both enumerations are those of one list.
     settings.scheme = static_cast<Scheme>(integrator.getScheme());
-    if (isImplicit(settings.scheme) && !includesChains)
+    if (computesChainForces(settings.scheme) && !includesChains)
         settings.scheme = Scheme::Midpoint;
     settings.kT = BOLTZ*integrator.getTemperature();
     settings.stepSize = integrator.getStepSize();

@@ -11,7 +11,7 @@ CylinderChainForceProxy::CylinderChainForceProxy() : SerializationProxy("Cylinde
 }
 
 void CylinderChainForceProxy::serialize(const void* object, SerializationNode& node) const {
-    node.setIntProperty("version", 3);
+    node.setIntProperty("version", 4);
     const CylinderChainForce& force = *reinterpret_cast<const CylinderChainForce*>(object);
     node.setIntProperty("forceGroup", force.getForceGroup());
     node.setStringProperty("name", force.getName());
@@ -21,8 +21,10 @@ void CylinderChainForceProxy::serialize(const void* object, SerializationNode& n
         int bendingModel, stretchingModel;
         force.getChainModels(i, bendingModel, stretchingModel);
         SerializationNode& chain = chains.createChildNode("Chain");
-        chain.setIntProperty("bendingModel", bendingModel).setIntProperty("stretchingModel", stretchingModel)
-                .setBoolProperty("closed", force.isChainClosed(i)).setBoolProperty("planar", force.isChainPlanar(i));
+        chain.setStringProperty("bendingModel", CylinderChainForce::getBendingModelNames()[bendingModel])
+                .setStringProperty("stretchingModel", CylinderChainForce::getStretchingModelNames()[stretchingModel])
+                .setBoolProperty("closed", force.isChainClosed(i)).setBoolProperty("planar", force.isChainPlanar(i))
+                .setDoubleProperty("nodeFriction", force.getChainNodeFriction(i));
         SerializationNode& particles = chain.createChildNode("Particles");
         for (int particle : force.getChainParticles(i))
             particles.createChildNode("Particle").setIntProperty("index", particle);
@@ -66,7 +68,20 @@ static void addSegment(CylinderChainForce& force, int chain, int segment, const 
     force.setSegmentPropulsion(chain, segment, node.getDoubleProperty("propulsion", 0));
 }
 
-static void addChain(CylinderChainForce& force, const SerializationNode& node) {
+/**
+ * The number of a model. Since version 4, its name is stored; before, it was the number.
+ */
+static int findModel(const SerializationNode& node, const string& property, const vector<string>& names, int version) {
+    if (version < 4)
+        return node.getIntProperty(property);
+    const string name = node.getStringProperty(property);
+    for (size_t i = 0; i < names.size(); i++)
+        if (names[i] == name)
+            return i;
+    throw OpenMMException("CylinderChainForce: There is no "+property+" "+name);
+}
+
+static void addChain(CylinderChainForce& force, const SerializationNode& node, int version) {
     vector<int> particles;
     for (auto& particle : node.getChildNode("Particles").getChildren())
         particles.push_back(particle.getIntProperty("index"));
@@ -79,9 +94,11 @@ static void addChain(CylinderChainForce& force, const SerializationNode& node) {
 
     // Add a chain of placeholders, and then set the parameters.
 
-    const int chain = force.addChain(particles, (CylinderChainForce::BendingModel) node.getIntProperty("bendingModel"),
-            (CylinderChainForce::StretchingModel) node.getIntProperty("stretchingModel"), 1, 1, 1, 0, 1, 1, 1, 1,
-            closed);
+    const int bending = findModel(node, "bendingModel", CylinderChainForce::getBendingModelNames(), version);
+    const int stretching = findModel(node, "stretchingModel", CylinderChainForce::getStretchingModelNames(), version);
+    const int chain = force.addChain(particles, (CylinderChainForce::BendingModel) bending,
+            (CylinderChainForce::StretchingModel) stretching, 1, 1, 1, 0, 1, 1, 1, 1, closed);
+    force.setChainNodeFriction(chain, node.getDoubleProperty("nodeFriction", 0));
     force.setChainPlanar(chain, node.getBoolProperty("planar", false));
     for (size_t j = 0; j < segments.size(); j++)
         addSegment(force, chain, j, segments[j]);
@@ -91,14 +108,14 @@ static void addChain(CylinderChainForce& force, const SerializationNode& node) {
 
 void* CylinderChainForceProxy::deserialize(const SerializationNode& node) const {
     const int version = node.getIntProperty("version");
-    if (version < 1 || version > 3)
+    if (version < 1 || version > 4)
         throw OpenMMException("Unsupported version number");
     unique_ptr<CylinderChainForce> force(new CylinderChainForce());
     force->setForceGroup(node.getIntProperty("forceGroup"));
     force->setName(node.getStringProperty("name"));
     force->setUsesPeriodicBoundaryConditions(node.getBoolProperty("usesPeriodic"));
     for (auto& chain : node.getChildNode("Chains").getChildren())
-        addChain(*force, chain);
+        addChain(*force, chain, version);
     if (version > 1)
         for (auto& tether : node.getChildNode("Tethers").getChildren())
             force->addTether(tether.getIntProperty("chain"), tether.getIntProperty("node"),

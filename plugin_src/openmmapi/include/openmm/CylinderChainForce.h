@@ -44,6 +44,8 @@ public:
      * Quadratic: (b/2) theta^2.
      *
      * InscribedCircle: 2b (1-c)/(1+c), eq. (27), which diverges where a joint folds back.
+     *
+     * BondDifference: (b/2) |u2-u1|^2, with the vectors u1 and u2 of the segments, and b measured in kJ/mol/nm^2.
      */
     enum BendingModel : int {CYLCHAIN_BENDING_MODELS(CYLCHAIN_ENUMERATOR)};
     /**
@@ -73,7 +75,7 @@ public:
         return chains.size();
     }
     /**
-     * Add a chain.
+     * Add a chain.  Segments may have no friction at all if its nodes are given some, by setChainNodeFriction().
      *
      * @param particles              the indices of the particles that are its nodes, in the order of the chain: at
      *                               least two, and none of them twice
@@ -84,7 +86,7 @@ public:
      * @param maximumExtension       the maximum extension D of each segment, measured in nm; it has no effect unless
      *                               the stretching model is FENE
      * @param jointStiffness         the bending stiffness b of each joint, measured in kJ/mol: the bending rigidity
-     *                               divided by the rest length
+     *                               divided by the rest length; in kJ/mol/nm^2 if the bending model is BondDifference
      * @param parallelFriction       the friction of each segment against motion along itself, measured in
      *                               kJ ps/mol/nm^2
      * @param perpendicularFriction  the friction of each segment against motion across itself, measured in
@@ -134,6 +136,20 @@ public:
      * @param planar  whether its nodes keep their z
      */
     void setChainPlanar(int chain, bool planar);
+    /**
+     * Get the friction of each node of a chain.
+     *
+     * @param chain  the index of the chain
+     */
+    double getChainNodeFriction(int chain) const;
+    /**
+     * Set the friction of each node of a chain against its motion, the same in all directions, besides that of its
+     * segments.  It is zero unless this is called.  A chain of beads has this friction alone.
+     *
+     * @param chain     the index of the chain
+     * @param friction  the friction, measured in kJ ps/mol/nm^2
+     */
+    void setChainNodeFriction(int chain, double friction);
     /**
      * Get the number of segments of a chain: one less than it has nodes, or as many if it is closed.
      *
@@ -322,6 +338,7 @@ public:
     std::vector<SegmentInfo> segments;
     std::vector<double> joints;
     bool closed, planar;
+    double nodeFriction;
 };
 
 } // namespace OpenMM

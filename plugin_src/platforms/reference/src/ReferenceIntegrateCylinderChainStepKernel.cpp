@@ -165,7 +165,7 @@ int ReferenceIntegrateCylinderChainStepKernel::advancePack(ContextImpl& context,
         settings.segmentForces = (done == count-1 ? segmentForces : NULL);
         const double* positions = &newPositions[0][0];
         engine.clearForces(pack, forces);
-        if (!isImplicit(settings.scheme))
+        if (!computesChainForces(settings.scheme))
             engine.addForces(pack, positions, forces, box, false);
         const Instability instability = engine.step(pack, positions, forces, box, settings, &displacements[0][0]);
         if (instability.chain != -1)
