@@ -4,7 +4,9 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdlib>
+#include <mutex>
 #include <numeric>
+#include <optional>
 #include <stdexcept>
 #include <tuple>
 
@@ -75,7 +77,7 @@ template <class Scalar> void setSegment(ChainPack<Scalar>& pack, int lane, int s
     }
 }
 
-template <class Scalar> void fillLane(ChainPack<Scalar>& pack, int lane, const Chain& chain, int index) {
+void fillLane(ChainPack<double>& pack, int lane, const Chain& chain, int index) {
     const int lanes = pack.lanes;
     const size_t own = chain.nodes.size(), unrolled = own+(chain.closed ? 2 : 0);
     pack.chain[lane] = index;
@@ -94,16 +96,12 @@ template <class Scalar> void fillLane(ChainPack<Scalar>& pack, int lane, const C
         setSegment(pack, lane, s, chain.segments[s%chain.segments.size()], chain.planar ? 2 : 3);
 }
 
-template <class Scalar> ChainPack<Scalar> packed(const vector<Chain>& chains, const vector<int>& members, int lanes) {
-    ChainPack<Scalar> pack;
-    const Chain& longest = chains[members[0]];
+/** A pack whose lanes are all filled up. */
+template <class Scalar> ChainPack<Scalar> packWithoutChains(const PackShape& shape, int lanes) {
+    typedef ChainPack<Scalar> Pack;
+    Pack pack;
+    static_cast<PackShape&>(pack) = shape;
     pack.lanes = lanes;
-    pack.nodes = longest.nodes.size()+(longest.closed ? 2 : 0);
-    pack.segments = longest.segments.size();
-    pack.bending = longest.bending;
-    pack.stretching = longest.stretching;
-    pack.closed = longest.closed;
-    pack.planar = longest.planar;
     pack.chain.resize(lanes, -1);
     pack.nodesOfLane.resize(lanes);
     pack.segmentsOfLane.resize(lanes);
@@ -112,20 +110,65 @@ template <class Scalar> ChainPack<Scalar> packed(const vector<Chain>& chains, co
     pack.particles.resize(places, -1);
     pack.mobile.resize(places, 0.0);
     pack.joints.resize(places, 0.0);
-    pack.properties.resize((places-lanes)*ChainPack<Scalar>::NumProperties);
+    pack.properties.resize((places-lanes)*Pack::NumProperties);
     // A filling segment that has no inverse length is not looked at when an iteration might end.
-    typedef ChainPack<Scalar> Pack;
     for (int s = 0; s < pack.nodes-1; s++)
         for (int lane = 0; lane < lanes; lane++) {
             setSegment(pack, lane, s, {1, 0, 1, 0, 0, 0, 0}, 0);
             pack.properties[((size_t) s*Pack::NumProperties+Pack::InverseRestLength)*lanes+lane] = 0;
         }
-    for (size_t lane = 0; lane < members.size(); lane++)
-        fillLane(pack, lane, chains[members[lane]], members[lane]);
+    return pack;
+}
+
+template <class Scalar> void sortTethers(ChainPack<Scalar>& pack) {
     stable_sort(pack.tethers.begin(), pack.tethers.end(), [] (const LaneTether& a, const LaneTether& b) {
         return a.node < b.node;
     });
+}
+
+ChainPack<double> packed(const vector<Chain>& chains, const vector<int>& members, int lanes) {
+    const Chain& longest = chains[members[0]];
+    ChainPack<double> pack = packWithoutChains<double>({(int) longest.nodes.size()+(longest.closed ? 2 : 0),
+            (int) longest.segments.size(), longest.bending, longest.stretching, longest.closed, longest.planar}, lanes);
+    for (size_t lane = 0; lane < members.size(); lane++)
+        fillLane(pack, lane, chains[members[lane]], members[lane]);
+    sortTethers(pack);
     return pack;
+}
+
+/** Copy arrays that have a row of lanes for each node, segment or property, into lanes from one on. */
+template <class From, class To> void copyLanes(const vector<From>& from, int lanes, vector<To>& to, int allLanes,
+        int firstLane) {
+    for (size_t row = 0; row*lanes < from.size(); row++)
+        copy_n(from.begin()+row*lanes, lanes, to.begin()+row*allLanes+firstLane);
+}
+
+/** Some packs, of which the first is the longest, as one in single precision. */
+ChainPack<float> widened(const ChainPack<double>* first, const ChainPack<double>* last, int lanes) {
+    ChainPack<float> wide = packWithoutChains<float>(*first, lanes);
+    int lane = 0;
+    for (const ChainPack<double>* pack = first; pack != last; lane += pack->lanes, pack++) {
+        auto copyTo = [&] (auto& to, const auto& from) {
+            copyLanes(from, pack->lanes, to, lanes, lane);
+        };
+        copyTo(wide.chain, pack->chain);
+        copyTo(wide.nodesOfLane, pack->nodesOfLane);
+        copyTo(wide.segmentsOfLane, pack->segmentsOfLane);
+        copyTo(wide.particles, pack->particles);
+        copyTo(wide.properties, pack->properties);
+        copyTo(wide.joints, pack->joints);
+        copyTo(wide.mobile, pack->mobile);
+        copyTo(wide.free, pack->free);
+        if (!pack->propulsions.empty())
+            wide.propulsions.resize((size_t) (wide.nodes-1)*lanes);
+        copyTo(wide.propulsions, pack->propulsions);
+        for (LaneTether tether : pack->tethers) {
+            tether.lane += lane;
+            wide.tethers.push_back(tether);
+        }
+    }
+    sortTethers(wide);
+    return wide;
 }
 
 template <class Scalar> ParticleRange particlesOf(const ChainPack<Scalar>& pack) {
@@ -135,17 +178,22 @@ template <class Scalar> ParticleRange particlesOf(const ChainPack<Scalar>& pack)
 /** A pack in single precision, in place of some of those in double precision, and what decides where it is right. */
 class WidePack {
 public:
-    ChainPack<float> pack;
     /** The packs that it replaces. */
     int first, last;
     int chains;
+    /** Nothing before a step takes it: with few chains, it is far larger than the packs that it replaces. */
+    optional<ChainPack<float> > pack;
     WidePack(const vector<Chain>& all, const vector<int>& members, int first, int last) :
-            pack(packed<float>(all, members, kernels().wide.lanes)), first(first), last(last), chains(members.size()) {
+            first(first), last(last), chains(members.size()) {
         for (int member : members)
             include(all[member]);
     }
+    void make(const vector<ChainPack<double> >& packs) {
+        if (!pack)
+            pack = widened(packs.data()+first, packs.data()+last, kernels().wide.lanes);
+    }
     bool isUsed(const StepSettings& settings) const {
-        if (settings.precision == Precision::Automatic && 2*chains <= pack.lanes)
+        if (settings.precision == Precision::Automatic && 2*chains <= kernels().wide.lanes)
             return false;
         const double h = settings.stepSize;
         // A flow needs to know where chains are. Written so that NaN is not right.
@@ -195,6 +243,8 @@ struct ChainEngine::Implementation {
     vector<ChainPack<double> > packs;
     /** In the order of the packs that they replace. */
     vector<WidePack> wide;
+    /** Held where wide packs are made. */
+    mutex making;
     bool isWide(int pack) const {
         return pack >= (int) packs.size();
     }
@@ -226,7 +276,7 @@ ChainEngine::ChainEngine(const vector<Chain>& chains) : implementation(new Imple
         while (2*lanes <= fitting)
             lanes *= 2;
         members.push_back(vector<int>(order.begin()+first, order.begin()+first+lanes));
-        implementation->packs.push_back(packed<double>(chains, members.back(), lanes));
+        implementation->packs.push_back(packed(chains, members.back(), lanes));
         first += lanes;
     }
 
@@ -255,10 +305,12 @@ int ChainEngine::getNumPacks() const {
 vector<int> ChainEngine::getPacksOfStep(const StepSettings& settings) const {
     vector<int> result;
     int next = 0;
+    const lock_guard<mutex> lock(implementation->making);
     for (size_t wide = 0; wide < implementation->wide.size(); wide++) {
-        const WidePack& pack = implementation->wide[wide];
+        WidePack& pack = implementation->wide[wide];
         if (!pack.isUsed(settings))
             continue;
+        pack.make(implementation->packs);
         for (; next < pack.first; next++)
             result.push_back(next);
         result.push_back(getNumPacks()+wide);
@@ -283,7 +335,7 @@ ChainEnergy ChainEngine::addForces(int pack, const double* positions, double* fo
 }
 
 ParticleRange ChainEngine::getParticles(int pack) const {
-    return implementation->isWide(pack) ? particlesOf(implementation->getWide(pack).pack) :
+    return implementation->isWide(pack) ? particlesOf(*implementation->getWide(pack).pack) :
             particlesOf(implementation->packs[pack]);
 }
 
@@ -296,7 +348,8 @@ void ChainEngine::clearForces(int pack, double* forces) const {
 Instability ChainEngine::step(int pack, const double* positions, const double* forces, const double* box,
             const StepSettings& settings, double* displacements) const {
     if (implementation->isWide(pack))
-        return kernels().wide.step(implementation->getWide(pack).pack, positions, forces, box, settings, displacements);
+        return kernels().wide.step(*implementation->getWide(pack).pack, positions, forces, box, settings,
+                displacements);
     return kernels().step(implementation->packs[pack], positions, forces, box, settings, displacements);
 }
 

@@ -7,6 +7,7 @@
 #include "lanes/Noise.h"
 #include <algorithm>
 #include <functional>
+#include <thread>
 
 static const double KT = 2.5;
 
@@ -213,6 +214,27 @@ static void testChainsDoNotDependOnTheirPack() {
                 checkClose(0, relativeDifference(a, b), 1, precision == Precision::Mixed ? 1e-5 : 1e-10, "chain alone");
             }
         }
+    }
+}
+
+static void testThreadsThatMakePacks() {
+    Array x;
+    const vector<Chain> chains = tetheredChains(x);
+    const Array f = someForces(x);
+    const StepSettings settings = settingsFor(Scheme::Implicit, 0.05);
+    const Array expected = stepIn(Precision::Mixed, ChainEngine(chains), x, f, settings).displacements;
+    for (int repeat = 0; repeat < 50; repeat++) {
+        const ChainEngine engine(chains);
+        vector<Array> found(4);
+        vector<thread> threads;
+        for (Array& displacements : found)
+            threads.emplace_back([&] () {
+                displacements = stepIn(Precision::Mixed, engine, x, f, settings).displacements;
+            });
+        for (thread& each : threads)
+            each.join();
+        for (const Array& displacements : found)
+            check(displacements == expected, "packs made by several threads");
     }
 }
 
@@ -576,6 +598,7 @@ int main() {
         testNoise,
         testPlaceInSpaceDoesNotMatter,
         testChainsDoNotDependOnTheirPack,
+        testThreadsThatMakePacks,
         testDividedSteps,
         testForcesOfSegments,
         testEnergies,
