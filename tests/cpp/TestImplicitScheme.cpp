@@ -21,7 +21,19 @@ static int componentFrom(const Chain& chain, int first, int component) {
     return 3*chain.nodes[(first+component/3)%chain.nodes.size()]+component%3;
 }
 
-/** A bend b = f (t2-t1), with the energy (stiffness/2) b^2. */
+/** The length of a bend b = f (t2-t1), with the energy (stiffness/2) b^2. */
+static double bendOfAngle(BendingModel model, double angle) {
+    switch (model) {
+    case BendingModel::KratkyPorod:
+        return 2*sin(0.5*angle);
+    case BendingModel::Quadratic:
+        return angle;
+    case BendingModel::InscribedCircle:
+        return 2*tan(0.5*angle);
+    }
+    throw runtime_error("The test does not know a bending model");
+}
+
 static Array bendOf(BendingModel model, const double* x) {
     double t1[3], t2[3], square1 = 0, square2 = 0, chordSquare = 0;
     for (int k = 0; k < 3; k++) {
@@ -36,13 +48,8 @@ static Array bendOf(BendingModel model, const double* x) {
         chordSquare += bend[k]*bend[k];
     }
     const double chord = sqrt(chordSquare), angle = 2*asin(0.5*chord);
-    double length = chord;
-    if (model == BendingModel::Quadratic)
-        length = angle;
-    if (model == BendingModel::InscribedCircle)
-        length = 2*tan(0.5*angle);
     for (double& component : bend)
-        component *= chord > 0 ? length/chord : 1;
+        component *= chord > 0 ? bendOfAngle(model, angle)/chord : 1;
     return bend;
 }
 
@@ -231,7 +238,7 @@ static void checkSteps(const vector<Chain>& chains, const Array& x, bool flows, 
 }
 
 static void testStepsWithoutNoise(Scheme scheme) {
-    for (int bending = 0; bending < 3; bending++)
+    for (int bending = 0; bending < countOf<BendingModel>(); bending++)
         for (int stretching = 0; stretching < 2; stretching++)
             for (bool tethers : {false, true})
                 for (bool flows : {false, true}) {
@@ -456,7 +463,7 @@ static void checkBalance(const vector<Chain>& chains, const Array& x, const Step
 }
 
 static void testBalanceOfNodes() {
-    for (int bending = 0; bending < 3; bending++)
+    for (int bending = 0; bending < countOf<BendingModel>(); bending++)
         for (int stretching = 0; stretching < 2; stretching++)
             for (bool tethers : {false, true})
                 for (bool flows : {false, true})

@@ -113,7 +113,7 @@ static void checkSteps(const string& kind, const vector<Chain>& chains, const Ar
 }
 
 static void testStepsAreThoseOfDoublePrecision() {
-    for (int bending = 0; bending < 3; bending++) {
+    for (int bending = 0; bending < countOf<BendingModel>(); bending++) {
         Array x;
         const vector<Chain> chains = makeChains(LENGTHS, (BendingModel) bending, StretchingModel::Harmonic, x);
         vector<Chain> held = chains, propelled = chains, planar = chains;
