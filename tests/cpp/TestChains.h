@@ -30,6 +30,24 @@ inline void checkClose(double expected, double found, double scale, double toler
         throw runtime_error(what+": expected "+to_string(expected)+", found "+to_string(found));
 }
 
+/** The length of a bend b = f (t2-t1), with the energy (stiffness/2) b^2, and its derivative by the angle. */
+struct BendByHand {
+    double length, slope;
+};
+
+inline BendByHand bendByHand(BendingModel model, double angle) {
+    const double half = 0.5*angle;
+    switch (model) {
+    case BendingModel::KratkyPorod:
+        return {2*sin(half), cos(half)};
+    case BendingModel::Quadratic:
+        return {angle, 1};
+    case BendingModel::InscribedCircle:
+        return {2*tan(half), 1+tan(half)*tan(half)};
+    }
+    throw runtime_error("The tests do not know a bending model");
+}
+
 /** Normal numbers to make chains with. */
 class NormalNumbers {
 public:

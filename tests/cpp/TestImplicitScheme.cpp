@@ -21,19 +21,7 @@ static int componentFrom(const Chain& chain, int first, int component) {
     return 3*chain.nodes[(first+component/3)%chain.nodes.size()]+component%3;
 }
 
-/** The length of a bend b = f (t2-t1), with the energy (stiffness/2) b^2. */
-static double bendOfAngle(BendingModel model, double angle) {
-    switch (model) {
-    case BendingModel::KratkyPorod:
-        return 2*sin(0.5*angle);
-    case BendingModel::Quadratic:
-        return angle;
-    case BendingModel::InscribedCircle:
-        return 2*tan(0.5*angle);
-    }
-    throw runtime_error("The test does not know a bending model");
-}
-
+/** A bend b = f (t2-t1), with the energy (stiffness/2) b^2. */
 static Array bendOf(BendingModel model, const double* x) {
     double t1[3], t2[3], square1 = 0, square2 = 0, chordSquare = 0;
     for (int k = 0; k < 3; k++) {
@@ -49,7 +37,7 @@ static Array bendOf(BendingModel model, const double* x) {
     }
     const double chord = sqrt(chordSquare), angle = 2*asin(0.5*chord);
     for (double& component : bend)
-        component *= chord > 0 ? bendOfAngle(model, angle)/chord : 1;
+        component *= chord > 0 ? bendByHand(model, angle).length/chord : 1;
     return bend;
 }
 

@@ -42,6 +42,14 @@ def test_every_bending_model_is_there_by_hand():
     assert set(BENDING_MODELS) == set(BENDING_POTENTIALS)
 
 
+@pytest.mark.parametrize("model", BENDING_POTENTIALS)
+def test_bending_energies_are_within_what_averages_assume(model):
+    angle = np.linspace(0.01, 3.14, 100)
+    energy = BENDING_POTENTIALS[model].energy(3.0, np.cos(angle)) / 3.0
+    assert energy[0] == pytest.approx(0.5 * angle[0] ** 2, rel=1e-4)
+    assert np.all(energy >= 2 * (angle / np.pi) ** 2)
+
+
 # The potentials once more, by hand, as functions of node positions.
 
 

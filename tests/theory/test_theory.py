@@ -394,5 +394,7 @@ def test_joints_stiffen_against_k_t_as_the_temperature_falls():
 def test_moments_of_any_bending_model_by_quadrature(model, stiffness):
     kind = filament(stiffness, bending_model=model)
     mean, variance = energies._moments_by_quadrature(kind.bending_potential, stiffness)
-    assert mean * KT == pytest.approx(theory.bending_energy_mean(kind, TEMPERATURE), rel=1e-5)
-    assert variance * KT**2 == pytest.approx(theory.bending_energy_variance(kind, TEMPERATURE), rel=1e-4)
+    # The cosine of a stiff joint has lost the digits of its angle.
+    accuracy = 1e-8 if stiffness < 1e6 else 1e-7
+    assert mean * KT == pytest.approx(theory.bending_energy_mean(kind, TEMPERATURE), rel=accuracy)
+    assert variance * KT**2 == pytest.approx(theory.bending_energy_variance(kind, TEMPERATURE), rel=accuracy)
