@@ -12,7 +12,7 @@ import numpy as np
 from ..units.types import FloatArray, IntArray
 from .flow import Flow
 from .geometry import segment_vectors
-from .redistribution import ChainSet, joint_tensions, segment_forces_to_nodes
+from .redistribution import ChainSet, joint_tensions, segment_forces_to_nodes, segments_at_nodes
 
 
 class Chain(Protocol):
@@ -67,10 +67,7 @@ def split_external_forces(
     (minus, plus) : two (segments, 3) arrays
     """
     external = forces - segment_forces_to_nodes(chains, minus, plus)
-    neighbours = np.zeros(chains.node_count)
-    np.add.at(neighbours, chains.first_node, 1.0)
-    np.add.at(neighbours, chains.second_node, 1.0)
-    share = external / neighbours[:, None]
+    share = external / segments_at_nodes(chains)[:, None]
     return minus + share[chains.first_node], plus + share[chains.second_node]
 
 

@@ -209,6 +209,40 @@ def test_equilibrium_run_agrees_with_theory(tmp_path):
     assert "24 × ACT, 6 segments" in format_summary(configuration, groups)
 
 
+def test_chains_of_beads_agree_with_theory(tmp_path, capsys):
+    config = configured(
+        tmp_path,
+        """
+[solvent]
+temperature = "296.15 K"
+viscosity = "1 mPa*s"
+[[filament]]
+type = "DSDNA_BASE_PAIRS"
+segments = 12
+count = 40
+[simulation]
+time_step = "recommended"
+duration = "1 ns"
+report_interval = "10 ps"
+""",
+    )
+    configuration = read_configuration(config)
+    run(configuration, tmp_path / "out")
+    (group,) = summarise(configuration, load_trajectory(configuration, RunDirectory(tmp_path / "out")))
+    names = [observable.name for observable in group.observables]
+    assert names[:4] == [
+        "stretching energy per segment",
+        "segment length",
+        "bending energy per joint",
+        "mean square end-to-end distance",
+    ]
+    for observable in group.observables:
+        if observable.verdict != "reference":
+            assert abs(observable.deviation) < 4.0 or abs(observable.relative_deviation) < 0.01, observable
+    assert main(["timestep", config]) == 0
+    assert "allowed by bends" in capsys.readouterr().out
+
+
 def test_killed_run_resumes_to_the_same_files(tmp_path, unbroken):
     output = tmp_path / "out"
     config = configured(tmp_path)
