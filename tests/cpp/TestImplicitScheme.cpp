@@ -140,7 +140,7 @@ static Array residualOf(const vector<Chain>& chains, const Array& x, const Array
             const double square = other.restLength*other.restLength, ofNodes = 0.25*chain.nodeFriction*square;
             const double friction = isLinear(chain.bending) ? (ofNodes+other.rotational)/square :
                     fmin(one.rotational, other.rotational)+ofNodes;
-            const double theta = fmax(0.5, 1-friction/(4*h*chain.joints[j]));
+            const double theta = fmin(isLinear(chain.bending) ? 0.8 : 1, fmax(0.5, 1-friction/(4*h*chain.joints[j])));
             const Array before = bendOf(chain.bending, nodesFrom(chain, start, 3, x).data());
             const Array after = bendOf(chain.bending, nodesFrom(chain, start, 3, y).data());
             const Array between = bendOf(chain.bending, nodesFrom(chain, start, 3, first).data());
