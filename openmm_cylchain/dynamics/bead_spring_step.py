@@ -68,7 +68,8 @@ def bead_spring_time_step(
       At smaller nu steps are shorter in proportion.
     - "implicit" and "implicit-second-order": 1e4 tau for 63 bonds and more, where correlations of the end-to-end vector
       lose 4 % too little over three steps and 2 % over ten; of fewer bonds as their slowest relaxation, with (N+1)^4,
-      but 10 tau at least. At a smaller nu they are shorter by nu/0.35: what holds lengths is stiffer against what bends.
+      but 10 tau at least. At a smaller nu they are shorter by nu/0.35: what holds lengths is stiffer against
+      what bends.
 
     Parameters
     ----------
