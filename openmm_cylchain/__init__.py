@@ -5,6 +5,7 @@ private and may change.
 """
 
 from . import analysis, theory
+from .bead_spring.bead_spring_type import DSDNA_BASE_PAIRS, BeadSpringType
 from .couplings.contacts import add_exclusions, contact_force, crossing_barrier, excluded_pairs, share_exclusions
 from .couplings.crosslink_tables import CrosslinkTable
 from .couplings.crosslinks import Crosslinks
@@ -29,6 +30,7 @@ from .version import __version__
 
 __all__ = [
     "Attachment",
+    "BeadSpringType",
     "Box",
     "ConstantVelocityPulling",
     "ContactWarning",
@@ -37,6 +39,7 @@ __all__ = [
     "Crosslinks",
     "Cylinder",
     "DSDNA",
+    "DSDNA_BASE_PAIRS",
     "Ellipsoid",
     "EndCorrections",
     "EquilibrationWarning",

@@ -189,7 +189,9 @@ def _time_step(options):
         recommended = recommended_time_step(*arguments, settings.scheme, group.segments)
         stability = min(stability_bounds(*arguments, group.segments).values())
         print(f"{group.type.name}, {group.segments} segments of {group.type.segment_length:g} nm")
-        for name, bound in time_step_bounds(*arguments, segments=group.segments).items():
+        # Table 1 is of cylinders.
+        bounds = {} if group.type.node_friction > 0.0 else time_step_bounds(*arguments, segments=group.segments)
+        for name, bound in bounds.items():
             print(f"  {_BOUND_LABELS[name]:<36} {format_time(bound, 4):>12}")
         print(f"  {'stability of explicit schemes':<36} {format_time(stability, 4):>12}")
         for name, allowed in recommended.allowed.items():

@@ -1,6 +1,7 @@
 """Hooks of pytest, and fixtures that several test files share."""
 
 import os
+import sys
 
 import openmm
 import pytest
@@ -37,3 +38,10 @@ def reference():
 def engine(request):
     """Every engine in turn."""
     return request.param
+
+
+@pytest.fixture
+def without_compiled(monkeypatch):
+    """An installation without the compiled engine."""
+    # None in sys.modules makes an import fail as if the module did not exist.
+    monkeypatch.setitem(sys.modules, "openmm_cylchain.engines.compiled", None)

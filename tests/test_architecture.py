@@ -14,6 +14,7 @@ FLOORS = (
     ("units",),
     ("mechanics",),
     ("filaments",),
+    ("bead_spring",),
     ("theory",),
     ("output",),
     ("couplings",),

@@ -6,7 +6,18 @@ from pathlib import Path
 import pytest
 
 PACKAGE = Path(__file__).parents[1] / "openmm_cylchain"
-TYPED = ("units", "mechanics", "filaments", "theory", "output", "couplings", "dynamics", "analysis", "systems")
+TYPED = (
+    "units",
+    "mechanics",
+    "filaments",
+    "bead_spring",
+    "theory",
+    "output",
+    "couplings",
+    "dynamics",
+    "analysis",
+    "systems",
+)
 MODULES = [
     *(path for folder in TYPED for path in sorted((PACKAGE / folder).glob("*.py"))),
     PACKAGE / "engine_choice.py",

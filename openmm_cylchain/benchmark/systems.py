@@ -7,7 +7,7 @@ import openmm
 from openmm import app, unit
 
 from .. import F_ACTIN, Filaments
-from ..engines.portable import add_bending_forces
+from ..engines.portable_forces import add_bending_forces
 
 TEMPERATURE = 310.0
 VISCOSITY = 1.71e-3 * unit.pascal * unit.second

@@ -20,7 +20,7 @@ import numpy as np
 
 from .. import Filaments
 from ..dynamics.recommended_step import recommended_time_step
-from ..dynamics.schemes import EXPLICIT_SCHEMES, SCHEMES
+from ..dynamics.schemes import CYLINDER_SCHEMES, EXPLICIT_SCHEMES
 from ..dynamics.stability import stability_bounds
 from ..dynamics.step_watch import LARGEST_DIVIDED_SHARE
 from ..engine_choice import choose_engine
@@ -185,7 +185,7 @@ def benchmark_time_step(effort=FULL, say=lambda message: None):
     return Report(title, machine, settings, rows, missing, details, table), results
 
 
-def measure_system(system, effort, say=lambda message: None, schemes=SCHEMES):
+def measure_system(system, effort, say=lambda message: None, schemes=CYLINDER_SCHEMES):
     """Run the ladders of schemes, "implicit" among them, for a system.
 
     Returns
@@ -361,7 +361,7 @@ def largest_step_rows(results):
     rows, missing = [], {}
     for result in results:
         for suffix, allowed in CRITERIA.items():
-            for scheme in SCHEMES:
+            for scheme in CYLINDER_SCHEMES:
                 name = f"largest_step_{_words(scheme)}_{result.system.name}{suffix}"
                 largest = result.largest_step(scheme, *allowed)
                 if largest is None:
@@ -376,7 +376,7 @@ def largest_step_rows(results):
 def _speed_rows(actin, effort, say, missing):
     """Simulated time per second, everything in turn: schemes at their largest steps, the workload, stock OpenMM."""
     steps = {}
-    for scheme in SCHEMES:
+    for scheme in CYLINDER_SCHEMES:
         largest = actin.largest_step(scheme, *CRITERIA[""])
         if largest is None:
             missing[f"simulated_time_per_second_{_words(scheme)}"] = "no step that was tried is accurate enough"
@@ -394,7 +394,7 @@ def _speed_rows(actin, effort, say, missing):
     cases.append(Case("stock", beads.advance))
     times = time_interleaved(cases, effort.repetitions, 0.3, say)
     rows = []
-    for scheme in SCHEMES:
+    for scheme in CYLINDER_SCHEMES:
         if scheme in steps:
             speed = median(1e-12 * steps[scheme][2] / times[scheme])
             rows.append(row(f"simulated_time_per_second_{_words(scheme)}", scaled(speed, 1e6), "us/s"))
@@ -473,7 +473,7 @@ def format_errors(result):
         f"{'scheme':<21} {'step':>8} {'V_el':>15} {'V_b':>15} {'R^2':>15} {'dynamics':>9} {'divided':>8} {'µs/s':>9}"
     )
     lines = [f"{result.system.label} (errors in %; recommended {format_time(result.recommended, 3)})", header]
-    for scheme in SCHEMES:
+    for scheme in CYLINDER_SCHEMES:
         for one in result.of_scheme(scheme):
             lines.append(f"{scheme:<21} {format_time(one.step, 2):>8} {_columns(one)}")
     return "\n".join(lines)

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from ..dynamics.schemes import SCHEMES
+from ..dynamics.schemes import CYLINDER_SCHEMES
 from ..errors import InputError
 from ..output.files import check_output_path
 from .time_step import CRITERIA
@@ -55,7 +55,7 @@ def write_figure(results, path):
 
 def _draw(panel, result):
     equilibrium, dynamics = CRITERIA[""]
-    for scheme in SCHEMES:
+    for scheme in CYLINDER_SCHEMES:
         steps = [one for one in result.of_scheme(scheme) if np.isfinite(one.largest_equilibrium_error)]
         errors = [(one.step, one.largest_equilibrium_error) for one in steps]
         _draw_errors(panel, errors, "o-", color=_COLORS[scheme], label=f"{scheme}, equilibrium")

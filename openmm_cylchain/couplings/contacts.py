@@ -85,7 +85,8 @@ def _excluded_in(filament, nodes, points, distance):
     if not filament.closed:
         first, last = np.maximum(first, 0), np.minimum(last, filament.segments - 1)
     # Both grow with the place, so those that a place does not see follow it without a gap.
-    reach = place + distance / filament.type.segment_length + SAME_PLACE
+    shortest = filament.type.segment_lengths(filament.segments, filament.closed).min()
+    reach = place + distance / shortest + SAME_PLACE
     end = np.maximum(np.searchsorted(first, last + 1, side="right"), np.searchsorted(place, reach, side="right"))
     counts = np.minimum(end - np.arange(len(place)) - 1, total - 1)[:total]
     one = np.repeat(np.arange(total), counts)

@@ -3,10 +3,10 @@
 import math
 from typing import cast
 
-import numpy as np
-
+from ..bead_spring.bead_spring_type import BeadSpringType
 from ..engine_choice import default_scheme
-from ..filaments.filament_type import FilamentType
+from ..errors import InputError
+from ..filaments.chain_type import ChainType
 from ..mechanics.flow import Flow
 from ..mechanics.friction import SegmentFriction
 from ..units.quantities import (
@@ -15,9 +15,10 @@ from ..units.quantities import (
     thermal_energy,
 )
 from ..units.types import Scalar
-from .schemes import IMPLICIT_SCHEMES, check_scheme
+from .bead_spring_step import bead_spring_time_step
+from .schemes import IMPLICIT_SCHEMES, MODES, check_scheme
 from .stability import bounds_of_chain, contact_stiffness_bound, diffusion_bound
-from .time_step import IDLE, TimeStep
+from .time_step import IDLE, RECOMMENDED_STRAIN, TimeStep, strain_rate
 
 _REASONS = {
     "stretching": "relaxation of a segment's length, eq. (57), with a margin of {margin:g} for accuracy",
@@ -38,7 +39,6 @@ _REASONS = {
 _RELAXATION_STEPS = 20.0
 _RELAXATION_STEPS_OF_SECOND_ORDER = 2.0
 _OVAL_MODE = 4.0 * math.pi * math.sqrt(0.75)
-RECOMMENDED_STRAIN = 0.03
 _ACCURACY_MARGIN = 20.0
 _TURNING_ANGLE = 0.1
 _IMPLICIT_TURNING_ANGLE = {"implicit": 0.15, "implicit-second-order": 0.1}
@@ -51,7 +51,7 @@ _LENGTH_DIFFUSION = 0.0008
 
 
 def recommended_time_step(
-    filament_type: FilamentType,
+    filament_type: ChainType,
     viscosity: Scalar,
     temperature: Scalar,
     scheme: str | None = None,
@@ -71,17 +71,17 @@ def recommended_time_step(
     to ``2 k_B T dt/gamma_rot < 0.1 gamma_rot/gamma_def``, at which free segments turn some 3 % too fast.
 
     FENE lengths narrow the bounds (``fene_bound``, for "implicit" ``fene_steps``), and a flow may strain the solvent by
-    0.03 in a step at most.
+    0.03 in a step at most. For beads, see ``bead_spring_step.bead_spring_time_step``.
 
     Parameters
     ----------
-    filament_type : FilamentType
+    filament_type : FilamentType or BeadSpringType
     viscosity : pressure*time
     temperature : temperature
-    scheme : {"implicit", "implicit-second-order", "midpoint", "euler"}, optional
+    scheme : {"implicit", "implicit-second-order", "midpoint", "euler", "modes"}, optional
         That of the fastest engine that is available if not given. "midpoint" and "euler" are explicit and have the
         same bounds; "euler" has a bias on chains that no step removes. "implicit" is not bound by stretching and
-        bending, see ``implicit_time_step``.
+        bending, see ``implicit_time_step``. "modes" is for beads.
     segments : int
     closed : bool
         A ring; matters only to "implicit".
@@ -96,6 +96,10 @@ def recommended_time_step(
     """
     scheme = default_scheme() if scheme is None else scheme
     check_scheme(scheme)
+    if isinstance(filament_type, BeadSpringType):
+        return bead_spring_time_step(filament_type, scheme, segments, closed, flow)
+    if scheme == MODES:
+        raise InputError(f"Scheme 'modes' moves chains of beads, but no cylinders, such as {filament_type.name!r}.")
     if friction is None:
         friction = filament_type.segment_friction(viscosity, temperature, segments)
     if scheme in IMPLICIT_SCHEMES:
@@ -135,11 +139,6 @@ def _binding(filament_type, friction, temperature, scheme, segments, flow, bound
     return TimeStep(allowed[binding], reason, bounds, allowed, dynamics=dynamics)
 
 
-def strain_rate(flow: Flow) -> float:
-    """The fastest rate, in 1/ps, at which a flow strains the solvent: the norm of its gradient."""
-    return float(np.linalg.norm(flow.gradient, 2))
-
-
 def _turning_in_range(filament_type):
     # Mean square angle: a segment that turns by phi is longer by l0 phi^2/2 before its length is solved for, which must
     # stay inside the range of a FENE length at five standard deviations.
@@ -157,7 +156,7 @@ def _length_variance(filament_type, kT):
     return softness / (1.0 + 3.0 * softness) * (extension / filament_type.segment_length) ** 2
 
 
-def fene_bound(filament_type: FilamentType, friction: SegmentFriction, temperature: Scalar) -> float:
+def fene_bound(filament_type: ChainType, friction: SegmentFriction, temperature: Scalar) -> float:
     """The step, in ps, of an explicit scheme in which the length of a segment with a FENE potential stays in its range.
 
     With nu = k D^2/k_B T, u = (l - l0)/D has the distribution (1 - u^2)^(nu/2), and relaxes in
@@ -182,7 +181,7 @@ def fene_bound(filament_type: FilamentType, friction: SegmentFriction, temperatu
     return min(noise, 0.1 * tau * narrow**2 / (2.0 - narrow))
 
 
-def fene_steps(filament_type: FilamentType, friction: SegmentFriction, temperature: Scalar) -> tuple[float, float]:
+def fene_steps(filament_type: ChainType, friction: SegmentFriction, temperature: Scalar) -> tuple[float, float]:
     """Where implicit schemes keep the energy of FENE lengths: up to the first step, in ps, and from the second one on.
 
     With nu = k D^2/k_B T, u = (l - l0)/D has the distribution (1 - u^2)^(nu/2). A length never leaves its range, at any
@@ -210,7 +209,7 @@ def fene_steps(filament_type: FilamentType, friction: SegmentFriction, temperatu
 
 
 def implicit_time_step(
-    filament_type: FilamentType,
+    filament_type: ChainType,
     viscosity: Scalar,
     temperature: Scalar,
     segments: int = 2,
@@ -277,7 +276,7 @@ def _relaxation_steps(scheme):
 
 
 def contact_time_step(
-    filament_type: FilamentType,
+    filament_type: ChainType,
     viscosity: Scalar,
     temperature: Scalar,
     diameter: Scalar,
@@ -294,7 +293,7 @@ def contact_time_step(
 
     Parameters
     ----------
-    filament_type : FilamentType
+    filament_type : FilamentType or BeadSpringType
     viscosity : pressure*time
     temperature : temperature
     diameter : length
@@ -323,7 +322,7 @@ def contact_time_step(
 
 
 def contact_diffusion_step(
-    filament_type: FilamentType,
+    filament_type: ChainType,
     friction: SegmentFriction,
     temperature: Scalar,
     diameter: Scalar,

@@ -12,7 +12,8 @@ EXPLICIT_SCHEMES = ("euler", "midpoint")
 IMPLICIT_SCHEMES = ("implicit", "implicit-second-order")
 MODES = "modes"
 """The scheme that advances the normal modes of chains of beads, each as if it were alone."""
-SCHEMES = (*EXPLICIT_SCHEMES, *IMPLICIT_SCHEMES, MODES)
+CYLINDER_SCHEMES = (*EXPLICIT_SCHEMES, *IMPLICIT_SCHEMES)
+SCHEMES = (*CYLINDER_SCHEMES, MODES)
 
 _DIAGONAL = 1.0 - math.sqrt(0.5)
 

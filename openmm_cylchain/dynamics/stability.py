@@ -7,7 +7,9 @@ passing through; they say nothing about accuracy, which is why ``recommended_ste
 import math
 from typing import cast
 
-from ..filaments.filament_type import FilamentType
+from ..bead_spring.bead_spring_type import BeadSpringType
+from ..errors import InputError
+from ..filaments.chain_type import ChainType
 from ..mechanics.friction import SegmentFriction
 from ..units.quantities import (
     BENDING_RIGIDITY,
@@ -20,6 +22,7 @@ from ..units.quantities import (
     thermal_energy,
 )
 from ..units.types import Scalar
+from .bead_spring_step import bead_spring_stability_bound
 
 
 def translation_bound(
@@ -170,7 +173,7 @@ def contact_stiffness_bound(
 
 
 def time_step_bounds(
-    filament_type: FilamentType, viscosity: Scalar, temperature: Scalar, confidence: float = 3.0, segments: int = 1
+    filament_type: ChainType, viscosity: Scalar, temperature: Scalar, confidence: float = 3.0, segments: int = 1
 ) -> dict[str, float]:
     """The five bounds of Table 1 for a filament type in a solvent, in ps.
 
@@ -189,6 +192,8 @@ def time_step_bounds(
     dict
         ``translation`` (54), ``rotation`` (55), ``diffusion`` (56), ``stretching`` (57), ``bending`` (58).
     """
+    if isinstance(filament_type, BeadSpringType):
+        raise InputError(f"Table 1 has bounds of cylinders, but {filament_type.name!r} has beads: see stability_bounds")
     friction = filament_type.segment_friction(viscosity, temperature, segments)
     length, diameter = filament_type.segment_length, filament_type.diameter
     return {
@@ -201,14 +206,19 @@ def time_step_bounds(
 
 
 def stability_bounds(
-    filament_type: FilamentType, viscosity: Scalar, temperature: Scalar, segments: int = 1
+    filament_type: ChainType, viscosity: Scalar, temperature: Scalar, segments: int = 1
 ) -> dict[str, float]:
-    """Steps, in ps, above which the explicit schemes blow up: ``stretching`` and ``bending`` of a chain."""
+    """Steps, in ps, above which the explicit schemes blow up: ``stretching`` and ``bending`` of a chain.
+
+    Of beads one alone, ``springs``, see ``bead_spring_step.bead_spring_stability_bound``.
+    """
+    if isinstance(filament_type, BeadSpringType):
+        return {"springs": bead_spring_stability_bound(filament_type)}
     friction = filament_type.segment_friction(viscosity, temperature, segments)
     return bounds_of_chain(filament_type, friction, segments)
 
 
-def bounds_of_chain(filament_type: FilamentType, friction: SegmentFriction, segments: int) -> dict[str, float]:
+def bounds_of_chain(filament_type: ChainType, friction: SegmentFriction, segments: int) -> dict[str, float]:
     """The bounds of ``stability_bounds`` for segments of a friction."""
     length = filament_type.segment_length
     bounds = {"stretching": chain_stretching_bound(friction, filament_type.segment_stiffness, length)}

@@ -5,16 +5,16 @@ import warnings
 import openmm
 
 from ..errors import TimeStepWarning
+from ..filaments.chain_type import ChainType
 from ..filaments.collection import FilamentCollection
-from ..filaments.filament_type import FilamentType
 from ..mechanics.flow import Flow
 from ..mechanics.friction import SegmentFriction
 from ..units.types import Numbers, Scalar
 from .explicit_forces import ExplicitForces
-from .recommended_step import RECOMMENDED_STRAIN, fene_steps, recommended_time_step, strain_rate
+from .recommended_step import fene_steps, recommended_time_step
 from .schemes import EXPLICIT_SCHEMES, IMPLICIT_SCHEMES
 from .stability import stability_bounds
-from .time_step import IDLE, TimeStep, as_step
+from .time_step import IDLE, RECOMMENDED_STRAIN, TimeStep, as_step, strain_rate
 
 _LARGEST_STRAIN = 0.06
 _LARGEST_ADVANCE = 0.5
@@ -43,7 +43,7 @@ def warn_of_long_step(
 
 
 def warn_if_unstable(
-    filament_type: FilamentType,
+    filament_type: ChainType,
     viscosity: Scalar,
     temperature: Scalar,
     step: Scalar | TimeStep,
@@ -72,7 +72,7 @@ def warn_if_unstable(
 
 
 def warn_if_far_above(
-    filament_type: FilamentType,
+    filament_type: ChainType,
     viscosity: Scalar,
     temperature: Scalar,
     step: Scalar | TimeStep,
@@ -100,7 +100,7 @@ def warn_if_far_above(
 
 
 def warn_if_fene_is_wrong(
-    filament_type: FilamentType, temperature: Scalar, step: Scalar | TimeStep, friction: SegmentFriction, scheme: str
+    filament_type: ChainType, temperature: Scalar, step: Scalar | TimeStep, friction: SegmentFriction, scheme: str
 ) -> None:
     """Issue a TimeStepWarning if a step of an implicit scheme is between those that keep the energy of FENE lengths."""
     step = as_step(step, "time step")
@@ -132,7 +132,7 @@ def warn_if_strained(step: Scalar | TimeStep, flow: Flow) -> None:
 
 
 def warn_if_driven_far(
-    filament_type: FilamentType,
+    filament_type: ChainType,
     viscosity: Scalar,
     temperature: Scalar,
     step: Scalar | TimeStep,

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.optimize import brentq
 
+from ..mechanics.flow import Flow
 from ..units.quantities import (
     DIMENSIONLESS,
     TIME,
@@ -17,8 +18,16 @@ from ..units.text import format_time
 from ..units.types import Scalar
 from .schemes import amplification_of_second_order, check_scheme
 
+RECOMMENDED_STRAIN = 0.03
+"""By how much a flow may strain the solvent in a step."""
+
 IDLE = "length"
 """The bound that holds where nothing but the relaxation of lengths is left to resolve."""
+
+
+def strain_rate(flow: Flow) -> float:
+    """The fastest rate, in 1/ps, at which a flow strains the solvent: the norm of its gradient."""
+    return float(np.linalg.norm(flow.gradient, 2))
 
 
 @dataclass(frozen=True)
@@ -97,6 +106,7 @@ _DECAYS = {
     "midpoint": lambda z, theta: 1.0 - z,
     "implicit": lambda z, theta: (1.0 - (1.0 - theta) * z) / (1.0 + theta * z),
     "implicit-second-order": lambda z, theta: float(amplification_of_second_order(z)),
+    "modes": lambda z, theta: math.exp(-z),
 }
 
 
@@ -110,6 +120,7 @@ def effective_rate(step: Scalar | TimeStep, scheme: str, rate: Scalar, fastest_r
       being the step times the rate of the sharpest bend, 4 K/gamma_rot. Steps that do not resolve that one relax as
       those of the implicit Euler method, R = 1/(1 + z), steps that do as Crank and Nicolson's.
     - "implicit-second-order": ``schemes.amplification_of_second_order``.
+    - "modes": R = exp(-z), of modes alone. What couples them is another matter.
 
     Fluctuations keep their exact variance in the implicit schemes, whatever the step; the rate alone is off.
 

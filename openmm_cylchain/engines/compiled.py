@@ -25,6 +25,7 @@ from .description import (
     advice_after_blow_up,
     describe_chains,
     filament_label,
+    friction_of_segments,
     refuse_constraints,
 )
 from .protocol import Engine
@@ -78,7 +79,6 @@ SCHEMES = _numbers(CylinderChainIntegrator.getSchemeNames(), ALL_SCHEMES, "schem
 PRECISIONS = _numbers(CylinderChainIntegrator.getPrecisionNames(), ALL_PRECISIONS, "precisions")
 
 _OTHER_FRICTION = 1.0
-LARGEST_PATH_LEVEL = 20
 
 
 class CompiledEngine(Engine):
@@ -191,21 +191,27 @@ def _refuse_unless_implicit(scheme):
 
 def _add_chain(force, filament, nodes, viscosity, temperature):
     kind = filament.type
-    friction = kind.segment_friction(viscosity, temperature, filament.segments)
+    friction = friction_of_segments(filament, viscosity, temperature)
+    frictions = (friction.parallel, friction.perpendicular, friction.rotational, friction.extensional)
+    extension = 0.0 if kind.maximum_extension is None else kind.maximum_extension
     chain = force.addChain(
         [int(node) for node in nodes],
         BENDING_MODELS[kind.bending_model],
         STRETCHING_MODELS[kind.stretching_model],
         kind.segment_length,
         kind.segment_stiffness,
-        0.0 if kind.maximum_extension is None else kind.maximum_extension,
-        kind.joint_stiffness,
-        friction.parallel,
-        friction.perpendicular,
-        friction.rotational,
-        friction.extensional,
+        extension,
+        kind.bending_stiffness,
+        *frictions,
         filament.closed,
     )
+    lengths = kind.segment_lengths(filament.segments, filament.closed)
+    stiffnesses = kind.segment_stiffnesses(filament.segments, filament.closed)
+    for segment in np.flatnonzero((lengths != kind.segment_length) | (stiffnesses != kind.segment_stiffness)):
+        own = float(lengths[segment]), float(stiffnesses[segment])
+        force.setSegmentParameters(chain, int(segment), *own, extension, *frictions)
+    if kind.node_friction > 0.0:
+        force.setChainNodeFriction(chain, kind.node_friction)
     force.setChainPlanar(chain, filament.planar)
     for segment in range(filament.segments if filament.propulsion else 0):
         force.setSegmentPropulsion(chain, segment, filament.propulsion)
@@ -349,11 +355,11 @@ class NativeIntegrator(CylinderChainIntegrator):
         Raises
         ------
         InputError
-            If it is not a whole number between 0 and 20.
+            If it is not a whole number between 0 and ``getLargestPathLevel()``.
         """
-        level = whole_number(level, 0, "path level")
-        if level > LARGEST_PATH_LEVEL:
-            raise InputError(f"path level must be at most {LARGEST_PATH_LEVEL}, but is {level}.")
+        level, largest = whole_number(level, 0, "path level"), self.getLargestPathLevel()
+        if level > largest:
+            raise InputError(f"path level must be at most {largest}, but is {level}.")
         super().setPathLevel(level)
 
     def setRecordsTensions(self, records):

@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..errors import InputError
+from ..mechanics.friction import SegmentFriction
 from ..mechanics.redistribution import ChainSet
 
 
@@ -61,18 +62,35 @@ def describe_chains(system, placed):
             raise InputError(f"{label} has only nodes of mass zero: leave at least one free to move.")
         fixed.extend(massless)
     filaments, solvent = placed.filaments, (placed.viscosity, placed.temperature)
-    frictions = [filament.type.segment_friction(*solvent, filament.segments) for filament in filaments]
+    frictions = [friction_of_segments(filament, *solvent) for filament in filaments]
+    node_frictions = [filament.type.node_friction for filament in filaments]
+    counts = [len(filament.positions) for filament in filaments]
     segments = [filament.segments for filament in filaments]
     return ChainSet(
-        node_counts=np.array([len(filament.positions) for filament in filaments]),
+        node_counts=np.array(counts),
         fixed=np.array(fixed),
         closed=np.array([filament.closed for filament in filaments]),
         planar=np.array([filament.planar for filament in filaments]),
+        node_friction=np.repeat(node_frictions, counts) if any(node_frictions) else None,
         **{
             name: np.repeat([getattr(friction, name) for friction in frictions], segments)
             for name in ("parallel", "perpendicular", "rotational", "extensional")
         },
     )
+
+
+def friction_of_segments(filament, viscosity, temperature):
+    """SegmentFriction of the segments of a filament as engines have it: none where nodes have all of the friction."""
+    if filament.type.node_friction > 0.0:
+        return SegmentFriction(0.0, 0.0, 0.0, 0.0)
+    return filament.type.segment_friction(viscosity, temperature, filament.segments)
+
+
+def describe_lengths(filaments):
+    """Rest lengths of all segments, and by how much each may be longer or shorter: two (segments,) arrays in nm."""
+    rest_lengths = [filament.type.segment_lengths(filament.segments, filament.closed) for filament in filaments]
+    ranges = [np.full(filament.segments, filament.type.maximum_extension or np.inf) for filament in filaments]
+    return np.concatenate(rest_lengths), np.concatenate(ranges)
 
 
 def _mass(system, particle):

@@ -85,12 +85,23 @@ def locate(
     if fraction is not None:
         raise InputError(f"{label}: a fraction goes with a segment, not with an arc_length.")
     arc_length = non_negative(arc_length, LENGTH, f"{label}: arc_length")
-    place = arc_length / filament.type.segment_length
+    place, contour = _along(filament, arc_length)
     if place > filament.segments * (1.0 + 1e-12):
-        contour = filament.segments * filament.type.segment_length
         raise InputError(f"{label}: arc_length is {arc_length:g} nm, but the filament is {contour:g} nm long.")
     segment = min(math.floor(place), filament.segments - 1)
     return Attachment(number, segment, min(place - segment, 1.0))
+
+
+def _along(filament, arc_length):
+    # An arc length in segments, and that of the whole filament, at rest.
+    kind, segments = filament.type, filament.segments
+    lengths = kind.segment_lengths(segments, True) if filament.closed else kind.straight_lengths(segments)
+    if np.all(lengths == kind.segment_length):
+        return arc_length / kind.segment_length, segments * kind.segment_length
+    ends = np.concatenate([[0.0], np.cumsum(lengths)])
+    if arc_length > ends[-1]:
+        return segments * arc_length / ends[-1], ends[-1]
+    return float(np.interp(arc_length, ends, np.arange(segments + 1))), ends[-1]
 
 
 def _segment(segment, filament, label):

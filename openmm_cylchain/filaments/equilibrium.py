@@ -15,16 +15,38 @@ in a plane,
 
 from collections.abc import Callable
 from functools import lru_cache
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 from scipy.integrate import simpson
 
 from ..units.quantities import TEMPERATURE, positive, thermal_energy
-from ..units.types import FloatArray, Scalar
-from .filament_type import FilamentType
+from ..units.types import FloatArray, FloatOrArray, Scalar
 
 _GRID = 20001
+
+
+class IndependentJoints(Protocol):
+    """A chain whose segments are alike and whose bending energy depends on the angle alone: a ``FilamentType``."""
+
+    @property
+    def segment_length(self) -> float: ...
+
+    @property
+    def segment_stiffness(self) -> float: ...
+
+    @property
+    def maximum_extension(self) -> float | None: ...
+
+    @property
+    def joint_stiffness(self) -> float: ...
+
+    def __hash__(self) -> int: ...
+
+    def stretching_energy(self, length: npt.ArrayLike) -> FloatOrArray: ...
+
+    def bending_energy(self, cosine: npt.ArrayLike, stiffness: npt.ArrayLike | None = None) -> FloatOrArray: ...
 
 
 class _Marginal:
@@ -68,7 +90,7 @@ class SegmentLengthDistribution(_Marginal):
         In a plane: rho(l) ~ l exp(-V_el/k_B T).
     """
 
-    def __init__(self, filament_type: FilamentType, temperature: Scalar, planar: bool = False) -> None:
+    def __init__(self, filament_type: IndependentJoints, temperature: Scalar, planar: bool = False) -> None:
         kT = thermal_energy(positive(temperature, TEMPERATURE, "temperature"))
         rest, stiffness = filament_type.segment_length, filament_type.segment_stiffness
         if filament_type.maximum_extension is not None:
@@ -96,7 +118,9 @@ class JointAngleDistribution(_Marginal):
         In kJ/mol; the type's if not given.
     """
 
-    def __init__(self, filament_type: FilamentType, temperature: Scalar, joint_stiffness: float | None = None) -> None:
+    def __init__(
+        self, filament_type: IndependentJoints, temperature: Scalar, joint_stiffness: float | None = None
+    ) -> None:
         kT = thermal_energy(positive(temperature, TEMPERATURE, "temperature"))
         joint_stiffness = filament_type.joint_stiffness if joint_stiffness is None else joint_stiffness
         cosine = _grid(1.0 - _widest_bend(joint_stiffness / kT), 1.0)
@@ -115,7 +139,9 @@ class PlanarJointAngleDistribution(_Marginal):
         In kJ/mol; the type's if not given.
     """
 
-    def __init__(self, filament_type: FilamentType, temperature: Scalar, joint_stiffness: float | None = None) -> None:
+    def __init__(
+        self, filament_type: IndependentJoints, temperature: Scalar, joint_stiffness: float | None = None
+    ) -> None:
         kT = thermal_energy(positive(temperature, TEMPERATURE, "temperature"))
         joint_stiffness = filament_type.joint_stiffness if joint_stiffness is None else joint_stiffness
         widest = np.arccos(1.0 - _widest_bend(joint_stiffness / kT))
@@ -152,7 +178,7 @@ def _draw_joints(filament_type, temperature, generator, planar, stiffnesses):
 
 
 def draw_chain(
-    filament_type: FilamentType,
+    filament_type: IndependentJoints,
     segments: int,
     temperature: Scalar,
     generator: np.random.Generator,

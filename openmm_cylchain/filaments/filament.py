@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from ..units.types import FloatArray
-from .filament_type import FilamentType
+from .chain_type import ChainType
 from .placement import joint_stiffnesses
 
 NODE_NAME = "NOD"
@@ -16,7 +16,7 @@ class Filament:
 
     Attributes
     ----------
-    type : FilamentType
+    type : FilamentType or BeadSpringType
     positions : (n, 3) array
         Initial node positions in nm.
     clamped : tuple of int
@@ -29,7 +29,7 @@ class Filament:
         F0 in kJ/(mol nm): the force F0 t on every segment, half on either end, with its tangent t.
     """
 
-    type: FilamentType
+    type: ChainType
     positions: FloatArray
     clamped: tuple[int, ...]
     closed: bool = False
@@ -43,7 +43,10 @@ class Filament:
 
     @property
     def joint_stiffnesses(self) -> FloatArray:
-        """Bending stiffness of every joint in kJ/mol, see ``placement.joint_stiffnesses``."""
+        """Stiffness in the bending potential of every joint, see ``placement.joint_stiffnesses``.
+
+        In kJ/mol; of bending model "bond-difference" in kJ/(mol nm^2).
+        """
         return joint_stiffnesses(self.type, len(self.positions), self.clamped, self.closed)
 
     def energies(self, nodes: FloatArray) -> tuple[float, float]:

@@ -17,7 +17,7 @@ from ..mechanics.friction import (
     translational_friction_parallel,
     translational_friction_perpendicular,
 )
-from ..mechanics.geometry import joint_cosines, segment_vectors
+from ..mechanics.geometry import joined
 from ..mechanics.potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS, BendingPotential, StretchingPotential
 from ..units.quantities import (
     BENDING_RIGIDITY,
@@ -35,11 +35,13 @@ from ..units.quantities import (
     whole_number,
 )
 from ..units.types import FloatArray, FloatOrArray, Scalar
+from .chain_type import ChainType, check_type_name
+from .equilibrium import draw_chain
 from .joint_calibration import calibrated_stiffness
 
 
 @dataclass(frozen=True, kw_only=True)
-class FilamentType:
+class FilamentType(ChainType):
     """Material, geometry and model of a filament: an immutable description.
 
     All arguments are keywords and take ``openmm.unit`` quantities or plain numbers in OpenMM's
@@ -144,7 +146,7 @@ class FilamentType:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        self._check_name()
+        check_type_name(self.name)
         for attribute, dimension in (
             ("diameter", LENGTH),
             ("segment_length", LENGTH),
@@ -170,11 +172,6 @@ class FilamentType:
 
     def _fail(self, message):
         raise InputError(f"Filament type {self.name!r}: {message}")
-
-    def _check_name(self):
-        name = self.name
-        if not (isinstance(name, str) and name.isascii() and name.isalnum() and len(name) <= 5):
-            raise InputError(f"The name of a filament type must be 1 to 5 letters or digits, but is {name!r}.")
 
     def _resolve_bending(self):
         name = f"of filament type {self.name!r}"
@@ -261,6 +258,16 @@ class FilamentType:
         """
         return self._stiffness_of_joint(0.5 * self.segment_length)
 
+    @property
+    def bending_stiffness(self) -> float:
+        """``joint_stiffness``: bending potentials are functions of the angle."""
+        return self.joint_stiffness
+
+    @property
+    def clamped_bending_stiffness(self) -> float:
+        """``clamped_joint_stiffness``."""
+        return self.clamped_joint_stiffness
+
     def _stiffness_of_joint(self, length):
         if self.temperature is None or self.bending_rigidity == 0.0:
             return self.bending_rigidity / length
@@ -271,6 +278,13 @@ class FilamentType:
     def segment_mass(self) -> float:
         """Mass of one segment in Da."""
         return self.mass_per_length * self.segment_length
+
+    def node_masses(self, nodes: int, closed: bool = False) -> FloatArray:
+        """Masses (nodes,) in Da: that of each segment goes to its two ends in equal parts."""
+        masses = np.full(nodes, self.segment_mass)
+        if not closed:
+            masses[[0, -1]] *= 0.5
+        return masses
 
     @property
     def bending_potential(self) -> BendingPotential:
@@ -306,24 +320,64 @@ class FilamentType:
             return np.zeros_like(cosine, dtype=float)
         return self.bending_potential.derivative(self.joint_stiffness if stiffness is None else stiffness, cosine)
 
-    def chain_energies(
-        self, nodes: FloatArray, joint_stiffnesses: npt.ArrayLike | None = None, closed: bool = False
-    ) -> tuple[float, float]:
-        """Stretching and bending energy, in kJ/mol, of a chain with node positions (n, 3) in nm.
+    def stretching_energies(self, lengths: FloatArray, closed: bool = False) -> FloatArray:
+        """See ``ChainType.stretching_energies``."""
+        return np.asarray(self.stretching_energy(lengths))
 
-        Parameters
-        ----------
-        nodes : (n, 3) array
-        joint_stiffnesses : (joints,) array, optional
-            As ``Filament.joint_stiffnesses``; those of a free chain if not given.
-        closed : bool
-            Whether the last node is joined to the first.
+    def stretching_derivatives(self, lengths: FloatArray, closed: bool = False) -> FloatArray:
+        """See ``ChainType.stretching_derivatives``."""
+        return np.asarray(self.stretching_derivative(lengths))
+
+    def bending_energies(
+        self, vectors: FloatArray, stiffnesses: npt.ArrayLike | None = None, closed: bool = False
+    ) -> FloatArray:
+        """See ``ChainType.bending_energies``."""
+        return np.asarray(self.bending_energy(_cosines(_tangents(vectors), closed), stiffnesses))
+
+    def bending_end_forces(self, vectors: FloatArray, stiffnesses: FloatArray, closed: bool = False) -> FloatArray:
+        """Forces (segments, 3) of bending on the plus ends of segments, eq. (28).
+
+        A bending torque T on a segment is the pair of forces -T/l and T/l on its ends, with
+        T_i = -dV_b/dc (t_j - c t_i) for each joint with a neighbour j (the print of (28) lacks brackets and
+        a 1/l).
         """
-        segments = segment_vectors(nodes, closed)
-        lengths = np.linalg.norm(segments, axis=1)
-        cosines = joint_cosines(segments / lengths[:, None], closed)
-        bending = self.bending_energy(cosines, joint_stiffnesses)
-        return float(np.sum(self.stretching_energy(lengths))), float(np.sum(bending))
+        plus = np.zeros_like(vectors)
+        if self.bending_rigidity == 0.0 or len(vectors) < 2:
+            return plus
+        length, tangent = np.linalg.norm(vectors, axis=1), _tangents(vectors)
+        before, behind = joined(np.arange(len(length)), closed)
+        cosine = _cosines(tangent, closed)
+        slope = np.asarray(self.bending_derivative(cosine, stiffnesses))[:, None]
+        cosine = cosine[:, None]
+        plus[before] -= slope * (tangent[behind] - cosine * tangent[before]) / length[before, None]
+        plus[behind] -= slope * (tangent[before] - cosine * tangent[behind]) / length[behind, None]
+        return plus
+
+    def check_folds(self, vectors: FloatArray, label: str, closed: bool = False) -> None:
+        """Raise InputError for segments (segments, 3) in nm that are antiparallel to their neighbours."""
+        if self.bending_rigidity == 0.0:
+            return
+        cosines = _cosines(_tangents(vectors), closed)
+        energies = self.bending_energy(cosines)
+        if not np.all(np.isfinite(energies)) or np.any(cosines < -1.0 + 1e-12):
+            joint = int(np.argmin(cosines)) + (0 if closed else 1)
+            raise InputError(
+                f"{label}: the segments before and after node {joint} are antiparallel, where the bending force is not "
+                "defined; move the node."
+            )
+
+    def draw_chain(
+        self,
+        segments: int,
+        temperature: Scalar,
+        generator: np.random.Generator,
+        start: npt.ArrayLike = (0.0, 0.0, 0.0),
+        direction: FloatArray | None = None,
+        planar: bool = False,
+        joint_stiffnesses: FloatArray | None = None,
+    ) -> FloatArray:
+        """See ``ChainType.draw_chain``."""
+        return draw_chain(self, segments, temperature, generator, start, direction, planar, joint_stiffnesses)
 
     def persistence_length_at(self, temperature: Scalar) -> float:
         """Persistence length a/(k_B T) of the continuous filament in nm at a temperature.
@@ -331,8 +385,7 @@ class FilamentType:
         At the temperature for which ``persistence_length`` was given, that of the discrete chain, too, exactly.
         ``theory.chain_persistence_length`` is that of the discrete chain at any temperature.
         """
-        kT = thermal_energy(positive(temperature, TEMPERATURE, "temperature"))
-        return self.bending_rigidity / kT
+        return super().persistence_length_at(temperature)
 
     def segment_friction(self, viscosity: Scalar, temperature: Scalar, segments: int = 1) -> SegmentFriction:
         """Friction coefficients of one segment in a solvent, eqs. (6) and (20).
@@ -397,6 +450,16 @@ class FilamentType:
             maximum_extension=None if self.maximum_extension is None else self.maximum_extension * scale,
             extensional_friction=None if self.extensional_friction is None else self.extensional_friction * scale**3,
         )
+
+
+def _tangents(vectors):
+    return vectors / np.linalg.norm(vectors, axis=-1)[..., None]
+
+
+def _cosines(tangents, closed):
+    before = np.roll(tangents, 1, axis=-2) if closed else tangents[..., :-1, :]
+    behind = tangents if closed else tangents[..., 1:, :]
+    return np.einsum("...k,...k->...", before, behind)
 
 
 _PICONEWTON = unit.piconewton

@@ -3,25 +3,12 @@
 import numpy as np
 
 from ..errors import InputError
-from ..mechanics.geometry import joined, joint_cosines, segment_vectors
+from ..mechanics.geometry import joined, segment_vectors
 from ..units.quantities import whole_number
 from ..units.types import FloatArray, Indices
-from .filament_type import FilamentType
+from .chain_type import ChainType
 
 _PLANE_TOLERANCE = 1e-9  # Of a segment's length: rounding of positions that were computed.
-
-
-def _check_folds(filament_type, vectors, lengths, label, closed):
-    if filament_type.bending_rigidity == 0.0:
-        return
-    cosines = joint_cosines(vectors / lengths[:, None], closed)
-    energies = filament_type.bending_energy(cosines)
-    if not np.all(np.isfinite(energies)) or np.any(cosines < -1.0 + 1e-12):
-        joint = int(np.argmin(cosines)) + (0 if closed else 1)
-        raise InputError(
-            f"{label}: the segments before and after node {joint} are antiparallel, where the bending force is not "
-            "defined; move the node."
-        )
 
 
 def named_nodes(nodes: int | Indices, count: int, label: str) -> tuple[int, ...]:
@@ -44,16 +31,16 @@ def clamped_nodes(clamped: int | Indices, count: int, label: str) -> tuple[int, 
     return nodes
 
 
-def joint_stiffnesses(filament_type: FilamentType, nodes: int, clamped: Indices, closed: bool = False) -> FloatArray:
-    """Bending stiffness of every joint of a filament in kJ/mol; that next to a clamped segment differs.
+def joint_stiffnesses(filament_type: ChainType, nodes: int, clamped: Indices, closed: bool = False) -> FloatArray:
+    """Stiffness in the bending potential of every joint of a filament; that next to a clamped segment differs.
 
     Half a segment of material on either side of a joint bends. Where a segment is held, because both of its nodes are
-    clamped, and its neighbour is not, only the half on the neighbour's side can: the joint has
+    clamped, and its neighbour is not, only the half on the neighbour's side can: the joint of a FilamentType has
     ``FilamentType.clamped_joint_stiffness``, about twice as much, and the filament is clamped at that node.
 
     Parameters
     ----------
-    filament_type : FilamentType
+    filament_type : ChainType
     nodes : int
     clamped : sequence of int
     closed : bool
@@ -67,7 +54,7 @@ def joint_stiffnesses(filament_type: FilamentType, nodes: int, clamped: Indices,
     fixed[list(clamped)] = True
     held = fixed & np.roll(fixed, -1)
     before, behind = joined(held if closed else held[:-1], closed)
-    return np.where(before != behind, filament_type.clamped_joint_stiffness, filament_type.joint_stiffness)
+    return np.where(before != behind, filament_type.clamped_bending_stiffness, filament_type.bending_stiffness)
 
 
 def planar_direction(direction: FloatArray, label: str) -> FloatArray:
@@ -77,7 +64,7 @@ def planar_direction(direction: FloatArray, label: str) -> FloatArray:
     return direction * [1.0, 1.0, 0.0]
 
 
-def check_shape(filament_type: FilamentType, positions: FloatArray, label: str, closed: bool = False) -> None:
+def check_shape(filament_type: ChainType, positions: FloatArray, label: str, closed: bool = False) -> None:
     """Raise InputError for node positions (n, 3) in nm in which a force is not defined."""
     vectors = segment_vectors(positions, closed)
     lengths = np.linalg.norm(vectors, axis=1)
@@ -86,7 +73,7 @@ def check_shape(filament_type: FilamentType, positions: FloatArray, label: str, 
         raise InputError(f"{label}: nodes {node} and {(node + 1) % len(positions)} coincide; move them apart.")
     if filament_type.maximum_extension is not None:
         _check_extension(filament_type, lengths, label)
-    _check_folds(filament_type, vectors, lengths, label, closed)
+    filament_type.check_folds(vectors, label, closed)
 
 
 def in_one_plane(positions: FloatArray, segment_length: float, label: str) -> FloatArray:

@@ -6,20 +6,24 @@ from ..errors import InputError
 from ..mechanics.geometry import regular_polygon
 from ..units.quantities import FORCE, LENGTH, finite_number, in_units_of, unit_vector, vector, whole_number
 from ..units.types import FloatArray, Indices, Scalar, Vector, Vectors
-from .equilibrium import draw_chain
+from .chain_type import ChainType
 from .filament import Filament
-from .filament_type import FilamentType
 from .placement import check_shape, clamped_nodes, in_one_plane, joint_stiffnesses, planar_direction
 
 MINIMUM_RING = 4
 """Segments that a ring has at least."""
 
 
-def straight(filament_type: FilamentType, segments: int, start: Vector, direction: Vector, label: str) -> FloatArray:
-    """Positions (segments + 1, 3) in nm of a straight filament with segments of rest length."""
+def straight(filament_type: ChainType, segments: int, start: Vector, direction: Vector, label: str) -> FloatArray:
+    """Positions (segments + 1, 3) in nm of a straight filament with segments of rest length: without forces."""
     segments = whole_number(segments, 1, f"{label}: segments")
     start = vector(start, LENGTH, f"{label}: start")
-    distance = np.arange(segments + 1) * filament_type.segment_length
+    lengths = filament_type.straight_lengths(segments)
+    # Equal ones without an error that adds up along the filament.
+    if np.all(lengths == lengths[0]):
+        distance = np.arange(segments + 1) * lengths[0]
+    else:
+        distance = np.concatenate([[0.0], np.cumsum(lengths)])
     return start + distance[:, None] * unit_vector(direction, label)
 
 
@@ -33,7 +37,7 @@ def given(positions: Vectors, label: str) -> FloatArray:
     return positions.copy()
 
 
-def ring(filament_type: FilamentType, segments: int, center: Vector, normal: Vector, label: str) -> FloatArray:
+def ring(filament_type: ChainType, segments: int, center: Vector, normal: Vector, label: str) -> FloatArray:
     """Positions (segments, 3) in nm of a regular polygon with segments of rest length."""
     segments = whole_number(segments, 1, f"{label}: segments")
     center = vector(center, LENGTH, f"{label}: center")
@@ -41,7 +45,7 @@ def ring(filament_type: FilamentType, segments: int, center: Vector, normal: Vec
 
 
 def drawn(
-    filament_type: FilamentType,
+    filament_type: ChainType,
     segments: int,
     temperature: float,
     generator: np.random.Generator,
@@ -61,11 +65,11 @@ def drawn(
     if temperature == 0:
         raise InputError(f"{label}: an equilibrium draw needs a temperature above zero.")
     stiffnesses = joint_stiffnesses(filament_type, segments + 1, clamped_nodes(clamped, segments + 1, label))
-    return draw_chain(filament_type, segments, temperature, generator, start, direction, planar, stiffnesses)
+    return filament_type.draw_chain(segments, temperature, generator, start, direction, planar, stiffnesses)
 
 
 def new_filament(
-    filament_type: FilamentType,
+    filament_type: ChainType,
     positions: FloatArray,
     clamped: int | Indices,
     label: str,

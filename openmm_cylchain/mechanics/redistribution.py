@@ -33,6 +33,8 @@ class ChainSet:
         Rings, in which the last segment leads from the last node to the first; none if not given.
     planar : (chains,) bool array, optional
         Chains that lie in a plane of constant z and stay there; none if not given.
+    node_friction : (nodes,) array, optional
+        Friction of nodes by themselves, the same in all directions; none if not given.
     """
 
     node_counts: IntArray
@@ -43,6 +45,7 @@ class ChainSet:
     fixed: BoolArray
     closed: BoolArray = None  # type: ignore[assignment]  # None is for the constructor.
     planar: BoolArray = None  # type: ignore[assignment]
+    node_friction: FloatArray | None = None
     start_of_chain: IntArray = field(init=False, repr=False)
     first_node: IntArray = field(init=False, repr=False)
     second_node: IntArray = field(init=False, repr=False)
@@ -110,7 +113,7 @@ def segment_geometry(chains: ChainSet, nodes: FloatArray) -> tuple[FloatArray, F
 def resistance_bands(chains: ChainSet, nodes: FloatArray) -> FloatArray:
     """The resistance Z of all chains in the lower banded form of ``scipy.linalg.solveh_banded``.
 
-    Z = sum_s P_s^T zeta_s P_s with the segment resistance
+    Z = sum_s P_s^T zeta_s P_s, and the friction of nodes on its diagonal, with the segment resistance
 
         zeta = [[g_trans/4 + g_dr/l^2, g_trans/4 - g_dr/l^2],
                 [g_trans/4 - g_dr/l^2, g_trans/4 + g_dr/l^2]]
@@ -133,6 +136,8 @@ def resistance_bands(chains: ChainSet, nodes: FloatArray) -> FloatArray:
     same = np.zeros((chains.node_count, 6))
     same[first] = end
     same[second] += end
+    if chains.node_friction is not None:
+        same[:, _ROW == _COLUMN] += chains.node_friction[:, None]
     other = _axial(across_trans - across_dr, along_trans - along_dr, tangent)
     if chains.fixed.any():
         same[chains.fixed] = [1.0, 0.0, 1.0, 0.0, 0.0, 1.0]
@@ -183,8 +188,10 @@ def redistribute(chains: ChainSet, nodes: FloatArray, forces: FloatArray, flow: 
         If the resistance is singular: a segment has collapsed or a position is not finite.
     """
     if flow is not None:
-        drag = drag_forces(chains, nodes, _flow_at_nodes(chains, nodes, flow))
-        forces = forces + segment_forces_to_nodes(chains, *drag)
+        velocities = _flow_at_nodes(chains, nodes, flow)
+        forces = forces + segment_forces_to_nodes(chains, *drag_forces(chains, nodes, velocities))
+        if chains.node_friction is not None:
+            forces += chains.node_friction[:, None] * velocities
     right = np.where(chains.fixed[:, None], 0.0, forces)
     right[chains.planar_node, 2] = 0.0
     places = np.empty_like(right)
@@ -207,6 +214,8 @@ def _flow_at_nodes(chains, nodes, flow):
 def drag_forces(chains: ChainSet, nodes: FloatArray, velocities: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Forces zeta_s v on the ends of all segments whose nodes move with the given velocities (nodes, 3).
 
+    Those of the friction of nodes are not among them.
+
     Returns
     -------
     (minus, plus) : two (segments, 3) arrays
@@ -223,6 +232,11 @@ def _apply(across, along, tangent, vector):
     return across[:, None] * vector + ((along - across) * projection)[:, None] * tangent
 
 
+def segments_at_nodes(chains: ChainSet) -> IntArray:
+    """How many segments meet in every node: (nodes,)."""
+    return np.bincount(np.concatenate([chains.first_node, chains.second_node]), minlength=chains.node_count)
+
+
 def segment_forces_to_nodes(chains: ChainSet, minus: FloatArray, plus: FloatArray) -> FloatArray:
     """Nodal forces from the forces (segments, 3) on the minus and plus ends of all segments."""
     forces = np.zeros((chains.node_count, 3))
@@ -237,7 +251,7 @@ def noise_forces(
     """Random forces on the ends of all segments, step (1) of Section 4.
 
     F = sqrt(2 k_B T/dt) g_trans^(1/2) a, T = sqrt(2 k_B T/dt) g_dr^(1/2) b, f_pm = F/2 pm T/l, so that
-    the nodal forces have the covariance (2 k_B T/dt) Z.
+    the nodal forces have the covariance (2 k_B T/dt) Z, but for what the friction of nodes adds to it.
 
     Parameters
     ----------
@@ -331,7 +345,8 @@ def joint_tensions(
 
     Phi of joint i is the force that segment i + 1 exerts on segment i: parallel to the tangent when the
     chain is under tension. It is what segment i needs, beyond the forces applied to it, to move as the
-    chain does: Phi_i = zeta_i (v - u) - f_i at its plus end.
+    chain does: Phi_i = zeta_i (v - u) - f_i at its plus end. The friction of a node belongs to its segments in equal
+    parts.
 
     Returns
     -------
@@ -342,5 +357,8 @@ def joint_tensions(
     if flow is not None:
         velocities -= _flow_at_nodes(chains, nodes, flow)
     tensions = drag_forces(chains, nodes, velocities)[1] - plus
+    if chains.node_friction is not None:
+        share = chains.node_friction / segments_at_nodes(chains)
+        tensions += share[chains.second_node, None] * velocities[chains.second_node]
     tensions[chains.planar_node[chains.first_node], 2] = 0.0
     return tensions

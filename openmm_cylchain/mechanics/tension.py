@@ -11,8 +11,8 @@ import numpy as np
 
 from ..units.types import FloatArray, IntArray
 from .flow import Flow
-from .geometry import joined, segment_vectors
-from .redistribution import ChainSet, joint_tensions, segment_forces_to_nodes
+from .geometry import segment_vectors
+from .redistribution import ChainSet, joint_tensions, segment_forces_to_nodes, segments_at_nodes
 
 
 class Chain(Protocol):
@@ -37,10 +37,6 @@ class Chain(Protocol):
 def segment_end_forces(filament: Chain, nodes: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Forces of stretching (8), bending (28) and propulsion on the ends of all segments of one filament.
 
-    A bending torque T on a segment is the pair of forces -T/l and T/l on its ends, with
-    T_i = -dV_b/dc (t_j - c t_i) for each joint with a neighbour j (the print of (28) lacks brackets and
-    a 1/l).
-
     Parameters
     ----------
     filament : Filament
@@ -50,25 +46,13 @@ def segment_end_forces(filament: Chain, nodes: FloatArray) -> tuple[FloatArray, 
     -------
     (minus, plus) : two (segments, 3) arrays in kJ/(mol nm)
     """
-    difference = segment_vectors(nodes, filament.closed)
-    length = np.linalg.norm(difference, axis=1)
-    tangent = difference / length[:, None]
-    plus = -filament.type.stretching_derivative(length)[:, None] * tangent
-    if filament.type.bending_rigidity > 0.0 and len(length) > 1:
-        plus += _bending_end_forces(filament, length, tangent)
+    vectors = segment_vectors(nodes, filament.closed)
+    length = np.linalg.norm(vectors, axis=1)
+    tangent = vectors / length[:, None]
+    plus = -filament.type.stretching_derivatives(length, filament.closed)[:, None] * tangent
+    plus += filament.type.bending_end_forces(vectors, filament.joint_stiffnesses, filament.closed)
     propulsion = 0.5 * filament.propulsion * tangent
     return propulsion - plus, propulsion + plus
-
-
-def _bending_end_forces(filament, length, tangent):
-    before, behind = joined(np.arange(len(length)), filament.closed)
-    cosine = np.einsum("ij,ij->i", tangent[before], tangent[behind])
-    slope = filament.type.bending_derivative(cosine, filament.joint_stiffnesses)[:, None]
-    cosine = cosine[:, None]
-    plus = np.zeros_like(tangent)
-    plus[before] -= slope * (tangent[behind] - cosine * tangent[before]) / length[before, None]
-    plus[behind] -= slope * (tangent[before] - cosine * tangent[behind]) / length[behind, None]
-    return plus
 
 
 def split_external_forces(
@@ -83,10 +67,7 @@ def split_external_forces(
     (minus, plus) : two (segments, 3) arrays
     """
     external = forces - segment_forces_to_nodes(chains, minus, plus)
-    neighbours = np.zeros(chains.node_count)
-    np.add.at(neighbours, chains.first_node, 1.0)
-    np.add.at(neighbours, chains.second_node, 1.0)
-    share = external / neighbours[:, None]
+    share = external / segments_at_nodes(chains)[:, None]
     return minus + share[chains.first_node], plus + share[chains.second_node]
 
 

@@ -15,10 +15,12 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..bead_spring.bead_spring_type import DSDNA_BASE_PAIRS, BeadSpringType
 from ..dynamics.recommended_step import recommended_time_step
 from ..dynamics.schemes import SCHEMES
 from ..engine_choice import ENGINES, default_scheme
 from ..errors import InputError
+from ..filaments.chain_type import ChainType
 from ..filaments.filament_type import DSDNA, F_ACTIN, MICROTUBULE, FilamentType
 from ..filaments.placement import clamped_nodes
 from ..mechanics.friction import EndCorrections
@@ -31,7 +33,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-PRESETS = {"F_ACTIN": F_ACTIN, "DSDNA": DSDNA, "MICROTUBULE": MICROTUBULE}
+PRESETS = {"F_ACTIN": F_ACTIN, "DSDNA": DSDNA, "MICROTUBULE": MICROTUBULE, "DSDNA_BASE_PAIRS": DSDNA_BASE_PAIRS}
 """Filament types by the names that a configuration uses."""
 
 STARTS = ("equilibrium", "straight")
@@ -51,7 +53,7 @@ class Solvent:
 class FilamentGroup:
     """One [[filament]] table: ``count`` filaments of one type, length and start; lengths in nm."""
 
-    type: FilamentType
+    type: ChainType
     segments: int
     count: int
     start: str
@@ -273,7 +275,14 @@ _TYPE_QUANTITIES = {
 }
 _TYPE_TEXTS = ("name", "bending_model", "stretching_model")
 _TYPE_KEYS = (*_TYPE_TEXTS, *_TYPE_QUANTITIES, "friction_length", "end_corrections")
-_FILAMENT_KEYS = ("type", "segments", "count", "start", "position", "direction", "clamped", *_TYPE_KEYS)
+
+# Of chains of beads alone, and of those that cylinders have as well.
+_BEAD_QUANTITIES = {"bead_spacing": units.LENGTH, "bead_friction": units.FRICTION, "bead_mass": units.MASS}
+_BEAD_NUMBERS = ("nu", "reduced_temperature")
+_BEAD_KEYS = (*_BEAD_QUANTITIES, *_BEAD_NUMBERS, "coarse_graining")
+_SHARED_KEYS = ("name", "diameter", "bending_rigidity", "persistence_length", "temperature", "stretching_modulus")
+
+_FILAMENT_KEYS = ("type", "segments", "count", "start", "position", "direction", "clamped", *_TYPE_KEYS, *_BEAD_KEYS)
 
 # Setting one of a pair in a preset takes the place of the other.
 _EXCLUSIVE = (
@@ -287,7 +296,8 @@ def _filament_group(table, solvent):
     if "type" not in table and "name" not in table:
         raise InputError(
             f"{table.label} lacks the key 'type': name a preset ({', '.join(PRESETS)}), or describe the filament "
-            "with name, diameter, segment_length and the other properties of a FilamentType."
+            "with name, diameter, segment_length and the other properties of a FilamentType, or with bead_spacing and "
+            "those of a BeadSpringType."
         )
     position = table.triple(
         "position", lambda text, name: parse_quantity(text, units.LENGTH, name), '["0 nm", "0 nm", "0 nm"]'
@@ -321,29 +331,80 @@ def _clamped(table, nodes):
 
 
 def _filament_type(table, solvent):
-    properties = _type_properties(table)
+    preset = PRESETS[table.choice("type", PRESETS)] if "type" in table else None
+    if isinstance(preset, BeadSpringType) or (preset is None and "bead_spacing" in table):
+        return _bead_spring_type(table, solvent, preset)
+    _refuse_keys(table, _BEAD_KEYS, "a chain of beads: give its bead_spacing, or the type DSDNA_BASE_PAIRS")
+    properties = _type_properties(table, _TYPE_QUANTITIES, _TYPE_TEXTS)
     if "persistence_length" in properties:
         properties.setdefault("temperature", solvent.temperature)
     elif "temperature" in properties:
         raise InputError(f"{table.label} temperature belongs to persistence_length; give both.")
     try:
-        if "type" not in table:
+        if preset is None:
             return _described_type(table, properties)
-        preset = PRESETS[table.choice("type", PRESETS)]
         if "segment_length" in properties:
             preset = preset.with_segment_length(properties.pop("segment_length"))
         return dataclasses.replace(preset, **_without_alternatives(properties)) if properties else preset
     except InputError as error:
-        message = str(error)
-        raise InputError(message if message.startswith(table.label) else f"{table.label} {message}") from None
+        raise _named(table, error) from None
 
 
-def _type_properties(table):
+def _named(table, error):
+    message = str(error)
+    return InputError(message if message.startswith(table.label) else f"{table.label} {message}")
+
+
+def _refuse_keys(table, keys, owner):
+    for key in keys:
+        if key in table:
+            raise InputError(f"{table.name(key)} belongs to {owner}.")
+
+
+def _bead_spring_type(table, solvent, preset):
+    own = [key for key in _TYPE_KEYS if key not in _SHARED_KEYS]
+    _refuse_keys(table, own, "a chain of cylinders, but this one has beads")
+    quantities = {key: unit for key, unit in _TYPE_QUANTITIES.items() if key in _SHARED_KEYS} | _BEAD_QUANTITIES
+    properties = _type_properties(table, quantities, ("name",))
+    beads = table.whole_number("coarse_graining", 1, 1, "2")
+    try:
+        return _bead_spring(table, solvent, preset, properties).coarse_grained(beads)
+    except InputError as error:
+        raise _named(table, error) from None
+
+
+def _bead_spring(table, solvent, preset, properties):
+    reduced = [key for key in _BEAD_NUMBERS if key in table]
+    if reduced and (preset is not None or len(reduced) < len(_BEAD_NUMBERS)):
+        raise InputError(f"{table.label} nu and reduced_temperature go together, in a description without a type.")
+    if reduced or "persistence_length" in properties:
+        properties.setdefault("temperature", solvent.temperature)
+    elif "temperature" in properties:
+        raise InputError(f"{table.label} temperature belongs to persistence_length, or to reduced_temperature.")
+    if preset is not None:
+        # Attributes of a type hold its bending_rigidity alone.
+        alternatives = {"bending_rigidity": None} if "persistence_length" in properties else {}
+        return dataclasses.replace(preset, **{**alternatives, **properties}) if properties else preset
+    missing = (("name", '"DNA"'), ("diameter", '"2 nm"'), ("bead_friction", '"1.91e-12 kg/s"'))
+    for key, example in missing if reduced else (*missing, ("stretching_modulus", '"1100 pN"')):
+        table.get(key, _REQUIRED, example)
+    if not reduced:
+        return BeadSpringType(**properties)
+    _refuse_keys(
+        table,
+        ("bending_rigidity", "persistence_length", "stretching_modulus"),
+        "a description without nu and reduced_temperature",
+    )
+    numbers = {key: table.number(key, None) for key in _BEAD_NUMBERS}
+    return BeadSpringType.from_reduced(**properties, **numbers)
+
+
+def _type_properties(table, quantities, texts):
     properties = {}
-    for key, unit in _TYPE_QUANTITIES.items():
+    for key, unit in quantities.items():
         if key in table:
             properties[key] = table.quantity(key, unit, zero_allowed=key == "bending_rigidity")
-    for key in _TYPE_TEXTS:
+    for key in texts:
         if key in table:
             properties[key] = table.text(key)
     if "friction_length" in table:

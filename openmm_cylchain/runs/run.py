@@ -11,8 +11,10 @@ import openmm
 from openmm import app, unit
 
 from ..dynamics.precision import PRECISIONS
+from ..engines.description import describe_lengths, filament_label
 from ..errors import InputError, InstabilityError
 from ..filaments import shapes
+from ..mechanics.broken_segment import find_broken_segment
 from ..output.files import write_atomically
 from ..output.progress import RunProgress
 from ..output.structure_files import write_lammps_data, write_psf
@@ -355,16 +357,18 @@ class _Recorder:
     def _check_finite(self, positions, stretching, bending):
         if np.isfinite(stretching) and np.isfinite(bending) and np.all(np.isfinite(positions)):
             return
-        for number, (filament, nodes) in enumerate(zip(self._filaments, self._filaments.node_indices)):
-            segment = _first_broken_segment(filament.type, positions[nodes])
-            if segment is not None:
-                raise InstabilityError(
-                    f"Filament {number} ({filament.type.name}) has blown up at segment {segment} by step {self._step}: "
-                    "its position or energy is not finite. Use a smaller time step.",
-                    filament=number,
-                    segment=segment,
-                    step=self._step,
-                )
+        filaments = self._filaments
+        chains = filaments.chain_set(self._simulation.system)
+        nodes = np.concatenate(filaments.node_indices)
+        broken = find_broken_segment(chains, *describe_lengths(filaments), positions[nodes])
+        if broken is not None:
+            raise InstabilityError(
+                f"{filament_label(broken.chain, filaments[broken.chain])} has blown up at segment {broken.segment} by "
+                f"step {self._step}: its position or energy is not finite. Use a smaller time step.",
+                filament=broken.chain,
+                segment=broken.segment,
+                step=self._step,
+            )
         raise InstabilityError(f"The energy is not finite in step {self._step}. Use a smaller time step.")
 
     def _write_checkpoint(self):
@@ -379,19 +383,6 @@ class _Recorder:
                 state=self._simulation.context.createCheckpoint(),
             )
         )
-
-
-def _first_broken_segment(filament_type, nodes):
-    # The first segment of infinite energy or position, counting a joint as part of the segment before it.
-    segments = np.diff(nodes, axis=0)
-    with np.errstate(all="ignore"):
-        lengths = np.linalg.norm(segments, axis=1)
-        tangents = segments / lengths[:, None]
-        energies = np.array(filament_type.stretching_energy(lengths))
-        if filament_type.bending_rigidity > 0:
-            energies[:-1] += filament_type.bending_energy(np.sum(tangents[1:] * tangents[:-1], axis=1))
-    broken = np.flatnonzero(~np.isfinite(energies))
-    return int(broken[0]) if len(broken) else None
 
 
 class _Signals:

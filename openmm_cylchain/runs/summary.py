@@ -19,9 +19,11 @@ from ..analysis.trajectories import (
     bending_drift,
     end_to_end_vectors,
     joint_cosines,
+    node_positions,
     persistence_length,
     segment_lengths,
 )
+from ..bead_spring.bead_spring_type import BeadSpringType
 from ..errors import EquilibrationWarning, InputError
 from ..filaments.equilibrium import SegmentLengthDistribution
 from ..output.files import write_atomically
@@ -178,6 +180,9 @@ def _series(group, temperature, trajectory, members):
     # (name, unit, (frames, filaments) averages, exact value) of every observable that is a plain average.
     kT = thermal_energy(temperature)
     kind = group.type
+    if isinstance(kind, BeadSpringType):
+        yield from _series_of_beads(kind, group.segments, temperature, trajectory, members)
+        return
     lengths = np.stack(segment_lengths(trajectory, members), axis=1)
     distribution = SegmentLengthDistribution(kind, temperature)
     yield (
@@ -197,12 +202,41 @@ def _series(group, temperature, trajectory, members):
                 theory.bending_energy_mean(kind, temperature) / kT,
             )
         yield "cosine of joint angle", "", cosines.mean(axis=2), theory.mean_joint_cosine(kind, temperature)
+    yield from _end_to_end(kind, group.segments, temperature, trajectory, members)
+
+
+def _series_of_beads(kind, bonds, temperature, trajectory, members):
+    # Averages over all bonds, or joints, of a chain, which are not alike.
+    kT = thermal_energy(temperature)
+    vectors = np.diff(np.stack(node_positions(trajectory, members), axis=1), axis=2)
+    lengths = np.linalg.norm(vectors, axis=3)
+    free = kind, bonds, temperature
+    energies = kind.stretching_energies(lengths).mean(axis=2) / kT
+    yield "stretching energy per segment", "kT", energies, theory.bead_spring_stretching_energies(*free).mean() / kT
+    yield "segment length", "nm", lengths.mean(axis=2), theory.bead_spring_mean_lengths(*free).mean()
+    if bonds > 1:
+        energies = kind.bending_energies(vectors).mean(axis=2) / kT
+        yield "bending energy per joint", "kT", energies, theory.bead_spring_bending_energies(*free).mean() / kT
+    yield from _end_to_end(kind, bonds, temperature, trajectory, members)
+
+
+def mean_energies(group, temperature):
+    """Exact mean energies in kJ/mol of a segment and of a joint of free chains; zero if there is no joint."""
+    kind = group.type
+    if not isinstance(kind, BeadSpringType):
+        return theory.stretching_energy_mean(kind, temperature), theory.bending_energy_mean(kind, temperature)
+    free = kind, group.segments, temperature
+    stretching, bending = theory.bead_spring_stretching_energies(*free), theory.bead_spring_bending_energies(*free)
+    return stretching.mean(), bending.mean() if group.segments > 1 else 0.0
+
+
+def _end_to_end(kind, segments, temperature, trajectory, members):
     squares = np.sum(end_to_end_vectors(trajectory, members) ** 2, axis=2)
     name = "mean square end-to-end distance"
-    yield name, "nm^2", squares, theory.chain_mean_square_end_to_end(kind, group.segments, temperature)
+    yield name, "nm^2", squares, theory.chain_mean_square_end_to_end(kind, segments, temperature)
     if kind.bending_rigidity > 0:
         wormlike = theory.wlc_mean_square_end_to_end(
-            group.segments * kind.segment_length, kind.persistence_length_at(temperature)
+            segments * kind.segment_length, kind.persistence_length_at(temperature)
         )
         yield _WORMLIKE, "nm^2", squares, float(wormlike)
 
@@ -216,7 +250,8 @@ def _mean_with_error(series):
 
 
 def _persistence_length(group, temperature, trajectory, members, comparable):
-    if group.segments < 2 or group.type.bending_rigidity == 0:
+    # In chains of beads, mean cosines depend on the place along the chain.
+    if group.segments < 2 or group.type.bending_rigidity == 0 or isinstance(group.type, BeadSpringType):
         return []
     try:
         with warnings.catch_warnings():

@@ -13,7 +13,7 @@ from ..output.files import write_atomically
 from ..units.quantities import thermal_energy
 from ..units.text import time_unit
 from .run_directory import read_energies
-from .summary import group_labels, group_members, is_in_equilibrium
+from .summary import group_labels, group_members, is_in_equilibrium, mean_energies
 
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
 _STRETCHING_COLOUR, _BENDING_COLOUR = "#D55E00", "#0072B2"
@@ -139,8 +139,7 @@ def _draw_energies(axis, groups, temperature, energies):
     kinds = [group for group, *_ in groups]
     segments = np.array([group.count * group.segments for group in kinds])
     joints = np.array([group.count * (group.segments - 1) for group in kinds])
-    stretching = np.array([theory.stretching_energy_mean(group.type, temperature) for group in kinds]) / kT
-    bending = np.array([theory.bending_energy_mean(group.type, temperature) for group in kinds]) / kT
+    stretching, bending = np.array([mean_energies(group, temperature) for group in kinds]).T / kT
     curves = [("stretching", "segment", np.average(stretching, weights=segments), _STRETCHING_COLOUR)]
     if np.any(joints * bending):
         curves.append(("bending", "joint", np.average(bending, weights=joints), _BENDING_COLOUR))
@@ -212,6 +211,9 @@ def _draw_joint_angles(axis, groups, temperature, trajectory):
         cosines = np.clip(np.concatenate([c.ravel() for c in joint_cosines(trajectory, members)]), -1.0, 1.0)
         angles = np.degrees(np.arccos(cosines))
         _draw_histogram(axis, angles, label, colour)
+        if group.type.node_friction > 0.0:
+            # Those of beads have no distribution that holds all along the chain.
+            continue
         angle = np.linspace(0.0, np.pi, 20001)
         density = np.sin(angle)
         if group.type.bending_rigidity > 0:
@@ -241,6 +243,8 @@ def _draw_segment_lengths(axis, groups, temperature, trajectory):
     for group, members, label, colour in groups:
         lengths = np.concatenate([values.ravel() for values in segment_lengths(trajectory, members)])
         _draw_histogram(axis, lengths, label, colour)
+        if group.type.node_friction > 0.0:
+            continue
         width = 6.0 * np.sqrt(kT / group.type.segment_stiffness)
         length = np.linspace(max(0.0, group.type.segment_length - width), group.type.segment_length + width, 2001)
         energy = group.type.stretching_energy(length) / kT

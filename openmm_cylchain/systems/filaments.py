@@ -10,13 +10,14 @@ import numpy as np
 import openmm
 from openmm import app, unit
 
+from ..dynamics.bead_spring_step import refuse_modes
 from ..dynamics.precision import check_precision
-from ..dynamics.schemes import check_scheme
+from ..dynamics.schemes import MODES, check_scheme
 from ..dynamics.step_of_system import recommended_step_of
 from ..dynamics.step_warnings import warn_of_long_step
 from ..dynamics.time_step import TimeStep, as_step
 from ..engine_choice import choose_engine, default_scheme, load_engine
-from ..engines.description import describe_chains
+from ..engines.description import describe_chains, filament_label
 from ..engines.protocol import IntegratorSettings, PlacedFilaments
 from ..errors import InputError
 from ..filaments import shapes
@@ -28,8 +29,8 @@ from ..filaments.attachments import (
     locate,
     neighbors,
 )
+from ..filaments.chain_type import ChainType
 from ..filaments.filament import Filament, Tether
-from ..filaments.filament_type import FilamentType
 from ..filaments.placement import named_nodes
 from ..mechanics.flow import Flow, as_flow
 from ..mechanics.redistribution import ChainSet
@@ -152,7 +153,7 @@ class Filaments:
 
     def add_straight(
         self,
-        filament_type: FilamentType,
+        filament_type: ChainType,
         segments: int,
         start: Vector,
         direction: Vector,
@@ -169,7 +170,7 @@ class Filaments:
 
         Parameters
         ----------
-        filament_type : FilamentType
+        filament_type : FilamentType or BeadSpringType
         segments : int
         start : (3,) length
             Position of the first node.
@@ -196,7 +197,7 @@ class Filaments:
 
     def add_nodes(
         self,
-        filament_type: FilamentType,
+        filament_type: ChainType,
         positions: Vectors,
         clamped: int | Indices = (),
         *,
@@ -210,7 +211,7 @@ class Filaments:
 
         Parameters
         ----------
-        filament_type : FilamentType
+        filament_type : FilamentType or BeadSpringType
         positions : (n, 3) length
             At least two nodes, four for a ring.
         clamped : sequence of int
@@ -231,7 +232,7 @@ class Filaments:
 
     def add_ring(
         self,
-        filament_type: FilamentType,
+        filament_type: ChainType,
         segments: int,
         center: Vector,
         normal: Vector = (0.0, 0.0, 1.0),
@@ -244,7 +245,7 @@ class Filaments:
 
         Parameters
         ----------
-        filament_type : FilamentType
+        filament_type : FilamentType or BeadSpringType
         segments : int
             At least four.
         center : (3,) length
@@ -264,7 +265,7 @@ class Filaments:
 
     def add_equilibrium(
         self,
-        filament_type: FilamentType,
+        filament_type: ChainType,
         segments: int,
         seed: int,
         start: Vector = (0.0, 0.0, 0.0),
@@ -281,7 +282,7 @@ class Filaments:
 
         Parameters
         ----------
-        filament_type : FilamentType
+        filament_type : FilamentType or BeadSpringType
         segments : int
         seed : int
             The same seed gives the same chain.
@@ -602,11 +603,12 @@ class Filaments:
         system : openmm.System
             The System that the filaments were put into.
         step_size : time, or TimeStep
-        scheme : {"implicit", "implicit-second-order", "midpoint", "euler"}, optional
+        scheme : {"implicit", "implicit-second-order", "midpoint", "euler", "modes"}, optional
             "implicit", the compiled engine's default, takes stretching, bending and tethers at the end of the step,
             and steps a thousand times as long as explicit ones. "implicit-second-order" does so in two stages, with
             decay of bends of second order in the step. "midpoint", the portable engine's default, is Fixman's
-            explicit scheme with the right drift on chains. "euler" is Section 4 of the paper, biased on chains.
+            explicit scheme with the right drift on chains. "euler" is Section 4 of the paper, biased on chains. "modes"
+            moves open chains of beads alone, by their modes.
         temperature : temperature, optional
             That of the filaments if not given.
         particle_friction : energy*time/length^2, or array of them
@@ -653,6 +655,9 @@ class Filaments:
         self._refuse_if_not_in(system)
         scheme = default_scheme(self._engine_name) if scheme is None else scheme
         check_scheme(scheme)
+        if scheme == MODES:
+            for number, filament in enumerate(self):
+                refuse_modes(filament, filament_label(number, filament))
         flow = as_flow(flow)
         bath = self._bath(temperature)
         if checks:
@@ -858,12 +863,15 @@ class Filaments:
         return filament
 
     def _label(self, filament_type):
-        if not isinstance(filament_type, FilamentType):
+        if not isinstance(filament_type, ChainType):
             raise InputError(
-                f"Filament {len(self)}: filament_type must be a FilamentType, such as F_ACTIN, but is "
-                f"{filament_type!r}."
+                f"Filament {len(self)}: filament_type must be a FilamentType, such as F_ACTIN, or a BeadSpringType, "
+                f"but is {filament_type!r}."
             )
-        return f"Filament {len(self)} ({filament_type.name})"
+        label = f"Filament {len(self)} ({filament_type.name})"
+        if self._engine_name == "portable" and filament_type.node_friction > 0.0:
+            raise InputError(f"{label}: the portable engine has no chains of beads; use engine='compiled'.")
+        return label
 
     def _add(self, filament_type, positions, clamped, label, closed=False, planar=False, propulsion=0.0):
         self._refuse_if_built(label)

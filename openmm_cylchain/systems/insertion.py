@@ -37,10 +37,7 @@ def check_force_groups(*groups: int) -> None:
 
 def add_nodes_to_system(system: openmm.System, filament: Filament) -> IntArray:
     """Add the nodes of a Filament to a System; return their particle indices."""
-    # Each segment's mass goes to its two ends in equal parts.
-    masses = np.full(len(filament.positions), filament.type.segment_mass)
-    if not filament.closed:
-        masses[[0, -1]] *= 0.5
+    masses = filament.type.node_masses(len(filament.positions), filament.closed)
     masses[list(filament.clamped)] = 0.0
     return np.array([system.addParticle(mass) for mass in masses])
 

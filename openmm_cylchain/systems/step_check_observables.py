@@ -118,13 +118,9 @@ class Probe:
         vectors = np.diff(nodes, axis=1, append=nodes[:, :1]) if closed else np.diff(nodes, axis=1)
         lengths = np.linalg.norm(vectors, axis=2)
         tangents = vectors / lengths[..., None]
-        if closed:
-            cosines = np.einsum("fsk,fsk->fs", np.roll(tangents, 1, axis=1), tangents)
-        else:
-            cosines = np.einsum("fsk,fsk->fs", tangents[:, :-1], tangents[:, 1:])
         bending = np.zeros(len(nodes))
-        if cosines.shape[1] and one.bending_rigidity > 0.0:
-            bending = one.bending_energy(cosines, kind.joint_stiffnesses).mean(axis=1) / self._kT
+        if len(kind.joint_stiffnesses) and one.bending_rigidity > 0.0:
+            bending = one.bending_energies(vectors, kind.joint_stiffnesses, closed).mean(axis=1) / self._kT
         half = nodes.shape[1] // 2
         ends = nodes[:, half if closed else -1] - nodes[:, 0]
         middle = nodes[:, half]
@@ -133,7 +129,7 @@ class Probe:
         scale = math.sqrt(2.0 * one.segment_length / filament.segments)
         amplitudes = scale * np.einsum("ms,fsk->mfk", waves, tangents)
         moved = [amplitudes, middle] if before is None else [amplitudes - before[0], middle - before[1]]
-        values = [one.stretching_energy(lengths).mean(axis=1) / self._kT, bending, np.sum(ends**2, axis=1)]
+        values = [one.stretching_energies(lengths, closed).mean(axis=1) / self._kT, bending, np.sum(ends**2, axis=1)]
         values += [*np.sum(moved[0] ** 2, axis=2), np.sum(moved[1] ** 2, axis=1)]
         return values, (amplitudes, middle)
 

@@ -7,6 +7,19 @@ outside the stated range. Functions of the discrete chain are exact for the mode
 any stiffness; the others belong to the continuous wormlike chain (WLC).
 """
 
+from ..bead_spring.equilibrium import (
+    bead_spring_bending_energies,
+    bead_spring_bond_correlations,
+    bead_spring_mean_lengths,
+    bead_spring_mean_square_distances_from_center,
+    bead_spring_mean_square_end_to_end,
+    bead_spring_mean_square_lengths,
+    bead_spring_mean_square_radius_of_gyration,
+    bead_spring_mode_variances,
+    bead_spring_persistence_length,
+    bead_spring_stretching_energies,
+)
+from ..bead_spring.modes import bead_spring_mode_rates
 from .discrete_chain import (
     chain_bending_mode_variance,
     chain_mean_square_end_to_end,
@@ -42,6 +55,17 @@ from .wormlike_chain import (
 )
 
 __all__ = [
+    "bead_spring_bending_energies",
+    "bead_spring_bond_correlations",
+    "bead_spring_mean_lengths",
+    "bead_spring_mean_square_distances_from_center",
+    "bead_spring_mean_square_end_to_end",
+    "bead_spring_mean_square_lengths",
+    "bead_spring_mean_square_radius_of_gyration",
+    "bead_spring_mode_rates",
+    "bead_spring_mode_variances",
+    "bead_spring_persistence_length",
+    "bead_spring_stretching_energies",
     "bending_energy_mean",
     "bending_energy_variance",
     "bending_mode_variance",

@@ -5,8 +5,18 @@ import numpy.typing as npt
 from openmm import unit
 
 from ..errors import InputError
+from ..filaments.chain_type import ChainType
 from ..units.quantities import DIMENSIONLESS, TEMPERATURE, in_units_of, positive, thermal_energy
 from ..units.types import FloatOrArray, Numbers, Scalar
+
+
+def refuse_beads(filament_type: ChainType) -> None:
+    """Raise InputError for a chain of beads, whose lengths and joints do not fluctuate independently."""
+    if filament_type.node_friction > 0.0:
+        raise InputError(
+            f"Filament type {filament_type.name!r} is a chain of beads, for which this closed form does not hold: see "
+            "the functions theory.bead_spring_..."
+        )
 
 
 def each_not_negative(value: Numbers, dimension: unit.Unit, name: str) -> FloatOrArray:

@@ -3,16 +3,23 @@
 import numpy as np
 import numpy.typing as npt
 
+from ..bead_spring.bead_spring_type import BeadSpringType
+from ..bead_spring.equilibrium import (
+    bead_spring_mean_square_end_to_end,
+    bead_spring_mean_square_radius_of_gyration,
+    bead_spring_persistence_length,
+)
 from ..errors import InputError
 from ..filaments.equilibrium import JointAngleDistribution, PlanarJointAngleDistribution, SegmentLengthDistribution
 from ..filaments.filament_type import FilamentType
 from ..units.quantities import whole_number
 from ..units.types import FloatOrArray, Scalar
-from .arguments import each_whole_number
+from .arguments import each_whole_number, refuse_beads
 
 
 def mean_joint_cosine(filament_type: FilamentType, temperature: Scalar, planar: bool = False) -> float:
     """Mean cosine <t1.t2> between neighbouring segments of the free discrete chain, in space or in a plane; exact."""
+    refuse_beads(filament_type)
     if planar:
         return float(PlanarJointAngleDistribution(filament_type, temperature).mean(np.cos))
     return float(JointAngleDistribution(filament_type, temperature).mean(lambda cosine: cosine))
@@ -35,13 +42,15 @@ def chain_tangent_correlation(
     return mean_joint_cosine(filament_type, temperature, planar) ** each_whole_number(lag, 0, "lag")
 
 
-def chain_persistence_length(filament_type: FilamentType, temperature: Scalar) -> float:
+def chain_persistence_length(filament_type: FilamentType | BeadSpringType, temperature: Scalar) -> float:
     """Length over which tangents of the discrete chain decorrelate, ``-<l>/ln<c>``, in nm; exact.
 
     Of a type given by its ``persistence_length`` it is that length at the temperature given with it, times <l>/l0. Of
     one given by its ``bending_rigidity`` it tends to the a/(k_B T) of ``FilamentType.persistence_length_at`` for
-    segments that are short against it. A freely jointed chain has 0.
+    segments that are short against it. A freely jointed chain has 0. Of beads, see ``bead_spring_persistence_length``.
     """
+    if isinstance(filament_type, BeadSpringType):
+        return bead_spring_persistence_length(filament_type, temperature)
     if filament_type.joint_stiffness == 0:
         return 0.0
     length = SegmentLengthDistribution(filament_type, temperature).mean(lambda length: length)
@@ -59,32 +68,36 @@ def _subchain_mean_square(filament_type, segments, temperature, planar):
 
 
 def chain_mean_square_end_to_end(
-    filament_type: FilamentType, segments: int, temperature: Scalar, planar: bool = False
+    filament_type: FilamentType | BeadSpringType, segments: int, temperature: Scalar, planar: bool = False
 ) -> float:
     """Mean square end-to-end distance of the free discrete chain in nm^2, exact at any stiffness.
 
     ``<R^2> = N <l^2> + 2 <l>^2 sum_k (N-k) <c>^k``, the averages over (19) and exp(-V_b/k_B T), or over what
-    they are in a plane.
+    they are in a plane. Of beads, by the transfer operator.
 
     Parameters
     ----------
-    filament_type : FilamentType
+    filament_type : FilamentType or BeadSpringType
     segments : int
     temperature : temperature, above zero
     planar : bool
         In a plane.
     """
+    if isinstance(filament_type, BeadSpringType):
+        return bead_spring_mean_square_end_to_end(filament_type, segments, temperature, planar)
     segments = whole_number(segments, 1, "segments")
     return float(_subchain_mean_square(filament_type, segments, temperature, planar)[-1])
 
 
 def chain_mean_square_radius_of_gyration(
-    filament_type: FilamentType, segments: int, temperature: Scalar, planar: bool = False
+    filament_type: FilamentType | BeadSpringType, segments: int, temperature: Scalar, planar: bool = False
 ) -> float:
     """Mean square radius of gyration of the N+1 nodes of the free discrete chain in nm^2, exact.
 
-    Every node has the same weight: ``<R_g^2> = sum over pairs <R_ij^2> / (N+1)^2``.
+    Every node has the same weight: ``<R_g^2> = sum over pairs <R_ij^2> / (N+1)^2``. Of beads, by the transfer operator.
     """
+    if isinstance(filament_type, BeadSpringType):
+        return bead_spring_mean_square_radius_of_gyration(filament_type, segments, temperature, planar)
     segments = whole_number(segments, 1, "segments")
     distances = _subchain_mean_square(filament_type, segments, temperature, planar)
     return float(np.arange(segments, 0, -1) @ distances) / (segments + 1) ** 2
@@ -108,6 +121,7 @@ def chain_bending_mode_variance(
     mode : int or array of int, from 1 to segments - 1
     temperature : temperature, above zero
     """
+    refuse_beads(filament_type)
     segments, modes = _bending_modes(segments, mode)
     cosines = np.cos(np.multiply.outer(modes, np.pi * (np.arange(segments) + 0.5) / segments))
     lag = np.abs(np.subtract.outer(np.arange(segments), np.arange(segments)))
@@ -138,6 +152,7 @@ def chain_planar_bending_mode_variance(
     mode : int or array of int, from 1 to segments - 1
     temperature : temperature, above zero
     """
+    refuse_beads(filament_type)
     segments, modes = _bending_modes(segments, mode)
     square = PlanarJointAngleDistribution(filament_type, temperature).mean(lambda angle: angle**2)
     return filament_type.segment_length * square / (4.0 * np.sin(0.5 * np.pi * modes / segments) ** 2)

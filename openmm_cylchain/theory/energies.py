@@ -7,7 +7,7 @@ import numpy as np
 from ..filaments.equilibrium import PlanarJointAngleDistribution, SegmentLengthDistribution
 from ..filaments.filament_type import FilamentType
 from ..units.types import Scalar
-from .arguments import thermal_energy_above_zero
+from .arguments import refuse_beads, thermal_energy_above_zero
 
 
 def bending_energy_mean(filament_type: FilamentType, temperature: Scalar, planar: bool = False) -> float:
@@ -25,6 +25,7 @@ def bending_energy_mean(filament_type: FilamentType, temperature: Scalar, planar
     planar : bool
         In a plane.
     """
+    refuse_beads(filament_type)
     kT = thermal_energy_above_zero(temperature)
     if planar:
         distribution = PlanarJointAngleDistribution(filament_type, temperature)
@@ -38,6 +39,7 @@ def bending_energy_variance(filament_type: FilamentType, temperature: Scalar) ->
     Inscribed circle: eq. (41), ``(x k_B T)^2 (E_0/E_2 - (E_1/E_2)^2)`` at x = 2 K/k_B T. Kratky-Porod:
     ``(k_B T)^2 (1 - (u/sinh u)^2)`` with u = K/k_B T. Quadratic: by quadrature.
     """
+    refuse_beads(filament_type)
     kT = thermal_energy_above_zero(temperature)
     return kT**2 * _reduced_bending_moments(filament_type, kT)[1]
 
@@ -59,11 +61,11 @@ def _reduced_bending_moments(filament_type, kT):
 
 
 def _moments_by_quadrature(potential, stiffness):
-    # Of any model, with angles from zero to where its energy is 40 k_B T.
-    angle = np.linspace(0.0, np.pi, 20_001)[1:-1]
-    angle = np.linspace(0.0, angle[potential.energy(stiffness, np.cos(angle)) < 40.0].max(initial=1e-3), 20_001)[1:-1]
+    # Of any model, as far as tangent_decorrelation goes.
+    node, weight = np.polynomial.legendre.leggauss(400)
+    angle = 0.5 * min(math.pi, 20.0 / math.sqrt(stiffness)) * (node + 1.0)
     energy = potential.energy(stiffness, np.cos(angle))
-    return _moments(energy, np.sin(angle) * np.exp(-energy))
+    return _moments(energy, weight * np.sin(angle) * np.exp(-energy))
 
 
 def _inscribed_circle_moments(stiffness):
@@ -115,6 +117,7 @@ def stretching_energy_mean(filament_type: FilamentType, temperature: Scalar, pla
     planar : bool
         In a plane.
     """
+    refuse_beads(filament_type)
     if planar:
         return float(
             SegmentLengthDistribution(filament_type, temperature, planar).mean(filament_type.stretching_energy)
@@ -124,6 +127,7 @@ def stretching_energy_mean(filament_type: FilamentType, temperature: Scalar, pla
 
 def stretching_energy_variance(filament_type: FilamentType, temperature: Scalar) -> float:
     """Variance of the stretching energy of one segment, in (kJ/mol)^2; exact, see ``stretching_energy_mean``."""
+    refuse_beads(filament_type)
     return _stretching_moments(filament_type, temperature)[1]
 
 

@@ -10,7 +10,9 @@ from .quantities import (
     AVOGADRO,
     BENDING_RIGIDITY,
     FORCE,
+    FRICTION,
     LENGTH,
+    MASS,
     MASS_PER_LENGTH,
     ROTATIONAL_FRICTION,
     STIFFNESS,
@@ -27,6 +29,8 @@ _EXAMPLES = {
     STIFFNESS: ("stiffness", "48.7 pN/nm"),
     FORCE: ("force", "1100 pN"),
     BENDING_RIGIDITY: ("bending rigidity", "2.2e7 pN*nm^2"),
+    FRICTION: ("friction", "1.91e-12 kg/s"),
+    MASS: ("mass", "650 Da"),
     ROTATIONAL_FRICTION: ("rotational friction", "7e4 pN*nm*us"),
     MASS_PER_LENGTH: ("mass per length", "3500 Da/nm"),
 }

@@ -6,6 +6,10 @@
 
 /** The largest change of a segment in the last iteration, over its rest length; a fifth of it remains as an error. */
 const Scalar NEWTON_TOLERANCE = 1e-2;
+/** The same for chains whose bends are linear in the nodes; Newton's method leaves less of it as an error. */
+const Scalar TOLERANCE_OF_LINEAR_BENDS = 3e-2;
+/** The least cosine of the angle by which a segment of such a chain may turn in a step. */
+const Scalar LEAST_COSINE = -0.5;
 /** The largest change of a node in the last iteration, over that length. */
 const Scalar NODE_TOLERANCE = 0.1;
 /**
@@ -27,7 +31,8 @@ public:
         Real excess = Real{};
         const Real perEnergy = (CLOSED ? splat<Real>(1) : 1-loaded<Real>(pack.free, 0))*(1/(kT+TINY));
         const Scalar tighter = step.twoStages ? 1/(TOLERANCE_OF_STAGES*TOLERANCE_OF_STAGES) : 1;
-        const Scalar ofSegments = NEWTON_TOLERANCE*NEWTON_TOLERANCE;
+        const Scalar tolerance = isLinear(pack.bending) ? TOLERANCE_OF_LINEAR_BENDS : NEWTON_TOLERANCE;
+        const Scalar ofSegments = tolerance*tolerance;
         for (int s = 0; s < pack.segments; s++) {
             const Vec difference = change[s+1]-change[s];
             const Real inverse = property<Real>(pack, s, Pack::InverseRestLength), square = difference.dot(difference);
@@ -48,17 +53,29 @@ public:
         }
         return any;
     }
-    /** Mark lanes a segment of which changes by more than a quarter of a turn would do, or leaves its range. */
+    /**
+     * Mark lanes a segment of which changes by more than a quarter of a turn would do, or leaves its range. Where bends
+     * are linear in the nodes, all that is needed is a direction half-way, which two thirds of half a turn leave.
+     */
     void findExcessiveChanges(const Vec* y, bool* failed) const {
         for (int s = 0; s < pack.segments; s++) {
             const Vec difference = y[s+1]-y[s];
-            // A quarter of a turn.
-            Real square = 0.5*difference.dot(difference), limit = property<Real>(pack, s, Pack::RestLength);
-            for (int i = 0; i < W; i++)
-                failed[i] |= s < pack.segmentsOfLane[i] && !(lane(square, i) < lane(limit, i)*lane(limit, i));
+            if (isLinear(pack.bending)) {
+                const Vec before = segments[s].difference, after = before+difference;
+                Real excess = root(before.dot(before)*after.dot(after))*LEAST_COSINE-before.dot(after);
+                for (int i = 0; i < W; i++)
+                    failed[i] |= s < pack.segmentsOfLane[i] && !(lane(excess, i) < 0);
+            }
+            else {
+                // A quarter of a turn.
+                Real square = 0.5*difference.dot(difference), limit = property<Real>(pack, s, Pack::RestLength);
+                for (int i = 0; i < W; i++)
+                    failed[i] |= s < pack.segmentsOfLane[i] && !(lane(square, i) < lane(limit, i)*lane(limit, i));
+            }
             if (hasRange(pack.stretching)) {
                 const Vec after = segments[s].difference+(y[s+1]-y[s]);
-                Real relative = (root(after.dot(after))-limit)*property<Real>(pack, s, Pack::InverseExtension);
+                Real relative = (root(after.dot(after))-property<Real>(pack, s, Pack::RestLength))*
+                        property<Real>(pack, s, Pack::InverseExtension);
                 for (int i = 0; i < W; i++)
                     failed[i] |= s < pack.segmentsOfLane[i] && !(std::fabs(lane(relative, i)) < 1);
             }

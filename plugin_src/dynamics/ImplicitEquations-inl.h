@@ -6,6 +6,13 @@
 
 /** The part of the friction against turning that compression may take away in the iteration's matrix. */
 const Scalar COMPRESSION = 0.9;
+/**
+ * Bends that are linear in the nodes leave the matrix regular under nearly all compression, so that Newton's method may
+ * have all of it. Where that has not converged after so many iterations, compression counts no more.
+ */
+const int ITERATIONS_WITH_COMPRESSION = 6;
+/** More than any tension over a length. */
+const Scalar UNBOUNDED = 1e30;
 
 template <int W, bool CLOSED> class ImplicitEquations {
     typedef typename Lanes<W>::Type Real;
@@ -30,8 +37,13 @@ public:
             settings(step.settings), n(step.n), h(step.h), segments(step.segments), x(step.start.nodes),
             loads(step.loads), change(step.change), band(pack, memory) {
     }
-    /** Linearise the equations around y, and eliminate the nodes from first to last. */
-    void eliminate(const Vec* y) {
+    /**
+     * Linearise the equations around y, and eliminate the nodes from first to last.
+     *
+     * @param iteration  how many there were before
+     */
+    void eliminate(const Vec* y, int iteration) {
+        allowsCompression = isLinear(pack.bending) && iteration < ITERATIONS_WITH_COMPRESSION;
         if (settings.flow.present)
             addDragOfFlow(y);
         Row rows[3];
@@ -179,7 +191,8 @@ public:
         segment.shift = lesser<Real>(0.5*segment.response, along);
         band.setTension(s, t, 1/(segment.response-segment.shift+TINY), segment.tension);
 
-        const Real turning = 0.5*larger<Real>(segment.multiplier*geometry.inverse, acrossTurn*(-COMPRESSION*perStep));
+        const Real least = allowsCompression ? splat<Real>(-UNBOUNDED) : acrossTurn*(-COMPRESSION*perStep);
+        const Real turning = 0.5*larger<Real>(segment.multiplier*geometry.inverse, least);
         after.diagonal = Symmetric<Real> {};
         after.diagonal.addAxial(sameAcross, along-sameAcross, direction);
         after.diagonal.addAxial(turning, segment.shift-turning, t);
@@ -273,6 +286,7 @@ private:
     ImplicitSegment<Real>* const segments;
     const Vec* const x;
     Vec *const loads, *const change;
+    bool allowsCompression = false;
     Band band;
 
     /**

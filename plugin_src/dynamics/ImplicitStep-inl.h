@@ -103,7 +103,7 @@ private:
         Real active = splat<Real>(1);
         int iterations = 0;
         while (iterations < NEWTON_ITERATIONS) {
-            equations.eliminate(y);
+            equations.eliminate(y, iterations);
             equations.template substitute<false>();
             if (iterations > 0 || step.stage == Stage::Second) {
                 if (step.settings.segmentForces == NULL || step.stage == Stage::First)
@@ -113,7 +113,7 @@ private:
             }
             else if (step.settings.kT > 0) {
                 if (metricForces.stiffenTautSegments()) {
-                    equations.eliminate(y);
+                    equations.eliminate(y, iterations);
                     equations.template substitute<false>();
                 }
                 metricForces.add(equations);

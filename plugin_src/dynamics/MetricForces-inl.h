@@ -78,12 +78,15 @@ private:
 
     /**
      * The friction of a segment's ends against turning, and the stiffness with which its tension turns it back, in a
-     * step.
+     * step. Bends that are linear in the nodes hold segments that are much shorter than what tension straightens.
      */
     void turningRates(int s, Real& friction, Real& tension) const {
         const Real l0 = property<Real>(pack, s, Pack::RestLength);
         friction = 0.25*property<Real>(pack, s, Pack::Perpendicular)+
-                property<Real>(pack, s, Pack::Rotational)/(l0*l0)+TINY;
+                property<Real>(pack, s, Pack::Rotational)/(l0*l0)+0.5*loaded<Real>(pack.nodeFriction, 0)+TINY;
+        if (isLinear(pack.bending))
+            friction = friction+(h/step.shareOfForces())*
+                    (loaded<Real>(pack.joints, s)+loaded<Real>(pack.joints, s+1));
         tension = (h/step.shareOfForces())*segments[s].multiplier/segments[s].length;
     }
 };

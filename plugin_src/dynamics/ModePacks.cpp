@@ -32,6 +32,18 @@ bool ModePacks::Wide::isUsed(const StepSettings& settings) const {
     return settings.kT > 0 && stiffness <= LARGEST_STIFFNESS*settings.kT;
 }
 
+/** Chains of a family side by side. */
+template <class Scalar> static ModePack<Scalar> packOf(const shared_ptr<const ModeFamily<Scalar> >& family,
+        const vector<Chain>& chains, const int* members, int count, int lanes) {
+    const Chain& chain = chains[*members];
+    ModePack<Scalar> result = {emptyPack<Scalar>({(int) chain.nodes.size(), (int) chain.segments.size(), chain.bending,
+            chain.stretching, chain.closed, chain.planar, true, false}, lanes), family};
+    for (int lane = 0; lane < count; lane++)
+        placeChain(result.pack, lane, chains[members[lane]], members[lane]);
+    sortTethers(result.pack);
+    return result;
+}
+
 ModePacks::ModePacks(const vector<Chain>& chains, int lanes, int wideLanes) {
     vector<BeadModes> modes;
     for (const Chain& chain : chains) {
@@ -46,7 +58,8 @@ ModePacks::ModePacks(const vector<Chain>& chains, int lanes, int wideLanes) {
     auto key = [&] (int chain) {return keyOf(chains[chain], modes[chain]);};
     stable_sort(order.begin(), order.end(), [&] (int a, int b) {return key(a) < key(b);});
     for (size_t first = 0, last; first < order.size(); first = last) {
-        for (last = first+1; last < order.size() && key(order[last]) == key(order[first]);)
+        last = first+1;
+        while (last < order.size() && key(order[last]) == key(order[first]))
             last++;
         addFamily(chains, vector<int>(order.begin()+first, order.begin()+last), modes[order[first]], lanes, wideLanes);
     }
@@ -55,18 +68,15 @@ ModePacks::ModePacks(const vector<Chain>& chains, int lanes, int wideLanes) {
 void ModePacks::addFamily(const vector<Chain>& chains, const vector<int>& members, const BeadModes& modes, int lanes,
             int wideLanes) {
     const int count = members.size(), nodes = chains[members[0]].nodes.size();
-    const auto family = make_shared<const ModeFamily<double> >(modes, nodes);
-    const auto wideFamily = make_shared<const ModeFamily<float> >(modes, nodes);
-    auto from = [&] (int first, int number) {
-        return vector<int>(members.begin()+first, members.begin()+first+number);
-    };
+    const shared_ptr<const ModeFamily<double> > family = make_shared<ModeFamily<double> >(modes, nodes);
+    const shared_ptr<const ModeFamily<float> > wideFamily = make_shared<ModeFamily<float> >(modes, nodes);
     for (int start = 0; start < count; start += wideLanes) {
         const int together = min(count-start, wideLanes), firstPack = packs.size();
         for (int first = 0, number; first < together; first += number) {
             number = min(lanes, lanesFor(together-first));
-            packs.push_back({placed<double>(chains, from(start+first, number), number), family});
+            packs.push_back(packOf(family, chains, &members[start+first], number, number));
         }
-        wide.push_back({{placed<float>(chains, from(start, together), wideLanes), wideFamily}, firstPack,
+        wide.push_back({packOf(wideFamily, chains, &members[start], together, wideLanes), firstPack,
                 (int) packs.size(), together});
     }
 }

@@ -16,6 +16,7 @@ inline int lanesFor(int chains) {
     return lanes;
 }
 
+/** Put a chain into a lane, but for the properties of its nodes and segments. */
 template <class Scalar> void placeChain(ChainPack<Scalar>& pack, int lane, const Chain& chain, int index) {
     const std::size_t own = chain.nodes.size(), unrolled = own+(chain.closed ? 2 : 0);
     pack.chain[lane] = index;
@@ -35,28 +36,22 @@ template <class Scalar> void placeChain(ChainPack<Scalar>& pack, int lane, const
     }
 }
 
-/** A pack of the given chains, the longest of which comes first, with all but the properties of nodes and segments. */
-template <class Scalar> ChainPack<Scalar> placed(const std::vector<Chain>& chains, const std::vector<int>& members,
-            int lanes) {
+/** A pack that has lanes, but no chains and no properties. */
+template <class Scalar> ChainPack<Scalar> emptyPack(const PackShape& shape, int lanes) {
     ChainPack<Scalar> pack;
-    const Chain& longest = chains[members[0]];
+    static_cast<PackShape&>(pack) = shape;
     pack.lanes = lanes;
-    pack.nodes = longest.nodes.size()+(longest.closed ? 2 : 0);
-    pack.segments = longest.segments.size();
-    pack.bending = longest.bending;
-    pack.stretching = longest.stretching;
-    pack.closed = longest.closed;
-    pack.planar = longest.planar;
     pack.chain.resize(lanes, -1);
     pack.nodesOfLane.resize(lanes);
     pack.segmentsOfLane.resize(lanes);
     pack.particles.resize((std::size_t) pack.nodes*lanes, -1);
-    for (std::size_t lane = 0; lane < members.size(); lane++)
-        placeChain(pack, lane, chains[members[lane]], members[lane]);
+    return pack;
+}
+
+template <class Scalar> void sortTethers(ChainPack<Scalar>& pack) {
     std::stable_sort(pack.tethers.begin(), pack.tethers.end(), [] (const LaneTether& a, const LaneTether& b) {
         return a.node < b.node;
     });
-    return pack;
 }
 
 } // namespace cylchain

@@ -1,40 +1,20 @@
-"""Benchmarks and information: rows, JSON, ratios from given timings. How fast anything is is never asserted."""
+"""Benchmarks of engines and scaling: rows, JSON, ratios from given timings. How fast anything is is never asserted."""
 
-import io
 import json
 import math
 import sys
-import types
 
 import numpy as np
 import openmm
 import pytest
 
-from openmm_cylchain import Filaments, InputError, cli, engine_choice
+from openmm_cylchain import cli
 from openmm_cylchain.benchmark import engines as engine_benchmark
 from openmm_cylchain.benchmark import measurement, memory, report, scaling, systems
-from openmm_cylchain.output.progress import ProgressMessages
-from openmm_cylchain.runs import information
 from support.contexts import positions_of
 
-NATIVE = "openmm_cylchain.engines.compiled"
 TINY_ENGINES = engine_benchmark.Effort(repetitions=2, seconds=1e-3)
 TINY_SCALING = scaling.Effort((2, 3), (1, 2), (2,), (), 2, 2, 1e-3)
-
-
-@pytest.fixture
-def without_compiled(monkeypatch):
-    # None in sys.modules makes an import fail as if the module did not exist.
-    monkeypatch.setitem(sys.modules, NATIVE, None)
-
-
-@pytest.fixture
-def with_compiled(monkeypatch):
-    """An engine in the place of the compiled one."""
-    module = types.ModuleType(NATIVE)
-    module.ENGINE = object()
-    monkeypatch.setitem(sys.modules, NATIVE, module)
-    return module.ENGINE
 
 
 def by_name(rows):
@@ -322,15 +302,6 @@ def test_values_of_any_size_can_be_shown():
         assert float(text.splitlines()[3].split()[1]) == pytest.approx(value, abs=1e-12 + (error or 0.0))
 
 
-def test_progress_goes_line_by_line_where_there_is_no_terminal():
-    stream = io.StringIO()
-    progress = ProgressMessages(stream)
-    progress("one")
-    progress("two")
-    progress.finish()
-    assert [line.split(" s  ")[1] for line in stream.getvalue().splitlines()] == ["one", "two"]
-
-
 @pytest.fixture
 def instant(monkeypatch):
     """Benchmarks that are over at once."""
@@ -381,43 +352,3 @@ def test_interruption(monkeypatch, capsys):
     monkeypatch.setattr(engine_benchmark, "benchmark_engines", interrupt)
     assert cli.main(["benchmark", "engines"]) == 130
     assert "--resume" not in capsys.readouterr().err
-
-
-def test_engines(without_compiled):
-    reasons = engine_choice.available_engines()
-    assert set(reasons) == set(engine_choice.ENGINES)
-    assert reasons["portable"] is None and reasons["compiled"] == "it is not part of this installation"
-    assert engine_choice.load_engine() is engine_choice.load_engine("portable")
-    with pytest.raises(InputError, match="compiled engine is missing: it is not part"):
-        engine_choice.load_engine("compiled")
-    with pytest.raises(InputError, match="engine must be one of compiled, portable"):
-        Filaments(1.0, 300.0, engine="fast")
-
-
-def test_compiled_engine_comes_first(with_compiled):
-    assert engine_choice.available_engines() == {"portable": None, "compiled": None}
-    assert engine_choice.load_engine() is with_compiled
-    assert engine_choice.load_engine("portable") is not with_compiled
-
-
-@pytest.mark.parametrize("error", [OSError("no such library"), openmm.OpenMMException("no such library")])
-def test_reason_why_a_plugin_does_not_load(error, monkeypatch):
-    def fail(name):
-        raise error
-
-    monkeypatch.setattr(engine_choice.importlib, "import_module", fail)
-    assert engine_choice.available_engines()["compiled"] == "no such library"
-
-
-def test_information(without_compiled, monkeypatch, capsys):
-    monkeypatch.setattr(openmm.Platform, "getPluginLoadFailures", staticmethod(lambda: ("libBroken.so: symbol",)))
-    monkeypatch.setattr(information, "platforms", lambda: {"Reference": None, "CUDA": "no device"})
-    assert cli.main(["info"]) == 0
-    text = capsys.readouterr().out
-    for part in ("openmm-cylchain", openmm.Platform.getOpenMMVersion(), np.__version__, "missing: it is not part"):
-        assert part in text
-    assert "libBroken.so: symbol" in text and "missing: no device" in text
-
-
-def test_platforms():
-    assert information.platforms()["Reference"] is None

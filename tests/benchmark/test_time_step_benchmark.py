@@ -11,7 +11,7 @@ from openmm_cylchain.benchmark import bead_spring, measurement, time_step, time_
 from openmm_cylchain.benchmark.measurement import Estimate
 from openmm_cylchain.benchmark.time_step import StepErrors, SystemErrors, ladder
 from openmm_cylchain.benchmark.time_step_systems import F_ACTIN_SYSTEM, WORKLOAD
-from openmm_cylchain.dynamics.schemes import SCHEMES
+from openmm_cylchain.dynamics.schemes import CYLINDER_SCHEMES
 
 TINY = time_step.Effort((replace(F_ACTIN_SYSTEM, segments=4),), frames=24, share=0.05, every=3, repetitions=2)
 
@@ -70,7 +70,7 @@ def test_changes_of_the_middle():
 def test_errors_of_a_system():
     result = time_step.measure_system(TINY.systems[0], TINY)
     schemes = {one.scheme for one in result.steps}
-    assert schemes == set(SCHEMES)
+    assert schemes == set(CYLINDER_SCHEMES)
     for one in result.steps:
         assert set(one.equilibrium) == {"stretching energy", "bending energy", "end-to-end distance"}
         assert all(np.isfinite(error.value) for error in (*one.equilibrium.values(), *one.dynamics.values()))

@@ -5,7 +5,7 @@ import math
 import pytest
 from openmm import unit
 
-from openmm_cylchain import DSDNA, F_ACTIN, MICROTUBULE, EndCorrections, FilamentType, InputError
+from openmm_cylchain import DSDNA, DSDNA_BASE_PAIRS, F_ACTIN, MICROTUBULE, EndCorrections, FilamentType, InputError
 from openmm_cylchain.dynamics.recommended_step import recommended_time_step
 from openmm_cylchain.engine_choice import default_scheme
 from openmm_cylchain.runs.configuration import changed_keys, parse_configuration, read_configuration
@@ -250,3 +250,57 @@ def test_example_is_the_filament_of_table_2():
     recommended = recommended_time_step(F_ACTIN, solvent.viscosity, solvent.temperature, segments=64)
     assert settings.time_step == pytest.approx(recommended.step, rel=0.05)
     assert math.isclose(configuration.solvent.viscosity, 1.71e-3 * 602214.076, rel_tol=1e-6)
+
+
+BEADS = """
+[[filament]]
+name = "BSP"
+diameter = "2 nm"
+bead_spacing = "0.33 nm"
+bead_friction = "1.91e-12 kg/s"
+segments = 7
+"""
+
+
+def beads(lines="", filament=BEADS):
+    return parse(filament=filament + lines).filaments[0].type
+
+
+def test_chains_of_beads():
+    preset = '[[filament]]\ntype = "DSDNA_BASE_PAIRS"\nsegments = 7\n'
+    assert beads(filament=preset) == DSDNA_BASE_PAIRS
+    assert beads("coarse_graining = 5\n", preset) == DSDNA_BASE_PAIRS.coarse_grained(5)
+    changed = beads('persistence_length = "50 nm"\nbead_mass = "330 Da"\n', preset)
+    assert changed.persistence_length_at(310.0) == pytest.approx(50.0)
+    assert (changed.bead_mass, changed.stretching_modulus) == (330.0, DSDNA_BASE_PAIRS.stretching_modulus)
+    described = beads('stretching_modulus = "1100 pN"\npersistence_length = "50 nm"\ntemperature = "296.15 K"\n')
+    assert described.persistence_length_at(296.15) == pytest.approx(50.0)
+    assert described.stretching_modulus == pytest.approx(1100 * 0.602214076)
+    assert described.bead_friction == pytest.approx(DSDNA_BASE_PAIRS.bead_friction, rel=1e-3)
+    reduced = beads("nu = 0.35\nreduced_temperature = 0.034\n")
+    assert (reduced.nu, reduced.reduced_temperature(310.0)) == pytest.approx((0.35, 0.034))
+
+
+@pytest.mark.parametrize(
+    ("lines", "fragment"),
+    [
+        ("", "lacks the key 'stretching_modulus'"),
+        ("nu = 0.35\n", "nu and reduced_temperature go together"),
+        ("nu = 0.6\nreduced_temperature = 0.034\n", "nu of filament type 'BSP' must be below 1/2"),
+        ('nu = 0.3\nreduced_temperature = 0.1\nstretching_modulus = "1 pN"\n', "stretching_modulus belongs to"),
+        ('stretching_modulus = "1 pN"\nsegment_length = "1 nm"\n', "segment_length belongs to a chain of cylinders"),
+        ('stretching_modulus = "1 pN"\nbending_model = "quadratic"\n', "bending_model belongs to a chain of cylinders"),
+        ('stretching_modulus = "1 pN"\n', "either bending_rigidity or persistence_length"),
+        ('stretching_modulus = "1 pN"\ntemperature = "300 K"\n', "temperature belongs to"),
+        ("coarse_graining = 0\n", "coarse_graining must be at least 1"),
+    ],
+)
+def test_mistakes_in_chains_of_beads_are_named(lines, fragment):
+    with pytest.raises(InputError) as caught:
+        beads(lines)
+    assert fragment in str(caught.value)
+
+
+def test_cylinders_have_no_beads():
+    with pytest.raises(InputError, match="bead_friction belongs to a chain of beads"):
+        beads('bead_friction = "1e-12 kg/s"\n', FILAMENT)

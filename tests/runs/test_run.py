@@ -14,6 +14,7 @@ import time
 import mdtraj
 import numpy as np
 import pytest
+from openmm import app
 
 from openmm_cylchain import F_ACTIN, InputError
 from openmm_cylchain.cli import main
@@ -21,6 +22,7 @@ from openmm_cylchain.runs.configuration import parse_configuration, read_configu
 from openmm_cylchain.runs.run import create_filaments, run
 from openmm_cylchain.runs.run_directory import RunDirectory, read_energies
 from openmm_cylchain.runs.summary import format_summary, load_trajectory, summarise
+from support.contexts import positions_of
 
 SHORT = """
 title = "short"
@@ -205,6 +207,40 @@ def test_equilibrium_run_agrees_with_theory(tmp_path):
             assert abs(observable.deviation) < 4.0, observable
     assert "24 independent filaments" in " ".join(groups[0].notes)
     assert "24 × ACT, 6 segments" in format_summary(configuration, groups)
+
+
+def test_chains_of_beads_agree_with_theory(tmp_path, capsys):
+    config = configured(
+        tmp_path,
+        """
+[solvent]
+temperature = "296.15 K"
+viscosity = "1 mPa*s"
+[[filament]]
+type = "DSDNA_BASE_PAIRS"
+segments = 12
+count = 40
+[simulation]
+time_step = "recommended"
+duration = "1 ns"
+report_interval = "10 ps"
+""",
+    )
+    configuration = read_configuration(config)
+    run(configuration, tmp_path / "out")
+    (group,) = summarise(configuration, load_trajectory(configuration, RunDirectory(tmp_path / "out")))
+    names = [observable.name for observable in group.observables]
+    assert names[:4] == [
+        "stretching energy per segment",
+        "segment length",
+        "bending energy per joint",
+        "mean square end-to-end distance",
+    ]
+    for observable in group.observables:
+        if observable.verdict != "reference":
+            assert abs(observable.deviation) < 4.0 or abs(observable.relative_deviation) < 0.01, observable
+    assert main(["timestep", config]) == 0
+    assert "allowed by bends" in capsys.readouterr().out
 
 
 def test_killed_run_resumes_to_the_same_files(tmp_path, unbroken):
@@ -392,6 +428,27 @@ def test_infinite_energy_is_not_written(tmp_path, capsys):
     assert re.search(r"error: Filament \d \(ACT\) has blown up at segment \d in step \d+", capsys.readouterr().err)
     energies = read_energies(output / "energies.csv")
     assert all(np.all(np.isfinite(column)) for column in energies.values())
+
+
+@pytest.mark.parametrize("moved", [[0.0, 0.0, 2.0], [0.0, 0.0, np.nan]], ids=["beyond its range", "not a number"])
+def test_configuration_without_an_energy_is_traced_to_its_segment(tmp_path, monkeypatch, capsys, moved):
+    """Where an engine has not stopped before."""
+    text = SHORT.replace(
+        'start = "straight"',
+        'start = "straight"\ndirection = [0, 0, 1]\nstretching_model = "fene"\nmaximum_extension = "1 nm"',
+    )
+
+    def step(simulation, steps):
+        positions = positions_of(simulation.context)
+        # The last node of the last filament, whose fourth segment it ends.
+        positions[-1] += moved
+        simulation.context.setPositions(positions)
+
+    monkeypatch.setattr(app.Simulation, "step", step)
+    assert main(["run", configured(tmp_path, text), "--output", str(tmp_path / "out")]) == 1
+    error = capsys.readouterr().err
+    assert "Filament 3 (ACT) has blown up at segment 3 by step" in error and "its position or energy is not" in error
+    assert np.all(np.isfinite(read_energies(tmp_path / "out" / "energies.csv")["stretching energy (kJ/mol)"]))
 
 
 @pytest.mark.parametrize(

@@ -21,11 +21,6 @@ using namespace std;
  */
 static const int STEPS_TOGETHER = 32;
 
-/**
- * The mechanics of chains has room for that many levels, and for those of divided steps above.
- */
-static const int LARGEST_PATH_LEVEL = cylchain::LARGEST_LEVEL;
-
 static CylinderChainForceImpl& findChains(ContextImpl& context) {
     CylinderChainForceImpl* found = NULL;
     for (ForceImpl* impl : context.getForceImpls()) {
@@ -149,10 +144,14 @@ int CylinderChainIntegrator::getNumMixedPrecisionChains() const {
     return stepper->getNumMixedPrecisionChains();
 }
 
+int CylinderChainIntegrator::getLargestPathLevel() {
+    return cylchain::LARGEST_LEVEL;
+}
+
 void CylinderChainIntegrator::setPathLevel(int level) {
-    if (level < 0 || level > LARGEST_PATH_LEVEL)
+    if (level < 0 || level > getLargestPathLevel())
         throw OpenMMException("CylinderChainIntegrator: The path level must be between 0 and "+
-                to_string(LARGEST_PATH_LEVEL)+", but is "+to_string(level));
+                to_string(getLargestPathLevel())+", but is "+to_string(level));
     pathLevel = level;
 }
 
@@ -293,7 +292,7 @@ void CylinderChainIntegrator::loadCheckpoint(istream& stream) {
     stream.read((char*) &steps, sizeof(steps));
     Vec3 flow[5];
     stream.read((char*) flow, sizeof(flow));
-    if (!stream || version != 3 || level < 0 || level > LARGEST_PATH_LEVEL)
+    if (!stream || version != 3 || level < 0 || level > getLargestPathLevel())
         throw OpenMMException("loadCheckpoint: Checkpoint was not created with this version of "
                 "CylinderChainIntegrator");
     setFlow(flow[0], flow[1], flow[2], flow[3], flow[4]);
@@ -321,7 +320,7 @@ void CylinderChainIntegrator::deserializeParameters(const SerializationNode& nod
     // The same time on the path, or the next step after it.
 
     const int level = node.getIntProperty("pathLevel", 0);
-    if (level < 0 || level > LARGEST_PATH_LEVEL)
+    if (level < 0 || level > getLargestPathLevel())
         throw OpenMMException("Illegal path level: "+to_string(level));
     stepsTaken = node.getLongProperty("stepsTaken");
     countAfterSteps = -1;

@@ -291,11 +291,15 @@ public:
      * level.  Those modes of the scheme Modes that relax within a step forget what came before it, so that the noise of
      * two short steps is not that of a long one for them.
      *
-     * The level is between 0, which is the default, and 20.  In a Context that exists already, a new one takes effect
-     * when the Context is reinitialized.  A State from a simulation at another level is continued at the same time on
-     * its path.
+     * The level is between 0, which is the default, and getLargestPathLevel().  In a Context that exists already, a new
+     * one takes effect when the Context is reinitialized.  A State from a simulation at another level is continued at
+     * the same time on its path.
      */
     void setPathLevel(int level);
+    /**
+     * Get the largest path level that there is.  See setPathLevel() for details.
+     */
+    static int getLargestPathLevel();
     /**
      * Get the temperature of the heat bath (in Kelvin): overdamped motion has no temperature of its own.
      */

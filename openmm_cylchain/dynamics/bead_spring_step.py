@@ -1,0 +1,117 @@
+"""Recommended steps and bounds of bead-spring chains.
+
+Equation and table numbers refer to Panja, Barkema and van Leeuwen, PRE 2015, 92, 032603. Times are in units of
+tau = xi/lambda there and here; results in ps.
+"""
+
+import math
+
+import numpy as np
+
+from ..bead_spring.bead_spring_type import BeadSpringType
+from ..errors import InputError
+from ..filaments.filament import Filament
+from ..mechanics.flow import Flow
+from .schemes import EXPLICIT_SCHEMES, MODES, check_scheme
+from .time_step import RECOMMENDED_STRAIN, TimeStep, strain_rate
+
+EXPLICIT_STEP = 0.1
+"""tau, at nu = 0.35: Section III A."""
+
+MODES_STEP, LARGEST_MODES_STEP = 10.0, 100.0
+"""tau, at nu = 0.35: of 63 bonds, and of 255 bonds and more, in the final column of Table II."""
+
+IMPLICIT_STEPS = {63: 1e3, 127: 1e4, 255: 3e4}
+"""tau by numbers of bonds, at nu = 0.35."""
+
+SHORTEST_IMPLICIT_STEP = 10.0
+"""tau, at nu = 0.35."""
+
+_NU = 0.35
+# Down to which the error of scheme "modes" is measured to be the same at the same step in tau.
+_SMALLEST_NU = 0.0117
+_RING = 4.73 / (4.0 * math.pi * math.sqrt(0.75))
+_REASONS = {
+    "springs": "relaxation of the stiffest mode of the springs, with a margin of {margin:.2g}",
+    "modes": "coupling of modes, which scheme 'modes' leaves out of those that relax within a step (Table II)",
+    "bends": "relaxation of bends, which an implicit scheme resolves over ten steps",
+    "flow": "flow, which may strain the solvent by {strain:g} in a step",
+}
+
+
+def refuse_modes(filament: Filament, label: str) -> None:
+    """Raise InputError unless a filament is an open chain of beads that are all free, as scheme "modes" moves them."""
+    if not isinstance(filament.type, BeadSpringType):
+        raise InputError(f"{label}: scheme 'modes' moves chains of beads (a BeadSpringType), but no cylinders.")
+    if filament.closed or filament.clamped:
+        what = "a ring" if filament.closed else "clamped"
+        raise InputError(f"{label} is {what}: scheme 'modes' moves open chains whose beads are all free.")
+
+
+def bead_spring_stability_bound(bead_type: BeadSpringType) -> float:
+    """The step, in ps, above which explicit schemes blow up the stiffest mode of a chain: tau/(2 (1 + 2 nu)).
+
+    Neighbouring beads that move against each other along the chain relax with zeta^l = 4 (1 + 2 nu), eq. (27). It is
+    0.29 tau at nu = 0.35, where the paper finds 0.3.
+    """
+    return bead_type.time_unit / (2.0 * (1.0 + 2.0 * bead_type.nu))
+
+
+def bead_spring_time_step(
+    bead_type: BeadSpringType, scheme: str, bonds: int, closed: bool = False, flow: Flow | None = None
+) -> TimeStep:
+    """The recommended step of a chain of beads, at which <L^2> is right to 2 to 5 %.
+
+    - "euler" and "midpoint": 0.34 of ``bead_spring_stability_bound``, which is 0.1 tau at nu = 0.35.
+    - "modes": 10 tau ((N+1)/64)^2, and no more than 100 tau. A step h uncouples the modes that relax within it, and the
+      bonds at the ends of the chain become too short: <L^2> is measured to be too small by 0.42 sqrt(h/tau)/(N+1), for
+      3 to 63 bonds, 1 to 100 tau and nu from 0.0117 to 0.35. So all err by 2 % there, as the shortest of Table II does.
+      At smaller nu steps are shorter in proportion.
+    - "implicit" and "implicit-second-order": by ``IMPLICIT_STEPS``, between which steps grow by a power of N + 1; of
+      fewer bonds as their slowest relaxation, with (N+1)^4, but 10 tau at least; of more, no further.
+      At a smaller nu they are shorter by nu/0.35: what holds lengths is stiffer against what bends.
+
+    Parameters
+    ----------
+    bead_type : BeadSpringType
+    scheme : str
+    bonds : int
+    closed : bool
+        A ring relaxes as an open chain that is 2.3 times shorter.
+    flow : Flow, optional
+        It may strain the solvent by 0.03 in a step.
+    """
+    check_scheme(scheme)
+    unit, bound = bead_type.time_unit, bead_spring_stability_bound(bead_type)
+    explicit = EXPLICIT_STEP * 2.0 * (1.0 + 2.0 * _NU) * bound
+    beads = (bonds + 1) * (_RING if closed else 1.0)
+    if scheme in EXPLICIT_SCHEMES:
+        name, step = "springs", explicit
+    elif scheme == MODES:
+        # In steps of Euler's scheme hardly a mode is uncoupled.
+        name = "modes"
+        bound = step = max(explicit, unit * _modes_step(beads) * min(1.0, bead_type.nu / _SMALLEST_NU))
+    else:
+        name = "bends"
+        bound = step = unit * min(1.0, bead_type.nu / _NU) * _implicit_step(beads)
+    bounds, allowed = {name: bound}, {name: step}
+    rate = 0.0 if flow is None else strain_rate(flow)
+    if rate > 0.0:
+        bounds["flow"] = allowed["flow"] = RECOMMENDED_STRAIN / rate
+    binding = min(allowed, key=allowed.__getitem__)
+    reason = _REASONS[binding].format(margin=bounds[binding] / allowed[binding], strain=RECOMMENDED_STRAIN)
+    fastest = 16.0 * bead_type.bending_stiffness / bead_type.bead_friction
+    dynamics = ((scheme, fastest),) if bonds > 1 else ()
+    return TimeStep(allowed[binding], reason, bounds, allowed, dynamics=dynamics)
+
+
+def _modes_step(beads):
+    return min(MODES_STEP * (beads / 64.0) ** 2, LARGEST_MODES_STEP)
+
+
+def _implicit_step(beads):
+    knots = [(bonds + 1.0, step) for bonds, step in IMPLICIT_STEPS.items()]
+    if beads < knots[0][0]:
+        return max(SHORTEST_IMPLICIT_STEP, knots[0][1] * (beads / knots[0][0]) ** 4)
+    counts, steps = np.log(knots).T
+    return float(np.exp(np.interp(math.log(beads), counts, steps)))
