@@ -1,6 +1,7 @@
 """Chains of beads as filaments: what is built of them, what they do in a simulation, and what is refused."""
 
 import numpy as np
+import openmm
 import pytest
 
 from openmm_cylchain import (
@@ -9,6 +10,7 @@ from openmm_cylchain import (
     Filaments,
     Flow,
     InputError,
+    check_time_step,
     recommended_time_step,
     stability_bounds,
     theory,
@@ -16,6 +18,7 @@ from openmm_cylchain import (
 )
 from openmm_cylchain.dynamics.bead_spring_step import bead_spring_stability_bound
 from openmm_cylchain.dynamics.schemes import EXPLICIT_SCHEMES
+from openmm_cylchain.units.quantities import thermal_energy
 from support.contexts import energy_of, forces_of, new_context, positions_of
 from support.platforms import ENGINES
 
@@ -98,6 +101,40 @@ def test_equilibrium_is_kept(engine, scheme):
     assert np.all(np.abs(averages.mean(axis=1) - exact) < 4.0 * error + 0.01 * exact)
 
 
+def test_a_single_bond_divides_no_step():
+    filaments = chains()
+    for number in range(200):
+        filaments.add_equilibrium(KIND, 1, number + 1)
+    context, integrator = context_of(filaments, "implicit", filaments.recommended_time_step("implicit"))
+    integrator.step(100)
+    assert integrator.getNumDividedSteps() < 1e-3 * 100 * 200
+    nodes = positions_of(context).reshape(200, 2, 3)
+    squares = np.sum((nodes[:, 1] - nodes[:, 0]) ** 2, axis=1)
+    exact, error = theory.chain_mean_square_end_to_end(KIND, 1, ROOM), squares.std(ddof=1) / np.sqrt(200)
+    assert abs(squares.mean() - exact) < 4.0 * error < 0.15 * exact
+
+
+def test_the_check_of_a_step_knows_exact_averages_of_beads():
+    filaments = chains()
+    for number in range(20):
+        filaments.add_equilibrium(KIND, 8, number + 1)
+    _, system, positions = filaments.build()
+    step = filaments.recommended_time_step("implicit")
+    platform = openmm.Platform.getPlatform("Reference")
+    check = check_time_step(filaments, system, positions, step, frames=200, equilibrium=True, platform=platform)
+    exact = {one.name: one.exact for one in check.observables if one.exact is not None}
+    kT, free = thermal_energy(ROOM), (KIND, 8, ROOM)
+    assert exact == pytest.approx(
+        {
+            "DBP stretching energy": theory.bead_spring_stretching_energies(*free).mean() / kT,
+            "DBP bending energy": theory.bead_spring_bending_energies(*free).mean() / kT,
+            "DBP end to end, mean square": theory.bead_spring_mean_square_end_to_end(*free),
+        }
+    )
+    for one in check.observables:
+        assert one.exact is None or abs(one.deviation) < 4.0 * one.deviation_standard_error + 0.02
+
+
 def test_a_chain_diffuses_as_its_beads_together():
     """D = k_B T/((N+1) xi), in one step."""
     filaments, count = chains(), 400
@@ -143,6 +180,7 @@ def test_recommended_steps():
     assert steps("modes") == pytest.approx([10.0, 40.0, 100.0, 100.0])
     assert steps("implicit") == pytest.approx([1e4] * 4)
     assert steps("implicit-second-order") == pytest.approx([1e3] * 4)
+    assert recommended_time_step(KIND, VISCOSITY, ROOM, "implicit", 1).step == pytest.approx(0.3 * unit)
     assert np.all(steps("implicit", KIND.coarse_grained(5)) < steps("implicit"))
     rings = [recommended_time_step(KIND, VISCOSITY, ROOM, "implicit", 100, closed).step for closed in (False, True)]
     assert rings[1] < rings[0]

@@ -16,7 +16,7 @@ from support.platforms import ENGINE_PLATFORMS
 from support.solvent import TEMPERATURE, VISCOSITY
 
 SLOW_DNA = replace(DSDNA, extension_relaxation_time=1e5)
-SLOW_BEADS = replace(DSDNA_BASE_PAIRS, bead_friction=2e4 * DSDNA_BASE_PAIRS.bead_friction)
+SLOW_BEADS = replace(DSDNA_BASE_PAIRS, bead_friction=1e5 * DSDNA_BASE_PAIRS.bead_friction)
 KINDS = [
     (F_ACTIN, 64, ()),
     (F_ACTIN, 1, ()),
