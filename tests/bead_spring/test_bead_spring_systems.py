@@ -219,3 +219,53 @@ def test_energies_of_short_chains_are_exact(engine, planar):
     print(ratios, errors)
     assert np.all(SIGMAS * errors + ALLOWED < 0.05)
     assert np.all(np.abs(ratios - 1.0) < SIGMAS * errors + ALLOWED)
+
+
+def test_joints_of_a_pulled_chain_carry_the_force():
+    filaments, count, force = Filaments(VISCOSITY, ROOM, engine="compiled"), 60, 30.0
+    for _ in range(count):
+        filaments.add_straight(KIND, 10, [0.0, 0.0, 0.0], [1.0, 0.0, 0.0], clamped=[0])
+    _, system, positions = filaments.build()
+    pull = openmm.CustomExternalForce(f"-{force}*x")
+    for nodes in filaments.node_indices:
+        pull.addParticle(int(nodes[-1]), [])
+    system.addForce(pull)
+    context, integrator = context_of((filaments, None, system, positions), "implicit", step=10.0 * KIND.time_unit)
+    integrator.setRecordsTensions(True)
+    integrator.step(300)
+    samples = []
+    for _ in range(1500):
+        integrator.step(1)
+        samples.append([tensions._value for tensions in filaments.mean_joint_tensions(context)])
+    by_chain = np.mean(samples, axis=0)[:, :, 0]
+    error = by_chain.std(axis=0, ddof=1) / np.sqrt(count)
+    assert np.all(SIGMAS * error < 0.1 * force)
+    assert np.all(np.abs(by_chain.mean(axis=0) - force) < SIGMAS * error)
+
+
+@pytest.mark.parametrize(("engine", "scheme", "stiffness"), [("compiled", "implicit", 1e3), ("portable", "euler", 2e4)])
+def test_a_spring_between_beads_has_its_energy_at_the_recommended_step(engine, scheme, stiffness):
+    """3/2 k_B T, where two free chains are joined by a spring of no length, and 5 % more at most."""
+    filaments, generator, pairs, bonds = Filaments(VISCOSITY, ROOM, engine=engine), np.random.default_rng(3), 100, 4
+    spring = openmm.HarmonicBondForce()
+    for pair in range(pairs):
+        first = filaments.add_equilibrium(KIND, bonds, 2 * pair + 1, [0.0, 40.0 * pair, 0.0])
+        start = filaments[first].positions[2] + generator.normal(scale=np.sqrt(KT / stiffness), size=3)
+        filaments.add_equilibrium(KIND, bonds, 2 * pair + 2, start)
+        ends = (10 * pair + 2, 10 * pair + 5)
+        spring.addBond(*ends, 0.0, stiffness)
+    _, system, positions = filaments.build()
+    system.addForce(spring)
+    step = filaments.recommended_time_step(scheme, system=system)
+    assert "HarmonicBondForce" in step.reason
+    context, integrator = context_of((filaments, None, system, positions), scheme, step=step)
+    integrator.step(50)
+    samples = []
+    for _ in range(200):
+        integrator.step(5)
+        nodes = positions_of(context).reshape(pairs, 10, 3)
+        samples.append(0.5 * stiffness * np.sum((nodes[:, 2] - nodes[:, 5]) ** 2, axis=1) / (1.5 * KT))
+    by_pair = np.mean(samples, axis=0)
+    error = by_pair.std(ddof=1) / np.sqrt(pairs)
+    assert SIGMAS * error < 0.1
+    assert abs(by_pair.mean() - 1.0) < 0.05 + SIGMAS * error
