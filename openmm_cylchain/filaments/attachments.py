@@ -159,6 +159,8 @@ def attachment_positions(attachments: Sequence[Attachment], positions: FloatArra
 def distribute_beads(filament: Filament, number: int, spacing: float) -> list[Attachment]:
     """Attachments at equal distances along segments of rest length, the first and the last node of a chain included.
 
+    In a ``BeadSpringType``, whose end bonds are shorter, they are closer to each other there.
+
     Parameters
     ----------
     filament : Filament
