@@ -19,6 +19,7 @@ CASES = [
     ("clamped_filament", "filaments", 200, 100, 8 * 9, 8 * 8),
     ("gliding_filaments", "gliding", 60, 60, 40 * 7, 40 * 6),
     ("tumbling_in_shear", "shear", 60, 60, 24 * 13 + 6 * 12, 24 * 12 + 6 * 12),
+    ("tumbling_dna", "tumbling", 60, 60, 12 * 256, 12 * 255),
     ("periodic_box", "periodic", 40, 40, 60 + 8 * 17, 8 * 16),
     ("dense_network", "network", 40, 40, 120 * (11 + 57), 120 * 10),
     ("filaments_in_a_vesicle", "vesicle", 40, 40, 24 + 24 * (13 + 1), 24 * 12),

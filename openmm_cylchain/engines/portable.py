@@ -34,7 +34,9 @@ class PortableEngine(Engine):
         for filament, indices in zip(placed.filaments, placed.node_indices):
             ends = [(int(indices[node - 1]), int(indices[node])) for node in range(1, len(indices))]
             ends += [(int(indices[-1]), int(indices[0]))] if filament.closed else []
-            segments += [(filament.type, *pair) for pair in ends]
+            stiffnesses = filament.type.segment_stiffnesses(filament.segments, filament.closed).tolist()
+            lengths = filament.type.segment_lengths(filament.segments, filament.closed).tolist()
+            segments += [(filament.type, *pair, *values) for pair, *values in zip(ends, stiffnesses, lengths)]
             pairs = zip(*joined(np.array(ends), filament.closed))
             for stiffness, (before, behind) in zip(filament.joint_stiffnesses, pairs):
                 joints.append((filament.type, *map(int, (before[0], *behind)), stiffness))

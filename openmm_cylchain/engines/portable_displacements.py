@@ -144,14 +144,16 @@ class ChainDisplacements:
         kT, step = parameters[KT], parameters[STEP_SIZE]
         steps_taken = int(parameters[STEPS_TAKEN])
         chains = self._chains
-        count = 2 * chains.segment_count + len(self._others)
+        parts = np.cumsum([chains.segment_count, chains.segment_count, len(self._others)])
+        count = parts[-1] + (0 if chains.node_friction is None else chains.node_count)
         gaussian = _gaussian_vectors(int(parameters[SEED]), steps_taken, step_count, count)
-        translational, rotational, other = np.split(gaussian, [chains.segment_count, 2 * chains.segment_count])
+        translational, rotational, other, nodal = np.split(gaussian, parts)
         advance = STEPS[EXPLICIT_SCHEMES[int(parameters[SCHEME])]]
         with np.errstate(all="ignore"):
             try:
+                nodes = positions[self._nodes]
                 displacements = advance(
-                    chains, positions[self._nodes], forces[self._nodes], kT, step, translational, rotational, flow
+                    chains, nodes, forces[self._nodes], kT, step, translational, rotational, flow, nodal
                 )
             except InstabilityError:
                 displacements = np.full((chains.node_count, 3), np.nan)

@@ -3,7 +3,12 @@
 import numpy as np
 import openmm
 
-from ..mechanics.potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
+from ..mechanics.potentials import (
+    BENDING_POTENTIALS,
+    BOND_DIFFERENCE,
+    BOND_DIFFERENCE_EXPRESSION,
+    STRETCHING_POTENTIALS,
+)
 
 STRETCHING_NAME = "CylinderChainStretching"
 BENDING_NAME = "CylinderChainBending"
@@ -17,13 +22,13 @@ def add_stretching_forces(system, segments, force_group):
     Parameters
     ----------
     system : openmm.System
-    segments : iterable of (FilamentType, particle, particle)
+    segments : iterable of (ChainType, particle, particle, stiffness, rest length)
     force_group : int
     """
     forces = {}
-    for filament_type, minus, plus in segments:
+    for filament_type, minus, plus, stiffness, rest_length in segments:
         model = filament_type.stretching_model
-        values = [filament_type.segment_stiffness, filament_type.segment_length]
+        values = [stiffness, rest_length]
         names = ["stretching_stiffness", "rest_length"]
         if filament_type.maximum_extension is not None:
             values.append(filament_type.maximum_extension)
@@ -40,12 +45,12 @@ def add_stretching_forces(system, segments, force_group):
 
 
 def add_bending_forces(system, joints, force_group):
-    """Add one CustomAngleForce for each bending model in use.
+    """Add one force for each bending model in use: a CustomAngleForce, or a CustomCompoundBondForce of beads.
 
     Parameters
     ----------
     system : openmm.System
-    joints : iterable of (FilamentType, particle, particle, particle, stiffness)
+    joints : iterable of (ChainType, particle, particle, particle, stiffness)
     force_group : int
     """
     forces = {}
@@ -54,13 +59,23 @@ def add_bending_forces(system, joints, force_group):
             continue
         model = filament_type.bending_model
         if model not in forces:
-            forces[model] = _named_force(
-                openmm.CustomAngleForce(BENDING_POTENTIALS[model].expression), BENDING_NAME, model, force_group
-            )
-            forces[model].addPerAngleParameter("bending_stiffness")
-        forces[model].addAngle(before, joint, after, [stiffness])
+            forces[model] = _named_force(_bending_force(model), BENDING_NAME, model, force_group)
+        if model == BOND_DIFFERENCE:
+            forces[model].addBond([before, joint, after], [stiffness])
+        else:
+            forces[model].addAngle(before, joint, after, [stiffness])
     for force in forces.values():
         system.addForce(force)
+
+
+def _bending_force(model):
+    if model == BOND_DIFFERENCE:
+        force = openmm.CustomCompoundBondForce(3, BOND_DIFFERENCE_EXPRESSION)
+        force.addPerBondParameter("bending_stiffness")
+    else:
+        force = openmm.CustomAngleForce(BENDING_POTENTIALS[model].expression)
+        force.addPerAngleParameter("bending_stiffness")
+    return force
 
 
 def add_propulsion(system, filaments, node_indices, force_group):

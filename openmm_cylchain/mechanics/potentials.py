@@ -79,6 +79,8 @@ BENDING_POTENTIALS = {
 
 BOND_DIFFERENCE = "bond-difference"
 """The bending model (K/2) |u2 - u1|^2 of the vectors of two segments, which is no function of their angle alone."""
+BOND_DIFFERENCE_EXPRESSION = "0.5*bending_stiffness*((x1-2*x2+x3)^2+(y1-2*y2+y3)^2+(z1-2*z2+z3)^2)"
+"""Its energy for OpenMM's CustomCompoundBondForce of three nodes."""
 BENDING_MODELS = (*BENDING_POTENTIALS, BOND_DIFFERENCE)
 
 

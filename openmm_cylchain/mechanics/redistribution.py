@@ -251,7 +251,8 @@ def noise_forces(
     """Random forces on the ends of all segments, step (1) of Section 4.
 
     F = sqrt(2 k_B T/dt) g_trans^(1/2) a, T = sqrt(2 k_B T/dt) g_dr^(1/2) b, f_pm = F/2 pm T/l, so that
-    the nodal forces have the covariance (2 k_B T/dt) Z, but for what the friction of nodes adds to it.
+    the nodal forces have the covariance (2 k_B T/dt) Z, but for what the friction of nodes adds to it (see
+    ``random_forces``).
 
     Parameters
     ----------
@@ -270,6 +271,30 @@ def noise_forces(
     return 0.5 * force - pair, 0.5 * force + pair
 
 
+def random_forces(
+    chains: ChainSet,
+    nodes: FloatArray,
+    kT: float,
+    step: float,
+    translational: FloatArray,
+    rotational: FloatArray,
+    nodal: FloatArray | None = None,
+) -> FloatArray:
+    """Random forces (nodes, 3) on all nodes, of the covariance (2 k_B T/dt) Z.
+
+    Those of ``noise_forces``, and sqrt(2 k_B T xi/dt) c where nodes have a friction xi by themselves.
+
+    Parameters
+    ----------
+    nodal : (nodes, 3) array
+        The independent standard Gaussian vectors c; needed if, and only if, nodes have friction.
+    """
+    forces = segment_forces_to_nodes(chains, *noise_forces(chains, nodes, kT, step, translational, rotational))
+    if chains.node_friction is not None:
+        forces += np.sqrt(2.0 * kT / step * chains.node_friction)[:, None] * nodal
+    return forces
+
+
 def _apply_root(across, along, tangent, vector):
     projection = np.einsum("ij,ij->i", tangent, vector)
     return np.sqrt(across)[:, None] * vector + ((np.sqrt(along) - np.sqrt(across)) * projection)[:, None] * tangent
@@ -278,15 +303,17 @@ def _apply_root(across, along, tangent, vector):
 def thermal_forces(chains: ChainSet, nodes: FloatArray, kT: float) -> tuple[FloatArray, FloatArray]:
     """Forces on the ends of all segments from the thermal torque (15), step (2) of Section 4.
 
-    T = 2 k_B T (2 - g_def/g_rot) t, f_pm = pm T/l; in d dimensions, k_B T (d + 1 - (d - 1) g_def/g_rot) t.
+    T = 2 k_B T (2 - g_def/g_rot) t, f_pm = pm T/l; in d dimensions, k_B T (d + 1 - (d - 1) g_def/g_rot) t. None on
+    segments without friction, whose nodes have all of it: the mobility of those depends on nothing.
 
     Returns
     -------
     (minus, plus) : two (segments, 3) arrays
     """
     length, tangent = segment_geometry(chains, nodes)
-    dimensions = chains.segment_dimensions
-    torque = kT * (dimensions + 1.0 - (dimensions - 1.0) * chains.extensional / chains.rotational)
+    dimensions, turns = chains.segment_dimensions, chains.rotational > 0.0
+    ratio = chains.extensional / np.where(turns, chains.rotational, 1.0)
+    torque = kT * np.where(turns, dimensions + 1.0 - (dimensions - 1.0) * ratio, 0.0)
     pair = (torque / length)[:, None] * tangent
     return -pair, pair
 
@@ -300,6 +327,7 @@ def euler_step(
     translational: FloatArray,
     rotational: FloatArray,
     flow: Flow | None = None,
+    nodal: FloatArray | None = None,
 ) -> FloatArray:
     """Displacements in one step of the paper's scheme, Section 4 (Euler-Maruyama).
 
@@ -308,7 +336,7 @@ def euler_step(
     involves the mobility of a segment's ends inside the chain, and equilibrium averages keep a bias at
     any step (freely jointed, two segments: <cos^2> = 0.30 where 1/3 is exact).
     """
-    noise = segment_forces_to_nodes(chains, *noise_forces(chains, nodes, kT, step, translational, rotational))
+    noise = random_forces(chains, nodes, kT, step, translational, rotational, nodal)
     thermal = segment_forces_to_nodes(chains, *thermal_forces(chains, nodes, kT))
     return step * redistribute(chains, nodes, forces + noise + thermal, flow)
 
@@ -322,6 +350,7 @@ def midpoint_step(
     translational: FloatArray,
     rotational: FloatArray,
     flow: Flow | None = None,
+    nodal: FloatArray | None = None,
 ) -> FloatArray:
     """Displacements in one step of Fixman's midpoint scheme; weak order one, right drift on chains.
 
@@ -329,7 +358,7 @@ def midpoint_step(
     Expanding Z(x*)^-1 gives the drift k_B T div(Z^-1) with no formula for it. (Fixman, J. Chem. Phys.
     1978, 69, 1527.) The drag of a flow is that at x and at x*.
     """
-    noise = segment_forces_to_nodes(chains, *noise_forces(chains, nodes, kT, step, translational, rotational))
+    noise = random_forces(chains, nodes, kT, step, translational, rotational, nodal)
     total = forces + noise
     halfway = nodes + 0.5 * step * redistribute(chains, nodes, total, flow)
     return step * redistribute(chains, halfway, total, flow)

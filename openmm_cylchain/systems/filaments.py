@@ -868,10 +868,7 @@ class Filaments:
                 f"Filament {len(self)}: filament_type must be a FilamentType, such as F_ACTIN, or a BeadSpringType, "
                 f"but is {filament_type!r}."
             )
-        label = f"Filament {len(self)} ({filament_type.name})"
-        if self._engine_name == "portable" and filament_type.node_friction > 0.0:
-            raise InputError(f"{label}: the portable engine has no chains of beads; use engine='compiled'.")
-        return label
+        return f"Filament {len(self)} ({filament_type.name})"
 
     def _add(self, filament_type, positions, clamped, label, closed=False, planar=False, propulsion=0.0):
         self._refuse_if_built(label)

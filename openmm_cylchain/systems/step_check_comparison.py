@@ -6,9 +6,16 @@ from typing import Any
 import numpy as np
 import openmm
 
+from ..bead_spring.bead_spring_type import BeadSpringType
 from ..filaments.collection import FilamentCollection
 from ..mechanics.flow import Flow
-from ..theory import bending_energy_mean, chain_mean_square_end_to_end, stretching_energy_mean
+from ..theory import (
+    bead_spring_bending_energies,
+    bead_spring_stretching_energies,
+    bending_energy_mean,
+    chain_mean_square_end_to_end,
+    stretching_energy_mean,
+)
 from ..units.quantities import thermal_energy
 from ..units.types import FloatArray
 from .step_check_observables import Kind, Probe, interacting
@@ -115,10 +122,13 @@ class ExactAverages:
         if one.closed or one.clamped or one.propulsion:
             return None
         arguments = self._temperature, one.planar
-        if what == "stretching":
-            return stretching_energy_mean(one.type, *arguments) / self._kT
-        if what == "bending":
-            return bending_energy_mean(one.type, *arguments) / self._kT
         if what == "distance":
             return chain_mean_square_end_to_end(one.type, one.segments, *arguments)
-        return None
+        if what not in ("stretching", "bending"):
+            return None
+        if isinstance(one.type, BeadSpringType):
+            of_beads = bead_spring_stretching_energies if what == "stretching" else bead_spring_bending_energies
+            energies = of_beads(one.type, one.segments, *arguments) / self._kT
+            return energies.mean() if len(energies) else 0.0
+        mean = stretching_energy_mean if what == "stretching" else bending_energy_mean
+        return mean(one.type, *arguments) / self._kT

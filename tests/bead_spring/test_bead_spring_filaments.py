@@ -1,6 +1,7 @@
 """Chains of beads as filaments: what is built of them, what they do in a simulation, and what is refused."""
 
 import numpy as np
+import openmm
 import pytest
 
 from openmm_cylchain import (
@@ -9,6 +10,7 @@ from openmm_cylchain import (
     Filaments,
     Flow,
     InputError,
+    check_time_step,
     recommended_time_step,
     stability_bounds,
     theory,
@@ -16,14 +18,16 @@ from openmm_cylchain import (
 )
 from openmm_cylchain.dynamics.bead_spring_step import bead_spring_stability_bound
 from openmm_cylchain.dynamics.schemes import EXPLICIT_SCHEMES
+from openmm_cylchain.units.quantities import thermal_energy
 from support.contexts import energy_of, forces_of, new_context, positions_of
+from support.platforms import ENGINES
 
 ROOM, VISCOSITY = 296.15, 602.0
 KIND = DSDNA_BASE_PAIRS
 
 
-def chains():
-    return Filaments(VISCOSITY, ROOM, engine="compiled")
+def chains(engine="compiled"):
+    return Filaments(VISCOSITY, ROOM, engine=engine)
 
 
 def context_of(filaments, scheme, step, seed=3):
@@ -32,22 +36,24 @@ def context_of(filaments, scheme, step, seed=3):
     return new_context(system, positions, integrator), integrator
 
 
-def test_straight_chains_are_without_forces():
-    filaments = chains()
+@pytest.mark.parametrize(("engine", "scheme"), [("compiled", "implicit"), ("portable", "midpoint")])
+def test_straight_chains_are_without_forces(engine, scheme):
+    filaments = chains(engine)
     for segments in (1, 2, 9):
         filaments.add_straight(KIND, segments, [0, 3 * segments, 0], [1, 1, 0])
-    context, _ = context_of(filaments, "implicit", 0.01)
+    context, _ = context_of(filaments, scheme, 0.001)
     assert forces_of(context) == pytest.approx(0.0, abs=1e-9 * KIND.stiffness)
     masses = [context.getSystem().getParticleMass(index)._value for index in range(3)]
     assert masses == [KIND.bead_mass] * 3
 
 
+@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("closed", [False, True])
-def test_energies_and_forces_are_those_of_the_plugin(closed):
-    filaments, generator = chains(), np.random.default_rng(4)
+def test_energies_and_forces_are_those_of_the_engine(closed, engine):
+    filaments, generator = chains(engine), np.random.default_rng(4)
     nodes = 0.4 * generator.normal(size=(7, 3))
     filaments.add_nodes(KIND, nodes, closed=closed)
-    context, _ = context_of(filaments, "implicit", 0.001)
+    context, _ = context_of(filaments, "midpoint", 0.001)
     energy = sum(filaments[0].energies(nodes))
     assert energy_of(context) == pytest.approx(energy, rel=1e-9)
     moved = 1e-6 * generator.normal(size=nodes.shape)
@@ -72,10 +78,11 @@ def test_tensions_are_the_pulls_of_bonds():
     assert tensions == pytest.approx(-0.5 * (plus[1:] + plus[:-1]))
 
 
-@pytest.mark.parametrize("scheme", ["implicit", "euler"])
-def test_equilibrium_is_kept(scheme):
+@pytest.mark.parametrize(("engine", "scheme"), [("compiled", "implicit"), *((engine, "euler") for engine in ENGINES)])
+def test_equilibrium_is_kept(engine, scheme):
+    """At the recommended step, without a warning."""
     segments, count = 10, 100
-    filaments = chains()
+    filaments = chains(engine)
     for number in range(count):
         filaments.add_equilibrium(KIND, segments, number + 1, [0, 20 * number, 0])
     context, integrator = context_of(filaments, scheme, filaments.recommended_time_step(scheme=scheme))
@@ -91,8 +98,41 @@ def test_equilibrium_is_kept(scheme):
     squares = theory.bead_spring_mean_square_lengths(KIND, segments, ROOM)
     exact = np.array([theory.chain_mean_square_end_to_end(KIND, segments, ROOM), squares[0], squares[5]])
     assert np.all(error < 0.02 * exact)
-    # Euler's scheme leaves some per cent in the fastest modes.
-    assert np.all(np.abs(averages.mean(axis=1) - exact) < 4.0 * error + (0.05 if scheme == "euler" else 0.01) * exact)
+    assert np.all(np.abs(averages.mean(axis=1) - exact) < 4.0 * error + 0.01 * exact)
+
+
+def test_a_single_bond_divides_no_step():
+    filaments = chains()
+    for number in range(200):
+        filaments.add_equilibrium(KIND, 1, number + 1)
+    context, integrator = context_of(filaments, "implicit", filaments.recommended_time_step("implicit"))
+    integrator.step(100)
+    assert integrator.getNumDividedSteps() < 1e-3 * 100 * 200
+    nodes = positions_of(context).reshape(200, 2, 3)
+    squares = np.sum((nodes[:, 1] - nodes[:, 0]) ** 2, axis=1)
+    exact, error = theory.chain_mean_square_end_to_end(KIND, 1, ROOM), squares.std(ddof=1) / np.sqrt(200)
+    assert abs(squares.mean() - exact) < 4.0 * error < 0.15 * exact
+
+
+def test_the_check_of_a_step_knows_exact_averages_of_beads():
+    filaments = chains()
+    for number in range(20):
+        filaments.add_equilibrium(KIND, 8, number + 1)
+    _, system, positions = filaments.build()
+    step = filaments.recommended_time_step("implicit")
+    platform = openmm.Platform.getPlatform("Reference")
+    check = check_time_step(filaments, system, positions, step, frames=200, equilibrium=True, platform=platform)
+    exact = {one.name: one.exact for one in check.observables if one.exact is not None}
+    kT, free = thermal_energy(ROOM), (KIND, 8, ROOM)
+    assert exact == pytest.approx(
+        {
+            "DBP stretching energy": theory.bead_spring_stretching_energies(*free).mean() / kT,
+            "DBP bending energy": theory.bead_spring_bending_energies(*free).mean() / kT,
+            "DBP end to end, mean square": theory.bead_spring_mean_square_end_to_end(*free),
+        }
+    )
+    for one in check.observables:
+        assert one.exact is None or abs(one.deviation) < 4.0 * one.deviation_standard_error + 0.02
 
 
 def test_a_chain_diffuses_as_its_beads_together():
@@ -135,11 +175,12 @@ def test_recommended_steps():
         return np.array(recommended) / kind.time_unit
 
     for scheme in EXPLICIT_SCHEMES:
-        assert steps(scheme) == pytest.approx([0.1] * 4)
+        assert steps(scheme) == pytest.approx([bead_spring_stability_bound(KIND) / unit / 20] * 4)
     # No longer than in Table II.
     assert steps("modes") == pytest.approx([10.0, 40.0, 100.0, 100.0])
     assert steps("implicit") == pytest.approx([1e4] * 4)
     assert steps("implicit-second-order") == pytest.approx([1e3] * 4)
+    assert recommended_time_step(KIND, VISCOSITY, ROOM, "implicit", 1).step == pytest.approx(0.3 * unit)
     assert np.all(steps("implicit", KIND.coarse_grained(5)) < steps("implicit"))
     rings = [recommended_time_step(KIND, VISCOSITY, ROOM, "implicit", 100, closed).step for closed in (False, True)]
     assert rings[1] < rings[0]
@@ -168,11 +209,13 @@ def test_what_is_for_cylinders_is_refused():
             function()
 
 
-def test_the_portable_engine_has_no_beads():
-    filaments = Filaments(VISCOSITY, ROOM, engine="portable")
-    with pytest.raises(InputError, match=r"Filament 0 \(DBP\): the portable engine has no chains of beads"):
-        filaments.add_straight(KIND, 3, [0, 0, 0], [1, 0, 0])
-    assert len(filaments) == 0
+@pytest.mark.parametrize("scheme", ["modes", "implicit", "implicit-second-order"])
+def test_the_portable_engine_has_explicit_schemes_alone(scheme):
+    filaments = chains("portable")
+    filaments.add_straight(KIND, 3, [0, 0, 0], [1, 0, 0])
+    _, system, _ = filaments.build()
+    with pytest.raises(InputError, match=f"The portable engine does not have scheme '{scheme}': use the compiled"):
+        filaments.create_integrator(system, 0.001, scheme=scheme)
 
 
 def test_the_scheme_of_modes_is_for_free_open_chains_of_beads():

@@ -7,15 +7,16 @@ import openmm
 import pytest
 from openmm import app, unit
 
-from openmm_cylchain import DSDNA, F_ACTIN, Filaments, stokes_friction
+from openmm_cylchain import DSDNA, DSDNA_BASE_PAIRS, F_ACTIN, Filaments, Flow, stokes_friction
 from support.bending_models import BENDING_MODELS
-from support.contexts import energy_of, new_context, positions_of
+from support.contexts import energy_of, forces_of, new_context, positions_of
 from support.dense_mechanics import bent_chain
 from support.equilibrium_cases import CASES
 from support.platforms import ENGINE_PLATFORMS
 from support.solvent import TEMPERATURE, VISCOSITY
 
 SLOW_DNA = replace(DSDNA, extension_relaxation_time=1e5)
+SLOW_BEADS = replace(DSDNA_BASE_PAIRS, bead_friction=1e5 * DSDNA_BASE_PAIRS.bead_friction)
 KINDS = [
     (F_ACTIN, 64, ()),
     (F_ACTIN, 1, ()),
@@ -25,6 +26,9 @@ KINDS = [
     *((CASES[model].type, 5, clamped) for model in BENDING_MODELS for clamped in ((), (0, 1))),
     (CASES["fene"].type, 6, ()),
     (CASES["freely-jointed"].type, 9, ()),
+    (SLOW_BEADS, 12, ()),
+    (SLOW_BEADS, 1, ()),
+    (SLOW_BEADS, 5, (0, 1)),
 ]
 
 
@@ -74,3 +78,50 @@ def test_trajectories_without_noise_agree(portable, platform):
     assert np.abs(other_moved - moved).max() < 1e-9 * np.abs(moved).max()
     assert np.abs(other_tensions - tensions).max() < 1e-9 * np.abs(tensions).max()
     assert other_energy == pytest.approx(energy, rel=1e-9)
+
+
+FLOW = Flow(gradient=1e-6 * np.array([[1.0, 3.0, 0.0], [2.0, -4.0, 1.0], [0.5, -1.0, 3.0]]), origin=[0.0, 3.0, 1.0])
+
+
+def _chains_of_beads(engine, platform, scheme):
+    """Open, held, planar, tethered and propelled chains of beads, rings and cylinders in a flow: what moves, and how."""
+    filaments, generator = Filaments(VISCOSITY, TEMPERATURE, engine=engine), np.random.default_rng(2)
+    ring = 0.3 * generator.normal(size=(7, 3))
+    flat = bent_chain(SLOW_BEADS, 6, 4) * [1.0, 1.0, 0.0]
+    filaments.add_nodes(SLOW_BEADS, bent_chain(SLOW_BEADS, 9, 1), propulsion=30.0)
+    filaments.add_nodes(SLOW_BEADS, ring, closed=True, propulsion=-20.0)
+    filaments.add_nodes(SLOW_BEADS, ring + 3.0, clamped=[2], closed=True)
+    filaments.add_nodes(SLOW_BEADS, flat, clamped=[-1], planar=True)
+    filaments.add_nodes(DSDNA, bent_chain(DSDNA, 3, 5))
+    filaments.add_tether(0, 4, [1.0, 2.0, 3.0], 5.0)
+    filaments.add_tether(3, 2, [1.0, 2.0, 3.0], 500.0)
+    _, system, positions = filaments.build()
+    integrator = filaments.create_integrator(system, 100.0, scheme=scheme, temperature=0, flow=FLOW, checks=False)
+    context = new_context(system, positions, integrator, platform)
+    tensions = np.concatenate([tension._value for tension in filaments.joint_tensions(context)])
+    energy, forces, start = energy_of(context), forces_of(context), positions_of(context)
+    integrator.step(1)
+    velocities = (positions_of(context) - start) / 100.0
+    integrator.step(50)
+    return filaments, start, forces, velocities, (positions_of(context) - start, tensions, energy, velocities)
+
+
+@pytest.mark.parametrize("scheme", ["euler", "midpoint"])
+def test_chains_of_beads_move_alike(scheme):
+    filaments, start, forces, velocities, expected = _chains_of_beads("portable", "Reference", scheme)
+    # A bead moves as it is pulled, wherever others are; in a flow, scheme "midpoint" does so half-way.
+    free = np.ones(len(start), dtype=bool)
+    free[filaments.node_indices[4]] = free[filaments.node_indices[2][2]] = free[filaments.node_indices[3][-1]] = False
+
+    def drift(positions):
+        result = (positions - FLOW.origin) @ np.array(FLOW.gradient).T + forces / SLOW_BEADS.bead_friction
+        result[filaments.node_indices[3], 2] = 0.0
+        return result
+
+    halfway = start + 50.0 * drift(start) if scheme == "midpoint" else start
+    assert velocities[free] == pytest.approx(drift(halfway)[free], rel=1e-9)
+    assert not np.any(velocities[filaments.node_indices[2][2]])
+    for platform in [platform for engine, platform in ENGINE_PLATFORMS if engine == "compiled"]:
+        found = _chains_of_beads("compiled", platform, scheme)[-1]
+        for one, other in zip(expected, found):
+            assert np.abs(one - other).max() < 1e-9 * np.abs(one).max()
