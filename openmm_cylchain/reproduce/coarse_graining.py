@@ -92,7 +92,7 @@ def evaluate_tables(records, quick):
     for k, text in _TABLE_5.items():
         ours, theory = BASE_PAIRS.coarse_grained(k).time_unit, unit_of_time(r, y, k, _TIME)
         results.append(_exact(f"unit_of_time_of_{k}_base_pairs", "ps", ours, theory, text, _cause_of_table_5(k, text)))
-    for k in (2, 5, 10, 20):
+    for k in (2, 5, 10, 12, 20):
         # What (55) gives for the r and y that the print must have had.
         for name, value, text in zip(("T", "nu"), coarse(*_OTHER, k), _TABLE_3[k]):
             results.append(_exact(f"{name}_of_{k}_base_pairs_with_r_120_and_y_12000", "1", value, None, text))
