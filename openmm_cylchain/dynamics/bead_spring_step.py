@@ -63,9 +63,10 @@ def bead_spring_time_step(
     """The recommended step of a chain of beads, at which <L^2> is right to 2 to 5 %.
 
     - "euler" and "midpoint": 0.34 of ``bead_spring_stability_bound``, which is 0.1 tau at nu = 0.35.
-    - "modes": 10 tau ((N+1)/64)^2, and no more than 100 tau. A step h uncouples the modes that relax within it, and the
-      bonds at the ends of the chain become too short: <L^2> is measured to be too small by 0.42 sqrt(h/tau)/(N+1), for
-      3 to 63 bonds, 1 to 100 tau and nu from 0.0117 to 0.35. So all err by 2 % there, as the shortest of Table II does.
+    - "modes": 10 tau ((N+1)/64)^2, and no more than 100 tau. A step h uncouples the modes that relax within it, and
+      <L^2> is measured to be too small by about 0.42 sqrt(h/tau)/(N+1), as if the ends of the chain were too short: for
+      3 to 31 bonds, 1 to 30 tau, nu from 0.0117 to 0.45 and T* from 0.001 to 0.3. So chains err by some 2 %, as the
+      shortest of Table II does.
       At smaller nu steps are shorter in proportion.
     - "implicit" and "implicit-second-order": by ``IMPLICIT_STEPS``, between which steps grow by a power of N + 1; of
       fewer bonds as their slowest relaxation, with (N+1)^4, but 10 tau at least; of more, no further.

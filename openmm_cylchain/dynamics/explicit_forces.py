@@ -411,6 +411,10 @@ class ExplicitForces:
             if force.getGlobalParameterName(index) == CONTACT_STIFFNESS
         )
         diameters = np.array([force.getParticleParameters(index)[0] for index in range(force.getNumParticles())])
+        return self._between_beads(label, stiffness, diameters)
+
+    def _between_beads(self, label, stiffness, diameters):
+        # Diameters of all particles, zero for those that take no part.
         columns = []
         for number, mine in enumerate(self._filaments.bead_indices):
             mine = mine[diameters[mine] > 0.0]

@@ -20,7 +20,8 @@ class BendingPotential:
     name : str
         The name by which a FilamentType selects the potential.
     energy : callable (stiffness, cosine) -> energy
-        With the stiffness K of the joint in kJ/mol: the a/l0 of the paper.
+        With the stiffness K of the joint in kJ/mol: the a/l0 of the paper. It is (K/2) theta^2 for small angles
+        theta, and never below 2K (theta/pi)^2: averages are taken as far as that reaches.
     derivative : callable (stiffness, cosine) -> dV/dc
     expression : str
         The same energy for OpenMM's CustomAngleForce, whose ``theta`` is pi for a straight joint.

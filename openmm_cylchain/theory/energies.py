@@ -61,11 +61,11 @@ def _reduced_bending_moments(filament_type, kT):
 
 
 def _moments_by_quadrature(potential, stiffness):
-    # Of any model, with angles from zero to where its energy is 40 k_B T.
-    angle = np.linspace(0.0, np.pi, 20_001)[1:-1]
-    angle = np.linspace(0.0, angle[potential.energy(stiffness, np.cos(angle)) < 40.0].max(initial=1e-3), 20_001)[1:-1]
+    # Of any model, as far as tangent_decorrelation goes.
+    node, weight = np.polynomial.legendre.leggauss(400)
+    angle = 0.5 * min(math.pi, 20.0 / math.sqrt(stiffness)) * (node + 1.0)
     energy = potential.energy(stiffness, np.cos(angle))
-    return _moments(energy, np.sin(angle) * np.exp(-energy))
+    return _moments(energy, weight * np.sin(angle) * np.exp(-energy))
 
 
 def _inscribed_circle_moments(stiffness):

@@ -4,7 +4,9 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdlib>
+#include <mutex>
 #include <numeric>
+#include <optional>
 #include <stdexcept>
 #include <tuple>
 
@@ -34,9 +36,16 @@ const ChainKernels& kernels() {
     return best;
 }
 
+bool hasSegmentFriction(const Chain& chain) {
+    return any_of(chain.segments.begin(), chain.segments.end(), [] (const Segment& segment) {
+        return segment.parallel > 0 || segment.perpendicular > 0 || segment.rotational > 0 || segment.extensional > 0;
+    });
+}
+
 bool mayShareLanes(const Chain& longest, const Chain& chain) {
     const size_t least = longest.closed ? longest.segments.size() : ceil((1-LARGEST_FILLING)*longest.segments.size());
-    return chain.bending == longest.bending && chain.stretching == longest.stretching &&
+    return hasSegmentFriction(chain) == hasSegmentFriction(longest) &&
+            (chain.nodeFriction > 0) == (longest.nodeFriction > 0) && chain.bending == longest.bending && chain.stretching == longest.stretching &&
             chain.closed == longest.closed && chain.planar == longest.planar && chain.segments.size() >= least;
 }
 
@@ -51,10 +60,6 @@ const double LARGEST_RATE_OF_LINEAR_BENDS = 1e6;
 const double LEAST_CHANGE = 1e-5;
 /** The resistance of a node to its motion. Third powers of it are computed, also for a thousandth of a step. */
 const double LEAST_RESISTANCE = 1e-9, LARGEST_RESISTANCE = 1e8;
-
-bool hasFriction(const Segment& segment) {
-    return segment.parallel > 0 || segment.perpendicular > 0 || segment.rotational > 0 || segment.extensional > 0;
-}
 
 template <class Scalar> void setSegment(ChainPack<Scalar>& pack, int lane, int s, const Segment& segment,
         int dimensions) {
@@ -81,7 +86,7 @@ template <class Scalar> void setSegment(ChainPack<Scalar>& pack, int lane, int s
     }
 }
 
-template <class Scalar> void fillLane(ChainPack<Scalar>& pack, int lane, const Chain& chain, int index) {
+void fillLane(ChainPack<double>& pack, int lane, const Chain& chain, int index) {
     const int lanes = pack.lanes;
     const size_t own = chain.nodes.size(), unrolled = own+(chain.closed ? 2 : 0);
     pack.chain[lane] = index;
@@ -94,28 +99,20 @@ template <class Scalar> void fillLane(ChainPack<Scalar>& pack, int lane, const C
     pack.free[lane] = any_of(chain.fixed.begin(), chain.fixed.end(), [] (bool fixed) {return fixed;}) ? 0.0 : 1.0;
     pack.nodeFriction[lane] = chain.nodeFriction;
     pack.rootNodeFriction[lane] = sqrt(chain.nodeFriction);
-    pack.hasNodeFriction |= chain.nodeFriction > 0;
     for (size_t node = 1; node < unrolled-1; node++)
         pack.joints[node*lanes+lane] = chain.joints[chain.closed ? node%own : node-1];
     for (size_t number = 0; number < chain.tethers.size(); number++)
         pack.tethers.push_back({chain.tethers[number], lane, (int) number});
-    for (size_t s = 0; s < unrolled-1; s++) {
-        const Segment& segment = chain.segments[s%chain.segments.size()];
-        setSegment(pack, lane, s, segment, chain.planar ? 2 : 3);
-        pack.hasSegmentFriction |= hasFriction(segment);
-    }
+    for (size_t s = 0; s < unrolled-1; s++)
+        setSegment(pack, lane, s, chain.segments[s%chain.segments.size()], chain.planar ? 2 : 3);
 }
 
-template <class Scalar> ChainPack<Scalar> packed(const vector<Chain>& chains, const vector<int>& members, int lanes) {
-    ChainPack<Scalar> pack;
-    const Chain& longest = chains[members[0]];
+/** A pack whose lanes are all filled up. */
+template <class Scalar> ChainPack<Scalar> packWithoutChains(const PackShape& shape, int lanes) {
+    typedef ChainPack<Scalar> Pack;
+    Pack pack;
+    static_cast<PackShape&>(pack) = shape;
     pack.lanes = lanes;
-    pack.nodes = longest.nodes.size()+(longest.closed ? 2 : 0);
-    pack.segments = longest.segments.size();
-    pack.bending = longest.bending;
-    pack.stretching = longest.stretching;
-    pack.closed = longest.closed;
-    pack.planar = longest.planar;
     pack.chain.resize(lanes, -1);
     pack.nodesOfLane.resize(lanes);
     pack.segmentsOfLane.resize(lanes);
@@ -126,20 +123,68 @@ template <class Scalar> ChainPack<Scalar> packed(const vector<Chain>& chains, co
     pack.particles.resize(places, -1);
     pack.mobile.resize(places, 0.0);
     pack.joints.resize(places, 0.0);
-    pack.properties.resize((places-lanes)*ChainPack<Scalar>::NumProperties);
+    pack.properties.resize((places-lanes)*Pack::NumProperties);
     // A filling segment that has no inverse length is not looked at when an iteration might end.
-    typedef ChainPack<Scalar> Pack;
     for (int s = 0; s < pack.nodes-1; s++)
         for (int lane = 0; lane < lanes; lane++) {
             setSegment(pack, lane, s, {1, 0, 1, 0, 0, 0, 0}, 0);
             pack.properties[((size_t) s*Pack::NumProperties+Pack::InverseRestLength)*lanes+lane] = 0;
         }
-    for (size_t lane = 0; lane < members.size(); lane++)
-        fillLane(pack, lane, chains[members[lane]], members[lane]);
+    return pack;
+}
+
+template <class Scalar> void sortTethers(ChainPack<Scalar>& pack) {
     stable_sort(pack.tethers.begin(), pack.tethers.end(), [] (const LaneTether& a, const LaneTether& b) {
         return a.node < b.node;
     });
+}
+
+ChainPack<double> packed(const vector<Chain>& chains, const vector<int>& members, int lanes) {
+    const Chain& longest = chains[members[0]];
+    ChainPack<double> pack = packWithoutChains<double>({(int) longest.nodes.size()+(longest.closed ? 2 : 0),
+            (int) longest.segments.size(), longest.bending, longest.stretching, longest.closed, longest.planar,
+            longest.nodeFriction > 0, hasSegmentFriction(longest)}, lanes);
+    for (size_t lane = 0; lane < members.size(); lane++)
+        fillLane(pack, lane, chains[members[lane]], members[lane]);
+    sortTethers(pack);
     return pack;
+}
+
+/** Copy arrays that have a row of lanes for each node, segment or property, into lanes from one on. */
+template <class From, class To> void copyLanes(const vector<From>& from, int lanes, vector<To>& to, int allLanes,
+        int firstLane) {
+    for (size_t row = 0; row*lanes < from.size(); row++)
+        copy_n(from.begin()+row*lanes, lanes, to.begin()+row*allLanes+firstLane);
+}
+
+/** Some packs, of which the first is the longest, as one in single precision. */
+ChainPack<float> widened(const ChainPack<double>* first, const ChainPack<double>* last, int lanes) {
+    ChainPack<float> wide = packWithoutChains<float>(*first, lanes);
+    int lane = 0;
+    for (const ChainPack<double>* pack = first; pack != last; lane += pack->lanes, pack++) {
+        auto copyTo = [&] (auto& to, const auto& from) {
+            copyLanes(from, pack->lanes, to, lanes, lane);
+        };
+        copyTo(wide.chain, pack->chain);
+        copyTo(wide.nodesOfLane, pack->nodesOfLane);
+        copyTo(wide.segmentsOfLane, pack->segmentsOfLane);
+        copyTo(wide.particles, pack->particles);
+        copyTo(wide.properties, pack->properties);
+        copyTo(wide.joints, pack->joints);
+        copyTo(wide.mobile, pack->mobile);
+        copyTo(wide.free, pack->free);
+        copyTo(wide.nodeFriction, pack->nodeFriction);
+        copyTo(wide.rootNodeFriction, pack->rootNodeFriction);
+        if (!pack->propulsions.empty())
+            wide.propulsions.resize((size_t) (wide.nodes-1)*lanes);
+        copyTo(wide.propulsions, pack->propulsions);
+        for (LaneTether tether : pack->tethers) {
+            tether.lane += lane;
+            wide.tethers.push_back(tether);
+        }
+    }
+    sortTethers(wide);
+    return wide;
 }
 
 template <class Scalar> ParticleRange particlesOf(const ChainPack<Scalar>& pack) {
@@ -149,17 +194,22 @@ template <class Scalar> ParticleRange particlesOf(const ChainPack<Scalar>& pack)
 /** A pack in single precision, in place of some of those in double precision, and what decides where it is right. */
 class WidePack {
 public:
-    ChainPack<float> pack;
     /** The packs that it replaces. */
     int first, last;
     int chains;
+    /** Nothing before a step takes it: with few chains, it is far larger than the packs that it replaces. */
+    optional<ChainPack<float> > pack;
     WidePack(const vector<Chain>& all, const vector<int>& members, int first, int last) :
-            pack(packed<float>(all, members, kernels().wide.lanes)), first(first), last(last), chains(members.size()) {
+            first(first), last(last), chains(members.size()) {
         for (int member : members)
             include(all[member]);
     }
+    void make(const vector<ChainPack<double> >& packs) {
+        if (!pack)
+            pack = widened(packs.data()+first, packs.data()+last, kernels().wide.lanes);
+    }
     bool isUsed(const StepSettings& settings) const {
-        if (settings.precision == Precision::Automatic && 2*chains <= pack.lanes)
+        if (settings.precision == Precision::Automatic && 2*chains <= kernels().wide.lanes)
             return false;
         const double h = settings.stepSize;
         // A flow needs to know where chains are. Written so that NaN is not right.
@@ -219,6 +269,8 @@ struct ChainEngine::Implementation {
     vector<ChainPack<double> > packs;
     /** In the order of the packs that they replace. */
     vector<WidePack> wide;
+    /** Held where wide packs are made. */
+    mutex making;
     bool isWide(int pack) const {
         return pack >= (int) packs.size();
     }
@@ -236,7 +288,8 @@ ChainEngine::ChainEngine(const vector<Chain>& chains) : implementation(new Imple
     iota(order.begin(), order.end(), 0);
     stable_sort(order.begin(), order.end(), [&] (int a, int b) {
         auto key = [&] (const Chain& chain) {
-            return make_tuple(-(int) chain.nodes.size(), chain.bending, chain.stretching, chain.closed, chain.planar);
+            return make_tuple(-(int) chain.nodes.size(), chain.bending, chain.stretching, chain.closed, chain.planar,
+                    chain.nodeFriction > 0);
         };
         return key(chains[a]) < key(chains[b]);
     });
@@ -250,7 +303,7 @@ ChainEngine::ChainEngine(const vector<Chain>& chains) : implementation(new Imple
         while (2*lanes <= fitting)
             lanes *= 2;
         members.push_back(vector<int>(order.begin()+first, order.begin()+first+lanes));
-        implementation->packs.push_back(packed<double>(chains, members.back(), lanes));
+        implementation->packs.push_back(packed(chains, members.back(), lanes));
         first += lanes;
     }
 
@@ -279,10 +332,12 @@ int ChainEngine::getNumPacks() const {
 vector<int> ChainEngine::getPacksOfStep(const StepSettings& settings) const {
     vector<int> result;
     int next = 0;
+    const lock_guard<mutex> lock(implementation->making);
     for (size_t wide = 0; wide < implementation->wide.size(); wide++) {
-        const WidePack& pack = implementation->wide[wide];
+        WidePack& pack = implementation->wide[wide];
         if (!pack.isUsed(settings))
             continue;
+        pack.make(implementation->packs);
         for (; next < pack.first; next++)
             result.push_back(next);
         result.push_back(getNumPacks()+wide);
@@ -307,7 +362,7 @@ ChainEnergy ChainEngine::addForces(int pack, const double* positions, double* fo
 }
 
 ParticleRange ChainEngine::getParticles(int pack) const {
-    return implementation->isWide(pack) ? particlesOf(implementation->getWide(pack).pack) :
+    return implementation->isWide(pack) ? particlesOf(*implementation->getWide(pack).pack) :
             particlesOf(implementation->packs[pack]);
 }
 
@@ -320,7 +375,8 @@ void ChainEngine::clearForces(int pack, double* forces) const {
 Instability ChainEngine::step(int pack, const double* positions, const double* forces, const double* box,
             const StepSettings& settings, double* displacements) const {
     if (implementation->isWide(pack))
-        return kernels().wide.step(implementation->getWide(pack).pack, positions, forces, box, settings, displacements);
+        return kernels().wide.step(*implementation->getWide(pack).pack, positions, forces, box, settings,
+                displacements);
     return kernels().step(implementation->packs[pack], positions, forces, box, settings, displacements);
 }
 

@@ -89,7 +89,8 @@ struct StepSettings {
  * depends on which thread computes what.
  *
  * Registers hold twice as many numbers in single precision. Beside the packs that hold all chains, each of them once,
- * there are wide ones for the chains of several of these. A step takes those that getPacksOfStep() says.
+ * there are wide ones for the chains of several of these. A step takes those that getPacksOfStep() says, which makes
+ * a wide pack when it first gives it.
  *
  * Positions, forces and displacements are arrays of three doubles for each particle.
  */
@@ -107,6 +108,7 @@ public:
     /**
      * Get the packs that a step with some settings takes: together, they hold each chain once. Those whose number is
      * not below getNumPacks() are wide ones. This depends on the settings but for seed, step and what is recorded.
+     * Several threads may call it at the same time, and while others use packs.
      */
     std::vector<int> getPacksOfStep(const StepSettings& settings) const;
     /**

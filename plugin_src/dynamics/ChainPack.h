@@ -12,6 +12,17 @@ struct LaneTether : Tether {
     int lane, number;
 };
 
+/** What packs of the same chains have in common in each precision. */
+struct PackShape {
+    /** The number of nodes includes those that come twice; that of segments does not. */
+    int nodes, segments;
+    BendingModel bending;
+    StretchingModel stretching;
+    bool closed, planar;
+    /** Whether nodes have friction, and whether segments have. */
+    bool hasNodeFriction, hasSegmentFriction;
+};
+
 /**
  * Chains side by side: the numbers of all chains for one segment lie next to each other, one in each lane. Chains that
  * are shorter than the longest one are filled up with segments without friction whose nodes are fixed, and so are lanes
@@ -20,18 +31,14 @@ struct LaneTether : Tether {
  * Closed chains are unrolled: their first two nodes come once more behind the last one, so that the joint of the first
  * node finds the segment after it there. All closed chains of a pack have the same number of nodes.
  */
-template <class Scalar> struct ChainPack {
+template <class Scalar> struct ChainPack : PackShape {
     /**
      * The properties of a segment, each of them for all lanes. Drift is the thermal torque (15) over k_B T, which is
      * d+1-(d-1)gamma_def/gamma_rot in d dimensions.
      */
     enum Property {RestLength, InverseRestLength, Stiffness, InverseExtension, Parallel, Perpendicular, Rotational,
             Extensional, RootParallel, RootPerpendicular, RootRotational, RootExtensional, Drift, NumProperties};
-    /** The number of nodes includes those that come twice; that of segments does not. */
-    int lanes, nodes, segments;
-    BendingModel bending;
-    StretchingModel stretching;
-    bool closed, planar;
+    int lanes;
     /** Number of each lane's chain, or -1, of its nodes and of its segments. */
     std::vector<int> chain, nodesOfLane, segmentsOfLane;
     /** Particle of each node and lane, [node][lane]; -1 for a node that only fills up. */
@@ -44,11 +51,8 @@ template <class Scalar> struct ChainPack {
     std::vector<Scalar> mobile;
     /** One for each lane whose chain has no node that is fixed; zero for others. */
     std::vector<Scalar> free;
-    /** Friction of nodes and its square root, [lane], and whether any chain has some. */
+    /** Friction of the nodes of each lane, and its square root. */
     std::vector<Scalar> nodeFriction, rootNodeFriction;
-    bool hasNodeFriction = false;
-    /** Whether any segment has friction. */
-    bool hasSegmentFriction = false;
     /** The tethers of all lanes, by their nodes. */
     std::vector<LaneTether> tethers;
     /** Half the propulsion of each segment, [segment][lane], or nothing if there is none. */

@@ -9,7 +9,7 @@ const Scalar NEWTON_TOLERANCE = 1e-2;
 /** The same for chains whose bends are linear in the nodes; Newton's method leaves less of it as an error. */
 const Scalar TOLERANCE_OF_LINEAR_BENDS = 3e-2;
 /** The least cosine of the angle by which a segment of such a chain may turn in a step. */
-const Scalar LEAST_COSINE = -0.5;
+const Scalar LEAST_COSINE = -0.9;
 /** The largest change of a node in the last iteration, over that length. */
 const Scalar NODE_TOLERANCE = 0.1;
 /**
@@ -55,7 +55,7 @@ public:
     }
     /**
      * Mark lanes a segment of which changes by more than a quarter of a turn would do, or leaves its range. Where bends
-     * are linear in the nodes, all that is needed is a direction half-way, which two thirds of half a turn leave.
+     * are linear in the nodes, all that is needed is a direction half-way, which a turn by 150 degrees leaves.
      */
     void findExcessiveChanges(const Vec* y, bool* failed) const {
         for (int s = 0; s < pack.segments; s++) {

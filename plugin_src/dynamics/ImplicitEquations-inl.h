@@ -10,7 +10,7 @@ const Scalar COMPRESSION = 0.9;
  * Bends that are linear in the nodes leave the matrix regular under nearly all compression, so that Newton's method may
  * have all of it. Where that has not converged after so many iterations, compression counts no more.
  */
-const int ITERATIONS_WITH_COMPRESSION = 6;
+const int ITERATIONS_WITH_COMPRESSION = 5;
 /** More than any tension over a length. */
 const Scalar UNBOUNDED = 1e30;
 

@@ -4,6 +4,12 @@
  * What an implicit step begins with, and what each of its stages makes of that: the coefficients of the tensions.
  */
 
+/**
+ * With all of theta, modes that a step just resolves decay too slowly. With less, the fastest ones change their sign from
+ * step to step, by (1-theta)/theta of themselves, which is forgotten after a few.
+ */
+const Scalar LARGEST_THETA_OF_LINEAR_BENDS = 0.8;
+
 template <int W, bool CLOSED> class ImplicitStages {
     typedef typename Lanes<W>::Type Real;
     typedef Vector<Real> Vec;
@@ -105,7 +111,8 @@ private:
         const Real friction = loaded<Real>(pack.nodeFriction, 0)+
                 4*inverse*inverse*property<Real>(pack, s, Pack::Rotational);
         const Real bendRate = 16*h*loaded<Real>(pack.joints, s)+TINY;
-        segment.jointTheta = larger<Real>(splat<Real>(0.5), 1-friction/bendRate);
+        segment.jointTheta = lesser<Real>(splat<Real>(LARGEST_THETA_OF_LINEAR_BENDS),
+                larger<Real>(splat<Real>(0.5), 1-friction/bendRate));
     }
     void describeTether(const LaneTether& tether, const TetherVector& start, ImplicitTether& result) {
         std::copy(start.d, start.d+3, result.start);

@@ -26,7 +26,7 @@
  * docs/design/implicit_scheme.md.
  */
 
-const int NEWTON_ITERATIONS = 14;
+const int NEWTON_ITERATIONS = 14, NEWTON_ITERATIONS_OF_LINEAR_BENDS = 20;
 
 /** A step of open chains or, if CLOSED, of rings. */
 template <int W, bool CLOSED> class ImplicitStep {
@@ -102,7 +102,8 @@ private:
         const int least = needsThree ? 3 : step.stage == Stage::First ? 2 : 1;
         Real active = splat<Real>(1);
         int iterations = 0;
-        while (iterations < NEWTON_ITERATIONS) {
+        const int most = isLinear(step.pack.bending) ? NEWTON_ITERATIONS_OF_LINEAR_BENDS : NEWTON_ITERATIONS;
+        while (iterations < most) {
             equations.eliminate(y, iterations);
             equations.template substitute<false>();
             if (iterations > 0 || step.stage == Stage::Second) {

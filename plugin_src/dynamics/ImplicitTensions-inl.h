@@ -74,9 +74,13 @@ void ImplicitTensions<W, CLOSED>::refineAndRecord(const Vec* y, Real active) {
         equations.describeNew(y, s, current);
         if (s > 0) {
             Row before = {}, here = {}, after = {};
-            JointGeometry joint;
-            equations.describeNewJoint(s, previous, current, joint);
-            equations.addJoint(s, joint, previous, current, before, here, after);
+            if (isLinear(pack.bending))
+                equations.addLinearBend(s, previous, current, before, here, after);
+            else {
+                JointGeometry joint;
+                equations.describeNewJoint(s, previous, current, joint);
+                equations.addJoint(s, joint, previous, current, before, here, after);
+            }
             const Vec change1 = change[s]-change[s-1], change2 = change[s+1]-change[s];
             const Vec force1 = before.right+before.diagonal*change1-before.second*change2;
             const Vec force2 = after.diagonal*change2-before.second.transposedTimes(change1)-after.right;

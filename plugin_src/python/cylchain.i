@@ -201,7 +201,7 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
     val = unit.Quantity(val, _FRICTION)
 %}
 %pythonappend OpenMM::CylinderChainForce::getJointParameters(int, int, double&) const %{
-    linear = self.getChainModels(args[0])[0] == CylinderChainForce.BondDifference
+    linear = self.getChainModels(chain)[0] == CylinderChainForce.BondDifference
     val = unit.Quantity(val, _STIFFNESS if linear else _ENERGY)
 %}
 %pythonappend OpenMM::CylinderChainForce::getTetherParameters(int, int&, int&, Vec3&, double&) const %{

@@ -30,6 +30,26 @@ inline void checkClose(double expected, double found, double scale, double toler
         throw runtime_error(what+": expected "+to_string(expected)+", found "+to_string(found));
 }
 
+/** The length of a bend b = f (t2-t1), with the energy (stiffness/2) b^2, and its derivative by the angle. */
+struct BendByHand {
+    double length, slope;
+};
+
+inline BendByHand bendByHand(BendingModel model, double angle) {
+    const double half = 0.5*angle;
+    switch (model) {
+    case BendingModel::BondDifference:
+        break;
+    case BendingModel::KratkyPorod:
+        return {2*sin(half), cos(half)};
+    case BendingModel::Quadratic:
+        return {angle, 1};
+    case BendingModel::InscribedCircle:
+        return {2*tan(half), 1+tan(half)*tan(half)};
+    }
+    throw runtime_error("The tests do not know a bending model of an angle");
+}
+
 /** Normal numbers to make chains with. */
 class NormalNumbers {
 public:
@@ -65,7 +85,7 @@ inline vector<Chain> makeChains(const vector<int>& segments, BendingModel bendin
             if (s < count)
                 chain.segments.push_back({10+0.5*g[0], 30+g[1], 6, 5+0.2*g[2], 8+0.2*g[3], 70+g[4], 200+g[0]});
             if (s > 0 && s < count)
-                chain.joints.push_back(20+g[1]);
+                chain.joints.push_back((20+g[1])*(isLinear(bending) ? 0.01 : 1));
             node[0] += 9.5+0.3*g[5];
             node[1] += 4*g[6];
             node[2] += 4*g[7];
@@ -97,7 +117,7 @@ inline vector<Chain> makeRings(const vector<int>& segments, BendingModel bending
             ring.nodes.push_back(x.size()/3);
             ring.fixed.push_back((s == 1 && count == 6) || (s == 0 && count == 7));
             ring.segments.push_back({10+0.3*g[0], 30+g[1], 6, 5+0.2*g[2], 8+0.2*g[3], 70+g[4], 200+g[0]});
-            ring.joints.push_back(20+g[1]);
+            ring.joints.push_back((20+g[1])*(isLinear(bending) ? 0.01 : 1));
             const double angle = 2*M_PI*s/count, radius = 5/sin(M_PI/count)+0.4*g[5];
             x.insert(x.end(), {100.0*rings.size()+radius*cos(angle), -200+radius*sin(angle), planar ? 3 : 0.7*g[6]});
         }
@@ -115,6 +135,17 @@ inline vector<Chain> makeAll(BendingModel bending, StretchingModel stretching, A
         chains.push_back(ring);
     for (const Chain& ring : makeRings({6, 5, 6}, bending, stretching, true, x))
         chains.push_back(ring);
+    return chains;
+}
+
+/** Chains whose nodes have friction; some of them have no other. */
+inline vector<Chain> beaded(vector<Chain> chains) {
+    for (size_t i = 0; i < chains.size(); i++) {
+        chains[i].nodeFriction = 3;
+        for (Segment& segment : chains[i].segments)
+            if (i != 1)
+                segment.parallel = segment.perpendicular = segment.rotational = segment.extensional = 0;
+    }
     return chains;
 }
 
@@ -163,6 +194,9 @@ inline vector<Array> denseResistance(const vector<Chain>& chains, const Array& x
     for (const Chain& chain : chains) {
         for (size_t node = 0; node < chain.nodes.size(); node++)
             fixed[chain.nodes[node]] = chain.fixed[node] && !ofFixedNodes;
+        for (int node : chain.nodes)
+            for (int i = 0; i < 3; i++)
+                z[3*node+i][3*node+i] += chain.nodeFriction;
         for (size_t s = 0; s < chain.segments.size(); s++) {
             const Segment& segment = chain.segments[s];
             const int ends[] = {chain.nodes[s], chain.nodes[(s+1)%chain.nodes.size()]};

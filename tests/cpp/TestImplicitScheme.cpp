@@ -21,7 +21,7 @@ static int componentFrom(const Chain& chain, int first, int component) {
     return 3*chain.nodes[(first+component/3)%chain.nodes.size()]+component%3;
 }
 
-/** A bend b = f (t2-t1), with the energy (stiffness/2) b^2. */
+/** A bend b = f (t2-t1), or the difference of the vectors of two segments, with the energy (stiffness/2) b^2. */
 static Array bendOf(BendingModel model, const double* x) {
     double t1[3], t2[3], square1 = 0, square2 = 0, chordSquare = 0;
     for (int k = 0; k < 3; k++) {
@@ -31,18 +31,17 @@ static Array bendOf(BendingModel model, const double* x) {
         square2 += t2[k]*t2[k];
     }
     Array bend(3);
+    for (int k = 0; k < 3 && isLinear(model); k++)
+        bend[k] = t2[k]-t1[k];
+    if (isLinear(model))
+        return bend;
     for (int k = 0; k < 3; k++) {
         bend[k] = t2[k]/sqrt(square2)-t1[k]/sqrt(square1);
         chordSquare += bend[k]*bend[k];
     }
     const double chord = sqrt(chordSquare), angle = 2*asin(0.5*chord);
-    double length = chord;
-    if (model == BendingModel::Quadratic)
-        length = angle;
-    if (model == BendingModel::InscribedCircle)
-        length = 2*tan(0.5*angle);
     for (double& component : bend)
-        component *= chord > 0 ? length/chord : 1;
+        component *= chord > 0 ? bendByHand(model, angle).length/chord : 1;
     return bend;
 }
 
@@ -120,7 +119,8 @@ static Array residualOf(const vector<Chain>& chains, const Array& x, const Array
                 for (int k = 0; k < 3; k++)
                     stretched += (between2[3+i]-between2[i])/length*FLOW.gradient[3*i+k]*(between2[3+k]-between2[k]);
             const double own = fmax(0.5,
-                    1-segment.extensional/(h*segment.stiffness*segment.restLength*segment.restLength));
+                    1-(segment.extensional/(segment.restLength*segment.restLength)+0.25*chain.nodeFriction)/
+                    (h*segment.stiffness));
             const double theta = stage.number == 1 ? DIAGONAL : own, rest = stage.number == 1 ? 0 : 1-own;
             const double between = 0.5*(before+after);
             const double slope = (stretchOf(chain.stretching, segment, between+width)-
@@ -136,8 +136,11 @@ static Array residualOf(const vector<Chain>& chains, const Array& x, const Array
         }
         for (size_t j = 0; j < chain.joints.size(); j++) {
             const int count = chain.segments.size(), start = chain.closed ? (j+count-1)%count : j;
-            const double friction = fmin(chain.segments[start].rotational, chain.segments[(start+1)%count].rotational);
-            const double theta = fmax(0.5, 1-friction/(4*h*chain.joints[j]));
+            const Segment &one = chain.segments[start], &other = chain.segments[(start+1)%count];
+            const double square = other.restLength*other.restLength, ofNodes = 0.25*chain.nodeFriction*square;
+            const double friction = isLinear(chain.bending) ? (ofNodes+other.rotational)/square :
+                    fmin(one.rotational, other.rotational)+ofNodes;
+            const double theta = fmin(isLinear(chain.bending) ? 0.8 : 1, fmax(0.5, 1-friction/(4*h*chain.joints[j])));
             const Array before = bendOf(chain.bending, nodesFrom(chain, start, 3, x).data());
             const Array after = bendOf(chain.bending, nodesFrom(chain, start, 3, y).data());
             const Array between = bendOf(chain.bending, nodesFrom(chain, start, 3, first).data());
@@ -153,7 +156,7 @@ static Array residualOf(const vector<Chain>& chains, const Array& x, const Array
             }
         }
         for (const Tether& tether : chain.tethers) {
-            double friction = 0;
+            double friction = chain.nodeFriction;
             const int count = chain.segments.size();
             for (int s = tether.node-1; s <= tether.node; s++)
                 if (chain.closed || (s >= 0 && s < count)) {
@@ -231,12 +234,15 @@ static void checkSteps(const vector<Chain>& chains, const Array& x, bool flows, 
 }
 
 static void testStepsWithoutNoise(Scheme scheme) {
-    for (int bending = 0; bending < 3; bending++)
+    for (int bending = 0; bending < countOf<BendingModel>(); bending++)
         for (int stretching = 0; stretching < 2; stretching++)
             for (bool tethers : {false, true})
-                for (bool flows : {false, true}) {
+                for (int kind = 0; kind < 4; kind++) {
+                    const bool flows = kind%2 == 1, beads = kind > 1;
                     const Array shortSteps = {0.001, 0.005}, steps = flows ? shortSteps : Array {0.001, 0.03, 1.0};
-                    auto check = [&] (const vector<Chain>& chains, const Array& x, const Array& steps) {
+                    auto check = [&] (vector<Chain> chains, const Array& x, const Array& steps) {
+                        if (beads)
+                            chains = beaded(chains);
                         checkSteps(tethers ? tethered(chains, x) : chains, x, flows, steps, scheme);
                     };
                     Array x, y, z;
@@ -279,8 +285,9 @@ static void testChainsDoNotDependOnTheirPack() {
         Array x;
         const BendingModel bending = BendingModel::InscribedCircle;
         const StretchingModel stretching = StretchingModel::FENE;
-        const vector<Chain> chains = tethered(rings ? makeRings(RINGS, bending, stretching, false, x) :
+        vector<Chain> chains = tethered(rings ? makeRings(RINGS, bending, stretching, false, x) :
                 makeChains(SEGMENTS, bending, stretching, x), x);
+        chains[3].nodeFriction = 2;
         ChainEngine together(chains), alone({chains[0]});
         // Some of its neighbours are taut.
         Array f(x.size(), 0.5);
@@ -456,7 +463,7 @@ static void checkBalance(const vector<Chain>& chains, const Array& x, const Step
 }
 
 static void testBalanceOfNodes() {
-    for (int bending = 0; bending < 3; bending++)
+    for (int bending = 0; bending < countOf<BendingModel>(); bending++)
         for (int stretching = 0; stretching < 2; stretching++)
             for (bool tethers : {false, true})
                 for (bool flows : {false, true})

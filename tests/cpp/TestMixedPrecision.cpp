@@ -7,6 +7,7 @@
 #include "lanes/Noise.h"
 #include <algorithm>
 #include <functional>
+#include <thread>
 
 static const double KT = 2.5;
 
@@ -112,7 +113,7 @@ static void checkSteps(const string& kind, const vector<Chain>& chains, const Ar
 }
 
 static void testStepsAreThoseOfDoublePrecision() {
-    for (int bending = 0; bending < 3; bending++) {
+    for (int bending = 0; bending < countOf<BendingModel>(); bending++) {
         Array x;
         const vector<Chain> chains = makeChains(LENGTHS, (BendingModel) bending, StretchingModel::Harmonic, x);
         vector<Chain> held = chains, propelled = chains, planar = chains;
@@ -126,6 +127,7 @@ static void testStepsAreThoseOfDoublePrecision() {
         checkSteps("tethered chains", tethered(chains, x), x);
         checkSteps("chains with fixed nodes", held, x);
         checkSteps("propelled chains", propelled, x);
+        checkSteps("chains of beads", beaded(chains), x);
         Array flat = x;
         for (size_t i = 2; i < x.size(); i += 3)
             flat[i] = 3;
@@ -213,6 +215,27 @@ static void testChainsDoNotDependOnTheirPack() {
                 checkClose(0, relativeDifference(a, b), 1, precision == Precision::Mixed ? 1e-5 : 1e-10, "chain alone");
             }
         }
+    }
+}
+
+static void testThreadsThatMakePacks() {
+    Array x;
+    const vector<Chain> chains = tetheredChains(x);
+    const Array f = someForces(x);
+    const StepSettings settings = settingsFor(Scheme::Implicit, 0.05);
+    const Array expected = stepIn(Precision::Mixed, ChainEngine(chains), x, f, settings).displacements;
+    for (int repeat = 0; repeat < 50; repeat++) {
+        const ChainEngine engine(chains);
+        vector<Array> found(4);
+        vector<thread> threads;
+        for (Array& displacements : found)
+            threads.emplace_back([&] () {
+                displacements = stepIn(Precision::Mixed, engine, x, f, settings).displacements;
+            });
+        for (thread& each : threads)
+            each.join();
+        for (const Array& displacements : found)
+            check(displacements == expected, "packs made by several threads");
     }
 }
 
@@ -576,6 +599,7 @@ int main() {
         testNoise,
         testPlaceInSpaceDoesNotMatter,
         testChainsDoNotDependOnTheirPack,
+        testThreadsThatMakePacks,
         testDividedSteps,
         testForcesOfSegments,
         testEnergies,

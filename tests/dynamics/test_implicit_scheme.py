@@ -10,6 +10,7 @@ from openmm import unit
 from openmm_cylchain import F_ACTIN, MICROTUBULE, Filaments, InputError, InstabilityError
 from openmm_cylchain.dynamics.recommended_step import recommended_time_step
 from openmm_cylchain.dynamics.schemes import IMPLICIT_SCHEMES
+from support.bending_models import BENDING_MODELS
 from support.contexts import energy_of, new_context, positions_of
 from support.equilibrium_cases import CASES, Case, exact_means, measured_means
 from support.solvent import KT, TEMPERATURE, VISCOSITY
@@ -257,7 +258,7 @@ def test_filaments_that_are_pulled_and_pushed_hard_come_back(direction, nanonewt
     assert abs(energy - expected) < 4 * np.sqrt(expected)
 
 
-@pytest.mark.parametrize("model", ["kratky-porod", "quadratic", "inscribed-circle"])
+@pytest.mark.parametrize("model", BENDING_MODELS)
 @pytest.mark.parametrize("angle", [np.pi, np.pi - 1e-9, np.pi - 0.01, 3.0])
 def test_segments_that_are_folded_back_open_or_stop_the_run(model, angle):
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")

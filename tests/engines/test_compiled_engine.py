@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import openmm
@@ -12,6 +13,7 @@ from openmm_cylchain import DSDNA, F_ACTIN, Filaments, InputError, InstabilityEr
 from openmm_cylchain.dynamics.schemes import SCHEMES
 from openmm_cylchain.engines import compiled as native
 from openmm_cylchain.engines.compiled import CylinderChainForce, CylinderChainIntegrator
+from openmm_cylchain.mechanics.potentials import BENDING_POTENTIALS
 from support.contexts import energy_of, new_context, positions_of
 
 VISCOSITY = 1029.8
@@ -91,8 +93,9 @@ def test_energies_are_told_apart():
     assert (stretching + bending)._value == pytest.approx(total._value, rel=1e-12)
 
 
-def test_system_survives_xml():
-    filaments = filaments_of("compiled")
+@pytest.mark.parametrize("model", BENDING_POTENTIALS)
+def test_system_survives_xml(model):
+    filaments = filaments_of("compiled", replace(F_ACTIN, bending_model=model))
     _, system, _ = filaments.build()
     text = openmm.XmlSerializer.serialize(system)
     restored = openmm.XmlSerializer.deserialize(text)
@@ -103,6 +106,7 @@ def test_system_survives_xml():
     force = CylinderChainForce.cast(force)
     assert force.getNumChains() == 2
     assert force.getChainParticles(1) == tuple(filaments.node_indices[1])
+    assert force.getBendingModelNames()[force.getChainModels(1)[0]] == model
 
 
 def integrator_with_everything_set():
@@ -334,7 +338,8 @@ def test_refused_systems():
         ([0], [0, 0, 1, 1, 0, 1, 1, 1, 1, 1], "at least two particles"),
         ([0, 1, 0], [0, 0, 1, 1, 0, 1, 1, 1, 1, 1], "Particle 0 appears twice"),
         ([0, -1], [0, 0, 1, 1, 0, 1, 1, 1, 1, 1], "Illegal particle index: -1"),
-        ([0, 1], [3, 0, 1, 1, 0, 1, 1, 1, 1, 1], "Illegal bending model: 3"),
+        ([0, 1], [-1, 0, 1, 1, 0, 1, 1, 1, 1, 1], "Illegal bending model: -1"),
+        ([0, 1], [99, 0, 1, 1, 0, 1, 1, 1, 1, 1], "Illegal bending model: 99"),
         ([0, 1], [0, 2, 1, 1, 0, 1, 1, 1, 1, 1], "Illegal stretching model: 2"),
         ([0, 1], [0, 0, 0, 1, 0, 1, 1, 1, 1, 1], "rest length must be positive"),
         ([0, 1], [0, 0, 1, 1, 0, -1, 1, 1, 1, 1], "stiffness of a joint"),

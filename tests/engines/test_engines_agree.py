@@ -8,6 +8,7 @@ import pytest
 from openmm import app, unit
 
 from openmm_cylchain import DSDNA, F_ACTIN, Filaments, stokes_friction
+from support.bending_models import BENDING_MODELS
 from support.contexts import energy_of, new_context, positions_of
 from support.dense_mechanics import bent_chain
 from support.equilibrium_cases import CASES
@@ -21,8 +22,7 @@ KINDS = [
     (F_ACTIN, 2, (0,)),
     (SLOW_DNA, 7, (3,)),
     (SLOW_DNA, 8, (-1,)),
-    (CASES["kratky-porod"].type, 5, ()),
-    (CASES["quadratic"].type, 5, (0, 1)),
+    *((CASES[model].type, 5, clamped) for model in BENDING_MODELS for clamped in ((), (0, 1))),
     (CASES["fene"].type, 6, ()),
     (CASES["freely-jointed"].type, 9, ()),
 ]

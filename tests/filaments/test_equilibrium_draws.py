@@ -13,10 +13,10 @@ from scipy.integrate import quad
 
 from openmm_cylchain import DSDNA, F_ACTIN, MICROTUBULE, Filaments, FilamentType, InputError
 from openmm_cylchain.filaments.equilibrium import JointAngleDistribution, SegmentLengthDistribution, draw_chain
+from support.bending_models import BENDING_MODELS
 
 TEMPERATURE = 300.0
 KT = 8.31446262e-3 * TEMPERATURE
-BENDING_MODELS = ("inscribed-circle", "kratky-porod", "quadratic")
 
 
 def chain_type(joint_stiffness=5.0, segment_stiffness=100.0, length=10.0, **changes):
@@ -60,11 +60,7 @@ def assert_mean(samples, expected, scale=None):
 
 def bending_energy(model, stiffness, bend):
     """V_b in k_B T as a function of bend = 1 - c."""
-    if model == "kratky-porod":
-        return stiffness * bend
-    if model == "quadratic":
-        return 0.5 * stiffness * (2 * math.asin(math.sqrt(0.5 * bend))) ** 2
-    return 2 * stiffness * bend / (2 - bend) if bend < 2 else math.inf
+    return stiffness * BENDING_MODELS[model].energy(2 * math.asin(math.sqrt(0.5 * bend)))
 
 
 def bend_integral(model, stiffness, function, low=0.0, high=2.0):
@@ -288,7 +284,8 @@ def discretisation_error(ratio, step):
 
 @pytest.mark.parametrize(
     "model, ratio, segments, chains",
-    [("inscribed-circle", *chain) for chain in CHAINS] + [(model, *CHAINS[2]) for model in BENDING_MODELS[1:]],
+    [("inscribed-circle", *chain) for chain in CHAINS]
+    + [(model, *CHAINS[2]) for model in BENDING_MODELS if model != "inscribed-circle"],
 )
 def test_mean_square_end_to_end_distance(model, ratio, segments, chains):
     joint_stiffness, segment_stiffness = segments / ratio, 400.0

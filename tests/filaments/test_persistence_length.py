@@ -13,18 +13,12 @@ from scipy.integrate import quad
 from openmm_cylchain import DSDNA, F_ACTIN, MICROTUBULE, EndCorrections, Filaments, FilamentType, InputError, theory
 from openmm_cylchain.filaments.equilibrium import JointAngleDistribution, PlanarJointAngleDistribution, draw_chain
 from openmm_cylchain.filaments.joint_calibration import calibrated_stiffness, tangent_decorrelation
+from support.bending_models import BENDING_MODELS
 from support.contexts import new_context, positions_of
 from support.solvent import TEMPERATURE, VISCOSITY
 
 KT = 8.31446262e-3 * TEMPERATURE
 SIGMAS = 4.0
-MODELS = ("inscribed-circle", "kratky-porod", "quadratic")
-# V_b of a joint of unit stiffness against its angle: eqs. (27) and (26) of Pesek et al. 2016, and their case B.
-REDUCED_ENERGY = {
-    "inscribed-circle": lambda angle: 2 * np.tan(angle / 2) ** 2,
-    "kratky-porod": lambda angle: 2 * np.sin(angle / 2) ** 2,
-    "quadratic": lambda angle: angle**2 / 2,
-}
 PRESETS = [(F_ACTIN, 360.0), (F_ACTIN, 60.0), (DSDNA, 8.0), (DSDNA, 4.0), (DSDNA, 2.0), (DSDNA, 1.0)]
 PRESET_LENGTHS = {"ACT": 17200.0, "DNA": 43.3}
 
@@ -50,7 +44,7 @@ def mean_bend(model, stiffness, kT=KT):
 
     def integral(power):
         def weight(angle):
-            return math.exp(-reduced * REDUCED_ENERGY[model](angle)) * math.sin(angle)
+            return math.exp(-reduced * BENDING_MODELS[model].energy(angle)) * math.sin(angle)
 
         return quad(
             lambda angle: (2 * math.sin(angle / 2) ** 2) ** power * weight(angle), 0, widest, epsabs=0, epsrel=1e-11
@@ -59,7 +53,7 @@ def mean_bend(model, stiffness, kT=KT):
     return integral(1) / integral(0)
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", BENDING_MODELS)
 @pytest.mark.parametrize("ratio", [1e-5, 0.003, 0.05, 8 / 43.3, 0.7, 2.0, 5.0])
 def test_tangents_decorrelate_over_the_persistence_length(model, ratio):
     kind = chain(ratio, model)
@@ -70,7 +64,7 @@ def test_tangents_decorrelate_over_the_persistence_length(model, ratio):
     assert length == pytest.approx(kind.persistence_length_at(TEMPERATURE), rel=1e-4)
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", BENDING_MODELS)
 @pytest.mark.parametrize("kind, length", PRESETS)
 def test_presets_are_what_their_label_says(kind, length, model):
     kind = replace(kind.with_segment_length(length), bending_model=model)
@@ -81,7 +75,7 @@ def test_presets_are_what_their_label_says(kind, length, model):
     assert correlation == pytest.approx(np.exp(-lags * length / PRESET_LENGTHS[kind.name]), rel=1e-7)
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", BENDING_MODELS)
 def test_weak_joints_reach_every_correlation(model):
     for decorrelation in (10.0, 25.0, 80.0):
         stiffness = calibrated_stiffness(model, decorrelation)
@@ -93,13 +87,16 @@ def test_weak_joints_reach_every_correlation(model):
     assert free.bending_energy(0.5) < 1e-30
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", BENDING_MODELS)
 def test_stiffness_tends_to_the_rigidity_over_the_segment_length(model):
-    """K l0/a - 1 falls with l0/l_p; the slope of Kratky-Porod joints, K/k_BT = 1/(1 - exp(-l0/l_p)), is 1/2."""
-    deviations = [chain(ratio, model).joint_stiffness * ratio / KT - 1 for ratio in (0.02, 0.002)]
-    slopes = {"inscribed-circle": -1.5, "kratky-porod": 0.5, "quadratic": -1 / 6}
-    assert deviations[1] == pytest.approx(slopes[model] * 0.002, rel=0.02)
-    assert deviations[0] == pytest.approx(10 * deviations[1], rel=0.05)
+    """K l0/a - 1 falls with l0/l_p: by -1/6 - 16 q for the energy K (angle^2/2 + q angle^4).
+
+    The slope of Kratky-Porod joints, K/k_BT = 1/(1 - exp(-l0/l_p)), is 1/2, and their q is -1/24.
+    """
+    quartic = (BENDING_MODELS[model].energy(0.01) - 0.01**2 / 2) / 0.01**4
+    for ratio in (0.02, 0.002):
+        deviation = chain(ratio, model).joint_stiffness * ratio / KT - 1
+        assert deviation == pytest.approx((-1 / 6 - 16 * quartic) * ratio, abs=3 * ratio**2)
 
 
 def test_quantities_and_plain_numbers_make_the_same_type():
@@ -149,7 +146,7 @@ def test_the_stiffness_stays_at_another_temperature():
     assert theory.mean_joint_cosine(kind, cold) == pytest.approx(1 / math.tanh(reduced) - 1 / reduced, rel=1e-8)
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", BENDING_MODELS)
 def test_joint_at_a_clamp_is_that_of_half_a_segment(model):
     kind = chain(0.4, model)
     assert mean_bend(model, kind.clamped_joint_stiffness) == pytest.approx(-math.expm1(-0.2), rel=1e-8)
@@ -159,7 +156,7 @@ def test_joint_at_a_clamp_is_that_of_half_a_segment(model):
     assert list(filaments[0].joint_stiffnesses) == expected
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", BENDING_MODELS)
 def test_in_a_plane_tangents_decorrelate_over_twice_the_length(model):
     """About, and exactly in the limit of short segments: the stiffness of a joint is the one in space."""
     for ratio, tolerance in ((0.1, 0.06), (0.001, 6e-4)):

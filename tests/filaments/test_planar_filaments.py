@@ -10,6 +10,7 @@ from scipy.integrate import quad
 
 from openmm_cylchain import F_ACTIN, Filaments, InputError, theory
 from openmm_cylchain.filaments.equilibrium import SegmentLengthDistribution
+from support.bending_models import BENDING_MODELS
 from support.contexts import new_context, positions_of
 from support.dense_mechanics import bent_chain, dense_resistance
 from support.equilibrium_cases import CASES, time_step
@@ -69,7 +70,7 @@ def _mean_square_end_to_end(kind, segments):
     return segments * square + 2 * mean**2 * sum((segments - k) * cosine**k for k in range(1, segments))
 
 
-NAMES = ("freely-jointed", "inscribed-circle", "kratky-porod", "quadratic", "fene")
+NAMES = ("freely-jointed", *BENDING_MODELS, "fene")
 
 
 @pytest.mark.parametrize("name", [*NAMES, "f-actin-60nm", "dna-8nm"])

@@ -14,6 +14,7 @@ from openmm_cylchain.filaments.equilibrium import (
     SegmentLengthDistribution,
 )
 from openmm_cylchain.output.reporters import FilamentReporter
+from support.bending_models import BENDING_MODELS
 from support.contexts import forces_of, new_context, new_simulation, positions_of
 from support.equilibrium_cases import Case, soft_chain, time_step
 from support.platforms import ENGINES
@@ -64,7 +65,7 @@ def test_stiffness_of_the_joints_of_a_ring(clamped, factors):
     assert filaments[0].joint_stiffnesses == pytest.approx(expected)
 
 
-@pytest.mark.parametrize("model", ["inscribed-circle", "kratky-porod", "quadratic"])
+@pytest.mark.parametrize("model", BENDING_MODELS)
 @pytest.mark.parametrize("engine", ENGINES)
 def test_reporter_and_state_have_the_stiffness_of_the_joints(engine, model):
     kind = replace(ACTIN, bending_model=model)

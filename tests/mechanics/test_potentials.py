@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from openmm_cylchain import Filament, Filaments, FilamentType, InputError
 from openmm_cylchain.mechanics.potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
 from openmm_cylchain.mechanics.tension import segment_end_forces
+from support.bending_models import BENDING_MODELS
 from support.contexts import forces_of, new_context
 
 ANGLES = (0.0, 1e-4, 0.01, 0.3, 1.0, 2.0, 3.0, 3.1)
@@ -37,6 +38,18 @@ MODELS = list(itertools.product(BENDING_POTENTIALS, STRETCHING_POTENTIALS))
 TYPES = {models: rod(*models) for models in MODELS}
 
 
+def test_every_bending_model_is_there_by_hand():
+    assert set(BENDING_MODELS) == set(BENDING_POTENTIALS)
+
+
+@pytest.mark.parametrize("model", BENDING_POTENTIALS)
+def test_bending_energies_are_within_what_averages_assume(model):
+    angle = np.linspace(0.01, 3.14, 100)
+    energy = BENDING_POTENTIALS[model].energy(3.0, np.cos(angle)) / 3.0
+    assert energy[0] == pytest.approx(0.5 * angle[0] ** 2, rel=1e-4)
+    assert np.all(energy >= 2 * (angle / np.pi) ** 2)
+
+
 # The potentials once more, by hand, as functions of node positions.
 
 
@@ -44,12 +57,7 @@ def bending_energy(model, first, second):
     # The half angle from sums and differences of unit vectors keeps all digits near 0 and near pi.
     t1, t2 = first / np.linalg.norm(first), second / np.linalg.norm(second)
     theta = 2 * math.atan2(np.linalg.norm(t2 - t1), np.linalg.norm(t2 + t1))
-    stiffness = RIGIDITY / LENGTH
-    return {
-        "kratky-porod": stiffness * 2 * math.sin(theta / 2) ** 2,
-        "quadratic": 0.5 * stiffness * theta**2,
-        "inscribed-circle": 2 * stiffness * math.tan(theta / 2) ** 2,
-    }[model]
+    return RIGIDITY / LENGTH * BENDING_MODELS[model].energy(theta)
 
 
 def stretching_energy(model, segment):
@@ -74,15 +82,7 @@ def bending_forces(model, nodes):
     l1, l2 = np.linalg.norm(first), np.linalg.norm(second)
     t1, t2 = first / l1, second / l2
     theta = 2 * math.atan2(np.linalg.norm(t2 - t1), np.linalg.norm(t2 + t1))
-    stiffness = RIGIDITY / LENGTH
-    slope = (
-        stiffness
-        * {
-            "kratky-porod": math.sin(theta),
-            "quadratic": theta,
-            "inscribed-circle": 2 * math.tan(theta / 2) / math.cos(theta / 2) ** 2,
-        }[model]
-    )
+    slope = RIGIDITY / LENGTH * BENDING_MODELS[model].slope(theta)
     if theta == 0.0:
         return np.zeros((3, 3))
     axis = np.cross(t1, t2)
@@ -164,8 +164,8 @@ def bending_tolerance(platform, model, angle, nodes, expected):
     angle_error = 4 * epsilon * np.abs(nodes).max() / LENGTH + min(
         math.sqrt(2 * epsilon), 2 * epsilon / max(math.sin(angle), 1e-30)
     )
-    secant, tangent = 1 / math.cos(angle / 2) ** 2, math.tan(angle / 2) ** 2
-    curvature = secant**2 + 2 * secant * tangent if model == "inscribed-circle" else 1.0
+    slopes = BENDING_MODELS[model].slope(angle + np.array([-1e-4, 1e-4]))
+    curvature = max(1.0, np.diff(slopes)[0] / 2e-4)
     return 4 * RIGIDITY / LENGTH**2 * curvature * angle_error + 1e-5 * np.abs(expected).max()
 
 

@@ -8,6 +8,7 @@ from openmm import unit
 from openmm_cylchain import F_ACTIN, Filaments, FilamentType
 from openmm_cylchain.dynamics.stability import stability_bounds
 from openmm_cylchain.filaments.equilibrium import JointAngleDistribution, SegmentLengthDistribution
+from support.bending_models import BENDING_MODELS
 from support.contexts import new_context, positions_of
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 
@@ -35,13 +36,10 @@ class Case:
 
 CASES = {
     "freely-jointed": Case(soft_chain("FJC", bending_rigidity=0.0), 2, 1500, 2000, 0.01),
-    "inscribed-circle": Case(
-        soft_chain("CIRC", bending_rigidity=2 * KT * 100, bending_model="inscribed-circle"), 8, 800, 1000, 0.01
-    ),
-    "kratky-porod": Case(
-        soft_chain("KP", bending_rigidity=2 * KT * 100, bending_model="kratky-porod"), 8, 800, 1000, 0.01
-    ),
-    "quadratic": Case(soft_chain("QUAD", bending_rigidity=2 * KT * 100, bending_model="quadratic"), 8, 800, 1000, 0.01),
+    **{
+        model: Case(soft_chain("BEND", bending_rigidity=2 * KT * 100, bending_model=model), 8, 800, 1000, 0.01)
+        for model in BENDING_MODELS
+    },
     "fene": Case(
         replace(soft_chain("FENE", bending_rigidity=2 * KT * 100), stretching_model="fene", maximum_extension=50.0),
         8,

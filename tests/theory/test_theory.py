@@ -14,6 +14,7 @@ from openmm_cylchain.filaments.equilibrium import draw_chain
 from openmm_cylchain.filaments.filament_type import DSDNA, F_ACTIN, FilamentType
 from openmm_cylchain.theory import energies
 from openmm_cylchain.units.quantities import thermal_energy
+from support.bending_models import BENDING_MODELS
 
 TEMPERATURE = 310.0
 KT = thermal_energy(TEMPERATURE)
@@ -33,20 +34,13 @@ def filament(bending=10.0, stretching=1000.0, **options):
     )
 
 
-REDUCED_BENDING_ENERGY = {
-    "kratky-porod": lambda angle: 1.0 - math.cos(angle),
-    "quadratic": lambda angle: 0.5 * angle**2,
-    "inscribed-circle": lambda angle: 2.0 * math.tan(0.5 * angle) ** 2,
-}
-
-
 def average_over_angle(model, stiffness, function):
     """<function(V_b/k_B T)> with the weight sin(angle) exp(-V_b/k_B T), by adaptive quadrature in angle."""
     upper = min(math.pi, 12.0 / math.sqrt(stiffness))
 
     def integral(value):
         def integrand(angle):
-            energy = stiffness * REDUCED_BENDING_ENERGY[model](angle)
+            energy = stiffness * BENDING_MODELS[model].energy(angle)
             return 0.0 if energy > 700.0 else value(energy) * math.sin(angle) * math.exp(-energy)
 
         return quad(integrand, 0.0, upper, epsabs=0, epsrel=1e-12, limit=500)[0]
@@ -90,7 +84,7 @@ def test_wlc_tangent_correlation():
     assert theory.wlc_tangent_correlation([0.0, 17200.0], 17.2 * unit.micrometer) == pytest.approx([1.0, math.exp(-1)])
 
 
-@pytest.mark.parametrize("model", REDUCED_BENDING_ENERGY)
+@pytest.mark.parametrize("model", BENDING_MODELS)
 @pytest.mark.parametrize("stiffness", [1e-4, 0.019, 0.021, 0.5, 3.0, 9.9, 10.1, 47.8, 1e3, 1e5])
 def test_bending_energy_moments_match_quadrature(model, stiffness):
     chain = filament(stiffness, bending_model=model)
@@ -100,7 +94,7 @@ def test_bending_energy_moments_match_quadrature(model, stiffness):
     assert theory.bending_energy_variance(chain, TEMPERATURE) / KT**2 == pytest.approx(variance, rel=1e-8)
 
 
-@pytest.mark.parametrize("model", REDUCED_BENDING_ENERGY)
+@pytest.mark.parametrize("model", BENDING_MODELS)
 def test_bending_energy_of_a_freely_jointed_chain_is_zero(model):
     chain = filament(0.0, bending_model=model)
     assert theory.bending_energy_mean(chain, TEMPERATURE) == 0.0
@@ -395,10 +389,12 @@ def test_joints_stiffen_against_k_t_as_the_temperature_falls():
     assert cold == pytest.approx(theory.bending_energy_mean(stiffer, 310.0) / KT, rel=1e-12)
 
 
-@pytest.mark.parametrize("model", ["kratky-porod", "quadratic", "inscribed-circle"])
+@pytest.mark.parametrize("model", BENDING_MODELS)
 @pytest.mark.parametrize("stiffness", [0.3, 10.0, 1e3, 1e8])
 def test_moments_of_any_bending_model_by_quadrature(model, stiffness):
     kind = filament(stiffness, bending_model=model)
     mean, variance = energies._moments_by_quadrature(kind.bending_potential, stiffness)
-    assert mean * KT == pytest.approx(theory.bending_energy_mean(kind, TEMPERATURE), rel=1e-5)
-    assert variance * KT**2 == pytest.approx(theory.bending_energy_variance(kind, TEMPERATURE), rel=1e-4)
+    # The cosine of a stiff joint has lost the digits of its angle.
+    accuracy = 1e-8 if stiffness < 1e6 else 1e-7
+    assert mean * KT == pytest.approx(theory.bending_energy_mean(kind, TEMPERATURE), rel=accuracy)
+    assert variance * KT**2 == pytest.approx(theory.bending_energy_variance(kind, TEMPERATURE), rel=accuracy)

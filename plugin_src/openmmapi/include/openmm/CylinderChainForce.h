@@ -36,16 +36,7 @@ namespace OpenMM {
 class CylinderChainForce : public Force {
 public:
     /**
-     * The bending energy of a joint of stiffness b whose segments have the directions t1 and t2, with c = t1.t2 and the
-     * angle theta between them:
-     *
-     * KratkyPorod: b (1-c), eq. (26).
-     *
-     * Quadratic: (b/2) theta^2.
-     *
-     * InscribedCircle: 2b (1-c)/(1+c), eq. (27), which diverges where a joint folds back.
-     *
-     * BondDifference: (b/2) |u2-u1|^2, with the vectors u1 and u2 of the segments, and b measured in kJ/mol/nm^2.
+     * The bending energy of a joint. mechanics/BendingModels.h says what each is.
      */
     enum BendingModel : int {CYLCHAIN_BENDING_MODELS(CYLCHAIN_ENUMERATOR)};
     /**
