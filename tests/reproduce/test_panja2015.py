@@ -140,7 +140,7 @@ class Given:
     """Records of times that are given: so many microseconds for a step of a bead."""
 
     def __init__(self, modes, implicit):
-        self.seconds = {"modes": 1e-6 * modes, "implicit": 1e-6 * implicit, "equilibrium": 1e-6 * implicit}
+        self.seconds = {"modes": 1e-6 * modes, "implicit": 1e-6 * implicit, "recommended": 1e-6 * implicit}
 
     def measure(self, name, function, bonds, steps, **settings):
         noise = 1.0 + 0.01 * np.random.default_rng(1).normal(size=9)
@@ -162,7 +162,7 @@ def test_simulated_time_of_given_times():
 
 
 def test_chains_are_timed():
-    steps = {"modes": [10.0], "implicit": [50.0], "equilibrium": [1000.0]}
+    steps = {"modes": [10.0], "implicit": [50.0], "recommended": [1000.0]}
     times = simulated_time.timed_chains([31], 2, steps, repetitions=3, seconds=2e-3)
     assert all(np.shape(times[curve]) == (1, 3) and np.min(times[curve]) > 0 for curve in steps)
 
