@@ -1,5 +1,7 @@
 #include "dynamics/ChainEngine.h"
 #include "dynamics/ChainPack.h"
+#include "dynamics/ModePacks.h"
+#include "dynamics/PackPlaces.h"
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -80,29 +82,19 @@ template <class Scalar> void setSegment(ChainPack<Scalar>& pack, int lane, int s
     properties[Pack::RootExtensional*lanes] = sqrt(segment.extensional);
     properties[Pack::Drift*lanes] = dimensions == 0 || segment.rotational == 0 ? 0.0 :
             dimensions+1-(dimensions-1)*segment.extensional/segment.rotational;
-    if (segment.propulsion != 0) {
-        pack.propulsions.resize((size_t) (pack.nodes-1)*lanes);
-        pack.propulsions[(size_t) s*lanes+lane] = 0.5*segment.propulsion;
-    }
 }
 
 void fillLane(ChainPack<double>& pack, int lane, const Chain& chain, int index) {
     const int lanes = pack.lanes;
     const size_t own = chain.nodes.size(), unrolled = own+(chain.closed ? 2 : 0);
-    pack.chain[lane] = index;
-    pack.nodesOfLane[lane] = unrolled;
-    pack.segmentsOfLane[lane] = chain.segments.size();
-    for (size_t node = 0; node < unrolled; node++) {
-        pack.particles[node*lanes+lane] = chain.nodes[node%own];
+    placeChain(pack, lane, chain, index);
+    for (size_t node = 0; node < unrolled; node++)
         pack.mobile[node*lanes+lane] = chain.fixed[node%own] ? 0.0 : 1.0;
-    }
     pack.free[lane] = any_of(chain.fixed.begin(), chain.fixed.end(), [] (bool fixed) {return fixed;}) ? 0.0 : 1.0;
     pack.nodeFriction[lane] = chain.nodeFriction;
     pack.rootNodeFriction[lane] = sqrt(chain.nodeFriction);
     for (size_t node = 1; node < unrolled-1; node++)
         pack.joints[node*lanes+lane] = chain.joints[chain.closed ? node%own : node-1];
-    for (size_t number = 0; number < chain.tethers.size(); number++)
-        pack.tethers.push_back({chain.tethers[number], lane, (int) number});
     for (size_t s = 0; s < unrolled-1; s++)
         setSegment(pack, lane, s, chain.segments[s%chain.segments.size()], chain.planar ? 2 : 3);
 }
@@ -110,17 +102,11 @@ void fillLane(ChainPack<double>& pack, int lane, const Chain& chain, int index) 
 /** A pack whose lanes are all filled up. */
 template <class Scalar> ChainPack<Scalar> packWithoutChains(const PackShape& shape, int lanes) {
     typedef ChainPack<Scalar> Pack;
-    Pack pack;
-    static_cast<PackShape&>(pack) = shape;
-    pack.lanes = lanes;
-    pack.chain.resize(lanes, -1);
-    pack.nodesOfLane.resize(lanes);
-    pack.segmentsOfLane.resize(lanes);
+    Pack pack = emptyPack<Scalar>(shape, lanes);
     pack.free.resize(lanes);
     pack.nodeFriction.resize(lanes);
     pack.rootNodeFriction.resize(lanes);
     const size_t places = (size_t) pack.nodes*lanes;
-    pack.particles.resize(places, -1);
     pack.mobile.resize(places, 0.0);
     pack.joints.resize(places, 0.0);
     pack.properties.resize((places-lanes)*Pack::NumProperties);
@@ -131,12 +117,6 @@ template <class Scalar> ChainPack<Scalar> packWithoutChains(const PackShape& sha
             pack.properties[((size_t) s*Pack::NumProperties+Pack::InverseRestLength)*lanes+lane] = 0;
         }
     return pack;
-}
-
-template <class Scalar> void sortTethers(ChainPack<Scalar>& pack) {
-    stable_sort(pack.tethers.begin(), pack.tethers.end(), [] (const LaneTether& a, const LaneTether& b) {
-        return a.node < b.node;
-    });
 }
 
 ChainPack<double> packed(const vector<Chain>& chains, const vector<int>& members, int lanes) {
@@ -178,6 +158,8 @@ ChainPack<float> widened(const ChainPack<double>* first, const ChainPack<double>
         if (!pack->propulsions.empty())
             wide.propulsions.resize((size_t) (wide.nodes-1)*lanes);
         copyTo(wide.propulsions, pack->propulsions);
+        wide.particlesOfChains.insert(wide.particlesOfChains.end(), pack->particlesOfChains.begin(),
+                pack->particlesOfChains.end());
         for (LaneTether tether : pack->tethers) {
             tether.lane += lane;
             wide.tethers.push_back(tether);
@@ -188,7 +170,7 @@ ChainPack<float> widened(const ChainPack<double>* first, const ChainPack<double>
 }
 
 template <class Scalar> ParticleRange particlesOf(const ChainPack<Scalar>& pack) {
-    return {pack.particles.data(), pack.particles.data()+(size_t) pack.ownNodes()*pack.lanes};
+    return {pack.particlesOfChains.data(), pack.particlesOfChains.data()+pack.particlesOfChains.size()};
 }
 
 /** A pack in single precision, in place of some of those in double precision, and what decides where it is right. */
@@ -266,20 +248,28 @@ void SegmentForces::add(const SegmentForces& other, double weight) {
 }
 
 struct ChainEngine::Implementation {
+    explicit Implementation(const vector<Chain>& chains) : modes(chains, kernels().lanes, kernels().wide.lanes) {
+    }
+    /** Packs are counted through all of these. Wide ones are in the order of those that they replace. */
     vector<ChainPack<double> > packs;
-    /** In the order of the packs that they replace. */
     vector<WidePack> wide;
+    ModePacks modes;
     /** Held where wide packs are made. */
     mutex making;
-    bool isWide(int pack) const {
-        return pack >= (int) packs.size();
+    bool isOfModes(int pack) const {
+        return pack >= (int) (packs.size()+wide.size());
     }
-    const WidePack& getWide(int pack) const {
-        return wide[pack-packs.size()];
+    /** Call a function with a pack: one in double precision, a wide one, or the number of one of modes. */
+    template <class Double, class Single, class Modes> auto with(int pack, Double ofDouble, Single ofSingle,
+                Modes ofModes) const {
+        const int count = packs.size();
+        if (pack < count)
+            return ofDouble(packs[pack]);
+        return isOfModes(pack) ? ofModes(pack-count-(int) wide.size()) : ofSingle(wide[pack-count]);
     }
 };
 
-ChainEngine::ChainEngine(const vector<Chain>& chains) : implementation(new Implementation()) {
+ChainEngine::ChainEngine(const vector<Chain>& chains) : implementation(new Implementation(chains)) {
     for (size_t i = 0; i < chains.size(); i++)
         if (!isEntry(chains[i].bending) || !isEntry(chains[i].stretching))
             throw invalid_argument("Chain "+to_string(i)+" has a model that there is not");
@@ -299,9 +289,7 @@ ChainEngine::ChainEngine(const vector<Chain>& chains) : implementation(new Imple
         while (fitting < kernels().lanes && first+fitting < order.size() &&
                 mayShareLanes(chains[order[first]], chains[order[first+fitting]]))
             fitting++;
-        int lanes = 1;
-        while (2*lanes <= fitting)
-            lanes *= 2;
+        const int lanes = lanesFor(fitting);
         members.push_back(vector<int>(order.begin()+first, order.begin()+first+lanes));
         implementation->packs.push_back(packed(chains, members.back(), lanes));
         first += lanes;
@@ -331,6 +319,12 @@ int ChainEngine::getNumPacks() const {
 
 vector<int> ChainEngine::getPacksOfStep(const StepSettings& settings) const {
     vector<int> result;
+    if (settings.scheme == Scheme::Modes) {
+        result = implementation->modes.getPacksOfStep(settings);
+        for (int& pack : result)
+            pack += getNumPacks()+implementation->wide.size();
+        return result;
+    }
     int next = 0;
     const lock_guard<mutex> lock(implementation->making);
     for (size_t wide = 0; wide < implementation->wide.size(); wide++) {
@@ -351,8 +345,9 @@ vector<int> ChainEngine::getPacksOfStep(const StepSettings& settings) const {
 int ChainEngine::getNumMixedChains(const vector<int>& packs) const {
     int count = 0;
     for (int pack : packs)
-        if (implementation->isWide(pack))
-            count += implementation->getWide(pack).chains;
+        count += implementation->with(pack, [] (const auto&) {return 0;},
+                [] (const WidePack& wide) {return wide.chains;},
+                [&] (int modes) {return implementation->modes.getNumWideChains(modes);});
     return count;
 }
 
@@ -362,22 +357,30 @@ ChainEnergy ChainEngine::addForces(int pack, const double* positions, double* fo
 }
 
 ParticleRange ChainEngine::getParticles(int pack) const {
-    return implementation->isWide(pack) ? particlesOf(*implementation->getWide(pack).pack) :
-            particlesOf(implementation->packs[pack]);
+    const ModePacks& modes = implementation->modes;
+    return implementation->with(pack, [] (const ChainPack<double>& own) {return particlesOf(own);},
+            [] (const WidePack& wide) {return particlesOf(*wide.pack);},
+            [&] (int own) {return modes.isWide(own) ? particlesOf(modes.getWide(own).pack) :
+                    particlesOf(modes.get(own).pack);});
 }
 
 void ChainEngine::clearForces(int pack, double* forces) const {
     for (int particle : getParticles(pack))
-        if (particle >= 0)
-            forces[3*particle] = forces[3*particle+1] = forces[3*particle+2] = 0;
+        forces[3*particle] = forces[3*particle+1] = forces[3*particle+2] = 0;
 }
 
 Instability ChainEngine::step(int pack, const double* positions, const double* forces, const double* box,
             const StepSettings& settings, double* displacements) const {
-    if (implementation->isWide(pack))
-        return kernels().wide.step(*implementation->getWide(pack).pack, positions, forces, box, settings,
-                displacements);
-    return kernels().step(implementation->packs[pack], positions, forces, box, settings, displacements);
+    if (implementation->isOfModes(pack) != (settings.scheme == Scheme::Modes))
+        throw invalid_argument("Pack "+to_string(pack)+" is not for this scheme");
+    const ModePacks& modes = implementation->modes;
+    auto stepOf = [&] (auto function, const auto& own) {
+        return function(own, positions, forces, box, settings, displacements);
+    };
+    return implementation->with(pack, [&] (const ChainPack<double>& own) {return stepOf(kernels().step, own);},
+            [&] (const WidePack& wide) {return stepOf(kernels().wide.step, *wide.pack);},
+            [&] (int own) {return modes.isWide(own) ? stepOf(kernels().wide.stepOfModes, modes.getWide(own)) :
+                    stepOf(kernels().stepOfModes, modes.get(own));});
 }
 
 void cylchain::drawWords(const NoiseKey& key, NoiseKind kind, uint32_t draw, const uint32_t* chains,
@@ -398,6 +401,14 @@ void cylchain::drawNormalsInSinglePrecision(const NoiseKey& key, NoiseKind kind,
 void cylchain::drawFeneCoordinates(const NoiseKey& key, const uint32_t* chains, const uint32_t* segments,
             const double* stiffness, int count, double* coordinates) {
     kernels().drawFeneCoordinates(key, chains, segments, stiffness, count, coordinates);
+}
+
+void cylchain::transformCosines(int length, int count, double* values, bool inverse) {
+    kernels().transformCosines(length, count, values, inverse);
+}
+
+void cylchain::transformCosinesInSinglePrecision(int length, int count, double* values, bool inverse) {
+    kernels().wide.transformCosines(length, count, values, inverse);
 }
 
 string ChainEngine::getInstructionSet() {

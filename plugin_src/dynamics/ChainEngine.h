@@ -31,7 +31,7 @@ struct Instability {
     int iterations = 0;
 };
 
-/** The particles of a pack, each of them once, in no particular order, with -1 for places that are empty. */
+/** The particles of a pack, each of them once, chain by chain. */
 class ParticleRange {
 public:
     ParticleRange(const int* first, const int* last) : first(first), last(last) {
@@ -107,8 +107,9 @@ public:
     int getNumPacks() const;
     /**
      * Get the packs that a step with some settings takes: together, they hold each chain once. Those whose number is
-     * not below getNumPacks() are wide ones. This depends on the settings but for seed, step and what is recorded.
-     * Several threads may call it at the same time, and while others use packs.
+     * not below getNumPacks() are wide ones, or of modes. This depends on the settings but for seed, step and what is
+     * recorded. The scheme of modes is for chains that have some alone, see findModes(). Several threads may call it at
+     * the same time, and while others use packs.
      */
     std::vector<int> getPacksOfStep(const StepSettings& settings) const;
     /**
@@ -134,8 +135,8 @@ public:
     void clearForces(int pack, double* forces) const;
     /**
      * Compute the displacements of the nodes of a pack in one step: noise, resistance, redistribution. The forces are
-     * all those on the nodes; for the implicit scheme, all but those of the chains themselves. A wide pack is for the
-     * settings that getPacksOfStep() gives it for.
+     * all those on the nodes; for schemes that compute those of the chains themselves, all but these. A pack that is
+     * not below getNumPacks() is for the settings that getPacksOfStep() gives it for.
      *
      * @param displacements  receives those of the pack's nodes
      * @return the first instability found, with chain = -1 if there is none

@@ -5,6 +5,6 @@
 const cylchain::ChainKernels& cylchain::baselineKernels() {
     static const ChainKernels kernels = {"baseline", CYLCHAIN_LANES, baseline::addForcesOfPack, baseline::stepOfPack,
             baseline::drawWordsOf, baseline::drawNormalsOf, baseline::drawFeneCoordinatesOf,
-            baselineWideKernels()};
+            baseline::stepOfModesOfPack, baseline::transformCosinesOf, baselineWideKernels()};
     return kernels;
 }

@@ -6,7 +6,7 @@
  * function of one is used by another, and for up to CYLCHAIN_LANES lanes.
  */
 
-#include "dynamics/ChainPack.h"
+#include "dynamics/ModePack.h"
 #include "lanes/Noise.h"
 #include "mechanics/PeriodicBox.h"
 #include <algorithm>
@@ -41,6 +41,8 @@ typedef ChainPack<Scalar> Pack;
 #include "dynamics/ImplicitConvergence-inl.h"
 #include "dynamics/ImplicitStep-inl.h"
 #include "dynamics/DividedStep-inl.h"
+#include "lanes/CosineTransform-inl.h"
+#include "dynamics/ModeStep-inl.h"
 
 #ifdef CYLCHAIN_SINGLE_PRECISION
 
@@ -48,6 +50,11 @@ typedef ChainPack<Scalar> Pack;
 Instability stepOfPack(const Pack& pack, const double* positions, const double* forces, const double* box,
             const StepSettings& settings, double* displacements) {
     return stepPackImplicitly<CYLCHAIN_LANES, false>(pack, positions, forces, box, settings, displacements);
+}
+
+Instability stepOfModesOfPack(const ModePack<Scalar>& modes, const double* positions, const double* forces,
+            const double* box, const StepSettings& settings, double* displacements) {
+    return stepPackOfModes<CYLCHAIN_LANES>(modes, positions, forces, box, settings, displacements);
 }
 
 #else
@@ -81,6 +88,13 @@ Instability stepOfPack(const Pack& pack, const double* positions, const double* 
             const StepSettings& settings, double* displacements) {
     return withLanesOf(pack, [&] (auto lanes) {
         return stepPackAs<lanes>(pack, positions, forces, box, settings, displacements);
+    });
+}
+
+Instability stepOfModesOfPack(const ModePack<Scalar>& modes, const double* positions, const double* forces,
+            const double* box, const StepSettings& settings, double* displacements) {
+    return withLanesOf(modes.pack, [&] (auto lanes) {
+        return stepPackOfModes<lanes>(modes, positions, forces, box, settings, displacements);
     });
 }
 

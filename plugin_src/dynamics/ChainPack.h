@@ -43,6 +43,8 @@ template <class Scalar> struct ChainPack : PackShape {
     std::vector<int> chain, nodesOfLane, segmentsOfLane;
     /** Particle of each node and lane, [node][lane]; -1 for a node that only fills up. */
     std::vector<int> particles;
+    /** The same particles, each of them once, chain by chain. */
+    std::vector<int> particlesOfChains;
     /** Properties of segments, [segment][property][lane]. */
     std::vector<Scalar> properties;
     /** Stiffness of the joint at each node, [node][lane]; zero at ends. */
@@ -63,6 +65,8 @@ template <class Scalar> struct ChainPack : PackShape {
     }
 };
 
+template <class Scalar> struct ModePack;
+
 /** The loops over a wide pack of open chains, in single precision. */
 struct WideKernels {
     /** The number of lanes of all such packs. */
@@ -73,6 +77,11 @@ struct WideKernels {
     /** See Noise.h. */
     void (*drawNormals)(const NoiseKey& key, NoiseKind kind, const std::uint32_t* chains, const std::uint32_t* parts,
             int count, double* normals);
+    /** A step by the modes of chains. */
+    Instability (*stepOfModes)(const ModePack<float>& pack, const double* positions, const double* forces,
+            const double* box, const StepSettings& settings, double* displacements);
+    /** See CosineTables.h. */
+    void (*transformCosines)(int length, int count, double* values, bool inverse);
 };
 
 /** The loops over a pack, compiled for one instruction set. */
@@ -91,6 +100,11 @@ struct ChainKernels {
             int count, double* normals);
     void (*drawFeneCoordinates)(const NoiseKey& key, const std::uint32_t* chains, const std::uint32_t* segments,
             const double* stiffness, int count, double* coordinates);
+    /** A step by the modes of chains. */
+    Instability (*stepOfModes)(const ModePack<double>& pack, const double* positions, const double* forces,
+            const double* box, const StepSettings& settings, double* displacements);
+    /** See CosineTables.h. */
+    void (*transformCosines)(int length, int count, double* values, bool inverse);
     const WideKernels& wide;
 };
 

@@ -4,19 +4,30 @@
  * Positions, forces and properties of a pack in lanes: what steps read of it, and what they write.
  */
 
+/**
+ * Call a function for each of the first places and each lane, some places of a lane at a time: the particles of a chain
+ * are likely to be neighbours in memory, but those of many chains may compete for the same places in a cache.
+ */
+template <int W, class Function> CYLCHAIN_INLINE void forPlacesOfLanes(int count, Function function) {
+    const int some = 16;
+    for (int first = 0; first < count; first += some)
+        for (int i = 0; i < W; i++)
+            for (int place = first; place < std::min(first+some, count); place++)
+                function(place, i);
+}
+
 /** Bring an array of three doubles for each particle into lanes. */
 template <int W> void gather(const Pack& pack, const double* values, Vector<typename Lanes<W>::Type>* result) {
-    for (int node = 0; node < pack.nodes; node++)
-        for (int i = 0; i < W; i++) {
-            const int particle = pack.particles[node*W+i];
-            if (particle < 0) {
-                lane(result[node].x, i) = lane(result[node].y, i) = lane(result[node].z, i) = 0;
-                continue;
-            }
-            lane(result[node].x, i) = values[3*particle];
-            lane(result[node].y, i) = values[3*particle+1];
-            lane(result[node].z, i) = values[3*particle+2];
+    forPlacesOfLanes<W>(pack.nodes, [&] (int node, int i) {
+        const int particle = pack.particles[node*W+i];
+        if (particle < 0) {
+            lane(result[node].x, i) = lane(result[node].y, i) = lane(result[node].z, i) = 0;
+            return;
         }
+        lane(result[node].x, i) = values[3*particle];
+        lane(result[node].y, i) = values[3*particle+1];
+        lane(result[node].z, i) = values[3*particle+2];
+    });
 }
 
 /** Bring forces into lanes: once for nodes that come twice, and in the plane for chains that stay there. */
@@ -33,15 +44,14 @@ template <int W> void gatherForces(const Pack& pack, const double* forces, Vecto
 /** Write vectors, times a factor, to an array of three doubles for each particle. */
 template <int W> void scatter(const Pack& pack, Vector<typename Lanes<W>::Type>* values, double factor,
         double* result) {
-    for (int node = 0; node < pack.ownNodes(); node++)
-        for (int i = 0; i < W; i++) {
-            const int particle = pack.particles[node*W+i];
-            if (particle >= 0) {
-                result[3*particle] = factor*lane(values[node].x, i);
-                result[3*particle+1] = factor*lane(values[node].y, i);
-                result[3*particle+2] = factor*lane(values[node].z, i);
-            }
+    forPlacesOfLanes<W>(pack.ownNodes(), [&] (int node, int i) {
+        const int particle = pack.particles[node*W+i];
+        if (particle >= 0) {
+            result[3*particle] = factor*lane(values[node].x, i);
+            result[3*particle+1] = factor*lane(values[node].y, i);
+            result[3*particle+2] = factor*lane(values[node].z, i);
         }
+    });
 }
 
 /** Bring positions into lanes. Each node is the image that is nearest to the one before it if there is a box. */
@@ -78,22 +88,21 @@ template <int W> void gatherStart(const Pack& pack, const double* positions, con
 /** Bring the vectors of segments into lanes: differences of doubles, however far from the origin they are. */
 template <int W> void gatherSegments(const Pack& pack, const double* positions, const double* box,
             Vector<typename Lanes<W>::Type>* result) {
-    for (int s = 0; s < pack.nodes-1; s++)
-        for (int i = 0; i < W; i++) {
-            const int first = pack.particles[s*W+i], second = pack.particles[(s+1)*W+i];
-            double d[] = {1, 0, 0};
-            if (first >= 0 && second >= 0) {
-                for (int k = 0; k < 3; k++)
-                    d[k] = positions[3*second+k]-positions[3*first+k];
-                if (box != NULL)
-                    takeToNearestImage(d, box);
-                if (pack.planar)
-                    d[2] = 0;
-            }
-            lane(result[s].x, i) = d[0];
-            lane(result[s].y, i) = d[1];
-            lane(result[s].z, i) = d[2];
+    forPlacesOfLanes<W>(pack.nodes-1, [&] (int s, int i) {
+        const int first = pack.particles[s*W+i], second = pack.particles[(s+1)*W+i];
+        double d[] = {1, 0, 0};
+        if (first >= 0 && second >= 0) {
+            for (int k = 0; k < 3; k++)
+                d[k] = positions[3*second+k]-positions[3*first+k];
+            if (box != NULL)
+                takeToNearestImage(d, box);
+            if (pack.planar)
+                d[2] = 0;
         }
+        lane(result[s].x, i) = d[0];
+        lane(result[s].y, i) = d[1];
+        lane(result[s].z, i) = d[2];
+    });
 }
 
 template <class Real> CYLCHAIN_INLINE Real property(const Pack& pack, int segment, int which) {

@@ -20,7 +20,10 @@ enum class NoiseKind : std::uint32_t {
     Tether = 3,
     /** Of a particle outside chains, by its index, with zero for the chain. */
     Particle = 4,
-    /** Of a node: three for the force on it, one for the length behind it if segments have none, three for its bend. */
+    /**
+     * Of a node: three for the force on it, one for the length behind it if segments have none, three for its bend. Of
+     * a mode, by its number, where modes are what is moved: three for its motion.
+     */
     Node = 5
 };
 

@@ -18,6 +18,11 @@ struct BackgroundFlow {
     bool varies() const;
     /** The velocity at x. */
     void getVelocity(const double* x, double* velocity) const;
+    /**
+     * The flow whose velocity at x is the mean of that of a particle that is carried along from there for some time,
+     * either in space or within a plane of constant z.
+     */
+    BackgroundFlow carriedAlong(double time, bool planar) const;
 };
 
 } // namespace cylchain

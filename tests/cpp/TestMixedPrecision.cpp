@@ -515,8 +515,7 @@ static int mixedOf(Precision precision, int count, const function<void(Chain&)>&
     vector<int> found(x.size()/3);
     for (int pack : engine.getPacksOfStep(settings))
         for (int particle : engine.getParticles(pack))
-            if (particle >= 0)
-                found[particle]++;
+            found[particle]++;
     check(count_if(found.begin(), found.end(), [] (int times) {return times != 1;}) == 0, "particles of packs");
     return mixedChains(precision, engine, settings);
 }

@@ -1,4 +1,5 @@
 #include "openmm/internal/CylinderChainDescription.h"
+#include "mechanics/BeadModes.h"
 #include "openmm/OpenMMException.h"
 
 using namespace std;
@@ -71,6 +72,7 @@ CylinderChainDescription::CylinderChainDescription(const System& system, const C
         chains.push_back(chain);
     }
     copyTethers(force, chains);
+    lookForModes();
 }
 
 void CylinderChainDescription::update(const CylinderChainForce& force) {
@@ -85,6 +87,22 @@ void CylinderChainDescription::update(const CylinderChainForce& force) {
         copyParameters(force, i, chains[i]);
     }
     copyTethers(force, chains);
+    lookForModes();
+}
+
+void CylinderChainDescription::lookForModes() {
+    withoutModes.clear();
+    for (size_t i = 0; i < chains.size() && withoutModes.empty(); i++) {
+        string reason;
+        if (!cylchain::findModes(chains[i], reason))
+            withoutModes = "chain "+to_string(i)+": "+reason;
+    }
+}
+
+void CylinderChainDescription::requireModes() const {
+    if (!withoutModes.empty())
+        throw OpenMMException("CylinderChainIntegrator: The scheme of modes is for chains of beads alone, not for "+
+                withoutModes);
 }
 
 } // namespace OpenMM

@@ -84,6 +84,8 @@ StepSettings CylinderChainStepper::describeStep(uint64_t seed, int level, uint64
     settings.scheme = static_cast<Scheme>(integrator.getScheme());
     if (computesChainForces(settings.scheme) && !includesChains)
         settings.scheme = Scheme::Midpoint;
+    if (settings.scheme == Scheme::Modes)
+        chains.requireModes();
     settings.kT = BOLTZ*integrator.getTemperature();
     settings.stepSize = integrator.getStepSize();
     settings.seed = seed;

@@ -64,6 +64,14 @@ public:
      *
      * ImplicitSecondOrder: the same in two stages.  The motion of bends, which is of first order in the step otherwise,
      * is right to second order, for half as much again of work.
+     *
+     * Modes: for chains of beads alone, those of Panja, Barkema and van Leeuwen, Phys. Rev. E 2015, 92, 032603: open,
+     * with harmonic segments that have no friction, BondDifference joints of one stiffness kappa, friction of nodes,
+     * and no fixed node.  In terms of their (1), inner segments have the stiffness k = lambda-2 kappa and the rest
+     * length lambda d/k, those at the ends lambda-kappa and lambda d/(lambda-kappa), and one that is alone lambda and
+     * d.  Their normal modes are advanced as in Section IV, to first order in the step.  This takes less work than other
+     * schemes and is stable, but bonds forget their length in steps that are long.  Other forces, tethers among them,
+     * are taken at the start of the step; they act on each mode as it relaxes.
      */
     enum Scheme : int {CYLCHAIN_SCHEMES(CYLCHAIN_ENUMERATOR)};
     /**
@@ -73,7 +81,8 @@ public:
      * Automatic: mixed, where it is right and faster: for open chains with harmonic lengths and a scheme that is
      * implicit, at a temperature above zero, without a flow, with bends that relax within a step by less than 10^4 of
      * their relaxation time, lengths of at most 10^9 kT that noise changes by 10^-5 in a step or more, if there are
-     * enough such chains to fill more than half of a vector register.  It is the default.
+     * enough such chains to fill more than half of a vector register.  For the scheme Modes: at a temperature above
+     * zero and with a stiffness of bonds and bends of at most 10^9 kT.  It is the default.
      *
      * Mixed: what happens within a step is computed in single precision wherever that is right, for as few chains as
      * there are.  Chains for which it is not right are computed in double precision.
@@ -279,7 +288,8 @@ public:
      * Set the path level.  The noise of two simulations with the same seed whose step sizes are h at level 0 and
      * h/2^level at another level is that of the same Brownian path, so that their difference is the error of the longer
      * step.  The lengths and bends of the implicit scheme that relax within a step are drawn anew in every step at any
-     * level.
+     * level.  Those modes of the scheme Modes that relax within a step forget what came before it, so that the noise of
+     * two short steps is not that of a long one for them.
      *
      * The level is between 0, which is the default, and getLargestPathLevel().  In a Context that exists already, a new
      * one takes effect when the Context is reinitialized.  A State from a simulation at another level is continued at

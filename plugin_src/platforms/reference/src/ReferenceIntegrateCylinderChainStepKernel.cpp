@@ -54,11 +54,10 @@ Instability ReferenceIntegrateCylinderChainStepKernel::displaceChains(ContextImp
     vector<Instability> instabilities(packs.size());
     loop.run(packs.size(), [&] (int i) {
         instabilities[i] = engine.step(packs[i], positions, forces, box, settings, &displacements[0][0]);
-        for (int particle : engine.getParticles(packs[i]))
-            if (particle >= 0) {
-                newPositions[particle] = (*data.positions)[particle]+displacements[particle];
-                (*data.velocities)[particle] = displacements[particle]/settings.stepSize;
-            }
+        for (int particle : engine.getParticles(packs[i])) {
+            newPositions[particle] = (*data.positions)[particle]+displacements[particle];
+            (*data.velocities)[particle] = displacements[particle]/settings.stepSize;
+        }
     });
 
     // Whatever the order of packs, report the first chain.
@@ -158,25 +157,25 @@ int ReferenceIntegrateCylinderChainStepKernel::advancePack(ContextImpl& context,
     double* forces = &(*data.forces)[0][0];
     const ParticleRange particles = engine.getParticles(pack);
     for (int particle : particles)
-        if (particle >= 0)
-            newPositions[particle] = (*data.positions)[particle];
+        newPositions[particle] = (*data.positions)[particle];
+    engine.clearForces(pack, forces);
     vector<vector<SegmentForces> >* const segmentForces = settings.segmentForces;
     for (int done = 0; done < count; done++, settings.step++) {
         settings.segmentForces = (done == count-1 ? segmentForces : NULL);
         const double* positions = &newPositions[0][0];
-        engine.clearForces(pack, forces);
-        if (!computesChainForces(settings.scheme))
+        if (!computesChainForces(settings.scheme)) {
+            engine.clearForces(pack, forces);
             engine.addForces(pack, positions, forces, box, false);
+        }
         const Instability instability = engine.step(pack, positions, forces, box, settings, &displacements[0][0]);
         if (instability.chain != -1)
             return done;
         divided += instability.divided;
         for (int particle : particles)
-            if (particle >= 0)
-                newPositions[particle] += displacements[particle];
+            newPositions[particle] += displacements[particle];
     }
     for (int particle : particles)
-        if (particle >= 0 && count > 0)
+        if (count > 0)
             (*data.velocities)[particle] = displacements[particle]/settings.stepSize;
     return count;
 }

@@ -4,6 +4,7 @@
 #include "mechanics/Chain.h"
 #include "openmm/CylinderChainForce.h"
 #include "openmm/System.h"
+#include <string>
 #include <vector>
 
 namespace OpenMM {
@@ -23,6 +24,10 @@ public:
         return chains;
     }
     /**
+     * Throw an exception if a chain has no modes, see Scheme::Modes.
+     */
+    void requireModes() const;
+    /**
      * Get the force group of the chains.
      */
     int getForceGroup() const {
@@ -35,7 +40,11 @@ public:
         return periodic;
     }
 private:
+    void lookForModes();
     std::vector<cylchain::Chain> chains;
+    // The first chain that has no modes, and why, or nothing.
+
+    std::string withoutModes;
     int forceGroup;
     bool periodic;
 };

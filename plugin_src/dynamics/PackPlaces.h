@@ -1,0 +1,59 @@
+#ifndef CYLCHAIN_PACK_PLACES_H_
+#define CYLCHAIN_PACK_PLACES_H_
+
+#include "dynamics/ChainPack.h"
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+namespace cylchain {
+
+/** The largest power of two that is not above a number of chains: lanes for some of them. */
+inline int lanesFor(int chains) {
+    int lanes = 1;
+    while (2*lanes <= chains)
+        lanes *= 2;
+    return lanes;
+}
+
+/** Put a chain into a lane, but for the properties of its nodes and segments. */
+template <class Scalar> void placeChain(ChainPack<Scalar>& pack, int lane, const Chain& chain, int index) {
+    const std::size_t own = chain.nodes.size(), unrolled = own+(chain.closed ? 2 : 0);
+    pack.chain[lane] = index;
+    pack.nodesOfLane[lane] = unrolled;
+    pack.segmentsOfLane[lane] = chain.segments.size();
+    for (std::size_t node = 0; node < unrolled; node++)
+        pack.particles[node*pack.lanes+lane] = chain.nodes[node%own];
+    pack.particlesOfChains.insert(pack.particlesOfChains.end(), chain.nodes.begin(), chain.nodes.end());
+    for (std::size_t number = 0; number < chain.tethers.size(); number++)
+        pack.tethers.push_back({chain.tethers[number], lane, (int) number});
+    for (std::size_t s = 0; s < unrolled-1; s++) {
+        const double propulsion = chain.segments[s%chain.segments.size()].propulsion;
+        if (propulsion != 0) {
+            pack.propulsions.resize((std::size_t) (pack.nodes-1)*pack.lanes);
+            pack.propulsions[s*pack.lanes+lane] = 0.5*propulsion;
+        }
+    }
+}
+
+/** A pack that has lanes, but no chains and no properties. */
+template <class Scalar> ChainPack<Scalar> emptyPack(const PackShape& shape, int lanes) {
+    ChainPack<Scalar> pack;
+    static_cast<PackShape&>(pack) = shape;
+    pack.lanes = lanes;
+    pack.chain.resize(lanes, -1);
+    pack.nodesOfLane.resize(lanes);
+    pack.segmentsOfLane.resize(lanes);
+    pack.particles.resize((std::size_t) pack.nodes*lanes, -1);
+    return pack;
+}
+
+template <class Scalar> void sortTethers(ChainPack<Scalar>& pack) {
+    std::stable_sort(pack.tethers.begin(), pack.tethers.end(), [] (const LaneTether& a, const LaneTether& b) {
+        return a.node < b.node;
+    });
+}
+
+} // namespace cylchain
+
+#endif /*CYLCHAIN_PACK_PLACES_H_*/
