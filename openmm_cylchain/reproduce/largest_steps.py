@@ -166,18 +166,22 @@ class _Ladder:
             )
 
 
+def _allowed(ratios, scheme, limit):
+    """The largest step that the rule allows here, and its deviation; None if it allows none or none is known."""
+    largest = None
+    for (which, step), each in ratios.items():
+        deviation = _largest_deviation(each, limit) if which == scheme else None
+        if deviation is not None and deviation.value > limit.value:
+            break
+        largest = (step, deviation) if deviation is not None else largest
+    return largest
+
+
 def _cause(ladder, name, ratios, limit, scheme, rule):
-    """What the rule says of all steps, if it says of more than one that they do."""
-    if rule is not AtLeast:
+    allowed = _allowed(ratios, scheme, limit)
+    if rule is not AtLeast or allowed is None:
         return ""
-    within = [
-        (step, deviation)
-        for (which, step), each in ratios.items()
-        if which == scheme and (deviation := _largest_deviation(each, limit)) and deviation.value <= limit.value
-    ]
-    if not within:
-        return ""
-    step, deviation = max(within)
+    step, deviation = allowed
     return (
         f"the rule allows {step:g} tau here, where {name} of chains of {ladder.bonds} bonds deviates by "
         f"{100 * deviation.value:.1f} ± {100 * deviation.error:.1f} %; error bars count in the paper, so that its "
@@ -205,7 +209,9 @@ def _remarks(ladders):
         f"{100 * _RESOLUTION[_DYNAMICS] * _DYNAMICS.value:.0f} % in dynamics: at the step of the table it should not "
         "be above the limit of the paper, at the next step of its ladder not below. Rates of change are those between "
         f"a lag and twice that, over those at the smallest step of scheme modes, in tau (bonds): {smallest}. "
-        "Scheme implicit takes half the shortest lag."
+        "Scheme implicit takes half the shortest lag. "
+        f"As values, without error bars, the rule allows dynamics here up to {_listed(ladders, 'modes')} tau with "
+        f"scheme modes, and {_listed(ladders, 'implicit')} tau with scheme implicit (bonds: step)."
     )
     if undecided:
         text += (
@@ -214,6 +220,11 @@ def _remarks(ladders):
             "bonds, which the paper calls not at all critical."
         )
     return text
+
+
+def _listed(ladders, scheme):
+    allowed = {ladder.bonds: _allowed(ladder.dynamics, scheme, _DYNAMICS) for ladder in ladders}
+    return ", ".join(f"{bonds}: {each[0]:g}" if each else f"{bonds}: none" for bonds, each in allowed.items())
 
 
 def _draw(figure, ladders, name, limit):
