@@ -108,7 +108,7 @@ def evaluate(records, quick):
             longer = steps["implicit"][number] / steps["modes"][number]
             gains[copies, count] = scaled(ratio(times["modes"][number], times["implicit"][number]), longer)
     for count in bonds:
-        # The print with its own steps is one; below 255 bonds the rule looks at lags of a few steps of scheme implicit.
+        # Of shorter chains the rule looks at lags of a few steps of scheme modes.
         if count >= 255:
             name = f"implicit_over_modes_{count + 1}_base_pairs_of_{_COPIES[-1]}_chains"
             results.append(Result(name, "1", gains[_COPIES[-1], count], _FASTER, 1.0))
@@ -160,8 +160,8 @@ def _remarks(bonds, speeds, gains, processor):
     return (
         f"Processor time of one thread, measured in turn on a processor named {processor}; times depend on the "
         "machine, their ratios less. One chain fills one of the lanes in which the compiled engine moves chains, "
-        f"{together} fill them. The rule of the paper allows scheme implicit half the shortest lag at which it looks "
-        f"(Fig. 3), which at small N is only some steps of scheme modes: it then simulates {ratios} times as much time "
+        f"{together} fill them. The rule of the paper allows scheme implicit a fifth of the shortest lag at which it looks "
+        f"(Fig. 3), which at small N are only some steps of scheme modes: it then simulates {ratios} times as much time "
         f"as scheme modes (base pairs: ratio, {together} chains). At its recommended steps, at which equilibrium is "
         "right and dynamics from ten steps on, it simulates, in ms in an hour for each chain, "
         f"{listed('recommended', together)} (one chain alone {listed('recommended', alone)}), scheme modes "

@@ -109,14 +109,14 @@ def test_coupling_of_modes_and_a_planted_fault(tmp_path, monkeypatch):
 
 
 def test_largest_steps_and_a_planted_fault(tmp_path, monkeypatch):
-    runs = largest_steps._Runs(64, 4e4, 1e2, 2, (5.0, 10.0, 20.0, 50.0, 100.0), (50.0,))
+    runs = largest_steps._Runs(64, 4e4, 1e2, 2, (5.0, 10.0, 20.0, 50.0, 100.0), (20.0,))
     monkeypatch.setattr(largest_steps, "_RUNS", {True: {63: runs}})
     ladders, _ = largest_steps.CASES
     results = ladders.evaluate(Records(tmp_path / "right"), True).results
     assert len(results) == 6 and not [each.name for each in results if each.unexplained]
     planted(monkeypatch, bending_rigidity=0.8)
     wrong = differing(ladders, tmp_path / "soft")
-    assert "largest_deviation_equilibrium_implicit_63_bonds_50_tau" in wrong
+    assert "largest_deviation_equilibrium_implicit_63_bonds_20_tau" in wrong
 
 
 def test_deviations_are_those_that_are_known():
@@ -156,13 +156,13 @@ def test_simulated_time_of_given_times():
     # 3600 s/(63 0.02 us) steps of 10 times 0.1557 ps.
     speed = results["ms_in_an_hour_modes_64_base_pairs"].ours.value
     assert speed == pytest.approx(3600 / (63 * 0.02e-6) * 1.557e-9, rel=0.02)
-    assert results["implicit_over_modes_256_base_pairs_of_16_chains"].ours.value == pytest.approx(5.0)
+    assert results["implicit_over_modes_256_base_pairs_of_16_chains"].ours.value == pytest.approx(2.0)
     slow = simulated_time.evaluate(Given(modes=2.0, implicit=20.0), True).results
     assert "ms_in_an_hour_modes_256_base_pairs" in {each.name for each in slow if each.unexplained}
 
 
 def test_chains_are_timed():
-    steps = {"modes": [10.0], "implicit": [50.0], "recommended": [1000.0]}
+    steps = {"modes": [10.0], "implicit": [20.0], "recommended": [1000.0]}
     times = simulated_time.timed_chains([31], 2, steps, repetitions=3, seconds=2e-3)
     assert all(np.shape(times[curve]) == (1, 3) and np.min(times[curve]) > 0 for curve in steps)
 
