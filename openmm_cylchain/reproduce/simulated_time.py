@@ -160,10 +160,11 @@ def _remarks(bonds, speeds, gains, processor):
     return (
         f"Processor time of one thread, measured in turn on a processor named {processor}; times depend on the "
         "machine, their ratios less. One chain fills one of the lanes in which the compiled engine moves chains, "
-        f"{together} fill them. The rule of the paper allows scheme implicit a fifth of the shortest lag at which it looks "
-        f"(Fig. 3), which at small N are only some steps of scheme modes: it then simulates {ratios} times as much time "
-        f"as scheme modes (base pairs: ratio, {together} chains). At its recommended steps, at which equilibrium is "
-        "right and dynamics from ten steps on, it simulates, in ms in an hour for each chain, "
+        f"{together} fill them. The rule of the paper allows scheme implicit a fifth of the shortest lag at which it "
+        "looks (Fig. 3), which at small N are only some steps of scheme modes: it then simulates "
+        f"{ratios} times as much time as scheme modes (base pairs: ratio, {together} chains). At its recommended "
+        "steps, at which equilibrium is right and dynamics from ten steps on, it simulates, in ms in an hour for each "
+        "chain, "
         f"{listed('recommended', together)} (one chain alone {listed('recommended', alone)}), scheme modes "
         f"{listed('modes', together)}; the paper has 0.23 to 0.56."
     )
