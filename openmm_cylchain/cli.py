@@ -121,7 +121,11 @@ def _add_benchmarks(parser):
         "bead-spring", help="segments of 10 to 1200 nm beside touching beads of stock OpenMM, several minutes"
     )
     bead_spring.set_defaults(command=_benchmark_bead_spring)
-    for benchmark in (engines, scaling, time_step, bead_spring):
+    base_pairs = benchmarks.add_parser(
+        "base-pairs", help="DNA base pair by base pair: the normal modes of Panja et al. beside scheme implicit, minutes"
+    )
+    base_pairs.set_defaults(command=_benchmark_base_pairs)
+    for benchmark in (engines, scaling, time_step, bead_spring, base_pairs):
         benchmark.add_argument("--quick", action="store_true", help="a rough measurement within a minute")
         benchmark.add_argument("--json", metavar="FILE", help="write machine, settings and results to FILE as well")
 
@@ -295,6 +299,12 @@ def _benchmark_bead_spring(options):
     from .benchmark.bead_spring import FULL, QUICK, benchmark_bead_spring
 
     _benchmark(options, lambda say: benchmark_bead_spring(QUICK if options.quick else FULL, say))
+
+
+def _benchmark_base_pairs(options):
+    from .benchmark.base_pairs import FULL, QUICK, benchmark_base_pairs
+
+    _benchmark(options, lambda say: benchmark_base_pairs(QUICK if options.quick else FULL, say))
 
 
 def _benchmark(options, measure):

@@ -319,6 +319,9 @@ def test_refused_systems():
     assert "multiple CylinderChainForces" in message_of(two, integrator())
     assert "Particle 1 is in two chains" in message_of(system_with(3, chain_force([0, 1], [1, 2])), integrator())
     assert "Illegal particle index: 5" in message_of(system_with(3, chain_force([0, 5])), integrator())
+    frictionless = chain_force([0, 1])
+    frictionless.setSegmentParameters(0, 0, 1, 1, 0, 1, 1, 0, 1)
+    assert "Segment 0 of chain 0 lacks friction" in message_of(system_with(2, frictionless), integrator())
     massless = system_with(2, chain_force([0, 1]), masses=[0.0, 0.0])
     assert "All nodes of chain 0 are massless" in message_of(massless, integrator())
     constrained = system_with(4, chain_force([0, 1]))
@@ -344,8 +347,8 @@ def test_refused_systems():
         ([0, 1], [0, 0, 0, 1, 0, 1, 1, 1, 1, 1], "rest length must be positive"),
         ([0, 1], [0, 0, 1, 1, 0, -1, 1, 1, 1, 1], "stiffness of a joint"),
         ([0, 1], [0, 1, 1, 1, 0, 1, 1, 1, 1, 1], "maximum extension must be positive"),
-        ([0, 1], [0, 0, 1, 1, 0, 1, np.nan, 1, 1, 1], "parallel friction must be positive"),
-        ([0, 1], [0, 0, 1, 1, 0, 1, 1, 1, 1, np.inf], "extensional friction must be positive"),
+        ([0, 1], [0, 0, 1, 1, 0, 1, np.nan, 1, 1, 1], "parallel friction cannot be negative"),
+        ([0, 1], [0, 0, 1, 1, 0, 1, 1, 1, 1, np.inf], "extensional friction cannot be negative"),
     ],
 )
 def test_refused_chains(particles, parameters, message):
