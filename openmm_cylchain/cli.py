@@ -122,7 +122,8 @@ def _add_benchmarks(parser):
     )
     bead_spring.set_defaults(command=_benchmark_bead_spring)
     base_pairs = benchmarks.add_parser(
-        "base-pairs", help="DNA base pair by base pair: the normal modes of Panja et al. beside scheme implicit, minutes"
+        "base-pairs",
+        help="DNA base pair by base pair: the normal modes of Panja et al. beside scheme implicit, minutes",
     )
     base_pairs.set_defaults(command=_benchmark_base_pairs)
     for benchmark in (engines, scaling, time_step, bead_spring, base_pairs):

@@ -51,8 +51,8 @@ _RUNS = {
     False: {
         63: _Runs(64, 8e5, 1e2, 4, (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0), (20.0, 50.0, 100.0, 1e3, 1e4)),
         127: _Runs(64, 6e6, 1e3, 3, (10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0), (200.0, 500.0, 1000.0, 1e4)),
-        255: _Runs(32, 4e6, 1e4, 2, (20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0), (2e3, 5e3, 1e4, 3e4)),
-        511: _Runs(16, 1e7, 1e5, 1, (50.0, 100.0, 200.0, 500.0, 1000.0, 5000.0), (2e4, 5e4, 1e5)),
+        255: _Runs(128, 4e6, 1e4, 2, (20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0), (2e3, 5e3, 1e4, 3e4)),
+        511: _Runs(64, 1e7, 1e5, 1, (50.0, 100.0, 200.0, 500.0, 1000.0, 5000.0), (2e4, 5e4, 1e5)),
     },
 }
 
@@ -233,7 +233,7 @@ def _draw(figure, ladders, name, limit):
         axis.axhspan(1 - limit, 1 + limit, color="#F0E442", alpha=0.3, linewidth=0)
         for scheme, colour in (("modes", style.COLOURS[0]), ("implicit", style.COLOURS[3])):
             for which, marker in enumerate(_MARKERS):
-                points = _points(getattr(ladder, name), scheme, which)
+                points = _points(getattr(ladder, name), scheme, which, limit)
                 if points:
                     label = f"ours, {scheme}, {_LABELS[which]}"
                     axis.errorbar(
@@ -241,18 +241,19 @@ def _draw(figure, ladders, name, limit):
                     )
         printed_step = _PRINTED[ladder.bonds][0 if name == "equilibrium" else 1]
         axis.axvline(printed_step, color=style.PAPER, linewidth=0.8, linestyle="--", label="Table II")
-        title = f"N = {ladder.bonds}: step (tau)"
-        style.finish(axis, title, "ratio", axis is panels[0] if len(ladders) == 1 else False, xscale="log")
+        style.finish(axis, f"N = {ladder.bonds}: step (tau)", "ratio", False, xscale="log")
         axis.set_ylim(1 - 4 * limit, 1 + 4 * limit)
+    entries = figure.axes[0].get_legend_handles_labels()
+    figure.legend(*entries, loc="outside upper center", ncols=3, fontsize="small", frameon=False)
 
 
-def _points(ratios, scheme, which):
+def _points(ratios, scheme, which, limit):
     return [
         (step, ratio.value, ratio.error)
         for (name, step), each in ratios.items()
         if name == scheme
         for key, ratio in each.items()
-        if (key if isinstance(key, int) else key[0]) == which
+        if (key if isinstance(key, int) else key[0]) == which and ratio.error <= limit
     ]
 
 
