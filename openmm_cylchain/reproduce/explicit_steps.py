@@ -31,7 +31,7 @@ _TIMES = {
         (_BONDS, _INEXTENSIBLE_STEP): 0.2,
         (_BONDS, 1e-4): 0.4,
         (_BONDS, 1e-3): 4.0,
-        (_BONDS, 1e-2): 40.0,
+        (_BONDS, 1e-2): 20.0,
         (_SHORT_BONDS, 1e-3): 12.0,
         (_SHORT_BONDS, 1e-2): 60.0,
         (_SHORT_BONDS, 3e-2): 60.0,
