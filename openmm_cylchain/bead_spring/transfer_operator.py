@@ -79,6 +79,7 @@ class TransferOperator:
         # In the middle of a long chain all bonds are alike, and so is what is computed for them.
         self._bulk = 1.0 / (1.0 - 2.0 * nu)
         self._kept: dict[str, Any] = {}
+        self._fine_messages: dict[int, tuple[_Grid, FloatArray]] = {}
         self._messages, self._growth = self._propagate()
 
     def _once_in_bulk(self, name, bonds, compute):
@@ -211,8 +212,7 @@ class TransferOperator:
 
     def _draw(self, generator, lengths):
         for bond in range(self.bonds - 1, -1, -1):
-            grid, message = self._fine_message(bond)
-            density = message * grid.weight
+            grid, density = self._kept_fine_message(bond)
             if bond == self.bonds - 1:
                 density = np.tile(density * self._gaussian(grid.shift), (len(lengths), 1))
             else:
@@ -221,6 +221,16 @@ class TransferOperator:
                 density = density * coupling * self._zeroth(x)
             spacing = grid.length[1] - grid.length[0]
             lengths[:, bond] = grid.length[0] + spacing * _invert(density, generator.random(len(lengths)))
+
+    def _kept_fine_message(self, bond):
+        # With the weights of the grid. One draw after the other takes the same ones.
+        if bond in self._fine_messages:
+            return self._fine_messages[bond]
+        grid, message = self._fine_message(bond)
+        weighted = grid, message * grid.weight
+        if self.bonds * self._cells <= _NUMBERS_AT_ONCE:
+            self._fine_messages[bond] = weighted
+        return weighted
 
     def _fine_message(self, bond):
         # A message on a fine grid, by the integral that makes it.
