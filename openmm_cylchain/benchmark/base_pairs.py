@@ -157,6 +157,8 @@ def observables(nodes):
 
 
 def _relative(found, expected):
-    errors = [values.std(ddof=1) / np.sqrt(len(values)) / values.mean() for values in (found, expected) if len(values) > 1]
+    errors = [
+        values.std(ddof=1) / np.sqrt(len(values)) / values.mean() for values in (found, expected) if len(values) > 1
+    ]
     value = found.mean() / expected.mean()
     return Estimate(float(value - 1.0), float(value * np.sqrt(np.sum(np.square(errors)))))
