@@ -89,7 +89,8 @@ def test_correlations_of_bonds_at_any_step(bonds, step):
     for frame in chains.frames(24, 10):
         vectors = np.diff(frame, axis=1)
         products = [
-            np.sum(vectors[:, distance:] * vectors[:, : bonds - distance], axis=2).mean(axis=1) for distance in distances
+            np.sum(vectors[:, distance:] * vectors[:, : bonds - distance], axis=2).mean(axis=1)
+            for distance in distances
         ]
         means.append(np.transpose(products))
     # The first half leads from the draws to what the scheme keeps.
