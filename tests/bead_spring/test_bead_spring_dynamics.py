@@ -1,4 +1,4 @@
-"""Averages and motion of DNA base pair by base pair: exact averages at steps from 1 ps to 1.6 ns, and how fast it moves."""
+"""Averages and motion of DNA base pair by base pair: exact averages at steps from 1 ps to 1.6 ns, and its motion."""
 
 import numpy as np
 import pytest
