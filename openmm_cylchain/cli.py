@@ -122,7 +122,8 @@ def _add_benchmarks(parser):
     )
     bead_spring.set_defaults(command=_benchmark_bead_spring)
     base_pairs = benchmarks.add_parser(
-        "base-pairs", help="DNA base pair by base pair: the normal modes of Panja et al. beside scheme implicit, minutes"
+        "base-pairs",
+        help="DNA base pair by base pair: the normal modes of Panja et al. beside scheme implicit, minutes",
     )
     base_pairs.set_defaults(command=_benchmark_base_pairs)
     for benchmark in (engines, scaling, time_step, bead_spring, base_pairs):
@@ -135,7 +136,8 @@ def _add_reproductions(parser):
         "paper",
         metavar="PAPER",
         help="pesek2016: Pesek et al., Soft Matter 2016, 12, 3360; "
-        "diffusion: Chandran and Mofrad, Phys. Rev. E 2009, 79, 011906",
+        "diffusion: Chandran and Mofrad, Phys. Rev. E 2009, 79, 011906; "
+        "panja2015: Panja, Barkema and van Leeuwen, Phys. Rev. E 2015, 92, 032603",
     )
     parser.add_argument("--figure", type=int, metavar="N", help="only this figure of the paper")
     parser.add_argument("--quick", action="store_true", help="reduced statistics, five minutes at most")

@@ -44,6 +44,10 @@ class _Grid:
     weight: FloatArray
 
 
+def _length(length: FloatArray) -> FloatArray:
+    return length
+
+
 class TransferOperator:
     """Averages and independent draws of a chain of N bonds in equilibrium.
 
@@ -156,25 +160,32 @@ class TransferOperator:
         source[bond] = 1.0
         return np.array([projection @ carried[:, 0] for _, carried, projection in self._carry(source, bond)])
 
-    def correlation_sum(self, first: FloatArray, second: FloatArray) -> FloatArray:
-        """Sums over pairs i < j of ``first[i] second[j] <u_i.u_j>``, for the columns of two (bonds, sums) arrays."""
+    def correlation_sum(
+        self, first: FloatArray, second: FloatArray, vector: Callable[[FloatArray], FloatArray] = _length
+    ) -> FloatArray:
+        """Sums over pairs i < j of ``first[i] second[j] <v_i.v_j>``, for the columns of two (bonds, sums) arrays.
+
+        v_n is a vector along the bond, ``vector`` of its length long: u_n itself if not given.
+        """
         total = np.zeros(first.shape[1])
-        for bond, carried, projection in self._carry(first):
+        for bond, carried, projection in self._carry(first, vector=vector):
             total += second[bond] * (projection @ carried)
         return total
 
-    def _carry(self, first: FloatArray, start: int = 0) -> Iterator[tuple[int, FloatArray, FloatArray]]:
-        # For every bond j: the sum over i < j of first[i] u_i, carried to j, and what makes averages <.u_j> of it.
+    def _carry(
+        self, first: FloatArray, start: int = 0, vector: Callable[[FloatArray], FloatArray] = _length
+    ) -> Iterator[tuple[int, FloatArray, FloatArray]]:
+        # For every bond j: the sum over i < j of first[i] v_i, carried to j, and what makes averages <.v_j> of it.
         carried = np.zeros((len(self._abscissae), first.shape[1]))
         for bond in range(start, self.bonds - 1):
             grid = self._grid(bond)
-            source = carried + np.outer(self._messages[bond] * grid.length, first[bond])
+            source = carried + np.outer(self._messages[bond] * vector(grid.length), first[bond])
             carried = self._kernels(bond)[1].T @ (source * grid.weight[:, None]) / self._growth[bond + 1]
-            yield bond + 1, carried, self._projection(bond + 1)
+            yield bond + 1, carried, self._projection(bond + 1, vector)
 
-    def _projection(self, bond):
+    def _projection(self, bond, vector=_length):
         behind = self._behind(bond)
-        return self._grid(bond).length * behind / (self._messages[bond] @ behind)
+        return vector(self._grid(bond).length) * behind / (self._messages[bond] @ behind)
 
     def correlation_length(self) -> float:
         """Number of bonds over which <u_i.u_j> falls by 1/e in the middle of a long chain of the same parameters."""

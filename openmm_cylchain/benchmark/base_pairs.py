@@ -1,11 +1,12 @@
-"""DNA base pair by base pair: the mode-space integrator of Panja et al. beside scheme "implicit", each at its largest step.
+"""DNA base pair by base pair: the mode-space integrator of Panja et al. beside scheme "implicit", each at its largest
+step.
 
-Chains of 63 to 511 bonds of ``DSDNA_BASE_PAIRS``, on one thread, timed in turn. The step of scheme "modes" is the largest
-of Table II of Panja, Barkema and van Leeuwen, Phys. Rev. E 2015, 92, 032603, for averages and motion. That of scheme
-"implicit" is the largest found by the same rule: averages within 5 %, and what the end-to-end vector, the middle bond and
-the middle bead (from the center of the chain) move in three steps within 10 %. The benchmark measures both again. The
-reference of the motion is scheme "implicit" with a thirtieth of the step, which is that of scheme "modes" at its shortest
-steps: tests/bead_spring/test_bead_spring_dynamics.py.
+Chains of 63 to 511 bonds of ``DSDNA_BASE_PAIRS``, on one thread, timed in turn. The step of scheme "modes" is the
+largest of Table II of Panja, Barkema and van Leeuwen, Phys. Rev. E 2015, 92, 032603, for averages and motion. That of
+scheme "implicit" is the largest found by the same rule: averages within 5 %, and what the end-to-end vector, the middle
+bond and the middle bead (from the center of the chain) move in three steps within 10 %. The benchmark measures both
+again. The reference of the motion is scheme "implicit" with a thirtieth of the step, which is that of scheme "modes" at
+its shortest steps: tests/bead_spring/test_bead_spring_dynamics.py.
 """
 
 from dataclasses import dataclass
@@ -157,6 +158,8 @@ def observables(nodes):
 
 
 def _relative(found, expected):
-    errors = [values.std(ddof=1) / np.sqrt(len(values)) / values.mean() for values in (found, expected) if len(values) > 1]
+    errors = [
+        values.std(ddof=1) / np.sqrt(len(values)) / values.mean() for values in (found, expected) if len(values) > 1
+    ]
     value = found.mean() / expected.mean()
     return Estimate(float(value - 1.0), float(value * np.sqrt(np.sum(np.square(errors)))))

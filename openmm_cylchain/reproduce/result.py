@@ -134,6 +134,50 @@ class LowerBound:
 
 
 @dataclass(frozen=True)
+class AtMost:
+    """When a result agrees with a paper, or a theory, that gives a limit: ours is not surely above it.
+
+    ours - value <= n s, with the standard error s of the difference.
+
+    Attributes
+    ----------
+    standard_errors : float
+        n.
+    resolution : float, optional
+        See ``Rule``.
+    """
+
+    standard_errors: float = 3.0
+    resolution: float | None = None
+
+    relation = "≤ "
+
+    def allows(self, difference, error, value, rounding):
+        """Whether ours may lie below a value; see ``Rule.allows``."""
+        return difference <= self.standard_errors * error + rounding
+
+    def __str__(self):
+        text = f"not above by more than {self.standard_errors:g} standard errors"
+        if self.resolution is not None:
+            text += f", with a standard error of at most {100 * self.resolution:g} %"
+        return text
+
+
+@dataclass(frozen=True)
+class AtLeast(AtMost):
+    """The same of a lower limit: ours is not surely below it."""
+
+    relation = "≥ "
+
+    def allows(self, difference, error, value, rounding):
+        """Whether ours may lie above a value; see ``Rule.allows``."""
+        return difference >= -self.standard_errors * error - rounding
+
+    def __str__(self):
+        return super().__str__().replace("above", "below")
+
+
+@dataclass(frozen=True)
 class Result:
     """One number.
 
@@ -144,7 +188,7 @@ class Result:
     unit : str
         "1" for a number without a unit.
     ours : Estimate
-    rule : Rule or LowerBound
+    rule : Rule, LowerBound, AtMost or AtLeast
     theory : float, optional
     paper : Printed, optional
     cause : str
@@ -160,7 +204,7 @@ class Result:
     name: str
     unit: str
     ours: Estimate
-    rule: Rule | LowerBound
+    rule: Rule | LowerBound | AtMost
     theory: float | None = None
     paper: Printed | None = None
     cause: str = ""

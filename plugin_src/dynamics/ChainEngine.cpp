@@ -47,8 +47,9 @@ bool hasSegmentFriction(const Chain& chain) {
 bool mayShareLanes(const Chain& longest, const Chain& chain) {
     const size_t least = longest.closed ? longest.segments.size() : ceil((1-LARGEST_FILLING)*longest.segments.size());
     return hasSegmentFriction(chain) == hasSegmentFriction(longest) &&
-            (chain.nodeFriction > 0) == (longest.nodeFriction > 0) && chain.bending == longest.bending && chain.stretching == longest.stretching &&
-            chain.closed == longest.closed && chain.planar == longest.planar && chain.segments.size() >= least;
+            (chain.nodeFriction > 0) == (longest.nodeFriction > 0) && chain.bending == longest.bending &&
+            chain.stretching == longest.stretching && chain.closed == longest.closed &&
+            chain.planar == longest.planar && chain.segments.size() >= least;
 }
 
 /**

@@ -5,8 +5,8 @@
  */
 
 /**
- * With all of theta, modes that a step just resolves decay too slowly. With less, the fastest ones change their sign from
- * step to step, by (1-theta)/theta of themselves, which is forgotten after a few.
+ * With all of theta, modes that a step just resolves decay too slowly. With less, the fastest ones change their sign
+ * from step to step, by (1-theta)/theta of themselves, which is forgotten after a few.
  */
 const Scalar LARGEST_THETA_OF_LINEAR_BENDS = 0.8;
 

@@ -10,8 +10,8 @@
  * - Midpoint: Fixman's midpoint, which has the right drift on chains.
  * - Implicit: the chain's own forces at the end of the step, so that they do not limit it.
  * - ImplicitSecondOrder: the same in two stages, so that the motion of bends is right to second order in the step.
- * - Modes: the normal modes of chains of beads, each advanced as if it were alone: Panja, Barkema and van Leeuwen, Phys.
- *   Rev. E 2015, 92, 032603, Section IV.
+ * - Modes: the normal modes of chains of beads, each advanced as if it were alone: Panja, Barkema and van Leeuwen,
+ *   Phys. Rev. E 2015, 92, 032603, Section IV.
  */
 #define CYLCHAIN_SCHEMES(ENTRY) \
     ENTRY(Euler, "euler", false) \

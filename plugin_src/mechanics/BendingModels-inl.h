@@ -4,8 +4,8 @@
  * Bends of joints as coordinates b = f (t2-t1) with the energy (stiffness/2) b^2, and their distribution in
  * equilibrium.
  *
- * Each entry of CYLCHAIN_ANGULAR_BENDING_MODELS has a struct of its name with its formulas. Bends that are linear in the
- * nodes need none: see LinearBends-inl.h.
+ * Each entry of CYLCHAIN_ANGULAR_BENDING_MODELS has a struct of its name with its formulas. Bends that are linear in
+ * the nodes need none.
  */
 
 /** f of a bend b = f (t2-t1), and df/dc, for the cosine c. */

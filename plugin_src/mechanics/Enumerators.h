@@ -9,8 +9,8 @@
  * What follows from a list of models, schemes or precisions: a macro that calls another one for each entry, with its
  * name in C++, its name for users and perhaps more.
  *
- * The number of an entry is its position. Stored Integrators hold it, so that new schemes and precisions come last; stored
- * Systems hold the names of models.
+ * The number of an entry is its position. Stored Integrators hold it, so that new schemes and precisions come last;
+ * stored Systems hold the names of models.
  */
 #define CYLCHAIN_ENUMERATOR(entry, ...) entry,
 #define CYLCHAIN_NAME(entry, name, ...) name,

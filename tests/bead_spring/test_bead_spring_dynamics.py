@@ -1,4 +1,4 @@
-"""Averages and motion of DNA base pair by base pair: exact averages at steps from 1 ps to 1.6 ns, and how fast it moves."""
+"""Averages and motion of DNA base pair by base pair: exact averages at steps from 1 ps to 1.6 ns, and its motion."""
 
 import numpy as np
 import pytest
@@ -62,7 +62,7 @@ def check_means(values, expected, tolerance, power):
     assert np.all(np.abs(values.mean(axis=0) - expected) < tolerance * expected + 4.0 * error)
 
 
-@pytest.mark.parametrize("precision", ["mixed", "double"])
+@pytest.mark.parametrize("precision", ["mixed", pytest.param("double", marks=pytest.mark.slow)])
 def test_averages_at_the_recommended_step(precision):
     # 1.6 ns, 1e4 tau; the slowest of the three relaxes in a hundred steps.
     chains = Chains(63, 256, "implicit", 1e4 * UNIT, precision)
@@ -89,7 +89,8 @@ def test_correlations_of_bonds_at_any_step(bonds, step):
     for frame in chains.frames(24, 10):
         vectors = np.diff(frame, axis=1)
         products = [
-            np.sum(vectors[:, distance:] * vectors[:, : bonds - distance], axis=2).mean(axis=1) for distance in distances
+            np.sum(vectors[:, distance:] * vectors[:, : bonds - distance], axis=2).mean(axis=1)
+            for distance in distances
         ]
         means.append(np.transpose(products))
     # The first half leads from the draws to what the scheme keeps.
@@ -97,20 +98,21 @@ def test_correlations_of_bonds_at_any_step(bonds, step):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("bonds, chains, frames", [(127, 512, 1500), (255, 256, 1500)])
-def test_averages_of_longer_chains(bonds, chains, frames):
-    found = Chains(bonds, chains, "implicit", 1e4 * UNIT).mean_squares(frames, 4)
-    check_means(found, exact_mean_squares(bonds), 0.01, 0.03)
+def test_averages_of_longer_chains():
+    found = Chains(127, 384, "implicit", 1e4 * UNIT).mean_squares(250, 10)
+    check_means(found, exact_mean_squares(127), 0.01, 0.04)
 
 
 @pytest.mark.slow
 def test_averages_of_modes():
-    """Scheme "modes" is right at short steps, and makes the end-to-end vector too short at long ones: Table II."""
+    """Scheme "modes" makes the end-to-end vector too short at long steps, by 7 % in its square at 100 tau: Table II."""
     exact = exact_mean_squares(63)
-    for step, shorter in ((10.0, 0.02), (50.0, 0.047), (100.0, 0.067)):
-        squares = Chains(63, 512, "modes", step * UNIT).mean_squares(100, 2000)[:, 0] / exact[0]
-        assert squares.std() / np.sqrt(512) < 0.01
-        assert squares.mean() == pytest.approx(1.0 - shorter, abs=0.01 + 3.0 * squares.std() / np.sqrt(512))
+    chains = Chains(63, 512, "modes", 100.0 * UNIT)
+    chains.integrator.step(8000)
+    squares = chains.mean_squares(30, 500)[:, 0] / exact[0]
+    error = squares.std() / np.sqrt(512)
+    assert error < 0.0125
+    assert squares.mean() == pytest.approx(1.0 - 0.067, abs=0.01 + 3.0 * error)
 
 
 @pytest.mark.slow
@@ -124,5 +126,5 @@ def test_loss_of_correlation_is_that_of_modes_at_their_smallest_step():
             ratio = one.mean() / other.mean()
             errors = [values.std(ddof=1) / np.sqrt(len(values)) / values.mean() for values in (one, other)]
             error = np.hypot(*errors)
-            assert error < 0.02
+            assert error < 0.025
             assert abs(ratio - 1.0) < bound + 2.0 * error

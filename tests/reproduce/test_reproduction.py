@@ -12,7 +12,17 @@ from openmm_cylchain.reproduce.case import Case, Outcome
 from openmm_cylchain.reproduce.page import format_number, format_page
 from openmm_cylchain.reproduce.records import Records
 from openmm_cylchain.reproduce.reproduction import unexplained
-from openmm_cylchain.reproduce.result import ROUNDING, Estimate, LowerBound, Printed, Result, Rule, printed
+from openmm_cylchain.reproduce.result import (
+    ROUNDING,
+    AtLeast,
+    AtMost,
+    Estimate,
+    LowerBound,
+    Printed,
+    Result,
+    Rule,
+    printed,
+)
 
 RULE = Rule(standard_errors=3.0, tolerance=0.01, resolution=0.02)
 
@@ -85,6 +95,20 @@ def test_a_lower_bound_is_surely_exceeded():
     assert bounded(2.0, 0.1).unexplained
     assert "paper: 0.2 times as much" in bounded(2.0, 0.1).reason
     assert bounded(11.0, 0.1).as_dict()["paper"] == {"value": 10.0, "error": None, "relation": "> "}
+
+
+def test_limits_are_not_surely_passed():
+    def limited(ours, error, rule):
+        return result(ours, error, theory=None, paper=Printed(10.0), rule=rule)
+
+    most, least = AtMost(3.0, 0.05), AtLeast(3.0, 0.05)
+    assert limited(11.0, 0.34, most).verdict == limited(2.0, 0.1, most).verdict == "agrees"
+    assert limited(9.0, 0.34, least).verdict == limited(20.0, 0.1, least).verdict == "agrees"
+    assert limited(11.0, 0.33, most).unexplained and limited(9.0, 0.33, least).unexplained
+    assert limited(10.0, 0.51, most).unexplained and limited(10.0, 0.51, least).unexplained
+    assert str(most) == "not above by more than 3 standard errors, with a standard error of at most 5 %"
+    assert str(least) == str(most).replace("above", "below")
+    assert [limited(10.0, 0.1, rule).as_dict()["paper"]["relation"] for rule in (most, least)] == ["≤ ", "≥ "]
 
 
 @pytest.mark.parametrize("arguments", [{"ours": 1.0, "theory": None}, {"ours": np.nan}, {"ours": 1.0, "error": np.inf}])

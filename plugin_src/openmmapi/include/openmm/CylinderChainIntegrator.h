@@ -69,9 +69,9 @@ public:
      * with harmonic segments that have no friction, BondDifference joints of one stiffness kappa, friction of nodes,
      * and no fixed node.  In terms of their (1), inner segments have the stiffness k = lambda-2 kappa and the rest
      * length lambda d/k, those at the ends lambda-kappa and lambda d/(lambda-kappa), and one that is alone lambda and
-     * d.  Their normal modes are advanced as in Section IV, to first order in the step.  This takes less work than other
-     * schemes and is stable, but bonds forget their length in steps that are long.  Other forces, tethers among them,
-     * are taken at the start of the step; they act on each mode as it relaxes.
+     * d.  Their normal modes are advanced as in Section IV, to first order in the step.  This takes less work than
+     * other schemes and is stable, but bonds forget their length in steps that are long.  Other forces, tethers among
+     * them, are taken at the start of the step; they act on each mode as it relaxes.
      */
     enum Scheme : int {CYLCHAIN_SCHEMES(CYLCHAIN_ENUMERATOR)};
     /**
