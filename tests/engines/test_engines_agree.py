@@ -84,7 +84,7 @@ FLOW = Flow(gradient=1e-6 * np.array([[1.0, 3.0, 0.0], [2.0, -4.0, 1.0], [0.5, -
 
 
 def _chains_of_beads(engine, platform, scheme):
-    """Open, held, planar, tethered and propelled chains of beads, rings and cylinders in a flow: what moves, and how."""
+    """Open, held, planar, tethered and propelled chains of beads, rings and cylinders in a flow, and their motion."""
     filaments, generator = Filaments(VISCOSITY, TEMPERATURE, engine=engine), np.random.default_rng(2)
     ring = 0.3 * generator.normal(size=(7, 3))
     flat = bent_chain(SLOW_BEADS, 6, 4) * [1.0, 1.0, 0.0]
