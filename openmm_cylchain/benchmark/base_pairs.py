@@ -27,7 +27,7 @@ TEMPERATURE = 296.15
 MODES_STEPS = {63: 10.0, 127: 50.0, 255: 100.0, 511: 100.0}
 """In units of tau: Table II, last column."""
 
-IMPLICIT_STEPS = {63: 1e4, 127: 3e4, 255: 1e5, 511: 1e5}
+IMPLICIT_STEPS = {63: 1e4, 127: 3e4, 255: 7e4, 511: 7e4}
 """In units of tau: see above."""
 
 LAG = 3
@@ -48,7 +48,7 @@ class BasePairEffort:
     seconds: float
 
 
-FULL = BasePairEffort((63, 127, 255, 511), 128, 60, 9, 1.0)
+FULL = BasePairEffort((63, 127, 255, 511), 128, 40, 9, 1.0)
 QUICK = BasePairEffort((63, 127), 64, 12, 3, 0.3)
 
 

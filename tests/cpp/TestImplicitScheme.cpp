@@ -239,6 +239,9 @@ static void testStepsWithoutNoise(Scheme scheme) {
             for (bool tethers : {false, true})
                 for (int kind = 0; kind < 4; kind++) {
                     const bool flows = kind%2 == 1, beads = kind > 1;
+                    // Friction of nodes has nothing to do with lengths and tethers, and little with bends.
+                    if (beads && (stretching == 1 || !tethers || bending%2 == 0))
+                        continue;
                     const Array shortSteps = {0.001, 0.005}, steps = flows ? shortSteps : Array {0.001, 0.03, 1.0};
                     auto check = [&] (vector<Chain> chains, const Array& x, const Array& steps) {
                         if (beads)
