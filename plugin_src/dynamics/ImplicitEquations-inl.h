@@ -260,7 +260,7 @@ public:
         here.upper = here.upper+mixed-Mat::of(last);
     }
     /** Add a bend that is linear in the nodes to their equations. */
-    CYLCHAIN_INLINE void addLinearBend(int s, const Geometry& geometry1, const Geometry& geometry2, Row& before,
+    void addLinearBend(int s, const Geometry& geometry1, const Geometry& geometry2, Row& before,
                 Row& here, Row& after) {
         const ImplicitSegment<Real>& segment = segments[s];
         const Real stiffness = loaded<Real>(pack.joints, s);
@@ -342,7 +342,7 @@ private:
         const Real squareOfSine = 0.5-0.5*segment.tangent.dot(geometry.tangent);
         return (1-squareOfSine*(0.25+0.09375*squareOfSine))*(segment.inverse*geometry.inverse);
     }
-    CYLCHAIN_INLINE void addNodeFriction(const Vec* y, int node, Row& row) {
+    void addNodeFriction(const Vec* y, int node, Row& row) {
         const Real friction = loaded<Real>(pack.nodeFriction, 0)*(1/h);
         row.diagonal.addDiagonal(friction);
         row.right = row.right-y[node]*friction;

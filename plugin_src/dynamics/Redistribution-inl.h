@@ -32,9 +32,9 @@ template <int W> void redistribute(const Pack& pack, const Vector<typename Lanes
             const Vector<typename Lanes<W>::Type>* f, Eliminated<typename Lanes<W>::Type>* nodes,
             Vector<typename Lanes<W>::Type>* v) {
     typedef typename Lanes<W>::Type Real;
-    Symmetric<Real> ofNode = {};
-    ofNode.addDiagonal(loaded<Real>(pack.nodeFriction, 0));
-    Symmetric<Real> diagonal = ofNode;
+    const Real ofNode = loaded<Real>(pack.nodeFriction, 0);
+    Symmetric<Real> diagonal = {};
+    diagonal.addDiagonal(ofNode);
     Vector<Real> right = f[0];
     const int last = pack.nodes-1;
     for (int s = 0; s < last; s++) {
@@ -67,7 +67,7 @@ template <int W> void redistribute(const Pack& pack, const Vector<typename Lanes
         next.zz = -(square*inverse.zz+2*cross*t.z*g.z+axial*t.z*t.z);
         next.addAxial(same, sameAxial, t);
         diagonal = next;
-        diagonal.add(ofNode);
+        diagonal.addDiagonal(ofNode);
         const Vector<Real> moved = node.inverse*right;
         right = f[s+1]-moved*other-t*(otherAxial*t.dot(moved));
     }
@@ -88,9 +88,9 @@ template <int W> void redistributeClosed(const Pack& pack, const Vector<typename
     typedef typename Lanes<W>::Type Real;
     typedef Matrix<Real> Mat;
     const int count = pack.segments;
-    Symmetric<Real> ofNode = {};
-    ofNode.addDiagonal(loaded<Real>(pack.nodeFriction, 0));
-    Symmetric<Real> diagonal = {}, first = ofNode;
+    const Real ofNode = loaded<Real>(pack.nodeFriction, 0);
+    Symmetric<Real> diagonal = {}, first = {};
+    first.addDiagonal(ofNode);
     Vector<Real> right = {}, rightOfFirst = f[0]+f[count];
     Mat coupling = {};
     for (int s = 0; s < count; s++) {
@@ -131,7 +131,7 @@ template <int W> void redistributeClosed(const Pack& pack, const Vector<typename
             }
         }
         diagonal = next;
-        diagonal.add(ofNode);
+        diagonal.addDiagonal(ofNode);
         right = nextRight;
         coupling = nextCoupling;
     }
