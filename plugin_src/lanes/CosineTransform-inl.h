@@ -102,7 +102,8 @@ template <int RADIX, class Real> void joinParts(const FourierTables<Scalar>& tab
     const Scalar* const roots = tables.numbers.data()+pass.roots;
     Complex<Real> z[LARGEST];
     if (part == 1) {
-        for (int t = 0; t < radix; t++)
+        z[0] = input[0];
+        for (int t = 1; t < radix; t++)
             z[t] = input[t*stride];
         transformFew<RADIX, LARGEST>(z, radix, roots);
         for (int t = 0; t < radix; t++)
