@@ -119,12 +119,12 @@ def test_averages_of_modes():
 def test_loss_of_correlation_is_that_of_modes_at_their_smallest_step():
     # In a thousand units of tau and more, at a step of 1e3 tau.
     reference = Chains(63, 256, "modes", UNIT, seed=5)
-    expected = {3: reference.motion(10, 3000), 10: reference.motion(8, 10000)}
+    expected = {3: reference.motion(10, 3000), 10: reference.motion(14, 10000)}
     for lag, bound in ((3, 0.1), (10, 0.05)):
         found = Chains(63, 256, "implicit", 1e3 * UNIT).motion(600 // lag, lag)
         for one, other in zip(found.T, expected[lag].T):
             ratio = one.mean() / other.mean()
             errors = [values.std(ddof=1) / np.sqrt(len(values)) / values.mean() for values in (one, other)]
             error = np.hypot(*errors)
-            assert error < 0.025
+            assert error < 0.025, (lag, error, ratio)
             assert abs(ratio - 1.0) < bound + 2.0 * error
