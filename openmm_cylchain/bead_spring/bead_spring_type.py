@@ -8,8 +8,9 @@ import numpy.typing as npt
 from openmm import unit
 
 from ..errors import InputError
-from ..filaments.chain_type import ChainType, check_type_name
+from ..filaments.chain_type import ChainType, check_bending_is_given_once, check_type_name
 from ..mechanics.friction import SegmentFriction
+from ..mechanics.potentials import BOND_DIFFERENCE
 from ..units.quantities import (
     BENDING_RIGIDITY,
     DIMENSIONLESS,
@@ -116,12 +117,7 @@ class BeadSpringType(ChainType):
             ("bead_mass", MASS),
         ):
             self._set(attribute, positive(getattr(self, attribute), dimension, f"{attribute} {label}"))
-        if (self.bending_rigidity is None) == (self.persistence_length is None):
-            raise InputError(
-                f"Filament type {self.name!r}: give either bending_rigidity or persistence_length (with its "
-                "temperature). A type that exists has a bending_rigidity: set it to None where persistence_length "
-                "takes its place."
-            )
+        check_bending_is_given_once(self.name, self.bending_rigidity, self.persistence_length)
         if (self.persistence_length is None) != (self.temperature is None):
             raise InputError(f"Filament type {self.name!r}: persistence_length and its temperature go together.")
         if self.persistence_length is None:
@@ -235,7 +231,7 @@ class BeadSpringType(ChainType):
     @property
     def bending_model(self) -> str:
         """The model "bond-difference": (kappa/2) |u_(n+1) - u_n|^2."""
-        return "bond-difference"
+        return BOND_DIFFERENCE
 
     @property
     def stretching_model(self) -> str:

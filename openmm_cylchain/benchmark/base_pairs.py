@@ -15,6 +15,7 @@ import numpy as np
 
 from ..bead_spring.bead_spring_type import DSDNA_BASE_PAIRS
 from ..bead_spring.equilibrium import bead_spring_bond_correlations
+from ..bead_spring.observables import observables
 from ..engine_choice import choose_engine
 from ..systems.filaments import Filaments
 from ..units.text import format_time
@@ -142,19 +143,6 @@ def _motion_and_correlation(bonds, effort, step, steps):
         before = now
         context.getIntegrator().step(steps)
     return moved, correlations
-
-
-def observables(nodes):
-    """End-to-end vector, middle bond, and middle bead from the center: (chains, 3, 3) of (chains, beads, 3)."""
-    middle = nodes.shape[1] // 2
-    return np.stack(
-        [
-            nodes[:, -1] - nodes[:, 0],
-            nodes[:, middle] - nodes[:, middle - 1],
-            nodes[:, middle] - nodes.mean(axis=1),
-        ],
-        axis=1,
-    )
 
 
 def _relative(found, expected):

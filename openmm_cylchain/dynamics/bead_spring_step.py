@@ -36,8 +36,8 @@ _SMALLEST_NU = 0.0117
 _RING = 4.73 / (4.0 * math.pi * math.sqrt(0.75))
 _REASONS = {
     "springs": "relaxation of the stiffest mode of the springs, with a margin of {margin:.2g}",
-    "modes": "coupling of modes, which scheme 'modes' leaves out of those that relax within a step (Table II): chains have "
-    "the right size, but bonds and bends too much energy",
+    "modes": "coupling of modes, which scheme 'modes' leaves out of those that relax within a step (Table II): chains "
+    "have the right size, but bonds and bends too much energy",
     "bends": "relaxation of bends, which an implicit scheme resolves over ten steps",
     "flow": "flow, which may strain the solvent by {strain:g} in a step",
 }

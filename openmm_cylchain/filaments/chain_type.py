@@ -187,3 +187,12 @@ def check_type_name(name: object) -> None:
     """Raise InputError unless ``name`` can name a filament type: a residue name that every format can hold."""
     if not (isinstance(name, str) and name.isascii() and name.isalnum() and len(name) <= 5):
         raise InputError(f"The name of a filament type must be 1 to 5 letters or digits, but is {name!r}.")
+
+
+def check_bending_is_given_once(name: str, bending_rigidity: object, persistence_length: object) -> None:
+    """Raise InputError unless either a bending rigidity or a persistence length is given, and the other is None."""
+    if (bending_rigidity is None) == (persistence_length is None):
+        raise InputError(
+            f"Filament type {name!r}: give either bending_rigidity or persistence_length (with its temperature). A "
+            "type that exists has a bending_rigidity: set it to None where persistence_length takes its place."
+        )

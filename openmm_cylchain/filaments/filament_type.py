@@ -35,7 +35,7 @@ from ..units.quantities import (
     whole_number,
 )
 from ..units.types import FloatArray, FloatOrArray, Scalar
-from .chain_type import ChainType, check_type_name
+from .chain_type import ChainType, check_bending_is_given_once, check_type_name
 from .equilibrium import draw_chain
 from .joint_calibration import calibrated_stiffness
 
@@ -175,11 +175,7 @@ class FilamentType(ChainType):
 
     def _resolve_bending(self):
         name = f"of filament type {self.name!r}"
-        if (self.bending_rigidity is None) == (self.persistence_length is None):
-            self._fail(
-                "give either bending_rigidity or persistence_length (with its temperature). A type that exists has a "
-                "bending_rigidity: set it to None where persistence_length takes its place."
-            )
+        check_bending_is_given_once(self.name, self.bending_rigidity, self.persistence_length)
         if self.persistence_length is None:
             rigidity = in_units_of(self.bending_rigidity, BENDING_RIGIDITY, f"bending_rigidity {name}")
             if not isinstance(rigidity, float) or rigidity < 0:

@@ -10,11 +10,8 @@ import openmm
 
 from .. import DSDNA_BASE_PAIRS, Filaments
 from ..bead_spring.draws import draw_bonds
-from ..theory import (
-    bead_spring_mean_square_distances_from_center,
-    bead_spring_mean_square_end_to_end,
-    bead_spring_mean_square_lengths,
-)
+from ..bead_spring.observables import mean_squares_of_observables, observables
+from ..benchmark.base_pairs import MODES_STEPS
 from . import simulation
 
 BASE_PAIRS = DSDNA_BASE_PAIRS
@@ -23,7 +20,7 @@ TEMPERATURE = 296.15
 """23 C."""
 SIMULATED_TEMPERATURE = 296.15
 BONDS = (63, 127, 255, 511)
-LARGEST_STEPS = {63: 10.0, 127: 50.0, 255: 100.0, 511: 100.0}
+LARGEST_STEPS = MODES_STEPS
 """The final column of Table II, in tau."""
 PRINTED_UNIT = 0.34e-1 * (1 - 2 * 0.35) ** 2 * 52.0
 """tau in ps, of (70) with the 52.0 ps of (71)."""
@@ -35,23 +32,7 @@ _VISCOSITY = 1.0
 
 def mean_squares(bonds, kind=BASE_PAIRS):
     """Exact mean squares of the three ``OBSERVABLES`` in units of d^2."""
-    middle = (bonds + 1) // 2
-    squares = (
-        bead_spring_mean_square_end_to_end(kind, bonds, TEMPERATURE),
-        bead_spring_mean_square_lengths(kind, bonds, TEMPERATURE)[middle - 1],
-        bead_spring_mean_square_distances_from_center(kind, bonds, TEMPERATURE, beads=[middle])[0],
-    )
-    return np.array(squares) / kind.natural_length**2
-
-
-def observables(nodes):
-    """The three ``OBSERVABLES`` of positions (copies, beads, 3): (copies, 3, 3), in the same unit.
-
-    End-to-end vector, middle bond, and middle bead as seen from the centre of all beads.
-    """
-    middle = nodes.shape[1] // 2
-    vectors = (nodes[:, -1] - nodes[:, 0], nodes[:, middle] - nodes[:, middle - 1], nodes[:, middle] - nodes.mean(1))
-    return np.stack(vectors, axis=1)
+    return mean_squares_of_observables(kind, bonds, TEMPERATURE) / kind.natural_length**2
 
 
 def drawn_positions(kind, bonds, copies, seed):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from openmm_cylchain import DSDNA_BASE_PAIRS, Filaments, theory
-from openmm_cylchain.benchmark.base_pairs import observables
+from openmm_cylchain.bead_spring.observables import mean_squares_of_observables, observables
 from support.contexts import new_context, positions_of
 
 ROOM, VISCOSITY = 296.15, 602.0
@@ -44,15 +44,7 @@ class Chains:
 
 
 def exact_mean_squares(bonds):
-    """Those of the paper's observables in nm^2."""
-    middle = (bonds + 1) // 2
-    return np.array(
-        [
-            theory.bead_spring_mean_square_end_to_end(KIND, bonds, ROOM),
-            theory.bead_spring_mean_square_lengths(KIND, bonds, ROOM)[middle - 1],
-            theory.bead_spring_mean_square_distances_from_center(KIND, bonds, ROOM)[middle],
-        ]
-    )
+    return mean_squares_of_observables(KIND, bonds, ROOM)
 
 
 def check_means(values, expected, tolerance, power):
@@ -77,6 +69,7 @@ def test_averages_at_the_recommended_step(precision):
         pytest.param(bonds, step, marks=pytest.mark.slow)
         for bonds in (63, 127, 255, 511)
         for step in (1.0, 16.0, 160.0, 1600.0)
+        if (bonds, step) not in ((63, 1.0), (511, 1600.0))
     ],
 )
 def test_correlations_of_bonds_at_any_step(bonds, step):
