@@ -23,6 +23,21 @@ struct Place {
     }
 };
 
+/** Whether two places are one, wherever particles are. */
+bool areSame(const Place& a, const Place& b);
+
+/**
+ * Find where a place is: (1-f) x1+f x2 between two particles.
+ *
+ * @param positions    those of all particles
+ * @param box          nine numbers if the second particle is the image nearest to the first one, or NULL
+ * @param[out] result  three numbers
+ */
+void locate(const Place& place, const double* positions, const double* box, double* result);
+
+/** Add a force on a place, times a factor, to the forces on the particles that hold it. */
+void addForce(const Place& place, const double* force, double factor, double* forces);
+
 } // namespace cylchain
 
 #endif /*CYLCHAIN_PLACE_H_*/
