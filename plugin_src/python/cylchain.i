@@ -368,6 +368,7 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %ignore OpenMM::CylinderChainForce::ChainInfo;
 %ignore OpenMM::CylinderChainForce::TetherInfo;
 %ignore OpenMM::CylinderChainLinkForce::getTable;
+%ignore OpenMM::CylinderChainLinkForce::setTable;
 %import "mechanics/Enumerators.h"
 %import "mechanics/BendingModels.h"
 %import "mechanics/StretchingModels.h"

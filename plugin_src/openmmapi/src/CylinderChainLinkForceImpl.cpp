@@ -75,7 +75,8 @@ void CylinderChainLinkForceImpl::follow() {
 
 void CylinderChainLinkForceImpl::accept(const cylchain::LinkChange& change) {
     check(change);
-    history.change(change);
+    if (change.size() > 0 || change.nextNumber != history.getTable().getNextNumber())
+        history.change(change);
     upToDate = false;
     version++;
     context->setParameter(parameter, (double) history.getTable().getDigest());

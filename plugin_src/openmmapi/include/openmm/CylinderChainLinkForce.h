@@ -289,6 +289,12 @@ public:
     const cylchain::LinkTable& getTable() const {
         return table;
     }
+    /**
+     * Set the links that new Contexts begin with.
+     */
+    void setTable(const cylchain::LinkTable& table) {
+        this->table = table;
+    }
 protected:
     ForceImpl* createImpl() const;
 private:
