@@ -1,6 +1,8 @@
 #ifndef CYLCHAIN_PLACE_H_
 #define CYLCHAIN_PLACE_H_
 
+#include "mechanics/PeriodicBox.h"
+
 namespace cylchain {
 
 /**
@@ -22,6 +24,49 @@ struct Place {
         return second >= 0;
     }
 };
+
+/** Whether two places are one, wherever particles are. */
+bool areSame(const Place& a, const Place& b);
+
+/**
+ * Find where a place is: (1-f) x1+f x2 between two particles.
+ *
+ * @param positions    those of all particles
+ * @param box          nine numbers if the second particle is the image nearest to the first one, or NULL
+ * @param[out] result  three numbers
+ */
+inline void locate(const Place& place, const double* positions, const double* box, double* result) {
+    const double* first = place.isPoint() ? place.point : positions+3*place.first;
+    if (!place.isOnSegment()) {
+        for (int k = 0; k < 3; k++)
+            result[k] = first[k];
+        return;
+    }
+    const double* second = positions+3*place.second;
+    if (box == nullptr) {
+        for (int k = 0; k < 3; k++)
+            result[k] = (1-place.fraction)*first[k]+place.fraction*second[k];
+        return;
+    }
+    double between[3];
+    for (int k = 0; k < 3; k++)
+        between[k] = second[k]-first[k];
+    takeToNearestImage(between, box);
+    for (int k = 0; k < 3; k++)
+        result[k] = first[k]+place.fraction*between[k];
+}
+
+/** Add a force on a place, times a factor, to the forces on the particles that hold it. */
+inline void addForce(const Place& place, const double* force, double factor, double* forces) {
+    if (place.isPoint())
+        return;
+    const double first = place.isOnSegment() ? factor*(1-place.fraction) : factor;
+    for (int k = 0; k < 3; k++)
+        forces[3*place.first+k] += first*force[k];
+    if (place.isOnSegment())
+        for (int k = 0; k < 3; k++)
+            forces[3*place.second+k] += factor*place.fraction*force[k];
+}
 
 } // namespace cylchain
 

@@ -20,6 +20,7 @@ namespace std {
 #include "openmm/CylinderChainException.h"
 #include "openmm/CylinderChainForce.h"
 #include "openmm/CylinderChainIntegrator.h"
+#include "openmm/CylinderChainLinkForce.h"
 #include "OpenMM.h"
 #include "OpenMMAmoeba.h"
 #include "OpenMMDrude.h"
@@ -52,8 +53,8 @@ static PyObject* newException(PyObject* type, const std::exception& e) {
     if (own == NULL)
         return PyObject_CallFunction(type, "s", e.what());
     const CylinderChainException::Place& place = own->getPlace();
-    return PyObject_CallFunction(type, "ssNNNN", e.what(), own->getKindName(), newNumber(place.chain),
-            newNumber(place.segment), newNumber(place.particle), newNumber(place.step));
+    return PyObject_CallFunction(type, "ssNNNNN", e.what(), own->getKindName(), newNumber(place.chain),
+            newNumber(place.segment), newNumber(place.particle), newNumber(place.step), newNumber(place.link));
 }
 
 static void raiseException(const std::exception& e) {
@@ -138,6 +139,74 @@ static void raiseException(const std::exception& e) {
         PyTuple_SetItem(tuple, i, PyFloat_FromDouble((*$1)[i]));
     $result = SWIG_Python_AppendOutput($result, tuple, 1);
 }
+%apply int& OUTPUT {int& first1, int& second1, int& first2, int& second2, int& nextNumber};
+%apply double& OUTPUT {double& fraction1, double& fraction2};
+
+%{
+static bool takeNumber(PyObject* object, double& value) {
+    value = PyFloat_AsDouble(object);
+    return !(value == -1 && PyErr_Occurred());
+}
+
+static bool takeNumber(PyObject* object, int& value) {
+    const long number = PyLong_AsLong(object);
+    if (number == -1 && PyErr_Occurred())
+        return false;
+    value = (int) number;
+    if (value == number)
+        return true;
+    PyErr_SetString(PyExc_OverflowError, "a number is too large");
+    return false;
+}
+
+template <class T>
+static bool takeNumbers(PyObject* object, std::vector<T>& values) {
+    PyObject* sequence = PySequence_Fast(object, "numbers must be in a sequence");
+    if (sequence == NULL)
+        return false;
+    values.resize(PySequence_Fast_GET_SIZE(sequence));
+    bool taken = true;
+    for (size_t i = 0; i < values.size() && taken; i++)
+        taken = takeNumber(PySequence_Fast_GET_ITEM(sequence, i), values[i]);
+    Py_DECREF(sequence);
+    return taken;
+}
+%}
+
+%typemap(in) const std::vector<int>& numbers (std::vector<int> value) {
+    if (!takeNumbers($input, value))
+        SWIG_fail;
+    $1 = &value;
+}
+%typemap(in) const std::vector<double>& fractions (std::vector<double> value) {
+    if (!takeNumbers($input, value))
+        SWIG_fail;
+    $1 = &value;
+}
+%typemap(freearg) const std::vector<int>& numbers, const std::vector<double>& fractions {
+}
+%typemap(in, numinputs=0) std::vector<int>& numbers (std::vector<int> value) {
+    $1 = &value;
+}
+%typemap(argout) std::vector<int>& numbers {
+    PyObject* tuple = PyTuple_New($1->size());
+    for (size_t i = 0; i < $1->size(); i++)
+        PyTuple_SetItem(tuple, i, PyLong_FromLong((*$1)[i]));
+    $result = SWIG_Python_AppendOutput($result, tuple, 1);
+}
+// What is constant goes in and does not come out.
+%typemap(argout) const std::vector<int>& numbers {
+}
+%typemap(argout) const std::vector<double>& fractions {
+}
+%apply std::vector<int>& numbers {std::vector<int>& ends, std::vector<int>& models, std::vector<int>& active};
+%apply const std::vector<int>& numbers {const std::vector<int>& ends, const std::vector<int>& models,
+        const std::vector<int>& active};
+%apply std::vector<double>& tensions {std::vector<double>& fractions, std::vector<double>& points,
+        std::vector<double>& parameters};
+%apply const std::vector<double>& fractions {const std::vector<double>& points,
+        const std::vector<double>& parameters};
+
 %typemap(in, numinputs=0) std::vector<Vec3>& vectors (std::vector<OpenMM::Vec3> value) {
     $1 = &value;
 }
@@ -166,18 +235,20 @@ class CylinderChainException(openmm.OpenMMException):
 
     Attributes
     ----------
-    kind : {"torn-chain", "length-out-of-range", "unstable-chain", "unstable-particle", "nothing-recorded"}
-    chain, segment, particle, step : int or None
+    kind : {"torn-chain", "length-out-of-range", "unstable-chain", "unstable-particle", "link-out-of-range", \
+            "nothing-recorded"}
+    chain, segment, particle, step, link : int or None
         None where it is not known. Steps count from 1.
     """
 
-    def __init__(self, message="", kind=None, chain=None, segment=None, particle=None, step=None):
+    def __init__(self, message="", kind=None, chain=None, segment=None, particle=None, step=None, link=None):
         super().__init__(message)
         self.kind = kind
         self.chain = chain
         self.segment = segment
         self.particle = particle
         self.step = step
+        self.link = link
 
 
 _LENGTH = unit.nanometer
@@ -210,6 +281,14 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %}
 %pythonappend OpenMM::CylinderChainForce::computeEnergies(Context&, double&, double&) const %{
     val = [unit.Quantity(v, _ENERGY) for v in val]
+%}
+%pythonappend OpenMM::CylinderChainLinkForce::getLinkPlaces(int, int&, int&, double&, int&, int&, double&,
+        Vec3&) const %{
+    val[6] = unit.Quantity(val[6], _LENGTH)
+%}
+%pythonappend OpenMM::CylinderChainLinkForce::getLinkParameters(int, int&, double&, double&, double&) const %{
+    units = (_LENGTH, _STIFFNESS, _LENGTH)
+    val = [val[0], *(unit.Quantity(v, u) for v, u in zip(val[1:], units))]
 %}
 %pythonappend OpenMM::CylinderChainIntegrator::getTemperature() const %{
     val = unit.Quantity(val, unit.kelvin)
@@ -282,15 +361,19 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %enddef
 
 %concreteClass(CylinderChainForce, Force)
+%concreteClass(CylinderChainLinkForce, Force)
 %concreteClass(CylinderChainIntegrator, Integrator)
 
 %ignore OpenMM::CylinderChainForce::SegmentInfo;
 %ignore OpenMM::CylinderChainForce::ChainInfo;
 %ignore OpenMM::CylinderChainForce::TetherInfo;
+%ignore OpenMM::CylinderChainLinkForce::getTable;
+%ignore OpenMM::CylinderChainLinkForce::setTable;
 %import "mechanics/Enumerators.h"
 %import "mechanics/BendingModels.h"
 %import "mechanics/StretchingModels.h"
 %import "dynamics/Schemes.h"
 %import "dynamics/Precisions.h"
 %include "openmm/CylinderChainForce.h"
+%include "openmm/CylinderChainLinkForce.h"
 %include "openmm/CylinderChainIntegrator.h"

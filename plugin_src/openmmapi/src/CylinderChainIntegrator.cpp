@@ -7,6 +7,7 @@
 #include "openmm/internal/ContextImpl.h"
 #include "openmm/internal/CylinderChainForceImpl.h"
 #include "openmm/internal/CylinderChainStepper.h"
+#include "openmm/internal/LinkStorage.h"
 #include "openmm/internal/OSRngSeed.h"
 #include "openmm/serialization/SerializationNode.h"
 #include <cmath>
@@ -273,7 +274,7 @@ uint64_t CylinderChainIntegrator::findNextStep() const {
 }
 
 void CylinderChainIntegrator::createCheckpoint(ostream& stream) const {
-    const int version = 3;
+    const int version = 4;
     stream.write((const char*) &version, sizeof(version));
     stream.write((const char*) &noiseLevel, sizeof(noiseLevel));
     stream.write((const char*) &noiseSeed, sizeof(noiseSeed));
@@ -281,6 +282,7 @@ void CylinderChainIntegrator::createCheckpoint(ostream& stream) const {
     stream.write((const char*) &steps, sizeof(steps));
     const Vec3 flow[] = {flowVelocity, flowGradient[0], flowGradient[1], flowGradient[2], flowOrigin};
     stream.write((const char*) flow, sizeof(flow));
+    writeLinks(stream, *context);
 }
 
 void CylinderChainIntegrator::loadCheckpoint(istream& stream) {
@@ -292,9 +294,11 @@ void CylinderChainIntegrator::loadCheckpoint(istream& stream) {
     stream.read((char*) &steps, sizeof(steps));
     Vec3 flow[5];
     stream.read((char*) flow, sizeof(flow));
-    if (!stream || version != 3 || level < 0 || level > getLargestPathLevel())
+    if (!stream || version < 3 || version > 4 || level < 0 || level > getLargestPathLevel())
         throw OpenMMException("loadCheckpoint: Checkpoint was not created with this version of "
                 "CylinderChainIntegrator");
+    if (version > 3)
+        readLinks(stream, *context);
     setFlow(flow[0], flow[1], flow[2], flow[3], flow[4]);
     noiseLevel = level;
     noiseSeed = seed;
@@ -303,18 +307,20 @@ void CylinderChainIntegrator::loadCheckpoint(istream& stream) {
 }
 
 void CylinderChainIntegrator::serializeParameters(SerializationNode& node) const {
-    node.setIntProperty("version", 3);
+    node.setIntProperty("version", 4);
     node.setIntProperty("pathLevel", noiseLevel);
     node.setLongProperty("stepsTaken", findNextStep());
     const Vec3 flow[] = {flowVelocity, flowGradient[0], flowGradient[1], flowGradient[2], flowOrigin};
     for (const Vec3& vector : flow)
         node.createChildNode("Flow").setDoubleProperty("x", vector[0]).setDoubleProperty("y", vector[1])
                 .setDoubleProperty("z", vector[2]);
+    if (context != NULL)
+        writeLinks(node, *context);
 }
 
 void CylinderChainIntegrator::deserializeParameters(const SerializationNode& node) {
     const int version = node.getIntProperty("version");
-    if (version < 1 || version > 3)
+    if (version < 1 || version > 4)
         throw OpenMMException("Unsupported version number");
 
     // The same time on the path, or the next step after it.
@@ -322,6 +328,8 @@ void CylinderChainIntegrator::deserializeParameters(const SerializationNode& nod
     const int level = node.getIntProperty("pathLevel", 0);
     if (level < 0 || level > getLargestPathLevel())
         throw OpenMMException("Illegal path level: "+to_string(level));
+    if (context != NULL)
+        readLinks(node, *context);
     stepsTaken = node.getLongProperty("stepsTaken");
     countAfterSteps = -1;
     if (noiseLevel >= level)
@@ -330,7 +338,9 @@ void CylinderChainIntegrator::deserializeParameters(const SerializationNode& nod
         stepsTaken = (stepsTaken+(1ULL<<(level-noiseLevel))-1)>>(level-noiseLevel);
     vector<Vec3> flow;
     for (const SerializationNode& child : node.getChildren())
-        flow.push_back(Vec3(child.getDoubleProperty("x"), child.getDoubleProperty("y"), child.getDoubleProperty("z")));
+        if (child.getName() == "Flow")
+            flow.push_back(Vec3(child.getDoubleProperty("x"), child.getDoubleProperty("y"),
+                    child.getDoubleProperty("z")));
     if (flow.size() == 5)
         setFlow(flow[0], flow[1], flow[2], flow[3], flow[4]);
 }

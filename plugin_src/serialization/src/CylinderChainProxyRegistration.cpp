@@ -1,7 +1,9 @@
 #include "openmm/CylinderChainForce.h"
 #include "openmm/CylinderChainIntegrator.h"
+#include "openmm/CylinderChainLinkForce.h"
 #include "openmm/serialization/CylinderChainForceProxy.h"
 #include "openmm/serialization/CylinderChainIntegratorProxy.h"
+#include "openmm/serialization/CylinderChainLinkForceProxy.h"
 #include <typeinfo>
 
 using namespace OpenMM;
@@ -11,6 +13,7 @@ using namespace OpenMM;
  */
 static const bool registered = []() {
     SerializationProxy::registerProxy(typeid(CylinderChainForce), new CylinderChainForceProxy());
+    SerializationProxy::registerProxy(typeid(CylinderChainLinkForce), new CylinderChainLinkForceProxy());
     SerializationProxy::registerProxy(typeid(CylinderChainIntegrator), new CylinderChainIntegratorProxy());
     return true;
 }();

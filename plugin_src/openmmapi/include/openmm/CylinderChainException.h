@@ -12,6 +12,7 @@
  * - LengthOutOfRange: a segment has a length at which its energy is infinite.
  * - UnstableChain: a chain has blown up.
  * - UnstableParticle: a particle outside chains has blown up.
+ * - LinkOutOfRange: a link has a length at which its energy is infinite.
  * - NothingRecorded: no tensions were recorded in the last step.
  */
 #define CYLCHAIN_EXCEPTION_KINDS(ENTRY) \
@@ -19,6 +20,7 @@
     ENTRY(LengthOutOfRange, "length-out-of-range") \
     ENTRY(UnstableChain, "unstable-chain") \
     ENTRY(UnstableParticle, "unstable-particle") \
+    ENTRY(LinkOutOfRange, "link-out-of-range") \
     ENTRY(NothingRecorded, "nothing-recorded")
 
 namespace OpenMM {
@@ -38,6 +40,10 @@ public:
          * The number of the step, from 1 on.
          */
         long long step = -1;
+        /**
+         * The number of the link.
+         */
+        long long link = -1;
     };
     CylinderChainException(Kind kind, const Place& place, const std::string& message);
     ~CylinderChainException();

@@ -342,19 +342,20 @@ protected:
      */
     bool kineticEnergyRequiresForce() const;
     /**
-     * Write the seed, the path level, the number of steps taken and the flow to a checkpoint.
+     * Write the seed, the path level, the number of steps taken, the flow and the links of all CylinderChainLinkForces
+     * to a checkpoint.
      */
     void createCheckpoint(std::ostream& stream) const;
     /**
-     * Read the seed, the path level, the number of steps taken and the flow from a checkpoint.
+     * Read the seed, the path level, the number of steps taken, the flow and links from a checkpoint.
      */
     void loadCheckpoint(std::istream& stream);
     /**
-     * Write the path level, the number of steps taken and the flow to a State.
+     * Write the path level, the number of steps taken, the flow and the links of all CylinderChainLinkForces to a State.
      */
     void serializeParameters(SerializationNode& node) const;
     /**
-     * Read the number of steps taken, for the path level, and the flow from a State.
+     * Read the number of steps taken, for the path level, the flow and links from a State.
      */
     void deserializeParameters(const SerializationNode& node);
 private:

@@ -1,6 +1,7 @@
 #ifndef OPENMM_CYLINDERCHAINKERNELS_H_
 #define OPENMM_CYLINDERCHAINKERNELS_H_
 
+#include "couplings/Links.h"
 #include "dynamics/ChainEngine.h"
 #include "openmm/KernelImpl.h"
 #include "openmm/Platform.h"
@@ -56,6 +57,40 @@ public:
      * @param context  the context to copy parameters to
      */
     virtual void copyParametersToContext(ContextImpl& context) = 0;
+};
+
+/**
+ * This kernel is invoked by CylinderChainLinkForce to calculate the forces acting on the system and the energy of the
+ * system.
+ */
+class CalcCylinderChainLinkForceKernel : public KernelImpl {
+public:
+    static std::string Name() {
+        return "CalcCylinderChainLinkForce";
+    }
+    CalcCylinderChainLinkForceKernel(std::string name, const Platform& platform) : KernelImpl(name, platform) {
+    }
+    /**
+     * Initialize the kernel.
+     *
+     * @param system            the System this kernel will be applied to
+     * @param periodic          whether the places of a link are taken as their nearest images
+     * @param nearestParticles  whether the two particles of a place are
+     */
+    virtual void initialize(const System& system, bool periodic, bool nearestParticles) = 0;
+    /**
+     * Execute the kernel to calculate the forces and/or energy.
+     *
+     * @param context          the context in which to execute this kernel
+     * @param links            the links of the context
+     * @param includeForces    true if forces should be calculated
+     * @param includeEnergy    true if the energy should be calculated
+     * @param[out] outOfRange  the index of the first link with a length that its potential does not allow, or -1.
+     *                         Forces are those of the other links then.
+     * @return the potential energy due to the force
+     */
+    virtual double execute(ContextImpl& context, const std::vector<cylchain::Link>& links, bool includeForces,
+            bool includeEnergy, int& outOfRange) = 0;
 };
 
 /**

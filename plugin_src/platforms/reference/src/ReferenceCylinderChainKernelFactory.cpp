@@ -1,5 +1,6 @@
 #include "ReferenceCylinderChainKernelFactory.h"
 #include "ReferenceCalcCylinderChainForceKernel.h"
+#include "ReferenceCalcCylinderChainLinkForceKernel.h"
 #include "ReferenceIntegrateCylinderChainStepKernel.h"
 #include "openmm/OpenMMException.h"
 #include "openmm/reference/ReferencePlatform.h"
@@ -16,6 +17,7 @@ extern "C" void registerKernelFactories() {
         if (dynamic_cast<ReferencePlatform*>(&platform) != NULL) {
             ReferenceCylinderChainKernelFactory* factory = new ReferenceCylinderChainKernelFactory();
             platform.registerKernelFactory(CalcCylinderChainForceKernel::Name(), factory);
+            platform.registerKernelFactory(CalcCylinderChainLinkForceKernel::Name(), factory);
             platform.registerKernelFactory(IntegrateCylinderChainStepKernel::Name(), factory);
         }
     }
@@ -25,6 +27,8 @@ KernelImpl* ReferenceCylinderChainKernelFactory::createKernelImpl(string name, c
         ContextImpl& context) const {
     if (name == CalcCylinderChainForceKernel::Name())
         return new ReferenceCalcCylinderChainForceKernel(name, platform, context);
+    if (name == CalcCylinderChainLinkForceKernel::Name())
+        return new ReferenceCalcCylinderChainLinkForceKernel(name, platform, context);
     if (name == IntegrateCylinderChainStepKernel::Name())
         return new ReferenceIntegrateCylinderChainStepKernel(name, platform, context);
     throw OpenMMException("Tried to create kernel with illegal kernel name '"+name+"'");

@@ -1,0 +1,100 @@
+#ifndef OPENMM_CYLINDERCHAINLINKFORCEIMPL_H_
+#define OPENMM_CYLINDERCHAINLINKFORCEIMPL_H_
+
+#include "couplings/LinkTable.h"
+#include "openmm/CylinderChainLinkForce.h"
+#include "openmm/Kernel.h"
+#include "openmm/internal/ForceImpl.h"
+#include <map>
+#include <string>
+#include <vector>
+
+namespace OpenMM {
+
+/**
+ * This is the internal implementation of CylinderChainLinkForce.  It holds the links of a Context.
+ *
+ * Which they are is said by a parameter of the Context, the digest of their table.  Where that has changed, because the
+ * Context has got a State or a checkpoint, the links follow as soon as they are looked at.
+ */
+class CylinderChainLinkForceImpl : public ForceImpl {
+public:
+    /**
+     * While an object of this class exists, the Force contributes nothing.
+     */
+    class Exclusion {
+    public:
+        Exclusion(CylinderChainLinkForceImpl& force, bool exclude) : force(force) {
+            force.excluded = exclude;
+        }
+        ~Exclusion() {
+            force.excluded = false;
+        }
+    private:
+        CylinderChainLinkForceImpl& force;
+    };
+    explicit CylinderChainLinkForceImpl(const CylinderChainLinkForce& owner);
+    void initialize(ContextImpl& context);
+    const CylinderChainLinkForce& getOwner() const {
+        return owner;
+    }
+    void updateContextState(ContextImpl&, bool&) {
+        // Nothing is modified between steps.
+    }
+    double calcForcesAndEnergy(ContextImpl& context, bool includeForces, bool includeEnergy, int groups);
+    std::map<std::string, double> getDefaultParameters();
+    std::vector<std::string> getKernelNames();
+    /**
+     * Get the links of the Context that are switched on, in the order of their numbers.  Places at virtual sites between
+     * two particles are those between these particles.  An exception is thrown if the links are not known.
+     */
+    const std::vector<cylchain::Link>& getLinks();
+    /**
+     * Get a number that increases whenever links change.
+     */
+    long long getVersion();
+    /**
+     * Get all links of the Context as they were described.  An exception is thrown if they are not known.
+     */
+    const cylchain::LinkTable& getTable();
+    /**
+     * Change links of the Context.
+     */
+    void change(const cylchain::LinkChange& change);
+    /**
+     * Give the Context another table, whether its present links are known or not.
+     */
+    void setTable(const cylchain::LinkTable& table);
+    /**
+     * Get the name of the parameter that holds the digest of the links.
+     */
+    const std::string& getDigestParameter() const {
+        return parameter;
+    }
+    /**
+     * Get whether the two particles of a place are taken as their nearest images.
+     */
+    bool takesNearestParticles() const {
+        return nearestParticles;
+    }
+private:
+    void check(const cylchain::LinkChange& change) const;
+    void follow();
+    void accept(const cylchain::LinkChange& change);
+    void reportLink(int index);
+    const CylinderChainLinkForce& owner;
+    ContextImpl* context;
+    Kernel kernel;
+    std::string parameter;
+    cylchain::LinkHistory history;
+    std::vector<cylchain::Link> links;
+    // Whether the links above are those of the table.
+
+    bool upToDate;
+    long long version;
+    bool nearestParticles, excluded;
+};
+
+} // namespace OpenMM
+
+#endif /*OPENMM_CYLINDERCHAINLINKFORCEIMPL_H_*/

@@ -1,0 +1,149 @@
+#include "openmm/internal/CylinderChainLinkForceImpl.h"
+#include "openmm/CylinderChainException.h"
+#include "openmm/CylinderChainForce.h"
+#include "openmm/CylinderChainKernels.h"
+#include "openmm/OpenMMException.h"
+#include "openmm/System.h"
+#include "openmm/internal/ContextImpl.h"
+#include "openmm/internal/LinkDescription.h"
+#include <sstream>
+
+using namespace OpenMM;
+using namespace std;
+
+CylinderChainLinkForceImpl::CylinderChainLinkForceImpl(const CylinderChainLinkForce& owner) : owner(owner),
+        context(NULL), upToDate(false), version(0), nearestParticles(false), excluded(false) {
+    forceGroup = owner.getForceGroup();
+}
+
+void CylinderChainLinkForceImpl::initialize(ContextImpl& context) {
+    this->context = &context;
+    const System& system = context.getSystem();
+
+    // Each such Force of a System has a parameter of its own.
+
+    int before = 0;
+    for (int i = 0; i < system.getNumForces(); i++) {
+        const Force* force = &system.getForce(i);
+        if (force == &owner)
+            parameter = "CylinderChainLinks"+to_string(before);
+        if (dynamic_cast<const CylinderChainLinkForce*>(force) != NULL)
+            before++;
+        const CylinderChainForce* chains = dynamic_cast<const CylinderChainForce*>(force);
+        if (chains != NULL && chains->usesPeriodicBoundaryConditions())
+            nearestParticles = true;
+    }
+    const cylchain::LinkChange change = history.getTable().changeTo(owner.getTable());
+    check(change);
+    history = cylchain::LinkHistory(owner.getTable());
+    kernel = context.getPlatform().createKernel(CalcCylinderChainLinkForceKernel::Name(), context);
+    kernel.getAs<CalcCylinderChainLinkForceKernel>().initialize(system, owner.usesPeriodicBoundaryConditions(),
+            nearestParticles);
+}
+
+map<string, double> CylinderChainLinkForceImpl::getDefaultParameters() {
+    return {{parameter, (double) history.getTable().getDigest()}};
+}
+
+vector<string> CylinderChainLinkForceImpl::getKernelNames() {
+    return {CalcCylinderChainLinkForceKernel::Name()};
+}
+
+void CylinderChainLinkForceImpl::check(const cylchain::LinkChange& change) const {
+    for (const cylchain::LinkEntry& entry : change.put)
+        checkLink(entry.link, context->getSystem());
+}
+
+void CylinderChainLinkForceImpl::follow() {
+    const double value = context->getParameter(parameter);
+    if (value == (double) history.getTable().getDigest())
+        return;
+    upToDate = false;
+    version++;
+    if (value >= 0 && value < 0x1p52 && history.goBack((uint64_t) value))
+        return;
+    if (value == (double) owner.getTable().getDigest()) {
+        history.change(history.getTable().changeTo(owner.getTable()));
+        return;
+    }
+    throw OpenMMException("CylinderChainLinkForce: The links of this Context are not known: it has got a State or "
+            "checkpoint of another Context, or one from more than "+to_string(cylchain::LinkHistory::CHANGES)+
+            " changes ago. Give it the links that belong to it by setLinksInContext(). The checkpoints of a "
+            "CylinderChainIntegrator, and States that hold its parameters (getState(integratorParameters=True)), "
+            "restore links themselves");
+}
+
+void CylinderChainLinkForceImpl::accept(const cylchain::LinkChange& change) {
+    check(change);
+    if (change.size() > 0 || change.nextNumber != history.getTable().getNextNumber())
+        history.change(change);
+    upToDate = false;
+    version++;
+    context->setParameter(parameter, (double) history.getTable().getDigest());
+}
+
+const cylchain::LinkTable& CylinderChainLinkForceImpl::getTable() {
+    follow();
+    return history.getTable();
+}
+
+long long CylinderChainLinkForceImpl::getVersion() {
+    follow();
+    return version;
+}
+
+void CylinderChainLinkForceImpl::change(const cylchain::LinkChange& change) {
+    follow();
+    accept(change);
+}
+
+void CylinderChainLinkForceImpl::setTable(const cylchain::LinkTable& table) {
+    accept(history.getTable().changeTo(table));
+}
+
+const vector<cylchain::Link>& CylinderChainLinkForceImpl::getLinks() {
+    follow();
+    if (!upToDate) {
+        const System& system = context->getSystem();
+        links.clear();
+        for (const cylchain::LinkEntry& entry : history.getTable().getEntries())
+            if (entry.active) {
+                links.push_back(entry.link);
+                links.back().first = resolvePlace(entry.link.first, system);
+                links.back().second = resolvePlace(entry.link.second, system);
+            }
+        upToDate = true;
+    }
+    return links;
+}
+
+double CylinderChainLinkForceImpl::calcForcesAndEnergy(ContextImpl& context, bool includeForces, bool includeEnergy,
+        int groups) {
+    if ((groups&(1<<forceGroup)) == 0 || excluded)
+        return 0.0;
+    int outOfRange = -1;
+    const double energy = kernel.getAs<CalcCylinderChainLinkForceKernel>().execute(context, getLinks(), includeForces,
+            includeEnergy, outOfRange);
+    if (outOfRange != -1)
+        reportLink(outOfRange);
+    return energy;
+}
+
+void CylinderChainLinkForceImpl::reportLink(int index) {
+    const cylchain::Link& link = links[index];
+    vector<Vec3> positions, box(3);
+    context->getPositions(positions);
+    context->getPeriodicBoxVectors(box[0], box[1], box[2]);
+    cylchain::LinkBoxes boxes;
+    boxes.distances = owner.usesPeriodicBoundaryConditions() ? &box[0][0] : NULL;
+    boxes.segments = nearestParticles ? &box[0][0] : NULL;
+    const double length = cylchain::computePull(link, &positions[0][0], boxes).length;
+    stringstream message;
+    message << "Link " << link.number << " " << describePlaces(history.getTable().find(link.number)->link) <<
+            " has blown up: its length of " << length << " nm is outside " << link.restLength << " -/+ " <<
+            link.maximumExtension << " nm of the FENE potential. Use a smaller time step, or look for places that are "
+            "too far apart.";
+    CylinderChainException::Place place;
+    place.link = link.number;
+    throw CylinderChainException(CylinderChainException::LinkOutOfRange, place, message.str());
+}

@@ -1,0 +1,29 @@
+#ifndef OPENMM_REFERENCECALCCYLINDERCHAINLINKFORCEKERNEL_H_
+#define OPENMM_REFERENCECALCCYLINDERCHAINLINKFORCEKERNEL_H_
+
+#include "ReferenceParallelLoop.h"
+#include "couplings/Links.h"
+#include "openmm/CylinderChainKernels.h"
+#include <vector>
+
+namespace OpenMM {
+
+/**
+ * This kernel is invoked by CylinderChainLinkForce to calculate the forces acting on the system and the energy of the
+ * system.
+ */
+class ReferenceCalcCylinderChainLinkForceKernel : public CalcCylinderChainLinkForceKernel {
+public:
+    ReferenceCalcCylinderChainLinkForceKernel(std::string name, const Platform& platform, ContextImpl& context);
+    void initialize(const System& system, bool periodic, bool nearestParticles);
+    double execute(ContextImpl& context, const std::vector<cylchain::Link>& links, bool includeForces,
+            bool includeEnergy, int& outOfRange);
+private:
+    ReferenceParallelLoop loop;
+    bool periodic, nearestParticles;
+    std::vector<cylchain::LinkPull> pulls;
+};
+
+} // namespace OpenMM
+
+#endif /*OPENMM_REFERENCECALCCYLINDERCHAINLINKFORCEKERNEL_H_*/

@@ -1,0 +1,32 @@
+#include "openmm/serialization/CylinderChainLinkForceProxy.h"
+#include "openmm/CylinderChainLinkForce.h"
+#include "openmm/OpenMMException.h"
+#include "openmm/internal/LinkStorage.h"
+#include "openmm/serialization/SerializationNode.h"
+#include <memory>
+
+using namespace OpenMM;
+using namespace std;
+
+CylinderChainLinkForceProxy::CylinderChainLinkForceProxy() : SerializationProxy("CylinderChainLinkForce") {
+}
+
+void CylinderChainLinkForceProxy::serialize(const void* object, SerializationNode& node) const {
+    node.setIntProperty("version", 1);
+    const CylinderChainLinkForce& force = *reinterpret_cast<const CylinderChainLinkForce*>(object);
+    node.setIntProperty("forceGroup", force.getForceGroup());
+    node.setStringProperty("name", force.getName());
+    node.setBoolProperty("usesPeriodic", force.usesPeriodicBoundaryConditions());
+    writeTable(node.createChildNode("Links"), force.getTable());
+}
+
+void* CylinderChainLinkForceProxy::deserialize(const SerializationNode& node) const {
+    if (node.getIntProperty("version") != 1)
+        throw OpenMMException("Unsupported version number");
+    unique_ptr<CylinderChainLinkForce> force(new CylinderChainLinkForce());
+    force->setForceGroup(node.getIntProperty("forceGroup"));
+    force->setName(node.getStringProperty("name"));
+    force->setUsesPeriodicBoundaryConditions(node.getBoolProperty("usesPeriodic"));
+    force->setTable(readTable(node.getChildNode("Links")));
+    return force.release();
+}
