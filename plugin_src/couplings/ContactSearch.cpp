@@ -679,6 +679,14 @@ int ContactSearch::evaluate(const ContactPair& pair, const double* x, const doub
     return implementation->evaluate(pair, x, y, contacts);
 }
 
+void ContactSearch::findVector(const ContactPair& pair, double s, double t, const double* positions,
+        double* result) const {
+    const Vec3d r = implementation->segments(pair.a, pair.b, pair.shift, positions).between(s, t);
+    result[0] = r.x;
+    result[1] = r.y;
+    result[2] = r.z;
+}
+
 bool ContactSearch::crosses(const ContactPair& pair, const double* x, const double* y) const {
     const Implementation& search = *implementation;
     const SegmentPair start = search.segments(pair.a, pair.b, pair.shift, x);

@@ -67,6 +67,12 @@ public:
      */
     int evaluate(const ContactPair& pair, const double* x, const double* y, Contact* contacts) const;
     /**
+     * Find the vector from the point at fraction t of the second capsule of a pair to that at s of the first.
+     *
+     * @param result  three numbers
+     */
+    void findVector(const ContactPair& pair, double s, double t, const double* positions, double* result) const;
+    /**
      * Get whether the segments of a pair pass through each other on the way from x to y, an odd number of times. Spheres
      * do not, nor do segments that stay in one plane.
      */

@@ -153,9 +153,10 @@ void CoupledEquations::solve(const vector<PackStep*>& packs, const vector<Coupli
             moves[3*(i/2)+k] += (i%2 == 0 ? 1 : -1)*change[3*termOf[i]+k];
 }
 
-void CoupledEquations::advance(const vector<PackStep*>& packs, LaneFlags& unfinished, const Loop& loop) {
+void CoupledEquations::advance(const vector<PackStep*>& packs, double share, LaneFlags& unfinished,
+            const Loop& loop) {
     loop(packs.size(), [&] (int pack) {
-        packs[pack]->advance(found.data()+3*firstTerms[pack], unfinished[pack].get());
+        packs[pack]->advance(found.data()+3*firstTerms[pack], share, unfinished[pack].get());
     });
 }
 

@@ -46,8 +46,8 @@ public:
     const std::vector<double>& getMoves() const {
         return moves;
     }
-    /** End the iteration of all packs. */
-    void advance(const std::vector<PackStep*>& packs, LaneFlags& unfinished, const Loop& loop);
+    /** End the iteration of all packs, with a share of the changes. */
+    void advance(const std::vector<PackStep*>& packs, double share, LaneFlags& unfinished, const Loop& loop);
     /**
      * Find how a force on each place of each equation moves that place: two symmetric matrices for each equation. What
      * couplings pass on from chain to chain is left out, but each couplings' own stiffness at its places is there.

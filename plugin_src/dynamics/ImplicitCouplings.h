@@ -52,9 +52,10 @@ public:
      * Take note of what the linear equations have found.
      *
      * @param moves  for each equation, how its first place moves against its second
+     * @param moved  where particles are now
      * @return whether another iteration is needed
      */
-    virtual bool finishIteration(const double* moves) = 0;
+    virtual bool finishIteration(const double* moves, const double* moved) = 0;
     /**
      * Find chains by which the step has gone wrong when the equations are solved, so that it must be divided.
      */

@@ -1,6 +1,5 @@
 #include "dynamics/LinkEquations.h"
 #include "lanes/Noise.h"
-#include "mechanics/PeriodicBox.h"
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -34,34 +33,23 @@ void multiply(const double* k, const double* v, double* result) {
     result[2] = k[2]*v[0]+k[4]*v[1]+k[5]*v[2];
 }
 
-void findPosition(const Place& place, const double* positions, double* result) {
-    for (int k = 0; k < 3; k++) {
-        if (place.isPoint())
-            result[k] = place.point[k];
-        else {
-            const double first = positions[3*place.first+k];
-            result[k] = first+(place.isOnSegment() ? place.fraction*(positions[3*place.second+k]-first) : 0);
-        }
-    }
-}
-
 } // namespace
 
-void LinkEquations::setLinks(const vector<Link>* newLinks) {
+void LinkEquations::setLinks(const vector<Link>* newLinks, const LinkBoxes& newBoxes) {
     links = newLinks;
+    boxes = newBoxes;
 }
 
 void LinkEquations::vectorOf(const State& state, const double* positions, double* r) const {
     double second[3];
-    findPosition(state.link->first, positions, r);
-    findPosition(state.link->second, positions, second);
+    locate(state.link->first, positions, boxes.segments, r);
+    locate(state.link->second, positions, boxes.segments, second);
     for (int k = 0; k < 3; k++)
         r[k] += state.shift[k]-second[k];
 }
 
 void LinkEquations::begin(const CoupledStart& start, const Loop&) {
     begun = start.positions;
-    box = start.box;
     kT = start.settings.kT;
     stepSize = start.settings.stepSize;
     states.clear();
@@ -89,8 +77,8 @@ void LinkEquations::describe(const CoupledStart& start, State& state) const {
     fill(state.shift, state.shift+3, 0.0);
     vectorOf(state, begun, direct);
     copy(direct, direct+3, state.start);
-    if (box != NULL)
-        takeToNearestImage(state.start, box);
+    if (boxes.distances != NULL)
+        takeToNearestImage(state.start, boxes.distances);
     for (int k = 0; k < 3; k++)
         state.shift[k] = state.start[k]-direct[k];
     state.length = sqrt(dot(state.start, state.start));
@@ -239,7 +227,7 @@ void LinkEquations::setCompliances(const double* compliances) {
     }
 }
 
-bool LinkEquations::finishIteration(const double* moves) {
+bool LinkEquations::finishIteration(const double* moves, const double*) {
     bool unfinished = false;
     for (size_t i = 0; i < states.size(); i++) {
         State& state = states[i];

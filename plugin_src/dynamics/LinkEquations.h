@@ -26,8 +26,11 @@ namespace cylchain {
  */
 class LinkEquations : public ImplicitCouplings {
 public:
-    /** Set the links that steps have; they must exist while steps are taken. Those that are on no chain are left out. */
-    void setLinks(const std::vector<Link>* links);
+    /**
+     * Set the links that steps have, which must exist while steps are taken, and how distances are measured. Links that
+     * are on no chain are left out.
+     */
+    void setLinks(const std::vector<Link>* links, const LinkBoxes& boxes);
     void begin(const CoupledStart& start, const Loop& loop) override;
     void beginStage(int stage, int numStages, const double* moved) override;
     void linearise(int iteration, const double* moved, std::vector<CouplingEquation>& equations) override;
@@ -35,7 +38,7 @@ public:
         return anyTurns;
     }
     void setCompliances(const double* compliances) override;
-    bool finishIteration(const double* moves) override;
+    bool finishIteration(const double* moves, const double* moved) override;
     void findFailures(const double* moved, std::vector<bool>& failed) const override;
     void findNeighbours(std::vector<std::pair<int, int> >& pairs) const override;
 private:
@@ -60,7 +63,8 @@ private:
     void vectorOf(const State& state, const double* positions, double* r) const;
     std::vector<State> states;
     const std::vector<Link>* links = nullptr;
-    const double *begun = nullptr, *box = nullptr;
+    LinkBoxes boxes;
+    const double* begun = nullptr;
     double kT = 0, stepSize = 0;
     bool anyTurns = false;
     std::vector<std::uint32_t> chains, parts;

@@ -9,6 +9,12 @@ using namespace std;
 namespace {
 
 const int NEWTON_ITERATIONS = 20;
+/**
+ * Contacts that open and close in turn keep Newton's method from ending. After so many iterations, only this share of
+ * each change is made.
+ */
+const int UNDAMPED_ITERATIONS = 8;
+const double DAMPING = 0.6;
 /** A step is divided into at most two to this power. */
 const int LARGEST_DIVISION = 10;
 
@@ -135,14 +141,15 @@ bool NetworkStep::iterate(const Attempt& attempt, int stage) {
                         couplings[i]->setCompliances(compliances.data()+12*first[i]);
             }
         }
-        coupled.advance(stepsOfPacks, unfinished, attempt.loop);
+        const double share = iteration < UNDAMPED_ITERATIONS ? 1 : DAMPING;
+        coupled.advance(stepsOfPacks, share, unfinished, attempt.loop);
         iterations++;
         attempt.loop(numPacks, [&] (int pack) {
             steps[pack]->getPositions(attempt.positions, moved.data());
         });
         bool more = false;
         for (size_t i = 0; i < couplings.size(); i++)
-            more |= couplings[i]->finishIteration(coupled.getMoves().data()+3*first[i]);
+            more |= couplings[i]->finishIteration(coupled.getMoves().data()+3*first[i], moved.data());
         for (int pack = 0; pack < numPacks; pack++) {
             const size_t lanes = engine.getChainsOfLanes(packs[pack]).size();
             more |= any_of(unfinished[pack].get(), unfinished[pack].get()+lanes, [] (bool flag) {return flag;});

@@ -55,11 +55,11 @@ public:
                 findCompliance(terms[next-1], first, both, second, compliances+6*(next-1));
         });
     }
-    void advance(const double* forces, bool* unfinished) override {
+    void advance(const double* forces, double share, bool* unfinished) override {
         spreadForces(forces);
         step->getEquations().setForcesOfOthers(forcesOnNodes);
         step->getEquations().addForcesOfOthers();
-        step->advance(y, iteration, active);
+        step->advance(y, iteration, active*splat<Real>(share));
         step->getEquations().setForcesOfOthers(NULL);
         iteration++;
         Real still = active;

@@ -56,9 +56,10 @@ public:
      * End the iteration: add what forces on the places of the terms do, and move the nodes.
      *
      * @param forces      three numbers for each term
+     * @param share       how much of the change of nodes to make
      * @param unfinished  receives, for each lane, whether another iteration is needed
      */
-    virtual void advance(const double* forces, bool* unfinished) = 0;
+    virtual void advance(const double* forces, double share, bool* unfinished) = 0;
     /** Find lanes a segment of which changes by too much, so that the step must be divided. */
     virtual void findExcessiveChanges(bool* failed) const = 0;
     /** Write where the nodes of the lanes that take the step are, if they began at some positions. */
