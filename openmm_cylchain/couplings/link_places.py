@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..errors import InputError
+from ..filaments.attachments import SAME_PLACE
 from ..filaments.segment_place import SegmentPlace
 from ..mechanics.geometry import to_nearest_images
 from ..units.quantities import LENGTH, vector, whole_number
@@ -160,11 +161,12 @@ class LinkPlaces:
         first = np.where(turned, self.partners, self.pairs)
         second = np.where(turned, self.pairs, self.partners)
         fraction = np.where(turned, 1.0 - self.fractions, self.fractions)
-        first = np.where(self.on_segments & (fraction == 1.0), second, first)
-        at_one = ~self.on_segments | (fraction == 0.0) | (fraction == 1.0)
+        at_second = self.on_segments & (fraction > 1.0 - SAME_PLACE)
+        first = np.where(at_second, second, first)
+        at_one = ~self.on_segments | at_second | (fraction < SAME_PLACE)
         second, fraction = np.where(at_one, NOWHERE, second), np.where(at_one, 0.0, fraction)
-        equal = [column[:, 0] == column[:, 1] for column in (first, second, fraction)]
-        return np.logical_and.reduce(equal)
+        equal = [column[:, 0] == column[:, 1] for column in (first, second)]
+        return equal[0] & equal[1] & (np.abs(fraction[:, 0] - fraction[:, 1]) < SAME_PLACE)
 
     def _describe(self, row, side):
         particle, partner = self.pairs[row, side], self.partners[row, side]

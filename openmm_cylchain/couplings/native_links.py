@@ -30,6 +30,12 @@ def is_of_compiled_engine(system: openmm.System) -> bool:
     return plugin is not None and any(plugin.CylinderChainForce.isinstance(force) for force in system.getForces())
 
 
+def is_link_force(force: openmm.Force) -> bool:
+    """Whether a force of a System is a CylinderChainLinkForce."""
+    plugin = _load_plugin()
+    return plugin is not None and plugin.CylinderChainLinkForce.isinstance(force)
+
+
 class NativeLinks(LinkStore):
     """The crosslinks of a CylinderChainLinkForce of a System.
 
@@ -60,9 +66,9 @@ class NativeLinks(LinkStore):
     @classmethod
     def of_force(cls, force: openmm.Force, order: int | None = None) -> "NativeLinks | None":
         """Those of a force of a System, or None if it is no such force, or its links differ in their potential."""
-        plugin = _load_plugin()
-        if plugin is None or not plugin.CylinderChainLinkForce.isinstance(force):
+        if not is_link_force(force):
             return None
+        plugin = _load_plugin()
         own = plugin.CylinderChainLinkForce.cast(force)
         models, links = own.getStretchingModelNames(), own.getLinks()
         number, rest, stiffness, extension = (getattr(one, "_value", one) for one in own.getDefaultLinkParameters())

@@ -22,6 +22,7 @@ from scipy.sparse import csr_array
 
 from ..couplings.contacts import CONTACT_STIFFNESS, is_contact_force
 from ..couplings.crosslinks import Crosslinks
+from ..couplings.native_links import is_link_force
 from ..couplings.pulling import is_constant_force
 from ..couplings.walls import WALL_NAME
 from ..errors import TimeStepWarning
@@ -379,8 +380,8 @@ class ExplicitForces:
     def _read(self, force, label):
         # A list of Springs, or None where the stiffness is not known.
         links = Crosslinks.of_force(force)
-        if links is not None:
-            return self._crosslinks(links, label)
+        if links is not None or is_link_force(force):
+            return None if links is None else self._crosslinks(links, label)
         if force.getName().startswith("CylinderChain") or isinstance(force, _WITHOUT_STIFFNESS):
             return []
         if isinstance(force, openmm.HarmonicBondForce):

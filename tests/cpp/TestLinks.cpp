@@ -105,6 +105,7 @@ static void testRangesAndDirections() {
 
 static void testSamePlaces() {
     check(areSame(between(0, 1, 0.25), between(1, 0, 0.75)), "turned");
+    check(areSame(between(0, 1, 0.3), between(1, 0, 1-0.3)), "turned, and rounded");
     check(areSame(between(0, 1, 0), at(0)) && areSame(between(0, 1, 1), at(1)), "at ends");
     check(areSame(point(1, 2, 3), point(1, 2, 3)) && !areSame(point(1, 2, 3), point(1, 2, 4)), "points");
     check(!areSame(between(0, 1, 0.25), between(0, 1, 0.3)) && !areSame(between(0, 1, 0.5), between(0, 2, 0.5)),
