@@ -18,6 +18,7 @@ from .errors import ContactWarning, EquilibrationWarning, InputError, Instabilit
 from .filaments.attachments import Attachment
 from .filaments.filament import Filament, Tether
 from .filaments.filament_type import DSDNA, F_ACTIN, MICROTUBULE, FilamentType
+from .filaments.segment_place import SegmentPlace
 from .mechanics.flow import Flow
 from .mechanics.friction import EndCorrections, SegmentFriction, stokes_friction
 from .output.reporters import CrosslinkReporter, FilamentReporter, TensionReporter, TetherReporter
@@ -55,6 +56,7 @@ __all__ = [
     "ObservableCheck",
     "Plane",
     "SegmentFriction",
+    "SegmentPlace",
     "Slab",
     "Sphere",
     "StepCheck",

@@ -7,6 +7,7 @@ from ..errors import InputError, note_raised_in_force
 from ..mechanics.potentials import STRETCHING_POTENTIALS
 from ..units.types import FloatArray
 from .crosslink_tables import RECENT_TABLES, TABLES, CrosslinkTable
+from .link_store import unknown_crosslinks
 
 
 class CrosslinkComputation:
@@ -41,60 +42,83 @@ class CrosslinkComputation:
             return self.initial
         table = TABLES.find(int(identity))
         if table is None:
-            raise InputError(
-                "The crosslinks of this Context are not known: its State or checkpoint was saved in another process, "
-                f"or more than {RECENT_TABLES} changes ago. Give the crosslinks that belong to it with "
-                "Crosslinks.set_table (those that Crosslinks.table returned when it was saved) or Crosslinks.set_pairs."
-            )
+            raise unknown_crosslinks(RECENT_TABLES)
         return table
-
-    def geometry(
-        self, table: CrosslinkTable, state: openmm.State, positions: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Lengths (n,) of crosslinks and vectors (n, 3) from their first to their second particles, in nm."""
-        box = state.getPeriodicBoxVectors(asNumpy=True)._value if self.periodic else None
-        vectors = table.displacements(positions, box)
-        lengths = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
-        if self.model == "fene":
-            _check_extensions(table, lengths)
-        return lengths, vectors
-
-    def slopes(self, table: CrosslinkTable, lengths: FloatArray) -> FloatArray:
-        """Derivatives dV/dd (n,) in kJ/(mol nm)."""
-        derivative = STRETCHING_POTENTIALS[self.model].derivative
-        return derivative(table.stiffness, table.rest_length, table.maximum_extension, lengths)
-
-    def energy(self, table: CrosslinkTable, lengths: FloatArray) -> float:
-        """Energy of all crosslinks in kJ/mol."""
-        energy = STRETCHING_POTENTIALS[self.model].energy
-        return float(np.sum(energy(table.stiffness, table.rest_length, table.maximum_extension, lengths)))
 
     def __call__(self, state: openmm.State) -> tuple[float, FloatArray]:
         table = self.table(state.getParameters()[self.parameter])
         positions = state.getPositions(asNumpy=True)._value
         if not len(table):
             return 0.0, np.zeros_like(positions)
-        lengths, vectors = self.geometry(table, state, positions)
-        # Where particles coincide the force has no direction and is zero, as OpenMM has it.
-        slopes = np.divide(self.slopes(table, lengths), lengths, out=np.zeros_like(lengths), where=lengths > 0)
-        pulls = slopes[:, None] * vectors
-        pulls = np.concatenate([pulls, -pulls])
+        box = state.getPeriodicBoxVectors(asNumpy=True)._value if self.periodic else None
+        lengths, vectors = lengths_and_vectors(self.model, table, positions, box)
+        # Where places coincide the force has no direction and is zero, as OpenMM has it.
+        slopes = slopes_of(self.model, table, lengths)
+        pulls = np.divide(slopes, lengths, out=np.zeros_like(lengths), where=lengths > 0)[:, None] * vectors
+        particles, links, shares = table.places.holders
+        pulls = shares[:, None] * pulls[links]
         forces = np.empty_like(positions)
         for axis in range(3):
-            forces[:, axis] = np.bincount(table.particles, weights=pulls[:, axis], minlength=len(positions))
-        return self.energy(table, lengths), forces
+            forces[:, axis] = np.bincount(particles, weights=pulls[:, axis], minlength=len(positions))
+        return _energy(self.model, table, lengths), forces
+
+
+def lengths_and_vectors(
+    model: str,
+    table: CrosslinkTable,
+    positions: FloatArray,
+    box: FloatArray | None,
+    segment_box: FloatArray | None = None,
+) -> tuple[FloatArray, FloatArray]:
+    """Lengths (n,) of crosslinks and vectors (n, 3) from their first to their second places, in nm.
+
+    Parameters
+    ----------
+    model : {"harmonic", "fene"}
+    table : CrosslinkTable
+    positions : (particles, 3) array
+    box, segment_box : (3, 3) array, optional
+        As for ``CrosslinkTable.displacements``.
+
+    Raises
+    ------
+    InputError
+        If a crosslink that is on has a length that its potential does not allow.
+    """
+    vectors = table.displacements(positions, box, segment_box)
+    lengths = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
+    if model == "fene":
+        _check_extensions(table, lengths)
+    return lengths, vectors
+
+
+def slopes_of(model: str, table: CrosslinkTable, lengths: FloatArray) -> FloatArray:
+    """Derivatives dV/dd (n,) in kJ/(mol nm); zero for crosslinks that are off."""
+    return _where_active(table, lengths, STRETCHING_POTENTIALS[model].derivative)
+
+
+def _energy(model, table, lengths):
+    return float(np.sum(_where_active(table, lengths, STRETCHING_POTENTIALS[model].energy)))
+
+
+def _where_active(table, lengths, function):
+    columns = (table.stiffness, table.rest_length, table.maximum_extension, lengths)
+    if np.all(table.active):
+        return function(*columns)
+    values = np.zeros_like(lengths)
+    values[table.active] = function(*(column[table.active] for column in columns))
+    return values
 
 
 def _check_extensions(table, lengths):
     # Written so that NaN counts as too long.
-    broken = ~(np.abs(lengths - table.rest_length) < table.maximum_extension)
+    broken = ~(np.abs(lengths - table.rest_length) < table.maximum_extension) & table.active
     if broken.any():
         row = int(np.argmax(broken))
-        first, second = table.pairs[row]
         error = InputError(
-            f"Crosslink {table.numbers[row]} between particles {first} and {second} has blown up: its length of "
+            f"Crosslink {table.numbers[row]} {table.places.describe(row)} has blown up: its length of "
             f"{lengths[row]:.6g} nm is outside {table.rest_length[row]:g} -/+ {table.maximum_extension[row]:g} nm of "
-            "the FENE potential. Use a smaller time step, or look for particles that are too far apart."
+            "the FENE potential. Use a smaller time step, or look for places that are too far apart."
         )
         note_raised_in_force(error)
         raise error

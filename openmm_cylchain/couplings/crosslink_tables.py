@@ -14,12 +14,16 @@ import openmm
 
 from ..errors import InputError
 from ..mechanics.geometry import to_nearest_images
-from ..units.types import FloatArray, IntArray
+from ..units.types import BoolArray, FloatArray, IntArray
+from .link_places import PLACE_COLUMNS, LinkPlaces
 
 RECENT_TABLES = 256
 """Changes of crosslinks that one can go back."""
 
 _COLUMNS = ("numbers", "pairs", "stiffness", "rest_length", "maximum_extension")
+# They may be missing: then there are no other places than particles, and all crosslinks are on.
+_FURTHER = ("partners", "fractions", "points", "active")
+_WHOLE = ("numbers", "pairs", "partners")
 
 
 def _empty(columns, kind):
@@ -35,7 +39,8 @@ class CrosslinkTable:
     numbers : (n,) int array
         The numbers by which crosslinks are known, in ascending order.
     pairs : (n, 2) int array
-        Their particles.
+        Their particles. The one at fraction 0 where a place is on a segment; -1 where the second place is a fixed
+        point.
     stiffness : (n,) array
         k in kJ/(mol nm^2).
     rest_length : (n,) array
@@ -44,6 +49,14 @@ class CrosslinkTable:
         D in nm; infinite for harmonic crosslinks.
     next_number : int
         The number of the next crosslink.
+    partners : (n, 2) int array
+        The particles at fraction 1 where places are on segments, and -1 where they are not.
+    fractions : (n, 2) array
+        Where places are on segments.
+    points : (n, 3) array
+        The second places, in nm, where they are fixed points.
+    active : (n,) bool array
+        Whether crosslinks are switched on.
     """
 
     numbers: IntArray = _empty((), int)
@@ -52,19 +65,32 @@ class CrosslinkTable:
     rest_length: FloatArray = _empty((), float)
     maximum_extension: FloatArray = _empty((), float)
     next_number: int = 0
+    partners: IntArray = _empty((2,), int)
+    fractions: FloatArray = _empty((2,), float)
+    points: FloatArray = _empty((3,), float)
+    active: BoolArray = _empty((), bool)
 
     def __post_init__(self) -> None:
         for name in _COLUMNS:
-            kind = np.int64 if name in ("numbers", "pairs") else np.float64
-            column = np.array(getattr(self, name), dtype=kind)
-            column.setflags(write=False)
-            object.__setattr__(self, name, column)
+            self._set(name, np.array(getattr(self, name), dtype=np.int64 if name in _WHOLE else np.float64))
+        places = LinkPlaces(*(getattr(self, name) for name in PLACE_COLUMNS))
+        for name in PLACE_COLUMNS:
+            self._set(name, getattr(places, name))
+        # They share their arrays.
+        object.__setattr__(self, "_places", places)
+        active = np.array(self.active, dtype=bool)
+        self._set("active", active if len(active) else np.ones(len(self.numbers), dtype=bool))
         self._check()
+
+    def _set(self, name, column):
+        column.setflags(write=False)
+        object.__setattr__(self, name, column)
 
     def _check(self):
         count = len(self.numbers)
-        shapes = [getattr(self, name).shape for name in _COLUMNS]
-        if shapes != [(count,), (count, 2), (count,), (count,), (count,)]:
+        shapes = [getattr(self, name).shape for name in (*_COLUMNS, *_FURTHER)]
+        expected = [(count,), (count, 2), (count,), (count,), (count,), (count, 2), (count, 2), (count, 3), (count,)]
+        if shapes != expected:
             raise InputError(f"The columns of a table of crosslinks do not have equal lengths: {shapes}.")
         bounded = np.concatenate([[-1], self.numbers, [self.next_number]])
         if not np.all(np.diff(bounded) > 0):
@@ -72,6 +98,8 @@ class CrosslinkTable:
         # Written so that NaN is refused.
         if not (np.all(self.stiffness > 0) and np.all(self.rest_length >= 0) and np.all(self.maximum_extension > 0)):
             raise InputError("A table of crosslinks must hold parameters that are positive (rest_length may be zero).")
+        if not (np.all(self.fractions >= 0) and np.all(self.fractions <= 1) and np.all(np.isfinite(self.points))):
+            raise InputError("A table of crosslinks must hold fractions between 0 and 1, and finite points.")
 
     def __len__(self) -> int:
         return len(self.numbers)
@@ -83,7 +111,16 @@ class CrosslinkTable:
         return hash(self.identity)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {name: getattr(self, name) for name in (*_COLUMNS, "next_number")}
+        return {name: getattr(self, name) for name in (*_COLUMNS, "next_number", *_FURTHER)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        # Earlier versions have stored tables without the further columns.
+        self.__init__(**state)  # type: ignore[misc]
+
+    @property
+    def places(self) -> LinkPlaces:
+        """What the crosslinks join."""
+        return self.__dict__["_places"]
 
     @cached_property
     def identity(self) -> int:
@@ -91,38 +128,50 @@ class CrosslinkTable:
         digest = hashlib.blake2b(np.int64(self.next_number).tobytes(), digest_size=8)
         for name in _COLUMNS:
             digest.update(getattr(self, name).tobytes())
+        if not (self.places.are_particles and np.all(self.active)):
+            for name in _FURTHER:
+                digest.update(getattr(self, name).tobytes())
         return int.from_bytes(digest.digest(), "little") >> 11
 
-    @cached_property
-    def particles(self) -> IntArray:
-        """The first particles of all crosslinks and then the second."""
-        return self.pairs.T.ravel()
-
     def with_links(
-        self, pairs: IntArray, stiffness: float, rest_length: float, maximum_extension: float
+        self, places: LinkPlaces, stiffness: float, rest_length: float, maximum_extension: float
     ) -> "CrosslinkTable":
         """This table with further crosslinks of equal parameters, numbered on."""
-        count = len(pairs)
+        count = len(places)
+        both = self.places.with_places(places)
         return CrosslinkTable(
             np.concatenate([self.numbers, self.next_number + np.arange(count)]),
-            np.concatenate([self.pairs, pairs]),
+            both.pairs,
             np.concatenate([self.stiffness, np.full(count, stiffness)]),
             np.concatenate([self.rest_length, np.full(count, rest_length)]),
             np.concatenate([self.maximum_extension, np.full(count, maximum_extension)]),
             self.next_number + count,
+            both.partners,
+            both.fractions,
+            both.points,
+            np.concatenate([self.active, np.ones(count, dtype=bool)]),
         )
 
     def without(self, numbers: IntArray) -> "CrosslinkTable":
         """This table without some crosslinks; raises InputError for a number that is not there or named twice."""
+        rest = np.delete(np.arange(len(self)), self._rows_of(numbers, "removed"))
+        return replace(self, **{name: getattr(self, name)[rest] for name in (*_COLUMNS, *_FURTHER)})
+
+    def switched(self, numbers: IntArray, active: bool) -> "CrosslinkTable":
+        """This table with some crosslinks on or off; raises InputError as ``without`` does."""
+        switched = np.array(self.active)
+        switched[self._rows_of(numbers, "switched")] = active
+        return replace(self, active=switched)
+
+    def _rows_of(self, numbers, what):
         rows = np.searchsorted(self.numbers, numbers)
         known = rows < len(self)
         known[known] = self.numbers[rows[known]] == numbers[known]
         if not known.all():
             raise InputError(f"Crosslink {numbers[~known][0]} does not exist.")
         if len(np.unique(numbers)) < len(numbers):
-            raise InputError("A crosslink to be removed is named twice.")
-        rest = np.delete(np.arange(len(self)), rows)
-        return replace(self, **{name: getattr(self, name)[rest] for name in _COLUMNS})
+            raise InputError(f"A crosslink to be {what} is named twice.")
+        return rows
 
     def save(self, file: str | Path | IO[bytes]) -> None:
         """Write the table to a file (.npz), for ``CrosslinkTable.load`` in another process."""
@@ -135,12 +184,24 @@ class CrosslinkTable:
             missing = {*_COLUMNS, "next_number"} - set(content.files)
             if missing:
                 raise InputError(f"{file} holds no table of crosslinks: it lacks {', '.join(sorted(missing))}.")
-            return cls(**{name: content[name] for name in _COLUMNS}, next_number=int(content["next_number"]))
+            columns = {name: content[name] for name in (*_COLUMNS, *_FURTHER) if name in content.files}
+            return cls(**columns, next_number=int(content["next_number"]))
 
-    def displacements(self, positions: FloatArray, box: FloatArray | None = None) -> FloatArray:
-        """Vectors (n, 3) from first to second particles, to nearest images in a box (3, 3) if one is given."""
-        ends = positions[self.particles]
-        vectors = ends[len(self) :] - ends[: len(self)]
+    def displacements(
+        self, positions: FloatArray, box: FloatArray | None = None, segment_box: FloatArray | None = None
+    ) -> FloatArray:
+        """Vectors (n, 3) from first to second places.
+
+        Parameters
+        ----------
+        positions : (particles, 3) array
+            In nm.
+        box : (3, 3) array, optional
+            Of which to take the nearest images of places.
+        segment_box : (3, 3) array, optional
+            Of which to take the nearest images of the two particles of a place.
+        """
+        vectors = self.places.positions(positions, 1, segment_box) - self.places.positions(positions, 0, segment_box)
         return vectors if box is None else to_nearest_images(vectors, box)
 
 

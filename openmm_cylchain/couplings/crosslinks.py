@@ -1,35 +1,36 @@
-"""Crosslinks: springs between particles that come and go while a simulation runs.
+"""Crosslinks: springs between two places that come and go while a simulation runs.
 
-A crosslink joins two particles, which may be attachment points or nodes of filaments or anything else, with the energy
-of their distance d
+A crosslink joins two places with the energy of their distance d
 
     harmonic    (k/2) (d - d0)^2
     fene        -(k/2) D^2 ln(1 - ((d - d0)/D)^2)
 
-A PythonForce computes them on any platform. Which ones there are is a table that never changes: adding or removing a
-crosslink makes another one. A context parameter holds the identity of the table that a Context uses, a digest of what
-the table holds. So Contexts of one System have crosslinks of their own, States and checkpoints say which belong to
-them, and one that comes from elsewhere cannot be taken for another.
+A place is a particle, which may be an attachment point or a node of a filament or anything else; a place on a segment;
+or, for one of the two, a point that does not move. Where the places coincide, the force has no direction and is zero.
+
+Where a System has filaments of the compiled engine, its CylinderChainLinkForce computes them; elsewhere a PythonForce
+does, on any platform. Which crosslinks there are belongs to each Context. A context parameter holds a digest of them:
+so States and checkpoints say which belong to them, and one that comes from elsewhere cannot be taken for another.
 """
 
-import pickle
-import xml.etree.ElementTree as ElementTree
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import openmm
 
 from ..errors import InputError
+from ..filaments.segment_place import SegmentPlace
 from ..mechanics.potentials import STRETCHING_POTENTIALS
 from ..units.quantities import LENGTH, STIFFNESS, non_negative, positive, thermal_energy, whole_number
-from ..units.types import FloatArray, FloatOrArray, Indices, IntArray, Scalar
-from .crosslink_computation import CrosslinkComputation
-from .crosslink_tables import TABLES, CrosslinkTable
+from ..units.types import FloatArray, FloatOrArray, Indices, IntArray, Scalar, Vector
+from .crosslink_computation import lengths_and_vectors, slopes_of
+from .crosslink_tables import CrosslinkTable
+from .link_places import as_places
+from .link_store import LinkStore
+from .native_links import NativeLinks, is_of_compiled_engine
+from .portable_links import PortableLinks
 
 CROSSLINKS_NAME = "Crosslinks"
-
-_PARAMETER = "crosslink_table"
 
 
 class Crosslinks:
@@ -59,11 +60,13 @@ class Crosslinks:
 
     Notes
     -----
-    States and checkpoints of OpenMM hold the identity of a table of crosslinks, not the crosslinks. In the process that
-    saved them, going back restores those that there were then, up to 256 changes ago. In another process, any step or
-    energy raises an error that asks for them: save ``table(context)`` beside the checkpoint
-    (``CrosslinkTable.save``) and give it to ``set_table``. It does not matter whether this is done before or after the
-    checkpoint is loaded.
+    With an integrator of the compiled engine, checkpoints hold the crosslinks themselves, and so do States with
+    ``integratorParameters=True`` (those of ``Simulation.saveState``): they restore them in any Context and process.
+
+    All other States and checkpoints hold a digest of the crosslinks. Going back to one restores those that the Context
+    had then, up to 256 changes ago. Elsewhere, any step or energy raises an error that asks for them: save
+    ``table(context)`` beside the checkpoint (``CrosslinkTable.save``) and give it to ``set_table``. It does not matter
+    whether this is done before or after the checkpoint is loaded.
 
     Examples
     --------
@@ -94,7 +97,7 @@ class Crosslinks:
         self._model = model
         self._defaults = self._described("Crosslinks:", stiffness, rest_length, maximum_extension)
         self._initial = CrosslinkTable()
-        self._computation: Any = None
+        self._store: LinkStore | None = None
 
     @classmethod
     def from_system(cls, system: openmm.System) -> "list[Crosslinks]":
@@ -105,24 +108,28 @@ class Crosslinks:
         list of Crosslinks
             In the order in which they were added.
         """
-        found = (cls.of_force(force) for force in system.getForces())
-        return [links for links in found if links is not None]
+        found: list[Crosslinks] = []
+        native = 0
+        for force in system.getForces():
+            store = PortableLinks.of_force(force) or NativeLinks.of_force(force, native)
+            native += isinstance(store, NativeLinks)
+            if store is not None:
+                found.append(cls._of(store))
+        return found
 
     @classmethod
     def of_force(cls, force: openmm.Force) -> "Crosslinks | None":
-        """The Crosslinks of a force of a System, or None if it is no force of crosslinks."""
-        if not _parameters_of(force):
-            return None
-        content = ElementTree.fromstring(openmm.XmlSerializer.serialize(force)).attrib["function"]
-        return cls._of(pickle.loads(bytes.fromhex(content)))
+        """The Crosslinks of a force of a System, or None if it is no force of crosslinks of one potential."""
+        store = PortableLinks.of_force(force) or NativeLinks.of_force(force)
+        return None if store is None else cls._of(store)
 
     @classmethod
-    def _of(cls, computation):
+    def _of(cls, store):
         links = cls.__new__(cls)
-        links._model = computation.model
-        links._defaults = computation.defaults
-        links._initial = computation.initial
-        links._computation = computation
+        links._model = store.model
+        links._defaults = store.defaults
+        links._initial = store.initial
+        links._store = store
         return links
 
     @property
@@ -130,59 +137,58 @@ class Crosslinks:
         """The potential: "harmonic" or "fene"."""
         return self._model
 
-    def add_to(self, system: openmm.System, force_group: int = 0, periodic: bool | None = None) -> openmm.PythonForce:
-        """Add the force to a System, when its particles are there and before the integrator is created.
+    def add_to(self, system: openmm.System, force_group: int = 0, periodic: bool | None = None) -> openmm.Force:
+        """Add the force to a System, when its filaments and particles are there and before the integrator is created.
 
         Parameters
         ----------
         system : openmm.System
         force_group : int
         periodic : bool, optional
-            Whether a crosslink joins the nearest images of its particles; whether the System has another force that
+            Whether a crosslink joins the nearest images of its places; whether the System has another force that
             does so if not given.
 
         Returns
         -------
-        openmm.PythonForce
+        openmm.Force
+            A CylinderChainLinkForce if the System has filaments of the compiled engine, or else a PythonForce.
 
         Raises
         ------
         InputError
             If these crosslinks are in a System already, or join particles that it does not have.
         """
-        if self._computation is not None:
+        if self._store is not None:
             raise InputError("These crosslinks are already in a System; make another Crosslinks for another System.")
         if whole_number(force_group, 0, "force_group") > 31:
             raise InputError(f"force_group must be between 0 and 31, but is {force_group}.")
-        _check_pairs(self._initial.pairs, self._initial.numbers, system.getNumParticles())
+        self._initial.places.check(self._initial.numbers, system.getNumParticles())
         periodic = system.usesPeriodicBoundaryConditions() if periodic is None else bool(periodic)
-        taken = [name for force in system.getForces() for name in _parameters_of(force)]
-        parameter = f"{_PARAMETER}_{len(taken)}"
-        computation = CrosslinkComputation(parameter, self._model, self._initial, periodic, self._defaults)
-        force = openmm.PythonForce(computation, {parameter: float(self._initial.identity)})
+        kind: Any = NativeLinks if is_of_compiled_engine(system) else PortableLinks
+        store, force = kind.make_for(system, self._model, self._initial, periodic, self._defaults)
         force.setName(CROSSLINKS_NAME)
         force.setForceGroup(int(force_group))
-        force.setUsesPeriodicBoundaryConditions(periodic)
         system.addForce(force)
-        self._computation = computation
+        self._store = store
         return force
 
     def add(
         self,
         context: openmm.Context | None,
-        first: int,
-        second: int,
+        first: int | SegmentPlace | Vector,
+        second: int | SegmentPlace | Vector,
         stiffness: Scalar | None = None,
         rest_length: Scalar | None = None,
         maximum_extension: Scalar | None = None,
     ) -> int:
-        """Add a crosslink between two particles.
+        """Add a crosslink between two places.
 
         Parameters
         ----------
         context : openmm.Context or None
-        first, second : int
-            Particle indices. A particle may have any number of crosslinks.
+        first, second : int, SegmentPlace, or (3,) length
+            A particle index; a place on a segment, such as ``Filaments.segment_place`` returns; or, for one of the two,
+            a point that does not move. A place may have any number of crosslinks.
         stiffness, rest_length, maximum_extension : optional
             Of this crosslink, if they differ from those of the others.
 
@@ -194,20 +200,55 @@ class Crosslinks:
         Raises
         ------
         InputError
-            For a particle that does not exist, a crosslink of a particle to itself, or a bad parameter.
+            For a particle that does not exist, a crosslink of a place to itself, or a bad parameter.
         """
-        table = self.table(context)
-        number = table.next_number
-        pairs = _as_pairs([[first, second]])
-        _check_pairs(pairs, [number], None if context is None else context.getSystem().getNumParticles())
+        return int(self.add_many(context, [(first, second)], stiffness, rest_length, maximum_extension)[0])
+
+    def add_many(
+        self,
+        context: openmm.Context | None,
+        pairs: Any,
+        stiffness: Scalar | None = None,
+        rest_length: Scalar | None = None,
+        maximum_extension: Scalar | None = None,
+    ) -> IntArray:
+        """Add many crosslinks at once, which is much faster than one by one.
+
+        Parameters
+        ----------
+        context : openmm.Context or None
+        pairs : (n, 2) array of int, or sequence of n pairs of places
+            What each of them joins, as for ``add``. An int array is taken fastest.
+        stiffness, rest_length, maximum_extension : optional
+            Of these crosslinks, if they differ from those of the others.
+
+        Returns
+        -------
+        (n,) int array
+            The numbers of the crosslinks.
+
+        Raises
+        ------
+        InputError
+            As for ``add``; none of them is added then.
+        """
+        store = self._store_for(context)
+        number = self._initial.next_number if store is None else store.next_number(context)
+        places = as_places(pairs)
+        numbers = number + np.arange(len(places))
+        places.check(numbers, None if context is None else context.getSystem().getNumParticles())
         default = self._defaults
         given = (
             default[0] if stiffness is None else stiffness,
             default[1] if rest_length is None else rest_length,
             self._default_extension() if maximum_extension is None else maximum_extension,
         )
-        self._replace(context, table.with_links(pairs, *self._described(f"Crosslink {number}:", *given)))
-        return number
+        parameters = self._described(f"Crosslink {number}:", *given)
+        if store is None:
+            self._initial = self._initial.with_links(places, *parameters)
+        elif len(places):
+            store.add(context, places, parameters)
+        return numbers
 
     def remove(self, context: openmm.Context | None, numbers: int | Indices) -> None:
         """Remove a crosslink, or several at once.
@@ -222,34 +263,64 @@ class Crosslinks:
         InputError
             For a number that is not that of a crosslink of this Context.
         """
-        numbers = np.atleast_1d(np.asarray(numbers, dtype=object)).ravel()
-        numbers = np.array([whole_number(number, 0, "The number of a crosslink") for number in numbers], dtype=int)
-        self._replace(context, self.table(context).without(numbers))
+        chosen, store = _as_numbers(numbers), self._store_for(context)
+        if store is None:
+            self._initial = self._initial.without(chosen)
+        else:
+            store.remove(context, chosen)
+
+    def set_active(self, context: openmm.Context | None, numbers: int | Indices, active: bool) -> None:
+        """Switch a crosslink, or several at once, on or off.
+
+        One that is off exerts no force, but keeps its number, places and parameters. ``table(context).active`` says
+        which are on.
+
+        Parameters
+        ----------
+        context : openmm.Context or None
+        numbers : int or sequence of int
+        active : bool
+
+        Raises
+        ------
+        InputError
+            For a number that is not that of a crosslink of this Context.
+        """
+        chosen, store = _as_numbers(numbers), self._store_for(context)
+        if store is None:
+            self._initial = self._initial.switched(chosen, bool(active))
+        else:
+            store.switch(context, chosen, bool(active))
 
     def pairs(self, context: openmm.Context | None) -> IntArray:
-        """The particles of all crosslinks of a Context: an int array (n, 2), in the order of ``numbers``."""
+        """The particles of all crosslinks of a Context: an int array (n, 2), in the order of ``numbers``.
+
+        Of a place on a segment, the particle at fraction 0; -1 for a fixed point, which is always the second place.
+        ``table(context)`` has the rest.
+        """
         return self.table(context).pairs
 
     def numbers(self, context: openmm.Context | None) -> IntArray:
         """The numbers of all crosslinks of a Context: an int array (n,), ascending."""
         return self.table(context).numbers
 
-    def set_pairs(self, context: openmm.Context | None, pairs: npt.ArrayLike) -> None:
+    def set_pairs(self, context: openmm.Context | None, pairs: Any) -> None:
         """Replace all crosslinks of a Context by others with the common parameters, numbered from 0.
 
         Parameters
         ----------
         context : openmm.Context or None
-        pairs : (n, 2) array of int
+        pairs : (n, 2) array of int, or sequence of n pairs of places
+            As for ``add_many``.
 
         Raises
         ------
         InputError
-            For particles that do not exist, or a crosslink of a particle to itself.
+            For particles that do not exist, or a crosslink of a place to itself.
         """
-        pairs = _as_pairs(pairs)
-        _check_pairs(pairs, range(len(pairs)), None if context is None else context.getSystem().getNumParticles())
-        self._replace(context, CrosslinkTable().with_links(pairs, *self._defaults))
+        places = as_places(pairs)
+        places.check(np.arange(len(places)), None if context is None else context.getSystem().getNumParticles())
+        self._replace(context, CrosslinkTable().with_links(places, *self._defaults))
 
     def table(self, context: openmm.Context | None) -> CrosslinkTable:
         """All crosslinks of a Context with their numbers and parameters: a CrosslinkTable, which never changes.
@@ -257,11 +328,11 @@ class Crosslinks:
         Raises
         ------
         InputError
-            If the Context has got a State or checkpoint whose crosslinks are not known in this process.
+            If the Context has got a State or checkpoint whose crosslinks are not known.
         """
         if context is None:
             return self._initial
-        return self._computation_in(context).table(context.getParameter(self._computation.parameter))
+        return self._store_in(context).table(context)
 
     def set_table(self, context: openmm.Context | None, table: CrosslinkTable) -> None:
         """Give a Context the crosslinks of a table, with the numbers and parameters that it holds."""
@@ -269,11 +340,11 @@ class Crosslinks:
             raise InputError(f"table must be a CrosslinkTable, as Crosslinks.table returns it, but is {table!r}.")
         if len(table) and np.all(np.isfinite(table.maximum_extension)) != (self._model == "fene"):
             raise InputError(f"The table is not one of crosslinks with model {self._model!r}.")
-        _check_pairs(table.pairs, table.numbers, None if context is None else context.getSystem().getNumParticles())
+        table.places.check(table.numbers, None if context is None else context.getSystem().getNumParticles())
         self._replace(context, table)
 
     def lengths(self, context: openmm.Context) -> FloatArray:
-        """Distances d between the particles of all crosslinks of a Context, in nm: an array (n,)."""
+        """Distances d between the places of all crosslinks of a Context, in nm: an array (n,)."""
         return self._measured(context)[1]
 
     def extensions(self, context: openmm.Context) -> FloatArray:
@@ -282,7 +353,10 @@ class Crosslinks:
         return lengths - table.rest_length
 
     def forces(self, context: openmm.Context) -> FloatArray:
-        """Forces dV/dd of all crosslinks of a Context, in kJ/(mol nm): an array (n,), positive where they pull."""
+        """Forces dV/dd of all crosslinks of a Context, in kJ/(mol nm): an array (n,), positive where they pull.
+
+        Zero of those that are off.
+        """
         return self._measured(context)[2]
 
     def measure(self, context: openmm.Context, state: openmm.State) -> tuple[CrosslinkTable, FloatArray, FloatArray]:
@@ -303,11 +377,13 @@ class Crosslinks:
         Raises
         ------
         InputError
-            If the crosslinks are not known in this process, or one is longer than its potential allows.
+            If the crosslinks are not known, or one is longer than its potential allows.
         """
-        table = self.table(context)
-        lengths, _ = self._computation.geometry(table, state, state.getPositions(asNumpy=True)._value)
-        return table, lengths, self._computation.slopes(table, lengths)
+        store = self._store_in(context)
+        table = store.table(context)
+        positions = state.getPositions(asNumpy=True)._value
+        lengths, _ = lengths_and_vectors(self._model, table, positions, *store.boxes(context, state))
+        return table, lengths, slopes_of(self._model, table, lengths)
 
     def thermal_stiffness(self, table: CrosslinkTable | None, temperature: Scalar) -> FloatOrArray:
         """Stiffness of crosslinks where thermal motion takes them, in kJ/(mol nm^2).
@@ -335,28 +411,31 @@ class Crosslinks:
         return stiffness * (1.0 + square) / (1.0 - square) ** 2
 
     def _measured(self, context):
-        self._computation_in(context)
+        self._store_in(context)
         return self.measure(context, context.getState(positions=True))
 
-    def _computation_in(self, context):
-        if self._computation is None:
+    def _store_in(self, context):
+        if self._store is None:
             raise InputError("These crosslinks are not in a System yet: call add_to before Contexts are created.")
         if not isinstance(context, openmm.Context):
             raise InputError(f"context must be an openmm.Context, but is {context!r}.")
-        if self._computation.parameter not in dict(context.getParameters()):
-            raise InputError("This Context is of a System that does not have these crosslinks.")
-        return self._computation
+        self._store.require(context)
+        return self._store
+
+    def _store_for(self, context):
+        # None where the crosslinks that new Contexts begin with are meant.
+        if context is not None:
+            return self._store_in(context)
+        if self._store is not None:
+            raise InputError("The crosslinks are in a System already: give the Context in which they shall change.")
+        return None
 
     def _replace(self, context, table):
-        if context is None:
-            if self._computation is not None:
-                raise InputError("The crosslinks are in a System already: give the Context in which they shall change.")
+        store = self._store_for(context)
+        if store is None:
             self._initial = table
-            return
-        parameter = self._computation_in(context).parameter
-        TABLES.hold(context, table)
-        # OpenMM drops forces that it may have kept.
-        context.setParameter(parameter, float(table.identity))
+        else:
+            store.replace(context, table)
 
     def _default_extension(self):
         return self._defaults[2] if self._model == "fene" else None
@@ -371,29 +450,9 @@ class Crosslinks:
         )
 
 
-def _parameters_of(force):
-    if not isinstance(force, openmm.PythonForce):
-        return []
-    return [name for name in dict(force.getGlobalParameters()) if name.startswith(_PARAMETER)]
-
-
-def _as_pairs(pairs: npt.ArrayLike) -> IntArray:
-    try:
-        array = np.asarray(pairs)
-    except ValueError:
-        array = np.asarray(None)
-    if array.size == 0 and array.dtype.kind != "O":
-        return np.zeros((0, 2), dtype=np.int64)
-    if array.ndim != 2 or array.shape[1] != 2:
-        raise InputError(f"pairs must have the shape (n, 2), but are {pairs!r}.")
-    return np.array([[whole_number(one, 0, "particle") for one in pair] for pair in array.tolist()], dtype=np.int64)
-
-
-def _check_pairs(pairs, numbers, particles):
-    for number, (first, second) in zip(numbers, pairs):
-        if first == second:
-            raise InputError(f"Crosslink {number} joins particle {first} to itself.")
-        if particles is not None and max(first, second) >= particles:
-            raise InputError(
-                f"Crosslink {number}: particle {max(first, second)} does not exist; the System has {particles}."
-            )
+def _as_numbers(numbers):
+    array = np.atleast_1d(np.asarray(numbers))
+    if array.dtype.kind in "iu" and np.all(array >= 0):
+        return array.ravel().astype(np.int64)
+    array = np.atleast_1d(np.asarray(numbers, dtype=object)).ravel()
+    return np.array([whole_number(number, 0, "The number of a crosslink") for number in array], dtype=np.int64)

@@ -22,6 +22,7 @@ from scipy.sparse import csr_array
 
 from ..couplings.contacts import CONTACT_STIFFNESS, is_contact_force
 from ..couplings.crosslinks import Crosslinks
+from ..couplings.native_links import is_link_force
 from ..couplings.pulling import is_constant_force
 from ..couplings.walls import WALL_NAME
 from ..errors import TimeStepWarning
@@ -122,6 +123,8 @@ class ExplicitForces:
         self._scheme = scheme
         self._other_friction = self._frictions(particle_friction)
         self._responses: dict[Any, FilamentResponse] = {}
+        # Places between two particles that have none of their own, with numbers behind those of all particles.
+        self._between: dict[tuple[int, int, float], int] = {}
         self.springs: list[Springs] = []
         unknown: list[str] = []
         for index, force in enumerate(system.getForces()):
@@ -274,7 +277,8 @@ class ExplicitForces:
         particles = np.unique(np.concatenate([np.zeros(0, int), *(np.r_[s.first, s.second] for s in self.springs)]))
         particles = particles[particles != _NOWHERE]
         # The last entry stands for _NOWHERE.
-        self._site_of = np.full(self._system.getNumParticles() + 1, -2)
+        self._between_of = {number: place for place, number in self._between.items()}
+        self._site_of = np.full(self._system.getNumParticles() + len(self._between) + 1, -2)
         self._site_of[_NOWHERE] = _NOWHERE
         places: dict[Any, int] = {}
         rows, columns, weights, unknown = [], [], [], []
@@ -294,6 +298,9 @@ class ExplicitForces:
 
     def _places_of(self, particle):
         # Weights of places: a friction, or a filament, a segment and a fraction. None where that is not known.
+        if particle in self._between_of:
+            first, second, fraction = self._between_of[particle]
+            return self._mean_place([first, second], [1.0 - fraction, fraction])
         if particle in self._node:
             number, node = self._node[particle]
             filament = self._filaments[number]
@@ -308,6 +315,9 @@ class ExplicitForces:
             return None
         parents = [site.getParticle(index) for index in range(site.getNumParticles())]
         weights = [site.getWeight(index) for index in range(site.getNumParticles())]
+        return self._mean_place(parents, weights)
+
+    def _mean_place(self, parents, weights):
         on_segment = self._on_segment(parents, weights)
         if on_segment is not None:
             return [(on_segment, 1.0)]
@@ -369,6 +379,9 @@ class ExplicitForces:
 
     def _read(self, force, label):
         # A list of Springs, or None where the stiffness is not known.
+        links = Crosslinks.of_force(force)
+        if links is not None or is_link_force(force):
+            return None if links is None else self._crosslinks(links, label)
         if force.getName().startswith("CylinderChain") or isinstance(force, _WITHOUT_STIFFNESS):
             return []
         if isinstance(force, openmm.HarmonicBondForce):
@@ -383,15 +396,14 @@ class ExplicitForces:
         if isinstance(force, openmm.PythonForce):
             if any(name.startswith("cylinder_chain") for name in dict(force.getGlobalParameters())):
                 return []
-            links = Crosslinks.of_force(force)
-            return None if links is None else self._crosslinks(links, label)
         return None
 
     def _crosslinks(self, links, label):
         table = links.table(None)
         if len(table):
             stiffness = links.thermal_stiffness(table, self._filaments.temperature)
-            return [Springs(label, "crosslink", table.numbers, table.pairs[:, 0], table.pairs[:, 1], stiffness)]
+            first, second = (self._holders(table.places, side) for side in (0, 1))
+            return [Springs(label, "crosslink", table.numbers, first, second, stiffness)]
         # Those to come may join any two places: ends of filaments move most.
         ends = [int(node) for nodes in self._filaments.node_indices for node in nodes[[0, -1]]]
         first, second = np.array(ends), np.roll(ends, 2)
@@ -403,6 +415,14 @@ class ExplicitForces:
                 label, "crosslink to come, on the end of filament", np.arange(len(first)) // 2, first, second, stiffness
             )
         ]
+
+    def _holders(self, places, side):
+        # Particles, and numbers behind all of them for places between two. Fixed points are nowhere.
+        particles = np.array(places.pairs[:, side])
+        for row in np.flatnonzero(places.on_segments[:, side]):
+            place = (int(particles[row]), int(places.partners[row, side]), float(places.fractions[row, side]))
+            particles[row] = self._between.setdefault(place, self._system.getNumParticles() + len(self._between))
+        return particles
 
     def _contacts(self, force, label):
         stiffness = next(

@@ -336,6 +336,10 @@ class NativeIntegrator(CylinderChainIntegrator):
             return InputError(f"{message} (openmm_cylchain.make_whole).")
         if error.kind == "length-out-of-range":
             return InputError(f"{message}.")
+        if error.kind == "unknown-links":
+            return InputError(f"{message}.")
+        if error.kind == "link-out-of-range":
+            return InstabilityError(message + self._advice)
         if error.kind in ("unstable-chain", "unstable-particle"):
             place = {"filament": error.chain, "segment": error.segment, "particle": error.particle, "step": error.step}
             return InstabilityError(message + self._advice, **place)

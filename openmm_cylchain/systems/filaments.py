@@ -32,6 +32,7 @@ from ..filaments.attachments import (
 from ..filaments.chain_type import ChainType
 from ..filaments.filament import Filament, Tether
 from ..filaments.placement import named_nodes
+from ..filaments.segment_place import SegmentPlace
 from ..mechanics.flow import Flow, as_flow
 from ..mechanics.redistribution import ChainSet
 from ..mechanics.tension import components_along, filament_tensions
@@ -381,6 +382,33 @@ class Filaments:
         self._refuse_if_built(label)
         filament = self._filament_number(filament, label)
         return self._attach(locate(self[filament], filament, label, arc_length, segment, fraction))
+
+    def segment_place(
+        self, filament: int, arc_length: Scalar | None = None, segment: int | None = None, fraction: float | None = None
+    ) -> SegmentPlace:
+        """A place on a filament that crosslinks can hold, at any time, without an attachment point.
+
+        Parameters
+        ----------
+        filament : int
+            The filament's number.
+        arc_length, segment, fraction
+            As for ``add_attachment``.
+
+        Returns
+        -------
+        SegmentPlace
+
+        Raises
+        ------
+        InputError
+            For a filament, segment or place that does not exist, or before ``build`` or ``add_to``.
+        """
+        label = "Place on a segment"
+        filament = self._filament_number(filament, label)
+        place = locate(self[filament], filament, label, arc_length, segment, fraction)
+        nodes = self.node_indices[filament]
+        return SegmentPlace(int(nodes[place.segment]), int(nodes[(place.segment + 1) % len(nodes)]), place.fraction)
 
     def add_beads(self, filament: int, spacing: Scalar) -> list[int]:
         """Cover a filament evenly with beads, on which contact forces act (see ``openmm_cylchain.couplings.contacts``).

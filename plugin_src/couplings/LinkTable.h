@@ -44,8 +44,7 @@ public:
     /** Find the entry of a number; NULL if there is none. */
     const LinkEntry* find(std::uint32_t number) const;
     /**
-     * Get a digest of all that the table holds: 52 bits, which a double holds exactly. An empty table with which no link
-     * was ever has that of no other.
+     * Get a digest of all that the table holds: 52 bits, which a double holds exactly.
      */
     std::uint64_t getDigest() const;
     /** Change the table, and return what takes it back. */

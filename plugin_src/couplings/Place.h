@@ -25,7 +25,7 @@ struct Place {
     }
 };
 
-/** Whether two places are one, wherever particles are. */
+/** Whether two places are one, wherever particles are, but for rounding of their fractions. */
 bool areSame(const Place& a, const Place& b);
 
 /**

@@ -236,7 +236,7 @@ class CylinderChainException(openmm.OpenMMException):
     Attributes
     ----------
     kind : {"torn-chain", "length-out-of-range", "unstable-chain", "unstable-particle", "link-out-of-range", \
-            "nothing-recorded"}
+            "unknown-links", "nothing-recorded"}
     chain, segment, particle, step, link : int or None
         None where it is not known. Steps count from 1.
     """
@@ -285,6 +285,10 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %pythonappend OpenMM::CylinderChainLinkForce::getLinkPlaces(int, int&, int&, double&, int&, int&, double&,
         Vec3&) const %{
     val[6] = unit.Quantity(val[6], _LENGTH)
+%}
+%pythonappend OpenMM::CylinderChainLinkForce::getDefaultLinkParameters(int&, double&, double&, double&) const %{
+    units = (_LENGTH, _STIFFNESS, _LENGTH)
+    val = [val[0], *(unit.Quantity(v, u) for v, u in zip(val[1:], units))]
 %}
 %pythonappend OpenMM::CylinderChainLinkForce::getLinkParameters(int, int&, double&, double&, double&) const %{
     units = (_LENGTH, _STIFFNESS, _LENGTH)

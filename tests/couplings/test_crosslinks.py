@@ -277,6 +277,10 @@ def test_a_restart_in_another_process_goes_on_to_the_bit(engine, tmp_path):
         assert output[0] == outputs[0][0] == "4"
         assert np.array_equal(output[1], outputs[0][1])
     process = _run_process(tmp_path, engine=engine, restart=True, order=FORGOTTEN, file="d.npy")
+    if engine == "compiled":
+        # Its integrator writes crosslinks into checkpoints.
+        assert process.stdout.split()[-1] == "4" and np.array_equal(np.load(tmp_path / "d.npy"), outputs[0][1])
+        return
     assert "The crosslinks of this Context are not known" in process.stderr
     assert "Crosslinks.set_table" in process.stderr and not (tmp_path / "d.npy").exists()
 
@@ -347,7 +351,7 @@ def test_fene_crosslinks_that_are_too_long_are_named(engine, tmp_path):
     integrator.step(1)
     links.remove(context, number)
     links.add(context, 1, 5)
-    message = "Crosslink 1 between particles 1 and 5 has blown up: its length of 616[.].* nm is outside 20 -/. 10 nm"
+    message = "[Ll]ink 1 between particles 1 and 5 has blown up: its length of 616[.].* nm is outside 20 -/. 10 nm"
     with pytest.raises(InstabilityError, match=message):
         integrator.step(1)
     with pytest.raises(openmm.OpenMMException, match=message):
@@ -368,14 +372,15 @@ def test_many_changes_take_no_memory():
 
     tracemalloc.start()
     try:
-        change(crosslink_tables.RECENT_TABLES)
-        before = tracemalloc.take_snapshot()
+        # Free lists of Python fill as well. A snapshot would take as much memory as it shall find.
+        change(2 * crosslink_tables.RECENT_TABLES)
+        before = tracemalloc.get_traced_memory()[0]
         change(1000)
-        growth = sum(one.size_diff for one in tracemalloc.take_snapshot().compare_to(before, "filename"))
+        growth = tracemalloc.get_traced_memory()[0] - before
     finally:
         tracemalloc.stop()
-    assert len(links.numbers(context)) == len(PAIRS) and links.table(context).next_number == len(PAIRS) + 1256
-    # A table takes about a kilobyte, so a leak would be of a megabyte.
+    assert len(links.numbers(context)) == len(PAIRS) and links.table(context).next_number == len(PAIRS) + 1512
+    # A table takes more than a kilobyte, so a leak would be of megabytes.
     assert growth < 1e5
 
 

@@ -128,6 +128,22 @@ void CylinderChainLinkForce::setLinkParameters(int number, StretchingModel stret
     table.apply(changeParameters(table, {number}, {stretchingModel}, {restLength, stiffness, maximumExtension}));
 }
 
+void CylinderChainLinkForce::getDefaultLinkParameters(int& stretchingModel, double& restLength, double& stiffness,
+        double& maximumExtension) const {
+    stretchingModel = static_cast<int>(defaults.model);
+    restLength = defaults.restLength;
+    stiffness = defaults.stiffness;
+    maximumExtension = defaults.maximumExtension;
+}
+
+void CylinderChainLinkForce::setDefaultLinkParameters(StretchingModel stretchingModel, double restLength,
+        double stiffness, double maximumExtension) {
+    // A link between any two particles, which is checked like all others.
+
+    defaults = oneRow(0, -1, 0, 1, -1, 0, Vec3(), stretchingModel, restLength, stiffness, maximumExtension)
+            .getEntry(0, 0).link;
+}
+
 bool CylinderChainLinkForce::isLinkActive(int number) const {
     return getEntry(number).active;
 }
@@ -213,6 +229,10 @@ void CylinderChainLinkForce::setLinksInContext(Context& context, const vector<in
         int nextNumber) const {
     getImpl(context).setTable(makeTable(numbers, LinkColumns(ends, fractions, points, models, parameters),
             active, nextNumber));
+}
+
+int CylinderChainLinkForce::getNextLinkNumberInContext(Context& context) const {
+    return getImpl(context).getTable().getNextNumber();
 }
 
 string CylinderChainLinkForce::getDigestParameter(Context& context) const {

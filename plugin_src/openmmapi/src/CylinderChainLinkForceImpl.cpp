@@ -66,11 +66,12 @@ void CylinderChainLinkForceImpl::follow() {
         history.change(history.getTable().changeTo(owner.getTable()));
         return;
     }
-    throw OpenMMException("CylinderChainLinkForce: The links of this Context are not known: it has got a State or "
+    throw CylinderChainException(CylinderChainException::UnknownLinks, {},
+            "CylinderChainLinkForce: The links of this Context are not known: it has got a State or "
             "checkpoint of another Context, or one from more than "+to_string(cylchain::LinkHistory::CHANGES)+
-            " changes ago. Give it the links that belong to it by setLinksInContext(). The checkpoints of a "
-            "CylinderChainIntegrator, and States that hold its parameters (getState(integratorParameters=True)), "
-            "restore links themselves");
+            " changes ago. Give it the links that belong to it by setLinksInContext(), or Crosslinks.set_table() in "
+            "Python. The checkpoints of a CylinderChainIntegrator, and States that hold its parameters "
+            "(getState(integratorParameters=True)), restore links themselves");
 }
 
 void CylinderChainLinkForceImpl::accept(const cylchain::LinkChange& change) {

@@ -59,7 +59,7 @@ void writeTable(SerializationNode& node, const LinkTable& table) {
     }
 }
 
-static int findModel(const string& name) {
+int findStretchingModel(const string& name) {
     const vector<string> names = namesOf<StretchingModel>();
     const auto found = find(names.begin(), names.end(), name);
     if (found == names.end())
@@ -73,7 +73,7 @@ LinkTable readTable(const SerializationNode& node) {
     for (const SerializationNode& link : node.getChildren()) {
         stored.numbers.push_back(link.getIntProperty("number"));
         stored.active.push_back(link.getBoolProperty("active"));
-        stored.columns.models.push_back(findModel(link.getStringProperty("stretchingModel")));
+        stored.columns.models.push_back(findStretchingModel(link.getStringProperty("stretchingModel")));
         for (const char* name : END_PROPERTIES)
             stored.columns.ends.push_back(link.getIntProperty(name));
         for (const char* name : FRACTION_PROPERTIES)

@@ -17,6 +17,12 @@ void CylinderChainLinkForceProxy::serialize(const void* object, SerializationNod
     node.setIntProperty("forceGroup", force.getForceGroup());
     node.setStringProperty("name", force.getName());
     node.setBoolProperty("usesPeriodic", force.usesPeriodicBoundaryConditions());
+    int model;
+    double restLength, stiffness, maximumExtension;
+    force.getDefaultLinkParameters(model, restLength, stiffness, maximumExtension);
+    node.createChildNode("Defaults").setStringProperty("stretchingModel",
+            CylinderChainLinkForce::getStretchingModelNames()[model]).setDoubleProperty("restLength", restLength)
+            .setDoubleProperty("stiffness", stiffness).setDoubleProperty("maximumExtension", maximumExtension);
     writeTable(node.createChildNode("Links"), force.getTable());
 }
 
@@ -27,6 +33,11 @@ void* CylinderChainLinkForceProxy::deserialize(const SerializationNode& node) co
     force->setForceGroup(node.getIntProperty("forceGroup"));
     force->setName(node.getStringProperty("name"));
     force->setUsesPeriodicBoundaryConditions(node.getBoolProperty("usesPeriodic"));
+    const SerializationNode& defaults = node.getChildNode("Defaults");
+    const int model = findStretchingModel(defaults.getStringProperty("stretchingModel"));
+    force->setDefaultLinkParameters((CylinderChainLinkForce::StretchingModel) model,
+            defaults.getDoubleProperty("restLength"), defaults.getDoubleProperty("stiffness"),
+            defaults.getDoubleProperty("maximumExtension"));
     force->setTable(readTable(node.getChildNode("Links")));
     return force.release();
 }

@@ -13,6 +13,7 @@
  * - UnstableChain: a chain has blown up.
  * - UnstableParticle: a particle outside chains has blown up.
  * - LinkOutOfRange: a link has a length at which its energy is infinite.
+ * - UnknownLinks: it is not known which links a Context has.
  * - NothingRecorded: no tensions were recorded in the last step.
  */
 #define CYLCHAIN_EXCEPTION_KINDS(ENTRY) \
@@ -21,6 +22,7 @@
     ENTRY(UnstableChain, "unstable-chain") \
     ENTRY(UnstableParticle, "unstable-particle") \
     ENTRY(LinkOutOfRange, "link-out-of-range") \
+    ENTRY(UnknownLinks, "unknown-links") \
     ENTRY(NothingRecorded, "nothing-recorded")
 
 namespace OpenMM {

@@ -351,7 +351,8 @@ protected:
      */
     void loadCheckpoint(std::istream& stream);
     /**
-     * Write the path level, the number of steps taken, the flow and the links of all CylinderChainLinkForces to a State.
+     * Write the path level, the number of steps taken, the flow and the links of all CylinderChainLinkForces to a
+     * State.
      */
     void serializeParameters(SerializationNode& node) const;
     /**

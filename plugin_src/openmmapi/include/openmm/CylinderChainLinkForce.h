@@ -17,8 +17,8 @@ class CylinderChainLinkForceImpl;
  * This class links filaments with each other, with other particles and with fixed points: springs between two places
  * that come and go while a simulation runs.
  *
- * A place is between two particles, such as the ends of a segment, at (1-f) x1+f x2 for a fraction f between 0 and 1; or
- * at a particle; or a point that does not move.  A link has an energy of the distance d of its places.  Where they
+ * A place is between two particles, such as the ends of a segment, at (1-f) x1+f x2 for a fraction f between 0 and 1;
+ * or at a particle; or a point that does not move.  A link has an energy of the distance d of its places.  Where they
  * coincide, the force of a link has no direction and is zero, even if its rest length is not.
  *
  * A particle that is a TwoParticleAverageSite whose weights are not negative and add up to 1 is replaced by the place
@@ -26,12 +26,12 @@ class CylinderChainLinkForceImpl;
  *
  * This class holds the links that every new Context begins with.  After that, links belong to the Context: the methods
  * that take one change its links alone, at any time, and neither this object nor other Contexts.  Links are known by
- * their numbers.  No other link of a Context gets the number of one that is removed, unless setLinksInContext() gives it
- * one.
+ * their numbers.  No other link of a Context gets the number of one that is removed, unless setLinksInContext() gives
+ * it one.
  *
  * A parameter of the Context holds a digest of its links, so that States and checkpoints say which belong to them.
- * Going back to one restores the links that the Context had then, up to 256 changes ago (fewer if they changed more than
- * 2^20 links together).  CylinderChainIntegrator writes links into its checkpoints, and into States that hold the
+ * Going back to one restores the links that the Context had then, up to 256 changes ago (fewer if they changed more
+ * than 2^20 links together).  CylinderChainIntegrator writes links into its checkpoints, and into States that hold the
  * parameters of the Integrator: these restore them in any Context and any process.  With other Integrators, save what
  * getLinksInContext() returns beside the State, and give it to setLinksInContext().
  *
@@ -159,6 +159,27 @@ public:
     void setLinkParameters(int number, StretchingModel stretchingModel, double restLength, double stiffness,
             double maximumExtension);
     /**
+     * Get the parameters for links that are given none of their own by whoever adds them.
+     *
+     * @param[out] stretchingModel   the energy of a link, a StretchingModel
+     * @param[out] restLength        the rest length d0, measured in nm
+     * @param[out] stiffness         the stiffness k, measured in kJ/mol/nm^2
+     * @param[out] maximumExtension  the maximum extension D, measured in nm
+     */
+    void getDefaultLinkParameters(int& stretchingModel, double& restLength, double& stiffness,
+            double& maximumExtension) const;
+    /**
+     * Set the parameters for links that are given none of their own by whoever adds them.  This class does not use
+     * them: it keeps them with the System.  All are zero unless this is called.
+     *
+     * @param stretchingModel   the energy of a link
+     * @param restLength        the rest length d0, measured in nm
+     * @param stiffness         the stiffness k, measured in kJ/mol/nm^2
+     * @param maximumExtension  the maximum extension D, measured in nm
+     */
+    void setDefaultLinkParameters(StretchingModel stretchingModel, double restLength, double stiffness,
+            double maximumExtension);
+    /**
      * Get whether a link is switched on.
      *
      * @param number  the number of the link
@@ -257,6 +278,10 @@ public:
     void setLinkParametersInContext(Context& context, const std::vector<int>& numbers, const std::vector<int>& models,
             const std::vector<double>& parameters) const;
     /**
+     * Get the number that the next link of a Context will have.
+     */
+    int getNextLinkNumberInContext(Context& context) const;
+    /**
      * Get all links of a Context at once, like getLinks().
      */
     void getLinksInContext(Context& context, std::vector<int>& numbers, std::vector<int>& ends,
@@ -275,8 +300,8 @@ public:
     std::string getDigestParameter(Context& context) const;
     /**
      * Set whether the distance of the places of a link should be that of their nearest periodic images.  By default it
-     * is not.  The two particles of a place are taken as they are, unless the System has a CylinderChainForce that takes
-     * the ends of segments as their nearest images.
+     * is not.  The two particles of a place are taken as they are, unless the System has a CylinderChainForce that
+     * takes the ends of segments as their nearest images.
      */
     void setUsesPeriodicBoundaryConditions(bool periodic);
     /**
@@ -302,6 +327,7 @@ private:
     const cylchain::LinkEntry& getEntry(int number) const;
     void replaceEntry(const cylchain::LinkEntry& entry);
     cylchain::LinkTable table;
+    cylchain::Link defaults;
     bool usePeriodic;
 };
 

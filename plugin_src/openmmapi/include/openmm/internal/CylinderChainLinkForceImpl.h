@@ -45,8 +45,8 @@ public:
     std::map<std::string, double> getDefaultParameters();
     std::vector<std::string> getKernelNames();
     /**
-     * Get the links of the Context that are switched on, in the order of their numbers.  Places at virtual sites between
-     * two particles are those between these particles.  An exception is thrown if the links are not known.
+     * Get the links of the Context that are switched on, in the order of their numbers.  Places at virtual sites
+     * between two particles are those between these particles.  An exception is thrown if the links are not known.
      */
     const std::vector<cylchain::Link>& getLinks();
     /**

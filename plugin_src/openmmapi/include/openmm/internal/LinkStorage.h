@@ -4,10 +4,16 @@
 #include "couplings/LinkTable.h"
 #include "openmm/internal/ContextImpl.h"
 #include <iosfwd>
+#include <string>
 
 namespace OpenMM {
 
 class SerializationNode;
+
+/**
+ * Find the number of a stretching model by its name; an exception is thrown if there is none.
+ */
+int findStretchingModel(const std::string& name);
 
 /**
  * Write a table to a node.

@@ -1,0 +1,44 @@
+"""Places on segments that need no particle of their own."""
+
+import math
+from dataclasses import dataclass
+
+from ..errors import InputError
+from ..units.quantities import whole_number
+
+
+@dataclass(frozen=True)
+class SegmentPlace:
+    """A place between two particles, such as the ends of a segment: (1 - fraction) x_first + fraction x_second.
+
+    ``Filaments.segment_place`` finds that of a filament, a segment and a fraction.
+
+    Attributes
+    ----------
+    first, second : int
+        Particle indices.
+    fraction : float
+        From 0 at the first particle to 1 at the second.
+
+    Raises
+    ------
+    InputError
+        For particle indices that are none or the same, or a fraction that is not between 0 and 1.
+    """
+
+    first: int
+    second: int
+    fraction: float
+
+    def __post_init__(self) -> None:
+        for name in ("first", "second"):
+            object.__setattr__(self, name, whole_number(getattr(self, name), 0, f"SegmentPlace: particle {name}"))
+        if self.first == self.second:
+            raise InputError(f"SegmentPlace: a place between particle {self.first} and itself does not exist.")
+        try:
+            fraction = float(self.fraction)
+        except (TypeError, ValueError):
+            fraction = math.nan
+        if not 0.0 <= fraction <= 1.0:
+            raise InputError(f"SegmentPlace: fraction must be a number between 0 and 1, but is {self.fraction!r}.")
+        object.__setattr__(self, "fraction", fraction)
