@@ -18,8 +18,8 @@ typedef std::function<void(int count, const std::function<void(int)>& iteration)
 /**
  * Finds capsules that touch each other, and where.
  *
- * Positions are arrays of three doubles for each particle: x at the start of a step, y at its end. In between, particles
- * move along straight lines. The two may be the same.
+ * Positions are arrays of three doubles for each particle: x at the start of a step, y at its end. In between,
+ * particles move along straight lines. The two may be the same.
  */
 class ContactSearch {
 public:
@@ -51,14 +51,15 @@ public:
      * nearestImages, the box is that of the last search.
      *
      * Two segments touch where they are nearest to each other. If they are nearly parallel, at both ends of their
-     * overlap, each with half of the stiffness. If they have crossed between x and y, they touch where they crossed, the
-     * normal is that of before, and the gap is the distance along it, less the radii: the signed distance goes on.
+     * overlap, each with half of the stiffness. If they have crossed between x and y, they touch where they crossed,
+     * the normal is that of before, and the gap is the distance along it, less the radii: the signed distance goes on.
      *
      * Around a joint, segments that share it may see one and the same contact. It is counted once:
      * - A contact at a joint is that of the segment that ends there (s = 1), and of none if the distance falls as one
      *   goes on into the other segment.
      * - Of two segments that both touch the same capsule on the inner side of a bend, the one with the lesser gap
-     *   counts. The energy is continuous where that changes from one to the other.
+     *   counts. The energy is continuous where that changes from one to the other, as long as the chain's radius of
+     *   curvature is more than twice the distance at which capsules touch.
      *
      * Capsules that are excluded do not take contacts from their neighbors.
      *
@@ -67,8 +68,8 @@ public:
      */
     int evaluate(const ContactPair& pair, const double* x, const double* y, Contact* contacts) const;
     /**
-     * Get whether the segments of a pair pass through each other on the way from x to y, an odd number of times. Spheres
-     * do not, nor do segments that stay in one plane.
+     * Get whether the segments of a pair pass through each other on the way from x to y, an odd number of times.
+     * Spheres do not, nor do segments that stay in one plane.
      */
     bool crosses(const ContactPair& pair, const double* x, const double* y) const;
 private:
