@@ -169,11 +169,10 @@ struct ContactSearch::Implementation {
     vector<int> next, previous;
     /** Explicit exclusions of each capsule, sorted. */
     vector<vector<int> > excluded;
-    double largestRadius = 0;
 
     // The last search.
     Frame frame;
-    double reach = 0;
+    double reach = 0, largestRadius = 0;
     vector<Described> described;
     vector<int> cellStart, members;
     vector<float> boxes;
@@ -202,7 +201,7 @@ struct ContactSearch::Implementation {
             const double* positions) const;
     bool isOwned(const Contact& contact, const ContactPair& pair, const SegmentPair& end, bool parallel, bool ofA,
             const double* x, const double* y) const;
-    int evaluate(const ContactPair& pair, const double* x, const double* y, Contact* contacts) const;
+    int evaluate(const ContactPair& pair, const double* x, const double* y, Contact* contacts, double limit) const;
 };
 
 ContactSearch::Implementation::Implementation(const CapsuleSystem& system, bool nearestImages) :
@@ -220,7 +219,6 @@ ContactSearch::Implementation::Implementation(const CapsuleSystem& system, bool 
             throw invalid_argument(name+" is in a chain that there is not");
         if (capsule.chain >= 0 && (capsule.index < 0 || capsule.index >= system.chains[capsule.chain].numCapsules))
             throw invalid_argument(name+" has a number in its chain that there is not");
-        largestRadius = max(largestRadius, capsule.radius);
         if (capsule.chain >= 0 && capsule.second >= 0)
             startsAt[{capsule.chain, capsule.first}] = i;
     }
@@ -284,6 +282,9 @@ SegmentPair ContactSearch::Implementation::segments(int a, int b, const double* 
 void ContactSearch::Implementation::setFrame(const double* x, const double* y, const double* box) {
     frame = Frame();
     frame.periodic = box != NULL;
+    largestRadius = 0;
+    for (const Capsule& capsule : system.capsules)
+        largestRadius = max(largestRadius, capsule.radius);
     if (frame.periodic) {
         copy(box, box+9, frame.vectors);
         if (box[1] != 0 || box[2] != 0 || box[5] != 0 || !(box[0] > 0 && box[4] > 0 && box[8] > 0))
@@ -379,7 +380,7 @@ void ContactSearch::Implementation::setCells() {
             throw invalid_argument("The periodic box is too small for contacts: its width along vector "+
                     to_string(k)+" is "+to_string(frame.widths[k])+", but twice the largest extent of a capsule in a "
                     "step with its diameter and the reach of the search is "+
-                    to_string(4*largestHalf[k]*frame.widths[k])+". Take a larger box or shorter segments");
+                    to_string(4*largestHalf[k]*frame.widths[k])+". Take a larger box or shorter segments, and chains that are whole");
         frame.cells[k] = max(1.0, floor(min(0.5/largestHalf[k], frame.periodic ? mostCells : 4*mostCells)));
     }
     // Where capsules fill a part of the frame only, there are more cells.
@@ -612,7 +613,7 @@ bool ContactSearch::Implementation::isOwned(const Contact& contact, const Contac
 }
 
 int ContactSearch::Implementation::evaluate(const ContactPair& pair, const double* x, const double* y,
-        Contact* contacts) const {
+        Contact* contacts, double limit) const {
     const SegmentPair end = segments(pair.a, pair.b, pair.shift, y);
     const double sum = radii(pair.a, pair.b);
     const Places places = findPlaces(end);
@@ -623,15 +624,19 @@ int ContactSearch::Implementation::evaluate(const ContactPair& pair, const doubl
             const Vec3d& n = crossing.normal;
             const double signedDistance = end.between(crossing.s, crossing.t).dot(n);
             contacts[0] = {crossing.s, crossing.t, {n.x, n.y, n.z}, signedDistance-sum, 1, true};
-            return 1;
+            return contacts[0].gap < limit ? 1 : 0;
         }
     }
+    if (places.distance-sum >= limit)
+        return 0;
     int kept = 0;
     const int count = places.parallel ? 2 : 1;
     for (int i = 0; i < count; i++) {
         const double s = places.s[i], t = places.t[i];
         const Vec3d r = end.between(s, t);
         const double length = sqrt(r.squared());
+        if (length-sum >= limit)
+            continue;
         const Vec3d n = length > 0 ? r*(1/length) : findNormal(end, pair.side);
         const Contact contact = {s, t, {n.x, n.y, n.z}, length-sum, 1.0/count, false};
         if (isOwned(contact, pair, end, places.parallel, true, x, y) &&
@@ -650,6 +655,10 @@ ContactSearch::~ContactSearch() {
 
 const CapsuleSystem& ContactSearch::getSystem() const {
     return implementation->system;
+}
+
+void ContactSearch::setRadius(int capsule, double radius) {
+    implementation->system.capsules.at(capsule).radius = radius;
 }
 
 bool ContactSearch::isExcluded(int a, int b) const {
@@ -687,8 +696,9 @@ void ContactSearch::findPairs(const double* x, const double* y, const double* bo
     search.gather(pairs);
 }
 
-int ContactSearch::evaluate(const ContactPair& pair, const double* x, const double* y, Contact* contacts) const {
-    return implementation->evaluate(pair, x, y, contacts);
+int ContactSearch::evaluate(const ContactPair& pair, const double* x, const double* y, Contact* contacts,
+        double limit) const {
+    return implementation->evaluate(pair, x, y, contacts, limit);
 }
 
 bool ContactSearch::crosses(const ContactPair& pair, const double* x, const double* y) const {

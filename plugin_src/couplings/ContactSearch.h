@@ -4,6 +4,7 @@
 #include "couplings/CapsuleGeometry.h"
 #include "couplings/Capsules.h"
 #include <functional>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -31,6 +32,8 @@ public:
     explicit ContactSearch(const CapsuleSystem& system, bool nearestImages = false);
     ~ContactSearch();
     const CapsuleSystem& getSystem() const;
+    /** Give a capsule another radius, which is not negative. Pairs that were found with other radii may lack some. */
+    void setRadius(int capsule, double radius);
     /** Get whether two capsules never touch each other. */
     bool isExcluded(int a, int b) const;
     /**
@@ -64,9 +67,11 @@ public:
      * Capsules that are excluded do not take contacts from their neighbors.
      *
      * @param contacts  room for two
+     * @param limit     contacts with a gap that is not less are left out, which takes less time
      * @return the number of contacts
      */
-    int evaluate(const ContactPair& pair, const double* x, const double* y, Contact* contacts) const;
+    int evaluate(const ContactPair& pair, const double* x, const double* y, Contact* contacts,
+            double limit = std::numeric_limits<double>::infinity()) const;
     /**
      * Get whether the segments of a pair pass through each other on the way from x to y, an odd number of times.
      * Spheres do not, nor do segments that stay in one plane.

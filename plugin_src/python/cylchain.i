@@ -18,6 +18,7 @@ namespace std {
 
 %{
 #include "openmm/CylinderChainException.h"
+#include "openmm/CylinderChainContactForce.h"
 #include "openmm/CylinderChainForce.h"
 #include "openmm/CylinderChainIntegrator.h"
 #include "OpenMM.h"
@@ -116,7 +117,7 @@ static void raiseException(const std::exception& e) {
 }
 
 %apply int& OUTPUT {int& bendingModel, int& stretchingModel, int& chain, int& node, int& particle, int& steps,
-        int& particles};
+        int& particles, int& chain1, int& segment1, int& chain2, int& segment2};
 
 %typemap(in, numinputs=0) Vec3& point (OpenMM::Vec3 value) {
     $1 = &value;
@@ -211,6 +212,15 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %pythonappend OpenMM::CylinderChainForce::computeEnergies(Context&, double&, double&) const %{
     val = [unit.Quantity(v, _ENERGY) for v in val]
 %}
+%pythonappend OpenMM::CylinderChainContactForce::getStiffness() const %{
+    val = unit.Quantity(val, _STIFFNESS)
+%}
+%pythonappend OpenMM::CylinderChainContactForce::getChainDiameter(int) const %{
+    val = unit.Quantity(val, _LENGTH)
+%}
+%pythonappend OpenMM::CylinderChainContactForce::getSphereDiameter(int) const %{
+    val = unit.Quantity(val, _LENGTH)
+%}
 %pythonappend OpenMM::CylinderChainIntegrator::getTemperature() const %{
     val = unit.Quantity(val, unit.kelvin)
 %}
@@ -282,15 +292,20 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %enddef
 
 %concreteClass(CylinderChainForce, Force)
+%concreteClass(CylinderChainContactForce, Force)
 %concreteClass(CylinderChainIntegrator, Integrator)
 
 %ignore OpenMM::CylinderChainForce::SegmentInfo;
 %ignore OpenMM::CylinderChainForce::ChainInfo;
 %ignore OpenMM::CylinderChainForce::TetherInfo;
+%ignore OpenMM::CylinderChainContactForce::ChainInfo;
+%ignore OpenMM::CylinderChainContactForce::SphereInfo;
+%ignore OpenMM::CylinderChainContactForce::ExclusionInfo;
 %import "mechanics/Enumerators.h"
 %import "mechanics/BendingModels.h"
 %import "mechanics/StretchingModels.h"
 %import "dynamics/Schemes.h"
 %import "dynamics/Precisions.h"
 %include "openmm/CylinderChainForce.h"
+%include "openmm/CylinderChainContactForce.h"
 %include "openmm/CylinderChainIntegrator.h"

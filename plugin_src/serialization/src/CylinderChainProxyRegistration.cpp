@@ -1,5 +1,7 @@
+#include "openmm/CylinderChainContactForce.h"
 #include "openmm/CylinderChainForce.h"
 #include "openmm/CylinderChainIntegrator.h"
+#include "openmm/serialization/CylinderChainContactForceProxy.h"
 #include "openmm/serialization/CylinderChainForceProxy.h"
 #include "openmm/serialization/CylinderChainIntegratorProxy.h"
 #include <typeinfo>
@@ -11,6 +13,7 @@ using namespace OpenMM;
  */
 static const bool registered = []() {
     SerializationProxy::registerProxy(typeid(CylinderChainForce), new CylinderChainForceProxy());
+    SerializationProxy::registerProxy(typeid(CylinderChainContactForce), new CylinderChainContactForceProxy());
     SerializationProxy::registerProxy(typeid(CylinderChainIntegrator), new CylinderChainIntegratorProxy());
     return true;
 }();

@@ -1,4 +1,5 @@
 #include "ReferenceCylinderChainKernelFactory.h"
+#include "ReferenceCalcCylinderChainContactForceKernel.h"
 #include "ReferenceCalcCylinderChainForceKernel.h"
 #include "ReferenceIntegrateCylinderChainStepKernel.h"
 #include "openmm/OpenMMException.h"
@@ -16,6 +17,7 @@ extern "C" void registerKernelFactories() {
         if (dynamic_cast<ReferencePlatform*>(&platform) != NULL) {
             ReferenceCylinderChainKernelFactory* factory = new ReferenceCylinderChainKernelFactory();
             platform.registerKernelFactory(CalcCylinderChainForceKernel::Name(), factory);
+            platform.registerKernelFactory(CalcCylinderChainContactForceKernel::Name(), factory);
             platform.registerKernelFactory(IntegrateCylinderChainStepKernel::Name(), factory);
         }
     }
@@ -25,6 +27,8 @@ KernelImpl* ReferenceCylinderChainKernelFactory::createKernelImpl(string name, c
         ContextImpl& context) const {
     if (name == CalcCylinderChainForceKernel::Name())
         return new ReferenceCalcCylinderChainForceKernel(name, platform, context);
+    if (name == CalcCylinderChainContactForceKernel::Name())
+        return new ReferenceCalcCylinderChainContactForceKernel(name, platform, context);
     if (name == IntegrateCylinderChainStepKernel::Name())
         return new ReferenceIntegrateCylinderChainStepKernel(name, platform, context);
     throw OpenMMException("Tried to create kernel with illegal kernel name '"+name+"'");
