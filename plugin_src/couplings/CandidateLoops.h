@@ -42,8 +42,8 @@ struct CandidateKernels {
     int (*findOverlaps)(const SweptBoxes& boxes, int capsule, const CapsuleRow* rows, int numRows,
             const CandidatePairs& pairs);
     /**
-     * Keep those of some pairs that come near each other at the start or at the end, or may cross in between, and return
-     * how many. Where there is no doubt that they come near, SURE is added to the image.
+     * Keep those of some pairs that come near each other at the start or at the end, or may cross in between, and
+     * return how many. Where there is no doubt that they come near, SURE is added to the image.
      *
      * @param shifts  the vectors of images, four numbers each
      * @param reach   how near their surfaces come

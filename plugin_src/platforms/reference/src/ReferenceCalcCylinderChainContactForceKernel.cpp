@@ -9,7 +9,7 @@ using namespace cylchain;
 using namespace std;
 
 /** The skin, over the largest diameter: a list lasts longer with a larger one, but has more pairs. */
-static const double SKIN = 0.5;
+static const double SKIN = 0.75;
 
 /** Pairs that are looked at by one thread at a time. */
 static const int CHUNK = 512;
