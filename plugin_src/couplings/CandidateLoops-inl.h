@@ -70,25 +70,39 @@ CYLCHAIN_INLINE LaneVector splat(const float* vector) {
     return {splat(vector[0]), splat(vector[1]), splat(vector[2])};
 }
 
-/** The numbers at a place of some capsules. */
-CYLCHAIN_INLINE Floats gather(const CoarseCapsule* capsules, Ints indices, int place) {
-    const float* base = capsules[0].center+place;
-    static_assert(sizeof(CoarseCapsule) == 16*sizeof(float), "A capsule is sixteen numbers");
+/** The numbers at a place of some records of equal size. */
+template <int Size> CYLCHAIN_INLINE Floats gather(const float* base, Ints indices) {
 #if defined(__AVX512F__) && CYLCHAIN_LANES == 16
-    return (Floats) _mm512_mask_i32gather_ps(_mm512_setzero_ps(), 0xffff, (__m512i) (indices*16), base, 4);
+    return (Floats) _mm512_mask_i32gather_ps(_mm512_setzero_ps(), 0xffff, (__m512i) (indices*Size), base, 4);
 #elif defined(__AVX2__) && CYLCHAIN_LANES == 8
-    return (Floats) _mm256_i32gather_ps(base, (__m256i) (indices*16), 4);
+    return (Floats) _mm256_i32gather_ps(base, (__m256i) (indices*Size), 4);
 #else
     Floats result;
     for (int i = 0; i < CYLCHAIN_LANES; i++)
-        result[i] = base[(std::size_t) 16*indices[i]];
+        result[i] = base[(std::size_t) Size*indices[i]];
     return result;
 #endif
 }
 
-CYLCHAIN_INLINE LaneVector gatherVector(const CoarseCapsule* capsules, Ints indices, int place) {
-    return {gather(capsules, indices, place), gather(capsules, indices, place+1), gather(capsules, indices, place+2)};
+template <int Size> CYLCHAIN_INLINE LaneVector gatherVector(const float* base, Ints indices) {
+    return {gather<Size>(base, indices), gather<Size>(base+1, indices), gather<Size>(base+2, indices)};
 }
+
+/** Some capsules in lanes. */
+struct LaneCapsules {
+    LaneVector center, middle, half, laterMiddle, laterHalf;
+    Floats radius;
+    CYLCHAIN_INLINE LaneCapsules(const CoarseCapsule* capsules, Ints indices) {
+        static_assert(sizeof(CoarseCapsule) == 16*sizeof(float), "A capsule is sixteen numbers");
+        const float* base = capsules[0].center;
+        center = gatherVector<16>(base, indices);
+        middle = gatherVector<16>(base+3, indices);
+        half = gatherVector<16>(base+6, indices);
+        laterMiddle = gatherVector<16>(base+9, indices);
+        laterHalf = gatherVector<16>(base+12, indices);
+        radius = gather<16>(base+15, indices);
+    }
+};
 
 /** The distance of segments c+-p and c'+-q, for w = c-c'. Where they are nearly parallel, it may be a bit too large. */
 CYLCHAIN_INLINE Floats distance(const LaneVector& p, const LaneVector& q, const LaneVector& w) {
@@ -103,46 +117,61 @@ CYLCHAIN_INLINE Floats distance(const LaneVector& p, const LaneVector& q, const 
     return root(r.dot(r));
 }
 
-static int findOverlaps(const SweptBoxes& boxes, int first, int last, const QueryBox& query, int* hits) {
+static int findOverlaps(const SweptBoxes& boxes, int capsule, const CapsuleRow* rows, int numRows,
+        const CandidatePairs& pairs) {
     Ints lanes;
     for (int i = 0; i < CYLCHAIN_LANES; i++)
         lanes[i] = i;
     int count = 0;
-    for (int start = first; start < last; start += CYLCHAIN_LANES) {
-        Ints mask = lanes < last-start;
-        for (int j = 0; j < 3; j++)
-            mask &= magnitude(load(boxes.center[j]+start)-query.center[j]) <= load(boxes.half[j]+start)+query.half[j];
-        for (unsigned bits = bitsOf(mask); bits != 0; bits &= bits-1)
-            hits[count++] = start+__builtin_ctz(bits);
+    for (int row = 0; row < numRows; row++) {
+        const CapsuleRow& others = rows[row];
+        Floats center[3], half[3];
+        for (int k = 0; k < 3; k++) {
+            center[k] = splat(boxes.center[k][capsule]-others.shift[k]);
+            half[k] = splat(boxes.half[k][capsule]);
+        }
+        for (int start = others.first; start < others.last; start += CYLCHAIN_LANES) {
+            Ints mask = lanes < others.last-start;
+            for (int k = 0; k < 3; k++)
+                mask &= magnitude(load(boxes.center[k]+start)-center[k]) <= load(boxes.half[k]+start)+half[k];
+            for (unsigned bits = bitsOf(mask); bits != 0; bits &= bits-1) {
+                pairs.first[count] = capsule;
+                pairs.second[count] = start+__builtin_ctz(bits);
+                pairs.image[count++] = others.image;
+            }
+        }
     }
     return count;
 }
 
-static int keepNear(const CoarseCapsule* capsules, int query, const float* shift, float reach, float margin,
-        int* hits, int count) {
-    const CoarseCapsule& own = capsules[query];
-    const float place[3] = {own.center[0]+shift[0], own.center[1]+shift[1], own.center[2]+shift[2]};
-    const LaneVector center = splat(place), middle = splat(own.middle), half = splat(own.half),
-            laterMiddle = splat(own.laterMiddle), laterHalf = splat(own.laterHalf);
+static int keepNear(const CoarseCapsule* capsules, const float* shifts, float reach, float margin,
+        const CandidatePairs& pairs, int count) {
     int kept = 0;
     for (int start = 0; start < count; start += CYLCHAIN_LANES) {
-        Ints indices;
-        for (int i = 0; i < CYLCHAIN_LANES; i++)
-            indices[i] = hits[start+i < count ? start+i : start];
-        const LaneVector between = center-gatherVector(capsules, indices, 0);
-        const LaneVector w = between+middle-gatherVector(capsules, indices, 3);
-        const LaneVector q = gatherVector(capsules, indices, 6);
-        const LaneVector laterW = between+laterMiddle-gatherVector(capsules, indices, 9);
-        const LaneVector laterQ = gatherVector(capsules, indices, 12);
-        const Floats contact = gather(capsules, indices, 15)+(own.radius+reach+margin);
-        const Floats d = distance(half, q, w), later = distance(laterHalf, laterQ, laterW);
-        const LaneVector dw = laterW-w, dp = laterHalf-half, dq = laterQ-q;
+        Ints first, second, image;
+        for (int i = 0; i < CYLCHAIN_LANES; i++) {
+            const int pair = start+i < count ? start+i : start;
+            first[i] = pairs.first[pair];
+            second[i] = pairs.second[pair];
+            image[i] = pairs.image[pair];
+        }
+        const LaneCapsules a(capsules, first), b(capsules, second);
+        const LaneVector between = a.center-b.center-gatherVector<4>(shifts, image);
+        const LaneVector w = between+a.middle-b.middle, laterW = between+a.laterMiddle-b.laterMiddle;
+        const LaneVector dw = laterW-w, dp = a.laterHalf-a.half, dq = b.laterHalf-b.half;
+        const Floats contact = a.radius+b.radius+(reach+margin);
+        const Floats before = distance(a.half, b.half, w), after = distance(a.laterHalf, b.laterHalf, laterW);
         const Floats motion = root(dw.dot(dw))+root(dp.dot(dp))+root(dq.dot(dq));
-        const Ints near = (d <= contact) | (later <= contact) | (d+later <= motion+2*margin);
+        const Ints near = (before <= contact) | (after <= contact) | (before+after <= motion+2*margin);
+        const Floats nearest = before < after ? before : after;
+        const unsigned sure = bitsOf((Ints) (nearest <= contact-2*margin));
         for (unsigned bits = bitsOf(near); bits != 0; bits &= bits-1) {
-            const int i = start+__builtin_ctz(bits);
-            if (i < count)
-                hits[kept++] = hits[i];
+            const int lane = __builtin_ctz(bits), pair = start+lane;
+            if (pair >= count)
+                break;
+            pairs.first[kept] = pairs.first[pair];
+            pairs.second[kept] = pairs.second[pair];
+            pairs.image[kept++] = pairs.image[pair]+((sure>>lane & 1) != 0 ? SURE : 0);
         }
     }
     return kept;

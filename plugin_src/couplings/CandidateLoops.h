@@ -12,31 +12,45 @@ struct CoarseCapsule {
     float radius;
 };
 
-/** The boxes that capsules sweep, one array for each center coordinate and each half width. */
+/** The boxes that capsules sweep, in fractions of the frame: one array for each center coordinate and half width. */
 struct SweptBoxes {
     const float *center[3], *half[3];
 };
 
-/** A box that others are compared with. */
-struct QueryBox {
-    float center[3], half[3];
+/** Capsules that follow each other in the order of cells, and what takes them to their image next to others. */
+struct CapsuleRow {
+    int first, last;
+    /** The number of the image, and its vector in fractions of the frame. */
+    int image;
+    float shift[3];
 };
+
+/** Pairs of capsules, the second one in an image. */
+struct CandidatePairs {
+    int *first, *second, *image;
+};
+
+/** What is added to the image of pairs that are near without doubt. */
+const int SURE = 32;
 
 /** A first look at many pairs, in lanes. It finds a few too many, and none too few. */
 struct CandidateKernels {
     const char* instructionSet;
-    /** Write which of some boxes overlap the query, and return how many. There is room for 16 more. */
-    int (*findOverlaps)(const SweptBoxes& boxes, int first, int last, const QueryBox& query, int* hits);
     /**
-     * Keep those of some capsules that come near a capsule at the start or at the end, or may cross it in between, and
-     * return how many.
+     * Write which boxes in some rows overlap that of a capsule, and return how many. There is room for 16 more.
+     */
+    int (*findOverlaps)(const SweptBoxes& boxes, int capsule, const CapsuleRow* rows, int numRows,
+            const CandidatePairs& pairs);
+    /**
+     * Keep those of some pairs that come near each other at the start or at the end, or may cross in between, and
+     * return how many. Where there is no doubt that they come near, SURE is added to the image.
      *
-     * @param shift   what takes the capsule to its image next to the others
+     * @param shifts  the vectors of images, four numbers each
      * @param reach   how near their surfaces come
      * @param margin  what rounding may add to a distance
      */
-    int (*keepNear)(const CoarseCapsule* capsules, int query, const float* shift, float reach, float margin, int* hits,
-            int count);
+    int (*keepNear)(const CoarseCapsule* capsules, const float* shifts, float reach, float margin,
+            const CandidatePairs& pairs, int count);
 };
 
 /** Get the loops for the best instruction set that there is. */

@@ -167,8 +167,8 @@ inline bool findSignChange(const Cubic& f, double lower, double upper, double& r
 }
 
 /**
- * Find whether two segments whose ends move with constant velocities pass through each other an odd number of times, and
- * if so, the first time. Lines pass each other where the volume changes its sign; segments do if they meet there.
+ * Find whether two segments whose ends move with constant velocities pass through each other an odd number of times,
+ * and if so, the first time. Lines pass each other where the volume changes its sign; segments do if they meet there.
  * Segments that stay in one plane do not: their volume is zero all the time.
  */
 inline bool findCrossing(const SegmentPair& start, const SegmentPair& end, Crossing& crossing) {

@@ -18,8 +18,8 @@ const double LARGEST_PARALLEL = 1e-3;
 const double AT_END = 1e-9;
 /** Gaps that differ by less, relative to distances, are equal. */
 const double LEAST_DIFFERENCE = 1e-10;
-/** Capsules that are described together. */
-const int CHUNK = 512;
+/** Capsules that are described together, and pairs that are looked at together. */
+const int CHUNK = 512, BATCH = 512;
 /** What rounding adds to distances in single precision, over the lengths that they are made of. */
 const double SINGLE_ROUNDING = 1e-6;
 /** The error of a distance where segments are nearly parallel, over their lengths, in single precision. */
@@ -54,12 +54,12 @@ struct Frame {
     bool periodic = false;
     Vec3d origin = {0, 0, 0};
     /** Its vectors, in reduced form, and its widths between opposite faces. */
-    double vectors[9] = {}, widths[3] = {};
+    double vectors[9] = {}, widths[3] = {}, inverse[3] = {}, inverseWidths[3] = {};
     int cells[3] = {1, 1, 1};
 
     Vec3d toFractions(const Vec3d& v) const {
-        const double z = v.z/vectors[8], y = (v.y-z*vectors[7])/vectors[4];
-        return {(v.x-y*vectors[3]-z*vectors[6])/vectors[0], y, z};
+        const double z = v.z*inverse[2], y = (v.y-z*vectors[7])*inverse[1];
+        return {(v.x-y*vectors[3]-z*vectors[6])*inverse[0], y, z};
     }
     Vec3d toVector(const Vec3d& f) const {
         return {f.x*vectors[0]+f.y*vectors[3]+f.z*vectors[6], f.y*vectors[4]+f.z*vectors[7], f.z*vectors[8]};
@@ -71,6 +71,10 @@ struct Frame {
         widths[0] = volume/sqrt(b.cross(c).squared());
         widths[1] = volume/sqrt(c.cross(a).squared());
         widths[2] = volume/sqrt(a.cross(b).squared());
+        for (int k = 0; k < 3; k++) {
+            inverse[k] = 1/vectors[4*k];
+            inverseWidths[k] = 1/widths[k];
+        }
     }
 };
 
@@ -82,16 +86,21 @@ struct Described {
     CoarseCapsule coarse;
 };
 
-/** A row of capsules in the order of cells, and how many vectors of the frame take them to where they are looked at. */
-struct Row {
-    int first, last, images[3];
-};
-
 /** What one part of the search finds. */
 struct Part {
     vector<ContactPair> pairs;
-    vector<int> hits;
+    vector<int> first, second, image;
+    CandidatePairs candidates(int from) {
+        return {first.data()+from, second.data()+from, image.data()+from};
+    }
 };
+
+/** Images are numbered from 0 to 26: by the number of vectors of the frame, each from -1 to 1. */
+const int NUM_IMAGES = 27, SAME_IMAGE = 13;
+
+int imageNumber(const int* images) {
+    return 9*(images[0]+1)+3*(images[1]+1)+images[2]+1;
+}
 
 /** By how much a point of one segment moves against one of the other, at most. */
 double largestMotion(const SegmentPair& start, const SegmentPair& end) {
@@ -160,17 +169,16 @@ struct ContactSearch::Implementation {
     vector<int> next, previous;
     /** Explicit exclusions of each capsule, sorted. */
     vector<vector<int> > excluded;
-    double largestRadius = 0;
 
     // The last search.
     Frame frame;
-    double reach = 0;
+    double reach = 0, largestRadius = 0;
     vector<Described> described;
     vector<int> cellStart, members;
     vector<float> boxes;
     vector<CoarseCapsule> sorted;
     SweptBoxes sweptBoxes;
-    float margin = 0;
+    float margin = 0, imageShifts[4*NUM_IMAGES];
     vector<Part> parts;
     vector<size_t> firstOf;
 
@@ -186,14 +194,14 @@ struct ContactSearch::Implementation {
     void checkPositions(const double* x, const double* y) const;
     void setCells();
     void searchCells(int part, const double* x, const double* y);
-    void searchNeighbor(int k, const Row& row, const double* x, const double* y, Part& part) const;
-    void addPair(int i, int j, const int* images, const double* x, const double* y, Part& part) const;
+    int findRows(int column, int iz, CapsuleRow* rows) const;
+    void addPair(int i, int j, int image, const double* x, const double* y, Part& part) const;
     void gather(vector<ContactPair>& pairs);
     SegmentPair withNeighbor(const SegmentPair& segments, int neighbor, bool ofA, bool atEnd,
             const double* positions) const;
     bool isOwned(const Contact& contact, const ContactPair& pair, const SegmentPair& end, bool parallel, bool ofA,
             const double* x, const double* y) const;
-    int evaluate(const ContactPair& pair, const double* x, const double* y, Contact* contacts) const;
+    int evaluate(const ContactPair& pair, const double* x, const double* y, Contact* contacts, double limit) const;
 };
 
 ContactSearch::Implementation::Implementation(const CapsuleSystem& system, bool nearestImages) :
@@ -211,7 +219,6 @@ ContactSearch::Implementation::Implementation(const CapsuleSystem& system, bool 
             throw invalid_argument(name+" is in a chain that there is not");
         if (capsule.chain >= 0 && (capsule.index < 0 || capsule.index >= system.chains[capsule.chain].numCapsules))
             throw invalid_argument(name+" has a number in its chain that there is not");
-        largestRadius = max(largestRadius, capsule.radius);
         if (capsule.chain >= 0 && capsule.second >= 0)
             startsAt[{capsule.chain, capsule.first}] = i;
     }
@@ -275,6 +282,9 @@ SegmentPair ContactSearch::Implementation::segments(int a, int b, const double* 
 void ContactSearch::Implementation::setFrame(const double* x, const double* y, const double* box) {
     frame = Frame();
     frame.periodic = box != NULL;
+    largestRadius = 0;
+    for (const Capsule& capsule : system.capsules)
+        largestRadius = max(largestRadius, capsule.radius);
     if (frame.periodic) {
         copy(box, box+9, frame.vectors);
         if (box[1] != 0 || box[2] != 0 || box[5] != 0 || !(box[0] > 0 && box[4] > 0 && box[8] > 0))
@@ -322,7 +332,7 @@ void ContactSearch::Implementation::describe(int i, const double* x, const doubl
         center[k] = 0.5*(lower+upper);
         result.images[k] = frame.periodic ? (int) floor(center[k]) : 0;
         result.center[k] = center[k]-result.images[k];
-        result.half[k] = 0.5*(upper-lower)+(capsule.radius+0.5*reach)/frame.widths[k]+SINGLE_ROUNDING;
+        result.half[k] = 0.5*(upper-lower)+(capsule.radius+0.5*reach)*frame.inverseWidths[k]+SINGLE_ROUNDING;
     }
     const Vec3d unwrapped = frame.toVector({center[0], center[1], center[2]});
     CoarseCapsule& coarse = result.coarse;
@@ -370,7 +380,7 @@ void ContactSearch::Implementation::setCells() {
             throw invalid_argument("The periodic box is too small for contacts: its width along vector "+
                     to_string(k)+" is "+to_string(frame.widths[k])+", but twice the largest extent of a capsule in a "
                     "step with its diameter and the reach of the search is "+
-                    to_string(4*largestHalf[k]*frame.widths[k])+". Take a larger box or shorter segments");
+                    to_string(4*largestHalf[k]*frame.widths[k])+". Take a larger box or shorter segments, and chains that are whole");
         frame.cells[k] = max(1.0, floor(min(0.5/largestHalf[k], frame.periodic ? mostCells : 4*mostCells)));
     }
     // Where capsules fill a part of the frame only, there are more cells.
@@ -397,6 +407,9 @@ void ContactSearch::Implementation::setCells() {
         cellStart[cell] = cellStart[cell-1];
     cellStart[0] = 0;
 
+    for (int image = 0; image < NUM_IMAGES; image++)
+        set(&imageShifts[4*image], frame.toVector({image/9-1.0, image/3%3-1.0, image%3-1.0}));
+
     const size_t stride = count+PADDING;
     boxes.resize(6*stride);
     sorted.resize(count);
@@ -413,111 +426,111 @@ void ContactSearch::Implementation::setCells() {
         sorted[i] = described[members[i]].coarse;
 }
 
-/** Look for pairs with a capsule in one column of cells. */
-void ContactSearch::Implementation::searchCells(int index, const double* x, const double* y) {
-    Part& part = parts[index];
-    part.pairs.clear();
+/** Find the rows of capsules in half of the neighbors of a cell: each two cells, in each image, meet once. */
+int ContactSearch::Implementation::findRows(int column, int iz, CapsuleRow* rows) const {
     const int* cells = frame.cells;
-    const int ix = index/cells[1], iy = index%cells[1];
-    Row rows[32];
-    for (int iz = 0; iz < cells[2]; iz++) {
-        const int cell = index*cells[2]+iz;
-        if (cellStart[cell] == cellStart[cell+1])
-            continue;
-        // Half of the neighbors: each pair of cells, in each image, is looked at from one of them.
-        int numRows = 0;
-        for (int dx = 0; dx <= 1; dx++)
-            for (int dy = (dx == 0 ? 0 : -1); dy <= 1; dy++) {
-                Row row = {};
-                int jx = ix+dx, jy = iy+dy;
-                if (jx == cells[0]) {
-                    jx = 0;
-                    row.images[0] = 1;
-                }
-                if (jy == cells[1] || jy < 0) {
-                    row.images[1] = jy < 0 ? -1 : 1;
-                    jy = jy < 0 ? cells[1]-1 : 0;
-                }
-                if (!frame.periodic && (row.images[0] != 0 || row.images[1] != 0))
-                    continue;
-                // Cells that follow each other are one row.
-                const int column = (jx*cells[1]+jy)*cells[2];
-                const int lower = dx == 0 && dy == 0 ? iz+1 : iz-1, upper = iz+1;
-                const int from = max(lower, 0), to = min(upper, cells[2]-1);
-                if (from <= to) {
-                    row.first = cellStart[column+from];
-                    row.last = cellStart[column+to+1];
-                    rows[numRows++] = row;
-                }
-                if (frame.periodic && lower < 0) {
-                    Row below = row;
-                    below.images[2] = -1;
-                    below.first = cellStart[column+cells[2]-1];
-                    below.last = cellStart[column+cells[2]];
-                    rows[numRows++] = below;
-                }
-                if (frame.periodic && upper >= cells[2]) {
-                    Row above = row;
-                    above.images[2] = 1;
-                    above.first = cellStart[column];
-                    above.last = cellStart[column+1];
-                    rows[numRows++] = above;
-                }
+    int numRows = 0;
+    auto add = [&] (int column, int from, int to, const int* images) {
+        // Cells that follow each other in a column are one row.
+        const int first = cellStart[column*cells[2]+from], last = cellStart[column*cells[2]+to+1];
+        if (first < last)
+            rows[numRows++] = {first, last, imageNumber(images), {(float) images[0], (float) images[1],
+                    (float) images[2]}};
+    };
+    for (int dx = 0; dx <= 1; dx++)
+        for (int dy = (dx == 0 ? 0 : -1); dy <= 1; dy++) {
+            int images[3] = {0, 0, 0}, jx = column/cells[1]+dx, jy = column%cells[1]+dy;
+            if (jx == cells[0]) {
+                jx = 0;
+                images[0] = 1;
             }
-        for (int k = cellStart[cell]; k < cellStart[cell+1]; k++) {
-            searchNeighbor(k, {k+1, cellStart[cell+1], {0, 0, 0}}, x, y, part);
-            for (int row = 0; row < numRows; row++)
-                searchNeighbor(k, rows[row], x, y, part);
+            if (jy < 0) {
+                jy = cells[1]-1;
+                images[1] = -1;
+            }
+            else if (jy == cells[1]) {
+                jy = 0;
+                images[1] = 1;
+            }
+            if (!frame.periodic && imageNumber(images) != SAME_IMAGE)
+                continue;
+            const int other = jx*cells[1]+jy, last = cells[2]-1;
+            const int lower = dx == 0 && dy == 0 ? iz+1 : iz-1, upper = iz+1;
+            if (max(lower, 0) <= min(upper, last))
+                add(other, max(lower, 0), min(upper, last), images);
+            if (frame.periodic && lower < 0) {
+                images[2] = -1;
+                add(other, last, last, images);
+            }
+            if (frame.periodic && upper > last) {
+                images[2] = 1;
+                add(other, 0, 0, images);
+            }
+        }
+    return numRows;
+}
+
+/** Look for pairs with a capsule in one column of cells. */
+void ContactSearch::Implementation::searchCells(int column, const double* x, const double* y) {
+    const CandidateKernels& kernels = candidateKernels();
+    Part& part = parts[column];
+    part.pairs.clear();
+    int count = 0;
+    auto look = [&] {
+        count = kernels.keepNear(sorted.data(), imageShifts, reach, margin, part.candidates(0), count);
+        for (int i = 0; i < count; i++)
+            addPair(members[part.first[i]], members[part.second[i]], part.image[i], x, y, part);
+        count = 0;
+    };
+    CapsuleRow rows[32];
+    for (int iz = 0; iz < frame.cells[2]; iz++) {
+        const int cell = column*frame.cells[2]+iz, first = cellStart[cell], last = cellStart[cell+1];
+        if (first == last)
+            continue;
+        const int numRows = 1+findRows(column, iz, rows+1);
+        int most = last-first;
+        for (int row = 1; row < numRows; row++)
+            most += rows[row].last-rows[row].first;
+        for (int i = first; i < last; i++) {
+            rows[0] = {i+1, last, SAME_IMAGE, {0, 0, 0}};
+            if ((int) part.first.size() < count+most+PADDING)
+                for (vector<int>* list : {&part.first, &part.second, &part.image})
+                    list->resize(max(count+most, 2*BATCH)+PADDING);
+            count += kernels.findOverlaps(sweptBoxes, i, rows, numRows, part.candidates(count));
+            if (count >= BATCH)
+                look();
         }
     }
+    look();
 }
 
-void ContactSearch::Implementation::searchNeighbor(int k, const Row& row, const double* x, const double* y,
-        Part& part) const {
-    if (row.first >= row.last)
-        return;
-    QueryBox query;
-    for (int j = 0; j < 3; j++) {
-        query.center[j] = sweptBoxes.center[j][k]-row.images[j];
-        query.half[j] = sweptBoxes.half[j][k];
-    }
-    const CandidateKernels& kernels = candidateKernels();
-    if ((int) part.hits.size() < row.last-row.first+PADDING)
-        part.hits.resize(row.last-row.first+PADDING);
-    int* hits = part.hits.data();
-    int count = kernels.findOverlaps(sweptBoxes, row.first, row.last, query, hits);
-    if (count == 0)
-        return;
-    float shift[3];
-    set(shift, frame.toVector({-1.0*row.images[0], -1.0*row.images[1], -1.0*row.images[2]}));
-    count = kernels.keepNear(sorted.data(), k, shift, reach, margin, hits, count);
-    for (int hit = 0; hit < count; hit++)
-        addPair(members[k], members[hits[hit]], row.images, x, y, part);
-}
-
-/** Add a pair if it is near enough in double precision. */
-void ContactSearch::Implementation::addPair(int i, int j, const int* images, const double* x, const double* y,
+/** Add a pair if it is near enough, in double precision where there is doubt. */
+void ContactSearch::Implementation::addPair(int i, int j, int image, const double* x, const double* y,
         Part& part) const {
     const int a = min(i, j), b = max(i, j);
     if (isExcluded(a, b))
         return;
     // Where images are wrapped into the frame, j is taken by some vectors of the frame to where it is near i.
+    const bool sure = image >= SURE;
+    image %= SURE;
+    const int images[3] = {image/9-1, image/3%3-1, image%3-1};
     double number[3];
     for (int k = 0; k < 3; k++)
         number[k] = (i < j ? 1 : -1)*(described[j].images[k]-described[i].images[k]-images[k]);
     const Vec3d shift = frame.toVector({number[0], number[1], number[2]});
     ContactPair pair = {a, b, {shift.x, shift.y, shift.z}, 0};
     const SegmentPair start = segments(a, b, pair.shift, x);
-    const double limit = radii(a, b)+reach;
-    const double before = sqrt(findNearestPoints(start).squared);
-    bool isNear = before < limit;
-    if (!isNear && x != y) {
-        const SegmentPair end = segments(a, b, pair.shift, y);
-        const double after = sqrt(findNearestPoints(end).squared);
-        isNear = after < limit || before+after <= largestMotion(start, end);
+    if (!sure) {
+        const double limit = radii(a, b)+reach, before = sqrt(findNearestPoints(start).squared);
+        if (before >= limit) {
+            if (x == y)
+                return;
+            const SegmentPair end = segments(a, b, pair.shift, y);
+            const double after = sqrt(findNearestPoints(end).squared);
+            if (after >= limit && before+after > largestMotion(start, end))
+                return;
+        }
     }
-    if (!isNear)
-        return;
     const double volume = start.volume();
     pair.side = volume > 0 ? 1 : volume < 0 ? -1 : 0;
     part.pairs.push_back(pair);
@@ -600,7 +613,7 @@ bool ContactSearch::Implementation::isOwned(const Contact& contact, const Contac
 }
 
 int ContactSearch::Implementation::evaluate(const ContactPair& pair, const double* x, const double* y,
-        Contact* contacts) const {
+        Contact* contacts, double limit) const {
     const SegmentPair end = segments(pair.a, pair.b, pair.shift, y);
     const double sum = radii(pair.a, pair.b);
     const Places places = findPlaces(end);
@@ -611,15 +624,19 @@ int ContactSearch::Implementation::evaluate(const ContactPair& pair, const doubl
             const Vec3d& n = crossing.normal;
             const double signedDistance = end.between(crossing.s, crossing.t).dot(n);
             contacts[0] = {crossing.s, crossing.t, {n.x, n.y, n.z}, signedDistance-sum, 1, true};
-            return 1;
+            return contacts[0].gap < limit ? 1 : 0;
         }
     }
+    if (places.distance-sum >= limit)
+        return 0;
     int kept = 0;
     const int count = places.parallel ? 2 : 1;
     for (int i = 0; i < count; i++) {
         const double s = places.s[i], t = places.t[i];
         const Vec3d r = end.between(s, t);
         const double length = sqrt(r.squared());
+        if (length-sum >= limit)
+            continue;
         const Vec3d n = length > 0 ? r*(1/length) : findNormal(end, pair.side);
         const Contact contact = {s, t, {n.x, n.y, n.z}, length-sum, 1.0/count, false};
         if (isOwned(contact, pair, end, places.parallel, true, x, y) &&
@@ -638,6 +655,10 @@ ContactSearch::~ContactSearch() {
 
 const CapsuleSystem& ContactSearch::getSystem() const {
     return implementation->system;
+}
+
+void ContactSearch::setRadius(int capsule, double radius) {
+    implementation->system.capsules.at(capsule).radius = radius;
 }
 
 bool ContactSearch::isExcluded(int a, int b) const {
@@ -675,8 +696,9 @@ void ContactSearch::findPairs(const double* x, const double* y, const double* bo
     search.gather(pairs);
 }
 
-int ContactSearch::evaluate(const ContactPair& pair, const double* x, const double* y, Contact* contacts) const {
-    return implementation->evaluate(pair, x, y, contacts);
+int ContactSearch::evaluate(const ContactPair& pair, const double* x, const double* y, Contact* contacts,
+        double limit) const {
+    return implementation->evaluate(pair, x, y, contacts, limit);
 }
 
 void ContactSearch::findVector(const ContactPair& pair, double s, double t, const double* positions,

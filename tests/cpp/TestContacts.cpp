@@ -1,6 +1,6 @@
 /**
- * This tests contacts between capsules: nearest points, crossings and pairs against other formulas and against all pairs
- * of capsules in all images, signed gaps along paths, and what is seen around joints.
+ * This tests contacts between capsules: nearest points, crossings and pairs against other formulas and against all
+ * pairs of capsules in all images, signed gaps along paths, and what is seen around joints.
  */
 
 #include "TestChains.h"
@@ -207,7 +207,8 @@ static void testCrossings() {
             "a point and a segment");
     check(!findCrossing(apart, {{10, 0, 0}, {0, 10, 0}, {-5, 5, 0.001}}, crossing), "it stops before");
     // A segment that turns through the direction of the other, beside it, does not cross it.
-    check(!findCrossing({{10, 1, 0}, {10, 0, 0}, {0, 0, 3}}, {{10, -1, 0}, {10, 0, 0}, {0, 0, 3}}, crossing), "it turns");
+    check(!findCrossing({{10, 1, 0}, {10, 0, 0}, {0, 0, 3}}, {{10, -1, 0}, {10, 0, 0}, {0, 0, 3}}, crossing),
+            "it turns");
 }
 
 struct TestSystem {
@@ -424,7 +425,8 @@ static void testSmallBoxes() {
     for (int trial = 0; trial < 30; trial++) {
         const double tilt = trial%2 == 0 ? 0 : 0.5;
         auto boxOfSize = [&] (double size, double* box) {
-            const double vectors[9] = {size, 0, 0, tilt*size*0.7, 0.9*size, 0, -tilt*0.9*size, tilt*0.8*size, 0.95*size};
+            const double vectors[9] = {size, 0, 0, tilt*size*0.7, 0.9*size, 0, -tilt*0.9*size, tilt*0.8*size,
+                    0.95*size};
             copy(vectors, vectors+9, box);
         };
         double box[9];
@@ -530,7 +532,8 @@ static void testSignedGap() {
     for (int trial = 0; trial < 200; trial++) {
         CapsuleSystem system;
         system.capsules = {{0, 1, 15}, {2, 3, 10}};
-        const Vec3d p = randomVector(generator, 60), q = randomVector(generator, 60), n = p.cross(q)*(1/length(p.cross(q)));
+        const Vec3d p = randomVector(generator, 60), q = randomVector(generator, 60);
+        const Vec3d n = p.cross(q)*(1/length(p.cross(q)));
         if (n.squared() < 0.9 || length(p.cross(q)) < 0.1*length(p)*length(q))
             continue;
         const double s = uniform(generator, 0.05, 0.95), t = uniform(generator, 0.05, 0.95);
@@ -558,7 +561,8 @@ static void testSignedGap() {
             check(search.crosses(pairs[0], x.data(), y.data()) == (way > 20), "crosses or not");
             checkClose(s, contacts[0].s, 1, 1e-9, "s");
             checkClose(t, contacts[0].t, 1, 1e-9, "t");
-            checkClose(1, n.dot({contacts[0].normal[0], contacts[0].normal[1], contacts[0].normal[2]}), 1, 1e-9, "normal");
+            const double* normal = contacts[0].normal;
+            checkClose(1, n.dot({normal[0], normal[1], normal[2]}), 1, 1e-9, "normal");
             checkClose(1, contacts[0].weight, 1, 0, "weight");
         }
     }
