@@ -624,11 +624,12 @@ int ContactSearch::Implementation::evaluate(const ContactPair& pair, const doubl
             const Vec3d& n = crossing.normal;
             const double signedDistance = end.between(crossing.s, crossing.t).dot(n);
             contacts[0] = {crossing.s, crossing.t, {n.x, n.y, n.z}, signedDistance-sum, 1, true};
-            return contacts[0].gap < limit ? 1 : 0;
+            return contacts[0].gap < limit ? 1 : -1;
         }
     }
-    if (places.distance-sum >= limit)
-        return 0;
+    contacts[0].gap = places.distance-sum;
+    if (contacts[0].gap >= limit)
+        return -1;
     int kept = 0;
     const int count = places.parallel ? 2 : 1;
     for (int i = 0; i < count; i++) {

@@ -68,7 +68,8 @@ public:
      *
      * @param contacts  room for two
      * @param limit     contacts with a gap that is not less are left out, which takes less time
-     * @return the number of contacts
+     * @return the number of contacts; -1 if the capsules are not nearer than the limit, and the gap of the first contact
+     *         is theirs
      */
     int evaluate(const ContactPair& pair, const double* x, const double* y, Contact* contacts,
             double limit = std::numeric_limits<double>::infinity()) const;

@@ -1,5 +1,4 @@
 #include "dynamics/ChainPlaces.h"
-#include "dynamics/ChainEngine.h"
 #include <algorithm>
 #include <cstddef>
 
@@ -15,15 +14,25 @@ ChainPlaces::ChainPlaces(const vector<Chain>& chains, int particles) : chains(ch
         }
 }
 
-void ChainPlaces::setPacks(const ChainEngine& engine, const vector<int>& packs) {
-    for (size_t pack = 0; pack < packs.size(); pack++) {
-        const vector<int>& ofLanes = engine.getChainsOfLanes(packs[pack]);
-        for (size_t lane = 0; lane < ofLanes.size(); lane++)
-            if (ofLanes[lane] >= 0) {
-                packOfChain[ofLanes[lane]] = pack;
-                laneOfChain[ofLanes[lane]] = lane;
+void ChainPlaces::setParticles(const vector<CoupledParticle>& newParticles) {
+    for (const CoupledParticle& own : particles)
+        chainOfParticle[own.particle] = -1;
+    particles = newParticles;
+    for (size_t i = 0; i < particles.size(); i++)
+        chainOfParticle[particles[i].particle] = chains.size()+i;
+    packOfChain.resize(getNumChains(), -1);
+    laneOfChain.resize(getNumChains(), -1);
+}
+
+void ChainPlaces::setPacks(const vector<vector<int> >& chainsOfLanes) {
+    for (size_t pack = 0; pack < chainsOfLanes.size(); pack++)
+        for (size_t lane = 0; lane < chainsOfLanes[pack].size(); lane++) {
+            const int chain = chainsOfLanes[pack][lane];
+            if (chain >= 0) {
+                packOfChain[chain] = pack;
+                laneOfChain[chain] = lane;
             }
-    }
+        }
 }
 
 bool ChainPlaces::find(const Place& place, PlaceOnChain& result) const {
@@ -33,18 +42,30 @@ bool ChainPlaces::find(const Place& place, PlaceOnChain& result) const {
     const int chain = chainOfParticle[place.first];
     if (chain < 0)
         return false;
+    result.pack = packOfChain[chain];
+    result.lane = laneOfChain[chain];
+    result.chain = chain;
+    if (chain >= (int) chains.size()) {
+        if (place.isOnSegment())
+            result = PlaceOnChain();
+        return !place.isOnSegment();
+    }
     const Chain& own = chains[chain];
     const int nodes = own.nodes.size(), first = nodeOfParticle[place.first];
     int node = first;
     double fraction = 0;
     if (place.isOnSegment()) {
-        if (chainOfParticle[place.second] != chain)
+        if (chainOfParticle[place.second] != chain) {
+            result = PlaceOnChain();
             return false;
+        }
         const int second = nodeOfParticle[place.second];
         const bool forwards = second == first+1 || (own.closed && second == (first+1)%nodes);
         const bool backwards = first == second+1 || (own.closed && first == (second+1)%nodes);
-        if (!forwards && !backwards)
+        if (!forwards && !backwards) {
+            result = PlaceOnChain();
             return false;
+        }
         node = forwards ? first : second;
         fraction = forwards ? place.fraction : 1-place.fraction;
     }
@@ -52,17 +73,22 @@ bool ChainPlaces::find(const Place& place, PlaceOnChain& result) const {
         node = first-1;
         fraction = 1;
     }
-    result.pack = packOfChain[chain];
-    result.lane = laneOfChain[chain];
-    result.chain = chain;
     result.node = node;
     result.fraction = fraction;
     return true;
 }
 
 double ChainPlaces::getFriction(const PlaceOnChain& place) const {
+    if (place.chain >= (int) chains.size())
+        return particles[place.chain-chains.size()].friction;
     const Chain& chain = chains[place.chain];
     const Segment& segment = chain.segments[place.node];
     return chain.nodeFriction+0.25*min(segment.parallel, segment.perpendicular)+
             segment.extensional/(segment.restLength*segment.restLength);
+}
+
+vector<int> ChainPlaces::getNodes(int chain) const {
+    if (chain >= (int) chains.size())
+        return {particles[chain-chains.size()].particle};
+    return chains[chain].nodes;
 }

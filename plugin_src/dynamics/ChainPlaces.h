@@ -2,24 +2,27 @@
 #define CYLCHAIN_CHAIN_PLACES_H_
 
 #include "couplings/Place.h"
+#include "dynamics/ParticleStep.h"
 #include "mechanics/Chain.h"
 #include <vector>
 
 namespace cylchain {
 
-class ChainEngine;
-
-/** A place on a segment of a chain, and where that is among packs. */
+/** A place on a segment of a chain, or at a particle outside chains, and where that is among packs. */
 struct PlaceOnChain {
-    /** The number of the pack among those of the step, or -1 for a place that is not on a chain. */
+    /** The number of the pack among those of the step, or -1 for a place that does not move. */
     int pack = -1;
     /** The segment is the one between this node and the next. */
     int node = 0, lane = 0;
+    /** The chain; for a particle, its number behind those of all chains. */
     int chain = -1;
     double fraction = 0;
 };
 
-/** Finds places on chains. */
+/**
+ * Finds places on chains, and at particles outside chains that are coupled to them. These particles count as further
+ * chains.
+ */
 class ChainPlaces {
 public:
     /**
@@ -27,25 +30,35 @@ public:
      * @param particles  the number of particles of the System
      */
     ChainPlaces(const std::vector<Chain>& chains, int particles);
-    /** Take note of the packs of a step. */
-    void setPacks(const ChainEngine& engine, const std::vector<int>& packs);
+    /** Set the particles outside chains. */
+    void setParticles(const std::vector<CoupledParticle>& particles);
     /**
-     * Find a place on a chain.
+     * Take note of the packs of a step.
      *
-     * @return whether it is on one; a point is not, nor is one between particles that are no segment
+     * @param chainsOfLanes  the chain in each lane of each pack, or -1
+     */
+    void setPacks(const std::vector<std::vector<int> >& chainsOfLanes);
+    /**
+     * Find a place.
+     *
+     * @return whether it moves with a chain or a particle; a point does not, nor does one between particles that are no
+     *         segment
      */
     bool find(const Place& place, PlaceOnChain& result) const;
     /** The least friction that a place has against any motion of its own. */
     double getFriction(const PlaceOnChain& place) const;
-    /** The chain of a particle, or -1. */
-    int getChain(int particle) const {
-        return chainOfParticle[particle];
-    }
     const std::vector<Chain>& getChains() const {
         return chains;
     }
+    /** The number of chains and particles. */
+    int getNumChains() const {
+        return chains.size()+particles.size();
+    }
+    /** The particles that move with a chain, or the one that is counted as one. */
+    std::vector<int> getNodes(int chain) const;
 private:
     const std::vector<Chain>& chains;
+    std::vector<CoupledParticle> particles;
     std::vector<int> chainOfParticle, nodeOfParticle, packOfChain, laneOfChain;
 };
 

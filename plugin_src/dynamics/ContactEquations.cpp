@@ -23,15 +23,15 @@ const int CHUNK = 128;
 
 } // namespace
 
-void ContactEquations::setContacts(ContactSearch* newSearch, double newStiffness) {
+void ContactEquations::setContacts(ContactSearch* newSearch, double newStiffness, const double* newBox) {
     search = newSearch;
     stiffness = newStiffness;
+    box = newBox;
 }
 
 void ContactEquations::begin(const CoupledStart& start, const Loop& newLoop) {
     loop = &newLoop;
     begun = start.positions;
-    box = start.box;
     kT = start.settings.kT;
     const vector<Capsule>& capsules = search->getSystem().capsules;
     places.resize(capsules.size());
@@ -104,24 +104,25 @@ void ContactEquations::updateContact(const ContactPair& pair, const double* move
 void ContactEquations::evaluate(State& state, const double* moved, bool first, Part& part) const {
     const ContactPair& pair = state.pair;
     const PlaceOnChain &a = places[pair.a].place, &b = places[pair.b].place;
-    if (a.pack < 0 && b.pack < 0)
+    state.near = a.pack >= 0 || b.pack >= 0;
+    if (!state.near)
         return;
-    if (iterations < SEARCHING_ITERATIONS || state.count < 0)
-        state.count = search->evaluate(pair, begun, moved, state.contacts);
+    const double diameter = search->getSystem().capsules[pair.a].radius+search->getSystem().capsules[pair.b].radius;
+    if (iterations < SEARCHING_ITERATIONS || state.count < 0) {
+        // What is farther away is left out, until it may have come near. Overlaps that are mirrored count.
+        const double limit = LARGEST_GAP*diameter+max(state.mirrored[0], state.mirrored[1]);
+        state.count = search->evaluate(pair, begun, moved, state.contacts, limit);
+        state.near = state.count >= 0 || !first;
+        state.gap = state.contacts[0].gap;
+    }
     else
         for (int i = 0; i < state.count; i++)
             updateContact(pair, moved, state.contacts[i]);
-    const double diameter = search->getSystem().capsules[pair.a].radius+search->getSystem().capsules[pair.b].radius;
-    // A contact that belongs to a neighbour may come back.
-    state.near = state.count == 0;
-    state.gap = HUGE_VAL;
     for (int i = 0; i < state.count; i++) {
         const Contact& contact = state.contacts[i];
         part.crossed |= contact.crossed;
         if (first)
             state.mirrored[i] = min(max(0.0, -contact.gap), LARGEST_MIRRORED*diameter);
-        state.near |= contact.gap < state.mirrored[i]+LARGEST_GAP*diameter;
-        state.gap = min(state.gap, contact.gap);
         const double overlap = state.mirrored[i]-contact.gap;
         if (!(overlap > 0))
             continue;
@@ -141,7 +142,6 @@ void ContactEquations::evaluate(State& state, const double* moved, bool first, P
         k[5] = own*n[2]*n[2];
         part.equations.push_back(equation);
     }
-    state.near |= !first;
 }
 
 void ContactEquations::linearise(int iteration, const double* moved, vector<CouplingEquation>& equations) {

@@ -27,8 +27,9 @@ public:
      * Set what touches, which must exist while steps are taken.
      *
      * @param stiffness  k_c
+     * @param box        the periodic box, if distances are those of nearest images, or NULL
      */
-    void setContacts(ContactSearch* search, double stiffness);
+    void setContacts(ContactSearch* search, double stiffness, const double* box);
     void begin(const CoupledStart& start, const Loop& loop) override;
     void beginStage(int stage, int numStages, const double* moved) override;
     void linearise(int iteration, const double* moved, std::vector<CouplingEquation>& equations) override;

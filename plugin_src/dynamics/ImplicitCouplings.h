@@ -11,8 +11,6 @@ namespace cylchain {
 struct CoupledStart {
     /** Three doubles for each particle. */
     const double* positions;
-    /** The three vectors of a periodic box, or NULL. */
-    const double* box;
     const StepSettings& settings;
     const ChainPlaces& places;
     /** Whether each chain takes the step; others do not move. */

@@ -35,34 +35,77 @@ NetworkStep::NetworkStep(const ChainEngine& engine, const vector<Chain>& chains,
 NetworkStep::~NetworkStep() {
 }
 
-void NetworkStep::setCouplings(const vector<ImplicitCouplings*>& newCouplings) {
-    couplings = newCouplings;
+void NetworkStep::setForces(const CoupledForces& forces, const double* box) {
+    setParticles(forces.particles);
+    couplings.clear();
+    links.resize(max(links.size(), forces.links.size()));
+    for (size_t i = 0; i < forces.links.size(); i++) {
+        const CoupledForces::Links& own = forces.links[i];
+        if (!links[i])
+            links[i].reset(new LinkEquations());
+        LinkBoxes boxes;
+        boxes.distances = own.periodic ? box : NULL;
+        boxes.segments = own.nearestParticles ? box : NULL;
+        links[i]->setLinks(own.links, boxes);
+        couplings.push_back(links[i].get());
+    }
+    contacts.resize(max(contacts.size(), forces.contacts.size()));
+    for (size_t i = 0; i < forces.contacts.size(); i++) {
+        const CoupledForces::Contacts& own = forces.contacts[i];
+        if (!contacts[i])
+            contacts[i].reset(new ContactEquations());
+        contacts[i]->setContacts(own.search, own.stiffness, own.periodic ? box : NULL);
+        couplings.push_back(contacts[i].get());
+    }
+}
+
+void NetworkStep::setParticles(const vector<CoupledParticle>& newParticles) {
+    const bool same = newParticles.size() == particles.size() &&
+            equal(particles.begin(), particles.end(), newParticles.begin(),
+                    [] (const CoupledParticle& a, const CoupledParticle& b) {
+                        return a.particle == b.particle && a.friction == b.friction;
+                    });
+    if (same)
+        return;
+    particles = newParticles;
+    places.setParticles(particles);
+    steps.clear();
 }
 
 void NetworkStep::choosePacks(const StepSettings& settings) {
     const vector<int> chosen = engine.getPacksOfStep(settings);
-    if (chosen == packs)
+    if (chosen == packs && !steps.empty())
         return;
     packs = chosen;
     steps.clear();
+    chainsOfLanes.clear();
+    for (int pack : packs) {
+        steps.push_back(engine.createStep(pack));
+        chainsOfLanes.push_back(engine.getChainsOfLanes(pack));
+    }
+    if (!particles.empty()) {
+        // They are numbered behind the chains.
+        vector<int> numbers(particles.size());
+        iota(numbers.begin(), numbers.end(), (int) places.getChains().size());
+        steps.emplace_back(new ParticleStep(particles));
+        chainsOfLanes.push_back(numbers);
+    }
     stepsOfPacks.clear();
     unfinished.clear();
     flags.clear();
-    for (int pack : packs) {
-        const size_t lanes = engine.getChainsOfLanes(pack).size();
-        steps.push_back(engine.createStep(pack));
-        stepsOfPacks.push_back(steps.back().get());
-        unfinished.emplace_back(new bool[lanes]);
-        flags.emplace_back(new bool[lanes]);
+    for (size_t pack = 0; pack < steps.size(); pack++) {
+        stepsOfPacks.push_back(steps[pack].get());
+        unfinished.emplace_back(new bool[chainsOfLanes[pack].size()]);
+        flags.emplace_back(new bool[chainsOfLanes[pack].size()]);
     }
-    places.setPacks(engine, packs);
+    places.setPacks(chainsOfLanes);
 }
 
 Instability NetworkStep::step(const double* positions, const double* forces, const double* box,
             const StepSettings& settings, double* displacements, const Loop& loop) {
     choosePacks(settings);
     iterations = substitutions = 0;
-    const size_t numChains = places.getChains().size();
+    const size_t numChains = places.getNumChains();
     const vector<bool> all(numChains, true);
     vector<bool> failed(numChains, false);
     Instability result;
@@ -79,14 +122,14 @@ Instability NetworkStep::step(const double* positions, const double* forces, con
 }
 
 bool NetworkStep::attempt(const Attempt& attempt, double* displacements, vector<bool>& failed) {
-    const int numPacks = packs.size();
+    const int numPacks = steps.size();
     attempt.loop(numPacks, [&] (int pack) {
-        const vector<int>& chains = engine.getChainsOfLanes(packs[pack]);
+        const vector<int>& chains = chainsOfLanes[pack];
         for (size_t lane = 0; lane < chains.size(); lane++)
             flags[pack][lane] = chains[lane] >= 0 && attempt.taken[chains[lane]];
         steps[pack]->begin(attempt.positions, attempt.forces, attempt.box, attempt.settings, flags[pack].get());
     });
-    const CoupledStart start = {attempt.positions, attempt.box, attempt.settings, places, attempt.taken};
+    const CoupledStart start = {attempt.positions, attempt.settings, places, attempt.taken};
     for (ImplicitCouplings* own : couplings)
         own->begin(start, attempt.loop);
     copy(attempt.positions, attempt.positions+moved.size(), moved.begin());
@@ -100,7 +143,7 @@ bool NetworkStep::attempt(const Attempt& attempt, double* displacements, vector<
     failed.assign(failed.size(), false);
     for (int pack = 0; pack < numPacks; pack++) {
         steps[pack]->findExcessiveChanges(flags[pack].get());
-        const vector<int>& chains = engine.getChainsOfLanes(packs[pack]);
+        const vector<int>& chains = chainsOfLanes[pack];
         for (size_t lane = 0; lane < chains.size(); lane++)
             if (chains[lane] >= 0 && attempt.taken[chains[lane]] && (flags[pack][lane] || unfinished[pack][lane]))
                 failed[chains[lane]] = true;
@@ -114,7 +157,7 @@ bool NetworkStep::attempt(const Attempt& attempt, double* displacements, vector<
 }
 
 bool NetworkStep::iterate(const Attempt& attempt, int stage) {
-    const int numPacks = packs.size();
+    const int numPacks = steps.size();
     attempt.loop(numPacks, [&] (int pack) {
         steps[pack]->beginStage(stage);
     });
@@ -151,7 +194,7 @@ bool NetworkStep::iterate(const Attempt& attempt, int stage) {
         for (size_t i = 0; i < couplings.size(); i++)
             more |= couplings[i]->finishIteration(coupled.getMoves().data()+3*first[i], moved.data());
         for (int pack = 0; pack < numPacks; pack++) {
-            const size_t lanes = engine.getChainsOfLanes(packs[pack]).size();
+            const size_t lanes = chainsOfLanes[pack].size();
             more |= any_of(unfinished[pack].get(), unfinished[pack].get()+lanes, [] (bool flag) {return flag;});
         }
         if (!more)
@@ -168,11 +211,10 @@ bool NetworkStep::divide(const Attempt& whole, int division, double* displacemen
     const size_t size = moved.size();
     vector<double> start(whole.positions, whole.positions+size), total(size), part(size);
     half.positions = start.data();
-    const vector<Chain>& chains = places.getChains();
     auto forTaken = [&] (auto function) {
-        for (size_t chain = 0; chain < chains.size(); chain++)
+        for (int chain = 0; chain < places.getNumChains(); chain++)
             if (whole.taken[chain])
-                for (int particle : chains[chain].nodes)
+                for (int particle : places.getNodes(chain))
                     for (int k = 3*particle; k < 3*particle+3; k++)
                         function(k);
     };

@@ -2,7 +2,10 @@
 #define CYLCHAIN_NETWORK_STEP_H_
 
 #include "dynamics/ChainEngine.h"
+#include "dynamics/ContactEquations.h"
+#include "dynamics/CoupledForces.h"
 #include "dynamics/ImplicitCouplings.h"
+#include "dynamics/LinkEquations.h"
 #include <memory>
 #include <vector>
 
@@ -25,10 +28,15 @@ public:
      */
     NetworkStep(const ChainEngine& engine, const std::vector<Chain>& chains, int particles);
     ~NetworkStep();
-    /** Set the couplings that steps have in their equations; they must exist while steps are taken. */
-    void setCouplings(const std::vector<ImplicitCouplings*>& couplings);
     /**
-     * Compute the displacements of all nodes in a step, as ChainEngine::step() does.
+     * Set the forces that steps have in their equations. What they point to must exist while steps are taken.
+     *
+     * @param box  the three vectors of the periodic box, for forces that are periodic, or NULL
+     */
+    void setForces(const CoupledForces& forces, const double* box);
+    /**
+     * Compute the displacements of all nodes and of the coupled particles in a step, as ChainEngine::step() does. Of the
+     * result, the chain by which the step has gone wrong may be a particle: the number behind those of all chains.
      */
     Instability step(const double* positions, const double* forces, const double* box, const StepSettings& settings,
             double* displacements, const Loop& loop);
@@ -38,6 +46,7 @@ public:
     }
 private:
     struct Attempt;
+    void setParticles(const std::vector<CoupledParticle>& particles);
     bool attempt(const Attempt& attempt, double* displacements, std::vector<bool>& failed);
     bool iterate(const Attempt& attempt, int stage);
     bool divide(const Attempt& whole, int division, double* displacements, std::vector<bool>& failed);
@@ -45,8 +54,12 @@ private:
     void choosePacks(const StepSettings& settings);
     const ChainEngine& engine;
     ChainPlaces places;
+    std::vector<std::unique_ptr<LinkEquations> > links;
+    std::vector<std::unique_ptr<ContactEquations> > contacts;
     std::vector<ImplicitCouplings*> couplings;
+    std::vector<CoupledParticle> particles;
     std::vector<int> packs;
+    std::vector<std::vector<int> > chainsOfLanes;
     std::vector<std::unique_ptr<PackStep> > steps;
     std::vector<PackStep*> stepsOfPacks;
     CoupledEquations coupled;

@@ -249,10 +249,11 @@ void CylinderChainIntegrator::step(int steps) {
                 continue;
         }
         {
-            // Most schemes compute the forces of the chains themselves.
+            // Most schemes compute the forces of the chains themselves, and implicit ones those of links and contacts.
 
             const bool excluded = computesChainForces(static_cast<cylchain::Scheme>(scheme));
             CylinderChainForceImpl::Exclusion exclusion(*chains, excluded);
+            ChainCouplings::Exclusion couplings(stepper->getCouplings(), stepper->getCoupledGroups());
             context->calcForcesAndEnergy(true, false, getIntegrationForceGroups());
         }
         stepper->step(noiseSeed, noiseLevel, stepsTaken, followsOn, recordsTensions && done == steps-1, dividedSteps);

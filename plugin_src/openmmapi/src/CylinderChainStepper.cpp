@@ -35,7 +35,7 @@ static vector<int> findMobileParticles(const CylinderChainDescription& chains, c
 
 CylinderChainStepper::CylinderChainStepper(ContextImpl& context, const CylinderChainIntegrator& integrator,
         CylinderChainForceImpl& force) : context(context), integrator(integrator), chains(force.getDescription()),
-        others(context.getSystem(), integrator, chains), kernel(createKernel(context, force, others)),
+        others(context.getSystem(), integrator, chains), couplings(context, chains, others), kernel(createKernel(context, force, others)),
         explicitWork(getKernel().getLoop()), periodic(context.getSystem().usesPeriodicBoundaryConditions()),
         recorded(false) {
     explicitWork.initialize(findMobileParticles(chains, others));
@@ -75,6 +75,12 @@ BackgroundFlow CylinderChainStepper::describeFlow() {
         flow.box = box;
     }
     return flow;
+}
+
+int CylinderChainStepper::getCoupledGroups() const {
+    const int groups = integrator.getIntegrationForceGroups();
+    const bool includesChains = (groups&(1<<chains.getForceGroup())) != 0;
+    return includesChains && isImplicit(static_cast<Scheme>(integrator.getScheme())) ? groups : 0;
 }
 
 StepSettings CylinderChainStepper::describeStep(uint64_t seed, int level, uint64_t step) {
@@ -179,11 +185,15 @@ void CylinderChainStepper::step(uint64_t seed, int level, uint64_t step, bool fo
     StepSettings settings = describeStep(seed, level, step);
     recordForces(settings, records);
     takeNoteOfForces(settings, followsOn);
-    const Instability found = getKernel().displaceChains(context, settings);
+    const int particle = getKernel().displaceOthers(context, settings, integrator.getFriction());
+    const CoupledForces& coupled = couplings.describe(getCoupledGroups(), integrator.getFriction());
+    const Instability found = coupled.empty() ? getKernel().displaceChains(context, settings) :
+            getKernel().displaceCoupledChains(context, settings, coupled);
+    if (found.chain >= (int) chains.getChains().size())
+        reportParticle(coupled.particles[found.chain-chains.getChains().size()].particle, settings);
     if (found.chain != -1)
         reportInstability(found.chain, settings);
     divided += found.divided;
-    const int particle = getKernel().displaceOthers(context, settings, integrator.getFriction());
     if (particle != -1)
         reportParticle(particle, settings);
 

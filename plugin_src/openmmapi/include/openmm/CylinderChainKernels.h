@@ -4,6 +4,7 @@
 #include "couplings/ContactSearch.h"
 #include "couplings/Links.h"
 #include "dynamics/ChainEngine.h"
+#include "dynamics/CoupledForces.h"
 #include "openmm/KernelImpl.h"
 #include "openmm/Platform.h"
 #include "openmm/System.h"
@@ -176,6 +177,18 @@ public:
      * @return the first chain by which the step has gone wrong, or the number of chains whose step was divided
      */
     virtual cylchain::Instability displaceChains(ContextImpl& context, const cylchain::StepSettings& settings) = 0;
+    /**
+     * Compute the displacements of chains that are coupled, and of the particles that are coupled to them, in one step
+     * of an implicit scheme.  Positions do not change.  displaceOthers() has been called before.
+     *
+     * @param context   the context in which to execute this kernel
+     * @param settings  the settings of the step
+     * @param coupled   the forces that couple them
+     * @return the first chain by which the step has gone wrong, or the number of chains whose step was divided.
+     *         Particles count as further chains, in their order.
+     */
+    virtual cylchain::Instability displaceCoupledChains(ContextImpl& context, const cylchain::StepSettings& settings,
+            const cylchain::CoupledForces& coupled) = 0;
     /**
      * Compute the displacements of the particles outside chains in one step.  Positions do not change.
      *

@@ -27,6 +27,18 @@ public:
         return *engine;
     }
     /**
+     * Get a number that increases whenever the engine is another one.
+     */
+    int getEngineVersion() const {
+        return version;
+    }
+    /**
+     * Get the chains.
+     */
+    const std::vector<cylchain::Chain>& getChains() const {
+        return chains->getChains();
+    }
+    /**
      * Get the box in which segments are taken as their shortest images, as nine numbers, or NULL if they are taken as
      * they are.
      */
@@ -36,6 +48,7 @@ private:
     ReferenceParallelLoop loop;
     const CylinderChainDescription* chains;
     std::unique_ptr<cylchain::ChainEngine> engine;
+    int version = 0;
 };
 
 } // namespace OpenMM

@@ -3,7 +3,9 @@
 
 #include "ReferenceCalcCylinderChainForceKernel.h"
 #include "ReferenceParallelLoop.h"
+#include "dynamics/NetworkStep.h"
 #include "openmm/CylinderChainKernels.h"
+#include <memory>
 #include <vector>
 
 namespace OpenMM {
@@ -24,6 +26,8 @@ public:
         return displacements;
     }
     cylchain::Instability displaceChains(ContextImpl& context, const cylchain::StepSettings& settings);
+    cylchain::Instability displaceCoupledChains(ContextImpl& context, const cylchain::StepSettings& settings,
+            const cylchain::CoupledForces& coupled);
     int displaceOthers(ContextImpl& context, const cylchain::StepSettings& settings, double friction);
     void move(ContextImpl& context, const cylchain::StepSettings& settings);
     int advanceChains(ContextImpl& context, const cylchain::StepSettings& settings, int count, long long& divided);
@@ -35,10 +39,15 @@ private:
     int advancePack(ContextImpl& context, int pack, cylchain::StepSettings settings, int count, long long& divided);
     void displaceBlock(int block, const std::vector<Vec3>& positions, const std::vector<Vec3>& forces,
             const cylchain::StepSettings& settings, double friction);
+    void findNewPosition(ContextImpl& context, int particle, double stepSize);
     void exchangePositions(ContextImpl& context, double time, int steps);
     ReferenceParallelLoop loop;
     ReferenceCalcCylinderChainForceKernel* chainKernel;
     const OtherParticles* others;
+    // Takes the steps of coupled chains, once there have been some, with the version of the engine that it knows.
+
+    std::unique_ptr<cylchain::NetworkStep> network;
+    int versionOfNetwork;
     int mixedChains;
     std::vector<Vec3> displacements, newPositions;
 };

@@ -59,4 +59,5 @@ void ReferenceCalcCylinderChainForceKernel::computeEnergies(ContextImpl& context
 
 void ReferenceCalcCylinderChainForceKernel::copyParametersToContext(ContextImpl&) {
     engine.reset(new ChainEngine(chains->getChains()));
+    version++;
 }

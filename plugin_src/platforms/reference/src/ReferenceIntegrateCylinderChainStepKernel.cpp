@@ -25,7 +25,7 @@ static bool isFinite(const Vec3& v) {
 
 ReferenceIntegrateCylinderChainStepKernel::ReferenceIntegrateCylinderChainStepKernel(string name,
         const Platform& platform, ContextImpl& context) : IntegrateCylinderChainStepKernel(name, platform),
-        loop(context), chainKernel(NULL), others(NULL), mixedChains(0) {
+        loop(context), chainKernel(NULL), others(NULL), versionOfNetwork(-1), mixedChains(0) {
 }
 
 void ReferenceIntegrateCylinderChainStepKernel::initialize(const System& system, const CylinderChainDescription&,
@@ -54,10 +54,8 @@ Instability ReferenceIntegrateCylinderChainStepKernel::displaceChains(ContextImp
     vector<Instability> instabilities(packs.size());
     loop.run(packs.size(), [&] (int i) {
         instabilities[i] = engine.step(packs[i], positions, forces, box, settings, &displacements[0][0]);
-        for (int particle : engine.getParticles(packs[i])) {
-            newPositions[particle] = (*data.positions)[particle]+displacements[particle];
-            (*data.velocities)[particle] = displacements[particle]/settings.stepSize;
-        }
+        for (int particle : engine.getParticles(packs[i]))
+            findNewPosition(context, particle, settings.stepSize);
     });
 
     // Whatever the order of packs, report the first chain.
@@ -70,6 +68,34 @@ Instability ReferenceIntegrateCylinderChainStepKernel::displaceChains(ContextImp
     }
     if (result.chain == -1)
         mixedChains = engine.getNumMixedChains(packs);
+    return result;
+}
+
+void ReferenceIntegrateCylinderChainStepKernel::findNewPosition(ContextImpl& context, int particle, double stepSize) {
+    ReferencePlatform::PlatformData& data = extractData(context);
+    newPositions[particle] = (*data.positions)[particle]+displacements[particle];
+    (*data.velocities)[particle] = displacements[particle]/stepSize;
+}
+
+Instability ReferenceIntegrateCylinderChainStepKernel::displaceCoupledChains(ContextImpl& context,
+        const StepSettings& settings, const CoupledForces& coupled) {
+    ReferencePlatform::PlatformData& data = extractData(context);
+    const ChainEngine& engine = chainKernel->getEngine();
+    if (!network || versionOfNetwork != chainKernel->getEngineVersion()) {
+        network.reset(new NetworkStep(engine, chainKernel->getChains(), context.getSystem().getNumParticles()));
+        versionOfNetwork = chainKernel->getEngineVersion();
+    }
+    network->setForces(coupled, &data.periodicBoxVectors[0][0]);
+    const Instability result = network->step(&(*data.positions)[0][0], &(*data.forces)[0][0],
+            chainKernel->getBox(context), settings, &displacements[0][0],
+            [&] (int count, const function<void(int)>& iteration) {loop.run(count, iteration);});
+    if (result.chain != -1)
+        return result;
+    const vector<int> packs = engine.getPacksOfStep(settings);
+    for (int pack : packs)
+        for (int particle : engine.getParticles(pack))
+            findNewPosition(context, particle, settings.stepSize);
+    mixedChains = engine.getNumMixedChains(packs);
     return result;
 }
 

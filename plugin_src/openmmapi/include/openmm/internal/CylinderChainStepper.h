@@ -4,6 +4,7 @@
 #include "dynamics/ChainEngine.h"
 #include "openmm/CylinderChainIntegrator.h"
 #include "openmm/Kernel.h"
+#include "openmm/internal/ChainCouplings.h"
 #include "openmm/internal/ContextImpl.h"
 #include "openmm/internal/CylinderChainForceImpl.h"
 #include "openmm/internal/ExplicitWork.h"
@@ -22,6 +23,17 @@ class CylinderChainStepper {
 public:
     CylinderChainStepper(ContextImpl& context, const CylinderChainIntegrator& integrator,
             CylinderChainForceImpl& force);
+    /**
+     * Get the force groups whose links and contacts are in the equations of steps: those of the integrator if its scheme
+     * is implicit, or none.
+     */
+    int getCoupledGroups() const;
+    /**
+     * Get the links and contacts of the Context.
+     */
+    ChainCouplings& getCouplings() {
+        return couplings;
+    }
     /**
      * Throw an exception if positions were wrapped into a periodic box so that a chain is torn: a segment is longer
      * than half the box and than twice its rest length, while its ends have images that are nearer.
@@ -82,6 +94,7 @@ private:
     const CylinderChainIntegrator& integrator;
     const CylinderChainDescription& chains;
     const OtherParticles others;
+    ChainCouplings couplings;
     Kernel kernel;
     ExplicitWork explicitWork;
     const bool periodic;
