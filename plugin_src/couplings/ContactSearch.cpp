@@ -81,9 +81,19 @@ struct Frame {
 /** The box that a capsule sweeps in a step, in fractions of the frame. */
 struct Described {
     bool finite;
-    int cell, images[3];
+    int cell;
     double center[3], half[3];
     CoarseCapsule coarse;
+};
+
+/** A capsule as it is at the start, for the order of cells: those that are near each other are so in memory. */
+struct PlacedCapsule {
+    int number;
+    bool hasExclusions;
+    Capsule capsule;
+    /** What was taken off to get its center into the frame. */
+    int images[3];
+    Vec3d first, along;
 };
 
 /** What one part of the search finds. */
@@ -174,6 +184,7 @@ struct ContactSearch::Implementation {
     Frame frame;
     double reach = 0, largestRadius = 0;
     vector<Described> described;
+    vector<PlacedCapsule> placed, sortedPlaced;
     vector<int> cellStart, members;
     vector<float> boxes;
     vector<CoarseCapsule> sorted;
@@ -195,7 +206,9 @@ struct ContactSearch::Implementation {
     void setCells();
     void searchCells(int part, const double* x, const double* y);
     int findRows(int column, int iz, CapsuleRow* rows) const;
-    void addPair(int i, int j, int image, const double* x, const double* y, Part& part) const;
+    void addPair(const PlacedCapsule& one, const PlacedCapsule& other, int image, const double* x, const double* y,
+            Part& part) const;
+    bool areNeighbors(const Capsule& first, const Capsule& second) const;
     void gather(vector<ContactPair>& pairs);
     SegmentPair withNeighbor(const SegmentPair& segments, int neighbor, bool ofA, bool atEnd,
             const double* positions) const;
@@ -243,22 +256,27 @@ ContactSearch::Implementation::Implementation(const CapsuleSystem& system, bool 
     for (vector<int>& others : excluded)
         sort(others.begin(), others.end());
     described.resize(capsules.size());
+    placed.resize(capsules.size());
+    sortedPlaced.resize(capsules.size());
+}
+
+/** Whether two capsules share a particle or are near each other in a chain. */
+bool ContactSearch::Implementation::areNeighbors(const Capsule& first, const Capsule& second) const {
+    if (first.first == second.first || first.end() == second.end() || first.first == second.end() ||
+            first.end() == second.first)
+        return true;
+    if (first.chain < 0 || first.chain != second.chain)
+        return false;
+    const CapsuleChain& chain = system.chains[first.chain];
+    int apart = abs(first.index-second.index);
+    if (chain.closed)
+        apart = min(apart, chain.numCapsules-apart);
+    return apart <= chain.excludedNeighbors;
 }
 
 bool ContactSearch::Implementation::isExcluded(int a, int b) const {
-    const Capsule &first = system.capsules[a], &second = system.capsules[b];
-    if (a == b || first.first == second.first || first.end() == second.end() || first.first == second.end() ||
-            first.end() == second.first)
-        return true;
-    if (first.chain >= 0 && first.chain == second.chain) {
-        const CapsuleChain& chain = system.chains[first.chain];
-        int apart = abs(first.index-second.index);
-        if (chain.closed)
-            apart = min(apart, chain.numCapsules-apart);
-        if (apart <= chain.excludedNeighbors)
-            return true;
-    }
-    return !excluded[a].empty() && binary_search(excluded[a].begin(), excluded[a].end(), b);
+    return a == b || areNeighbors(system.capsules[a], system.capsules[b]) ||
+            (!excluded[a].empty() && binary_search(excluded[a].begin(), excluded[a].end(), b));
 }
 
 Vec3d ContactSearch::Implementation::along(const Capsule& capsule, const double* positions) const {
@@ -321,6 +339,8 @@ void ContactSearch::Implementation::describe(int i, const double* x, const doubl
     const Vec3d ends[] = {frame.toFractions(x0), frame.toFractions(x0+p), frame.toFractions(y0),
             frame.toFractions(y0+q)};
     Described& result = described[i];
+    PlacedCapsule& place = placed[i];
+    place = {i, !excluded[i].empty(), capsule, {0, 0, 0}, x0, p};
     double center[3];
     for (int k = 0; k < 3; k++) {
         const double f[] = {component(ends[0], k), component(ends[1], k), component(ends[2], k), component(ends[3], k)};
@@ -330,8 +350,9 @@ void ContactSearch::Implementation::describe(int i, const double* x, const doubl
             return;
         const double lower = smallestOf(f[0], f[1], f[2], f[3]), upper = largestOf(f[0], f[1], f[2], f[3]);
         center[k] = 0.5*(lower+upper);
-        result.images[k] = frame.periodic ? (int) floor(center[k]) : 0;
-        result.center[k] = center[k]-result.images[k];
+        if (frame.periodic)
+            place.images[k] = (int) floor(center[k]);
+        result.center[k] = center[k]-place.images[k];
         result.half[k] = 0.5*(upper-lower)+(capsule.radius+0.5*reach)*frame.inverseWidths[k]+SINGLE_ROUNDING;
     }
     const Vec3d unwrapped = frame.toVector({center[0], center[1], center[2]});
@@ -422,8 +443,10 @@ void ContactSearch::Implementation::setCells() {
             half[i] = described[members[i]].half[k];
         }
     }
-    for (int i = 0; i < count; i++)
+    for (int i = 0; i < count; i++) {
         sorted[i] = described[members[i]].coarse;
+        sortedPlaced[i] = placed[members[i]];
+    }
 }
 
 /** Find the rows of capsules in half of the neighbors of a cell: each two cells, in each image, meet once. */
@@ -479,7 +502,7 @@ void ContactSearch::Implementation::searchCells(int column, const double* x, con
     auto look = [&] {
         count = kernels.keepNear(sorted.data(), imageShifts, reach, margin, part.candidates(0), count);
         for (int i = 0; i < count; i++)
-            addPair(members[part.first[i]], members[part.second[i]], part.image[i], x, y, part);
+            addPair(sortedPlaced[part.first[i]], sortedPlaced[part.second[i]], part.image[i], x, y, part);
         count = 0;
     };
     CapsuleRow rows[32];
@@ -505,23 +528,25 @@ void ContactSearch::Implementation::searchCells(int column, const double* x, con
 }
 
 /** Add a pair if it is near enough, in double precision where there is doubt. */
-void ContactSearch::Implementation::addPair(int i, int j, int image, const double* x, const double* y,
-        Part& part) const {
-    const int a = min(i, j), b = max(i, j);
-    if (isExcluded(a, b))
+void ContactSearch::Implementation::addPair(const PlacedCapsule& one, const PlacedCapsule& other, int image,
+        const double* x, const double* y, Part& part) const {
+    const bool inOrder = one.number < other.number;
+    const PlacedCapsule &first = inOrder ? one : other, &second = inOrder ? other : one;
+    const int a = first.number, b = second.number;
+    if (areNeighbors(first.capsule, second.capsule) || (first.hasExclusions && isExcluded(a, b)))
         return;
-    // Where images are wrapped into the frame, j is taken by some vectors of the frame to where it is near i.
     const bool sure = image >= SURE;
     image %= SURE;
     const int images[3] = {image/9-1, image/3%3-1, image%3-1};
+    // Where images are wrapped into the frame, the other one is taken by some vectors of it to where it is near.
     double number[3];
     for (int k = 0; k < 3; k++)
-        number[k] = (i < j ? 1 : -1)*(described[j].images[k]-described[i].images[k]-images[k]);
+        number[k] = (inOrder ? 1 : -1)*(other.images[k]-one.images[k]-images[k]);
     const Vec3d shift = frame.toVector({number[0], number[1], number[2]});
     ContactPair pair = {a, b, {shift.x, shift.y, shift.z}, 0};
-    const SegmentPair start = segments(a, b, pair.shift, x);
+    const SegmentPair start = {first.along, second.along, first.first-second.first+shift};
     if (!sure) {
-        const double limit = radii(a, b)+reach, before = sqrt(findNearestPoints(start).squared);
+        const double limit = first.capsule.radius+second.capsule.radius+reach, before = sqrt(findNearestPoints(start).squared);
         if (before >= limit) {
             if (x == y)
                 return;
