@@ -212,8 +212,8 @@ struct ContactSearch::Implementation {
     void gather(vector<ContactPair>& pairs);
     SegmentPair withNeighbor(const SegmentPair& segments, int neighbor, bool ofA, bool atEnd,
             const double* positions) const;
-    bool isOwned(const Contact& contact, const ContactPair& pair, const SegmentPair& end, bool parallel, bool ofA,
-            const double* x, const double* y) const;
+    bool isOwned(const Contact& contact, const ContactPair& pair, const SegmentPair& start, const SegmentPair& end,
+            bool parallel, bool ofA, const double* x, const double* y) const;
     int evaluate(const ContactPair& pair, const double* x, const double* y, Contact* contacts, double limit) const;
 };
 
@@ -594,8 +594,8 @@ SegmentPair ContactSearch::Implementation::withNeighbor(const SegmentPair& segme
 }
 
 /** Get whether a contact belongs to its pair, or to a neighbor of a, or of b, in its chain. */
-bool ContactSearch::Implementation::isOwned(const Contact& contact, const ContactPair& pair, const SegmentPair& end,
-        bool parallel, bool ofA, const double* x, const double* y) const {
+bool ContactSearch::Implementation::isOwned(const Contact& contact, const ContactPair& pair, const SegmentPair& start,
+        const SegmentPair& end, bool parallel, bool ofA, const double* x, const double* y) const {
     const int own = ofA ? pair.a : pair.b, other = ofA ? pair.b : pair.a;
     const double fraction = ofA ? contact.s : contact.t, sum = radii(pair.a, pair.b);
     const double least = LEAST_DIFFERENCE*(sum+fabs(contact.gap));
@@ -607,11 +607,14 @@ bool ContactSearch::Implementation::isOwned(const Contact& contact, const Contac
             continue;
         if (!atJoint) {
             // If the distance from the other capsule grows as one goes from the joint into the neighbor, that has no
-            // place nearer than the joint.
+            // place nearer than the joint, unless it has been crossed.
             const Vec3d joint = (ofA ? end.w : end.w*-1)+ownAlong*(atEnd ? 1 : 0);
             const Vec3d fromOther = joint-otherAlong*nearestFraction(otherAlong, joint*-1);
             const Vec3d into = along(system.capsules[neighbor], y)*(atEnd ? 1 : -1);
-            if (fromOther.dot(into) >= 0 && sqrt(fromOther.squared())-sum > contact.gap+2*least)
+            const double distance = sqrt(fromOther.squared());
+            if (fromOther.dot(into) >= 0 && distance-sum > contact.gap+2*least &&
+                    (x == y || distance > largestMotion(withNeighbor(start, neighbor, ofA, atEnd, x),
+                    withNeighbor(end, neighbor, ofA, atEnd, y))))
                 continue;
         }
         const SegmentPair beside = withNeighbor(end, neighbor, ofA, atEnd, y);
@@ -628,8 +631,8 @@ bool ContactSearch::Implementation::isOwned(const Contact& contact, const Contac
                 return false;
             continue;
         }
-        const SegmentPair start = segments(pair.a, pair.b, pair.shift, x);
-        const double gap = findGap(withNeighbor(start, neighbor, ofA, atEnd, x), beside, radii(neighbor, other));
+        const SegmentPair before = x == y ? beside : withNeighbor(start, neighbor, ofA, atEnd, x);
+        const double gap = findGap(before, beside, radii(neighbor, other));
         // What differs by rounding is equal. Then the one that ends there counts.
         if (parallel || atEnd ? gap < contact.gap-least : !(contact.gap < gap-least))
             return false;
@@ -641,9 +644,9 @@ int ContactSearch::Implementation::evaluate(const ContactPair& pair, const doubl
         Contact* contacts, double limit) const {
     const SegmentPair end = segments(pair.a, pair.b, pair.shift, y);
     const double sum = radii(pair.a, pair.b);
+    const SegmentPair start = x == y ? end : segments(pair.a, pair.b, pair.shift, x);
     const Places places = findPlaces(end);
     if (x != y) {
-        const SegmentPair start = segments(pair.a, pair.b, pair.shift, x);
         Crossing crossing;
         if (places.distance <= largestMotion(start, end) && findCrossing(start, end, crossing)) {
             const Vec3d& n = crossing.normal;
@@ -664,8 +667,8 @@ int ContactSearch::Implementation::evaluate(const ContactPair& pair, const doubl
             continue;
         const Vec3d n = length > 0 ? r*(1/length) : findNormal(end, pair.side);
         const Contact contact = {s, t, {n.x, n.y, n.z}, length-sum, 1.0/count, false};
-        if (isOwned(contact, pair, end, places.parallel, true, x, y) &&
-                isOwned(contact, pair, end, places.parallel, false, x, y))
+        if (isOwned(contact, pair, start, end, places.parallel, true, x, y) &&
+                isOwned(contact, pair, start, end, places.parallel, false, x, y))
             contacts[kept++] = contact;
     }
     return kept;

@@ -692,6 +692,74 @@ static void testDivision() {
         }
 }
 
+/** A rod is carried through a chain, at joints or beside them: what crosses is seen, and pushed back. */
+static void testCrossingChains() {
+    mt19937_64 generator(10);
+    int crossed = 0, atJoints = 0, wrong = 0;
+    for (int trial = 0; trial < 4000; trial++) {
+        CapsuleSystem system;
+        Array x;
+        Vec3d node = {0, 0, 0}, direction = {1, 0, 0};
+        const int segments = 5;
+        for (int s = 0; s <= segments; s++) {
+            add(x, node);
+            direction = direction+randomVector(generator, 0.3);
+            direction = direction*(1/length(direction));
+            node = node+direction*40;
+            if (s < segments)
+                system.capsules.push_back({s, s+1, 8, 0, s});
+        }
+        system.chains.push_back({segments, false, 1});
+        // Through a place of the chain, half of the time near a joint.
+        const int segment = 1+generator()%3;
+        const bool joint = trial%2 == 0;
+        const double fraction = joint ? uniform(generator, -0.02, 0.02) : uniform(generator, 0.1, 0.9);
+        const Vec3d place = at(x, segment)+(at(x, segment+1)-at(x, segment))*max(0.0, fraction)+
+                (at(x, segment)-at(x, segment-1))*min(0.0, fraction);
+        const Vec3d along = Vec3d{uniform(generator, -0.5, 0.5), 1, uniform(generator, -0.5, 0.5)}*60;
+        const Vec3d way = {uniform(generator, -2, 2), uniform(generator, -2, 2), uniform(generator, 4, 16)};
+        const double before = uniform(generator, 0.1, 0.9);
+        add(x, place-along*0.5-way*before);
+        add(x, place+along*0.5-way*before);
+        Array y = x;
+        for (int particle = segments+1; particle <= segments+2; particle++)
+            for (int k = 0; k < 3; k++)
+                y[3*particle+k] += k == 0 ? way.x : k == 1 ? way.y : way.z;
+        system.capsules.push_back({segments+1, segments+2, 8});
+        ContactSearch search(system);
+        vector<ContactPair> pairs;
+        search.findPairs(x.data(), y.data(), NULL, 0, pairs);
+        int throughs = 0;
+        bool clear = true, seen = false;
+        for (int s = 0; s < segments; s++) {
+            const Vec3d start[] = {at(x, s), at(x, s+1), at(x, segments+1), at(x, segments+2)};
+            const Vec3d end[] = {at(y, s), at(y, s+1), at(y, segments+1), at(y, segments+2)};
+            const CrossingByHand one = crossingsByHand(start, end);
+            throughs += one.count;
+            clear = clear && one.clear;
+        }
+        Vec3d force = {0, 0, 0};
+        for (const Contact& contact : evaluateAll(search, pairs, x, y)) {
+            seen = seen || contact.crossed;
+            // On the rod, which is b.
+            if (contact.gap < 0)
+                force = force+Vec3d{contact.normal[0], contact.normal[1], contact.normal[2]}*
+                        (contact.weight*contact.gap);
+        }
+        if (!clear || throughs != 1)
+            continue;
+        bool verified = false;
+        for (const ContactPair& pair : pairs)
+            verified = verified || search.crosses(pair, x.data(), y.data());
+        check(seen && verified, "what crosses a chain is seen");
+        crossed++;
+        atJoints += joint;
+        wrong += force.dot(way) >= 0;
+    }
+    check(crossed > 2000 && atJoints > 800, "chains were crossed");
+    check(wrong == 0, "what has crossed is pushed back");
+}
+
 /** Segments taken as their shortest images give the same contacts as whole chains, around joints, too. */
 static void testNearestImages() {
     mt19937_64 generator(9);
@@ -778,7 +846,8 @@ int main() {
     const string instructionSet = candidateKernels().instructionSet;
     try {
         for (auto test : {testNearestPoints, testCrossings, testPairs, testSmallBoxes, testRounding, testLoops,
-                testSignedGap, testParallel, testJoints, testDivision, testNearestImages, testRefusals})
+                testSignedGap, testParallel, testJoints, testDivision, testCrossingChains,
+                testNearestImages, testRefusals})
             test();
     }
     catch (const exception& error) {
