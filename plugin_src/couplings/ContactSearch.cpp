@@ -401,7 +401,8 @@ void ContactSearch::Implementation::setCells() {
             throw invalid_argument("The periodic box is too small for contacts: its width along vector "+
                     to_string(k)+" is "+to_string(frame.widths[k])+", but twice the largest extent of a capsule in a "
                     "step with its diameter and the reach of the search is "+
-                    to_string(4*largestHalf[k]*frame.widths[k])+". Take a larger box or shorter segments, and chains that are whole");
+                    to_string(4*largestHalf[k]*frame.widths[k])+". Take a larger box or shorter segments, and "
+                    "chains that are whole");
         frame.cells[k] = max(1.0, floor(min(0.5/largestHalf[k], frame.periodic ? mostCells : 4*mostCells)));
     }
     // Where capsules fill a part of the frame only, there are more cells.
@@ -546,7 +547,8 @@ void ContactSearch::Implementation::addPair(const PlacedCapsule& one, const Plac
     ContactPair pair = {a, b, {shift.x, shift.y, shift.z}, 0};
     const SegmentPair start = {first.along, second.along, first.first-second.first+shift};
     if (!sure) {
-        const double limit = first.capsule.radius+second.capsule.radius+reach, before = sqrt(findNearestPoints(start).squared);
+        const double limit = first.capsule.radius+second.capsule.radius+reach;
+        const double before = sqrt(findNearestPoints(start).squared);
         if (before >= limit) {
             if (x == y)
                 return;
