@@ -808,12 +808,8 @@ static void checkRefused(const function<void()>& function, const string& reason)
 }
 
 static void testRefusals() {
-    auto make = [] (vector<Capsule> capsules, vector<pair<int, int> > exclusions) {
-        CapsuleSystem system;
-        system.capsules = capsules;
-        system.exclusions = exclusions;
-        system.chains = {{1, false, 1}};
-        ContactSearch search(system);
+    auto make = [] (const vector<Capsule>& capsules, const vector<pair<int, int> >& exclusions) {
+        ContactSearch search({capsules, {{1, false, 1}}, exclusions});
     };
     checkRefused([&] {make({{-1, 0, 1}}, {});}, "particle");
     checkRefused([&] {make({{2, 2, 1}}, {});}, "particle");
