@@ -530,8 +530,7 @@ static vector<Contact> evaluateAll(const ContactSearch& search, const vector<Con
 static void testSignedGap() {
     mt19937_64 generator(7);
     for (int trial = 0; trial < 200; trial++) {
-        CapsuleSystem system;
-        system.capsules = {{0, 1, 15}, {2, 3, 10}};
+        CapsuleSystem system = {{{0, 1, 15}, {2, 3, 10}}, {}, {}};
         const Vec3d p = randomVector(generator, 60), q = randomVector(generator, 60);
         const Vec3d n = p.cross(q)*(1/length(p.cross(q)));
         if (n.squared() < 0.9 || length(p.cross(q)) < 0.1*length(p)*length(q))
@@ -570,8 +569,7 @@ static void testSignedGap() {
 
 /** Rods side by side: a contact at each end of their overlap, with half of the stiffness. */
 static void testParallel() {
-    CapsuleSystem system;
-    system.capsules = {{0, 1, 10}, {2, 3, 10}};
+    CapsuleSystem system = {{{0, 1, 10}, {2, 3, 10}}, {}, {}};
     ContactSearch search(system);
     for (double offset : {-120.0, -90.0, -30.0, 0.0, 20.0, 99.0, 110.0})
         for (bool reversed : {false, true}) {
@@ -818,8 +816,7 @@ static void testRefusals() {
     checkRefused([&] {make({{0, 1, 1, 1, 0}}, {});}, "chain");
     checkRefused([&] {make({{0, 1, 1, 0, 1}}, {});}, "number in its chain");
     checkRefused([&] {make({{0, 1, 1, 0, 0}}, {{0, 1}});}, "capsule 1");
-    CapsuleSystem system;
-    system.capsules = {{0, 1, 1}, {2, -1, 1}};
+    CapsuleSystem system = {{{0, 1, 1}, {2, -1, 1}}, {}, {}};
     ContactSearch search(system);
     vector<ContactPair> pairs;
     const double x[] = {0, 0, 0, 10, 0, 0, 5, 0, 1}, box[] = {100, 0, 0, 0, 100, 0, 0, 0, 100};
