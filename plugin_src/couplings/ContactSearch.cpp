@@ -81,9 +81,19 @@ struct Frame {
 /** The box that a capsule sweeps in a step, in fractions of the frame. */
 struct Described {
     bool finite;
-    int cell, images[3];
+    int cell;
     double center[3], half[3];
     CoarseCapsule coarse;
+};
+
+/** A capsule as it is at the start, for the order of cells: those that are near each other are so in memory. */
+struct PlacedCapsule {
+    int number;
+    bool hasExclusions;
+    Capsule capsule;
+    /** What was taken off to get its center into the frame. */
+    int images[3];
+    Vec3d first, along;
 };
 
 /** What one part of the search finds. */
@@ -174,6 +184,7 @@ struct ContactSearch::Implementation {
     Frame frame;
     double reach = 0, largestRadius = 0;
     vector<Described> described;
+    vector<PlacedCapsule> placed, sortedPlaced;
     vector<int> cellStart, members;
     vector<float> boxes;
     vector<CoarseCapsule> sorted;
@@ -195,12 +206,14 @@ struct ContactSearch::Implementation {
     void setCells();
     void searchCells(int part, const double* x, const double* y);
     int findRows(int column, int iz, CapsuleRow* rows) const;
-    void addPair(int i, int j, int image, const double* x, const double* y, Part& part) const;
+    void addPair(const PlacedCapsule& one, const PlacedCapsule& other, int image, const double* x, const double* y,
+            Part& part) const;
+    bool areNeighbors(const Capsule& first, const Capsule& second) const;
     void gather(vector<ContactPair>& pairs);
     SegmentPair withNeighbor(const SegmentPair& segments, int neighbor, bool ofA, bool atEnd,
             const double* positions) const;
-    bool isOwned(const Contact& contact, const ContactPair& pair, const SegmentPair& end, bool parallel, bool ofA,
-            const double* x, const double* y) const;
+    bool isOwned(const Contact& contact, const ContactPair& pair, const SegmentPair& start, const SegmentPair& end,
+            bool parallel, bool ofA, const double* x, const double* y) const;
     int evaluate(const ContactPair& pair, const double* x, const double* y, Contact* contacts, double limit) const;
 };
 
@@ -243,22 +256,27 @@ ContactSearch::Implementation::Implementation(const CapsuleSystem& system, bool 
     for (vector<int>& others : excluded)
         sort(others.begin(), others.end());
     described.resize(capsules.size());
+    placed.resize(capsules.size());
+    sortedPlaced.resize(capsules.size());
+}
+
+/** Whether two capsules share a particle or are near each other in a chain. */
+bool ContactSearch::Implementation::areNeighbors(const Capsule& first, const Capsule& second) const {
+    if (first.first == second.first || first.end() == second.end() || first.first == second.end() ||
+            first.end() == second.first)
+        return true;
+    if (first.chain < 0 || first.chain != second.chain)
+        return false;
+    const CapsuleChain& chain = system.chains[first.chain];
+    int apart = abs(first.index-second.index);
+    if (chain.closed)
+        apart = min(apart, chain.numCapsules-apart);
+    return apart <= chain.excludedNeighbors;
 }
 
 bool ContactSearch::Implementation::isExcluded(int a, int b) const {
-    const Capsule &first = system.capsules[a], &second = system.capsules[b];
-    if (a == b || first.first == second.first || first.end() == second.end() || first.first == second.end() ||
-            first.end() == second.first)
-        return true;
-    if (first.chain >= 0 && first.chain == second.chain) {
-        const CapsuleChain& chain = system.chains[first.chain];
-        int apart = abs(first.index-second.index);
-        if (chain.closed)
-            apart = min(apart, chain.numCapsules-apart);
-        if (apart <= chain.excludedNeighbors)
-            return true;
-    }
-    return !excluded[a].empty() && binary_search(excluded[a].begin(), excluded[a].end(), b);
+    return a == b || areNeighbors(system.capsules[a], system.capsules[b]) ||
+            (!excluded[a].empty() && binary_search(excluded[a].begin(), excluded[a].end(), b));
 }
 
 Vec3d ContactSearch::Implementation::along(const Capsule& capsule, const double* positions) const {
@@ -321,6 +339,8 @@ void ContactSearch::Implementation::describe(int i, const double* x, const doubl
     const Vec3d ends[] = {frame.toFractions(x0), frame.toFractions(x0+p), frame.toFractions(y0),
             frame.toFractions(y0+q)};
     Described& result = described[i];
+    PlacedCapsule& place = placed[i];
+    place = {i, !excluded[i].empty(), capsule, {0, 0, 0}, x0, p};
     double center[3];
     for (int k = 0; k < 3; k++) {
         const double f[] = {component(ends[0], k), component(ends[1], k), component(ends[2], k), component(ends[3], k)};
@@ -330,8 +350,9 @@ void ContactSearch::Implementation::describe(int i, const double* x, const doubl
             return;
         const double lower = smallestOf(f[0], f[1], f[2], f[3]), upper = largestOf(f[0], f[1], f[2], f[3]);
         center[k] = 0.5*(lower+upper);
-        result.images[k] = frame.periodic ? (int) floor(center[k]) : 0;
-        result.center[k] = center[k]-result.images[k];
+        if (frame.periodic)
+            place.images[k] = (int) floor(center[k]);
+        result.center[k] = center[k]-place.images[k];
         result.half[k] = 0.5*(upper-lower)+(capsule.radius+0.5*reach)*frame.inverseWidths[k]+SINGLE_ROUNDING;
     }
     const Vec3d unwrapped = frame.toVector({center[0], center[1], center[2]});
@@ -380,7 +401,8 @@ void ContactSearch::Implementation::setCells() {
             throw invalid_argument("The periodic box is too small for contacts: its width along vector "+
                     to_string(k)+" is "+to_string(frame.widths[k])+", but twice the largest extent of a capsule in a "
                     "step with its diameter and the reach of the search is "+
-                    to_string(4*largestHalf[k]*frame.widths[k])+". Take a larger box or shorter segments, and chains that are whole");
+                    to_string(4*largestHalf[k]*frame.widths[k])+". Take a larger box or shorter segments, and "
+                    "chains that are whole");
         frame.cells[k] = max(1.0, floor(min(0.5/largestHalf[k], frame.periodic ? mostCells : 4*mostCells)));
     }
     // Where capsules fill a part of the frame only, there are more cells.
@@ -422,8 +444,10 @@ void ContactSearch::Implementation::setCells() {
             half[i] = described[members[i]].half[k];
         }
     }
-    for (int i = 0; i < count; i++)
+    for (int i = 0; i < count; i++) {
         sorted[i] = described[members[i]].coarse;
+        sortedPlaced[i] = placed[members[i]];
+    }
 }
 
 /** Find the rows of capsules in half of the neighbors of a cell: each two cells, in each image, meet once. */
@@ -479,7 +503,7 @@ void ContactSearch::Implementation::searchCells(int column, const double* x, con
     auto look = [&] {
         count = kernels.keepNear(sorted.data(), imageShifts, reach, margin, part.candidates(0), count);
         for (int i = 0; i < count; i++)
-            addPair(members[part.first[i]], members[part.second[i]], part.image[i], x, y, part);
+            addPair(sortedPlaced[part.first[i]], sortedPlaced[part.second[i]], part.image[i], x, y, part);
         count = 0;
     };
     CapsuleRow rows[32];
@@ -505,23 +529,26 @@ void ContactSearch::Implementation::searchCells(int column, const double* x, con
 }
 
 /** Add a pair if it is near enough, in double precision where there is doubt. */
-void ContactSearch::Implementation::addPair(int i, int j, int image, const double* x, const double* y,
-        Part& part) const {
-    const int a = min(i, j), b = max(i, j);
-    if (isExcluded(a, b))
+void ContactSearch::Implementation::addPair(const PlacedCapsule& one, const PlacedCapsule& other, int image,
+        const double* x, const double* y, Part& part) const {
+    const bool inOrder = one.number < other.number;
+    const PlacedCapsule &first = inOrder ? one : other, &second = inOrder ? other : one;
+    const int a = first.number, b = second.number;
+    if (areNeighbors(first.capsule, second.capsule) || (first.hasExclusions && isExcluded(a, b)))
         return;
-    // Where images are wrapped into the frame, j is taken by some vectors of the frame to where it is near i.
     const bool sure = image >= SURE;
     image %= SURE;
     const int images[3] = {image/9-1, image/3%3-1, image%3-1};
+    // Where images are wrapped into the frame, the other one is taken by some vectors of it to where it is near.
     double number[3];
     for (int k = 0; k < 3; k++)
-        number[k] = (i < j ? 1 : -1)*(described[j].images[k]-described[i].images[k]-images[k]);
+        number[k] = (inOrder ? 1 : -1)*(other.images[k]-one.images[k]-images[k]);
     const Vec3d shift = frame.toVector({number[0], number[1], number[2]});
     ContactPair pair = {a, b, {shift.x, shift.y, shift.z}, 0};
-    const SegmentPair start = segments(a, b, pair.shift, x);
+    const SegmentPair start = {first.along, second.along, first.first-second.first+shift};
     if (!sure) {
-        const double limit = radii(a, b)+reach, before = sqrt(findNearestPoints(start).squared);
+        const double limit = first.capsule.radius+second.capsule.radius+reach;
+        const double before = sqrt(findNearestPoints(start).squared);
         if (before >= limit) {
             if (x == y)
                 return;
@@ -569,8 +596,8 @@ SegmentPair ContactSearch::Implementation::withNeighbor(const SegmentPair& segme
 }
 
 /** Get whether a contact belongs to its pair, or to a neighbor of a, or of b, in its chain. */
-bool ContactSearch::Implementation::isOwned(const Contact& contact, const ContactPair& pair, const SegmentPair& end,
-        bool parallel, bool ofA, const double* x, const double* y) const {
+bool ContactSearch::Implementation::isOwned(const Contact& contact, const ContactPair& pair, const SegmentPair& start,
+        const SegmentPair& end, bool parallel, bool ofA, const double* x, const double* y) const {
     const int own = ofA ? pair.a : pair.b, other = ofA ? pair.b : pair.a;
     const double fraction = ofA ? contact.s : contact.t, sum = radii(pair.a, pair.b);
     const double least = LEAST_DIFFERENCE*(sum+fabs(contact.gap));
@@ -582,11 +609,14 @@ bool ContactSearch::Implementation::isOwned(const Contact& contact, const Contac
             continue;
         if (!atJoint) {
             // If the distance from the other capsule grows as one goes from the joint into the neighbor, that has no
-            // place nearer than the joint.
+            // place nearer than the joint, unless it has been crossed.
             const Vec3d joint = (ofA ? end.w : end.w*-1)+ownAlong*(atEnd ? 1 : 0);
             const Vec3d fromOther = joint-otherAlong*nearestFraction(otherAlong, joint*-1);
             const Vec3d into = along(system.capsules[neighbor], y)*(atEnd ? 1 : -1);
-            if (fromOther.dot(into) >= 0 && sqrt(fromOther.squared())-sum > contact.gap+2*least)
+            const double distance = sqrt(fromOther.squared());
+            if (fromOther.dot(into) >= 0 && distance-sum > contact.gap+2*least &&
+                    (x == y || distance > largestMotion(withNeighbor(start, neighbor, ofA, atEnd, x),
+                    withNeighbor(end, neighbor, ofA, atEnd, y))))
                 continue;
         }
         const SegmentPair beside = withNeighbor(end, neighbor, ofA, atEnd, y);
@@ -603,8 +633,8 @@ bool ContactSearch::Implementation::isOwned(const Contact& contact, const Contac
                 return false;
             continue;
         }
-        const SegmentPair start = segments(pair.a, pair.b, pair.shift, x);
-        const double gap = findGap(withNeighbor(start, neighbor, ofA, atEnd, x), beside, radii(neighbor, other));
+        const SegmentPair before = x == y ? beside : withNeighbor(start, neighbor, ofA, atEnd, x);
+        const double gap = findGap(before, beside, radii(neighbor, other));
         // What differs by rounding is equal. Then the one that ends there counts.
         if (parallel || atEnd ? gap < contact.gap-least : !(contact.gap < gap-least))
             return false;
@@ -616,9 +646,9 @@ int ContactSearch::Implementation::evaluate(const ContactPair& pair, const doubl
         Contact* contacts, double limit) const {
     const SegmentPair end = segments(pair.a, pair.b, pair.shift, y);
     const double sum = radii(pair.a, pair.b);
+    const SegmentPair start = x == y ? end : segments(pair.a, pair.b, pair.shift, x);
     const Places places = findPlaces(end);
     if (x != y) {
-        const SegmentPair start = segments(pair.a, pair.b, pair.shift, x);
         Crossing crossing;
         if (places.distance <= largestMotion(start, end) && findCrossing(start, end, crossing)) {
             const Vec3d& n = crossing.normal;
@@ -640,8 +670,8 @@ int ContactSearch::Implementation::evaluate(const ContactPair& pair, const doubl
             continue;
         const Vec3d n = length > 0 ? r*(1/length) : findNormal(end, pair.side);
         const Contact contact = {s, t, {n.x, n.y, n.z}, length-sum, 1.0/count, false};
-        if (isOwned(contact, pair, end, places.parallel, true, x, y) &&
-                isOwned(contact, pair, end, places.parallel, false, x, y))
+        if (isOwned(contact, pair, start, end, places.parallel, true, x, y) &&
+                isOwned(contact, pair, start, end, places.parallel, false, x, y))
             contacts[kept++] = contact;
     }
     return kept;

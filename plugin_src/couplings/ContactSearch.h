@@ -62,7 +62,7 @@ public:
      *   goes on into the other segment.
      * - Of two segments that both touch the same capsule on the inner side of a bend, the one with the lesser gap
      *   counts. The energy is continuous where that changes from one to the other, as long as the chain's radius of
-     *   curvature is more than twice the distance at which capsules touch.
+     *   curvature is more than twice the distance at which capsules touch. A neighbor that was crossed counts alone.
      *
      * Capsules that are excluded do not take contacts from their neighbors.
      *

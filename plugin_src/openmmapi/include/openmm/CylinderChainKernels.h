@@ -96,8 +96,8 @@ public:
 };
 
 /**
- * This kernel is invoked by CylinderChainContactForce to calculate the forces acting on the system and the energy of the
- * system.
+ * This kernel is invoked by CylinderChainContactForce to calculate the forces acting on the system and the energy of
+ * the system.
  */
 class CalcCylinderChainContactForceKernel : public KernelImpl {
 public:
