@@ -278,6 +278,13 @@ def test_which_force_computes_them():
     assert isinstance(Crosslinks(1, 1).add_to(filaments.build()[1]), plugin.CylinderChainLinkForce)
 
 
+def test_crosslinks_without_the_compiled_engine(without_compiled):
+    filaments, system, positions, links = two_filaments("portable")
+    links.add_many(None, places_of(filaments))
+    assert isinstance(links.add_to(system), openmm.PythonForce)
+    assert len(Crosslinks.from_system(system)) == 1 and len(links.lengths(new_context(system, positions))) == 7
+
+
 def test_states_that_do_not_hold_the_links_of_the_compiled_engine():
     links, system, positions, integrator = crosslinked_filaments("compiled")
     first = new_context(system, positions, integrator)
