@@ -53,7 +53,7 @@ class TimeStepError(InstabilityError):
 
 
 class ContactWarning(UserWarning):
-    """Beads that are too far apart or too soft to keep filaments from passing through each other."""
+    """Beads that are too far apart, or contacts too soft, to keep filaments from passing through each other."""
 
 
 class EquilibrationWarning(UserWarning):

@@ -260,7 +260,7 @@ def contact_force(
     diameters = np.zeros(system.getNumParticles())
     for indices, value in zip(beads, filament_diameters(diameter, len(filaments))):
         diameters[indices] = value
-    diameters[_outside(filaments, system, particles)] = _particle_diameters(particles, particle_diameter)
+    diameters[outside_particles(filaments, system, particles)] = particle_diameters(particles, particle_diameter)
     if stiffness is None:
         if filaments.temperature == 0.0:
             raise InputError("At a temperature of zero, a contact needs a stiffness.")
@@ -275,7 +275,7 @@ def contact_force(
     force.addPerParticleParameter("diameter")
     for value in diameters:
         force.addParticle([value])
-    _set_cutoff(force, system, float(diameters.max()), _is_periodic(system) if periodic is None else bool(periodic))
+    _set_cutoff(force, system, float(diameters.max()), is_periodic(system) if periodic is None else bool(periodic))
     add_exclusions(force, excluded_pairs(filaments, 2.0 * diameters[np.concatenate(beads)].max()))
     return force
 
@@ -321,7 +321,8 @@ def _positive_array(value, count, name):
     return np.broadcast_to(values, (count,))
 
 
-def _particle_diameters(particles, particle_diameter):
+def particle_diameters(particles: Indices, particle_diameter: Numbers | None) -> FloatArray:
+    """Contact diameters in nm of particles outside filaments."""
     if particle_diameter is None:
         if len(particles):
             raise InputError("particles need a particle_diameter.")
@@ -329,7 +330,8 @@ def _particle_diameters(particles, particle_diameter):
     return _positive_array(particle_diameter, len(particles), "particle_diameter")
 
 
-def _outside(filaments, system, particles):
+def outside_particles(filaments: FilamentCollection, system: openmm.System, particles: Indices) -> IntArray:
+    """Particles that take part in contacts, which are none of the filaments'; an InputError if they are not there."""
     count = system.getNumParticles()
     own = set(np.concatenate([*filaments.node_indices, filaments.attachment_indices]).tolist())
     indices = [whole_number(particle, 0, "an index in particles") for particle in particles]
@@ -337,11 +339,12 @@ def _outside(filaments, system, particles):
         if index >= count:
             raise InputError(f"particles contains {index}, but the System has {count} particles.")
         if index in own:
-            raise InputError(f"particles contains {index}, which belongs to a filament, which touches by its beads.")
+            raise InputError(f"particles contains {index}, which belongs to a filament.")
     return np.array(indices, dtype=int)
 
 
-def _is_periodic(system):
+def is_periodic(system: openmm.System) -> bool:
+    """Whether a force of a System has periodic boundary conditions, or a box has been set."""
     box = np.array([list(edge._value) for edge in system.getDefaultPeriodicBoxVectors()])
     return system.usesPeriodicBoundaryConditions() or not np.array_equal(box, _OPENMM_BOX)
 

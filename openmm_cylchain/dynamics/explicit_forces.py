@@ -20,6 +20,7 @@ import openmm
 from scipy.optimize import brentq
 from scipy.sparse import csr_array
 
+from ..couplings.capsule_contacts import as_capsule_contact_force
 from ..couplings.contacts import CONTACT_STIFFNESS, is_contact_force
 from ..couplings.crosslinks import Crosslinks
 from ..couplings.native_links import is_link_force
@@ -379,6 +380,9 @@ class ExplicitForces:
 
     def _read(self, force, label):
         # A list of Springs, or None where the stiffness is not known.
+        capsules = as_capsule_contact_force(force)
+        if capsules is not None:
+            return self._between_capsules(label, capsules)
         links = Crosslinks.of_force(force)
         if links is not None or is_link_force(force):
             return None if links is None else self._crosslinks(links, label)
@@ -452,6 +456,36 @@ class ExplicitForces:
         partner = np.full(len(others), beads[0])
         outside = Springs(label, "particle", others, others, partner, np.full(len(others), stiffness))
         return [crossing, along, outside] if len(others) else [crossing, along]
+
+    def _between_capsules(self, label, force):
+        # One contact, at the node that moves most; and where filaments lie side by side, one for each segment.
+        stiffness = force.getStiffness()._value
+        chains = [np.array(force.getChainParticles(chain)) for chain in range(force.getNumChains())]
+        ends = [nodes[:1] if force.isChainClosed(chain) else nodes[[0, -1]] for chain, nodes in enumerate(chains)]
+        springs = []
+        # Of two filaments that touch, each moves.
+        for item, parts, accurate in (
+            ("end of filament", ends, ACCURATE),
+            ("all along filament", chains, ACCURATE_ALONG_CONTACT),
+        ):
+            owners = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
+            nodes = np.concatenate([np.zeros(0, dtype=int), *parts])
+            springs.append(
+                Springs(
+                    label,
+                    item,
+                    owners,
+                    nodes,
+                    np.full(len(nodes), _NOWHERE),
+                    np.full(len(nodes), 2.0 * stiffness),
+                    accurate,
+                )
+            )
+        spheres = np.array([force.getSphereParticle(sphere) for sphere in range(force.getNumSpheres())], dtype=int)
+        if len(spheres):
+            partner = np.full(len(spheres), chains[0][0] if chains else _NOWHERE)
+            springs.append(Springs(label, "particle", spheres, spheres, partner, np.full(len(spheres), stiffness)))
+        return springs
 
 
 def _bonds(label, bonds):

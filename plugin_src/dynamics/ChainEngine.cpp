@@ -1,6 +1,7 @@
 #include "dynamics/ChainEngine.h"
 #include "dynamics/ChainPack.h"
 #include "dynamics/ModePacks.h"
+#include "dynamics/PackStep.h"
 #include "dynamics/PackPlaces.h"
 #include <algorithm>
 #include <cmath>
@@ -261,7 +262,7 @@ struct ChainEngine::Implementation {
         return pack >= (int) (packs.size()+wide.size());
     }
     /** Call a function with a pack: one in double precision, a wide one, or the number of one of modes. */
-    template <class Double, class Single, class Modes> auto with(int pack, Double ofDouble, Single ofSingle,
+    template <class Double, class Single, class Modes> decltype(auto) with(int pack, Double ofDouble, Single ofSingle,
                 Modes ofModes) const {
         const int count = packs.size();
         if (pack < count)
@@ -382,6 +383,22 @@ Instability ChainEngine::step(int pack, const double* positions, const double* f
             [&] (const WidePack& wide) {return stepOf(kernels().wide.step, *wide.pack);},
             [&] (int own) {return modes.isWide(own) ? stepOf(kernels().wide.stepOfModes, modes.getWide(own)) :
                     stepOf(kernels().stepOfModes, modes.get(own));});
+}
+
+unique_ptr<PackStep> ChainEngine::createStep(int pack) const {
+    typedef unique_ptr<PackStep> Step;
+    return implementation->with(pack, [] (const auto& own) {return Step(kernels().createStep(own));},
+            [] (const WidePack& wide) {return Step(kernels().wide.createStep(*wide.pack));},
+            [] (int) -> Step {throw invalid_argument("A pack of modes takes no implicit steps");});
+}
+
+const vector<int>& ChainEngine::getChainsOfLanes(int pack) const {
+    typedef const vector<int>& Chains;
+    const ModePacks& modes = implementation->modes;
+    return implementation->with(pack, [] (const ChainPack<double>& own) -> Chains {return own.chain;},
+            [] (const WidePack& wide) -> Chains {return wide.pack->chain;},
+            [&] (int own) -> Chains {return modes.isWide(own) ? modes.getWide(own).pack.chain :
+                    modes.get(own).pack.chain;});
 }
 
 void cylchain::drawWords(const NoiseKey& key, NoiseKind kind, uint32_t draw, const uint32_t* chains,

@@ -13,6 +13,8 @@
 
 namespace cylchain {
 
+class PackStep;
+
 /** Energies of a pack of chains. */
 struct ChainEnergy {
     double stretching = 0, bending = 0, tethers = 0;
@@ -143,6 +145,15 @@ public:
      */
     Instability step(int pack, const double* positions, const double* forces, const double* box,
             const StepSettings& settings, double* displacements) const;
+    /**
+     * Create an object that takes implicit steps of a pack whose chains are coupled to others. The pack is one of those
+     * that getPacksOfStep() has returned.
+     */
+    std::unique_ptr<PackStep> createStep(int pack) const;
+    /**
+     * Get the chain of each lane of a pack, or -1.
+     */
+    const std::vector<int>& getChainsOfLanes(int pack) const;
     /** The instruction set in use: "avx512", "avx2" or "baseline". */
     static std::string getInstructionSet();
 private:

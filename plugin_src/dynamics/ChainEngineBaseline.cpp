@@ -4,7 +4,7 @@
 
 const cylchain::ChainKernels& cylchain::baselineKernels() {
     static const ChainKernels kernels = {"baseline", CYLCHAIN_LANES, baseline::addForcesOfPack, baseline::stepOfPack,
-            baseline::drawWordsOf, baseline::drawNormalsOf, baseline::drawFeneCoordinatesOf,
+            baseline::createStepOfPack, baseline::drawWordsOf, baseline::drawNormalsOf, baseline::drawFeneCoordinatesOf,
             baseline::stepOfModesOfPack, baseline::transformCosinesOf, baselineWideKernels()};
     return kernels;
 }

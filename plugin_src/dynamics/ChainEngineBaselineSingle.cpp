@@ -4,7 +4,7 @@
 #include "dynamics/ChainLoops-inl.h"
 
 const cylchain::WideKernels& cylchain::baselineWideKernels() {
-    static const WideKernels kernels = {CYLCHAIN_LANES, baseline_single::stepOfPack, baseline_single::drawNormalsOf,
-            baseline_single::stepOfModesOfPack, baseline_single::transformCosinesOf};
+    static const WideKernels kernels = {CYLCHAIN_LANES, baseline_single::stepOfPack, baseline_single::createStepOfPack,
+            baseline_single::drawNormalsOf, baseline_single::stepOfModesOfPack, baseline_single::transformCosinesOf};
     return kernels;
 }

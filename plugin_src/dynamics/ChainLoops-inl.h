@@ -7,6 +7,7 @@
  */
 
 #include "dynamics/ModePack.h"
+#include "dynamics/PackStep.h"
 #include "lanes/Noise.h"
 #include "mechanics/PeriodicBox.h"
 #include <algorithm>
@@ -15,6 +16,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <new>
+#include <optional>
 #include <type_traits>
 
 namespace cylchain {
@@ -41,6 +43,7 @@ typedef ChainPack<Scalar> Pack;
 #include "dynamics/ImplicitConvergence-inl.h"
 #include "dynamics/ImplicitStep-inl.h"
 #include "dynamics/DividedStep-inl.h"
+#include "dynamics/PackStep-inl.h"
 #include "lanes/CosineTransform-inl.h"
 #include "dynamics/ModeStep-inl.h"
 
@@ -50,6 +53,10 @@ typedef ChainPack<Scalar> Pack;
 Instability stepOfPack(const Pack& pack, const double* positions, const double* forces, const double* box,
             const StepSettings& settings, double* displacements) {
     return stepPackImplicitly<CYLCHAIN_LANES, false>(pack, positions, forces, box, settings, displacements);
+}
+
+PackStep* createStepOfPack(const Pack& pack) {
+    return newPackStep<CYLCHAIN_LANES>(pack);
 }
 
 Instability stepOfModesOfPack(const ModePack<Scalar>& modes, const double* positions, const double* forces,
@@ -88,6 +95,12 @@ Instability stepOfPack(const Pack& pack, const double* positions, const double* 
             const StepSettings& settings, double* displacements) {
     return withLanesOf(pack, [&] (auto lanes) {
         return stepPackAs<lanes>(pack, positions, forces, box, settings, displacements);
+    });
+}
+
+PackStep* createStepOfPack(const Pack& pack) {
+    return withLanesOf(pack, [&] (auto lanes) {
+        return newPackStep<lanes>(pack);
     });
 }
 

@@ -66,6 +66,7 @@ template <class Scalar> struct ChainPack : PackShape {
 };
 
 template <class Scalar> struct ModePack;
+class PackStep;
 
 /** The loops over a wide pack of open chains, in single precision. */
 struct WideKernels {
@@ -74,6 +75,8 @@ struct WideKernels {
     /** A step of an implicit scheme. */
     Instability (*step)(const ChainPack<float>& pack, const double* positions, const double* forces, const double* box,
             const StepSettings& settings, double* displacements);
+    /** A new object that takes an implicit step of a pack whose chains are coupled to others. */
+    PackStep* (*createStep)(const ChainPack<float>& pack);
     /** See Noise.h. */
     void (*drawNormals)(const NoiseKey& key, NoiseKind kind, const std::uint32_t* chains, const std::uint32_t* parts,
             int count, double* normals);
@@ -93,6 +96,8 @@ struct ChainKernels {
             bool includeEnergy);
     Instability (*step)(const ChainPack<double>& pack, const double* positions, const double* forces, const double* box,
             const StepSettings& settings, double* displacements);
+    /** A new object that takes an implicit step of a pack whose chains are coupled to others. */
+    PackStep* (*createStep)(const ChainPack<double>& pack);
     /** See Noise.h. */
     void (*drawWords)(const NoiseKey& key, NoiseKind kind, std::uint32_t draw, const std::uint32_t* chains,
             const std::uint32_t* parts, int count, std::uint32_t* words);

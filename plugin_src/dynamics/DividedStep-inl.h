@@ -106,6 +106,19 @@ template <int W, bool CLOSED> void divideStep(const Pack& pack, const StepStart<
     }
 }
 
+/** Bring what a step begins with into lanes. */
+template <int W> void gatherStepStart(const Pack& pack, const double* positions, const double* box, bool needsNodes,
+            const StepStart<W>& start) {
+    if (needsNodes)
+        gatherStart<W>(pack, positions, box, start.nodes);
+    gatherSegments<W>(pack, positions, box, start.segments);
+    for (std::size_t i = 0; i < pack.tethers.size(); i++) {
+        tetherVector(pack, pack.tethers[i], positions, box, start.tethers[i].d);
+        if (pack.planar)
+            start.tethers[i].d[2] = 0;
+    }
+}
+
 template <int W, bool CLOSED> Instability stepPackImplicitly(const Pack& pack, const double* positions,
             const double* forces, const double* box, const StepSettings& settings, double* displacements) {
     typedef typename Lanes<W>::Type Real;
@@ -115,14 +128,7 @@ template <int W, bool CLOSED> Instability stepPackImplicitly(const Pack& pack, c
     Vector<Real>* f = vectors.reserve<Vector<Real> >(4*n);
     Vector<Real>* y = f+n;
     const StepStart<W> start = {y+n, y+2*n, tethers.reserve<TetherVector>(pack.tethers.size())};
-    if (settings.flow.present)
-        gatherStart<W>(pack, positions, box, start.nodes);
-    gatherSegments<W>(pack, positions, box, start.segments);
-    for (std::size_t i = 0; i < pack.tethers.size(); i++) {
-        tetherVector(pack, pack.tethers[i], positions, box, start.tethers[i].d);
-        if (pack.planar)
-            start.tethers[i].d[2] = 0;
-    }
+    gatherStepStart<W>(pack, positions, box, settings.flow.present, start);
     gatherForces<W>(pack, forces, f);
     bool failed[W];
     Instability result;

@@ -52,6 +52,7 @@ public:
         Geometry previous = {}, current, ahead;
         JointGeometry joint = {}, jointAhead = {};
         std::size_t tether = 0;
+        int term = 0;
         const bool linear = isLinear(pack.bending);
         band.begin();
         *here = Row {};
@@ -71,6 +72,8 @@ public:
                 after->right = loads[s+1];
             }
             addTethers(y, s, tether, *here);
+            if (numTerms > 0)
+                addTerms(s, term, *here, *after);
             if (pack.hasNodeFriction && s < pack.ownNodes())
                 addNodeFriction(y, s, *here);
             if (s > 0 && linear)
@@ -101,8 +104,8 @@ public:
         }
     }
     /** Find the changes of y and the tensions, or add to them. */
-    template <bool ADD> void substitute() {
-        band.template substitute<ADD>(change, [&] (int s, Real tension) {
+    template <Goal GOAL> void substitute() {
+        band.template substitute<GOAL>(change, [&] (int s, Real tension) {
             ImplicitSegment<Real>& segment = segments[s];
             segment.multiplier = tension+segment.shift*segment.newTangent.dot(change[s+1]-change[s]);
         });
@@ -112,11 +115,36 @@ public:
         band.setForces([&] (int s) {
             return segments[s].turned*(segments[s].multiplier-segments[s].multiplierBefore);
         });
-        substitute<true>();
+        substitute<Goal::Add>();
+    }
+    /** From now on, the equations have the terms of couplings, in the order of their nodes. */
+    void setTerms(const CouplingTerm* others, int count) {
+        terms = others;
+        numTerms = count;
+    }
+    /** Find how forces on nodes move nodes, with the same elimination. See TensionBand for those of rings. */
+    void respond(const Vec* forces, Vec* moves) {
+        band.setForcesOnNodes(forces);
+        band.template substitute<Goal::Nodes>(moves, [] (int, Real) {});
+    }
+    /**
+     * Set forces on nodes that come from couplings with other chains, or NULL for none. They are no part of the right
+     * side that eliminate() gathers.
+     */
+    void setForcesOfOthers(const Vec* forces) {
+        forcesOfOthers = forces;
+    }
+    /** Add what these forces do to the changes of y and of the tensions. */
+    void addForcesOfOthers() {
+        if (forcesOfOthers == NULL)
+            return;
+        band.setForcesOnNodes(forcesOfOthers);
+        substitute<Goal::Add>();
     }
     /** See TensionBand. */
-    template <class Function> void findResponses(Function use) const {
-        band.findResponses(use);
+    template <class Function, class Blocks = NoBlocks> void findResponses(Function use,
+            Blocks useBlocks = Blocks()) const {
+        band.findResponses(use, useBlocks);
     }
     /**
      * The drag of the flow on a segment: what each end gets, and what the second one has more and the first one less.
@@ -287,6 +315,9 @@ private:
     const Vec* const x;
     Vec *const loads, *const change;
     bool allowsCompression = false;
+    const CouplingTerm* terms = NULL;
+    int numTerms = 0;
+    const Vec* forcesOfOthers = NULL;
     Band band;
 
     /**
@@ -341,6 +372,39 @@ private:
         const ImplicitSegment<Real>& segment = segments[s];
         const Real squareOfSine = 0.5-0.5*segment.tangent.dot(geometry.tangent);
         return (1-squareOfSine*(0.25+0.09375*squareOfSine))*(segment.inverse*geometry.inverse);
+    }
+    /** Add the terms of couplings of a segment, the next ones, to the equations of its nodes. */
+    void addTerms(int s, int& next, Row& here, Row& after) {
+        for (; next < numTerms && terms[next].node == s; next++) {
+            const CouplingTerm& term = terms[next];
+            const Scalar first = 1-term.fraction, second = term.fraction;
+            addTo(here.right, term.lane, term.force, first);
+            addTo(after.right, term.lane, term.force, second);
+            addTo(here.diagonal, term.lane, term.stiffness, first*first);
+            addTo(after.diagonal, term.lane, term.stiffness, second*second);
+            addTo(here.upper, term.lane, term.stiffness, first*second);
+        }
+    }
+    static void addTo(Vec& vector, int i, const double* values, Scalar factor) {
+        lane(vector.x, i) += factor*values[0];
+        lane(vector.y, i) += factor*values[1];
+        lane(vector.z, i) += factor*values[2];
+    }
+    static void addTo(Symmetric<Real>& matrix, int i, const double* values, Scalar factor) {
+        lane(matrix.xx, i) += factor*values[0];
+        lane(matrix.yx, i) += factor*values[1];
+        lane(matrix.zx, i) += factor*values[2];
+        lane(matrix.yy, i) += factor*values[3];
+        lane(matrix.zy, i) += factor*values[4];
+        lane(matrix.zz, i) += factor*values[5];
+    }
+    static void addTo(Mat& matrix, int i, const double* values, Scalar factor) {
+        Vec* const rows[] = {&matrix.x, &matrix.y, &matrix.z};
+        const int of[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
+        for (int row = 0; row < 3; row++) {
+            const double own[] = {values[of[row][0]], values[of[row][1]], values[of[row][2]]};
+            addTo(*rows[row], i, own, factor);
+        }
     }
     void addNodeFriction(const Vec* y, int node, Row& row) {
         const Real friction = loaded<Real>(pack.nodeFriction, 0)*(1/h);

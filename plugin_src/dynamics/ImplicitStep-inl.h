@@ -54,6 +54,19 @@ public:
      * @return the number of iterations
      */
     int take(const Vec* forces, Vec* y, bool* failed) {
+        begin(forces, y);
+        for (int i = 0; i < W; i++)
+            failed[i] = false;
+        int iterations = 0;
+        for (int stage = 0; stage < getNumStages(); stage++) {
+            beginStage(stage, y);
+            iterations += solve(y, failed);
+        }
+        convergence.findExcessiveChanges(y, failed);
+        return iterations;
+    }
+    /** Describe the start of a step, and draw its noise. */
+    void begin(const Vec* forces, Vec* y) {
         for (int node = 0; node < step.n; node++) {
             y[node] = Vec {};
             step.external[node] = forces[node];
@@ -64,20 +77,59 @@ public:
         stages.describe();
         if (step.settings.kT > 0)
             noise.draw();
-        for (int i = 0; i < W; i++)
-            failed[i] = false;
-        int iterations = 0;
-        if (step.twoStages) {
-            stages.prepare(Stage::First, y);
-            iterations = solve(y, failed);
-            stages.prepare(Stage::Second, y);
+    }
+    int getNumStages() const {
+        return step.twoStages ? 2 : 1;
+    }
+    void beginStage(int stage, Vec* y) {
+        stages.prepare(!step.twoStages ? Stage::Only : stage == 0 ? Stage::First : Stage::Second, y);
+        if (step.stage == Stage::Second)
             positions.extrapolate(y);
+        if (step.settings.flow.present && step.stage != Stage::Second)
+            positions.carryAlong(y);
+    }
+    /** Linearise the equations around y, and solve them. */
+    void eliminate(const Vec* y, int iteration) {
+        equations.eliminate(y, iteration);
+        equations.template substitute<Goal::Find>();
+    }
+    /** Finish the iteration, with what the linear equations have changed, and move the nodes of active lanes. */
+    void advance(Vec* y, int iteration, Real active) {
+        if (iteration > 0 || step.stage == Stage::Second) {
+            if (step.settings.segmentForces == NULL || step.stage == Stage::First)
+                equations.refine();
+            else
+                tensions.refineAndRecord(y, active);
         }
-        else
-            stages.prepare(Stage::Only, y);
-        iterations += solve(y, failed);
-        convergence.findExcessiveChanges(y, failed);
-        return iterations;
+        else if (step.settings.kT > 0) {
+            if (metricForces.stiffenTautSegments()) {
+                eliminate(y, iteration);
+                equations.addForcesOfOthers();
+            }
+            metricForces.add(equations);
+        }
+        for (int node = 0; node < step.n; node++)
+            y[node] = y[node]+step.change[node]*active;
+        if (!CLOSED)
+            positions.resetLengths(y);
+    }
+    /**
+     * The first iteration has neither metric forces nor tensions along the mean segment, and the second one the
+     * tensions of the first. With two, filaments that relax from straight shorten 2 to 5 % too fast in steps of 1 to
+     * 3 us.
+     */
+    int leastIterations() const {
+        const bool needsThree = step.stage == Stage::Only || step.settings.flow.varies();
+        return needsThree ? 3 : step.stage == Stage::First ? 2 : 1;
+    }
+    const ImplicitConvergence<W, CLOSED>& getConvergence() const {
+        return convergence;
+    }
+    ImplicitEquations<W, CLOSED>& getEquations() {
+        return equations;
+    }
+    Vec* getChange() {
+        return step.change;
     }
 private:
     ImplicitState<W> step;
@@ -93,38 +145,14 @@ private:
      * Solve the equations of a stage by Newton's method; returns the number of iterations, and marks lanes that fail.
      */
     int solve(Vec* y, bool* failed) {
-        if (step.settings.flow.present && step.stage != Stage::Second)
-            positions.carryAlong(y);
-        // The first iteration has neither metric forces nor tensions along the mean segment, and the second one the
-        // tensions of the first. With two, filaments that relax from straight shorten 2 to 5 % too fast in steps of 1
-        // to 3 us.
-        const bool needsThree = step.stage == Stage::Only || step.settings.flow.varies();
-        const int least = needsThree ? 3 : step.stage == Stage::First ? 2 : 1;
         Real active = splat<Real>(1);
         int iterations = 0;
         const int most = isLinear(step.pack.bending) ? NEWTON_ITERATIONS_OF_LINEAR_BENDS : NEWTON_ITERATIONS;
         while (iterations < most) {
-            equations.eliminate(y, iterations);
-            equations.template substitute<false>();
-            if (iterations > 0 || step.stage == Stage::Second) {
-                if (step.settings.segmentForces == NULL || step.stage == Stage::First)
-                    equations.refine();
-                else
-                    tensions.refineAndRecord(y, active);
-            }
-            else if (step.settings.kT > 0) {
-                if (metricForces.stiffenTautSegments()) {
-                    equations.eliminate(y, iterations);
-                    equations.template substitute<false>();
-                }
-                metricForces.add(equations);
-            }
-            for (int node = 0; node < step.n; node++)
-                y[node] = y[node]+step.change[node]*active;
-            if (!CLOSED)
-                positions.resetLengths(y);
+            eliminate(y, iterations);
+            advance(y, iterations, active);
             iterations++;
-            if (iterations >= least && !convergence.anyUnfinished(active))
+            if (iterations >= leastIterations() && !convergence.anyUnfinished(active))
                 break;
         }
         for (int i = 0; i < W; i++)

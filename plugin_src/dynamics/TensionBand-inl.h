@@ -53,6 +53,9 @@ template <class Real> struct TensionEquation {
     Real compliance, start;
 };
 
+/** What a substitution finds: nodes and tensions, what to add to them, or nodes alone. */
+enum class Goal {Find, Add, Nodes};
+
 #include "dynamics/TensionResponses-inl.h"
 
 template <int W, bool CLOSED> class TensionBand {
@@ -109,10 +112,10 @@ public:
      * Find nodes and tensions, or add them to what is there.
      *
      * @param y        those of a ring must have place for the first two nodes once more
-     * @param ADD      whether to add to them
+     * @param GOAL     what to find, or add to
      * @param use      is called with the number of each segment and its tension, when its nodes have been found
      */
-    template <bool ADD, class Function> CYLCHAIN_INLINE void substitute(Vec* y, Function use) {
+    template <Goal GOAL, class Function> CYLCHAIN_INLINE void substitute(Vec* y, Function use) {
         Vec next = {}, second = {};
         Real tension = {};
         if constexpr (CLOSED) {
@@ -120,24 +123,26 @@ public:
             const Real tension0 = nodes[1].tension;
             const Vec found0 = nodes[0].solution-nodes[0].next*found1+nodes[0].pull*tension0;
             const Real tensionLast = nodes[0].tension+nodes[0].first.dot(found1)+nodes[0].share*tension0;
-            tensions[0] = ADD ? tensions[0]+tension0 : tension0;
-            tensions[n-1] = ADD ? tensions[n-1]+tensionLast : tensionLast;
+            if (GOAL != Goal::Nodes) {
+                tensions[0] = GOAL == Goal::Add ? tensions[0]+tension0 : tension0;
+                tensions[n-1] = GOAL == Goal::Add ? tensions[n-1]+tensionLast : tensionLast;
+            }
             tension = tensionLast;
-            y[0] = ADD ? y[0]+found0 : found0;
-            y[1] = ADD ? y[1]+found1 : found1;
+            y[0] = GOAL == Goal::Add ? y[0]+found0 : found0;
+            y[1] = GOAL == Goal::Add ? y[1]+found1 : found1;
             y[n] = y[0];
             y[n+1] = y[1];
             for (int node = n-1; node > 1; node--) {
-                substitutePair<ADD>(node, found0, found1, next, second, tension, y);
+                substitutePair<GOAL>(node, found0, found1, next, second, tension, y);
                 use(node, tensions[node]);
             }
             use(1, tensions[1]);
             use(0, tensions[0]);
         }
         else {
-            substitutePair<ADD>(n-1, next, next, next, second, tension, y);
+            substitutePair<GOAL>(n-1, next, next, next, second, tension, y);
             for (int node = n-2; node >= 0; node--) {
-                substitutePair<ADD>(node, next, next, next, second, tension, y);
+                substitutePair<GOAL>(node, next, next, next, second, tension, y);
                 use(node, tensions[node]);
             }
         }
@@ -148,45 +153,34 @@ public:
      * @param forceOf   returns the force of each segment on its first node; its second node has the opposite one
      */
     template <class Function> CYLCHAIN_INLINE void setForces(Function forceOf) {
-        Vec here = {}, next = {}, borderRight[2] = {};
-        Real start = {};
-        Vec forceBefore = {};
+        Vec forceBefore = {}, ofBorder[2] = {};
         if constexpr (CLOSED) {
             const Vec force0 = forceOf(0), force1 = forceOf(1);
-            borderRight[0] = force0-forceOf(n-1);
-            borderRight[1] = force1-force0;
+            ofBorder[0] = force0-forceOf(n-1);
+            ofBorder[1] = force1-force0;
             forceBefore = force1;
         }
-        for (int node = CLOSED ? 2 : 0; node < n; node++) {
-            EliminatedPair<Real, CLOSED>& own = nodes[node];
-            Vec right = here-forceBefore;
+        setRightSides(ofBorder, [&] (int node, Vec right) {
+            right = right-forceBefore;
             if (CLOSED || node < n-1) {
                 forceBefore = forceOf(node);
                 right = right+forceBefore;
             }
-            own.solution = own.inverse*right-own.give*start;
-            own.tension = own.reciprocal*start+own.give.dot(right);
-            if constexpr (CLOSED)
-                for (int k = 0; k < 2; k++)
-                    borderRight[k] = borderRight[k]-own.border[k].transposedTimes(right)-own.tensionBorder[k]*start;
-            else if (node == n-1)
-                return;
-            here = next-own.next.transposedTimes(right)-own.first*start;
-            next = -(own.second.transposedTimes(right)+own.last*start);
-            start = -equations[node].direction.dot(own.solution);
-        }
-        if constexpr (CLOSED) {
-            nodes[0].solution = nodes[0].inverse*borderRight[0]-nodes[0].give*start;
-            nodes[0].tension = nodes[0].reciprocal*start+nodes[0].give.dot(borderRight[0]);
-            const Vec right = borderRight[1]-nodes[0].next.transposedTimes(borderRight[0])-nodes[0].first*start;
-            start = -equations[0].direction.dot(nodes[0].solution);
-            nodes[1].solution = nodes[1].inverse*right-nodes[1].give*start;
-            nodes[1].tension = nodes[1].reciprocal*start+nodes[1].give.dot(right);
-        }
+            return right;
+        });
+    }
+    /** The same with a force on each node. Those on the first two nodes of a ring may come a second time behind it. */
+    CYLCHAIN_INLINE void setForcesOnNodes(const Vec* forces) {
+        Vec ofBorder[2] = {};
+        if constexpr (CLOSED)
+            for (int k = 0; k < 2; k++)
+                ofBorder[k] = forces[k]+forces[n+k];
+        setRightSides(ofBorder, [&] (int node, const Vec& right) {return right+forces[node];});
     }
     /** See TensionResponses-inl.h. */
-    template <class Function> void findResponses(Function use) const {
-        cylchain::CYLCHAIN_LOOPS::findResponses<W, CLOSED>(n, nodes, equations, use);
+    template <class Function, class Blocks = NoBlocks> void findResponses(Function use,
+            Blocks useBlocks = Blocks()) const {
+        cylchain::CYLCHAIN_LOOPS::findResponses<W, CLOSED>(n, nodes, equations, use, useBlocks);
     }
 private:
     const Pack& pack;
@@ -206,6 +200,33 @@ private:
     Link link;
     Row border[CLOSED ? 2 : 1];
 
+    /** Begin the border of a ring with some right sides; a function adds what others have to what is there. */
+    template <class Function> CYLCHAIN_INLINE void setRightSides(Vec* ofBorder, Function added) {
+        Vec here = {}, next = {};
+        Real start = {};
+        for (int node = CLOSED ? 2 : 0; node < n; node++) {
+            EliminatedPair<Real, CLOSED>& own = nodes[node];
+            const Vec right = added(node, here);
+            own.solution = own.inverse*right-own.give*start;
+            own.tension = own.reciprocal*start+own.give.dot(right);
+            if constexpr (CLOSED)
+                for (int k = 0; k < 2; k++)
+                    ofBorder[k] = ofBorder[k]-own.border[k].transposedTimes(right)-own.tensionBorder[k]*start;
+            else if (node == n-1)
+                return;
+            here = next-own.next.transposedTimes(right)-own.first*start;
+            next = -(own.second.transposedTimes(right)+own.last*start);
+            start = -equations[node].direction.dot(own.solution);
+        }
+        if constexpr (CLOSED) {
+            nodes[0].solution = nodes[0].inverse*ofBorder[0]-nodes[0].give*start;
+            nodes[0].tension = nodes[0].reciprocal*start+nodes[0].give.dot(ofBorder[0]);
+            const Vec right = ofBorder[1]-nodes[0].next.transposedTimes(ofBorder[0])-nodes[0].first*start;
+            start = -equations[0].direction.dot(nodes[0].solution);
+            nodes[1].solution = nodes[1].inverse*right-nodes[1].give*start;
+            nodes[1].tension = nodes[1].reciprocal*start+nodes[1].give.dot(right);
+        }
+    }
     template <int FOLLOWING> CYLCHAIN_INLINE void eliminatePair(int node, const Row& row, Row& next, Row& second) {
         EliminatedPair<Real, CLOSED>& result = nodes[node];
         Sym inverse = inverseOfMobile(row.diagonal, loaded<Real>(pack.mobile, node));
@@ -302,7 +323,7 @@ private:
         border[0].upper = border[0].upper-row.border[0].transposedTimes(result.border[1])+
                 Mat::outer(before.border[0], result.tensionBorder[1]);
     }
-    template <bool ADD> CYLCHAIN_INLINE void substitutePair(int node, const Vec& found0, const Vec& found1, Vec& next,
+    template <Goal GOAL> CYLCHAIN_INLINE void substitutePair(int node, const Vec& found0, const Vec& found1, Vec& next,
                 Vec& second, Real& tension, Vec* y) {
         const EliminatedPair<Real, CLOSED>& own = nodes[node];
         Vec here = own.solution;
@@ -315,9 +336,9 @@ private:
             here = here-own.border[0]*found0-own.border[1]*found1;
             found = found+own.tensionBorder[0].dot(found0)+own.tensionBorder[1].dot(found1);
         }
-        y[node] = ADD ? y[node]+here : here;
-        if (node > 0)
-            tensions[node-1] = ADD ? tensions[node-1]+found : found;
+        y[node] = GOAL == Goal::Add ? y[node]+here : here;
+        if (node > 0 && GOAL != Goal::Nodes)
+            tensions[node-1] = GOAL == Goal::Add ? tensions[node-1]+found : found;
         tension = found;
         second = next;
         next = here;

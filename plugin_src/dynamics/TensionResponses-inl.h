@@ -1,13 +1,24 @@
 // Included into the namespace of an instruction set. It does not compile alone.
 
+/** Does not ask for the blocks of the inverse. */
+struct NoBlocks {
+    template <class First, class Both, class Second> void operator()(int, const First&, const Both&,
+            const Second&) const {
+    }
+};
+
 /**
  * For each segment, call a function with its number and with how far a unit force along the segment, which pushes its
  * ends apart, moves its second end from its first. These are blocks of the inverse of the equations of TensionBand,
  * from the last node to the first; those of A with the tensions in it.
+ *
+ * @param useBlocks   is called with the number of each segment and three of the blocks: that of its first node, the
+ *                    one between its nodes, and that of its second node
  */
-template <int W, bool CLOSED, class Function> void findResponses(int n,
+template <int W, bool CLOSED, class Function, class Blocks> void findResponses(int n,
             const EliminatedPair<typename Lanes<W>::Type, CLOSED>* nodes,
-            const TensionEquation<typename Lanes<W>::Type>* equations, Function use) {
+            const TensionEquation<typename Lanes<W>::Type>* equations, Function use, Blocks useBlocks) {
+    const bool needsBlocks = !std::is_same<Blocks, NoBlocks>::value;
     typedef typename Lanes<W>::Type Real;
     typedef Vector<Real> Vec;
     typedef Matrix<Real> Mat;
@@ -54,7 +65,7 @@ template <int W, bool CLOSED, class Function> void findResponses(int n,
         }
         else {
             use(s, (here-after)*equations[s].compliance);
-            if (s == 0)
+            if (s == 0 && !needsBlocks)
                 return;
         }
         // The node's own block, and those with the next two.
@@ -74,6 +85,11 @@ template <int W, bool CLOSED, class Function> void findResponses(int n,
         newSame.subtractProductTransposed(node.next, newOther);
         newSame.subtractProductTransposed(node.second, newSecond);
         newSame.addOuter(-node.pull, here);
+        if constexpr (!CLOSED) {
+            useBlocks(s, newSame, newOther, same);
+            if (s == 0)
+                return;
+        }
 
         // The same for the tension before the node.
         Real mutual = node.first.dot(after)+node.last.dot(afterNext)+node.share*own;
@@ -90,6 +106,10 @@ template <int W, bool CLOSED, class Function> void findResponses(int n,
                         second[k].transposedTimes(node.last)-borders[k][0]*node.tensionBorder[0]-
                         borders[k][1]*node.tensionBorder[1];
             }
+            if (s == n-1)
+                useBlocks(s, newSame, newBorder[0], borders[0][0].lower());
+            else
+                useBlocks(s, newSame, newOther, same);
             after = node.pull*mutual-node.give-node.next*newAfterNext-node.second*beyond-node.border[0]*newOfBorder[0]-
                     node.border[1]*newOfBorder[1];
             own = node.reciprocal+node.first.dot(newAfterNext)+node.last.dot(beyond)+node.share*mutual+
@@ -109,6 +129,9 @@ template <int W, bool CLOSED, class Function> void findResponses(int n,
         same = newSame;
         other = newOther;
     }
-    if constexpr (CLOSED)
+    if constexpr (CLOSED) {
         use(1, (ofBorder[1]-after)*equations[1].compliance);
+        useBlocks(1, borders[1][1].lower(), next[1].transposed(), same);
+        useBlocks(0, borders[0][0].lower(), borders[0][1], borders[1][1].lower());
+    }
 }

@@ -24,7 +24,9 @@ enum class NoiseKind : std::uint32_t {
      * Of a node: three for the force on it, one for the length behind it if segments have none, three for its bend. Of
      * a mode, by its number, where modes are what is moved: three for its motion.
      */
-    Node = 5
+    Node = 5,
+    /** Of a link between places of chains, by its number, with zero for the chain: for its coordinates. */
+    Link = 6
 };
 
 /**

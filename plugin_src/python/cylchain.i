@@ -18,6 +18,7 @@ namespace std {
 
 %{
 #include "openmm/CylinderChainException.h"
+#include "openmm/CylinderChainContactForce.h"
 #include "openmm/CylinderChainForce.h"
 #include "openmm/CylinderChainIntegrator.h"
 #include "openmm/CylinderChainLinkForce.h"
@@ -117,7 +118,7 @@ static void raiseException(const std::exception& e) {
 }
 
 %apply int& OUTPUT {int& bendingModel, int& stretchingModel, int& chain, int& node, int& particle, int& steps,
-        int& particles};
+        int& particles, int& chain1, int& segment1, int& chain2, int& segment2};
 
 %typemap(in, numinputs=0) Vec3& point (OpenMM::Vec3 value) {
     $1 = &value;
@@ -294,6 +295,15 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
     units = (_LENGTH, _STIFFNESS, _LENGTH)
     val = [val[0], *(unit.Quantity(v, u) for v, u in zip(val[1:], units))]
 %}
+%pythonappend OpenMM::CylinderChainContactForce::getStiffness() const %{
+    val = unit.Quantity(val, _STIFFNESS)
+%}
+%pythonappend OpenMM::CylinderChainContactForce::getChainDiameter(int) const %{
+    val = unit.Quantity(val, _LENGTH)
+%}
+%pythonappend OpenMM::CylinderChainContactForce::getSphereDiameter(int) const %{
+    val = unit.Quantity(val, _LENGTH)
+%}
 %pythonappend OpenMM::CylinderChainIntegrator::getTemperature() const %{
     val = unit.Quantity(val, unit.kelvin)
 %}
@@ -365,12 +375,16 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %enddef
 
 %concreteClass(CylinderChainForce, Force)
+%concreteClass(CylinderChainContactForce, Force)
 %concreteClass(CylinderChainLinkForce, Force)
 %concreteClass(CylinderChainIntegrator, Integrator)
 
 %ignore OpenMM::CylinderChainForce::SegmentInfo;
 %ignore OpenMM::CylinderChainForce::ChainInfo;
 %ignore OpenMM::CylinderChainForce::TetherInfo;
+%ignore OpenMM::CylinderChainContactForce::ChainInfo;
+%ignore OpenMM::CylinderChainContactForce::SphereInfo;
+%ignore OpenMM::CylinderChainContactForce::ExclusionInfo;
 %ignore OpenMM::CylinderChainLinkForce::getTable;
 %ignore OpenMM::CylinderChainLinkForce::setTable;
 %import "mechanics/Enumerators.h"
@@ -379,5 +393,6 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %import "dynamics/Schemes.h"
 %import "dynamics/Precisions.h"
 %include "openmm/CylinderChainForce.h"
+%include "openmm/CylinderChainContactForce.h"
 %include "openmm/CylinderChainLinkForce.h"
 %include "openmm/CylinderChainIntegrator.h"

@@ -1,6 +1,8 @@
+#include "openmm/CylinderChainContactForce.h"
 #include "openmm/CylinderChainForce.h"
 #include "openmm/CylinderChainIntegrator.h"
 #include "openmm/CylinderChainLinkForce.h"
+#include "openmm/serialization/CylinderChainContactForceProxy.h"
 #include "openmm/serialization/CylinderChainForceProxy.h"
 #include "openmm/serialization/CylinderChainIntegratorProxy.h"
 #include "openmm/serialization/CylinderChainLinkForceProxy.h"
@@ -14,6 +16,7 @@ using namespace OpenMM;
 static const bool registered = []() {
     SerializationProxy::registerProxy(typeid(CylinderChainForce), new CylinderChainForceProxy());
     SerializationProxy::registerProxy(typeid(CylinderChainLinkForce), new CylinderChainLinkForceProxy());
+    SerializationProxy::registerProxy(typeid(CylinderChainContactForce), new CylinderChainContactForceProxy());
     SerializationProxy::registerProxy(typeid(CylinderChainIntegrator), new CylinderChainIntegratorProxy());
     return true;
 }();

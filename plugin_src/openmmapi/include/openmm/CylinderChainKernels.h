@@ -1,6 +1,7 @@
 #ifndef OPENMM_CYLINDERCHAINKERNELS_H_
 #define OPENMM_CYLINDERCHAINKERNELS_H_
 
+#include "couplings/ContactSearch.h"
 #include "couplings/Links.h"
 #include "dynamics/ChainEngine.h"
 #include "openmm/KernelImpl.h"
@@ -91,6 +92,45 @@ public:
      */
     virtual double execute(ContextImpl& context, const std::vector<cylchain::Link>& links, bool includeForces,
             bool includeEnergy, int& outOfRange) = 0;
+};
+
+/**
+ * This kernel is invoked by CylinderChainContactForce to calculate the forces acting on the system and the energy of the
+ * system.
+ */
+class CalcCylinderChainContactForceKernel : public KernelImpl {
+public:
+    static std::string Name() {
+        return "CalcCylinderChainContactForce";
+    }
+    CalcCylinderChainContactForceKernel(std::string name, const Platform& platform) : KernelImpl(name, platform) {
+    }
+    /**
+     * Initialize the kernel.
+     *
+     * @param system     the System this kernel will be applied to
+     * @param search     what finds contacts, which exists for as long as the kernel
+     * @param stiffness  the stiffness of contacts
+     * @param periodic   whether distances are those of nearest periodic images
+     */
+    virtual void initialize(const System& system, cylchain::ContactSearch& search, double stiffness,
+            bool periodic) = 0;
+    /**
+     * Execute the kernel to calculate the forces and/or energy.
+     *
+     * @param context        the context in which to execute this kernel
+     * @param includeForces  true if forces should be calculated
+     * @param includeEnergy  true if the energy should be calculated
+     * @return the potential energy due to the force
+     */
+    virtual double execute(ContextImpl& context, bool includeForces, bool includeEnergy) = 0;
+    /**
+     * Take over another stiffness, and other radii, which the search has already.
+     *
+     * @param context    the context to copy parameters to
+     * @param stiffness  the stiffness of contacts
+     */
+    virtual void copyParametersToContext(ContextImpl& context, double stiffness) = 0;
 };
 
 /**

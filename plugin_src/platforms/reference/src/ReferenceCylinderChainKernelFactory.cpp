@@ -1,4 +1,5 @@
 #include "ReferenceCylinderChainKernelFactory.h"
+#include "ReferenceCalcCylinderChainContactForceKernel.h"
 #include "ReferenceCalcCylinderChainForceKernel.h"
 #include "ReferenceCalcCylinderChainLinkForceKernel.h"
 #include "ReferenceIntegrateCylinderChainStepKernel.h"
@@ -17,6 +18,7 @@ extern "C" void registerKernelFactories() {
         if (dynamic_cast<ReferencePlatform*>(&platform) != NULL) {
             ReferenceCylinderChainKernelFactory* factory = new ReferenceCylinderChainKernelFactory();
             platform.registerKernelFactory(CalcCylinderChainForceKernel::Name(), factory);
+            platform.registerKernelFactory(CalcCylinderChainContactForceKernel::Name(), factory);
             platform.registerKernelFactory(CalcCylinderChainLinkForceKernel::Name(), factory);
             platform.registerKernelFactory(IntegrateCylinderChainStepKernel::Name(), factory);
         }
@@ -27,6 +29,8 @@ KernelImpl* ReferenceCylinderChainKernelFactory::createKernelImpl(string name, c
         ContextImpl& context) const {
     if (name == CalcCylinderChainForceKernel::Name())
         return new ReferenceCalcCylinderChainForceKernel(name, platform, context);
+    if (name == CalcCylinderChainContactForceKernel::Name())
+        return new ReferenceCalcCylinderChainContactForceKernel(name, platform, context);
     if (name == CalcCylinderChainLinkForceKernel::Name())
         return new ReferenceCalcCylinderChainLinkForceKernel(name, platform, context);
     if (name == IntegrateCylinderChainStepKernel::Name())

@@ -1,0 +1,155 @@
+"""Contact of filaments whose segments are capsules: cylinders with round ends, without beads and without gaps."""
+
+import math
+import warnings
+from typing import Any
+
+import numpy as np
+import openmm
+
+from ..engine_choice import available_engines, choose_engine
+from ..errors import ContactWarning, InputError
+from ..filaments.collection import FilamentCollection
+from ..units.quantities import LENGTH, STIFFNESS, positive, thermal_energy, whole_number
+from ..units.types import Indices, Numbers, Scalar
+from .contacts import SAFE_BARRIER, filament_diameters, is_periodic, outside_particles, particle_diameters
+
+CAPSULE_BARRIER = 40.0
+"""Energy of two capsules whose axes meet in k_B T, with the stiffness that ``default_capsule_stiffness`` gives."""
+
+# Along the contour, in diameters. Segments that are nearer do not touch each other.
+_EXCLUDED_DIAMETERS = 2.0
+
+
+def default_capsule_stiffness(diameter: Scalar, temperature: Scalar) -> float:
+    """Stiffness of a contact that two filaments cross for 40 k_B T: k = 80 k_B T/d^2, in kJ/(mol nm^2)."""
+    return 2.0 * CAPSULE_BARRIER * thermal_energy(temperature) / positive(diameter, LENGTH, "diameter") ** 2
+
+
+def capsule_contact_force(
+    filaments: FilamentCollection,
+    system: openmm.System,
+    diameter: Numbers,
+    stiffness: Scalar | None = None,
+    particles: Indices = (),
+    particle_diameter: Numbers | None = None,
+    excluded_neighbors: int | None = None,
+    periodic: bool | None = None,
+) -> Any:
+    """A repulsion between segments of filaments, and between segments and other particles.
+
+    Segments are capsules: all points within half the diameter of the line between their ends. Where two of them
+    overlap, the energy is ``(k/2) g^2`` for the gap g, the distance of the lines less the mean of the diameters. Unlike
+    the beads of ``contact_force``, capsules have no gaps and are smooth along the filament, two that cross cost
+    ``(k/2) d^2`` at whatever place and angle, and the force takes a fraction of the time.
+
+    Two segments touch where they are nearest to each other, and if they are nearly parallel (within 1.8 degrees), at
+    both ends of their overlap with k/2 each. What neighbouring segments see of one thing counts once, so that nothing
+    is felt of joints. Forces act on the ends of segments, in proportion to where they touch.
+
+    It is explicit in every scheme. ``Filaments.recommended_time_step(system=system)`` says which step it allows.
+
+    Parameters
+    ----------
+    filaments : Filaments
+        In the System. They need no beads.
+    system : openmm.System
+        With all of its particles. The force is not added to it.
+    diameter : length, or (filaments,) array of lengths
+        Distance of two axes at which filaments touch: that of the cylinders, or more.
+    stiffness : energy/length^2, optional
+        k; that of ``default_capsule_stiffness`` for the thinnest filament if not given: crossing costs 40 k_B T.
+        ``setStiffness`` and ``updateParametersInContext`` change it.
+    particles : sequence of int
+        Particles outside filaments that take part, as spheres.
+    particle_diameter : length, or array of lengths, one for each of ``particles``
+    excluded_neighbors : int, optional
+        Segments of one filament whose numbers differ by no more than this do not touch each other. If not given: those
+        that are within two diameters along the contour; at least 1.
+    periodic : bool, optional
+        Whether distances are those of nearest images. If not given: whether another force of the System says so, or a
+        box has been set.
+
+    Returns
+    -------
+    CylinderChainContactForce
+        To be added to the System. It works on the Reference and CPU platforms. Its ``addExclusion`` lets further pairs
+        not touch each other.
+
+    Raises
+    ------
+    InputError
+        If the compiled engine is missing, a particle does not exist or is one of the filaments', a diameter or
+        stiffness is not positive, or the box is narrower than twice a segment with its diameter.
+
+    Warns
+    -----
+    ContactWarning
+        If filaments can pass through each other: if ``(k/2) d^2`` is below 25 k_B T for the thinnest.
+    """
+    choose_engine("compiled")
+    from .. import plugin
+
+    diameters = filament_diameters(diameter, len(filaments))
+    spheres = outside_particles(filaments, system, particles)
+    sphere_diameters = particle_diameters(particles, particle_diameter)
+    if not len(diameters):
+        raise InputError("There are no filaments that could touch.")
+    if stiffness is None:
+        if filaments.temperature == 0.0:
+            raise InputError("At a temperature of zero, a contact needs a stiffness.")
+        stiffness = default_capsule_stiffness(diameters.min(), filaments.temperature)
+    stiffness = positive(stiffness, STIFFNESS, "stiffness")
+    if excluded_neighbors is not None:
+        excluded_neighbors = whole_number(excluded_neighbors, 0, "excluded_neighbors")
+    periodic = is_periodic(system) if periodic is None else bool(periodic)
+    if periodic:
+        _check_box(system, filaments, max([*diameters, *sphere_diameters]))
+    _warn_of_barrier(filaments, diameters, stiffness)
+    force = plugin.CylinderChainContactForce(stiffness)
+    force.setUsesPeriodicBoundaryConditions(periodic)
+    for filament, nodes, value in zip(filaments, filaments.node_indices, diameters):
+        neighbors = excluded_neighbors
+        if neighbors is None:
+            shortest = filament.type.segment_lengths(filament.segments, filament.closed).min()
+            neighbors = max(1, math.ceil(_EXCLUDED_DIAMETERS * value / shortest - 1e-9))
+        force.addChain([int(node) for node in nodes], float(value), neighbors, filament.closed)
+    for particle, value in zip(spheres, sphere_diameters):
+        force.addSphere(int(particle), float(value))
+    return force
+
+
+def as_capsule_contact_force(force: openmm.Force) -> Any | None:
+    """A force as the CylinderChainContactForce that it is, or None if it is another one."""
+    if available_engines()["compiled"] is not None:
+        return None
+    from .. import plugin
+
+    if not plugin.CylinderChainContactForce.isinstance(force):
+        return None
+    return plugin.CylinderChainContactForce.cast(force)
+
+
+def _check_box(system, filaments, diameter):
+    a, b, c = (np.array(edge._value) for edge in system.getDefaultPeriodicBoxVectors())
+    volume = abs(np.dot(a, np.cross(b, c)))
+    narrowest = min(volume / np.linalg.norm(np.cross(*pair)) for pair in ((b, c), (c, a), (a, b)))
+    longest = max(float(one.type.segment_lengths(one.segments, one.closed).max()) for one in filaments)
+    needed = 2.0 * (longest + diameter)
+    if narrowest < needed:
+        raise InputError(
+            f"The periodic box is {narrowest:g} nm wide between two of its faces: contacts of {diameter:g} nm between "
+            f"segments of {longest:g} nm need {needed:g} nm. Take a larger box or shorter segments."
+        )
+
+
+def _warn_of_barrier(filaments, diameters, stiffness):
+    number = int(np.argmin(diameters))
+    barrier, kT = 0.5 * stiffness * diameters[number] ** 2, thermal_energy(filaments.temperature)
+    if barrier < SAFE_BARRIER * kT:
+        warnings.warn(
+            f"Filament {number} has a contact diameter of {diameters[number]:.3g} nm: others of its kind can pass "
+            f"through it for {barrier / kT:.3g} k_B T. Use a larger stiffness.",
+            ContactWarning,
+            stacklevel=3,
+        )

@@ -1,0 +1,183 @@
+// Compiled once for each instruction set, which CYLCHAIN_LOOPS names. It does not compile alone.
+
+#include "couplings/CandidateLoops.h"
+#include <cmath>
+#include <cstddef>
+#include <cstring>
+#if defined(__AVX2__) || defined(__AVX512F__)
+#include <immintrin.h>
+#endif
+
+namespace cylchain {
+namespace CYLCHAIN_LOOPS {
+
+typedef float Floats __attribute__((vector_size(4*CYLCHAIN_LANES)));
+typedef int Ints __attribute__((vector_size(4*CYLCHAIN_LANES)));
+
+// Called functions cannot keep vectors in registers.
+#define CYLCHAIN_INLINE inline __attribute__((always_inline))
+
+CYLCHAIN_INLINE Floats splat(float value) {
+    return value-Floats{};
+}
+
+CYLCHAIN_INLINE Floats load(const float* values) {
+    Floats result;
+    std::memcpy(&result, values, sizeof(result));
+    return result;
+}
+
+CYLCHAIN_INLINE Floats magnitude(Floats value) {
+    return value > -value ? value : -value;
+}
+
+CYLCHAIN_INLINE Floats clamped(Floats value) {
+    const Floats one = splat(1);
+    const Floats below = value < one ? value : one;
+    return below > -one ? below : -one;
+}
+
+CYLCHAIN_INLINE Floats root(Floats value) {
+    Floats result;
+    for (int i = 0; i < CYLCHAIN_LANES; i++)
+        reinterpret_cast<float*>(&result)[i] = std::sqrt(reinterpret_cast<const float*>(&value)[i]);
+    return result;
+}
+
+/** One bit for each lane that is not zero. */
+CYLCHAIN_INLINE unsigned bitsOf(Ints mask) {
+#if defined(__AVX512F__) && CYLCHAIN_LANES == 16
+    return _mm512_test_epi32_mask((__m512i) mask, (__m512i) mask);
+#elif defined(__AVX2__) && CYLCHAIN_LANES == 8
+    return _mm256_movemask_ps((__m256) mask);
+#else
+    unsigned bits = 0;
+    for (int i = 0; i < CYLCHAIN_LANES; i++)
+        bits |= (mask[i] != 0 ? 1u : 0u)<<i;
+    return bits;
+#endif
+}
+
+struct LaneVector {
+    Floats x, y, z;
+    CYLCHAIN_INLINE LaneVector operator+(const LaneVector& v) const {return {x+v.x, y+v.y, z+v.z};}
+    CYLCHAIN_INLINE LaneVector operator-(const LaneVector& v) const {return {x-v.x, y-v.y, z-v.z};}
+    CYLCHAIN_INLINE LaneVector operator*(Floats s) const {return {x*s, y*s, z*s};}
+    CYLCHAIN_INLINE Floats dot(const LaneVector& v) const {return x*v.x+y*v.y+z*v.z;}
+};
+
+CYLCHAIN_INLINE LaneVector splat(const float* vector) {
+    return {splat(vector[0]), splat(vector[1]), splat(vector[2])};
+}
+
+/** The numbers at a place of some records of equal size. */
+template <int Size> CYLCHAIN_INLINE Floats gather(const float* base, Ints indices) {
+#if defined(__AVX512F__) && CYLCHAIN_LANES == 16
+    return (Floats) _mm512_mask_i32gather_ps(_mm512_setzero_ps(), 0xffff, (__m512i) (indices*Size), base, 4);
+#elif defined(__AVX2__) && CYLCHAIN_LANES == 8
+    return (Floats) _mm256_i32gather_ps(base, (__m256i) (indices*Size), 4);
+#else
+    Floats result;
+    for (int i = 0; i < CYLCHAIN_LANES; i++)
+        result[i] = base[(std::size_t) Size*indices[i]];
+    return result;
+#endif
+}
+
+template <int Size> CYLCHAIN_INLINE LaneVector gatherVector(const float* base, Ints indices) {
+    return {gather<Size>(base, indices), gather<Size>(base+1, indices), gather<Size>(base+2, indices)};
+}
+
+/** Some capsules in lanes. */
+struct LaneCapsules {
+    LaneVector center, middle, half, laterMiddle, laterHalf;
+    Floats radius;
+    CYLCHAIN_INLINE LaneCapsules(const CoarseCapsule* capsules, Ints indices) {
+        static_assert(sizeof(CoarseCapsule) == 16*sizeof(float), "A capsule is sixteen numbers");
+        const float* base = capsules[0].center;
+        center = gatherVector<16>(base, indices);
+        middle = gatherVector<16>(base+3, indices);
+        half = gatherVector<16>(base+6, indices);
+        laterMiddle = gatherVector<16>(base+9, indices);
+        laterHalf = gatherVector<16>(base+12, indices);
+        radius = gather<16>(base+15, indices);
+    }
+};
+
+/** The distance of segments c+-p and c'+-q, for w = c-c'. Where they are nearly parallel, it may be a bit too large. */
+CYLCHAIN_INLINE Floats distance(const LaneVector& p, const LaneVector& q, const LaneVector& w) {
+    const Floats tiny = splat(1e-30f);
+    const Floats a = p.dot(p)+tiny, b = p.dot(q), e = q.dot(q)+tiny, c = p.dot(w), f = q.dot(w);
+    const Floats ae = a*e;
+    Floats s = clamped((b*f-c*e)/(ae-b*b+1e-6f*ae));
+    Floats t = clamped((b*s+f)/e);
+    s = clamped((b*t-c)/a);
+    t = clamped((b*s+f)/e);
+    const LaneVector r = w+p*s-q*t;
+    return root(r.dot(r));
+}
+
+static int findOverlaps(const SweptBoxes& boxes, int capsule, const CapsuleRow* rows, int numRows,
+        const CandidatePairs& pairs) {
+    Ints lanes;
+    for (int i = 0; i < CYLCHAIN_LANES; i++)
+        lanes[i] = i;
+    int count = 0;
+    for (int row = 0; row < numRows; row++) {
+        const CapsuleRow& others = rows[row];
+        Floats center[3], half[3];
+        for (int k = 0; k < 3; k++) {
+            center[k] = splat(boxes.center[k][capsule]-others.shift[k]);
+            half[k] = splat(boxes.half[k][capsule]);
+        }
+        for (int start = others.first; start < others.last; start += CYLCHAIN_LANES) {
+            Ints mask = lanes < others.last-start;
+            for (int k = 0; k < 3; k++)
+                mask &= magnitude(load(boxes.center[k]+start)-center[k]) <= load(boxes.half[k]+start)+half[k];
+            for (unsigned bits = bitsOf(mask); bits != 0; bits &= bits-1) {
+                pairs.first[count] = capsule;
+                pairs.second[count] = start+__builtin_ctz(bits);
+                pairs.image[count++] = others.image;
+            }
+        }
+    }
+    return count;
+}
+
+static int keepNear(const CoarseCapsule* capsules, const float* shifts, float reach, float margin,
+        const CandidatePairs& pairs, int count) {
+    int kept = 0;
+    for (int start = 0; start < count; start += CYLCHAIN_LANES) {
+        Ints first, second, image;
+        for (int i = 0; i < CYLCHAIN_LANES; i++) {
+            const int pair = start+i < count ? start+i : start;
+            first[i] = pairs.first[pair];
+            second[i] = pairs.second[pair];
+            image[i] = pairs.image[pair];
+        }
+        const LaneCapsules a(capsules, first), b(capsules, second);
+        const LaneVector between = a.center-b.center-gatherVector<4>(shifts, image);
+        const LaneVector w = between+a.middle-b.middle, laterW = between+a.laterMiddle-b.laterMiddle;
+        const LaneVector dw = laterW-w, dp = a.laterHalf-a.half, dq = b.laterHalf-b.half;
+        const Floats contact = a.radius+b.radius+(reach+margin);
+        const Floats before = distance(a.half, b.half, w), after = distance(a.laterHalf, b.laterHalf, laterW);
+        const Floats motion = root(dw.dot(dw))+root(dp.dot(dp))+root(dq.dot(dq));
+        const Ints near = (before <= contact) | (after <= contact) | (before+after <= motion+2*margin);
+        const Floats nearest = before < after ? before : after;
+        const unsigned sure = bitsOf((Ints) (nearest <= contact-2*margin));
+        for (unsigned bits = bitsOf(near); bits != 0; bits &= bits-1) {
+            const int lane = __builtin_ctz(bits), pair = start+lane;
+            if (pair >= count)
+                break;
+            pairs.first[kept] = pairs.first[pair];
+            pairs.second[kept] = pairs.second[pair];
+            pairs.image[kept++] = pairs.image[pair]+((sure>>lane & 1) != 0 ? SURE : 0);
+        }
+    }
+    return kept;
+}
+
+static const CandidateKernels KERNELS = {CYLCHAIN_LOOPS_NAME, findOverlaps, keepNear};
+
+} // namespace CYLCHAIN_LOOPS
+} // namespace cylchain

@@ -1,0 +1,718 @@
+#include "couplings/ContactSearch.h"
+#include "couplings/CandidateLoops.h"
+#include "mechanics/PeriodicBox.h"
+#include <cstddef>
+#include <cstdlib>
+#include <map>
+#include <stdexcept>
+#include <string>
+
+using namespace cylchain;
+using namespace std;
+
+namespace {
+
+/** Segments with a lesser sin^2 of their angle are nearly parallel. */
+const double LARGEST_PARALLEL = 1e-3;
+/** Fractions of a segment that are less than this are zero. */
+const double AT_END = 1e-9;
+/** Gaps that differ by less, relative to distances, are equal. */
+const double LEAST_DIFFERENCE = 1e-10;
+/** Capsules that are described together, and pairs that are looked at together. */
+const int CHUNK = 512, BATCH = 512;
+/** What rounding adds to distances in single precision, over the lengths that they are made of. */
+const double SINGLE_ROUNDING = 1e-6;
+/** The error of a distance where segments are nearly parallel, over their lengths, in single precision. */
+const double PARALLEL_ERROR = 5e-3;
+/** What a block of lanes may read or write beyond the end of an array. */
+const int PADDING = 16;
+
+Vec3d position(const double* positions, int particle) {
+    return {positions[3*particle], positions[3*particle+1], positions[3*particle+2]};
+}
+
+double component(const Vec3d& vector, int k) {
+    return k == 0 ? vector.x : k == 1 ? vector.y : vector.z;
+}
+
+void set(float* values, const Vec3d& vector) {
+    values[0] = vector.x;
+    values[1] = vector.y;
+    values[2] = vector.z;
+}
+
+double smallestOf(double a, double b, double c, double d) {
+    return min(min(a, b), min(c, d));
+}
+
+double largestOf(double a, double b, double c, double d) {
+    return max(max(a, b), max(c, d));
+}
+
+/** The parallelepiped in fractions of which cells are counted: the periodic box, or one around everything. */
+struct Frame {
+    bool periodic = false;
+    Vec3d origin = {0, 0, 0};
+    /** Its vectors, in reduced form, and its widths between opposite faces. */
+    double vectors[9] = {}, widths[3] = {}, inverse[3] = {}, inverseWidths[3] = {};
+    int cells[3] = {1, 1, 1};
+
+    Vec3d toFractions(const Vec3d& v) const {
+        const double z = v.z*inverse[2], y = (v.y-z*vectors[7])*inverse[1];
+        return {(v.x-y*vectors[3]-z*vectors[6])*inverse[0], y, z};
+    }
+    Vec3d toVector(const Vec3d& f) const {
+        return {f.x*vectors[0]+f.y*vectors[3]+f.z*vectors[6], f.y*vectors[4]+f.z*vectors[7], f.z*vectors[8]};
+    }
+    void findWidths() {
+        const Vec3d a = {vectors[0], vectors[1], vectors[2]}, b = {vectors[3], vectors[4], vectors[5]},
+                c = {vectors[6], vectors[7], vectors[8]};
+        const double volume = fabs(a.dot(b.cross(c)));
+        widths[0] = volume/sqrt(b.cross(c).squared());
+        widths[1] = volume/sqrt(c.cross(a).squared());
+        widths[2] = volume/sqrt(a.cross(b).squared());
+        for (int k = 0; k < 3; k++) {
+            inverse[k] = 1/vectors[4*k];
+            inverseWidths[k] = 1/widths[k];
+        }
+    }
+};
+
+/** The box that a capsule sweeps in a step, in fractions of the frame. */
+struct Described {
+    bool finite;
+    int cell, images[3];
+    double center[3], half[3];
+    CoarseCapsule coarse;
+};
+
+/** What one part of the search finds. */
+struct Part {
+    vector<ContactPair> pairs;
+    vector<int> first, second, image;
+    CandidatePairs candidates(int from) {
+        return {first.data()+from, second.data()+from, image.data()+from};
+    }
+};
+
+/** Images are numbered from 0 to 26: by the number of vectors of the frame, each from -1 to 1. */
+const int NUM_IMAGES = 27, SAME_IMAGE = 13;
+
+int imageNumber(const int* images) {
+    return 9*(images[0]+1)+3*(images[1]+1)+images[2]+1;
+}
+
+/** By how much a point of one segment moves against one of the other, at most. */
+double largestMotion(const SegmentPair& start, const SegmentPair& end) {
+    const Vec3d dw = end.w-start.w, dp = end.p-start.p, dq = end.q-start.q;
+    return sqrt(largestOf(dw.squared(), (dw+dp).squared(), (dw-dq).squared(), (dw+dp-dq).squared()));
+}
+
+/** The gap of two capsules, signed if they have crossed. */
+double findGap(const SegmentPair& start, const SegmentPair& end, double radii) {
+    const double distance = sqrt(findNearestPoints(end).squared);
+    if (distance <= largestMotion(start, end)) {
+        Crossing crossing;
+        if (findCrossing(start, end, crossing))
+            return end.between(crossing.s, crossing.t).dot(crossing.normal)-radii;
+    }
+    return distance-radii;
+}
+
+/** Where two segments touch: where they are nearest, or if they are nearly parallel at both ends of their overlap. */
+struct Places {
+    bool parallel;
+    double s[2], t[2], distance;
+};
+
+/** What is at an end but for rounding is there: joints are looked at apart. */
+double takenToEnd(double fraction) {
+    return fraction < AT_END ? 0 : fraction > 1-AT_END ? 1 : fraction;
+}
+
+Places findPlaces(const SegmentPair& pair) {
+    const NearestPoints nearest = findNearestPoints(pair);
+    Places places = {false, {takenToEnd(nearest.s), 0}, {takenToEnd(nearest.t), 0}, sqrt(nearest.squared)};
+    const double a = pair.p.squared(), b = pair.p.dot(pair.q), e = pair.q.squared();
+    if (a > 0 && e > 0 && a*e-b*b < LARGEST_PARALLEL*a*e) {
+        // The ends of b, as fractions of a.
+        const double c = pair.p.dot(pair.w), f = pair.q.dot(pair.w), first = -c/a, second = (b-c)/a;
+        const double lower = max(0.0, min(first, second)), upper = min(1.0, max(first, second));
+        places.parallel = upper > lower;
+        if (places.parallel)
+            for (int i = 0; i < 2; i++) {
+                const double s = i == 0 ? lower : upper;
+                places.s[i] = takenToEnd(s);
+                places.t[i] = s == first ? 0 : s == second ? 1 : takenToEnd(clampToUnit((b*s+f)/e));
+            }
+    }
+    return places;
+}
+
+/** A unit vector across both segments, or across one of them if they are parallel or the other has no length. */
+Vec3d findNormal(const SegmentPair& pair, int side) {
+    Vec3d normal = pair.p.cross(pair.q)*(side < 0 ? -1 : 1);
+    if (!(normal.squared() > 0)) {
+        const Vec3d& along = pair.p.squared() > 0 ? pair.p : pair.q;
+        const double x = fabs(along.x), y = fabs(along.y), z = fabs(along.z);
+        normal = along.cross({x <= y && x <= z ? 1.0 : 0.0, y < x && y <= z ? 1.0 : 0.0, z < x && z < y ? 1.0 : 0.0});
+    }
+    return normal.squared() > 0 ? normal*(1/sqrt(normal.squared())) : Vec3d{1, 0, 0};
+}
+
+} // namespace
+
+struct ContactSearch::Implementation {
+    CapsuleSystem system;
+    bool nearestImages;
+    /** The capsule of the same chain that shares the second particle, or the first one, or -1. */
+    vector<int> next, previous;
+    /** Explicit exclusions of each capsule, sorted. */
+    vector<vector<int> > excluded;
+
+    // The last search.
+    Frame frame;
+    double reach = 0, largestRadius = 0;
+    vector<Described> described;
+    vector<int> cellStart, members;
+    vector<float> boxes;
+    vector<CoarseCapsule> sorted;
+    SweptBoxes sweptBoxes;
+    float margin = 0, imageShifts[4*NUM_IMAGES];
+    vector<Part> parts;
+    vector<size_t> firstOf;
+
+    Implementation(const CapsuleSystem& system, bool nearestImages);
+    bool isExcluded(int a, int b) const;
+    double radii(int a, int b) const {
+        return system.capsules[a].radius+system.capsules[b].radius;
+    }
+    Vec3d along(const Capsule& capsule, const double* positions) const;
+    SegmentPair segments(int a, int b, const double* shift, const double* positions) const;
+    void setFrame(const double* x, const double* y, const double* box);
+    void describe(int i, const double* x, const double* y);
+    void checkPositions(const double* x, const double* y) const;
+    void setCells();
+    void searchCells(int part, const double* x, const double* y);
+    int findRows(int column, int iz, CapsuleRow* rows) const;
+    void addPair(int i, int j, int image, const double* x, const double* y, Part& part) const;
+    void gather(vector<ContactPair>& pairs);
+    SegmentPair withNeighbor(const SegmentPair& segments, int neighbor, bool ofA, bool atEnd,
+            const double* positions) const;
+    bool isOwned(const Contact& contact, const ContactPair& pair, const SegmentPair& end, bool parallel, bool ofA,
+            const double* x, const double* y) const;
+    int evaluate(const ContactPair& pair, const double* x, const double* y, Contact* contacts, double limit) const;
+};
+
+ContactSearch::Implementation::Implementation(const CapsuleSystem& system, bool nearestImages) :
+        system(system), nearestImages(nearestImages) {
+    const vector<Capsule>& capsules = system.capsules;
+    map<pair<int, int>, int> startsAt;
+    for (size_t i = 0; i < capsules.size(); i++) {
+        const Capsule& capsule = capsules[i];
+        const string name = "Capsule "+to_string(i);
+        if (capsule.first < 0 || capsule.second < -1 || capsule.first == capsule.second)
+            throw invalid_argument(name+" has no particle, or the same one twice");
+        if (!(capsule.radius >= 0 && isfinite(capsule.radius)))
+            throw invalid_argument(name+" has a radius that is negative or not finite");
+        if (capsule.chain < -1 || capsule.chain >= (int) system.chains.size())
+            throw invalid_argument(name+" is in a chain that there is not");
+        if (capsule.chain >= 0 && (capsule.index < 0 || capsule.index >= system.chains[capsule.chain].numCapsules))
+            throw invalid_argument(name+" has a number in its chain that there is not");
+        if (capsule.chain >= 0 && capsule.second >= 0)
+            startsAt[{capsule.chain, capsule.first}] = i;
+    }
+    next.assign(capsules.size(), -1);
+    previous.assign(capsules.size(), -1);
+    for (size_t i = 0; i < capsules.size(); i++)
+        if (capsules[i].chain >= 0 && capsules[i].second >= 0) {
+            const auto found = startsAt.find({capsules[i].chain, capsules[i].second});
+            if (found != startsAt.end()) {
+                next[i] = found->second;
+                previous[found->second] = i;
+            }
+        }
+    excluded.resize(capsules.size());
+    for (const pair<int, int>& exclusion : system.exclusions) {
+        for (int i : {exclusion.first, exclusion.second})
+            if (i < 0 || i >= (int) capsules.size())
+                throw invalid_argument("An exclusion names capsule "+to_string(i)+", which there is not");
+        excluded[exclusion.first].push_back(exclusion.second);
+        excluded[exclusion.second].push_back(exclusion.first);
+    }
+    for (vector<int>& others : excluded)
+        sort(others.begin(), others.end());
+    described.resize(capsules.size());
+}
+
+bool ContactSearch::Implementation::isExcluded(int a, int b) const {
+    const Capsule &first = system.capsules[a], &second = system.capsules[b];
+    if (a == b || first.first == second.first || first.end() == second.end() || first.first == second.end() ||
+            first.end() == second.first)
+        return true;
+    if (first.chain >= 0 && first.chain == second.chain) {
+        const CapsuleChain& chain = system.chains[first.chain];
+        int apart = abs(first.index-second.index);
+        if (chain.closed)
+            apart = min(apart, chain.numCapsules-apart);
+        if (apart <= chain.excludedNeighbors)
+            return true;
+    }
+    return !excluded[a].empty() && binary_search(excluded[a].begin(), excluded[a].end(), b);
+}
+
+Vec3d ContactSearch::Implementation::along(const Capsule& capsule, const double* positions) const {
+    if (capsule.second < 0)
+        return {0, 0, 0};
+    Vec3d difference = position(positions, capsule.second)-position(positions, capsule.first);
+    if (nearestImages && frame.periodic) {
+        double d[] = {difference.x, difference.y, difference.z};
+        takeToNearestImage(d, frame.vectors);
+        difference = {d[0], d[1], d[2]};
+    }
+    return difference;
+}
+
+SegmentPair ContactSearch::Implementation::segments(int a, int b, const double* shift, const double* positions) const {
+    const Capsule &first = system.capsules[a], &second = system.capsules[b];
+    const Vec3d w = position(positions, first.first)-position(positions, second.first);
+    return {along(first, positions), along(second, positions), {w.x+shift[0], w.y+shift[1], w.z+shift[2]}};
+}
+
+void ContactSearch::Implementation::setFrame(const double* x, const double* y, const double* box) {
+    frame = Frame();
+    frame.periodic = box != NULL;
+    largestRadius = 0;
+    for (const Capsule& capsule : system.capsules)
+        largestRadius = max(largestRadius, capsule.radius);
+    if (frame.periodic) {
+        copy(box, box+9, frame.vectors);
+        if (box[1] != 0 || box[2] != 0 || box[5] != 0 || !(box[0] > 0 && box[4] > 0 && box[8] > 0))
+            throw invalid_argument("The vectors of the periodic box are not in reduced form");
+    }
+    else {
+        Vec3d lower = {0, 0, 0}, upper = lower;
+        bool isFirst = true;
+        for (const Capsule& capsule : system.capsules)
+            for (int particle : {capsule.first, capsule.end()})
+                for (const double* positions : {x, y}) {
+                    const Vec3d v = position(positions, particle);
+                    if (isFirst)
+                        lower = upper = v;
+                    isFirst = false;
+                    lower = {min(lower.x, v.x), min(lower.y, v.y), min(lower.z, v.z)};
+                    upper = {max(upper.x, v.x), max(upper.y, v.y), max(upper.z, v.z)};
+                }
+        frame.origin = lower;
+        for (int k = 0; k < 3; k++) {
+            // Never flat.
+            const double extent = component(upper, k)-component(lower, k);
+            frame.vectors[4*k] = max(extent, max(2*largestRadius+reach, 1e-3));
+        }
+    }
+    frame.findWidths();
+}
+
+/** Find the box, in fractions of the frame, that a capsule sweeps. */
+void ContactSearch::Implementation::describe(int i, const double* x, const double* y) {
+    const Capsule& capsule = system.capsules[i];
+    const Vec3d x0 = position(x, capsule.first)-frame.origin, p = along(capsule, x);
+    const Vec3d y0 = position(y, capsule.first)-frame.origin, q = x == y ? p : along(capsule, y);
+    const Vec3d ends[] = {frame.toFractions(x0), frame.toFractions(x0+p), frame.toFractions(y0),
+            frame.toFractions(y0+q)};
+    Described& result = described[i];
+    double center[3];
+    for (int k = 0; k < 3; k++) {
+        const double f[] = {component(ends[0], k), component(ends[1], k), component(ends[2], k), component(ends[3], k)};
+        // Written so that NaN fails.
+        result.finite = fabs(f[0])+fabs(f[1])+fabs(f[2])+fabs(f[3]) < 1e9;
+        if (!result.finite)
+            return;
+        const double lower = smallestOf(f[0], f[1], f[2], f[3]), upper = largestOf(f[0], f[1], f[2], f[3]);
+        center[k] = 0.5*(lower+upper);
+        result.images[k] = frame.periodic ? (int) floor(center[k]) : 0;
+        result.center[k] = center[k]-result.images[k];
+        result.half[k] = 0.5*(upper-lower)+(capsule.radius+0.5*reach)*frame.inverseWidths[k]+SINGLE_ROUNDING;
+    }
+    const Vec3d unwrapped = frame.toVector({center[0], center[1], center[2]});
+    CoarseCapsule& coarse = result.coarse;
+    set(coarse.center, frame.toVector({result.center[0], result.center[1], result.center[2]}));
+    set(coarse.middle, x0+p*0.5-unwrapped);
+    set(coarse.half, p*0.5);
+    set(coarse.laterMiddle, y0+q*0.5-unwrapped);
+    set(coarse.laterHalf, q*0.5);
+    coarse.radius = capsule.radius;
+}
+
+void ContactSearch::Implementation::checkPositions(const double* x, const double* y) const {
+    for (size_t i = 0; i < described.size(); i++)
+        if (!described[i].finite) {
+            const Capsule& capsule = system.capsules[i];
+            for (int particle : {capsule.first, capsule.end()})
+                for (const double* positions : {x, y})
+                    for (int k = 0; k < 3; k++)
+                        if (!isfinite(positions[3*particle+k]))
+                            throw invalid_argument("The position of particle "+to_string(particle)+" is not finite");
+            throw invalid_argument("Capsule "+to_string(i)+" is too far away");
+        }
+}
+
+/** Divide the frame into cells, and sort capsules by them. Capsules in cells that are not neighbors do not meet. */
+void ContactSearch::Implementation::setCells() {
+    const int count = described.size();
+    double largestHalf[3] = {0, 0, 0}, largestLength = 0;
+    for (const Described& capsule : described) {
+        for (int k = 0; k < 3; k++)
+            largestHalf[k] = max(largestHalf[k], capsule.half[k]);
+        const float *half = capsule.coarse.half, *later = capsule.coarse.laterHalf;
+        largestLength = max(largestLength, (double) max(half[0]*half[0]+half[1]*half[1]+half[2]*half[2],
+                later[0]*later[0]+later[1]*later[1]+later[2]*later[2]));
+    }
+    largestLength = 2*sqrt(largestLength);
+    double size = 0;
+    for (double entry : frame.vectors)
+        size += fabs(entry);
+    margin = SINGLE_ROUNDING*(size+largestLength+reach+largestRadius)+PARALLEL_ERROR*largestLength;
+    // In a box of that many cells in each direction, there is one for every few capsules.
+    const double mostCells = max(1.0, cbrt(2.0*count)+1);
+    for (int k = 0; k < 3; k++) {
+        if (frame.periodic && 4*largestHalf[k] > 1)
+            throw invalid_argument("The periodic box is too small for contacts: its width along vector "+
+                    to_string(k)+" is "+to_string(frame.widths[k])+", but twice the largest extent of a capsule in a "
+                    "step with its diameter and the reach of the search is "+
+                    to_string(4*largestHalf[k]*frame.widths[k])+". Take a larger box or shorter segments, and chains that are whole");
+        frame.cells[k] = max(1.0, floor(min(0.5/largestHalf[k], frame.periodic ? mostCells : 4*mostCells)));
+    }
+    // Where capsules fill a part of the frame only, there are more cells.
+    while ((double) frame.cells[0]*frame.cells[1]*frame.cells[2] > 16.0*count+64)
+        for (int k = 0; k < 3; k++)
+            frame.cells[k] = (frame.cells[k]+1)/2;
+
+    const int* cells = frame.cells;
+    const int numCells = cells[0]*cells[1]*cells[2];
+    cellStart.assign(numCells+1, 0);
+    for (Described& capsule : described) {
+        int cell = 0;
+        for (int k = 0; k < 3; k++)
+            cell = cell*cells[k]+min(max((int) (capsule.center[k]*cells[k]), 0), cells[k]-1);
+        capsule.cell = cell;
+        cellStart[cell+1]++;
+    }
+    for (int cell = 0; cell < numCells; cell++)
+        cellStart[cell+1] += cellStart[cell];
+    members.resize(count);
+    for (int i = 0; i < count; i++)
+        members[cellStart[described[i].cell]++] = i;
+    for (int cell = numCells; cell > 0; cell--)
+        cellStart[cell] = cellStart[cell-1];
+    cellStart[0] = 0;
+
+    for (int image = 0; image < NUM_IMAGES; image++)
+        set(&imageShifts[4*image], frame.toVector({image/9-1.0, image/3%3-1.0, image%3-1.0}));
+
+    const size_t stride = count+PADDING;
+    boxes.resize(6*stride);
+    sorted.resize(count);
+    for (int k = 0; k < 3; k++) {
+        float *center = &boxes[k*stride], *half = &boxes[(3+k)*stride];
+        sweptBoxes.center[k] = center;
+        sweptBoxes.half[k] = half;
+        for (int i = 0; i < count; i++) {
+            center[i] = described[members[i]].center[k];
+            half[i] = described[members[i]].half[k];
+        }
+    }
+    for (int i = 0; i < count; i++)
+        sorted[i] = described[members[i]].coarse;
+}
+
+/** Find the rows of capsules in half of the neighbors of a cell: each two cells, in each image, meet once. */
+int ContactSearch::Implementation::findRows(int column, int iz, CapsuleRow* rows) const {
+    const int* cells = frame.cells;
+    int numRows = 0;
+    auto add = [&] (int column, int from, int to, const int* images) {
+        // Cells that follow each other in a column are one row.
+        const int first = cellStart[column*cells[2]+from], last = cellStart[column*cells[2]+to+1];
+        if (first < last)
+            rows[numRows++] = {first, last, imageNumber(images), {(float) images[0], (float) images[1],
+                    (float) images[2]}};
+    };
+    for (int dx = 0; dx <= 1; dx++)
+        for (int dy = (dx == 0 ? 0 : -1); dy <= 1; dy++) {
+            int images[3] = {0, 0, 0}, jx = column/cells[1]+dx, jy = column%cells[1]+dy;
+            if (jx == cells[0]) {
+                jx = 0;
+                images[0] = 1;
+            }
+            if (jy < 0) {
+                jy = cells[1]-1;
+                images[1] = -1;
+            }
+            else if (jy == cells[1]) {
+                jy = 0;
+                images[1] = 1;
+            }
+            if (!frame.periodic && imageNumber(images) != SAME_IMAGE)
+                continue;
+            const int other = jx*cells[1]+jy, last = cells[2]-1;
+            const int lower = dx == 0 && dy == 0 ? iz+1 : iz-1, upper = iz+1;
+            if (max(lower, 0) <= min(upper, last))
+                add(other, max(lower, 0), min(upper, last), images);
+            if (frame.periodic && lower < 0) {
+                images[2] = -1;
+                add(other, last, last, images);
+            }
+            if (frame.periodic && upper > last) {
+                images[2] = 1;
+                add(other, 0, 0, images);
+            }
+        }
+    return numRows;
+}
+
+/** Look for pairs with a capsule in one column of cells. */
+void ContactSearch::Implementation::searchCells(int column, const double* x, const double* y) {
+    const CandidateKernels& kernels = candidateKernels();
+    Part& part = parts[column];
+    part.pairs.clear();
+    int count = 0;
+    auto look = [&] {
+        count = kernels.keepNear(sorted.data(), imageShifts, reach, margin, part.candidates(0), count);
+        for (int i = 0; i < count; i++)
+            addPair(members[part.first[i]], members[part.second[i]], part.image[i], x, y, part);
+        count = 0;
+    };
+    CapsuleRow rows[32];
+    for (int iz = 0; iz < frame.cells[2]; iz++) {
+        const int cell = column*frame.cells[2]+iz, first = cellStart[cell], last = cellStart[cell+1];
+        if (first == last)
+            continue;
+        const int numRows = 1+findRows(column, iz, rows+1);
+        int most = last-first;
+        for (int row = 1; row < numRows; row++)
+            most += rows[row].last-rows[row].first;
+        for (int i = first; i < last; i++) {
+            rows[0] = {i+1, last, SAME_IMAGE, {0, 0, 0}};
+            if ((int) part.first.size() < count+most+PADDING)
+                for (vector<int>* list : {&part.first, &part.second, &part.image})
+                    list->resize(max(count+most, 2*BATCH)+PADDING);
+            count += kernels.findOverlaps(sweptBoxes, i, rows, numRows, part.candidates(count));
+            if (count >= BATCH)
+                look();
+        }
+    }
+    look();
+}
+
+/** Add a pair if it is near enough, in double precision where there is doubt. */
+void ContactSearch::Implementation::addPair(int i, int j, int image, const double* x, const double* y,
+        Part& part) const {
+    const int a = min(i, j), b = max(i, j);
+    if (isExcluded(a, b))
+        return;
+    // Where images are wrapped into the frame, j is taken by some vectors of the frame to where it is near i.
+    const bool sure = image >= SURE;
+    image %= SURE;
+    const int images[3] = {image/9-1, image/3%3-1, image%3-1};
+    double number[3];
+    for (int k = 0; k < 3; k++)
+        number[k] = (i < j ? 1 : -1)*(described[j].images[k]-described[i].images[k]-images[k]);
+    const Vec3d shift = frame.toVector({number[0], number[1], number[2]});
+    ContactPair pair = {a, b, {shift.x, shift.y, shift.z}, 0};
+    const SegmentPair start = segments(a, b, pair.shift, x);
+    if (!sure) {
+        const double limit = radii(a, b)+reach, before = sqrt(findNearestPoints(start).squared);
+        if (before >= limit) {
+            if (x == y)
+                return;
+            const SegmentPair end = segments(a, b, pair.shift, y);
+            const double after = sqrt(findNearestPoints(end).squared);
+            if (after >= limit && before+after > largestMotion(start, end))
+                return;
+        }
+    }
+    const double volume = start.volume();
+    pair.side = volume > 0 ? 1 : volume < 0 ? -1 : 0;
+    part.pairs.push_back(pair);
+}
+
+/** Sort what the parts have found: by a, in one turn, then the few with the same a. */
+void ContactSearch::Implementation::gather(vector<ContactPair>& pairs) {
+    firstOf.assign(system.capsules.size()+1, 0);
+    const size_t numParts = (size_t) frame.cells[0]*frame.cells[1];
+    for (size_t part = 0; part < numParts; part++)
+        for (const ContactPair& pair : parts[part].pairs)
+            firstOf[pair.a+1]++;
+    for (size_t i = 1; i < firstOf.size(); i++)
+        firstOf[i] += firstOf[i-1];
+    pairs.resize(firstOf.back());
+    for (size_t part = 0; part < numParts; part++)
+        for (const ContactPair& pair : parts[part].pairs)
+            pairs[firstOf[pair.a]++] = pair;
+    // Each entry is now where the next one starts.
+    size_t first = 0;
+    for (size_t i = 0; i+1 < firstOf.size(); i++) {
+        sort(pairs.begin()+first, pairs.begin()+firstOf[i], [] (const ContactPair& one, const ContactPair& other) {
+            return one.b < other.b;
+        });
+        first = firstOf[i];
+    }
+}
+
+/** Replace one of two segments by its neighbor in its chain. */
+SegmentPair ContactSearch::Implementation::withNeighbor(const SegmentPair& segments, int neighbor, bool ofA, bool atEnd,
+        const double* positions) const {
+    const Vec3d beside = along(system.capsules[neighbor], positions);
+    if (ofA)
+        return {beside, segments.q, atEnd ? segments.w+segments.p : segments.w-beside};
+    return {segments.p, beside, atEnd ? segments.w-segments.q : segments.w+beside};
+}
+
+/** Get whether a contact belongs to its pair, or to a neighbor of a, or of b, in its chain. */
+bool ContactSearch::Implementation::isOwned(const Contact& contact, const ContactPair& pair, const SegmentPair& end,
+        bool parallel, bool ofA, const double* x, const double* y) const {
+    const int own = ofA ? pair.a : pair.b, other = ofA ? pair.b : pair.a;
+    const double fraction = ofA ? contact.s : contact.t, sum = radii(pair.a, pair.b);
+    const double least = LEAST_DIFFERENCE*(sum+fabs(contact.gap));
+    const Vec3d &ownAlong = ofA ? end.p : end.q, &otherAlong = ofA ? end.q : end.p;
+    for (bool atEnd : {false, true}) {
+        const int neighbor = atEnd ? next[own] : previous[own];
+        const bool atJoint = fraction == (atEnd ? 1 : 0);
+        if (neighbor < 0 || (parallel && !atJoint) || isExcluded(neighbor, other))
+            continue;
+        if (!atJoint) {
+            // If the distance from the other capsule grows as one goes from the joint into the neighbor, that has no
+            // place nearer than the joint.
+            const Vec3d joint = (ofA ? end.w : end.w*-1)+ownAlong*(atEnd ? 1 : 0);
+            const Vec3d fromOther = joint-otherAlong*nearestFraction(otherAlong, joint*-1);
+            const Vec3d into = along(system.capsules[neighbor], y)*(atEnd ? 1 : -1);
+            if (fromOther.dot(into) >= 0 && sqrt(fromOther.squared())-sum > contact.gap+2*least)
+                continue;
+        }
+        const SegmentPair beside = withNeighbor(end, neighbor, ofA, atEnd, y);
+        const Places places = findPlaces(beside);
+        bool endsThere = false;
+        if (places.parallel)
+            for (int i = 0; i < 2; i++)
+                endsThere = endsThere || (ofA ? places.s[i] : places.t[i]) == (atEnd ? 0 : 1);
+        if (endsThere) {
+            // The neighbor has a contact at the joint.
+            const Vec3d joint = (ofA ? end.w : end.w*-1)+ownAlong*(atEnd ? 1 : 0);
+            const Vec3d fromOther = joint-otherAlong*nearestFraction(otherAlong, joint*-1);
+            if (parallel ? !atEnd : !(contact.gap < sqrt(fromOther.squared())-sum-least))
+                return false;
+            continue;
+        }
+        const SegmentPair start = segments(pair.a, pair.b, pair.shift, x);
+        const double gap = findGap(withNeighbor(start, neighbor, ofA, atEnd, x), beside, radii(neighbor, other));
+        // What differs by rounding is equal. Then the one that ends there counts.
+        if (parallel || atEnd ? gap < contact.gap-least : !(contact.gap < gap-least))
+            return false;
+    }
+    return true;
+}
+
+int ContactSearch::Implementation::evaluate(const ContactPair& pair, const double* x, const double* y,
+        Contact* contacts, double limit) const {
+    const SegmentPair end = segments(pair.a, pair.b, pair.shift, y);
+    const double sum = radii(pair.a, pair.b);
+    const Places places = findPlaces(end);
+    if (x != y) {
+        const SegmentPair start = segments(pair.a, pair.b, pair.shift, x);
+        Crossing crossing;
+        if (places.distance <= largestMotion(start, end) && findCrossing(start, end, crossing)) {
+            const Vec3d& n = crossing.normal;
+            const double signedDistance = end.between(crossing.s, crossing.t).dot(n);
+            contacts[0] = {crossing.s, crossing.t, {n.x, n.y, n.z}, signedDistance-sum, 1, true};
+            return contacts[0].gap < limit ? 1 : 0;
+        }
+    }
+    if (places.distance-sum >= limit)
+        return 0;
+    int kept = 0;
+    const int count = places.parallel ? 2 : 1;
+    for (int i = 0; i < count; i++) {
+        const double s = places.s[i], t = places.t[i];
+        const Vec3d r = end.between(s, t);
+        const double length = sqrt(r.squared());
+        if (length-sum >= limit)
+            continue;
+        const Vec3d n = length > 0 ? r*(1/length) : findNormal(end, pair.side);
+        const Contact contact = {s, t, {n.x, n.y, n.z}, length-sum, 1.0/count, false};
+        if (isOwned(contact, pair, end, places.parallel, true, x, y) &&
+                isOwned(contact, pair, end, places.parallel, false, x, y))
+            contacts[kept++] = contact;
+    }
+    return kept;
+}
+
+ContactSearch::ContactSearch(const CapsuleSystem& system, bool nearestImages) :
+        implementation(new Implementation(system, nearestImages)) {
+}
+
+ContactSearch::~ContactSearch() {
+}
+
+const CapsuleSystem& ContactSearch::getSystem() const {
+    return implementation->system;
+}
+
+void ContactSearch::setRadius(int capsule, double radius) {
+    implementation->system.capsules.at(capsule).radius = radius;
+}
+
+bool ContactSearch::isExcluded(int a, int b) const {
+    return implementation->isExcluded(a, b);
+}
+
+void ContactSearch::findPairs(const double* x, const double* y, const double* box, double reach,
+        vector<ContactPair>& pairs, const LoopRunner& run) {
+    if (!(reach >= 0 && isfinite(reach)))
+        throw invalid_argument("The reach of a search for contacts is negative or not finite");
+    pairs.clear();
+    Implementation& search = *implementation;
+    const int count = search.system.capsules.size();
+    if (count == 0)
+        return;
+    auto runParts = [&] (int parts, const function<void(int)>& part) {
+        if (run)
+            run(parts, part);
+        else
+            for (int i = 0; i < parts; i++)
+                part(i);
+    };
+    search.reach = reach;
+    search.setFrame(x, y, box);
+    runParts((count+CHUNK-1)/CHUNK, [&] (int chunk) {
+        for (int i = chunk*CHUNK; i < min(count, (chunk+1)*CHUNK); i++)
+            search.describe(i, x, y);
+    });
+    search.checkPositions(x, y);
+    search.setCells();
+    const int columns = search.frame.cells[0]*search.frame.cells[1];
+    if ((int) search.parts.size() < columns)
+        search.parts.resize(columns);
+    runParts(columns, [&] (int column) {search.searchCells(column, x, y);});
+    search.gather(pairs);
+}
+
+int ContactSearch::evaluate(const ContactPair& pair, const double* x, const double* y, Contact* contacts,
+        double limit) const {
+    return implementation->evaluate(pair, x, y, contacts, limit);
+}
+
+void ContactSearch::findVector(const ContactPair& pair, double s, double t, const double* positions,
+        double* result) const {
+    const Vec3d r = implementation->segments(pair.a, pair.b, pair.shift, positions).between(s, t);
+    result[0] = r.x;
+    result[1] = r.y;
+    result[2] = r.z;
+}
+
+bool ContactSearch::crosses(const ContactPair& pair, const double* x, const double* y) const {
+    const Implementation& search = *implementation;
+    const SegmentPair start = search.segments(pair.a, pair.b, pair.shift, x);
+    const SegmentPair end = search.segments(pair.a, pair.b, pair.shift, y);
+    Crossing crossing;
+    return findCrossing(start, end, crossing);
+}

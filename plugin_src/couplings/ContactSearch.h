@@ -1,0 +1,93 @@
+#ifndef CYLCHAIN_CONTACT_SEARCH_H_
+#define CYLCHAIN_CONTACT_SEARCH_H_
+
+#include "couplings/CapsuleGeometry.h"
+#include "couplings/Capsules.h"
+#include <functional>
+#include <limits>
+#include <memory>
+#include <vector>
+
+namespace cylchain {
+
+/**
+ * Calls a function with each number from 0 to count-1, in any order, perhaps on several threads. The function throws no
+ * exceptions.
+ */
+typedef std::function<void(int count, const std::function<void(int)>& iteration)> LoopRunner;
+
+/**
+ * Finds capsules that touch each other, and where.
+ *
+ * Positions are arrays of three doubles for each particle: x at the start of a step, y at its end. In between,
+ * particles move along straight lines. The two may be the same.
+ */
+class ContactSearch {
+public:
+    /**
+     * @param system         the capsules. std::invalid_argument says what is wrong with them.
+     * @param nearestImages  whether each segment is taken as its shortest image in a periodic box. If not, the
+     *                       particles of a chain must be images that belong together.
+     */
+    explicit ContactSearch(const CapsuleSystem& system, bool nearestImages = false);
+    ~ContactSearch();
+    const CapsuleSystem& getSystem() const;
+    /** Give a capsule another radius, which is not negative. Pairs that were found with other radii may lack some. */
+    void setRadius(int capsule, double radius);
+    /** Get whether two capsules never touch each other. */
+    bool isExcluded(int a, int b) const;
+    /**
+     * Find the pairs of capsules whose surfaces come within reach of each other at x or at y, or that may pass through
+     * each other in between, sorted by a and b. They do not depend on the loop runner.
+     *
+     * @param box    the three vectors of a periodic box (nine doubles, in reduced form), or NULL. Its widths must be
+     *               more than twice the extent of a capsule in a step with its diameter and the reach, so that two
+     *               capsules do not meet twice; std::invalid_argument says so if not.
+     * @param reach  not negative
+     * @param pairs  receives the pairs
+     * @param run    runs the parts of the search; one after the other if there is none
+     */
+    void findPairs(const double* x, const double* y, const double* box, double reach, std::vector<ContactPair>& pairs,
+            const LoopRunner& run = LoopRunner());
+    /**
+     * Find the contacts of a pair at y: none, one or two. Several threads may do so at the same time. With
+     * nearestImages, the box is that of the last search.
+     *
+     * Two segments touch where they are nearest to each other. If they are nearly parallel, at both ends of their
+     * overlap, each with half of the stiffness. If they have crossed between x and y, they touch where they crossed,
+     * the normal is that of before, and the gap is the distance along it, less the radii: the signed distance goes on.
+     *
+     * Around a joint, segments that share it may see one and the same contact. It is counted once:
+     * - A contact at a joint is that of the segment that ends there (s = 1), and of none if the distance falls as one
+     *   goes on into the other segment.
+     * - Of two segments that both touch the same capsule on the inner side of a bend, the one with the lesser gap
+     *   counts. The energy is continuous where that changes from one to the other, as long as the chain's radius of
+     *   curvature is more than twice the distance at which capsules touch.
+     *
+     * Capsules that are excluded do not take contacts from their neighbors.
+     *
+     * @param contacts  room for two
+     * @param limit     contacts with a gap that is not less are left out, which takes less time
+     * @return the number of contacts
+     */
+    int evaluate(const ContactPair& pair, const double* x, const double* y, Contact* contacts,
+            double limit = std::numeric_limits<double>::infinity()) const;
+    /**
+     * Find the vector from the point at fraction t of the second capsule of a pair to that at s of the first.
+     *
+     * @param result  three numbers
+     */
+    void findVector(const ContactPair& pair, double s, double t, const double* positions, double* result) const;
+    /**
+     * Get whether the segments of a pair pass through each other on the way from x to y, an odd number of times.
+     * Spheres do not, nor do segments that stay in one plane.
+     */
+    bool crosses(const ContactPair& pair, const double* x, const double* y) const;
+private:
+    struct Implementation;
+    std::unique_ptr<Implementation> implementation;
+};
+
+} // namespace cylchain
+
+#endif /*CYLCHAIN_CONTACT_SEARCH_H_*/

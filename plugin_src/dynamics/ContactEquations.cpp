@@ -1,0 +1,233 @@
+#include "dynamics/ContactEquations.h"
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+using namespace cylchain;
+using namespace std;
+
+namespace {
+
+/** How near pairs come that are looked at in a step, over their diameter: further iterations move them. */
+const double REACH = 0.8;
+/** The largest overlap that is mirrored, over the same. */
+const double LARGEST_MIRRORED = 0.33;
+/** Pairs with a larger gap are only looked at again if they may have come near, over the same. */
+const double LARGEST_GAP = 0.3;
+/** The largest change of a gap in the last iteration, over the thermal fluctuation of a contact. */
+const double TOLERANCE = 0.3;
+/** The number of iterations that look where capsules touch. */
+const int SEARCHING_ITERATIONS = 5;
+/** Pairs that a thread looks at together. */
+const int CHUNK = 128;
+
+} // namespace
+
+void ContactEquations::setContacts(ContactSearch* newSearch, double newStiffness) {
+    search = newSearch;
+    stiffness = newStiffness;
+}
+
+void ContactEquations::begin(const CoupledStart& start, const Loop& newLoop) {
+    loop = &newLoop;
+    begun = start.positions;
+    box = start.box;
+    kT = start.settings.kT;
+    const vector<Capsule>& capsules = search->getSystem().capsules;
+    places.resize(capsules.size());
+    double diameter = 0;
+    for (size_t i = 0; i < capsules.size(); i++) {
+        const Capsule& capsule = capsules[i];
+        diameter = max(diameter, 2*capsule.radius);
+        Place place;
+        place.first = capsule.first;
+        place.second = capsule.second;
+        PlaceOnChain& found = places[i].place;
+        places[i].direction = 0;
+        if (start.places.find(place, found) && start.taken[found.chain])
+            places[i].direction = capsule.second < 0 ? 0 : found.fraction == 0 ? 1 : -1;
+        else
+            found = PlaceOnChain();
+    }
+    reach = REACH*diameter;
+    pairs.clear();
+    states.clear();
+    predicted.clear();
+}
+
+void ContactEquations::beginStage(int, int, const double*) {
+    iterations = 0;
+}
+
+PlaceOnChain ContactEquations::placeOf(int capsule, double fraction) const {
+    PlaceOnChain place = places[capsule].place;
+    place.fraction += places[capsule].direction*fraction;
+    return place;
+}
+
+void ContactEquations::findPairs(const double* moved) {
+    int particles = 0;
+    for (const Capsule& capsule : search->getSystem().capsules)
+        particles = max(particles, max(capsule.first, capsule.end())+1);
+    predicted.assign(moved, moved+3*(size_t) particles);
+    search->findPairs(begun, moved, box, reach, pairs, *loop);
+
+    // Pairs that were known keep what is known of them.
+
+    vector<State> before;
+    before.swap(states);
+    size_t next = 0;
+    for (const ContactPair& pair : pairs) {
+        auto isBefore = [&] (const ContactPair& other) {
+            return other.a < pair.a || (other.a == pair.a && other.b < pair.b);
+        };
+        while (next < before.size() && isBefore(before[next].pair))
+            next++;
+        if (next < before.size() && before[next].pair.a == pair.a && before[next].pair.b == pair.b) {
+            states.push_back(before[next]);
+            states.back().near = true;
+        }
+        else
+            states.push_back({pair, true, 0, {0, 0}, {}, -1});
+    }
+}
+
+void ContactEquations::updateContact(const ContactPair& pair, const double* moved, Contact& contact) const {
+    double r[3];
+    search->findVector(pair, contact.s, contact.t, moved, r);
+    const vector<Capsule>& capsules = search->getSystem().capsules;
+    const double radii = capsules[pair.a].radius+capsules[pair.b].radius;
+    const double* n = contact.normal;
+    contact.gap = r[0]*n[0]+r[1]*n[1]+r[2]*n[2]-radii;
+}
+
+void ContactEquations::evaluate(State& state, const double* moved, bool first, Part& part) const {
+    const ContactPair& pair = state.pair;
+    const PlaceOnChain &a = places[pair.a].place, &b = places[pair.b].place;
+    if (a.pack < 0 && b.pack < 0)
+        return;
+    if (iterations < SEARCHING_ITERATIONS || state.count < 0)
+        state.count = search->evaluate(pair, begun, moved, state.contacts);
+    else
+        for (int i = 0; i < state.count; i++)
+            updateContact(pair, moved, state.contacts[i]);
+    const double diameter = search->getSystem().capsules[pair.a].radius+search->getSystem().capsules[pair.b].radius;
+    // A contact that belongs to a neighbour may come back.
+    state.near = state.count == 0;
+    state.gap = HUGE_VAL;
+    for (int i = 0; i < state.count; i++) {
+        const Contact& contact = state.contacts[i];
+        part.crossed |= contact.crossed;
+        if (first)
+            state.mirrored[i] = min(max(0.0, -contact.gap), LARGEST_MIRRORED*diameter);
+        state.near |= contact.gap < state.mirrored[i]+LARGEST_GAP*diameter;
+        state.gap = min(state.gap, contact.gap);
+        const double overlap = state.mirrored[i]-contact.gap;
+        if (!(overlap > 0))
+            continue;
+        CouplingEquation equation;
+        equation.places[0] = placeOf(pair.a, contact.s);
+        equation.places[1] = placeOf(pair.b, contact.t);
+        const double* n = contact.normal;
+        const double own = contact.weight*stiffness;
+        for (int k = 0; k < 3; k++)
+            equation.force[k] = own*overlap*n[k];
+        double* const k = equation.stiffness;
+        k[0] = own*n[0]*n[0];
+        k[1] = own*n[0]*n[1];
+        k[2] = own*n[0]*n[2];
+        k[3] = own*n[1]*n[1];
+        k[4] = own*n[1]*n[2];
+        k[5] = own*n[2]*n[2];
+        part.equations.push_back(equation);
+    }
+    state.near |= !first;
+}
+
+void ContactEquations::linearise(int iteration, const double* moved, vector<CouplingEquation>& equations) {
+    iterations = iteration;
+    normals.clear();
+    crossed = false;
+    if (iteration == 0 && predicted.empty())
+        return;
+    const bool first = predicted.empty();
+    if (first)
+        findPairs(moved);
+    const int count = states.size(), chunks = (count+CHUNK-1)/CHUNK;
+    if ((int) parts.size() < chunks)
+        parts.resize(chunks);
+    (*loop)(chunks, [&] (int chunk) {
+        Part& part = parts[chunk];
+        part.equations.clear();
+        part.crossed = false;
+        for (int i = chunk*CHUNK; i < min(count, (chunk+1)*CHUNK); i++)
+            if (states[i].near)
+                evaluate(states[i], moved, first, part);
+    });
+    for (int chunk = 0; chunk < chunks; chunk++) {
+        const Part& part = parts[chunk];
+        crossed |= part.crossed;
+        equations.insert(equations.end(), part.equations.begin(), part.equations.end());
+        for (const CouplingEquation& equation : part.equations)
+            for (int k : {0, 3, 5})
+                normals.push_back(equation.stiffness[k]);
+    }
+}
+
+/** Whether pairs that were left out may touch, or new ones: they take part from now on. */
+bool ContactEquations::anyComeNear(const double* moved) {
+    const vector<Capsule>& capsules = search->getSystem().capsules;
+    motion.resize(capsules.size());
+    double largest = 0, second = 0;
+    for (size_t i = 0; i < capsules.size(); i++) {
+        double square = 0;
+        for (int particle : {capsules[i].first, capsules[i].end()}) {
+            double own = 0;
+            for (int k = 3*particle; k < 3*particle+3; k++)
+                own += (moved[k]-predicted[k])*(moved[k]-predicted[k]);
+            square = max(square, own);
+        }
+        motion[i] = sqrt(square);
+        second = max(second, min(largest, motion[i]));
+        largest = max(largest, motion[i]);
+    }
+    if (largest+second > reach) {
+        findPairs(moved);
+        return true;
+    }
+    bool any = false;
+    for (State& state : states)
+        if (!state.near && motion[state.pair.a]+motion[state.pair.b] > state.gap) {
+            state.near = any = true;
+            state.count = -1;
+        }
+    return any;
+}
+
+bool ContactEquations::finishIteration(const double* moves, const double* moved) {
+    if (iterations < 2 || crossed)
+        return true;
+    for (size_t i = 0; i < normals.size(); i += 3) {
+        // At most the squared change of the gap, times the stiffness.
+        double change = 0;
+        for (int k = 0; k < 3; k++)
+            change += sqrt(normals[i+k])*fabs(moves[i+k]);
+        if (!(change*change < TOLERANCE*TOLERANCE*kT))
+            return true;
+    }
+    return anyComeNear(moved);
+}
+
+void ContactEquations::findFailures(const double* moved, vector<bool>& failed) const {
+    for (const State& state : states)
+        if (state.near && search->crosses(state.pair, begun, moved))
+            for (int capsule : {state.pair.a, state.pair.b})
+                if (places[capsule].place.pack >= 0)
+                    failed[places[capsule].place.chain] = true;
+}
+
+void ContactEquations::findNeighbours(vector<pair<int, int> >& neighbours) const {
+    for (const ContactPair& pair : pairs)
+        if (places[pair.a].place.pack >= 0 && places[pair.b].place.pack >= 0)
+            neighbours.push_back(make_pair(places[pair.a].place.chain, places[pair.b].place.chain));
+}

@@ -1,0 +1,82 @@
+#ifndef CYLCHAIN_COUPLED_EQUATIONS_H_
+#define CYLCHAIN_COUPLED_EQUATIONS_H_
+
+#include "dynamics/ChainPlaces.h"
+#include "dynamics/PackStep.h"
+#include <functional>
+#include <memory>
+#include <vector>
+
+namespace cylchain {
+
+/** Calls a function with each number from 0 to count-1, in any order, maybe from several threads. */
+typedef std::function<void(int, const std::function<void(int)>&)> Loop;
+
+/** A flag for each lane of each pack. */
+typedef std::vector<std::unique_ptr<bool[]> > LaneFlags;
+
+/**
+ * A coupling in the equations of an iteration: a force on its first place, and the opposite one on the second, and how
+ * much less force there is for each displacement of the first against the second, a symmetric matrix (xx, xy, xz, yy,
+ * yz, zz) without negative eigenvalues. A place that is not on a chain does not move.
+ */
+struct CouplingEquation {
+    PlaceOnChain places[2];
+    double force[3], stiffness[6];
+};
+
+/**
+ * The linear equations of an iteration for all chains of an implicit step, and their solution.
+ *
+ * With A of all chains, block by block, and couplings with S = S_1-S_2 between places 1 and 2, they are
+ *
+ *     (A + sum S^T K S) change = right + sum S^T F.
+ *
+ * Of S^T K S, what concerns one place alone, S_1^T K S_1 and S_2^T K S_2, lies inside the band of its chain and is
+ * eliminated with it: that is P. The rest, X, is left to conjugate gradients with the preconditioner P, beginning with
+ * P^-1 right: all residuals are forces on places of couplings then, and so are all vectors of the method; a product with
+ * P^-1 is one substitution along chains. All sums are in an order that does not depend on threads.
+ */
+class CoupledEquations {
+public:
+    /** Linearise all packs and solve the equations, to within a tolerance of energy. */
+    void solve(const std::vector<PackStep*>& packs, const std::vector<CouplingEquation>& equations, double kT,
+            const Loop& loop);
+    /** For each equation, how much its first place moves against the second: three numbers. */
+    const std::vector<double>& getMoves() const {
+        return moves;
+    }
+    /** End the iteration of all packs, with a share of the changes. */
+    void advance(const std::vector<PackStep*>& packs, double share, LaneFlags& unfinished, const Loop& loop);
+    /**
+     * Find how a force on each place of each equation moves that place: two symmetric matrices for each equation. What
+     * couplings pass on from chain to chain is left out, but each couplings' own stiffness at its places is there.
+     */
+    void findCompliances(const std::vector<PackStep*>& packs, std::vector<double>& compliances, const Loop& loop);
+    /** The number of substitutions that the last call of solve() took. */
+    int getNumIterations() const {
+        return iterations;
+    }
+private:
+    void gatherTerms(const std::vector<CouplingEquation>& equations, int numPacks);
+    double total() const;
+    /** One for each place on a chain, pack by pack, in the order of their nodes. */
+    std::vector<CouplingTerm> terms;
+    /** For each term, the number of that of the other place of its coupling, or -1. */
+    std::vector<int> partners;
+    /** For each equation and side, the number of its term, or -1. */
+    std::vector<int> termOf;
+    /** Where the terms of each pack begin. Packs that no coupling joins to another place take no part in iterations. */
+    std::vector<int> firstTerms;
+    std::vector<char> coupled;
+    std::vector<double> sums;
+    /** Three numbers for each term: solution, residual, its response, direction and its image, and the forces found. */
+    std::vector<double> change, residual, response, force, direction, nextDirection, found;
+    std::vector<double> moves, compliancesOfTerms;
+    std::vector<int> firstOfPack, firstOfNode;
+    int iterations = 0;
+};
+
+} // namespace cylchain
+
+#endif /*CYLCHAIN_COUPLED_EQUATIONS_H_*/

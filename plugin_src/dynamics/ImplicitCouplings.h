@@ -1,0 +1,69 @@
+#ifndef CYLCHAIN_IMPLICIT_COUPLINGS_H_
+#define CYLCHAIN_IMPLICIT_COUPLINGS_H_
+
+#include "dynamics/CoupledEquations.h"
+#include <utility>
+#include <vector>
+
+namespace cylchain {
+
+/** What a step of coupled chains begins with. */
+struct CoupledStart {
+    /** Three doubles for each particle. */
+    const double* positions;
+    /** The three vectors of a periodic box, or NULL. */
+    const double* box;
+    const StepSettings& settings;
+    const ChainPlaces& places;
+    /** Whether each chain takes the step; others do not move. */
+    const std::vector<bool>& taken;
+    /** Whether a place takes part: one that is on no chain or on one that takes the step. */
+    bool takes(const PlaceOnChain& place) const {
+        return place.pack < 0 || taken[place.chain];
+    }
+};
+
+/**
+ * Couplings of one kind: forces between places of chains, or on places of chains, that an implicit step has in its
+ * equations. NetworkStep calls these functions in the order in which they stand here.
+ */
+class ImplicitCouplings {
+public:
+    virtual ~ImplicitCouplings() {
+    }
+    /** Describe the start of a step, and draw its noise. */
+    virtual void begin(const CoupledStart& start, const Loop& loop) = 0;
+    /** Begin a stage, see PackStep. The end of the stage before is where particles have been moved to. */
+    virtual void beginStage(int stage, int numStages, const double* moved) = 0;
+    /**
+     * Add the equations of an iteration, linearised where particles have been moved to.
+     *
+     * @param moved  positions after the last iteration, three doubles for each particle
+     */
+    virtual void linearise(int iteration, const double* moved, std::vector<CouplingEquation>& equations) = 0;
+    /** Whether setCompliances() is to be called after the first iteration has been solved. */
+    virtual bool needsCompliances() const {
+        return false;
+    }
+    /** Take note of how forces move the places of the equations: see CoupledEquations::findCompliances(). */
+    virtual void setCompliances(const double*) {
+    }
+    /**
+     * Take note of what the linear equations have found.
+     *
+     * @param moves  for each equation, how its first place moves against its second
+     * @param moved  where particles are now
+     * @return whether another iteration is needed
+     */
+    virtual bool finishIteration(const double* moves, const double* moved) = 0;
+    /**
+     * Find chains by which the step has gone wrong when the equations are solved, so that it must be divided.
+     */
+    virtual void findFailures(const double* moved, std::vector<bool>& failed) const = 0;
+    /** Add pairs of chains that these couplings join, so that a step is divided for both. */
+    virtual void findNeighbours(std::vector<std::pair<int, int> >& pairs) const = 0;
+};
+
+} // namespace cylchain
+
+#endif /*CYLCHAIN_IMPLICIT_COUPLINGS_H_*/

@@ -1,0 +1,215 @@
+#include "dynamics/NetworkStep.h"
+#include <algorithm>
+#include <cstddef>
+#include <numeric>
+
+using namespace cylchain;
+using namespace std;
+
+namespace {
+
+const int NEWTON_ITERATIONS = 20;
+/**
+ * Contacts that open and close in turn keep Newton's method from ending. After so many iterations, only this share of
+ * each change is made.
+ */
+const int UNDAMPED_ITERATIONS = 8;
+const double DAMPING = 0.6;
+/** A step is divided into at most two to this power. */
+const int LARGEST_DIVISION = 10;
+
+} // namespace
+
+/** A step, or a part of it, of some chains. */
+struct NetworkStep::Attempt {
+    const double *positions, *forces, *box;
+    StepSettings settings;
+    const vector<bool>& taken;
+    const Loop& loop;
+};
+
+NetworkStep::NetworkStep(const ChainEngine& engine, const vector<Chain>& chains, int particles) : engine(engine),
+        places(chains, particles), moved(3*(size_t) particles) {
+}
+
+NetworkStep::~NetworkStep() {
+}
+
+void NetworkStep::setCouplings(const vector<ImplicitCouplings*>& newCouplings) {
+    couplings = newCouplings;
+}
+
+void NetworkStep::choosePacks(const StepSettings& settings) {
+    const vector<int> chosen = engine.getPacksOfStep(settings);
+    if (chosen == packs)
+        return;
+    packs = chosen;
+    steps.clear();
+    stepsOfPacks.clear();
+    unfinished.clear();
+    flags.clear();
+    for (int pack : packs) {
+        const size_t lanes = engine.getChainsOfLanes(pack).size();
+        steps.push_back(engine.createStep(pack));
+        stepsOfPacks.push_back(steps.back().get());
+        unfinished.emplace_back(new bool[lanes]);
+        flags.emplace_back(new bool[lanes]);
+    }
+    places.setPacks(engine, packs);
+}
+
+Instability NetworkStep::step(const double* positions, const double* forces, const double* box,
+            const StepSettings& settings, double* displacements, const Loop& loop) {
+    choosePacks(settings);
+    iterations = substitutions = 0;
+    const size_t numChains = places.getChains().size();
+    const vector<bool> all(numChains, true);
+    vector<bool> failed(numChains, false);
+    Instability result;
+    if (attempt({positions, forces, box, settings, all, loop}, displacements, failed)) {
+        result.iterations = iterations;
+        return result;
+    }
+    const vector<bool> divided = findComponents(failed);
+    result.divided = count(divided.begin(), divided.end(), true);
+    if (!divide({positions, forces, box, settings, divided, loop}, 1, displacements, failed))
+        result.chain = find(failed.begin(), failed.end(), true)-failed.begin();
+    result.iterations = iterations;
+    return result;
+}
+
+bool NetworkStep::attempt(const Attempt& attempt, double* displacements, vector<bool>& failed) {
+    const int numPacks = packs.size();
+    attempt.loop(numPacks, [&] (int pack) {
+        const vector<int>& chains = engine.getChainsOfLanes(packs[pack]);
+        for (size_t lane = 0; lane < chains.size(); lane++)
+            flags[pack][lane] = chains[lane] >= 0 && attempt.taken[chains[lane]];
+        steps[pack]->begin(attempt.positions, attempt.forces, attempt.box, attempt.settings, flags[pack].get());
+    });
+    const CoupledStart start = {attempt.positions, attempt.box, attempt.settings, places, attempt.taken};
+    for (ImplicitCouplings* own : couplings)
+        own->begin(start, attempt.loop);
+    copy(attempt.positions, attempt.positions+moved.size(), moved.begin());
+    const int numStages = steps.empty() ? 0 : steps[0]->getNumStages();
+    bool solved = true;
+    for (int stage = 0; stage < numStages && solved; stage++)
+        solved = iterate(attempt, stage);
+
+    // Who failed, and where the others are.
+
+    failed.assign(failed.size(), false);
+    for (int pack = 0; pack < numPacks; pack++) {
+        steps[pack]->findExcessiveChanges(flags[pack].get());
+        const vector<int>& chains = engine.getChainsOfLanes(packs[pack]);
+        for (size_t lane = 0; lane < chains.size(); lane++)
+            if (chains[lane] >= 0 && attempt.taken[chains[lane]] && (flags[pack][lane] || unfinished[pack][lane]))
+                failed[chains[lane]] = true;
+    }
+    for (const ImplicitCouplings* own : couplings)
+        own->findFailures(moved.data(), failed);
+    attempt.loop(numPacks, [&] (int pack) {
+        steps[pack]->getDisplacements(displacements);
+    });
+    return find(failed.begin(), failed.end(), true) == failed.end();
+}
+
+bool NetworkStep::iterate(const Attempt& attempt, int stage) {
+    const int numPacks = packs.size();
+    attempt.loop(numPacks, [&] (int pack) {
+        steps[pack]->beginStage(stage);
+    });
+    for (ImplicitCouplings* own : couplings)
+        own->beginStage(stage, steps[0]->getNumStages(), moved.data());
+    vector<size_t> first(couplings.size()+1);
+    for (int iteration = 0; iteration < NEWTON_ITERATIONS; iteration++) {
+        equations.clear();
+        for (size_t i = 0; i < couplings.size(); i++) {
+            first[i] = equations.size();
+            couplings[i]->linearise(iteration, moved.data(), equations);
+        }
+        first[couplings.size()] = equations.size();
+        coupled.solve(stepsOfPacks, equations, attempt.settings.kT, attempt.loop);
+        substitutions += coupled.getNumIterations();
+        if (iteration == 0 && stage == 0) {
+            const bool needed = any_of(couplings.begin(), couplings.end(), [] (const ImplicitCouplings* own) {
+                return own->needsCompliances();
+            });
+            if (needed) {
+                coupled.findCompliances(stepsOfPacks, compliances, attempt.loop);
+                for (size_t i = 0; i < couplings.size(); i++)
+                    if (couplings[i]->needsCompliances())
+                        couplings[i]->setCompliances(compliances.data()+12*first[i]);
+            }
+        }
+        const double share = iteration < UNDAMPED_ITERATIONS ? 1 : DAMPING;
+        coupled.advance(stepsOfPacks, share, unfinished, attempt.loop);
+        iterations++;
+        attempt.loop(numPacks, [&] (int pack) {
+            steps[pack]->getPositions(attempt.positions, moved.data());
+        });
+        bool more = false;
+        for (size_t i = 0; i < couplings.size(); i++)
+            more |= couplings[i]->finishIteration(coupled.getMoves().data()+3*first[i], moved.data());
+        for (int pack = 0; pack < numPacks; pack++) {
+            const size_t lanes = engine.getChainsOfLanes(packs[pack]).size();
+            more |= any_of(unfinished[pack].get(), unfinished[pack].get()+lanes, [] (bool flag) {return flag;});
+        }
+        if (!more)
+            return true;
+    }
+    return false;
+}
+
+bool NetworkStep::divide(const Attempt& whole, int division, double* displacements, vector<bool>& failed) {
+    Attempt half = whole;
+    half.settings.stepSize = 0.5*whole.settings.stepSize;
+    half.settings.level++;
+    half.settings.step *= 2;
+    const size_t size = moved.size();
+    vector<double> start(whole.positions, whole.positions+size), total(size), part(size);
+    half.positions = start.data();
+    const vector<Chain>& chains = places.getChains();
+    auto forTaken = [&] (auto function) {
+        for (size_t chain = 0; chain < chains.size(); chain++)
+            if (whole.taken[chain])
+                for (int particle : chains[chain].nodes)
+                    for (int k = 3*particle; k < 3*particle+3; k++)
+                        function(k);
+    };
+    for (int i = 0; i < 2; i++, half.settings.step++) {
+        const bool taken = attempt(half, part.data(), failed) ||
+                (division < LARGEST_DIVISION && divide(half, division+1, part.data(), failed));
+        if (!taken)
+            return false;
+        forTaken([&] (int k) {
+            start[k] += part[k];
+            total[k] += part[k];
+        });
+    }
+    forTaken([&] (int k) {
+        displacements[k] = total[k];
+    });
+    return true;
+}
+
+vector<bool> NetworkStep::findComponents(const vector<bool>& failed) const {
+    vector<pair<int, int> > pairs;
+    for (const ImplicitCouplings* own : couplings)
+        own->findNeighbours(pairs);
+    vector<int> root(failed.size());
+    iota(root.begin(), root.end(), 0);
+    auto rootOf = [&] (int chain) {
+        while (root[chain] != chain)
+            chain = root[chain] = root[root[chain]];
+        return chain;
+    };
+    for (const pair<int, int>& joined : pairs)
+        root[rootOf(joined.first)] = rootOf(joined.second);
+    vector<bool> ofRoot(failed.size()), result(failed.size());
+    for (size_t chain = 0; chain < failed.size(); chain++)
+        if (failed[chain])
+            ofRoot[rootOf(chain)] = true;
+    for (size_t chain = 0; chain < failed.size(); chain++)
+        result[chain] = ofRoot[rootOf(chain)];
+    return result;
+}

@@ -1,0 +1,61 @@
+#ifndef CYLCHAIN_NETWORK_STEP_H_
+#define CYLCHAIN_NETWORK_STEP_H_
+
+#include "dynamics/ChainEngine.h"
+#include "dynamics/ImplicitCouplings.h"
+#include <memory>
+#include <vector>
+
+namespace cylchain {
+
+/**
+ * Implicit steps of chains that are coupled to each other.
+ *
+ * Newton's method for all chains at once: each iteration linearises chains and couplings, solves the linear equations
+ * (CoupledEquations) and moves the nodes, until all chains and all couplings have converged. Where that fails, or where
+ * something has gone wrong that couplings must prevent, the chains that are connected with the one that failed take the
+ * step again in two halves, which follow the same Brownian path, and these in halves if need be.
+ */
+class NetworkStep {
+public:
+    /**
+     * @param engine     the engine of the chains
+     * @param chains     they must exist as long as this object, and so must the engine
+     * @param particles  the number of particles of the System
+     */
+    NetworkStep(const ChainEngine& engine, const std::vector<Chain>& chains, int particles);
+    ~NetworkStep();
+    /** Set the couplings that steps have in their equations; they must exist while steps are taken. */
+    void setCouplings(const std::vector<ImplicitCouplings*>& couplings);
+    /**
+     * Compute the displacements of all nodes in a step, as ChainEngine::step() does.
+     */
+    Instability step(const double* positions, const double* forces, const double* box, const StepSettings& settings,
+            double* displacements, const Loop& loop);
+    /** The number of substitutions along chains in the last step, beside those of its iterations. */
+    int getNumSubstitutions() const {
+        return substitutions;
+    }
+private:
+    struct Attempt;
+    bool attempt(const Attempt& attempt, double* displacements, std::vector<bool>& failed);
+    bool iterate(const Attempt& attempt, int stage);
+    bool divide(const Attempt& whole, int division, double* displacements, std::vector<bool>& failed);
+    std::vector<bool> findComponents(const std::vector<bool>& failed) const;
+    void choosePacks(const StepSettings& settings);
+    const ChainEngine& engine;
+    ChainPlaces places;
+    std::vector<ImplicitCouplings*> couplings;
+    std::vector<int> packs;
+    std::vector<std::unique_ptr<PackStep> > steps;
+    std::vector<PackStep*> stepsOfPacks;
+    CoupledEquations coupled;
+    std::vector<CouplingEquation> equations;
+    std::vector<double> moved, compliances;
+    LaneFlags unfinished, flags;
+    int iterations = 0, substitutions = 0;
+};
+
+} // namespace cylchain
+
+#endif /*CYLCHAIN_NETWORK_STEP_H_*/

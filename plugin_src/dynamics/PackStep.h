@@ -1,0 +1,73 @@
+#ifndef CYLCHAIN_PACK_STEP_H_
+#define CYLCHAIN_PACK_STEP_H_
+
+#include "dynamics/ChainEngine.h"
+
+namespace cylchain {
+
+/**
+ * One side of a coupling, in the equations of a pack: a place on a segment of one of its lanes, the force on it, and
+ * how much less that becomes for each displacement of the place, a symmetric matrix (xx, xy, xz, yy, yz, zz).
+ */
+struct CouplingTerm {
+    /** The segment is the one between this node and the next. */
+    int node, lane;
+    double fraction;
+    double force[3], stiffness[6];
+};
+
+/**
+ * An implicit step of a pack, taken one iteration at a time, so that couplings between chains of different packs can
+ * enter its equations. See NetworkStep.
+ *
+ * In each iteration, the linear equations of a chain are (A + sum S^T K S) change = right + sum S^T F for the terms of
+ * couplings, with A and right as in ImplicitEquations-inl.h; S takes the displacement of a place from those of nodes.
+ */
+class PackStep {
+public:
+    virtual ~PackStep() {
+    }
+    /**
+     * Begin a step: describe its start, and draw its noise.
+     *
+     * @param taken  whether to take the step, for each lane; the chains of others stay where they are
+     */
+    virtual void begin(const double* positions, const double* forces, const double* box,
+            const StepSettings& settings, const bool* taken) = 0;
+    /** The number of stages of the step's scheme. */
+    virtual int getNumStages() const = 0;
+    /** Begin a stage, with the number of 0 on. */
+    virtual void beginStage(int stage) = 0;
+    /**
+     * Linearise the equations, and solve them as if no coupling joined two places of packs.
+     *
+     * @param terms  in the order of their nodes; they must not change before advance()
+     * @param moves  receives the change of each term's place, three numbers for each
+     */
+    virtual void eliminate(const CouplingTerm* terms, int numTerms, double* moves) = 0;
+    /** Find how forces on the places of the terms, three numbers for each, move them, with the same elimination. */
+    virtual void respond(const double* forces, double* moves) = 0;
+    /**
+     * Find for each term how a force on its place moves this place: a symmetric matrix in the order of a term's
+     * stiffness.
+     */
+    virtual void findCompliances(double* compliances) = 0;
+    /**
+     * End the iteration: add what forces on the places of the terms do, and move the nodes.
+     *
+     * @param forces      three numbers for each term
+     * @param share       how much of the change of nodes to make
+     * @param unfinished  receives, for each lane, whether another iteration is needed
+     */
+    virtual void advance(const double* forces, double share, bool* unfinished) = 0;
+    /** Find lanes a segment of which changes by too much, so that the step must be divided. */
+    virtual void findExcessiveChanges(bool* failed) const = 0;
+    /** Write where the nodes of the lanes that take the step are, if they began at some positions. */
+    virtual void getPositions(const double* start, double* positions) const = 0;
+    /** Write how far the nodes of the lanes that take the step have moved since it began. */
+    virtual void getDisplacements(double* displacements) const = 0;
+};
+
+} // namespace cylchain
+
+#endif /*CYLCHAIN_PACK_STEP_H_*/

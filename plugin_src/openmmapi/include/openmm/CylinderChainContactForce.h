@@ -1,0 +1,213 @@
+#ifndef OPENMM_CYLINDERCHAINCONTACTFORCE_H_
+#define OPENMM_CYLINDERCHAINCONTACTFORCE_H_
+
+#include "openmm/Context.h"
+#include "openmm/Force.h"
+#include <vector>
+
+namespace OpenMM {
+
+/**
+ * This class keeps filaments, and particles, from passing through each other.
+ *
+ * Segments of chains are capsules: all points within half the diameter of the line between their ends.  Other particles
+ * may be spheres.  Where two of them overlap, the energy is (k/2) g^2, for the gap g: the distance less half the sum of
+ * the diameters.  Two segments touch where they are nearest to each other; if they are nearly parallel (within 1.8
+ * degrees), at both ends of their overlap, with k/2 at each.  What two neighboring segments of a chain see of one thing
+ * counts once.  Energy and force are bounded: two lines meet for (k/2) d^2.
+ *
+ * Segments that share a particle, or whose numbers in their chain differ by no more than a number that is given with the
+ * chain, do not touch each other.
+ *
+ * The force is taken at the present positions, with every Integrator.  After a Context has been created, the stiffness
+ * and diameters may be changed: call updateParametersInContext() to copy them over.
+ */
+class CylinderChainContactForce : public Force {
+public:
+    /**
+     * Create a CylinderChainContactForce.
+     *
+     * @param stiffness  the stiffness k, measured in kJ/mol/nm^2
+     */
+    explicit CylinderChainContactForce(double stiffness);
+    /**
+     * Get the stiffness k.
+     *
+     * @return the stiffness, measured in kJ/mol/nm^2
+     */
+    double getStiffness() const {
+        return stiffness;
+    }
+    /**
+     * Set the stiffness k.
+     *
+     * @param stiffness  the stiffness, measured in kJ/mol/nm^2
+     */
+    void setStiffness(double stiffness);
+    /**
+     * Get the number of chains.
+     */
+    int getNumChains() const {
+        return chains.size();
+    }
+    /**
+     * Add a chain.
+     *
+     * @param particles          the indices of its particles, in the order of the chain: at least two
+     * @param diameter           the diameter of its segments, measured in nm
+     * @param excludedNeighbors  segments whose numbers in the chain differ by no more than this do not touch each other
+     * @param closed             whether the last particle is joined to the first by a segment more
+     * @return the index of the chain that was added
+     */
+    int addChain(const std::vector<int>& particles, double diameter, int excludedNeighbors = 1, bool closed = false);
+    /**
+     * Get the particles of a chain.
+     *
+     * @param chain  the index of the chain
+     * @return the indices of the particles, in the order of the chain
+     */
+    const std::vector<int>& getChainParticles(int chain) const;
+    /**
+     * Get the number of neighbors that a segment of a chain does not touch, to either side.
+     *
+     * @param chain  the index of the chain
+     */
+    int getChainExcludedNeighbors(int chain) const;
+    /**
+     * Get whether a chain is closed.
+     *
+     * @param chain  the index of the chain
+     */
+    bool isChainClosed(int chain) const;
+    /**
+     * Get the diameter of a chain.
+     *
+     * @param chain  the index of the chain
+     * @return the diameter, measured in nm
+     */
+    double getChainDiameter(int chain) const;
+    /**
+     * Set the diameter of a chain.
+     *
+     * @param chain     the index of the chain
+     * @param diameter  the diameter, measured in nm
+     */
+    void setChainDiameter(int chain, double diameter);
+    /**
+     * Get the number of spheres.
+     */
+    int getNumSpheres() const {
+        return spheres.size();
+    }
+    /**
+     * Add a sphere.
+     *
+     * @param particle  the index of the particle in its center
+     * @param diameter  the diameter, measured in nm
+     * @return the index of the sphere that was added
+     */
+    int addSphere(int particle, double diameter);
+    /**
+     * Get the particle of a sphere.
+     *
+     * @param sphere  the index of the sphere
+     */
+    int getSphereParticle(int sphere) const;
+    /**
+     * Get the diameter of a sphere.
+     *
+     * @param sphere  the index of the sphere
+     * @return the diameter, measured in nm
+     */
+    double getSphereDiameter(int sphere) const;
+    /**
+     * Set the diameter of a sphere.
+     *
+     * @param sphere    the index of the sphere
+     * @param diameter  the diameter, measured in nm
+     */
+    void setSphereDiameter(int sphere, double diameter);
+    /**
+     * Get the number of exclusions that were added.
+     */
+    int getNumExclusions() const {
+        return exclusions.size();
+    }
+    /**
+     * Let two segments or spheres not touch each other.
+     *
+     * @param chain1    the index of the chain of the first segment, or -1 for a sphere
+     * @param segment1  the index of the segment in the chain, or that of the sphere
+     * @param chain2    the index of the chain of the second segment, or -1 for a sphere
+     * @param segment2  the index of the segment in the chain, or that of the sphere
+     * @return the index of the exclusion that was added
+     */
+    int addExclusion(int chain1, int segment1, int chain2, int segment2);
+    /**
+     * Get an exclusion.
+     *
+     * @param index          the index of the exclusion
+     * @param[out] chain1    the index of the chain of the first segment, or -1 for a sphere
+     * @param[out] segment1  the index of the segment in the chain, or that of the sphere
+     * @param[out] chain2    the index of the chain of the second segment, or -1 for a sphere
+     * @param[out] segment2  the index of the segment in the chain, or that of the sphere
+     */
+    void getExclusion(int index, int& chain1, int& segment1, int& chain2, int& segment2) const;
+    /**
+     * Copy the stiffness and the diameters to a Context.  Chains, spheres and exclusions cannot be added in this way.
+     */
+    void updateParametersInContext(Context& context);
+    /**
+     * Set whether the distances of segments and spheres are those of their nearest periodic images.  The positions of a
+     * chain's particles are taken as they are, even in a periodic box.
+     */
+    void setUsesPeriodicBoundaryConditions(bool periodic);
+    /**
+     * Get whether this Force makes use of periodic boundary conditions.
+     */
+    bool usesPeriodicBoundaryConditions() const;
+protected:
+    ForceImpl* createImpl() const;
+private:
+    class ChainInfo;
+    class SphereInfo;
+    class ExclusionInfo;
+    void checkBody(int chain, int segment) const;
+    std::vector<ChainInfo> chains;
+    std::vector<SphereInfo> spheres;
+    std::vector<ExclusionInfo> exclusions;
+    double stiffness;
+    bool usePeriodic;
+};
+
+/**
+ * A chain.
+ */
+class CylinderChainContactForce::ChainInfo {
+public:
+    std::vector<int> particles;
+    double diameter;
+    int excludedNeighbors;
+    bool closed;
+};
+
+/**
+ * A sphere.
+ */
+class CylinderChainContactForce::SphereInfo {
+public:
+    int particle;
+    double diameter;
+};
+
+/**
+ * Two segments or spheres that do not touch each other.
+ */
+class CylinderChainContactForce::ExclusionInfo {
+public:
+    int chain1, segment1, chain2, segment2;
+};
+
+} // namespace OpenMM
+
+#endif /*OPENMM_CYLINDERCHAINCONTACTFORCE_H_*/

@@ -1,0 +1,78 @@
+#ifndef OPENMM_CYLINDERCHAINCONTACTFORCEIMPL_H_
+#define OPENMM_CYLINDERCHAINCONTACTFORCEIMPL_H_
+
+#include "couplings/ContactSearch.h"
+#include "openmm/CylinderChainContactForce.h"
+#include "openmm/Kernel.h"
+#include "openmm/internal/ForceImpl.h"
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace OpenMM {
+
+/**
+ * This is the internal implementation of CylinderChainContactForce.
+ */
+class CylinderChainContactForceImpl : public ForceImpl {
+public:
+    /**
+     * While an object of this class exists, the Force contributes nothing.
+     */
+    class Exclusion {
+    public:
+        Exclusion(CylinderChainContactForceImpl& force, bool exclude) : force(force) {
+            force.excluded = exclude;
+        }
+        ~Exclusion() {
+            force.excluded = false;
+        }
+    private:
+        CylinderChainContactForceImpl& force;
+    };
+    explicit CylinderChainContactForceImpl(const CylinderChainContactForce& owner);
+    void initialize(ContextImpl& context);
+    const CylinderChainContactForce& getOwner() const {
+        return owner;
+    }
+    void updateContextState(ContextImpl&, bool&) {
+        // Nothing is modified between steps.
+    }
+    double calcForcesAndEnergy(ContextImpl& context, bool includeForces, bool includeEnergy, int groups);
+    std::map<std::string, double> getDefaultParameters() {
+        return std::map<std::string, double>();
+    }
+    std::vector<std::string> getKernelNames();
+    void updateParametersInContext(ContextImpl& context);
+    /**
+     * Get what finds contacts in the Context: the segments of all chains, in their order, then the spheres.
+     */
+    cylchain::ContactSearch& getSearch() {
+        return *search;
+    }
+    /**
+     * Get the stiffness in the Context.
+     */
+    double getStiffness() const {
+        return stiffness;
+    }
+    /**
+     * Get whether distances are those of nearest periodic images.
+     */
+    bool usesPeriodicBoundaryConditions() const {
+        return periodic;
+    }
+private:
+    int getNumSegments(int chain) const;
+    const CylinderChainContactForce& owner;
+    std::unique_ptr<cylchain::ContactSearch> search;
+    double stiffness;
+    bool periodic;
+    Kernel kernel;
+    bool excluded;
+};
+
+} // namespace OpenMM
+
+#endif /*OPENMM_CYLINDERCHAINCONTACTFORCEIMPL_H_*/

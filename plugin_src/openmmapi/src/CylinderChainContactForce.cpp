@@ -1,0 +1,149 @@
+#include "openmm/CylinderChainContactForce.h"
+#include "openmm/OpenMMException.h"
+#include "openmm/internal/AssertionUtilities.h"
+#include "openmm/internal/CylinderChainContactForceImpl.h"
+#include <cmath>
+#include <set>
+#include <string>
+
+using namespace OpenMM;
+using namespace std;
+
+static void checkPositive(double value, const char* name) {
+    // Written so that NaN fails.
+
+    if (!(value > 0 && isfinite(value)))
+        throw OpenMMException(string("CylinderChainContactForce: ")+name+" must be positive and finite");
+}
+
+static void checkStiffness(double stiffness) {
+    if (!(stiffness >= 0 && isfinite(stiffness)))
+        throw OpenMMException("CylinderChainContactForce: The stiffness cannot be negative and must be finite");
+}
+
+CylinderChainContactForce::CylinderChainContactForce(double stiffness) : stiffness(stiffness), usePeriodic(false) {
+    checkStiffness(stiffness);
+    setName("CylinderChainContactForce");
+}
+
+void CylinderChainContactForce::setStiffness(double stiffness) {
+    checkStiffness(stiffness);
+    this->stiffness = stiffness;
+}
+
+int CylinderChainContactForce::addChain(const vector<int>& particles, double diameter, int excludedNeighbors,
+        bool closed) {
+    if (particles.size() < 2)
+        throw OpenMMException("CylinderChainContactForce: A chain must have at least two particles");
+    if (closed && particles.size() < 3)
+        throw OpenMMException("CylinderChainContactForce: A closed chain must have at least three particles");
+    set<int> distinct;
+    for (int particle : particles) {
+        if (particle < 0)
+            throw OpenMMException("CylinderChainContactForce: Illegal particle index: "+to_string(particle));
+        if (!distinct.insert(particle).second)
+            throw OpenMMException("CylinderChainContactForce: Particle "+to_string(particle)+
+                    " appears twice in a chain");
+    }
+    checkPositive(diameter, "The diameter of a chain");
+    if (excludedNeighbors < 0)
+        throw OpenMMException("CylinderChainContactForce: The number of excluded neighbors cannot be negative");
+    chains.push_back({particles, diameter, excludedNeighbors, closed});
+    return chains.size()-1;
+}
+
+const vector<int>& CylinderChainContactForce::getChainParticles(int chain) const {
+    ASSERT_VALID_INDEX(chain, chains);
+    return chains[chain].particles;
+}
+
+int CylinderChainContactForce::getChainExcludedNeighbors(int chain) const {
+    ASSERT_VALID_INDEX(chain, chains);
+    return chains[chain].excludedNeighbors;
+}
+
+bool CylinderChainContactForce::isChainClosed(int chain) const {
+    ASSERT_VALID_INDEX(chain, chains);
+    return chains[chain].closed;
+}
+
+double CylinderChainContactForce::getChainDiameter(int chain) const {
+    ASSERT_VALID_INDEX(chain, chains);
+    return chains[chain].diameter;
+}
+
+void CylinderChainContactForce::setChainDiameter(int chain, double diameter) {
+    ASSERT_VALID_INDEX(chain, chains);
+    checkPositive(diameter, "The diameter of a chain");
+    chains[chain].diameter = diameter;
+}
+
+int CylinderChainContactForce::addSphere(int particle, double diameter) {
+    if (particle < 0)
+        throw OpenMMException("CylinderChainContactForce: Illegal particle index: "+to_string(particle));
+    checkPositive(diameter, "The diameter of a sphere");
+    spheres.push_back({particle, diameter});
+    return spheres.size()-1;
+}
+
+int CylinderChainContactForce::getSphereParticle(int sphere) const {
+    ASSERT_VALID_INDEX(sphere, spheres);
+    return spheres[sphere].particle;
+}
+
+double CylinderChainContactForce::getSphereDiameter(int sphere) const {
+    ASSERT_VALID_INDEX(sphere, spheres);
+    return spheres[sphere].diameter;
+}
+
+void CylinderChainContactForce::setSphereDiameter(int sphere, double diameter) {
+    ASSERT_VALID_INDEX(sphere, spheres);
+    checkPositive(diameter, "The diameter of a sphere");
+    spheres[sphere].diameter = diameter;
+}
+
+void CylinderChainContactForce::checkBody(int chain, int segment) const {
+    if (chain == -1) {
+        ASSERT_VALID_INDEX(segment, spheres);
+        return;
+    }
+    ASSERT_VALID_INDEX(chain, chains);
+    const int segments = chains[chain].particles.size()-(chains[chain].closed ? 0 : 1);
+    if (segment < 0 || segment >= segments)
+        throw OpenMMException("CylinderChainContactForce: Chain "+to_string(chain)+" has no segment "+
+                to_string(segment));
+}
+
+int CylinderChainContactForce::addExclusion(int chain1, int segment1, int chain2, int segment2) {
+    checkBody(chain1, segment1);
+    checkBody(chain2, segment2);
+    exclusions.push_back({chain1, segment1, chain2, segment2});
+    return exclusions.size()-1;
+}
+
+void CylinderChainContactForce::getExclusion(int index, int& chain1, int& segment1, int& chain2,
+        int& segment2) const {
+    ASSERT_VALID_INDEX(index, exclusions);
+    const ExclusionInfo& exclusion = exclusions[index];
+    chain1 = exclusion.chain1;
+    segment1 = exclusion.segment1;
+    chain2 = exclusion.chain2;
+    segment2 = exclusion.segment2;
+}
+
+void CylinderChainContactForce::updateParametersInContext(Context& context) {
+    dynamic_cast<CylinderChainContactForceImpl&>(getImplInContext(context)).updateParametersInContext(
+            getContextImpl(context));
+}
+
+void CylinderChainContactForce::setUsesPeriodicBoundaryConditions(bool periodic) {
+    usePeriodic = periodic;
+}
+
+bool CylinderChainContactForce::usesPeriodicBoundaryConditions() const {
+    return usePeriodic;
+}
+
+ForceImpl* CylinderChainContactForce::createImpl() const {
+    return new CylinderChainContactForceImpl(*this);
+}

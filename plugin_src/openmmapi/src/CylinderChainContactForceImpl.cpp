@@ -1,0 +1,84 @@
+#include "openmm/internal/CylinderChainContactForceImpl.h"
+#include "openmm/CylinderChainKernels.h"
+#include "openmm/OpenMMException.h"
+#include "openmm/System.h"
+#include "openmm/internal/ContextImpl.h"
+
+using namespace OpenMM;
+using namespace cylchain;
+using namespace std;
+
+CylinderChainContactForceImpl::CylinderChainContactForceImpl(const CylinderChainContactForce& owner) : owner(owner),
+        stiffness(owner.getStiffness()), periodic(owner.usesPeriodicBoundaryConditions()), excluded(false) {
+    forceGroup = owner.getForceGroup();
+}
+
+int CylinderChainContactForceImpl::getNumSegments(int chain) const {
+    return owner.getChainParticles(chain).size()-(owner.isChainClosed(chain) ? 0 : 1);
+}
+
+void CylinderChainContactForceImpl::initialize(ContextImpl& context) {
+    const int numParticles = context.getSystem().getNumParticles();
+    auto checkParticle = [&] (int particle) {
+        if (particle >= numParticles)
+            throw OpenMMException("CylinderChainContactForce: Illegal particle index: "+to_string(particle));
+    };
+    CapsuleSystem capsules;
+    vector<int> firstOfChain;
+    for (int chain = 0; chain < owner.getNumChains(); chain++) {
+        const vector<int>& particles = owner.getChainParticles(chain);
+        for (int particle : particles)
+            checkParticle(particle);
+        const int segments = getNumSegments(chain);
+        firstOfChain.push_back(capsules.capsules.size());
+        for (int segment = 0; segment < segments; segment++)
+            capsules.capsules.push_back({particles[segment], particles[(segment+1)%particles.size()],
+                    0.5*owner.getChainDiameter(chain), chain, segment});
+        capsules.chains.push_back({segments, owner.isChainClosed(chain), owner.getChainExcludedNeighbors(chain)});
+    }
+    firstOfChain.push_back(capsules.capsules.size());
+    for (int sphere = 0; sphere < owner.getNumSpheres(); sphere++) {
+        checkParticle(owner.getSphereParticle(sphere));
+        capsules.capsules.push_back({owner.getSphereParticle(sphere), -1, 0.5*owner.getSphereDiameter(sphere), -1, 0});
+    }
+    for (int exclusion = 0; exclusion < owner.getNumExclusions(); exclusion++) {
+        int chain1, segment1, chain2, segment2;
+        owner.getExclusion(exclusion, chain1, segment1, chain2, segment2);
+        // Spheres come after the segments of all chains.
+
+        const int first = firstOfChain[chain1 == -1 ? owner.getNumChains() : chain1]+segment1;
+        const int second = firstOfChain[chain2 == -1 ? owner.getNumChains() : chain2]+segment2;
+        capsules.exclusions.push_back({first, second});
+    }
+    search.reset(new ContactSearch(capsules));
+    kernel = context.getPlatform().createKernel(CalcCylinderChainContactForceKernel::Name(), context);
+    kernel.getAs<CalcCylinderChainContactForceKernel>().initialize(context.getSystem(), *search, stiffness, periodic);
+}
+
+double CylinderChainContactForceImpl::calcForcesAndEnergy(ContextImpl& context, bool includeForces,
+        bool includeEnergy, int groups) {
+    if ((groups&(1<<forceGroup)) != 0 && !excluded)
+        return kernel.getAs<CalcCylinderChainContactForceKernel>().execute(context, includeForces, includeEnergy);
+    return 0.0;
+}
+
+vector<string> CylinderChainContactForceImpl::getKernelNames() {
+    return {CalcCylinderChainContactForceKernel::Name()};
+}
+
+void CylinderChainContactForceImpl::updateParametersInContext(ContextImpl& context) {
+    int capsules = owner.getNumSpheres();
+    for (int chain = 0; chain < owner.getNumChains(); chain++)
+        capsules += getNumSegments(chain);
+    if (capsules != (int) search->getSystem().capsules.size())
+        throw OpenMMException("CylinderChainContactForce: Chains and spheres cannot be added to a Context");
+    stiffness = owner.getStiffness();
+    int capsule = 0;
+    for (int chain = 0; chain < owner.getNumChains(); chain++)
+        for (int segment = 0; segment < getNumSegments(chain); segment++)
+            search->setRadius(capsule++, 0.5*owner.getChainDiameter(chain));
+    for (int sphere = 0; sphere < owner.getNumSpheres(); sphere++)
+        search->setRadius(capsule++, 0.5*owner.getSphereDiameter(sphere));
+    kernel.getAs<CalcCylinderChainContactForceKernel>().copyParametersToContext(context, stiffness);
+    context.systemChanged();
+}

@@ -1,0 +1,130 @@
+#include "ReferenceCalcCylinderChainContactForceKernel.h"
+#include "openmm/OpenMMException.h"
+#include "openmm/reference/ReferencePlatform.h"
+#include <algorithm>
+#include <stdexcept>
+
+using namespace OpenMM;
+using namespace cylchain;
+using namespace std;
+
+/** The skin, over the largest diameter: a list lasts longer with a larger one, but has more pairs. */
+static const double SKIN = 0.75;
+
+/** Pairs that are looked at by one thread at a time. */
+static const int CHUNK = 512;
+
+static ReferencePlatform::PlatformData& extractData(ContextImpl& context) {
+    return *reinterpret_cast<ReferencePlatform::PlatformData*>(context.getPlatformData());
+}
+
+/** A contact of a pair. */
+struct ReferenceCalcCylinderChainContactForceKernel::Touching {
+    int pair;
+    Contact contact;
+};
+
+ReferenceCalcCylinderChainContactForceKernel::ReferenceCalcCylinderChainContactForceKernel(string name,
+        const Platform& platform, ContextImpl& context) : CalcCylinderChainContactForceKernel(name, platform),
+        loop(context), search(NULL), stiffness(0), skin(0), periodic(false), hasList(false) {
+}
+
+void ReferenceCalcCylinderChainContactForceKernel::initialize(const System&, ContactSearch& search, double stiffness,
+        bool periodic) {
+    this->search = &search;
+    this->stiffness = stiffness;
+    this->periodic = periodic;
+    for (const Capsule& capsule : search.getSystem().capsules)
+        for (int particle : {capsule.first, capsule.end()})
+            particles.push_back(particle);
+    sort(particles.begin(), particles.end());
+    particles.erase(unique(particles.begin(), particles.end()), particles.end());
+}
+
+bool ReferenceCalcCylinderChainContactForceKernel::isListValid(const vector<Vec3>& positions, const Vec3* box) const {
+    if (!hasList || (periodic && !equal(box, box+3, listBox)))
+        return false;
+    const double limit = 0.25*skin*skin;
+    double largest = 0;
+    bool finite = true;
+    for (size_t i = 0; i < particles.size(); i++) {
+        const Vec3 moved = positions[particles[i]]-listPositions[i];
+        const double square = moved.dot(moved);
+        largest = max(largest, square);
+        finite &= square < limit;
+    }
+    // NaN fails.
+
+    return finite && largest < limit;
+}
+
+void ReferenceCalcCylinderChainContactForceKernel::findPairs(vector<Vec3>& positions, Vec3* box) {
+    double diameter = 0;
+    for (const Capsule& capsule : search->getSystem().capsules)
+        diameter = max(diameter, 2*capsule.radius);
+    hasList = false;
+    const LoopRunner run = [&] (int count, const function<void(int)>& iteration) {loop.run(count, iteration);};
+    // A box that is too small for a skin may be large enough for contacts.
+
+    for (skin = SKIN*diameter; ; skin = 0)
+        try {
+            search->findPairs(&positions[0][0], &positions[0][0], periodic ? &box[0][0] : NULL, skin, pairs, run);
+            break;
+        }
+        catch (const invalid_argument& error) {
+            if (skin == 0 || !periodic)
+                throw OpenMMException(string("CylinderChainContactForce: ")+error.what());
+        }
+    listPositions.resize(particles.size());
+    for (size_t i = 0; i < particles.size(); i++)
+        listPositions[i] = positions[particles[i]];
+    copy(box, box+3, listBox);
+    hasList = true;
+}
+
+double ReferenceCalcCylinderChainContactForceKernel::execute(ContextImpl& context, bool includeForces, bool) {
+    vector<Vec3>& positions = *extractData(context).positions;
+    Vec3* box = extractData(context).periodicBoxVectors;
+    if (particles.empty())
+        return 0;
+    if (!isListValid(positions, box))
+        findPairs(positions, box);
+    const double* x = &positions[0][0];
+    const int chunks = (pairs.size()+CHUNK-1)/CHUNK;
+    vector<vector<Touching> > touching(chunks);
+    loop.run(chunks, [&] (int chunk) {
+        const int last = min((int) pairs.size(), (chunk+1)*CHUNK);
+        for (int pair = chunk*CHUNK; pair < last; pair++) {
+            Contact contacts[2];
+            const int count = search->evaluate(pairs[pair], x, x, contacts, 0);
+            for (int i = 0; i < count; i++)
+                touching[chunk].push_back({pair, contacts[i]});
+        }
+    });
+
+    // Those that touch are few, so one thread adds their forces, in the order of pairs.
+
+    vector<Vec3>& forces = *extractData(context).forces;
+    const vector<Capsule>& capsules = search->getSystem().capsules;
+    double energy = 0;
+    for (const vector<Touching>& part : touching)
+        for (const Touching& one : part) {
+            const Contact& contact = one.contact;
+            const double k = contact.weight*stiffness;
+            energy += 0.5*k*contact.gap*contact.gap;
+            if (!includeForces)
+                continue;
+            const Vec3 force = Vec3(contact.normal[0], contact.normal[1], contact.normal[2])*(-k*contact.gap);
+            const Capsule &a = capsules[pairs[one.pair].a], &b = capsules[pairs[one.pair].b];
+            forces[a.first] += force*(1-contact.s);
+            forces[a.end()] += force*contact.s;
+            forces[b.first] -= force*(1-contact.t);
+            forces[b.end()] -= force*contact.t;
+        }
+    return energy;
+}
+
+void ReferenceCalcCylinderChainContactForceKernel::copyParametersToContext(ContextImpl&, double stiffness) {
+    this->stiffness = stiffness;
+    hasList = false;
+}
