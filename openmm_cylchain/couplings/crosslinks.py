@@ -27,7 +27,7 @@ from .crosslink_computation import lengths_and_vectors, slopes_of
 from .crosslink_tables import CrosslinkTable
 from .link_places import as_places
 from .link_store import LinkStore
-from .native_links import NativeLinks, is_of_compiled_engine
+from .native_links import NativeLinks, is_link_force, is_of_compiled_engine
 from .portable_links import PortableLinks
 
 CROSSLINKS_NAME = "Crosslinks"
@@ -112,7 +112,7 @@ class Crosslinks:
         native = 0
         for force in system.getForces():
             store = PortableLinks.of_force(force) or NativeLinks.of_force(force, native)
-            native += isinstance(store, NativeLinks)
+            native += is_link_force(force)
             if store is not None:
                 found.append(cls._of(store))
         return found
