@@ -11,13 +11,15 @@ namespace {
 /** How near pairs come that are looked at in a step, over their diameter: further iterations move them. */
 const double REACH = 0.8;
 /** The largest overlap that is mirrored, over the same. */
-const double LARGEST_MIRRORED = 0.33;
+const double LARGEST_MIRRORED = 0.5;
 /** Pairs with a larger gap are only looked at again if they may have come near, over the same. */
 const double LARGEST_GAP = 0.3;
 /** The largest change of a gap in the last iteration, over the thermal fluctuation of a contact. */
 const double TOLERANCE = 0.3;
 /** The number of iterations that look where capsules touch. */
-const int SEARCHING_ITERATIONS = 5;
+const int SEARCHING_ITERATIONS = 6;
+/** The number of iterations in which a contact may pass to a neighbour. */
+const int PASSING_ITERATIONS = 3;
 /** Pairs that a thread looks at together. */
 const int CHUNK = 128;
 
@@ -92,13 +94,16 @@ void ContactEquations::findPairs(const double* moved) {
     }
 }
 
-void ContactEquations::updateContact(const ContactPair& pair, const double* moved, Contact& contact) const {
-    double r[3];
-    search->findVector(pair, contact.s, contact.t, moved, r);
+void ContactEquations::updateContacts(State& state, const double* moved) const {
     const vector<Capsule>& capsules = search->getSystem().capsules;
-    const double radii = capsules[pair.a].radius+capsules[pair.b].radius;
-    const double* n = contact.normal;
-    contact.gap = r[0]*n[0]+r[1]*n[1]+r[2]*n[2]-radii;
+    const double radii = capsules[state.pair.a].radius+capsules[state.pair.b].radius;
+    for (int i = 0; i < state.count; i++) {
+        Contact& contact = state.contacts[i];
+        double r[3];
+        search->findVector(state.pair, contact.s, contact.t, moved, r);
+        const double* n = contact.normal;
+        contact.gap = r[0]*n[0]+r[1]*n[1]+r[2]*n[2]-radii;
+    }
 }
 
 void ContactEquations::evaluate(State& state, const double* moved, bool first, Part& part) const {
@@ -111,13 +116,20 @@ void ContactEquations::evaluate(State& state, const double* moved, bool first, P
     if (iterations < SEARCHING_ITERATIONS || state.count < 0) {
         // What is farther away is left out, until it may have come near. Overlaps that are mirrored count.
         const double limit = LARGEST_GAP*diameter+max(state.mirrored[0], state.mirrored[1]);
-        state.count = search->evaluate(pair, begun, moved, state.contacts, limit);
-        state.near = state.count >= 0 || !first;
-        state.gap = state.contacts[0].gap;
+        Contact contacts[2];
+        const int count = search->evaluate(pair, begun, moved, contacts, limit);
+        // A contact at a joint may pass from one segment to the next and back: in the end, it must not be lost.
+        if (count == 0 && state.count > 0 && iterations >= PASSING_ITERATIONS)
+            updateContacts(state, moved);
+        else {
+            state.count = count;
+            copy(contacts, contacts+2, state.contacts);
+            state.near = count >= 0 || !first;
+            state.gap = contacts[0].gap;
+        }
     }
     else
-        for (int i = 0; i < state.count; i++)
-            updateContact(pair, moved, state.contacts[i]);
+        updateContacts(state, moved);
     for (int i = 0; i < state.count; i++) {
         const Contact& contact = state.contacts[i];
         part.crossed |= contact.crossed;
@@ -205,7 +217,7 @@ bool ContactEquations::anyComeNear(const double* moved) {
 }
 
 bool ContactEquations::finishIteration(const double* moves, const double* moved) {
-    if (iterations < 2 || crossed)
+    if (iterations < 2 || anyComeNear(moved) || crossed)
         return true;
     for (size_t i = 0; i < normals.size(); i += 3) {
         // At most the squared change of the gap, times the stiffness.
@@ -215,7 +227,21 @@ bool ContactEquations::finishIteration(const double* moves, const double* moved)
         if (!(change*change < TOLERANCE*TOLERANCE*kT))
             return true;
     }
-    return anyComeNear(moved);
+    return anyCross(moved);
+}
+
+/** Whether pairs cross elsewhere than where they were last seen to touch: they are looked at again. */
+bool ContactEquations::anyCross(const double* moved) {
+    const int count = states.size(), chunks = (count+CHUNK-1)/CHUNK;
+    (*loop)(chunks, [&] (int chunk) {
+        parts[chunk].crossed = false;
+        for (int i = chunk*CHUNK; i < min(count, (chunk+1)*CHUNK); i++)
+            if (states[i].near && search->crosses(states[i].pair, begun, moved)) {
+                states[i].count = -1;
+                parts[chunk].crossed = true;
+            }
+    });
+    return any_of(parts.begin(), parts.begin()+chunks, [] (const Part& part) {return part.crossed;});
 }
 
 void ContactEquations::findFailures(const double* moved, vector<bool>& failed) const {

@@ -59,8 +59,9 @@ private:
     };
     void findPairs(const double* moved);
     void evaluate(State& state, const double* moved, bool first, Part& part) const;
-    void updateContact(const ContactPair& pair, const double* moved, Contact& contact) const;
+    void updateContacts(State& state, const double* moved) const;
     bool anyComeNear(const double* moved);
+    bool anyCross(const double* moved);
     PlaceOnChain placeOf(int capsule, double fraction) const;
     ContactSearch* search = nullptr;
     double stiffness = 0;

@@ -8,12 +8,12 @@ using namespace std;
 
 namespace {
 
-const int NEWTON_ITERATIONS = 20;
+const int NEWTON_ITERATIONS = 30;
 /**
  * Contacts that open and close in turn keep Newton's method from ending. After so many iterations, only this share of
  * each change is made.
  */
-const int UNDAMPED_ITERATIONS = 8;
+const int UNDAMPED_ITERATIONS = 14;
 const double DAMPING = 0.6;
 /** A step is divided into at most two to this power. */
 const int LARGEST_DIVISION = 10;
