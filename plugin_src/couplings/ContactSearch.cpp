@@ -190,6 +190,7 @@ struct ContactSearch::Implementation {
     vector<CoarseCapsule> sorted;
     SweptBoxes sweptBoxes;
     float margin = 0, imageShifts[4*NUM_IMAGES];
+    double largestHalf[3];
     vector<Part> parts;
     vector<size_t> firstOf;
 
@@ -201,13 +202,14 @@ struct ContactSearch::Implementation {
     Vec3d along(const Capsule& capsule, const double* positions) const;
     SegmentPair segments(int a, int b, const double* shift, const double* positions) const;
     void setFrame(const double* x, const double* y, const double* box);
-    void describe(int i, const double* x, const double* y);
+    void describe(int i, const double* x, const double* y, Described& result, PlacedCapsule& place) const;
+    void searchAround(int i, const double* x, const double* y, double slack, Part& part) const;
     void checkPositions(const double* x, const double* y) const;
     void setCells();
     void searchCells(int part, const double* x, const double* y);
     int findRows(int column, int iz, CapsuleRow* rows) const;
-    void addPair(const PlacedCapsule& one, const PlacedCapsule& other, int image, const double* x, const double* y,
-            Part& part) const;
+    void addPair(const PlacedCapsule& one, const PlacedCapsule& other, const int* images, bool sure, const double* x,
+            const double* y, Part& part) const;
     bool areNeighbors(const Capsule& first, const Capsule& second) const;
     void gather(vector<ContactPair>& pairs);
     SegmentPair withNeighbor(const SegmentPair& segments, int neighbor, bool ofA, bool atEnd,
@@ -332,14 +334,13 @@ void ContactSearch::Implementation::setFrame(const double* x, const double* y, c
 }
 
 /** Find the box, in fractions of the frame, that a capsule sweeps. */
-void ContactSearch::Implementation::describe(int i, const double* x, const double* y) {
+void ContactSearch::Implementation::describe(int i, const double* x, const double* y, Described& result,
+        PlacedCapsule& place) const {
     const Capsule& capsule = system.capsules[i];
     const Vec3d x0 = position(x, capsule.first)-frame.origin, p = along(capsule, x);
     const Vec3d y0 = position(y, capsule.first)-frame.origin, q = x == y ? p : along(capsule, y);
     const Vec3d ends[] = {frame.toFractions(x0), frame.toFractions(x0+p), frame.toFractions(y0),
             frame.toFractions(y0+q)};
-    Described& result = described[i];
-    PlacedCapsule& place = placed[i];
     place = {i, !excluded[i].empty(), capsule, {0, 0, 0}, x0, p};
     double center[3];
     for (int k = 0; k < 3; k++) {
@@ -381,7 +382,8 @@ void ContactSearch::Implementation::checkPositions(const double* x, const double
 /** Divide the frame into cells, and sort capsules by them. Capsules in cells that are not neighbors do not meet. */
 void ContactSearch::Implementation::setCells() {
     const int count = described.size();
-    double largestHalf[3] = {0, 0, 0}, largestLength = 0;
+    double largestLength = 0;
+    fill(largestHalf, largestHalf+3, 0.0);
     for (const Described& capsule : described) {
         for (int k = 0; k < 3; k++)
             largestHalf[k] = max(largestHalf[k], capsule.half[k]);
@@ -502,8 +504,11 @@ void ContactSearch::Implementation::searchCells(int column, const double* x, con
     int count = 0;
     auto look = [&] {
         count = kernels.keepNear(sorted.data(), imageShifts, reach, margin, part.candidates(0), count);
-        for (int i = 0; i < count; i++)
-            addPair(sortedPlaced[part.first[i]], sortedPlaced[part.second[i]], part.image[i], x, y, part);
+        for (int i = 0; i < count; i++) {
+            const int image = part.image[i]%SURE, images[3] = {image/9-1, image/3%3-1, image%3-1};
+            addPair(sortedPlaced[part.first[i]], sortedPlaced[part.second[i]], images, part.image[i] >= SURE, x, y,
+                    part);
+        }
         count = 0;
     };
     CapsuleRow rows[32];
@@ -528,17 +533,52 @@ void ContactSearch::Implementation::searchCells(int column, const double* x, con
     look();
 }
 
+/** Look for pairs with one capsule, in all cells that it may reach now. */
+void ContactSearch::Implementation::searchAround(int i, const double* x, const double* y, double slack,
+        Part& part) const {
+    Described own;
+    PlacedCapsule place;
+    describe(i, x, y, own, place);
+    if (!own.finite)
+        return;
+    int lower[3], upper[3];
+    for (int k = 0; k < 3; k++) {
+        own.half[k] += slack*frame.inverseWidths[k];
+        lower[k] = (int) floor((own.center[k]-own.half[k]-largestHalf[k])*frame.cells[k]);
+        upper[k] = (int) floor((own.center[k]+own.half[k]+largestHalf[k])*frame.cells[k]);
+        if (!frame.periodic) {
+            lower[k] = max(lower[k], 0);
+            upper[k] = min(upper[k], frame.cells[k]-1);
+        }
+    }
+    int cell[3];
+    for (cell[0] = lower[0]; cell[0] <= upper[0]; cell[0]++)
+        for (cell[1] = lower[1]; cell[1] <= upper[1]; cell[1]++)
+            for (cell[2] = lower[2]; cell[2] <= upper[2]; cell[2]++) {
+                int images[3], number = 0;
+                for (int k = 0; k < 3; k++) {
+                    images[k] = (int) floor((double) cell[k]/frame.cells[k]);
+                    number = number*frame.cells[k]+cell[k]-images[k]*frame.cells[k];
+                }
+                for (int other = cellStart[number]; other < cellStart[number+1]; other++) {
+                    bool overlaps = true;
+                    for (int k = 0; k < 3; k++)
+                        overlaps &= fabs(sweptBoxes.center[k][other]+images[k]-own.center[k]) <=
+                                sweptBoxes.half[k][other]+own.half[k];
+                    if (overlaps && members[other] != i)
+                        addPair(place, sortedPlaced[other], images, false, x, y, part);
+                }
+            }
+}
+
 /** Add a pair if it is near enough, in double precision where there is doubt. */
-void ContactSearch::Implementation::addPair(const PlacedCapsule& one, const PlacedCapsule& other, int image,
-        const double* x, const double* y, Part& part) const {
+void ContactSearch::Implementation::addPair(const PlacedCapsule& one, const PlacedCapsule& other, const int* images,
+        bool sure, const double* x, const double* y, Part& part) const {
     const bool inOrder = one.number < other.number;
     const PlacedCapsule &first = inOrder ? one : other, &second = inOrder ? other : one;
     const int a = first.number, b = second.number;
     if (areNeighbors(first.capsule, second.capsule) || (first.hasExclusions && isExcluded(a, b)))
         return;
-    const bool sure = image >= SURE;
-    image %= SURE;
-    const int images[3] = {image/9-1, image/3%3-1, image%3-1};
     // Where images are wrapped into the frame, the other one is taken by some vectors of it to where it is near.
     double number[3];
     for (int k = 0; k < 3; k++)
@@ -716,7 +756,7 @@ void ContactSearch::findPairs(const double* x, const double* y, const double* bo
     search.setFrame(x, y, box);
     runParts((count+CHUNK-1)/CHUNK, [&] (int chunk) {
         for (int i = chunk*CHUNK; i < min(count, (chunk+1)*CHUNK); i++)
-            search.describe(i, x, y);
+            search.describe(i, x, y, search.described[i], search.placed[i]);
     });
     search.checkPositions(x, y);
     search.setCells();
@@ -725,6 +765,22 @@ void ContactSearch::findPairs(const double* x, const double* y, const double* bo
         search.parts.resize(columns);
     runParts(columns, [&] (int column) {search.searchCells(column, x, y);});
     search.gather(pairs);
+}
+
+void ContactSearch::findPairsOf(const vector<int>& capsules, const double* x, const double* y, double slack,
+        vector<ContactPair>& pairs) const {
+    Part part;
+    for (int capsule : capsules)
+        implementation->searchAround(capsule, x, y, slack, part);
+    auto isBefore = [] (const ContactPair& one, const ContactPair& other) {
+        return one.a < other.a || (one.a == other.a && one.b < other.b);
+    };
+    sort(part.pairs.begin(), part.pairs.end(), isBefore);
+    // Two capsules of those asked for have found each other twice.
+    part.pairs.erase(unique(part.pairs.begin(), part.pairs.end(), [] (const ContactPair& one, const ContactPair& other) {
+        return one.a == other.a && one.b == other.b;
+    }), part.pairs.end());
+    pairs.swap(part.pairs);
 }
 
 int ContactSearch::evaluate(const ContactPair& pair, const double* x, const double* y, Contact* contacts,

@@ -50,6 +50,16 @@ public:
     void findPairs(const double* x, const double* y, const double* box, double reach, std::vector<ContactPair>& pairs,
             const LoopRunner& run = LoopRunner());
     /**
+     * Find the same pairs as far as some capsules are in them, after a search with another y. This takes less time where
+     * they are few.
+     *
+     * @param capsules  some capsules
+     * @param slack     how far others have moved since that search, at most
+     * @param pairs     receives the pairs, sorted by a and b
+     */
+    void findPairsOf(const std::vector<int>& capsules, const double* x, const double* y, double slack,
+            std::vector<ContactPair>& pairs) const;
+    /**
      * Find the contacts of a pair at y: none, one or two. Several threads may do so at the same time. With
      * nearestImages, the box is that of the last search.
      *

@@ -54,7 +54,7 @@ void ContactEquations::begin(const CoupledStart& start, const Loop& newLoop) {
     reach = REACH*diameter;
     pairs.clear();
     states.clear();
-    predicted.clear();
+    searched.clear();
 }
 
 void ContactEquations::beginStage(int, int, const double*) {
@@ -67,31 +67,45 @@ PlaceOnChain ContactEquations::placeOf(int capsule, double fraction) const {
     return place;
 }
 
+void ContactEquations::takeNoteOf(int capsule, const double* moved) {
+    const Capsule& own = search->getSystem().capsules[capsule];
+    copy_n(moved+3*own.first, 3, &searched[6*capsule]);
+    copy_n(moved+3*own.end(), 3, &searched[6*capsule+3]);
+}
+
 void ContactEquations::findPairs(const double* moved) {
-    int particles = 0;
-    for (const Capsule& capsule : search->getSystem().capsules)
-        particles = max(particles, max(capsule.first, capsule.end())+1);
-    predicted.assign(moved, moved+3*(size_t) particles);
     search->findPairs(begun, moved, box, reach, pairs, *loop);
+    searched.resize(6*places.size());
+    for (size_t i = 0; i < places.size(); i++)
+        takeNoteOf(i, moved);
+    for (const ContactPair& pair : pairs)
+        states.push_back({pair, true, 0, {0, 0}, {}, -1});
+}
 
-    // Pairs that were known keep what is known of them.
-
-    vector<State> before;
-    before.swap(states);
-    size_t next = 0;
+/** Look for pairs of some capsules again; false if all that are found take part already. */
+bool ContactEquations::findPairsOf(const vector<int>& capsules, const double* moved, double slack) {
+    search->findPairsOf(capsules, begun, moved, slack, pairs);
+    for (int capsule : capsules)
+        takeNoteOf(capsule, moved);
+    auto isBefore = [] (const State& one, const State& other) {
+        return one.pair.a < other.pair.a || (one.pair.a == other.pair.a && one.pair.b < other.pair.b);
+    };
+    const size_t known = states.size();
+    bool any = false;
     for (const ContactPair& pair : pairs) {
-        auto isBefore = [&] (const ContactPair& other) {
-            return other.a < pair.a || (other.a == pair.a && other.b < pair.b);
-        };
-        while (next < before.size() && isBefore(before[next].pair))
-            next++;
-        if (next < before.size() && before[next].pair.a == pair.a && before[next].pair.b == pair.b) {
-            states.push_back(before[next]);
-            states.back().near = true;
+        const State state = {pair, true, 0, {0, 0}, {}, -1};
+        const auto found = lower_bound(states.begin(), states.begin()+known, state, isBefore);
+        if (found == states.begin()+known || isBefore(state, *found)) {
+            states.push_back(state);
+            any = true;
         }
-        else
-            states.push_back({pair, true, 0, {0, 0}, {}, -1});
+        else if (!found->near) {
+            found->near = any = true;
+            found->count = -1;
+        }
     }
+    inplace_merge(states.begin(), states.begin()+known, states.end(), isBefore);
+    return any;
 }
 
 void ContactEquations::updateContacts(State& state, const double* moved) const {
@@ -160,9 +174,9 @@ void ContactEquations::linearise(int iteration, const double* moved, vector<Coup
     iterations = iteration;
     normals.clear();
     crossed = false;
-    if (iteration == 0 && predicted.empty())
+    if (iteration == 0 && searched.empty())
         return;
-    const bool first = predicted.empty();
+    const bool first = searched.empty();
     if (first)
         findPairs(moved);
     const int count = states.size(), chunks = (count+CHUNK-1)/CHUNK;
@@ -193,19 +207,17 @@ bool ContactEquations::anyComeNear(const double* moved) {
     double largest = 0, second = 0;
     for (size_t i = 0; i < capsules.size(); i++) {
         double square = 0;
-        for (int particle : {capsules[i].first, capsules[i].end()}) {
+        for (int end = 0; end < 2; end++) {
+            const double* now = moved+3*(end == 0 ? capsules[i].first : capsules[i].end());
+            const double* before = &searched[6*i+3*end];
             double own = 0;
-            for (int k = 3*particle; k < 3*particle+3; k++)
-                own += (moved[k]-predicted[k])*(moved[k]-predicted[k]);
+            for (int k = 0; k < 3; k++)
+                own += (now[k]-before[k])*(now[k]-before[k]);
             square = max(square, own);
         }
         motion[i] = sqrt(square);
         second = max(second, min(largest, motion[i]));
         largest = max(largest, motion[i]);
-    }
-    if (largest+second > reach) {
-        findPairs(moved);
-        return true;
     }
     bool any = false;
     for (State& state : states)
@@ -213,6 +225,14 @@ bool ContactEquations::anyComeNear(const double* moved) {
             state.near = any = true;
             state.count = -1;
         }
+    // Pairs that no search has seen were out of reach: one of the two has moved by more than half of it.
+    if (largest+second > reach) {
+        movers.clear();
+        for (size_t i = 0; i < motion.size(); i++)
+            if (2*motion[i] > reach)
+                movers.push_back(i);
+        any |= findPairsOf(movers, moved, largest);
+    }
     return any;
 }
 
