@@ -29,9 +29,10 @@ from ..couplings.walls import WALL_NAME
 from ..errors import TimeStepWarning
 from ..filaments.collection import FilamentCollection
 from ..units.types import FloatArray, Indices, IntArray, Numbers
+from .coupled_step import is_coupled
 from .mobility import FilamentResponse
 from .other_particles import describe_other_particles
-from .schemes import EXPLICIT_SCHEMES
+from .schemes import EXPLICIT_SCHEMES, IMPLICIT_SCHEMES
 from .time_step import TimeStep
 
 ACCURATE = 2.0 * (1.0 - 1.0 / 1.05)
@@ -380,6 +381,8 @@ class ExplicitForces:
 
     def _read(self, force, label):
         # A list of Springs, or None where the stiffness is not known.
+        if self._scheme in IMPLICIT_SCHEMES and is_coupled(force):
+            return []
         capsules = as_capsule_contact_force(force)
         if capsules is not None:
             return self._between_capsules(label, capsules)
