@@ -80,7 +80,9 @@ def steps_of_couplings(
     return steps
 
 
-def _mobilities(filaments, system, particle_friction) -> FloatArray:
+def _mobilities(
+    filaments: FilamentCollection, system: openmm.System, particle_friction: Numbers | None
+) -> FloatArray:
     # Of all particles; zero for those that do not move.
     mobility = np.zeros(system.getNumParticles())
     for filament, nodes in zip(filaments, filaments.node_indices):
