@@ -28,8 +28,7 @@ RELATIVE_MOTION = 0.6
 """The largest standard deviation of relative motion in a step, over the distance."""
 
 _REASON = (
-    "{what}, whose places may diffuse against each other by {share:g} of {distance}, {value:.3g} nm, in a step of an "
-    "implicit scheme"
+    "{what}: the two may diffuse against each other by {share:g} of {distance}, {value:.3g} nm, in an implicit step"
 )
 
 
@@ -76,13 +75,12 @@ def steps_of_couplings(
         bound = distance**2 / (2.0 * kT * total)
         reason = _REASON.format(what=what, share=RELATIVE_MOTION, distance=of_what, value=distance)
         name = f"{label}: {what}"
-        steps.append(TimeStep(RELATIVE_MOTION**2 * bound, f"{label}: {reason}", {name: bound}, {name: bound}))
+        allowed = float(RELATIVE_MOTION**2 * bound)
+        steps.append(TimeStep(allowed, f"{label}: {reason}", {name: float(bound)}, {name: allowed}))
     return steps
 
 
-def _mobilities(
-    filaments: FilamentCollection, system: openmm.System, particle_friction: Numbers | None
-) -> FloatArray:
+def _mobilities(filaments: FilamentCollection, system: openmm.System, particle_friction: Numbers | None) -> FloatArray:
     # Of all particles; zero for those that do not move.
     mobility = np.zeros(system.getNumParticles())
     for filament, nodes in zip(filaments, filaments.node_indices):
@@ -104,7 +102,10 @@ def _contacts(force, mobility):
         return None
     total = kinds[:, 0] + kinds[:, :1]
     distance = 0.5 * (kinds[:, 1] + kinds[:, 1][:, None])
-    return _worst(distance.ravel(), total.ravel(), "segments in contact", "the contact distance")
+    worst = _worst(distance.ravel(), total.ravel())
+    if worst is None:
+        return None
+    return distance.ravel()[worst], total.ravel()[worst], "segments in contact", "the contact distance"
 
 
 def _links(force, filaments, mobility):
@@ -112,6 +113,7 @@ def _links(force, filaments, mobility):
     if links is None:
         return None
     table = links.table(None)
+    numbers = table.numbers
     if len(table):
         rest, extension, places = table.rest_length, table.maximum_extension, table.places
         first, second = (np.where(places.pairs[:, side] >= 0, mobility[places.pairs[:, side]], 0.0) for side in (0, 1))
@@ -122,13 +124,15 @@ def _links(force, filaments, mobility):
         first, second = largest[:1], largest[-1:] if len(largest) == 1 else largest[1:2]
     # The distance of a FENE link is never zero for long.
     distance = np.where((rest == 0.0) & np.isfinite(extension), extension, rest)
-    return _worst(distance, first + second, "linked places", "the rest length")
+    worst = _worst(distance, first + second)
+    if worst is None:
+        return None
+    what = f"crosslink {numbers[worst]}" if len(table) else "a crosslink to come"
+    return distance[worst], (first + second)[worst], what, "its rest length"
 
 
-def _worst(distance, total, what, of_what):
+def _worst(distance, total):
     moving = (distance > 0.0) & (total > 0.0)
     if not np.any(moving):
         return None
-    ratio = np.where(moving, total / np.where(moving, distance, 1.0) ** 2, -math.inf)
-    worst = int(np.argmax(ratio))
-    return float(distance[worst]), float(total[worst]), what, of_what
+    return int(np.argmax(np.where(moving, total / np.where(moving, distance, 1.0) ** 2, -math.inf)))
