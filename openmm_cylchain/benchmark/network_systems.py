@@ -23,6 +23,7 @@ CONTACT_STIFFNESS = 0.38 * PICONEWTON_PER_NANOMETER
 _MICROSECOND = 1e6
 _LINK_GROUP, _CONTACT_GROUP = 1, 2
 _SEED = 1
+_NOWHERE = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,8 @@ class NetworkSystem:
         For rows.
     steps : tuple of float
         Of the implicit scheme, in us. The last one is that of the rows without a step in their names.
+    explicit_step : float
+        In us, of the implicit scheme with links and contacts that are explicit.
     edge : float
         Of the box, in nm.
     filaments : int
@@ -47,6 +50,7 @@ class NetworkSystem:
 
     name: str
     steps: tuple
+    explicit_step: float
     edge: float = 1200.0
     filaments: int = 200
     contacts: bool = False
@@ -56,12 +60,12 @@ class NetworkSystem:
 
 
 NETWORKS = (
-    NetworkSystem("contacts", (5.0, 10.0), contacts=True),
-    NetworkSystem("links_very_soft", (20.0, 50.0, 100.0), links=1000, stiffness=0.1),
-    NetworkSystem("links_soft", (20.0, 50.0, 100.0), links=1000, stiffness=0.25),
-    NetworkSystem("links_stiff", (20.0, 50.0), edge=700.0, links=900, stiffness=100.0),
-    NetworkSystem("links_35_nm", (10.0, 20.0), links=1000, stiffness=0.25, rest_length=35.0),
-    NetworkSystem("contacts_and_links", (5.0, 10.0), contacts=True, links=1000, stiffness=0.25, rest_length=35.0),
+    NetworkSystem("contacts", (5.0, 10.0), 0.5, contacts=True),
+    NetworkSystem("links_very_soft", (20.0, 50.0, 100.0), 0.5, links=1000, stiffness=0.1),
+    NetworkSystem("links_soft", (20.0, 50.0, 100.0), 0.2, links=1000, stiffness=0.25),
+    NetworkSystem("links_stiff", (20.0, 50.0), 0.0005, edge=700.0, links=900, stiffness=100.0),
+    NetworkSystem("links_35_nm", (10.0, 20.0), 0.2, links=1000, stiffness=0.25, rest_length=35.0),
+    NetworkSystem("contacts_and_links", (5.0, 10.0), 0.2, contacts=True, links=1000, stiffness=0.25, rest_length=35.0),
 )
 """Stiff links are in a dense box, where segments nearly touch."""
 
@@ -76,13 +80,18 @@ class Network:
     context: openmm.Context
 
     @property
+    def node_count(self):
+        """Nodes of all filaments, the first particles of the System."""
+        return self.system.filaments * (SEGMENTS + 1)
+
+    @property
     def integrator(self):
         """Of the Context."""
         return self.context.getIntegrator()
 
     def positions(self):
         """Of all nodes, in nm, not wrapped into the box."""
-        return self.context.getState(positions=True).getPositions(asNumpy=True)._value
+        return self.context.getState(positions=True).getPositions(asNumpy=True)._value[: self.node_count]
 
     def count_crossings(self, steps):
         """How often filaments pass through each other in so many steps, each of them looked at."""
@@ -111,7 +120,7 @@ class Network:
         return {name: energy / kT for name, energy in energies.items()}
 
 
-def create_network(system, scheme, step, positions=None, seed=1):
+def create_network(system, scheme, step, positions=None, seed=1, explicit_couplings=False):
     """A network in a Context on one thread.
 
     Parameters
@@ -124,6 +133,9 @@ def create_network(system, scheme, step, positions=None, seed=1):
         In nm; as drawn if not given. Links are those of the filaments as drawn.
     seed : int
         Of the noise.
+    explicit_couplings : bool
+        Whether links and contacts are explicit in an implicit scheme, too. They are if they act on a virtual site that
+        is not on a segment: one is added, which nothing touches.
 
     Returns
     -------
@@ -134,13 +146,23 @@ def create_network(system, scheme, step, positions=None, seed=1):
     for number in range(system.filaments):
         filaments.add_equilibrium(ACTIN, SEGMENTS, seed=number, start=generator.uniform(0.0, system.edge, 3))
     _, openmm_system, drawn = filaments.build(box_vectors=system.edge * np.eye(3))
+    drawn = drawn._value
+    sites = _add_virtual_site(openmm_system) if explicit_couplings else []
     links = None
     if system.links:
         links = Crosslinks(system.stiffness * PICONEWTON_PER_NANOMETER, system.rest_length)
-        links.add_many(None, nearest_places(filaments, drawn._value, system.edge)[: system.links])
+        links.add_many(None, nearest_places(filaments, drawn, system.edge)[: system.links])
+        for site in sites:
+            links.add(None, site, _NOWHERE, rest_length=0.0)
         links.add_to(openmm_system, force_group=_LINK_GROUP, periodic=True)
     if system.contacts:
-        force = capsule_contact_force(filaments, openmm_system, CONTACT_DIAMETER, CONTACT_STIFFNESS, periodic=True)
+        force = capsule_contact_force(
+            filaments, openmm_system, CONTACT_DIAMETER, CONTACT_STIFFNESS, sites, 1.0 if sites else None, periodic=True
+        )
+        for sphere in range(len(sites)):
+            for filament in range(system.filaments):
+                for segment in range(SEGMENTS):
+                    force.addExclusion(-1, sphere, filament, segment)
         force.setForceGroup(_CONTACT_GROUP)
         openmm_system.addForce(force)
     if step is None:
@@ -148,8 +170,17 @@ def create_network(system, scheme, step, positions=None, seed=1):
     integrator = filaments.create_integrator(
         openmm_system, step * _MICROSECOND, scheme=scheme, random_seed=seed, checks=False
     )
-    context = systems.one_thread_context(openmm_system, integrator, drawn if positions is None else positions)
+    nodes = drawn if positions is None else positions
+    others = np.tile(_NOWHERE, (openmm_system.getNumParticles() - len(nodes), 1))
+    context = systems.one_thread_context(openmm_system, integrator, np.concatenate([nodes, others]))
     return Network(system, filaments, links, context)
+
+
+def _add_virtual_site(system):
+    # Of three particles that do not move; one of two is a place that a step knows.
+    *particles, site = (system.addParticle(0.0) for _ in range(4))
+    system.setVirtualSite(site, openmm.ThreeParticleAverageSite(*particles, 0.25, 0.25, 0.5))
+    return [site]
 
 
 _COLD_STEPS = (1e-3, 1e-2, 0.1, 1.0)

@@ -1,9 +1,10 @@
-"""Networks: links and contacts in implicit steps, beside the same networks with the explicit scheme "midpoint".
+"""Networks: links and contacts in implicit steps, beside the same networks with links and contacts that are explicit.
 
 Two hundred actin filaments of 1 um, at random in a periodic box, on one thread: with contacts; with a thousand links
-that are soft, stiff, or of a rest length; with both. Each network is timed with the steps of ``NETWORKS`` and with the
-step that is recommended for scheme "midpoint", in turn. Energies of all of them begin at the same positions: what the
-step changes of them is an error of the step. Crossings are counted where contacts should prevent them.
+that are soft, stiff, or of a rest length; with both. Each network is timed with the steps of ``NETWORKS``; with the
+step that is recommended for the explicit scheme "midpoint"; and with scheme "implicit" whose links and contacts are
+explicit, at the step of ``NETWORKS`` for that; all in turn. Energies begin at the same positions: what the step changes
+of them is an error of the step. Crossings are counted where contacts should prevent them.
 """
 
 import time
@@ -17,7 +18,12 @@ from .measurement import Case, Estimate, describe_machine, median, ratio, scaled
 from .network_systems import NETWORKS, create_network, relaxed_positions
 from .report import Report, Row, row
 
-EXPLICIT_SCHEME = "midpoint"
+_EXPLICIT = {
+    "explicit": lambda system, positions: create_network(system, "midpoint", None, positions),
+    "explicit_couplings": lambda system, positions: create_network(
+        system, "implicit", system.explicit_step, positions, explicit_couplings=True
+    ),
+}
 REFERENCE_FACTOR = 10.0
 """How much shorter than the shortest step the one is, with the implicit scheme, that energies can be compared with."""
 
@@ -38,7 +44,7 @@ class NetworkEffort:
     duration : float
         Over which energies are averaged, in us; a tenth of it with the steps that others are compared with.
     explicit_steps : int
-        Over which the energies of the explicit scheme are averaged.
+        Over which the energies of what is explicit are averaged.
     crossing_steps : int
         In which crossings are counted.
     repetitions : int
@@ -59,7 +65,7 @@ def _with_longest_steps(networks):
     return tuple(replace(network, steps=network.steps[-1:]) for network in networks)
 
 
-FULL = NetworkEffort(NETWORKS, 300, 1e4, 50000, 500, 7, 1.0)
+FULL = NetworkEffort(NETWORKS, 300, 1e4, 30000, 300, 7, 0.7)
 QUICK = NetworkEffort(_with_longest_steps(NETWORKS), 30, 1e3, 2000, 30, 3, 0.2)
 
 
@@ -105,7 +111,7 @@ def benchmark_networks(effort=FULL, say=lambda message: None):
     """
     choose_engine("compiled")
     machine = describe_machine()
-    cases, details, missing, explicit_steps, links = [], [], {}, {}, {}
+    cases, details, missing, explicit_steps = [], [], {}, {}
     for system in effort.networks:
         say(f"{system.name}: relaxing")
         positions = relaxed_positions(system, effort.relaxation)
@@ -119,25 +125,23 @@ def benchmark_networks(effort=FULL, say=lambda message: None):
             details += error_rows(f"{system.name}_{step:g}_us", errors)
             if step != reference:
                 cases.append(_case(case_name(system, step), network))
-        if system.links:
-            links[system.name] = len(network.links.pairs(network.context))
-        network = create_network(system, EXPLICIT_SCHEME, None, positions)
-        step = network.integrator.getStepSize()._value / _MICROSECOND
-        say(f"{system.name}: energies with scheme {EXPLICIT_SCHEME}, {step:.2g} us")
-        try:
-            errors = measure_errors(network, effort.explicit_steps)
-        except InstabilityError as error:
-            missing[explicit_name(system)] = str(error)
-        else:
-            explicit_steps[system.name] = step
-            details += error_rows(explicit_name(system), errors)
-            cases.append(_case(explicit_name(system), network))
+        explicit_steps[system.name] = {}
+        for kind, create in _EXPLICIT.items():
+            say(f"{system.name}: energies, {kind.replace('_', ' ')}")
+            network = create(system, positions)
+            try:
+                errors = measure_errors(network, effort.explicit_steps)
+            except InstabilityError as error:
+                missing[f"{system.name}_{kind}"] = str(error)
+            else:
+                explicit_steps[system.name][kind] = errors.step
+                details += error_rows(f"{system.name}_{kind}", errors)
+                cases.append(_case(f"{system.name}_{kind}", network))
     # Of one thread, so that other processes disturb it less.
     times = time_interleaved(cases, effort.repetitions, effort.seconds, say, clock=time.process_time)
     rows = speed_rows(effort.networks, explicit_steps, times)
     settings = {
         "steps_us": {system.name: system.steps for system in effort.networks},
-        "links": links,
         "duration_of_energies_us": effort.duration,
         "explicit_steps_of_energies": effort.explicit_steps,
         "crossing_steps": effort.crossing_steps,
@@ -151,11 +155,6 @@ def benchmark_networks(effort=FULL, say=lambda message: None):
 def case_name(system, step):
     """The name of a network with an implicit step in us, as in rows."""
     return f"{system.name}_{step:g}_us"
-
-
-def explicit_name(system):
-    """The name of a network with the explicit scheme, as in rows."""
-    return f"{system.name}_explicit"
 
 
 def _case(name, network):
@@ -205,30 +204,27 @@ def error_rows(name, errors):
 
 
 def speed_rows(networks, explicit_steps, times):
-    """Rows of speeds, and of their ratios to that of the explicit scheme.
+    """Rows of speeds, and of their ratios to those of what is explicit.
 
     Parameters
     ----------
     networks : sequence of NetworkSystem
-    explicit_steps : dict
-        In us, by the names of networks that have been run with the explicit scheme.
+    explicit_steps : dict of dict
+        In us, by the names of networks and by what is explicit.
     times : dict
         Seconds per step, one for each repetition, by the names of cases.
     """
     rows = []
     for system in networks:
-        explicit = explicit_steps.get(system.name)
-        if explicit is not None:
-            rows.append(row(f"step_{explicit_name(system)}", Estimate(explicit, None), "us"))
-            rows += _rows_of_case(explicit_name(system), explicit, times)
         for step in system.steps:
             rows += _rows_of_case(case_name(system, step), step, times)
-        step = system.steps[-1]
-        speed = _speed(step, times[case_name(system, step)])
-        rows.append(row(f"simulated_seconds_per_second_{system.name}", median(speed), "s/s"))
-        if explicit is not None:
-            slow = _speed(explicit, times[explicit_name(system)])
-            rows.append(row(f"implicit_over_explicit_{system.name}", ratio(speed, slow), "1"))
+        fastest = _speed(system.steps[-1], times[case_name(system, system.steps[-1])])
+        rows.append(row(f"simulated_seconds_per_second_{system.name}", median(fastest), "s/s"))
+        for kind, step in explicit_steps[system.name].items():
+            name = f"{system.name}_{kind}"
+            rows.append(row(f"step_{name}", Estimate(step, None), "us"))
+            rows += _rows_of_case(name, step, times)
+            rows.append(row(f"implicit_over_{kind}_{system.name}", ratio(fastest, _speed(step, times[name])), "1"))
     return rows
 
 

@@ -100,17 +100,36 @@ def test_speeds_and_ratios():
         "contacts_5_us": 4e-3 * disturbance,
         "contacts_10_us": 5e-3 * disturbance,
         "contacts_explicit": 1e-3 * disturbance,
+        "contacts_explicit_couplings": 2e-3 * disturbance,
     }
-    rows = {row.name: row for row in networks.speed_rows([system], {"contacts": 0.02}, times)}
+    steps = {"contacts": {"explicit": 0.02, "explicit_couplings": 0.5}}
+    rows = {row.name: row for row in networks.speed_rows([system], steps, times)}
     assert rows["time_per_step_contacts_5_us"].value == pytest.approx(4.0)
     assert rows["simulated_seconds_per_second_contacts_5_us"].value == pytest.approx(5e-6 / 4e-3)
     assert rows["simulated_seconds_per_second_contacts"].value == pytest.approx(10e-6 / 5e-3)
     assert rows["simulated_seconds_per_second_contacts_explicit"].value == pytest.approx(2e-5)
     assert rows["implicit_over_explicit_contacts"].value == pytest.approx(100.0)
     assert rows["implicit_over_explicit_contacts"].error == pytest.approx(0.0, abs=1e-9)
+    assert rows["implicit_over_explicit_couplings_contacts"].value == pytest.approx(8.0)
     assert rows["step_contacts_explicit"].value == 0.02
-    without = {row.name for row in networks.speed_rows([system], {}, times)}
+    without = {row.name for row in networks.speed_rows([system], {"contacts": {}}, times)}
     assert without == {name for name in rows if "explicit" not in name}
+
+
+@pytest.mark.parametrize("name", ["contacts", "links_soft", "links_35_nm"])
+def test_explicit_couplings_are_explicit(name):
+    """At steps far beyond their stability they throw filaments apart; implicit ones do not."""
+    system = small(name)
+    positions = relaxed_positions(system, 5)
+    energies = []
+    for explicit in (False, True):
+        network = create_network(system, "implicit", 1e-3, positions, explicit_couplings=explicit)
+        before = network.energies()
+        network.integrator.setStepSize(50e6)
+        network.integrator.step(20)
+        energies.append(network.energies()["bending"])
+        assert before == pytest.approx(create_network(system, "implicit", 1e-3, positions).energies())
+    assert energies[1] > 5.0 * energies[0]
 
 
 def test_rows_of_errors():
@@ -156,6 +175,7 @@ def test_benchmark_of_networks(monkeypatch, tmp_path, capsys):
     for name, system in BY_NAME.items():
         assert rows[f"simulated_seconds_per_second_{name}"]["value"] > 0
         assert rows[f"implicit_over_explicit_{name}"]["value"] > 0
+        assert rows[f"implicit_over_explicit_couplings_{name}"]["value"] > 0
         step = f"{name}_{system.steps[-1]:g}_us"
         assert rows[f"bending_energy_{step}"]["error"] > 0
         assert 0 <= rows[f"divided_steps_{step}"]["value"] < 1
