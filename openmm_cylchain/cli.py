@@ -126,7 +126,11 @@ def _add_benchmarks(parser):
         help="DNA base pair by base pair: the normal modes of Panja et al. beside scheme implicit, minutes",
     )
     base_pairs.set_defaults(command=_benchmark_base_pairs)
-    for benchmark in (engines, scaling, time_step, bead_spring, base_pairs):
+    networks = benchmarks.add_parser(
+        "networks", help="links and contacts in implicit steps beside explicit ones: 200 filaments, ten minutes"
+    )
+    networks.set_defaults(command=_benchmark_networks)
+    for benchmark in (engines, scaling, time_step, bead_spring, base_pairs, networks):
         benchmark.add_argument("--quick", action="store_true", help="a rough measurement within a minute")
         benchmark.add_argument("--json", metavar="FILE", help="write machine, settings and results to FILE as well")
 
@@ -306,6 +310,12 @@ def _benchmark_base_pairs(options):
     from .benchmark.base_pairs import FULL, QUICK, benchmark_base_pairs
 
     _benchmark(options, lambda say: benchmark_base_pairs(QUICK if options.quick else FULL, say))
+
+
+def _benchmark_networks(options):
+    from .benchmark.networks import FULL, QUICK, benchmark_networks
+
+    _benchmark(options, lambda say: benchmark_networks(QUICK if options.quick else FULL, say))
 
 
 def _benchmark(options, measure):

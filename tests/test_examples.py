@@ -21,9 +21,9 @@ CASES = [
     ("tumbling_in_shear", "shear", 60, 60, 24 * 13 + 6 * 12, 24 * 12 + 6 * 12),
     ("tumbling_dna", "tumbling", 60, 60, 12 * 256, 12 * 255),
     ("periodic_box", "periodic", 40, 40, 60 + 8 * 17, 8 * 16),
-    ("dense_network", "network", 40, 40, 120 * (11 + 57), 120 * 10),
+    ("dense_network", "network", 40, 40, 120 * 11, 120 * 10),
     ("filaments_in_a_vesicle", "vesicle", 40, 40, 24 + 24 * (13 + 1), 24 * 12),
-    ("crosslinked_bundle", "bundle", 40, 40, 6 * (31 + 30), 6 * 30),
+    ("crosslinked_bundle", "bundle", 40, 40, 6 * 31, 6 * 30),
     ("force_extension", "dna", 200, 100, 24 * 21, 24 * 20),
 ]
 # What an example writes beside the files that all of them write.

@@ -77,6 +77,8 @@ def _format_load(load):
 
 def _format_value(value, error):
     scale = error if error else abs(value) / 100.0
+    if 0 < scale < 1e-5:
+        return f"{value:.3g}", "" if error is None else f"± {error:.1g}"
     decimals = max(0, 1 - math.floor(math.log10(scale))) if scale > 0 else 0
     return f"{value:.{decimals}f}", "" if error is None else f"± {error:.{decimals}f}"
 
