@@ -57,6 +57,13 @@ void NetworkStep::setForces(const CoupledForces& forces, const double* box) {
         contacts[i]->setContacts(own.search, own.stiffness, own.periodic ? box : NULL);
         couplings.push_back(contacts[i].get());
     }
+    walls.resize(max(walls.size(), forces.walls.size()));
+    for (size_t i = 0; i < forces.walls.size(); i++) {
+        if (!walls[i])
+            walls[i].reset(new WallEquations());
+        walls[i]->setWalls(forces.walls[i]);
+        couplings.push_back(walls[i].get());
+    }
 }
 
 void NetworkStep::setParticles(const vector<CoupledParticle>& newParticles) {
