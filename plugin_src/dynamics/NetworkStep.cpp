@@ -157,6 +157,9 @@ bool NetworkStep::attempt(const Attempt& attempt, double* displacements, vector<
     }
     for (const ImplicitCouplings* own : couplings)
         own->findFailures(moved.data(), failed);
+    // Where couplings alone have not converged, nobody knows whose they are.
+    if (!solved && find(failed.begin(), failed.end(), true) == failed.end())
+        failed = attempt.taken;
     attempt.loop(numPacks, [&] (int pack) {
         steps[pack]->getDisplacements(displacements);
     });
@@ -215,6 +218,13 @@ bool NetworkStep::divide(const Attempt& whole, int division, double* displacemen
     half.settings.stepSize = 0.5*whole.settings.stepSize;
     half.settings.level++;
     half.settings.step *= 2;
+    // Recorded forces are means over the halves.
+    vector<vector<SegmentForces> >* const recorded = whole.settings.segmentForces;
+    vector<vector<SegmentForces> > ofHalf;
+    if (recorded != NULL) {
+        ofHalf = *recorded;
+        half.settings.segmentForces = &ofHalf;
+    }
     const size_t size = moved.size();
     vector<double> start(whole.positions, whole.positions+size), total(size), part(size);
     half.positions = start.data();
@@ -234,6 +244,13 @@ bool NetworkStep::divide(const Attempt& whole, int division, double* displacemen
             start[k] += part[k];
             total[k] += part[k];
         });
+        for (size_t chain = 0; recorded != NULL && chain < recorded->size(); chain++)
+            for (size_t s = 0; whole.taken[chain] && s < ofHalf[chain].size(); s++) {
+                SegmentForces& mean = (*recorded)[chain][s];
+                if (i == 0)
+                    mean = SegmentForces();
+                mean.add(ofHalf[chain][s], 0.5);
+            }
     }
     forTaken([&] (int k) {
         displacements[k] = total[k];
