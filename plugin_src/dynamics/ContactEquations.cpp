@@ -16,6 +16,8 @@ const double LARGEST_MIRRORED = 0.5;
 const double LARGEST_GAP = 0.3;
 /** The largest change of a gap in the last iteration, over the thermal fluctuation of a contact. */
 const double TOLERANCE = 0.3;
+/** What counts as no change of a gap, over how near pairs come. */
+const double LEAST_CHANGE = 3e-3;
 /** The number of iterations that look where capsules touch. */
 const int SEARCHING_ITERATIONS = 6;
 /** The number of iterations in which a contact may pass to a neighbour. */
@@ -244,7 +246,8 @@ bool ContactEquations::finishIteration(const double* moves, const double* moved)
         double change = 0;
         for (int k = 0; k < 3; k++)
             change += sqrt(normals[i+k])*fabs(moves[i+k]);
-        if (!(change*change < TOLERANCE*TOLERANCE*kT))
+        const double least = LEAST_CHANGE*LEAST_CHANGE*reach*reach*stiffness;
+        if (!(change*change < TOLERANCE*TOLERANCE*kT+least))
             return true;
     }
     return anyCross(moved);

@@ -18,8 +18,12 @@ namespace {
 const double DIAGONAL = 1-M_SQRT1_2, NOISE_OF_FIRST = DIAGONAL/(1-DIAGONAL);
 /** The largest change of a link in the last iteration, over its thermal fluctuation. */
 const double TOLERANCE = 0.3;
+/** What counts as no change: over the change of the whole step, and over the length. */
+const double OF_CHANGE = 1e-3, OF_LENGTH = 1e-6;
 /** The largest error of a distance that turning leaves, over the same. */
 const double LENGTH_TOLERANCE = 0.07;
+/** Without noise: the largest change across a link in the last iteration, over its length. */
+const double OF_TURN = 1e-2;
 /** The least cosine of the angle by which a link may turn in a step. */
 const double LEAST_COSINE = -0.9;
 
@@ -225,21 +229,29 @@ void LinkEquations::setCompliances(const double* compliances) {
     }
 }
 
-bool LinkEquations::finishIteration(const double* moves, const double*) {
+bool LinkEquations::finishIteration(const double* moves, const double* moved) {
     bool unfinished = false;
     for (size_t i = 0; i < states.size(); i++) {
         State& state = states[i];
         const double* move = moves+3*i;
-        const double square = dot(move, move);
-        const double tolerance = TOLERANCE*TOLERANCE*kT;
+        double r[3], square = dot(move, move), ofStep = 0;
+        vectorOf(state, moved, r);
+        for (int k = 0; k < 3; k++)
+            ofStep += (r[k]-state.start[k])*(r[k]-state.start[k]);
+        const double least = OF_CHANGE*OF_CHANGE*ofStep+
+                OF_LENGTH*OF_LENGTH*(state.length*state.length+state.link->restLength*state.link->restLength);
+        const double thermal = TOLERANCE*TOLERANCE*kT/state.response;
+        // Written so that NaN is not finished.
         if (!state.turns) {
-            unfinished |= !(square*state.response < tolerance);
+            unfinished |= !(square <= thermal+least);
             continue;
         }
         const double along = dot(state.direction, move);
         state.multiplier = state.tension+state.response*along;
-        const double error = (square-along*along)/(2*LENGTH_TOLERANCE*state.length);
-        unfinished |= !(max(along*along*state.response, error*error*state.response*TOLERANCE*TOLERANCE) < tolerance);
+        const double error = (square-along*along)/(2*LENGTH_TOLERANCE*max(state.length, LEAST));
+        unfinished |= !(along*along <= thermal+least);
+        unfinished |= kT > 0 && !(error*error <= thermal/(TOLERANCE*TOLERANCE)+least);
+        unfinished |= kT == 0 && !(square <= OF_TURN*OF_TURN*state.length*state.length+least);
     }
     return unfinished;
 }

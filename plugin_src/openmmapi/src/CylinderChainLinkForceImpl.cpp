@@ -6,6 +6,7 @@
 #include "openmm/System.h"
 #include "openmm/internal/ContextImpl.h"
 #include "openmm/internal/LinkDescription.h"
+#include <algorithm>
 #include <sstream>
 
 using namespace OpenMM;
@@ -120,11 +121,20 @@ const vector<cylchain::Link>& CylinderChainLinkForceImpl::getLinks() {
 
 double CylinderChainLinkForceImpl::calcForcesAndEnergy(ContextImpl& context, bool includeForces, bool includeEnergy,
         int groups) {
-    if ((groups&(1<<forceGroup)) == 0 || excluded)
+    if ((groups&(1<<forceGroup)) == 0)
+        return 0.0;
+
+    // An implicit step computes the forces itself, but it must begin within the range of each link.
+
+    const vector<cylchain::Link>& present = getLinks();
+    const bool anyRange = any_of(present.begin(), present.end(), [] (const cylchain::Link& link) {
+        return hasRange(link.model);
+    });
+    if (excluded && !anyRange)
         return 0.0;
     int outOfRange = -1;
-    const double energy = kernel.getAs<CalcCylinderChainLinkForceKernel>().execute(context, getLinks(), includeForces,
-            includeEnergy, outOfRange);
+    const double energy = kernel.getAs<CalcCylinderChainLinkForceKernel>().execute(context, present,
+            includeForces && !excluded, includeEnergy && !excluded, outOfRange);
     if (outOfRange != -1)
         reportLink(outOfRange);
     return energy;
