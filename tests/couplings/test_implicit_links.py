@@ -119,7 +119,10 @@ def test_without_noise_a_link_relaxes_as_it_should(step, form, scheme):
         # Lags of ten steps, or five of the longer ones.
         assert explicit[0] - explicit[-1] > 1
         first = 1 if step < 1 else 5
-        assert ours[first:] == pytest.approx(explicit[first:], abs=0.02 * (explicit[0] - explicit[-1])), (ours, explicit)
+        assert ours[first:] == pytest.approx(explicit[first:], abs=0.02 * (explicit[0] - explicit[-1])), (
+            ours,
+            explicit,
+        )
     else:
         again = Simulation(network, potential, nodes, np.zeros((1, 0, 3)), scheme, step * MICROSECOND, temperature=0.0)
         again.integrator.step(400)
@@ -269,7 +272,9 @@ def test_thousands_of_links_on_one_place_are_one_stiff_link(scheme):
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("temperature", [0.0, None])
-@pytest.mark.parametrize("potential", [LinkPotential(0.25, 35.0), LinkPotential(10.0), LinkPotential(100.0, 35.0)], ids=str)
+@pytest.mark.parametrize(
+    "potential", [LinkPotential(0.25, 35.0), LinkPotential(10.0), LinkPotential(100.0, 35.0)], ids=str
+)
 def test_links_that_are_stretched_by_micrometers(potential, temperature, scheme):
     """Up to 300 nN: either the link shortens, or an error names what is wrong."""
     simulation = pair(potential, 3000.0, scheme, 1, temperature=temperature)
@@ -314,9 +319,9 @@ def test_positions_that_are_not_finite(value, scheme):
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("form", ["zero", "rest", "stiff"])
-def test_ten_times_too_long_steps_are_right_or_counted(form, scheme):
+def test_a_hundred_times_too_long_steps_are_right_or_counted(form, scheme):
     potential = FORMS[form]
-    simulation = pair(potential, potential.rest_length, scheme, 1.3e4, 100)
+    simulation = pair(potential, potential.rest_length, scheme, 100, 100)
     simulation.integrator.step(10)
     energies = simulation.measure(30, 1)["links"]
     divided = simulation.integrator.getNumDividedSteps() / (200 * 40)
