@@ -34,7 +34,7 @@ LONG, LONG_STIFF = LinkPotential(0.25, 35.0), LinkPotential(100.0, 35.0)
 FENE = LinkPotential(0.25, 35.0, 20.0)
 # Potential, steps in us.
 RANGES = [(SOFT, (20, 50)), (MIDDLE, (2, 50)), (STIFF, (0.1, 1, 50)), (LONG, (2, 10)), (LONG_STIFF, (0.1, 1, 10)),
-          (LinkPotential(0.01, 35.0), (20,)), (FENE, (1, 5))]  # fmt: skip
+          (LinkPotential(0.01, 35.0), (50,)), (FENE, (5,))]  # fmt: skip
 CASES = [(potential, step) for potential, steps in RANGES for step in steps]
 
 
@@ -48,7 +48,9 @@ def check(name, values, exact, allowed=0.01, power=0.01):
     """Within ``allowed`` of ``exact`` and four standard errors, and able to tell 5 %."""
     mean, error = mean_and_error(values)
     assert error < power * exact, f"{name}: the standard error is {error / exact:.4f} of {exact:.4f}"
-    assert abs(mean - exact) < allowed * exact + 4 * error, f"{name}: {mean / exact:.4f} +- {error / exact:.4f} of exact"
+    assert abs(mean - exact) < allowed * exact + 4 * error, (
+        f"{name}: {mean / exact:.4f} +- {error / exact:.4f} of exact"
+    )
 
 
 def run_tree(network, potential, scheme, step, copies, samples, seed=1, interval=1, **options):
@@ -134,7 +136,7 @@ LOOPS = {
     "same place": Network((((0, 1, 0.5), (1, 1, 0.5)),) * 3, 2, 3),
     "three": Network(tuple(((i, 2, 0.5), ((i + 1) % 3, 0, 0.5)) for i in range(3)), 3, 3),
     "four": Network(tuple(((i, 2, 1.0), ((i + 1) % 4, 0, 0.0)) for i in range(4)), 4, 3),
-    "one filament": Network((((0, 1, 0.3), (0, 3, 0.6)),), 1, 5),
+    "one filament": Network((((0, 1, 0.8), (0, 2, 0.2)),), 1, 4),
 }
 
 
@@ -159,8 +161,8 @@ def check_loop(loop, potential, scheme, step, copies, moves, samples, allowed=0.
     for name in ("links", "bending", "stretching"):
         # Both averages began with the same copies: their difference has no more than the sum of their errors.
         exact, error = mean_and_error(expected[name])
-        assert error < 0.015 * exact
-        check(name, energies[name], exact, allowed + 4 * error / exact, 0.015)
+        assert error < 0.02 * exact, f"{name}: the error of Monte Carlo is {error / exact:.4f}"
+        check(name, energies[name], exact, allowed + 4 * error / exact, 0.02)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
@@ -168,7 +170,7 @@ def check_loop(loop, potential, scheme, step, copies, moves, samples, allowed=0.
 @pytest.mark.parametrize("loop", LOOPS)
 @pytest.mark.parametrize("rest_length", [0.0, 35.0])
 def test_loops_agree_with_monte_carlo(rest_length, loop, step, scheme):
-    check_loop(loop, LinkPotential(0.25, rest_length), scheme, step, 150, 4000, 100)
+    check_loop(loop, LinkPotential(0.25, rest_length), scheme, step, 400, 4000, 80)
 
 
 @pytest.mark.slow
@@ -191,5 +193,3 @@ def test_the_noise_of_links_is_their_own(sets, scheme):
     simulation = Simulation(network, single, nodes, particles, scheme, 5 * MICROSECOND, sets=sets)
     energies = simulation.measure(150, 1)
     check("links", energies["links"], 0.5 * double.mean(double.energy))
-
-

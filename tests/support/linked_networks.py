@@ -174,7 +174,9 @@ class Simulation:
                     else:
                         segment, fraction = place[1:]
                         ends.append(
-                            filaments.segment_place(copy * network.filaments + place[0], segment=segment, fraction=fraction)
+                            filaments.segment_place(
+                                copy * network.filaments + place[0], segment=segment, fraction=fraction
+                            )
                         )
                 self.crosslinks[number % sets].add(None, *ends)
         for one in self.crosslinks:
@@ -228,7 +230,7 @@ def monte_carlo(network, potential, nodes, particles, moves, generator, samples=
     energy = of_links(nodes, particles)
     sums = None
     for move in range(moves):
-        scale = 10.0 ** generator.uniform(-3, 0)
+        scale = 10.0 ** generator.uniform(-2, 0)
         new_nodes, new_particles, log_weight = nodes, particles, np.zeros(copies)
         which = generator.integers(network.filaments + network.particles)
         if which >= network.filaments:
@@ -255,7 +257,7 @@ def monte_carlo(network, potential, nodes, particles, moves, generator, samples=
                 axis = generator.normal(size=(copies, 3))
                 axis /= np.linalg.norm(axis, axis=1)[:, None]
                 first = 0 if action == 1 else node
-                angle = scale * (1 if action == 1 else 0.5) * generator.normal(size=(copies, 1, 1))
+                angle = scale * (1 if action == 1 else 0.2) * generator.normal(size=(copies, 1, 1))
                 arms, axis = own[:, first:] - own[:, node : node + 1], axis[:, None]
                 turned = arms * np.cos(angle) + np.cross(axis, arms) * np.sin(angle)
                 turned += axis * np.sum(axis * arms, axis=2, keepdims=True) * (1 - np.cos(angle))
