@@ -239,6 +239,7 @@ bool ContactEquations::anyComeNear(const double* moved) {
 }
 
 bool ContactEquations::finishIteration(const double* moves, const double* moved) {
+    clear = false;
     if (iterations < 2 || anyComeNear(moved) || crossed)
         return true;
     for (size_t i = 0; i < normals.size(); i += 3) {
@@ -250,7 +251,8 @@ bool ContactEquations::finishIteration(const double* moves, const double* moved)
         if (!(change*change < TOLERANCE*TOLERANCE*kT+least))
             return true;
     }
-    return anyCross(moved);
+    clear = !anyCross(moved);
+    return !clear;
 }
 
 /** Whether pairs cross elsewhere than where they were last seen to touch: they are looked at again. */
@@ -259,17 +261,19 @@ bool ContactEquations::anyCross(const double* moved) {
     (*loop)(chunks, [&] (int chunk) {
         parts[chunk].crossed = false;
         for (int i = chunk*CHUNK; i < min(count, (chunk+1)*CHUNK); i++)
-            if (states[i].near && search->crosses(states[i].pair, begun, moved)) {
+            if (search->crosses(states[i].pair, begun, moved)) {
+                states[i].near = parts[chunk].crossed = true;
                 states[i].count = -1;
-                parts[chunk].crossed = true;
             }
     });
     return any_of(parts.begin(), parts.begin()+chunks, [] (const Part& part) {return part.crossed;});
 }
 
 void ContactEquations::findFailures(const double* moved, vector<bool>& failed) const {
+    if (clear)
+        return;
     for (const State& state : states)
-        if (state.near && search->crosses(state.pair, begun, moved))
+        if (search->crosses(state.pair, begun, moved))
             for (int capsule : {state.pair.a, state.pair.b})
                 if (places[capsule].place.pack >= 0)
                     failed[places[capsule].place.chain] = true;

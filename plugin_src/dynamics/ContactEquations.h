@@ -78,7 +78,8 @@ private:
     std::vector<double> searched, motion;
     std::vector<Part> parts;
     std::vector<double> normals;
-    bool crossed = false;
+    /** Whether any contact was crossed where it was evaluated last, and whether none is now. */
+    bool crossed = false, clear = false;
     int iterations = 0;
 };
 

@@ -376,7 +376,10 @@ private:
     /** Add the terms of couplings of a segment, the next ones, to the equations of its nodes. */
     void addTerms(int s, int& next, Row& here, Row& after) {
         for (; next < numTerms && terms[next].node == s; next++) {
-            const CouplingTerm& term = terms[next];
+            CouplingTerm term = terms[next];
+            if (pack.planar)
+                // What is along z moves nothing.
+                term.force[2] = term.stiffness[2] = term.stiffness[4] = term.stiffness[5] = 0;
             const Scalar first = 1-term.fraction, second = term.fraction;
             addTo(here.right, term.lane, term.force, first);
             addTo(after.right, term.lane, term.force, second);
