@@ -1,4 +1,4 @@
-"""Contacts in the equations of implicit steps, of 10 us: who meets whom, what may not cross, and the same to the bit."""
+"""Contacts in the equations of implicit steps of 10 us: what may not cross, what is refused, the same to the bit."""
 
 import itertools
 
@@ -7,7 +7,16 @@ import openmm
 import pytest
 from openmm import unit
 
-from openmm_cylchain import F_ACTIN, Crosslinks, Filaments, Flow, SegmentPlace, capsule_contact_force
+from openmm_cylchain import (
+    F_ACTIN,
+    ContactWarning,
+    Crosslinks,
+    Filaments,
+    Flow,
+    InstabilityError,
+    SegmentPlace,
+    capsule_contact_force,
+)
 from openmm_cylchain.analysis.crossings import CrossingCounter
 from support.contexts import new_context, positions_of
 from support.solvent import KT, TEMPERATURE, VISCOSITY
@@ -147,7 +156,7 @@ def test_systems_and_integrators_from_xml_change_no_bit(scheme):
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_contacts_that_nothing_touches_change_little(scheme):
-    """Far from each other, filaments move as without contacts but for what another solver rounds."""
+    """Far from each other, filaments move as without contacts but for where Newton's method ends."""
     results = []
     for contacts in (False, True):
         filaments = Filaments(VISCOSITY, TEMPERATURE)
@@ -159,7 +168,7 @@ def test_contacts_that_nothing_touches_change_little(scheme):
         context = _context(filaments, system, positions, LARGEST_STEP, scheme, precision="double")
         context.getIntegrator().step(5)
         results.append(positions_of(context))
-    assert np.abs(results[0] - results[1]).max() < 1e-3
+    assert np.abs(results[0] - results[1]).max() < 0.02
 
 
 # Where steps go wrong
@@ -187,7 +196,8 @@ def test_a_filament_that_is_dropped_onto_another_stays_above(scheme, force):
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("step", [LARGEST_STEP, 10 * LARGEST_STEP])
 @pytest.mark.parametrize(
-    "start, direction", [([0, 0, 0], [1, 0, 0]), ([500, 0, 0], [-1, 0, 0]), ([30, 0, 0], [1, 0, 0]), ([0, 5, 0], [1, 0, 0])]
+    "start, direction",
+    [([0, 0, 0], [1, 0, 0]), ([500, 0, 0], [-1, 0, 0]), ([30, 0, 0], [1, 0, 0]), ([0, 5, 0], [1, 0, 0])],
 )
 def test_filaments_on_top_of_each_other_come_apart(scheme, step, start, direction):
     filaments = Filaments(VISCOSITY, TEMPERATURE)
@@ -202,6 +212,50 @@ def test_filaments_on_top_of_each_other_come_apart(scheme, step, start, directio
     energy = context.getState(energy=True, groups={1}).getPotentialEnergy().value_in_unit(unit.kilojoule_per_mole)
     assert np.isfinite(positions_of(context)).all()
     assert energy < 10 * KT
+
+
+@pytest.mark.xfail(
+    strict=True, reason="Pairs that were far at the end of the first iteration are not looked at in the end."
+)
+def test_filaments_do_not_cross_at_joints():
+    """Above the force of a contact a filament may be stopped, or pass with an error; never unnoticed."""
+    for seed in range(1, 7):
+        filaments = Filaments(VISCOSITY, TEMPERATURE)
+        filaments.add_straight(ACTIN, 20, [-1000, 0, 0], [1, 0, 0], clamped=[0, 1, 19, 20])
+        filaments.add_straight(ACTIN, 20, [50, -1000, 45], [0, 1, 0])
+        _, system, positions = filaments.build()
+        system.addForce(capsule_contact_force(filaments, system, DIAMETER, STIFFNESS))
+        weight = openmm.CustomExternalForce(f"{20 * PICONEWTON / 21}*z")
+        for node in filaments.node_indices[1]:
+            weight.addParticle(int(node))
+        system.addForce(weight)
+        context = _context(filaments, system, positions, LARGEST_STEP, seed=seed)
+        try:
+            assert _count_crossings(filaments, context, 100) == 0, seed
+        except InstabilityError:
+            pass
+
+
+@pytest.mark.xfail(strict=True, reason="Spheres that go through a segment in a step are not looked for.")
+def test_a_sphere_does_not_pass_through_a_row_of_rods():
+    """It is pushed by 0.5 pN, by less than 18 nm in a step, onto a grid that is too narrow for it by far."""
+    filaments = Filaments(VISCOSITY, TEMPERATURE)
+    for row in range(-8, 9):
+        filaments.add_straight(ACTIN, 4, [-200, 20 * row, 0], [1, 0, 0], clamped=[0, 1, 3, 4])
+    _, system, positions = filaments.build()
+    sphere = system.addParticle(1.0)
+    positions = np.vstack([positions._value, [0, 10, 40]])
+    spheres = {"particles": [sphere], "particle_diameter": 45.0}
+    with pytest.warns(ContactWarning):
+        system.addForce(capsule_contact_force(filaments, system, 15.0, STIFFNESS, **spheres))
+    push = openmm.CustomExternalForce(f"{0.5 * PICONEWTON}*z+0.01*(x^2+y^2)")
+    push.addParticle(sphere)
+    system.addForce(push)
+    for step, steps in ((LARGEST_STEP / 10, 1000), (LARGEST_STEP, 100)):
+        context = _context(filaments, system, positions, step, particle_friction=2.9e5)
+        for _ in range(steps // 50):
+            context.getIntegrator().step(50)
+            assert positions_of(context)[sphere, 2] > 0, step
 
 
 def _intersections(filaments, positions, edge):
