@@ -258,6 +258,40 @@ def test_a_sphere_does_not_pass_through_a_row_of_rods():
             assert positions_of(context)[sphere, 2] > 0, step
 
 
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("coupling", ["contacts", "links"])
+@pytest.mark.parametrize(
+    "planar, clamped, fixed",
+    [
+        (False, [0, 2, 4], [(0, None), (2, None), (4, None)]),
+        pytest.param(
+            True,
+            [],
+            [(node, 2) for node in range(5)],
+            marks=pytest.mark.xfail(strict=True, reason="Couplings move planar filaments out of their plane."),
+        ),
+    ],
+)
+def test_nodes_that_do_not_move_are_not_moved_by_couplings(scheme, coupling, planar, clamped, fixed):
+    """Clamped nodes, and the height of those of planar filaments."""
+    filaments = Filaments(VISCOSITY, TEMPERATURE)
+    filaments.add_straight(ACTIN, 4, [0, 0, 0], [1, 0, 0], clamped=clamped, planar=planar)
+    filaments.add_straight(ACTIN, 4, [150, -150, 20], [0, 1, 0], clamped=[0, 1, 3, 4])
+    _, system, positions = filaments.build()
+    if coupling == "contacts":
+        system.addForce(capsule_contact_force(filaments, system, DIAMETER, STIFFNESS))
+    else:
+        links = Crosslinks(stiffness=0.1, rest_length=0.0)
+        links.add(None, SegmentPlace(1, 2, 0.5), [150, 0, 50])
+        links.add_to(system)
+    context = _context(filaments, system, positions, LARGEST_STEP, scheme)
+    context.getIntegrator().step(20)
+    moved = positions_of(context) - positions._value
+    assert np.abs(moved).max() > 1
+    for node, axis in fixed:
+        assert np.all(moved[node] == 0.0) if axis is None else moved[node, axis] == 0.0, (node, moved[node])
+
+
 def _intersections(filaments, positions, edge):
     """Number of pairs of segments of different filaments in one plane that lie across each other."""
     nodes = filaments.node_indices
