@@ -11,7 +11,7 @@ from .couplings.contacts import add_exclusions, contact_force, crossing_barrier,
 from .couplings.crosslink_tables import CrosslinkTable
 from .couplings.crosslinks import Crosslinks
 from .couplings.pulling import ConstantVelocityPulling, change_constant_force, constant_force, constant_tension
-from .couplings.walls import Box, Cylinder, Ellipsoid, Plane, Slab, Sphere, wall_force
+from .couplings.walls import Box, Cylinder, Ellipsoid, Plane, Slab, Sphere, filament_wall_force, wall_force
 from .dynamics.recommended_step import fene_steps, recommended_time_step
 from .dynamics.stability import stability_bounds, time_step_bounds
 from .dynamics.time_step import TimeStep, effective_rate
@@ -80,6 +80,7 @@ __all__ = [
     "effective_rate",
     "excluded_pairs",
     "fene_steps",
+    "filament_wall_force",
     "make_trajectory_whole",
     "make_whole",
     "recommended_time_step",

@@ -27,7 +27,7 @@ from .crosslink_computation import lengths_and_vectors, slopes_of
 from .crosslink_tables import CrosslinkTable
 from .link_places import as_places
 from .link_store import LinkStore
-from .native_links import NativeLinks, is_of_compiled_engine
+from .native_links import NativeLinks, is_link_force, is_of_compiled_engine
 from .portable_links import PortableLinks
 
 CROSSLINKS_NAME = "Crosslinks"
@@ -40,8 +40,9 @@ class Crosslinks:
     that every new Context begins with, which can change until ``add_to``. No other crosslink of a Context gets the
     number of one that is removed, unless ``set_pairs`` numbers all of them anew.
 
-    Crosslinks are explicit in every scheme. ``Filaments.recommended_time_step(system=system)`` knows those that the
-    System begins with, or where there are none, one between ends of filaments.
+    The implicit schemes of the compiled engine have crosslinks in their equations, however stiff they are; all other
+    schemes take them at the start of a step. ``Filaments.recommended_time_step(system=system)`` knows those that the
+    System begins with, or where there are none, one between filaments.
 
     Parameters
     ----------
@@ -112,7 +113,7 @@ class Crosslinks:
         native = 0
         for force in system.getForces():
             store = PortableLinks.of_force(force) or NativeLinks.of_force(force, native)
-            native += isinstance(store, NativeLinks)
+            native += is_link_force(force)
             if store is not None:
                 found.append(cls._of(store))
         return found
@@ -384,6 +385,12 @@ class Crosslinks:
         positions = state.getPositions(asNumpy=True)._value
         lengths, _ = lengths_and_vectors(self._model, table, positions, *store.boxes(context, state))
         return table, lengths, slopes_of(self._model, table, lengths)
+
+    @property
+    def default_lengths(self) -> tuple[float, float]:
+        """Rest length and maximum extension, in nm, of a crosslink that is given none; the latter may be infinite."""
+        extension = self._default_extension()
+        return self._defaults[1], float("inf") if extension is None else extension
 
     def thermal_stiffness(self, table: CrosslinkTable | None, temperature: Scalar) -> FloatOrArray:
         """Stiffness of crosslinks where thermal motion takes them, in kJ/(mol nm^2).

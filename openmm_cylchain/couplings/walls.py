@@ -1,19 +1,24 @@
 """Walls that confine filaments: planes, slabs, spheres, cylinders, boxes and ellipsoids.
 
 A wall pushes back what is beyond it, with the energy ``(k/2) d^2`` for the depth d to which a particle has got in.
+``wall_force`` is for every engine and platform, ``filament_wall_force`` for steps that walls do not limit.
 """
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 import openmm
 
+from ..engine_choice import available_engines, choose_engine
 from ..errors import InputError
-from ..units.quantities import LENGTH, STIFFNESS, positive, unit_vector, vector
-from ..units.types import FloatArray, FloatOrArray, Indices, Scalar, Vector
+from ..filaments.collection import FilamentCollection
+from ..units.quantities import LENGTH, STIFFNESS, in_units_of, positive, unit_vector, vector
+from ..units.types import FloatArray, FloatOrArray, Indices, Numbers, Scalar, Vector
+from .contacts import outside_particles
 
 WALL_NAME = "Wall"
 
@@ -21,16 +26,31 @@ WALL_NAME = "Wall"
 _TINY = "1e-30"
 
 
+Region = tuple[str, FloatArray, FloatArray, float]
+
+
 class Shape(ABC):
     """A region that particles are kept in.
 
     ``expression`` is the square of the depth d beyond the wall in OpenMM's syntax, a function of x, y and z in nm.
+    ``region`` is what a CylinderChainWallForce knows it by, and ``room`` the largest radius, exclusive, of a particle
+    that fits in.
     """
 
     @property
     @abstractmethod
     def expression(self) -> str:
         """The square of the depth for OpenMM."""
+
+    @property
+    @abstractmethod
+    def region(self) -> Region:
+        """Name, point, vector and length for the compiled engine."""
+
+    @property
+    @abstractmethod
+    def room(self) -> float:
+        """In nm."""
 
     @abstractmethod
     def square_depth(self, positions: npt.ArrayLike) -> FloatOrArray:
@@ -77,6 +97,14 @@ class Plane(Shape):
     def expression(self) -> str:
         return _beyond(f"-{_along(self.point, self.normal)}")
 
+    @property
+    def region(self) -> Region:
+        return ("plane", self.point, self.normal, 0.0)
+
+    @property
+    def room(self) -> float:
+        return math.inf
+
     def square_depth(self, positions: npt.ArrayLike) -> FloatOrArray:
         return np.maximum(0.0, -((np.asarray(positions) - self.point) @ self.normal)) ** 2
 
@@ -110,6 +138,14 @@ class Slab(Shape):
     def expression(self) -> str:
         return _beyond(f"abs({_along(self.point, self.normal)})-{_number(0.5 * self.thickness)}")
 
+    @property
+    def region(self) -> Region:
+        return ("slab", self.point, self.normal, self.thickness)
+
+    @property
+    def room(self) -> float:
+        return 0.5 * self.thickness
+
     def square_depth(self, positions: npt.ArrayLike) -> FloatOrArray:
         height = np.abs((np.asarray(positions) - self.point) @ self.normal)
         return np.maximum(0.0, height - 0.5 * self.thickness) ** 2
@@ -140,6 +176,14 @@ class Sphere(Shape):
     def expression(self) -> str:
         squares = "+".join(f"({name}-{_number(c)})^2" for name, c in zip("xyz", self.center))
         return _beyond(f"sqrt({squares}+{_TINY})-{_number(self.radius)}")
+
+    @property
+    def region(self) -> Region:
+        return ("sphere", self.center, np.zeros(3), self.radius)
+
+    @property
+    def room(self) -> float:
+        return self.radius
 
     def square_depth(self, positions: npt.ArrayLike) -> FloatOrArray:
         distance = np.linalg.norm(np.asarray(positions) - self.center, axis=-1)
@@ -182,6 +226,14 @@ class Cylinder(Shape):
         first, second = (_along(self.point, direction) for direction in self._across())
         return _beyond(f"sqrt({first}^2+{second}^2+{_TINY})-{_number(self.radius)}")
 
+    @property
+    def region(self) -> Region:
+        return ("cylinder", self.point, self.axis, self.radius)
+
+    @property
+    def room(self) -> float:
+        return self.radius
+
     def square_depth(self, positions: npt.ArrayLike) -> FloatOrArray:
         across = (np.asarray(positions) - self.point) @ np.transpose(self._across())
         return np.maximum(0.0, np.linalg.norm(across, axis=-1) - self.radius) ** 2
@@ -214,6 +266,14 @@ class Box(Shape):
     def expression(self) -> str:
         pairs = zip("xyz", self.lower, self.upper)
         return "+".join(f"max(0, max({_number(a)}-{name}, {name}-{_number(b)}))^2" for name, a, b in pairs)
+
+    @property
+    def region(self) -> Region:
+        return ("box", self.lower, self.upper, 0.0)
+
+    @property
+    def room(self) -> float:
+        return 0.5 * float(np.min(self.upper - self.lower))
 
     def square_depth(self, positions: npt.ArrayLike) -> FloatOrArray:
         positions = np.asarray(positions)
@@ -261,6 +321,14 @@ class Ellipsoid(Shape):
         # Less than anywhere outside, for a quotient that is finite at the center.
         return 0.25 / np.max(self.semi_axes) ** 2
 
+    @property
+    def region(self) -> Region:
+        return ("ellipsoid", self.center, self.semi_axes, 0.0)
+
+    @property
+    def room(self) -> float:
+        return float(np.min(self.semi_axes))
+
     def square_depth(self, positions: npt.ArrayLike) -> FloatOrArray:
         relative = np.asarray(positions) - self.center
         s = np.sqrt(np.sum((relative / self.semi_axes) ** 2, axis=-1))
@@ -276,6 +344,7 @@ def wall_force(shape: Shape, stiffness: Scalar, particles: Indices) -> openmm.Cu
     """A CustomExternalForce with the energy (k/2) d^2 of each particle, for its depth d beyond a wall.
 
     It is explicit in every scheme: ``Filaments.recommended_time_step(system=system)`` says which step it allows.
+    ``filament_wall_force`` makes walls that implicit schemes have in their equations.
 
     Parameters
     ----------
@@ -304,3 +373,89 @@ def wall_force(shape: Shape, stiffness: Scalar, particles: Indices) -> openmm.Cu
     for particle in particles:
         force.addParticle(int(particle), [])
     return force
+
+
+def filament_wall_force(
+    filaments: FilamentCollection,
+    system: openmm.System,
+    shape: Shape,
+    stiffness: Scalar,
+    radius: Numbers = 0.0,
+    particles: Indices = (),
+    particle_radius: Numbers = 0.0,
+) -> Any:
+    """A wall around the nodes of filaments, which implicit schemes have in their equations.
+
+    The energy is ``(k/2) d^2`` for the depth d to which a node, or a sphere around it, gets beyond the wall: that of
+    ``wall_force`` at a radius of zero. Schemes "implicit" and "implicit-second-order" take the wall at the end of the
+    step and mirror what would diffuse into it, so that its stiffness does not limit their steps. In other schemes, and
+    in other Integrators, it is explicit.
+
+    Parameters
+    ----------
+    filaments : Filaments
+        In the System.
+    system : openmm.System
+        The force is not added to it.
+    shape : Shape
+    stiffness : energy/length^2
+        k. A node gets ``(k_BT/k)^(1/2)`` beyond the wall.
+    radius : length, or (filaments,) array of lengths
+        Distance from the wall that axes of filaments keep, such as half their diameter.
+    particles : sequence of int
+        Particles outside filaments that the wall keeps in, too.
+    particle_radius : length, or array of lengths, one for each of ``particles``
+
+    Returns
+    -------
+    CylinderChainWallForce
+        To be added to the System. It works on the Reference and CPU platforms. ``setRegion``, ``setStiffness`` and
+        ``updateParametersInContext`` move and change the wall.
+
+    Raises
+    ------
+    InputError
+        If the compiled engine is missing, for a shape that is none, a stiffness that is not positive, a radius that is
+        negative or does not fit in, or a particle that does not exist or is one of the filaments'.
+    """
+    choose_engine("compiled")
+    from .. import plugin
+
+    if not isinstance(shape, Shape):
+        raise InputError(f"shape must be a Shape such as Sphere, but is {shape!r}.")
+    stiffness = positive(stiffness, STIFFNESS, "stiffness")
+    radii = _radii(radius, len(filaments), "radius", shape)
+    spheres = outside_particles(filaments, system, particles)
+    sphere_radii = _radii(particle_radius, len(spheres), "particle_radius", shape)
+    name, point, direction, length = shape.region
+    force = plugin.CylinderChainWallForce(name, openmm.Vec3(*point), openmm.Vec3(*direction), length, stiffness)
+    force.setName(f"CylinderChainWallForce ({name})")
+    for nodes, value in zip(filaments.node_indices, radii):
+        for node in nodes:
+            force.addParticle(int(node), float(value))
+    for particle, value in zip(spheres, sphere_radii):
+        force.addParticle(int(particle), float(value))
+    return force
+
+
+def _radii(value, count, name, shape):
+    values = np.asarray(in_units_of(value, LENGTH, name))
+    if values.ndim and values.shape != (count,):
+        raise InputError(f"{name} must be a number or have {count} entries, but has the shape {values.shape}.")
+    values = np.broadcast_to(values, (count,))
+    if not np.all(values >= 0.0):
+        raise InputError(f"{name} cannot be negative, but is {values.min():g}.")
+    if not np.all(values < shape.room):
+        raise InputError(f"{name} must be below {shape.room:g} nm to fit into the shape, but is {values.max():g}.")
+    return values
+
+
+def as_filament_wall_force(force: openmm.Force) -> Any | None:
+    """A force as the CylinderChainWallForce that it is, or None if it is another one."""
+    if available_engines()["compiled"] is not None:
+        return None
+    from .. import plugin
+
+    if not plugin.CylinderChainWallForce.isinstance(force):
+        return None
+    return plugin.CylinderChainWallForce.cast(force)

@@ -25,13 +25,14 @@ from ..couplings.contacts import CONTACT_STIFFNESS, is_contact_force
 from ..couplings.crosslinks import Crosslinks
 from ..couplings.native_links import is_link_force
 from ..couplings.pulling import is_constant_force
-from ..couplings.walls import WALL_NAME
+from ..couplings.walls import WALL_NAME, as_filament_wall_force
 from ..errors import TimeStepWarning
 from ..filaments.collection import FilamentCollection
 from ..units.types import FloatArray, Indices, IntArray, Numbers
+from .coupled_step import is_coupled
 from .mobility import FilamentResponse
 from .other_particles import describe_other_particles
-from .schemes import EXPLICIT_SCHEMES
+from .schemes import EXPLICIT_SCHEMES, IMPLICIT_SCHEMES
 from .time_step import TimeStep
 
 ACCURATE = 2.0 * (1.0 - 1.0 / 1.05)
@@ -380,9 +381,14 @@ class ExplicitForces:
 
     def _read(self, force, label):
         # A list of Springs, or None where the stiffness is not known.
+        if self._scheme in IMPLICIT_SCHEMES and is_coupled(force):
+            return []
         capsules = as_capsule_contact_force(force)
         if capsules is not None:
             return self._between_capsules(label, capsules)
+        wall = as_filament_wall_force(force)
+        if wall is not None:
+            return self._at_wall(label, wall)
         links = Crosslinks.of_force(force)
         if links is not None or is_link_force(force):
             return None if links is None else self._crosslinks(links, label)
@@ -401,6 +407,13 @@ class ExplicitForces:
             if any(name.startswith("cylinder_chain") for name in dict(force.getGlobalParameters())):
                 return []
         return None
+
+    def _at_wall(self, label, wall):
+        particles = [wall.getParticle(index) for index in range(wall.getNumParticles())]
+        # Implicit steps have the wall in their equations, unless a virtual site is at it.
+        if self._scheme in IMPLICIT_SCHEMES and not any(map(self._system.isVirtualSite, particles)):
+            return []
+        return [Springs.at_points(label, "entry", particles, wall.getStiffness()._value)]
 
     def _crosslinks(self, links, label):
         table = links.table(None)

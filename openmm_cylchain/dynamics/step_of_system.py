@@ -4,15 +4,17 @@ from collections import Counter
 
 import openmm
 
+from ..couplings.capsule_contacts import as_capsule_contact_force
 from ..couplings.contacts import default_stiffness, filament_diameters, is_contact_force
 from ..errors import InputError
 from ..filaments.attachments import BEAD_NAME
 from ..filaments.collection import FilamentCollection
 from ..mechanics.flow import Flow
 from ..units.types import Numbers, Scalar
+from .coupled_step import steps_of_couplings
 from .explicit_forces import ExplicitForces
 from .recommended_step import contact_diffusion_step, contact_time_step, recommended_time_step
-from .schemes import check_scheme
+from .schemes import IMPLICIT_SCHEMES, check_scheme
 from .time_step import TimeStep, shortest
 
 
@@ -38,7 +40,9 @@ def recommended_step_of(
     elif contact_stiffness is not None:
         raise InputError("A contact_stiffness needs a contact_diameter.")
     if system is not None:
-        steps += _steps_of_diffusion(filaments, system, temperature, confidence)
+        steps += _steps_of_diffusion(filaments, system, temperature, confidence, scheme)
+        if scheme in IMPLICIT_SCHEMES:
+            steps += steps_of_couplings(filaments, system, temperature, particle_friction)
         steps.append(ExplicitForces(system, filaments, scheme, particle_friction).recommended_step())
     return shortest(steps)
 
@@ -77,10 +81,17 @@ def _step_of_contacts(filaments, diameter, stiffness, confidence):
     return shortest(steps)
 
 
-def _steps_of_diffusion(filaments, system, temperature, confidence):
-    # Of filaments that a contact force of the System keeps apart.
+def _steps_of_diffusion(filaments, system, temperature, confidence, scheme):
+    # Of filaments that a contact force of the System keeps apart, unless it is in the equations of the step.
     found = {}
     for force in system.getForces():
+        capsules = None if scheme in IMPLICIT_SCHEMES else as_capsule_contact_force(force)
+        if capsules is not None:
+            owners = {int(nodes[0]): filament for filament, nodes in zip(filaments, filaments.node_indices)}
+            for chain in range(capsules.getNumChains()):
+                filament = owners.get(capsules.getChainParticles(chain)[0])
+                if filament is not None:
+                    found[filament.type, filament.segments, capsules.getChainDiameter(chain)._value] = True
         if is_contact_force(force):
             for filament, beads in zip(filaments, filaments.bead_indices):
                 diameter = force.getParticleParameters(int(beads[0]))[0] if len(beads) else 0.0

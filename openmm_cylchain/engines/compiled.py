@@ -289,12 +289,13 @@ class NativeIntegrator(CylinderChainIntegrator):
         Raises
         ------
         InstabilityError
-            If a chain or a particle blows up; positions are then those before the failing step.
+            If a chain, a particle or a FENE crosslink blows up; positions are then those before the failing step.
         TimeStepError
             If more than one in ten steps of filaments had to be divided, or if the step is far too long for the forces.
         InputError
             If a filament was torn because positions were wrapped into a periodic box, or if a segment of the positions
-            that were set is longer or shorter than its FENE potential allows.
+            that were set is longer or shorter than its FENE potential allows; if it is not known which crosslinks the
+            Context has, because its State is from elsewhere.
         """
         steps = whole_number(steps, 0, "steps")
         if not self.checks:

@@ -310,6 +310,8 @@ class CrosslinkReporter(_TableReporter):
     kJ/(mol nm), positive where it pulls. A crosslink is known by its number, which no other one gets when it is
     removed. Since each report may have more or fewer, ``reporter["force"]`` is an array (lines,) as in the file, beside
     ``reporter["step"]``, ``reporter["time_ps"]`` and ``reporter["crosslink"]``; ``count`` says how many a report has.
+    Of a place on a segment, the particle is that at fraction 0; of a fixed point it is -1. The force of a crosslink
+    that is off is zero.
 
     Parameters
     ----------

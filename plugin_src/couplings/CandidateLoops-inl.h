@@ -28,7 +28,7 @@ CYLCHAIN_INLINE Floats load(const float* values) {
 }
 
 CYLCHAIN_INLINE Floats magnitude(Floats value) {
-    return value > -value ? value : -value;
+    return (Floats) ((Ints) value & 0x7fffffff);
 }
 
 CYLCHAIN_INLINE Floats clamped(Floats value) {

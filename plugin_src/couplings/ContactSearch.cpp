@@ -81,9 +81,19 @@ struct Frame {
 /** The box that a capsule sweeps in a step, in fractions of the frame. */
 struct Described {
     bool finite;
-    int cell, images[3];
+    int cell;
     double center[3], half[3];
     CoarseCapsule coarse;
+};
+
+/** A capsule as it is at the start, for the order of cells: those that are near each other are so in memory. */
+struct PlacedCapsule {
+    int number;
+    bool hasExclusions;
+    Capsule capsule;
+    /** What was taken off to get its center into the frame. */
+    int images[3];
+    Vec3d first, along;
 };
 
 /** What one part of the search finds. */
@@ -174,11 +184,13 @@ struct ContactSearch::Implementation {
     Frame frame;
     double reach = 0, largestRadius = 0;
     vector<Described> described;
+    vector<PlacedCapsule> placed, sortedPlaced;
     vector<int> cellStart, members;
     vector<float> boxes;
     vector<CoarseCapsule> sorted;
     SweptBoxes sweptBoxes;
     float margin = 0, imageShifts[4*NUM_IMAGES];
+    double largestHalf[3];
     vector<Part> parts;
     vector<size_t> firstOf;
 
@@ -190,17 +202,20 @@ struct ContactSearch::Implementation {
     Vec3d along(const Capsule& capsule, const double* positions) const;
     SegmentPair segments(int a, int b, const double* shift, const double* positions) const;
     void setFrame(const double* x, const double* y, const double* box);
-    void describe(int i, const double* x, const double* y);
+    void describe(int i, const double* x, const double* y, Described& result, PlacedCapsule& place) const;
+    void searchAround(int i, const double* x, const double* y, double slack, Part& part) const;
     void checkPositions(const double* x, const double* y) const;
     void setCells();
     void searchCells(int part, const double* x, const double* y);
     int findRows(int column, int iz, CapsuleRow* rows) const;
-    void addPair(int i, int j, int image, const double* x, const double* y, Part& part) const;
+    void addPair(const PlacedCapsule& one, const PlacedCapsule& other, const int* images, bool sure, const double* x,
+            const double* y, Part& part) const;
+    bool areNeighbors(const Capsule& first, const Capsule& second) const;
     void gather(vector<ContactPair>& pairs);
     SegmentPair withNeighbor(const SegmentPair& segments, int neighbor, bool ofA, bool atEnd,
             const double* positions) const;
-    bool isOwned(const Contact& contact, const ContactPair& pair, const SegmentPair& end, bool parallel, bool ofA,
-            const double* x, const double* y) const;
+    bool isOwned(const Contact& contact, const ContactPair& pair, const SegmentPair& start, const SegmentPair& end,
+            bool parallel, bool ofA, const double* x, const double* y) const;
     int evaluate(const ContactPair& pair, const double* x, const double* y, Contact* contacts, double limit) const;
 };
 
@@ -243,22 +258,27 @@ ContactSearch::Implementation::Implementation(const CapsuleSystem& system, bool 
     for (vector<int>& others : excluded)
         sort(others.begin(), others.end());
     described.resize(capsules.size());
+    placed.resize(capsules.size());
+    sortedPlaced.resize(capsules.size());
+}
+
+/** Whether two capsules share a particle or are near each other in a chain. */
+bool ContactSearch::Implementation::areNeighbors(const Capsule& first, const Capsule& second) const {
+    if (first.first == second.first || first.end() == second.end() || first.first == second.end() ||
+            first.end() == second.first)
+        return true;
+    if (first.chain < 0 || first.chain != second.chain)
+        return false;
+    const CapsuleChain& chain = system.chains[first.chain];
+    int apart = abs(first.index-second.index);
+    if (chain.closed)
+        apart = min(apart, chain.numCapsules-apart);
+    return apart <= chain.excludedNeighbors;
 }
 
 bool ContactSearch::Implementation::isExcluded(int a, int b) const {
-    const Capsule &first = system.capsules[a], &second = system.capsules[b];
-    if (a == b || first.first == second.first || first.end() == second.end() || first.first == second.end() ||
-            first.end() == second.first)
-        return true;
-    if (first.chain >= 0 && first.chain == second.chain) {
-        const CapsuleChain& chain = system.chains[first.chain];
-        int apart = abs(first.index-second.index);
-        if (chain.closed)
-            apart = min(apart, chain.numCapsules-apart);
-        if (apart <= chain.excludedNeighbors)
-            return true;
-    }
-    return !excluded[a].empty() && binary_search(excluded[a].begin(), excluded[a].end(), b);
+    return a == b || areNeighbors(system.capsules[a], system.capsules[b]) ||
+            (!excluded[a].empty() && binary_search(excluded[a].begin(), excluded[a].end(), b));
 }
 
 Vec3d ContactSearch::Implementation::along(const Capsule& capsule, const double* positions) const {
@@ -314,13 +334,14 @@ void ContactSearch::Implementation::setFrame(const double* x, const double* y, c
 }
 
 /** Find the box, in fractions of the frame, that a capsule sweeps. */
-void ContactSearch::Implementation::describe(int i, const double* x, const double* y) {
+void ContactSearch::Implementation::describe(int i, const double* x, const double* y, Described& result,
+        PlacedCapsule& place) const {
     const Capsule& capsule = system.capsules[i];
     const Vec3d x0 = position(x, capsule.first)-frame.origin, p = along(capsule, x);
     const Vec3d y0 = position(y, capsule.first)-frame.origin, q = x == y ? p : along(capsule, y);
     const Vec3d ends[] = {frame.toFractions(x0), frame.toFractions(x0+p), frame.toFractions(y0),
             frame.toFractions(y0+q)};
-    Described& result = described[i];
+    place = {i, !excluded[i].empty(), capsule, {0, 0, 0}, x0, p};
     double center[3];
     for (int k = 0; k < 3; k++) {
         const double f[] = {component(ends[0], k), component(ends[1], k), component(ends[2], k), component(ends[3], k)};
@@ -330,8 +351,9 @@ void ContactSearch::Implementation::describe(int i, const double* x, const doubl
             return;
         const double lower = smallestOf(f[0], f[1], f[2], f[3]), upper = largestOf(f[0], f[1], f[2], f[3]);
         center[k] = 0.5*(lower+upper);
-        result.images[k] = frame.periodic ? (int) floor(center[k]) : 0;
-        result.center[k] = center[k]-result.images[k];
+        if (frame.periodic)
+            place.images[k] = (int) floor(center[k]);
+        result.center[k] = center[k]-place.images[k];
         result.half[k] = 0.5*(upper-lower)+(capsule.radius+0.5*reach)*frame.inverseWidths[k]+SINGLE_ROUNDING;
     }
     const Vec3d unwrapped = frame.toVector({center[0], center[1], center[2]});
@@ -360,7 +382,8 @@ void ContactSearch::Implementation::checkPositions(const double* x, const double
 /** Divide the frame into cells, and sort capsules by them. Capsules in cells that are not neighbors do not meet. */
 void ContactSearch::Implementation::setCells() {
     const int count = described.size();
-    double largestHalf[3] = {0, 0, 0}, largestLength = 0;
+    double largestLength = 0;
+    fill(largestHalf, largestHalf+3, 0.0);
     for (const Described& capsule : described) {
         for (int k = 0; k < 3; k++)
             largestHalf[k] = max(largestHalf[k], capsule.half[k]);
@@ -380,7 +403,8 @@ void ContactSearch::Implementation::setCells() {
             throw invalid_argument("The periodic box is too small for contacts: its width along vector "+
                     to_string(k)+" is "+to_string(frame.widths[k])+", but twice the largest extent of a capsule in a "
                     "step with its diameter and the reach of the search is "+
-                    to_string(4*largestHalf[k]*frame.widths[k])+". Take a larger box or shorter segments, and chains that are whole");
+                    to_string(4*largestHalf[k]*frame.widths[k])+". Take a larger box or shorter segments, and "
+                    "chains that are whole");
         frame.cells[k] = max(1.0, floor(min(0.5/largestHalf[k], frame.periodic ? mostCells : 4*mostCells)));
     }
     // Where capsules fill a part of the frame only, there are more cells.
@@ -422,8 +446,10 @@ void ContactSearch::Implementation::setCells() {
             half[i] = described[members[i]].half[k];
         }
     }
-    for (int i = 0; i < count; i++)
+    for (int i = 0; i < count; i++) {
         sorted[i] = described[members[i]].coarse;
+        sortedPlaced[i] = placed[members[i]];
+    }
 }
 
 /** Find the rows of capsules in half of the neighbors of a cell: each two cells, in each image, meet once. */
@@ -478,8 +504,11 @@ void ContactSearch::Implementation::searchCells(int column, const double* x, con
     int count = 0;
     auto look = [&] {
         count = kernels.keepNear(sorted.data(), imageShifts, reach, margin, part.candidates(0), count);
-        for (int i = 0; i < count; i++)
-            addPair(members[part.first[i]], members[part.second[i]], part.image[i], x, y, part);
+        for (int i = 0; i < count; i++) {
+            const int image = part.image[i]%SURE, images[3] = {image/9-1, image/3%3-1, image%3-1};
+            addPair(sortedPlaced[part.first[i]], sortedPlaced[part.second[i]], images, part.image[i] >= SURE, x, y,
+                    part);
+        }
         count = 0;
     };
     CapsuleRow rows[32];
@@ -504,24 +533,62 @@ void ContactSearch::Implementation::searchCells(int column, const double* x, con
     look();
 }
 
-/** Add a pair if it is near enough, in double precision where there is doubt. */
-void ContactSearch::Implementation::addPair(int i, int j, int image, const double* x, const double* y,
+/** Look for pairs with one capsule, in all cells that it may reach now. */
+void ContactSearch::Implementation::searchAround(int i, const double* x, const double* y, double slack,
         Part& part) const {
-    const int a = min(i, j), b = max(i, j);
-    if (isExcluded(a, b))
+    Described own;
+    PlacedCapsule place;
+    describe(i, x, y, own, place);
+    if (!own.finite)
         return;
-    // Where images are wrapped into the frame, j is taken by some vectors of the frame to where it is near i.
-    const bool sure = image >= SURE;
-    image %= SURE;
-    const int images[3] = {image/9-1, image/3%3-1, image%3-1};
+    int lower[3], upper[3];
+    for (int k = 0; k < 3; k++) {
+        own.half[k] += slack*frame.inverseWidths[k];
+        lower[k] = (int) floor((own.center[k]-own.half[k]-largestHalf[k])*frame.cells[k]);
+        upper[k] = (int) floor((own.center[k]+own.half[k]+largestHalf[k])*frame.cells[k]);
+        if (!frame.periodic) {
+            lower[k] = max(lower[k], 0);
+            upper[k] = min(upper[k], frame.cells[k]-1);
+        }
+    }
+    int cell[3];
+    for (cell[0] = lower[0]; cell[0] <= upper[0]; cell[0]++)
+        for (cell[1] = lower[1]; cell[1] <= upper[1]; cell[1]++)
+            for (cell[2] = lower[2]; cell[2] <= upper[2]; cell[2]++) {
+                int images[3], number = 0;
+                for (int k = 0; k < 3; k++) {
+                    images[k] = (int) floor((double) cell[k]/frame.cells[k]);
+                    number = number*frame.cells[k]+cell[k]-images[k]*frame.cells[k];
+                }
+                for (int other = cellStart[number]; other < cellStart[number+1]; other++) {
+                    bool overlaps = true;
+                    for (int k = 0; k < 3; k++)
+                        overlaps &= fabs(sweptBoxes.center[k][other]+images[k]-own.center[k]) <=
+                                sweptBoxes.half[k][other]+own.half[k];
+                    if (overlaps && members[other] != i)
+                        addPair(place, sortedPlaced[other], images, false, x, y, part);
+                }
+            }
+}
+
+/** Add a pair if it is near enough, in double precision where there is doubt. */
+void ContactSearch::Implementation::addPair(const PlacedCapsule& one, const PlacedCapsule& other, const int* images,
+        bool sure, const double* x, const double* y, Part& part) const {
+    const bool inOrder = one.number < other.number;
+    const PlacedCapsule &first = inOrder ? one : other, &second = inOrder ? other : one;
+    const int a = first.number, b = second.number;
+    if (areNeighbors(first.capsule, second.capsule) || (first.hasExclusions && isExcluded(a, b)))
+        return;
+    // Where images are wrapped into the frame, the other one is taken by some vectors of it to where it is near.
     double number[3];
     for (int k = 0; k < 3; k++)
-        number[k] = (i < j ? 1 : -1)*(described[j].images[k]-described[i].images[k]-images[k]);
+        number[k] = (inOrder ? 1 : -1)*(other.images[k]-one.images[k]-images[k]);
     const Vec3d shift = frame.toVector({number[0], number[1], number[2]});
     ContactPair pair = {a, b, {shift.x, shift.y, shift.z}, 0};
-    const SegmentPair start = segments(a, b, pair.shift, x);
+    const SegmentPair start = {first.along, second.along, first.first-second.first+shift};
     if (!sure) {
-        const double limit = radii(a, b)+reach, before = sqrt(findNearestPoints(start).squared);
+        const double limit = first.capsule.radius+second.capsule.radius+reach;
+        const double before = sqrt(findNearestPoints(start).squared);
         if (before >= limit) {
             if (x == y)
                 return;
@@ -569,8 +636,8 @@ SegmentPair ContactSearch::Implementation::withNeighbor(const SegmentPair& segme
 }
 
 /** Get whether a contact belongs to its pair, or to a neighbor of a, or of b, in its chain. */
-bool ContactSearch::Implementation::isOwned(const Contact& contact, const ContactPair& pair, const SegmentPair& end,
-        bool parallel, bool ofA, const double* x, const double* y) const {
+bool ContactSearch::Implementation::isOwned(const Contact& contact, const ContactPair& pair, const SegmentPair& start,
+        const SegmentPair& end, bool parallel, bool ofA, const double* x, const double* y) const {
     const int own = ofA ? pair.a : pair.b, other = ofA ? pair.b : pair.a;
     const double fraction = ofA ? contact.s : contact.t, sum = radii(pair.a, pair.b);
     const double least = LEAST_DIFFERENCE*(sum+fabs(contact.gap));
@@ -582,11 +649,14 @@ bool ContactSearch::Implementation::isOwned(const Contact& contact, const Contac
             continue;
         if (!atJoint) {
             // If the distance from the other capsule grows as one goes from the joint into the neighbor, that has no
-            // place nearer than the joint.
+            // place nearer than the joint, unless it has been crossed.
             const Vec3d joint = (ofA ? end.w : end.w*-1)+ownAlong*(atEnd ? 1 : 0);
             const Vec3d fromOther = joint-otherAlong*nearestFraction(otherAlong, joint*-1);
             const Vec3d into = along(system.capsules[neighbor], y)*(atEnd ? 1 : -1);
-            if (fromOther.dot(into) >= 0 && sqrt(fromOther.squared())-sum > contact.gap+2*least)
+            const double distance = sqrt(fromOther.squared());
+            if (fromOther.dot(into) >= 0 && distance-sum > contact.gap+2*least &&
+                    (x == y || distance > largestMotion(withNeighbor(start, neighbor, ofA, atEnd, x),
+                    withNeighbor(end, neighbor, ofA, atEnd, y))))
                 continue;
         }
         const SegmentPair beside = withNeighbor(end, neighbor, ofA, atEnd, y);
@@ -603,8 +673,8 @@ bool ContactSearch::Implementation::isOwned(const Contact& contact, const Contac
                 return false;
             continue;
         }
-        const SegmentPair start = segments(pair.a, pair.b, pair.shift, x);
-        const double gap = findGap(withNeighbor(start, neighbor, ofA, atEnd, x), beside, radii(neighbor, other));
+        const SegmentPair before = x == y ? beside : withNeighbor(start, neighbor, ofA, atEnd, x);
+        const double gap = findGap(before, beside, radii(neighbor, other));
         // What differs by rounding is equal. Then the one that ends there counts.
         if (parallel || atEnd ? gap < contact.gap-least : !(contact.gap < gap-least))
             return false;
@@ -616,9 +686,9 @@ int ContactSearch::Implementation::evaluate(const ContactPair& pair, const doubl
         Contact* contacts, double limit) const {
     const SegmentPair end = segments(pair.a, pair.b, pair.shift, y);
     const double sum = radii(pair.a, pair.b);
+    const SegmentPair start = x == y ? end : segments(pair.a, pair.b, pair.shift, x);
     const Places places = findPlaces(end);
     if (x != y) {
-        const SegmentPair start = segments(pair.a, pair.b, pair.shift, x);
         Crossing crossing;
         if (places.distance <= largestMotion(start, end) && findCrossing(start, end, crossing)) {
             const Vec3d& n = crossing.normal;
@@ -640,8 +710,8 @@ int ContactSearch::Implementation::evaluate(const ContactPair& pair, const doubl
             continue;
         const Vec3d n = length > 0 ? r*(1/length) : findNormal(end, pair.side);
         const Contact contact = {s, t, {n.x, n.y, n.z}, length-sum, 1.0/count, false};
-        if (isOwned(contact, pair, end, places.parallel, true, x, y) &&
-                isOwned(contact, pair, end, places.parallel, false, x, y))
+        if (isOwned(contact, pair, start, end, places.parallel, true, x, y) &&
+                isOwned(contact, pair, start, end, places.parallel, false, x, y))
             contacts[kept++] = contact;
     }
     return kept;
@@ -686,7 +756,7 @@ void ContactSearch::findPairs(const double* x, const double* y, const double* bo
     search.setFrame(x, y, box);
     runParts((count+CHUNK-1)/CHUNK, [&] (int chunk) {
         for (int i = chunk*CHUNK; i < min(count, (chunk+1)*CHUNK); i++)
-            search.describe(i, x, y);
+            search.describe(i, x, y, search.described[i], search.placed[i]);
     });
     search.checkPositions(x, y);
     search.setCells();
@@ -695,6 +765,22 @@ void ContactSearch::findPairs(const double* x, const double* y, const double* bo
         search.parts.resize(columns);
     runParts(columns, [&] (int column) {search.searchCells(column, x, y);});
     search.gather(pairs);
+}
+
+void ContactSearch::findPairsOf(const vector<int>& capsules, const double* x, const double* y, double slack,
+        vector<ContactPair>& pairs) const {
+    Part part;
+    for (int capsule : capsules)
+        implementation->searchAround(capsule, x, y, slack, part);
+    auto isBefore = [] (const ContactPair& one, const ContactPair& other) {
+        return one.a < other.a || (one.a == other.a && one.b < other.b);
+    };
+    sort(part.pairs.begin(), part.pairs.end(), isBefore);
+    // Two capsules of those asked for have found each other twice.
+    part.pairs.erase(unique(part.pairs.begin(), part.pairs.end(), [] (const ContactPair& one, const ContactPair& other) {
+        return one.a == other.a && one.b == other.b;
+    }), part.pairs.end());
+    pairs.swap(part.pairs);
 }
 
 int ContactSearch::evaluate(const ContactPair& pair, const double* x, const double* y, Contact* contacts,

@@ -50,6 +50,16 @@ public:
     void findPairs(const double* x, const double* y, const double* box, double reach, std::vector<ContactPair>& pairs,
             const LoopRunner& run = LoopRunner());
     /**
+     * Find the same pairs as far as some capsules are in them, after a search with another y. This takes less time where
+     * they are few.
+     *
+     * @param capsules  some capsules
+     * @param slack     how far others have moved since that search, at most
+     * @param pairs     receives the pairs, sorted by a and b
+     */
+    void findPairsOf(const std::vector<int>& capsules, const double* x, const double* y, double slack,
+            std::vector<ContactPair>& pairs) const;
+    /**
      * Find the contacts of a pair at y: none, one or two. Several threads may do so at the same time. With
      * nearestImages, the box is that of the last search.
      *
@@ -62,7 +72,7 @@ public:
      *   goes on into the other segment.
      * - Of two segments that both touch the same capsule on the inner side of a bend, the one with the lesser gap
      *   counts. The energy is continuous where that changes from one to the other, as long as the chain's radius of
-     *   curvature is more than twice the distance at which capsules touch.
+     *   curvature is more than twice the distance at which capsules touch. A neighbor that was crossed counts alone.
      *
      * Capsules that are excluded do not take contacts from their neighbors.
      *

@@ -11,13 +11,15 @@ namespace {
 /** How near pairs come that are looked at in a step, over their diameter: further iterations move them. */
 const double REACH = 0.8;
 /** The largest overlap that is mirrored, over the same. */
-const double LARGEST_MIRRORED = 0.33;
+const double LARGEST_MIRRORED = 0.5;
 /** Pairs with a larger gap are only looked at again if they may have come near, over the same. */
 const double LARGEST_GAP = 0.3;
 /** The largest change of a gap in the last iteration, over the thermal fluctuation of a contact. */
 const double TOLERANCE = 0.3;
 /** The number of iterations that look where capsules touch. */
-const int SEARCHING_ITERATIONS = 5;
+const int SEARCHING_ITERATIONS = 6;
+/** The number of iterations in which a contact may pass to a neighbour. */
+const int PASSING_ITERATIONS = 3;
 /** Pairs that a thread looks at together. */
 const int CHUNK = 128;
 
@@ -52,7 +54,7 @@ void ContactEquations::begin(const CoupledStart& start, const Loop& newLoop) {
     reach = REACH*diameter;
     pairs.clear();
     states.clear();
-    predicted.clear();
+    searched.clear();
 }
 
 void ContactEquations::beginStage(int, int, const double*) {
@@ -65,40 +67,57 @@ PlaceOnChain ContactEquations::placeOf(int capsule, double fraction) const {
     return place;
 }
 
-void ContactEquations::findPairs(const double* moved) {
-    int particles = 0;
-    for (const Capsule& capsule : search->getSystem().capsules)
-        particles = max(particles, max(capsule.first, capsule.end())+1);
-    predicted.assign(moved, moved+3*(size_t) particles);
-    search->findPairs(begun, moved, box, reach, pairs, *loop);
-
-    // Pairs that were known keep what is known of them.
-
-    vector<State> before;
-    before.swap(states);
-    size_t next = 0;
-    for (const ContactPair& pair : pairs) {
-        auto isBefore = [&] (const ContactPair& other) {
-            return other.a < pair.a || (other.a == pair.a && other.b < pair.b);
-        };
-        while (next < before.size() && isBefore(before[next].pair))
-            next++;
-        if (next < before.size() && before[next].pair.a == pair.a && before[next].pair.b == pair.b) {
-            states.push_back(before[next]);
-            states.back().near = true;
-        }
-        else
-            states.push_back({pair, true, 0, {0, 0}, {}, -1});
-    }
+void ContactEquations::takeNoteOf(int capsule, const double* moved) {
+    const Capsule& own = search->getSystem().capsules[capsule];
+    copy_n(moved+3*own.first, 3, &searched[6*capsule]);
+    copy_n(moved+3*own.end(), 3, &searched[6*capsule+3]);
 }
 
-void ContactEquations::updateContact(const ContactPair& pair, const double* moved, Contact& contact) const {
-    double r[3];
-    search->findVector(pair, contact.s, contact.t, moved, r);
+void ContactEquations::findPairs(const double* moved) {
+    search->findPairs(begun, moved, box, reach, pairs, *loop);
+    searched.resize(6*places.size());
+    for (size_t i = 0; i < places.size(); i++)
+        takeNoteOf(i, moved);
+    for (const ContactPair& pair : pairs)
+        states.push_back({pair, true, 0, {0, 0}, {}, -1});
+}
+
+/** Look for pairs of some capsules again; false if all that are found take part already. */
+bool ContactEquations::findPairsOf(const vector<int>& capsules, const double* moved, double slack) {
+    search->findPairsOf(capsules, begun, moved, slack, pairs);
+    for (int capsule : capsules)
+        takeNoteOf(capsule, moved);
+    auto isBefore = [] (const State& one, const State& other) {
+        return one.pair.a < other.pair.a || (one.pair.a == other.pair.a && one.pair.b < other.pair.b);
+    };
+    const size_t known = states.size();
+    bool any = false;
+    for (const ContactPair& pair : pairs) {
+        const State state = {pair, true, 0, {0, 0}, {}, -1};
+        const auto found = lower_bound(states.begin(), states.begin()+known, state, isBefore);
+        if (found == states.begin()+known || isBefore(state, *found)) {
+            states.push_back(state);
+            any = true;
+        }
+        else if (!found->near) {
+            found->near = any = true;
+            found->count = -1;
+        }
+    }
+    inplace_merge(states.begin(), states.begin()+known, states.end(), isBefore);
+    return any;
+}
+
+void ContactEquations::updateContacts(State& state, const double* moved) const {
     const vector<Capsule>& capsules = search->getSystem().capsules;
-    const double radii = capsules[pair.a].radius+capsules[pair.b].radius;
-    const double* n = contact.normal;
-    contact.gap = r[0]*n[0]+r[1]*n[1]+r[2]*n[2]-radii;
+    const double radii = capsules[state.pair.a].radius+capsules[state.pair.b].radius;
+    for (int i = 0; i < state.count; i++) {
+        Contact& contact = state.contacts[i];
+        double r[3];
+        search->findVector(state.pair, contact.s, contact.t, moved, r);
+        const double* n = contact.normal;
+        contact.gap = r[0]*n[0]+r[1]*n[1]+r[2]*n[2]-radii;
+    }
 }
 
 void ContactEquations::evaluate(State& state, const double* moved, bool first, Part& part) const {
@@ -111,13 +130,20 @@ void ContactEquations::evaluate(State& state, const double* moved, bool first, P
     if (iterations < SEARCHING_ITERATIONS || state.count < 0) {
         // What is farther away is left out, until it may have come near. Overlaps that are mirrored count.
         const double limit = LARGEST_GAP*diameter+max(state.mirrored[0], state.mirrored[1]);
-        state.count = search->evaluate(pair, begun, moved, state.contacts, limit);
-        state.near = state.count >= 0 || !first;
-        state.gap = state.contacts[0].gap;
+        Contact contacts[2];
+        const int count = search->evaluate(pair, begun, moved, contacts, limit);
+        // A contact at a joint may pass from one segment to the next and back: in the end, it must not be lost.
+        if (count == 0 && state.count > 0 && iterations >= PASSING_ITERATIONS)
+            updateContacts(state, moved);
+        else {
+            state.count = count;
+            copy(contacts, contacts+2, state.contacts);
+            state.near = count >= 0 || !first;
+            state.gap = contacts[0].gap;
+        }
     }
     else
-        for (int i = 0; i < state.count; i++)
-            updateContact(pair, moved, state.contacts[i]);
+        updateContacts(state, moved);
     for (int i = 0; i < state.count; i++) {
         const Contact& contact = state.contacts[i];
         part.crossed |= contact.crossed;
@@ -148,9 +174,9 @@ void ContactEquations::linearise(int iteration, const double* moved, vector<Coup
     iterations = iteration;
     normals.clear();
     crossed = false;
-    if (iteration == 0 && predicted.empty())
+    if (iteration == 0 && searched.empty())
         return;
-    const bool first = predicted.empty();
+    const bool first = searched.empty();
     if (first)
         findPairs(moved);
     const int count = states.size(), chunks = (count+CHUNK-1)/CHUNK;
@@ -181,19 +207,17 @@ bool ContactEquations::anyComeNear(const double* moved) {
     double largest = 0, second = 0;
     for (size_t i = 0; i < capsules.size(); i++) {
         double square = 0;
-        for (int particle : {capsules[i].first, capsules[i].end()}) {
+        for (int end = 0; end < 2; end++) {
+            const double* now = moved+3*(end == 0 ? capsules[i].first : capsules[i].end());
+            const double* before = &searched[6*i+3*end];
             double own = 0;
-            for (int k = 3*particle; k < 3*particle+3; k++)
-                own += (moved[k]-predicted[k])*(moved[k]-predicted[k]);
+            for (int k = 0; k < 3; k++)
+                own += (now[k]-before[k])*(now[k]-before[k]);
             square = max(square, own);
         }
         motion[i] = sqrt(square);
         second = max(second, min(largest, motion[i]));
         largest = max(largest, motion[i]);
-    }
-    if (largest+second > reach) {
-        findPairs(moved);
-        return true;
     }
     bool any = false;
     for (State& state : states)
@@ -201,11 +225,19 @@ bool ContactEquations::anyComeNear(const double* moved) {
             state.near = any = true;
             state.count = -1;
         }
+    // Pairs that no search has seen were out of reach: one of the two has moved by more than half of it.
+    if (largest+second > reach) {
+        movers.clear();
+        for (size_t i = 0; i < motion.size(); i++)
+            if (2*motion[i] > reach)
+                movers.push_back(i);
+        any |= findPairsOf(movers, moved, largest);
+    }
     return any;
 }
 
 bool ContactEquations::finishIteration(const double* moves, const double* moved) {
-    if (iterations < 2 || crossed)
+    if (iterations < 2 || anyComeNear(moved) || crossed)
         return true;
     for (size_t i = 0; i < normals.size(); i += 3) {
         // At most the squared change of the gap, times the stiffness.
@@ -215,7 +247,21 @@ bool ContactEquations::finishIteration(const double* moves, const double* moved)
         if (!(change*change < TOLERANCE*TOLERANCE*kT))
             return true;
     }
-    return anyComeNear(moved);
+    return anyCross(moved);
+}
+
+/** Whether pairs cross elsewhere than where they were last seen to touch: they are looked at again. */
+bool ContactEquations::anyCross(const double* moved) {
+    const int count = states.size(), chunks = (count+CHUNK-1)/CHUNK;
+    (*loop)(chunks, [&] (int chunk) {
+        parts[chunk].crossed = false;
+        for (int i = chunk*CHUNK; i < min(count, (chunk+1)*CHUNK); i++)
+            if (states[i].near && search->crosses(states[i].pair, begun, moved)) {
+                states[i].count = -1;
+                parts[chunk].crossed = true;
+            }
+    });
+    return any_of(parts.begin(), parts.begin()+chunks, [] (const Part& part) {return part.crossed;});
 }
 
 void ContactEquations::findFailures(const double* moved, vector<bool>& failed) const {

@@ -58,9 +58,12 @@ private:
         bool crossed;
     };
     void findPairs(const double* moved);
+    void takeNoteOf(int capsule, const double* moved);
+    bool findPairsOf(const std::vector<int>& capsules, const double* moved, double slack);
     void evaluate(State& state, const double* moved, bool first, Part& part) const;
-    void updateContact(const ContactPair& pair, const double* moved, Contact& contact) const;
+    void updateContacts(State& state, const double* moved) const;
     bool anyComeNear(const double* moved);
+    bool anyCross(const double* moved);
     PlaceOnChain placeOf(int capsule, double fraction) const;
     ContactSearch* search = nullptr;
     double stiffness = 0;
@@ -69,9 +72,10 @@ private:
     double kT = 0, reach = 0;
     std::vector<CapsulePlace> places;
     std::vector<ContactPair> pairs;
+    std::vector<int> movers;
     std::vector<State> states;
-    /** Where particles were when pairs were looked for, and by how much each capsule has moved since. */
-    std::vector<double> predicted, motion;
+    /** Where the ends of each capsule were when its pairs were looked for, and by how much they have moved since. */
+    std::vector<double> searched, motion;
     std::vector<Part> parts;
     std::vector<double> normals;
     bool crossed = false;

@@ -3,6 +3,7 @@
 
 #include "couplings/ContactSearch.h"
 #include "couplings/Links.h"
+#include "couplings/Walls.h"
 #include "dynamics/ParticleStep.h"
 #include <vector>
 
@@ -22,10 +23,11 @@ struct CoupledForces {
     };
     std::vector<Links> links;
     std::vector<Contacts> contacts;
+    std::vector<const WallSystem*> walls;
     /** The particles outside chains that these forces act on, in ascending order. */
     std::vector<CoupledParticle> particles;
     bool empty() const {
-        return links.empty() && contacts.empty();
+        return links.empty() && contacts.empty() && walls.empty();
     }
 };
 

@@ -121,34 +121,31 @@ void LinkEquations::drawNoise(const CoupledStart& start) {
 }
 
 void LinkEquations::beginStage(int stage, int numStages, const double* moved) {
+    const bool first = numStages == 2 && stage == 0;
+    shareOfMetricForces = first ? NOISE_OF_FIRST*NOISE_OF_FIRST : 1;
     for (State& state : states) {
         double before[3] = {state.coordinate, 0, 0}, ofStart, ofRandom;
+        if (!state.turns)
+            copy(state.start, state.start+3, before);
         state.implicit = DIAGONAL;
-        if (numStages == 1) {
+        if (first) {
+            ofStart = 0;
+            ofRandom = DIAGONAL*NOISE_OF_FIRST;
+        }
+        else if (numStages == 2 && !state.turns) {
+            // As bends: the end of the first stage is part of the second.
+            vectorOf(state, moved, before);
+            ofStart = 1-DIAGONAL;
+            ofRandom = 2*DIAGONAL;
+        }
+        else {
+            // As lengths.
             state.implicit = state.theta;
             ofStart = 1-state.theta;
             ofRandom = sqrt(2*state.theta-1);
         }
-        else if (stage == 0) {
-            ofStart = 0;
-            ofRandom = DIAGONAL*NOISE_OF_FIRST;
-        }
-        else {
-            ofStart = 1-DIAGONAL;
-            ofRandom = 2*DIAGONAL;
-        }
-        if (!state.turns)
-            copy(state.start, state.start+3, before);
-        if (stage > 0) {
-            vectorOf(state, moved, before);
-            if (state.turns) {
-                double slope;
-                const double inverse = state.link->maximumExtension > 0 ? 1/state.link->maximumExtension : 0;
-                stretchCoordinate<double>(state.link->model, inverse, sqrt(dot(before, before))-state.link->restLength,
-                        before[0], slope);
-            }
+        if (stage > 0)
             state.multiplier /= NOISE_OF_FIRST;
-        }
         for (int k = 0; k < (state.turns ? 1 : 3); k++)
             state.constant[k] = ofStart*before[k]-ofRandom*state.random[k];
     }
@@ -194,7 +191,7 @@ void LinkEquations::linearise(int, const double* moved, vector<CouplingEquation>
         const double turning = max(0.0, 0.5*state.multiplier/max(state.distance, 1e-9*(1+link.restLength)));
         const double rest = state.response-turning;
         for (int i = 0; i < 3; i++)
-            equation.force[i] = state.metricForce[i]-state.tension*m[i];
+            equation.force[i] = shareOfMetricForces*state.metricForce[i]-state.tension*m[i];
         k[0] = turning+rest*m[0]*m[0];
         k[1] = rest*m[0]*m[1];
         k[2] = rest*m[0]*m[2];
@@ -220,8 +217,9 @@ void LinkEquations::setCompliances(const double* compliances) {
             for (int k = 0; k < 3; k++)
                 response[k] += ofSide[k]*without;
         }
-        const double along = dot(t, response);
-        const double size = kT*state.link->stiffness*(2*state.theta-1)/(state.length*(1+state.response*along));
+        // Where a second stage follows, the distance resists by theta there.
+        const double along = dot(t, response), resistance = state.response*state.theta/state.implicit;
+        const double size = kT*state.link->stiffness*(2*state.theta-1)/(state.length*(1+resistance*along));
         for (int k = 0; k < 3; k++)
             state.metricForce[k] = -size*(response[k]-along*t[k]);
     }

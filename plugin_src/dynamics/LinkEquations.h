@@ -56,7 +56,6 @@ private:
         /** Of the last iteration: direction, distance, tension, its response, and the tension after it. */
         double direction[3], distance, tension, response, multiplier;
         double metricForce[3];
-        double stageLength;
     };
     void describe(const CoupledStart& start, State& state) const;
     void drawNoise(const CoupledStart& start);
@@ -65,7 +64,7 @@ private:
     const std::vector<Link>* links = nullptr;
     LinkBoxes boxes;
     const double* begun = nullptr;
-    double kT = 0, stepSize = 0;
+    double kT = 0, stepSize = 0, shareOfMetricForces = 1;
     bool anyTurns = false;
     std::vector<std::uint32_t> chains, parts;
     std::vector<double> normals;

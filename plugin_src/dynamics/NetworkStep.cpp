@@ -8,12 +8,12 @@ using namespace std;
 
 namespace {
 
-const int NEWTON_ITERATIONS = 20;
+const int NEWTON_ITERATIONS = 30;
 /**
  * Contacts that open and close in turn keep Newton's method from ending. After so many iterations, only this share of
  * each change is made.
  */
-const int UNDAMPED_ITERATIONS = 8;
+const int UNDAMPED_ITERATIONS = 14;
 const double DAMPING = 0.6;
 /** A step is divided into at most two to this power. */
 const int LARGEST_DIVISION = 10;
@@ -56,6 +56,13 @@ void NetworkStep::setForces(const CoupledForces& forces, const double* box) {
             contacts[i].reset(new ContactEquations());
         contacts[i]->setContacts(own.search, own.stiffness, own.periodic ? box : NULL);
         couplings.push_back(contacts[i].get());
+    }
+    walls.resize(max(walls.size(), forces.walls.size()));
+    for (size_t i = 0; i < forces.walls.size(); i++) {
+        if (!walls[i])
+            walls[i].reset(new WallEquations());
+        walls[i]->setWalls(forces.walls[i]);
+        couplings.push_back(walls[i].get());
     }
 }
 
@@ -150,6 +157,9 @@ bool NetworkStep::attempt(const Attempt& attempt, double* displacements, vector<
     }
     for (const ImplicitCouplings* own : couplings)
         own->findFailures(moved.data(), failed);
+    // Where couplings alone have not converged, nobody knows whose they are.
+    if (!solved && find(failed.begin(), failed.end(), true) == failed.end())
+        failed = attempt.taken;
     attempt.loop(numPacks, [&] (int pack) {
         steps[pack]->getDisplacements(displacements);
     });
@@ -208,6 +218,13 @@ bool NetworkStep::divide(const Attempt& whole, int division, double* displacemen
     half.settings.stepSize = 0.5*whole.settings.stepSize;
     half.settings.level++;
     half.settings.step *= 2;
+    // Recorded forces are means over the halves.
+    vector<vector<SegmentForces> >* const recorded = whole.settings.segmentForces;
+    vector<vector<SegmentForces> > ofHalf;
+    if (recorded != NULL) {
+        ofHalf = *recorded;
+        half.settings.segmentForces = &ofHalf;
+    }
     const size_t size = moved.size();
     vector<double> start(whole.positions, whole.positions+size), total(size), part(size);
     half.positions = start.data();
@@ -227,6 +244,13 @@ bool NetworkStep::divide(const Attempt& whole, int division, double* displacemen
             start[k] += part[k];
             total[k] += part[k];
         });
+        for (size_t chain = 0; recorded != NULL && chain < recorded->size(); chain++)
+            for (size_t s = 0; whole.taken[chain] && s < ofHalf[chain].size(); s++) {
+                SegmentForces& mean = (*recorded)[chain][s];
+                if (i == 0)
+                    mean = SegmentForces();
+                mean.add(ofHalf[chain][s], 0.5);
+            }
     }
     forTaken([&] (int k) {
         displacements[k] = total[k];

@@ -6,6 +6,7 @@
 #include "dynamics/CoupledForces.h"
 #include "dynamics/ImplicitCouplings.h"
 #include "dynamics/LinkEquations.h"
+#include "dynamics/WallEquations.h"
 #include <memory>
 #include <vector>
 
@@ -56,6 +57,7 @@ private:
     ChainPlaces places;
     std::vector<std::unique_ptr<LinkEquations> > links;
     std::vector<std::unique_ptr<ContactEquations> > contacts;
+    std::vector<std::unique_ptr<WallEquations> > walls;
     std::vector<ImplicitCouplings*> couplings;
     std::vector<CoupledParticle> particles;
     std::vector<int> packs;

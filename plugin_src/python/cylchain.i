@@ -22,6 +22,7 @@ namespace std {
 #include "openmm/CylinderChainForce.h"
 #include "openmm/CylinderChainIntegrator.h"
 #include "openmm/CylinderChainLinkForce.h"
+#include "openmm/CylinderChainWallForce.h"
 #include "OpenMM.h"
 #include "OpenMMAmoeba.h"
 #include "OpenMMDrude.h"
@@ -218,13 +219,13 @@ static bool takeNumbers(PyObject* object, std::vector<T>& values) {
     $result = SWIG_Python_AppendOutput($result, tuple, 1);
 }
 %apply std::vector<Vec3>& vectors {std::vector<Vec3>& jointForces, std::vector<Vec3>& directions};
-%apply Vec3& point {Vec3& velocity, Vec3& gradientX, Vec3& gradientY, Vec3& gradientZ, Vec3& origin};
-%apply const Vec3& point {const Vec3& velocity, const Vec3& gradientX, const Vec3& gradientY, const Vec3& gradientZ,
-        const Vec3& origin};
+%apply Vec3& point {Vec3& vector, Vec3& velocity, Vec3& gradientX, Vec3& gradientY, Vec3& gradientZ, Vec3& origin};
+%apply const Vec3& point {const Vec3& vector, const Vec3& velocity, const Vec3& gradientX, const Vec3& gradientY,
+        const Vec3& gradientZ, const Vec3& origin};
 %apply double& OUTPUT {double& restLength, double& stretchingStiffness, double& maximumExtension,
         double& parallelFriction, double& perpendicularFriction, double& rotationalFriction,
-        double& extensionalFriction, double& stiffness, double& stretching, double& bending, double& propulsion,
-        double& work};
+        double& extensionalFriction, double& length, double& stiffness, double& stretching, double& bending,
+        double& propulsion, double& work};
 
 %pythoncode %{
 import openmm
@@ -304,6 +305,17 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %pythonappend OpenMM::CylinderChainContactForce::getSphereDiameter(int) const %{
     val = unit.Quantity(val, _LENGTH)
 %}
+%pythonappend OpenMM::CylinderChainWallForce::getStiffness() const %{
+    val = unit.Quantity(val, _STIFFNESS)
+%}
+%pythonappend OpenMM::CylinderChainWallForce::getParticleRadius(int) const %{
+    val = unit.Quantity(val, _LENGTH)
+%}
+%pythonappend OpenMM::CylinderChainWallForce::getRegion(Vec3&, Vec3&, double&) const %{
+    # Directions have no unit.
+    kind = _LENGTH if val[0] in ("box", "ellipsoid") else unit.dimensionless
+    val = [val[0], unit.Quantity(val[1], _LENGTH), unit.Quantity(val[2], kind), unit.Quantity(val[3], _LENGTH)]
+%}
 %pythonappend OpenMM::CylinderChainIntegrator::getTemperature() const %{
     val = unit.Quantity(val, unit.kelvin)
 %}
@@ -377,6 +389,7 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %concreteClass(CylinderChainForce, Force)
 %concreteClass(CylinderChainContactForce, Force)
 %concreteClass(CylinderChainLinkForce, Force)
+%concreteClass(CylinderChainWallForce, Force)
 %concreteClass(CylinderChainIntegrator, Integrator)
 
 %ignore OpenMM::CylinderChainForce::SegmentInfo;
@@ -385,6 +398,7 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %ignore OpenMM::CylinderChainContactForce::ChainInfo;
 %ignore OpenMM::CylinderChainContactForce::SphereInfo;
 %ignore OpenMM::CylinderChainContactForce::ExclusionInfo;
+%ignore OpenMM::CylinderChainWallForce::ParticleInfo;
 %ignore OpenMM::CylinderChainLinkForce::getTable;
 %ignore OpenMM::CylinderChainLinkForce::setTable;
 %import "mechanics/Enumerators.h"
@@ -395,4 +409,5 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %include "openmm/CylinderChainForce.h"
 %include "openmm/CylinderChainContactForce.h"
 %include "openmm/CylinderChainLinkForce.h"
+%include "openmm/CylinderChainWallForce.h"
 %include "openmm/CylinderChainIntegrator.h"

@@ -382,11 +382,26 @@ def test_step_is_that_of_springs_of_twice_the_stiffness():
     for one in (force, springs):
         host = copy.deepcopy(system)
         host.addForce(one)
-        known = ExplicitForces(host, filaments, "implicit")
+        known = ExplicitForces(host, filaments, "midpoint")
         assert known.unknown == ()
         steps.append(known.recommended_step())
     assert steps[0].step == pytest.approx(steps[1].step, rel=1e-6)
     assert "CylinderChainContactForce (force" in steps[0].reason and "end of filament" in steps[0].reason
+
+
+def test_step_of_contacts_in_the_equations_is_that_of_diffusion():
+    filaments, _, system, _ = _filaments(([0, 0, 0], [1, 0, 0]), ([0, 0, 60], [0, 1, 0]))
+    free = filaments.recommended_time_step("implicit", system=system)
+    force = capsule_contact_force(filaments, system, DIAMETER, STIFFNESS)
+    index = system.addForce(force)
+    assert ExplicitForces(system, filaments, "implicit").springs == []
+    step = filaments.recommended_time_step("implicit", system=system)
+    filament = filaments[0]
+    friction = filament.type.segment_friction(filaments.viscosity, filaments.temperature, filament.segments)
+    expected = (0.6 * DIAMETER) ** 2 / (2 * KT * 2 / friction.perpendicular)
+    name = f"CylinderChainContactForce (force {index}): segments in contact"
+    assert step.allowed[name] == pytest.approx(expected)
+    assert step.step == pytest.approx(min(free.step, expected))
 
 
 # What is refused and warned of

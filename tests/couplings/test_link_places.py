@@ -5,11 +5,11 @@ import re
 import numpy as np
 import openmm
 import pytest
-from openmm import unit
+from openmm import app, unit
 
 from openmm_cylchain import F_ACTIN, CrosslinkReporter, Crosslinks, CrosslinkTable, Filaments, InputError, SegmentPlace
 from openmm_cylchain.engines.compiled import CylinderChainForce, plugin
-from support.contexts import energy_of, forces_of, new_context, positions_of
+from support.contexts import energy_of, forces_of, new_context, new_simulation, positions_of
 from support.crosslinked_filaments import crosslinked_filaments
 from support.platforms import ENGINES
 from support.solvent import TEMPERATURE, VISCOSITY
@@ -246,17 +246,27 @@ def test_files_and_xml(engine, tmp_path):
             CrosslinkTable([0], [[0, 1]], [1.0], [0.0], [np.inf], 1, **bad)
 
 
-def test_reports_of_places(tmp_path):
-    for engine in ENGINES:
-        filaments, system, positions, links = two_filaments(engine)
-        links.add_many(None, places_of(filaments)[:5])
-        links.set_active(None, 1, False)
-        links.add_to(system)
-        context = new_context(system, positions)
-        table, lengths, forces = links.measure(context, context.getState(positions=True))
-        assert table == links.table(context) and forces[1] == 0 and lengths[1] > 0
-        assert table.pairs[4].tolist() == [int(filaments.segment_place(1, arc_length=500).first), -1]
-    assert "particle_1" in CrosslinkReporter._columns
+@pytest.mark.parametrize("engine", ENGINES)
+def test_reports_of_places(engine):
+    filaments, system, positions, links = two_filaments(engine)
+    links.add_many(None, places_of(filaments)[:5])
+    links.set_active(None, 1, False)
+    links.add_to(system)
+    topology = app.Topology()
+    residue = topology.addResidue("X", topology.addChain())
+    for _ in range(system.getNumParticles()):
+        topology.addAtom("X", None, residue)
+    integrator = filaments.create_integrator(system, 1e4, scheme="midpoint", random_seed=2)
+    simulation = new_simulation(topology, system, positions, integrator)
+    reporter = CrosslinkReporter(None, 5, links)
+    simulation.reporters.append(reporter)
+    simulation.step(10)
+    lengths, forces = links.lengths(simulation.context), links.forces(simulation.context)
+    assert reporter["length"][5:] == pytest.approx(lengths) and reporter["force"][5:] == pytest.approx(forces)
+    assert np.all((reporter["force"] == 0) == (reporter["crosslink"] == 1)) and reporter.count.tolist() == [5, 5]
+    # The first particle of a segment, and none for a point.
+    segment = filaments.segment_place(1, arc_length=500)
+    assert reporter["particle_1"][4] == segment.first and reporter["particle_2"][4] == -1
 
 
 def test_which_force_computes_them():
@@ -266,6 +276,13 @@ def test_which_force_computes_them():
     system = openmm.System()
     assert isinstance(Crosslinks(1, 1).add_to(system), openmm.PythonForce)
     assert isinstance(Crosslinks(1, 1).add_to(filaments.build()[1]), plugin.CylinderChainLinkForce)
+
+
+def test_crosslinks_without_the_compiled_engine(without_compiled):
+    filaments, system, positions, links = two_filaments("portable")
+    links.add_many(None, places_of(filaments))
+    assert isinstance(links.add_to(system), openmm.PythonForce)
+    assert len(Crosslinks.from_system(system)) == 1 and len(links.lengths(new_context(system, positions))) == 7
 
 
 def test_states_that_do_not_hold_the_links_of_the_compiled_engine():

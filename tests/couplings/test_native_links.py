@@ -497,6 +497,22 @@ def test_restarts_with_the_integrator_of_the_plugin(tmp_path):
         context.loadCheckpoint((tmp_path / "links.chk").read_bytes()[:-20])
 
 
+def test_contexts_that_are_reinitialized():
+    context, forces, integrator = filaments_with_links()
+    forces[0].addLinkInContext(context, 0, -1, 0, 5, -1, 0, HARMONIC, 0.0, 0.01, 0.0)
+    links, energy = forces[0].getLinksInContext(context), energy_of(context)
+    context.reinitialize(preserveState=True)
+    assert forces[0].getLinksInContext(context) == links and energy_of(context) == energy
+    # Other integrators do not keep links.
+    other = new_context(context.getSystem(), positions_of(context))
+    forces[0].setLinksInContext(other, *links)
+    other.reinitialize(preserveState=True)
+    with pytest.raises(openmm.OpenMMException, match="links of this Context are not known: it was reinitialized"):
+        energy_of(other)
+    forces[0].setLinksInContext(other, *links)
+    assert energy_of(other) == energy
+
+
 def without_parameters(state):
     """A State that has only what is the integrator's."""
     xml = openmm.XmlSerializer.serialize(state)

@@ -530,8 +530,7 @@ static vector<Contact> evaluateAll(const ContactSearch& search, const vector<Con
 static void testSignedGap() {
     mt19937_64 generator(7);
     for (int trial = 0; trial < 200; trial++) {
-        CapsuleSystem system;
-        system.capsules = {{0, 1, 15}, {2, 3, 10}};
+        CapsuleSystem system = {{{0, 1, 15}, {2, 3, 10}}, {}, {}};
         const Vec3d p = randomVector(generator, 60), q = randomVector(generator, 60);
         const Vec3d n = p.cross(q)*(1/length(p.cross(q)));
         if (n.squared() < 0.9 || length(p.cross(q)) < 0.1*length(p)*length(q))
@@ -570,8 +569,7 @@ static void testSignedGap() {
 
 /** Rods side by side: a contact at each end of their overlap, with half of the stiffness. */
 static void testParallel() {
-    CapsuleSystem system;
-    system.capsules = {{0, 1, 10}, {2, 3, 10}};
+    CapsuleSystem system = {{{0, 1, 10}, {2, 3, 10}}, {}, {}};
     ContactSearch search(system);
     for (double offset : {-120.0, -90.0, -30.0, 0.0, 20.0, 99.0, 110.0})
         for (bool reversed : {false, true}) {
@@ -692,6 +690,74 @@ static void testDivision() {
         }
 }
 
+/** A rod is carried through a chain, at joints or beside them: what crosses is seen, and pushed back. */
+static void testCrossingChains() {
+    mt19937_64 generator(10);
+    int crossed = 0, atJoints = 0, wrong = 0;
+    for (int trial = 0; trial < 4000; trial++) {
+        CapsuleSystem system;
+        Array x;
+        Vec3d node = {0, 0, 0}, direction = {1, 0, 0};
+        const int segments = 5;
+        for (int s = 0; s <= segments; s++) {
+            add(x, node);
+            direction = direction+randomVector(generator, 0.3);
+            direction = direction*(1/length(direction));
+            node = node+direction*40;
+            if (s < segments)
+                system.capsules.push_back({s, s+1, 8, 0, s});
+        }
+        system.chains.push_back({segments, false, 1});
+        // Through a place of the chain, half of the time near a joint.
+        const int segment = 1+generator()%3;
+        const bool joint = trial%2 == 0;
+        const double fraction = joint ? uniform(generator, -0.02, 0.02) : uniform(generator, 0.1, 0.9);
+        const Vec3d place = at(x, segment)+(at(x, segment+1)-at(x, segment))*max(0.0, fraction)+
+                (at(x, segment)-at(x, segment-1))*min(0.0, fraction);
+        const Vec3d along = Vec3d{uniform(generator, -0.5, 0.5), 1, uniform(generator, -0.5, 0.5)}*60;
+        const Vec3d way = {uniform(generator, -2, 2), uniform(generator, -2, 2), uniform(generator, 4, 16)};
+        const double before = uniform(generator, 0.1, 0.9);
+        add(x, place-along*0.5-way*before);
+        add(x, place+along*0.5-way*before);
+        Array y = x;
+        for (int particle = segments+1; particle <= segments+2; particle++)
+            for (int k = 0; k < 3; k++)
+                y[3*particle+k] += k == 0 ? way.x : k == 1 ? way.y : way.z;
+        system.capsules.push_back({segments+1, segments+2, 8});
+        ContactSearch search(system);
+        vector<ContactPair> pairs;
+        search.findPairs(x.data(), y.data(), NULL, 0, pairs);
+        int throughs = 0;
+        bool clear = true, seen = false;
+        for (int s = 0; s < segments; s++) {
+            const Vec3d start[] = {at(x, s), at(x, s+1), at(x, segments+1), at(x, segments+2)};
+            const Vec3d end[] = {at(y, s), at(y, s+1), at(y, segments+1), at(y, segments+2)};
+            const CrossingByHand one = crossingsByHand(start, end);
+            throughs += one.count;
+            clear = clear && one.clear;
+        }
+        Vec3d force = {0, 0, 0};
+        for (const Contact& contact : evaluateAll(search, pairs, x, y)) {
+            seen = seen || contact.crossed;
+            // On the rod, which is b.
+            if (contact.gap < 0)
+                force = force+Vec3d{contact.normal[0], contact.normal[1], contact.normal[2]}*
+                        (contact.weight*contact.gap);
+        }
+        if (!clear || throughs != 1)
+            continue;
+        bool verified = false;
+        for (const ContactPair& pair : pairs)
+            verified = verified || search.crosses(pair, x.data(), y.data());
+        check(seen && verified, "what crosses a chain is seen");
+        crossed++;
+        atJoints += joint;
+        wrong += force.dot(way) >= 0;
+    }
+    check(crossed > 2000 && atJoints > 800, "chains were crossed");
+    check(wrong == 0, "what has crossed is pushed back");
+}
+
 /** Segments taken as their shortest images give the same contacts as whole chains, around joints, too. */
 static void testNearestImages() {
     mt19937_64 generator(9);
@@ -740,12 +806,8 @@ static void checkRefused(const function<void()>& function, const string& reason)
 }
 
 static void testRefusals() {
-    auto make = [] (vector<Capsule> capsules, vector<pair<int, int> > exclusions) {
-        CapsuleSystem system;
-        system.capsules = capsules;
-        system.exclusions = exclusions;
-        system.chains = {{1, false, 1}};
-        ContactSearch search(system);
+    auto make = [] (const vector<Capsule>& capsules, const vector<pair<int, int> >& exclusions) {
+        ContactSearch search({capsules, {{1, false, 1}}, exclusions});
     };
     checkRefused([&] {make({{-1, 0, 1}}, {});}, "particle");
     checkRefused([&] {make({{2, 2, 1}}, {});}, "particle");
@@ -754,8 +816,7 @@ static void testRefusals() {
     checkRefused([&] {make({{0, 1, 1, 1, 0}}, {});}, "chain");
     checkRefused([&] {make({{0, 1, 1, 0, 1}}, {});}, "number in its chain");
     checkRefused([&] {make({{0, 1, 1, 0, 0}}, {{0, 1}});}, "capsule 1");
-    CapsuleSystem system;
-    system.capsules = {{0, 1, 1}, {2, -1, 1}};
+    CapsuleSystem system = {{{0, 1, 1}, {2, -1, 1}}, {}, {}};
     ContactSearch search(system);
     vector<ContactPair> pairs;
     const double x[] = {0, 0, 0, 10, 0, 0, 5, 0, 1}, box[] = {100, 0, 0, 0, 100, 0, 0, 0, 100};
@@ -778,7 +839,8 @@ int main() {
     const string instructionSet = candidateKernels().instructionSet;
     try {
         for (auto test : {testNearestPoints, testCrossings, testPairs, testSmallBoxes, testRounding, testLoops,
-                testSignedGap, testParallel, testJoints, testDivision, testNearestImages, testRefusals})
+                testSignedGap, testParallel, testJoints, testDivision, testCrossingChains,
+                testNearestImages, testRefusals})
             test();
     }
     catch (const exception& error) {

@@ -322,24 +322,43 @@ def test_places_on_filaments():
     assert filaments.recommended_time_step("implicit", system=system).step == alone.step
 
 
-def test_crosslinks():
-    for first_only, model in ((True, "harmonic"), (False, "harmonic"), (False, "fene")):
-        filaments, system, _, pairs = pairs_of_filaments(F_ACTIN, 8)
-        extension = 100.0 if model == "fene" else None
-        links = Crosslinks(0.5, 10.0, model, extension)
-        if first_only:
-            links.add(None, *pairs[0])
-        links.add_to(system)
-        label = f"Crosslinks (force {system.getNumForces() - 1}): "
-        recommended = filaments.recommended_time_step("implicit", system=system)
-        assert label in recommended.reason
-        assert ("crosslink 0" if first_only else "crosslink to come") in recommended.reason
-        reference = filaments.recommended_time_step("implicit").step
-        assert recommended.step < 0.1 * reference
-        if first_only:
-            system.removeForce(system.getNumForces() - 1)
-            system.addForce(bond(0.5, *pairs[0]))
-            assert filaments.recommended_time_step("implicit", system=system).step == pytest.approx(recommended.step)
+def system_with_crosslinks(model, first_only, rest_length=10.0):
+    filaments, system, _, pairs = pairs_of_filaments(F_ACTIN, 8)
+    extension = 100.0 if model == "fene" else None
+    links = Crosslinks(0.5, rest_length, model, extension)
+    if first_only:
+        links.add(None, *pairs[0])
+    links.add_to(system)
+    return filaments, system, pairs, f"Crosslinks (force {system.getNumForces() - 1}): "
+
+
+@pytest.mark.parametrize("first_only, model", [(True, "harmonic"), (False, "harmonic"), (False, "fene")])
+def test_crosslinks_where_they_are_explicit(first_only, model):
+    filaments, system, pairs, label = system_with_crosslinks(model, first_only)
+    recommended = filaments.recommended_time_step("midpoint", system=system)
+    name = next(name for name in recommended.allowed if name.startswith(label))
+    assert ("crosslink 0" if first_only else "crosslink to come") in name
+    if first_only:
+        system.removeForce(system.getNumForces() - 1)
+        system.addForce(bond(0.5, *pairs[0]))
+        alone = filaments.recommended_time_step("midpoint", system=system)
+        of_bond = next(value for key, value in alone.allowed.items() if "bond" in key)
+        assert recommended.allowed[name] == pytest.approx(of_bond)
+
+
+@pytest.mark.parametrize("scheme", IMPLICIT_SCHEMES)
+@pytest.mark.parametrize("first_only, model", [(True, "harmonic"), (False, "harmonic"), (False, "fene")])
+def test_crosslinks_in_the_equations_bind_by_their_rest_length(first_only, model, scheme):
+    filaments, system, _, label = system_with_crosslinks(model, first_only)
+    recommended = filaments.recommended_time_step(scheme, system=system)
+    assert recommended.reason.startswith(label)
+    assert ("crosslink 0" if first_only else "crosslink to come") in recommended.reason
+    friction = F_ACTIN.segment_friction(filaments.viscosity, filaments.temperature, 8).perpendicular
+    assert recommended.step == pytest.approx((0.6 * 10.0) ** 2 / (2 * KT * 2 / friction))
+    # Those without a direction do not bind, however stiff they are.
+    filaments, system, _, label = system_with_crosslinks("harmonic", first_only, 0.0)
+    free = filaments.recommended_time_step(scheme)
+    assert filaments.recommended_time_step(scheme, system=system).step == free.step
 
 
 def test_tethers_bind_where_they_are_explicit():

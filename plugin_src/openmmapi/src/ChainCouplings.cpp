@@ -25,6 +25,14 @@ ChainCouplings::ChainCouplings(ContextImpl& context, const CylinderChainDescript
         CylinderChainLinkForceImpl* ofLinks = dynamic_cast<CylinderChainLinkForceImpl*>(impl);
         if (ofLinks != NULL)
             links.push_back({ofLinks, -1, false});
+        CylinderChainWallForceImpl* ofWalls = dynamic_cast<CylinderChainWallForceImpl*>(impl);
+        if (ofWalls != NULL) {
+            const vector<WallParticle>& particles = ofWalls->getWalls().particles;
+            const bool taken = all_of(particles.begin(), particles.end(), [&] (const WallParticle& own) {
+                return !system.isVirtualSite(own.particle);
+            });
+            walls.push_back({ofWalls, taken});
+        }
         CylinderChainContactForceImpl* ofContacts = dynamic_cast<CylinderChainContactForceImpl*>(impl);
         if (ofContacts == NULL)
             continue;
@@ -72,6 +80,10 @@ bool ChainCouplings::isTaken(const Contacts& own, int groups) const {
     return own.taken && (groups&(1<<own.force->getOwner().getForceGroup())) != 0;
 }
 
+bool ChainCouplings::isTaken(const Walls& own, int groups) const {
+    return own.taken && (groups&(1<<own.force->getOwner().getForceGroup())) != 0;
+}
+
 ChainCouplings::Exclusion::Exclusion(ChainCouplings& couplings, int groups) {
     if (groups == 0)
         return;
@@ -82,6 +94,9 @@ ChainCouplings::Exclusion::Exclusion(ChainCouplings& couplings, int groups) {
     for (const Contacts& own : couplings.contacts)
         if (couplings.isTaken(own, groups))
             contacts.emplace_back(new CylinderChainContactForceImpl::Exclusion(*own.force, true));
+    for (const Walls& own : couplings.walls)
+        if (couplings.isTaken(own, groups))
+            walls.emplace_back(new CylinderChainWallForceImpl::Exclusion(*own.force, true));
 }
 
 void ChainCouplings::addParticle(const Place& place, vector<int>& particles) const {
@@ -94,6 +109,7 @@ const CoupledForces& ChainCouplings::describe(int groups, double friction) {
     update();
     forces.links.clear();
     forces.contacts.clear();
+    forces.walls.clear();
     forces.particles.clear();
     vector<int> particles;
     for (const Links& own : links) {
@@ -117,6 +133,17 @@ const CoupledForces& ChainCouplings::describe(int groups, double friction) {
             Place place;
             place.first = capsule.first;
             place.second = capsule.second;
+            addParticle(place, particles);
+        }
+    }
+    for (const Walls& own : walls) {
+        const WallSystem& present = own.force->getWalls();
+        if (!isTaken(own, groups) || present.particles.empty() || present.stiffness == 0)
+            continue;
+        forces.walls.push_back(&present);
+        for (const WallParticle& wallParticle : present.particles) {
+            Place place;
+            place.first = wallParticle.particle;
             addParticle(place, particles);
         }
     }

@@ -67,8 +67,8 @@ void CylinderChainLinkForceImpl::follow() {
         return;
     }
     throw CylinderChainException(CylinderChainException::UnknownLinks, {},
-            "CylinderChainLinkForce: The links of this Context are not known: it has got a State or "
-            "checkpoint of another Context, or one from more than "+to_string(cylchain::LinkHistory::CHANGES)+
+            "CylinderChainLinkForce: The links of this Context are not known: it was reinitialized, or has got a State "
+            "or checkpoint of another Context, or one from more than "+to_string(cylchain::LinkHistory::CHANGES)+
             " changes ago. Give it the links that belong to it by setLinksInContext(), or Crosslinks.set_table() in "
             "Python. The checkpoints of a CylinderChainIntegrator, and States that hold its parameters "
             "(getState(integratorParameters=True)), restore links themselves");

@@ -16,8 +16,8 @@ namespace OpenMM {
  * degrees), at both ends of their overlap, with k/2 at each.  What two neighboring segments of a chain see of one thing
  * counts once.  Energy and force are bounded: two lines meet for (k/2) d^2.
  *
- * Segments that share a particle, or whose numbers in their chain differ by no more than a number that is given with the
- * chain, do not touch each other.
+ * Segments that share a particle, or whose numbers in their chain differ by no more than a number that is given with
+ * the chain, do not touch each other.
  *
  * The force is taken at the present positions, with every Integrator.  After a Context has been created, the stiffness
  * and diameters may be changed: call updateParametersInContext() to copy them over.

@@ -3,6 +3,7 @@
 
 #include "couplings/ContactSearch.h"
 #include "couplings/Links.h"
+#include "couplings/Walls.h"
 #include "dynamics/ChainEngine.h"
 #include "dynamics/CoupledForces.h"
 #include "openmm/KernelImpl.h"
@@ -96,8 +97,8 @@ public:
 };
 
 /**
- * This kernel is invoked by CylinderChainContactForce to calculate the forces acting on the system and the energy of the
- * system.
+ * This kernel is invoked by CylinderChainContactForce to calculate the forces acting on the system and the energy of
+ * the system.
  */
 class CalcCylinderChainContactForceKernel : public KernelImpl {
 public:
@@ -132,6 +133,42 @@ public:
      * @param stiffness  the stiffness of contacts
      */
     virtual void copyParametersToContext(ContextImpl& context, double stiffness) = 0;
+};
+
+/**
+ * This kernel is invoked by CylinderChainWallForce to calculate the forces acting on the system and the energy of the
+ * system.
+ */
+class CalcCylinderChainWallForceKernel : public KernelImpl {
+public:
+    static std::string Name() {
+        return "CalcCylinderChainWallForce";
+    }
+    CalcCylinderChainWallForceKernel(std::string name, const Platform& platform) : KernelImpl(name, platform) {
+    }
+    /**
+     * Initialize the kernel.
+     *
+     * @param system  the System this kernel will be applied to
+     * @param walls   the wall and its particles
+     */
+    virtual void initialize(const System& system, const cylchain::WallSystem& walls) = 0;
+    /**
+     * Execute the kernel to calculate the forces and/or energy.
+     *
+     * @param context        the context in which to execute this kernel
+     * @param includeForces  true if forces should be calculated
+     * @param includeEnergy  true if the energy should be calculated
+     * @return the potential energy due to the force
+     */
+    virtual double execute(ContextImpl& context, bool includeForces, bool includeEnergy) = 0;
+    /**
+     * Take over another region, stiffness and radii.
+     *
+     * @param context  the context to copy parameters to
+     * @param walls    the wall and its particles
+     */
+    virtual void copyParametersToContext(ContextImpl& context, const cylchain::WallSystem& walls) = 0;
 };
 
 /**

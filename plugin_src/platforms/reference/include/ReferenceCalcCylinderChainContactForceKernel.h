@@ -9,8 +9,8 @@
 namespace OpenMM {
 
 /**
- * This kernel is invoked by CylinderChainContactForce to calculate the forces acting on the system and the energy of the
- * system.
+ * This kernel is invoked by CylinderChainContactForce to calculate the forces acting on the system and the energy of
+ * the system.
  *
  * Pairs are searched for with a skin, and again when a particle has moved by half of it.  Only those that touch count,
  * in the order of their numbers, so that results depend neither on when pairs were searched for nor on threads.

@@ -2,6 +2,7 @@
 #include "ReferenceCalcCylinderChainContactForceKernel.h"
 #include "ReferenceCalcCylinderChainForceKernel.h"
 #include "ReferenceCalcCylinderChainLinkForceKernel.h"
+#include "ReferenceCalcCylinderChainWallForceKernel.h"
 #include "ReferenceIntegrateCylinderChainStepKernel.h"
 #include "openmm/OpenMMException.h"
 #include "openmm/reference/ReferencePlatform.h"
@@ -20,6 +21,7 @@ extern "C" void registerKernelFactories() {
             platform.registerKernelFactory(CalcCylinderChainForceKernel::Name(), factory);
             platform.registerKernelFactory(CalcCylinderChainContactForceKernel::Name(), factory);
             platform.registerKernelFactory(CalcCylinderChainLinkForceKernel::Name(), factory);
+            platform.registerKernelFactory(CalcCylinderChainWallForceKernel::Name(), factory);
             platform.registerKernelFactory(IntegrateCylinderChainStepKernel::Name(), factory);
         }
     }
@@ -33,6 +35,8 @@ KernelImpl* ReferenceCylinderChainKernelFactory::createKernelImpl(string name, c
         return new ReferenceCalcCylinderChainContactForceKernel(name, platform, context);
     if (name == CalcCylinderChainLinkForceKernel::Name())
         return new ReferenceCalcCylinderChainLinkForceKernel(name, platform, context);
+    if (name == CalcCylinderChainWallForceKernel::Name())
+        return new ReferenceCalcCylinderChainWallForceKernel(name, platform);
     if (name == IntegrateCylinderChainStepKernel::Name())
         return new ReferenceIntegrateCylinderChainStepKernel(name, platform, context);
     throw OpenMMException("Tried to create kernel with illegal kernel name '"+name+"'");

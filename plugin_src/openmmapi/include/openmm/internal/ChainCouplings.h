@@ -6,6 +6,7 @@
 #include "openmm/internal/CylinderChainContactForceImpl.h"
 #include "openmm/internal/CylinderChainDescription.h"
 #include "openmm/internal/CylinderChainLinkForceImpl.h"
+#include "openmm/internal/CylinderChainWallForceImpl.h"
 #include "openmm/internal/OtherParticles.h"
 #include <memory>
 #include <vector>
@@ -13,7 +14,7 @@
 namespace OpenMM {
 
 /**
- * The links and contacts of a Context that implicit steps have in their equations.
+ * The links, contacts and walls of a Context that implicit steps have in their equations.
  *
  * A Force is among them if all of its places are on segments of chains, at particles, or do not move.  If not, it stays
  * an ordinary Force.
@@ -33,6 +34,7 @@ public:
     private:
         std::vector<std::unique_ptr<CylinderChainLinkForceImpl::Exclusion> > links;
         std::vector<std::unique_ptr<CylinderChainContactForceImpl::Exclusion> > contacts;
+        std::vector<std::unique_ptr<CylinderChainWallForceImpl::Exclusion> > walls;
     };
     /**
      * Describe the forces that an implicit step takes.
@@ -51,10 +53,15 @@ private:
         CylinderChainContactForceImpl* force;
         bool taken;
     };
+    struct Walls {
+        CylinderChainWallForceImpl* force;
+        bool taken;
+    };
     bool canTake(const cylchain::Place& place) const;
     void update();
     bool isTaken(const Links& own, int groups) const;
     bool isTaken(const Contacts& own, int groups) const;
+    bool isTaken(const Walls& own, int groups) const;
     void addParticle(const cylchain::Place& place, std::vector<int>& particles) const;
     const System& system;
     const OtherParticles& others;
@@ -64,6 +71,7 @@ private:
     std::vector<bool> isNode;
     std::vector<Links> links;
     std::vector<Contacts> contacts;
+    std::vector<Walls> walls;
     cylchain::CoupledForces forces;
 };
 

@@ -1,0 +1,138 @@
+"""The recommended step of links and contacts that are in the equations of implicit schemes.
+
+Their stiffness does not bound it. What they join or keep apart does: two places that diffuse with the frictions z1 and
+z2 move against each other by the mean square 2 k_B T dt (1/z1 + 1/z2) along each axis in a step. That should stay below
+(0.6 d)^2, where d is the rest length of a link, whose direction a step would lose otherwise, or the distance at which
+two filaments touch, which would often be predicted on the wrong sides of each other. Links of rest length zero have no
+direction, and do not bind.
+
+Measured for F-actin in segments of 100 nm: the distribution of gaps beyond 10 nm is right to 5 % at that step, for
+contacts of 30 nm; beyond it, more and more steps must be divided.
+"""
+
+import math
+
+import numpy as np
+import openmm
+
+from ..couplings.capsule_contacts import as_capsule_contact_force
+from ..couplings.crosslinks import Crosslinks
+from ..couplings.native_links import is_link_force
+from ..filaments.collection import FilamentCollection
+from ..units.quantities import thermal_energy
+from ..units.types import FloatArray, Numbers
+from .other_particles import describe_other_particles
+from .time_step import TimeStep
+
+RELATIVE_MOTION = 0.6
+"""The largest standard deviation of relative motion in a step, over the distance."""
+
+_REASON = (
+    "{what}: the two may diffuse against each other by {share:g} of {distance}, {value:.3g} nm, in an implicit step"
+)
+
+
+def is_coupled(force: openmm.Force) -> bool:
+    """Whether implicit schemes of the compiled engine have a force in their equations: native links and contacts."""
+    return is_link_force(force) or as_capsule_contact_force(force) is not None
+
+
+def steps_of_couplings(
+    filaments: FilamentCollection,
+    system: openmm.System,
+    temperature: float,
+    particle_friction: Numbers | None = None,
+) -> list[TimeStep]:
+    """The TimeSteps of the links and contacts of a System; none where they do not bind.
+
+    Parameters
+    ----------
+    filaments : Filaments
+        In the System.
+    system : openmm.System
+    temperature : float
+        Of the bath, in K.
+    particle_friction : energy*time/length^2, or array of them, optional
+        As for ``Filaments.create_integrator``.
+
+    Returns
+    -------
+    list of TimeStep
+    """
+    coupled = [(index, force) for index, force in enumerate(system.getForces()) if is_coupled(force)]
+    kT = thermal_energy(temperature)
+    if not coupled or kT == 0.0:
+        return []
+    mobility = _mobilities(filaments, system, particle_friction)
+    steps = []
+    for index, force in coupled:
+        label = f"{force.getName()} (force {index})"
+        capsules = as_capsule_contact_force(force)
+        found = _contacts(capsules, mobility) if capsules is not None else _links(force, filaments, mobility)
+        if found is None:
+            continue
+        distance, total, what, of_what = found
+        bound = distance**2 / (2.0 * kT * total)
+        reason = _REASON.format(what=what, share=RELATIVE_MOTION, distance=of_what, value=distance)
+        name = f"{label}: {what}"
+        allowed = float(RELATIVE_MOTION**2 * bound)
+        steps.append(TimeStep(allowed, f"{label}: {reason}", {name: float(bound)}, {name: allowed}))
+    return steps
+
+
+def _mobilities(filaments: FilamentCollection, system: openmm.System, particle_friction: Numbers | None) -> FloatArray:
+    # Of all particles; zero for those that do not move.
+    mobility = np.zeros(system.getNumParticles())
+    for filament, nodes in zip(filaments, filaments.node_indices):
+        friction = filament.type.segment_friction(filaments.viscosity, filaments.temperature, filament.segments)
+        mobility[nodes] = 1.0 / max(friction.perpendicular, filament.type.node_friction)
+    for particle, attachment in zip(filaments.attachment_indices, filaments.attachments):
+        mobility[particle] = mobility[filaments.node_indices[attachment.filament][0]]
+    others, frictions = describe_other_particles(system, np.concatenate(filaments.node_indices), particle_friction)
+    mobility[others] = 1.0 / np.asarray(frictions, dtype=float)
+    return mobility
+
+
+def _contacts(force, mobility):
+    # The pair that diffuses most over its distance: of all, as good as the worst capsule with the worst other one.
+    capsules = [(force.getChainParticles(i)[0], force.getChainDiameter(i)._value) for i in range(force.getNumChains())]
+    capsules += [(force.getSphereParticle(i), force.getSphereDiameter(i)._value) for i in range(force.getNumSpheres())]
+    kinds = np.array(sorted({(float(mobility[particle]), diameter) for particle, diameter in capsules}))
+    if not len(kinds):
+        return None
+    total = kinds[:, 0] + kinds[:, :1]
+    distance = 0.5 * (kinds[:, 1] + kinds[:, 1][:, None])
+    worst = _worst(distance.ravel(), total.ravel())
+    if worst is None:
+        return None
+    return distance.ravel()[worst], total.ravel()[worst], "segments in contact", "the contact distance"
+
+
+def _links(force, filaments, mobility):
+    links = Crosslinks.of_force(force)
+    if links is None:
+        return None
+    table = links.table(None)
+    numbers = table.numbers
+    if len(table):
+        rest, extension, places = table.rest_length, table.maximum_extension, table.places
+        first, second = (np.where(places.pairs[:, side] >= 0, mobility[places.pairs[:, side]], 0.0) for side in (0, 1))
+    else:
+        # Those to come may join any two.
+        rest, extension = (np.array([value]) for value in links.default_lengths)
+        largest = np.sort([mobility[nodes[0]] for nodes in filaments.node_indices])[::-1]
+        first, second = largest[:1], largest[-1:] if len(largest) == 1 else largest[1:2]
+    # The distance of a FENE link is never zero for long.
+    distance = np.where((rest == 0.0) & np.isfinite(extension), extension, rest)
+    worst = _worst(distance, first + second)
+    if worst is None:
+        return None
+    what = f"crosslink {numbers[worst]}" if len(table) else "a crosslink to come"
+    return distance[worst], (first + second)[worst], what, "its rest length"
+
+
+def _worst(distance, total):
+    moving = (distance > 0.0) & (total > 0.0)
+    if not np.any(moving):
+        return None
+    return int(np.argmax(np.where(moving, total / np.where(moving, distance, 1.0) ** 2, -math.inf)))

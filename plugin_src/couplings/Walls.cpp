@@ -1,0 +1,127 @@
+#include "couplings/Walls.h"
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+using namespace cylchain;
+using namespace std;
+
+static double dot(const double* a, const double* b) {
+    return a[0]*b[0]+a[1]*b[1]+a[2]*b[2];
+}
+
+int cylchain::countFaces(const Wall& wall) {
+    switch (wall.shape) {
+        case WallShape::Slab:
+            return 2;
+        case WallShape::Box:
+            return 6;
+        default:
+            return 1;
+    }
+}
+
+bool cylchain::isFlat(const Wall& wall) {
+    return wall.shape == WallShape::Plane || wall.shape == WallShape::Slab || wall.shape == WallShape::Box;
+}
+
+double cylchain::getRoom(const Wall& wall) {
+    const double *p = wall.point, *v = wall.vector;
+    switch (wall.shape) {
+        case WallShape::Plane:
+            return numeric_limits<double>::infinity();
+        case WallShape::Slab:
+            return 0.5*wall.length;
+        case WallShape::Sphere:
+        case WallShape::Cylinder:
+            return wall.length;
+        case WallShape::Box:
+            return 0.5*min(min(v[0]-p[0], v[1]-p[1]), v[2]-p[2]);
+        case WallShape::Ellipsoid:
+            return min(min(v[0], v[1]), v[2]);
+    }
+    return 0;
+}
+
+/** A direction at right angles to another one. */
+static void findOrthogonal(const double* direction, double* result) {
+    int least = 0;
+    for (int k = 1; k < 3; k++)
+        if (fabs(direction[k]) < fabs(direction[least]))
+            least = k;
+    double square = 0;
+    for (int k = 0; k < 3; k++) {
+        result[k] = (k == least ? 1 : 0)-direction[least]*direction[k];
+        square += result[k]*result[k];
+    }
+    for (int k = 0; k < 3; k++)
+        result[k] /= sqrt(square);
+}
+
+/** The depth (s-1) s/q with q^2 the sum of x_i^2/a_i^4. */
+static double findDepthInEllipsoid(const Wall& wall, const double* r, double* gradient) {
+    const double* a = wall.vector;
+    double square = 0, steepness = 0;
+    for (int k = 0; k < 3; k++) {
+        const double share = r[k]/a[k];
+        square += share*share;
+        steepness += share*share/(a[k]*a[k]);
+    }
+    const double s = sqrt(square), q = sqrt(steepness);
+    if (!(s > 1e-12)) {
+        const int shortest = min_element(a, a+3)-a;
+        for (int k = 0; k < 3; k++)
+            gradient[k] = k == shortest ? 1 : 0;
+        return -a[shortest];
+    }
+    const double depth = (square-s)/q;
+    for (int k = 0; k < 3; k++) {
+        const double ofSquare = 2*r[k]/(a[k]*a[k]);
+        gradient[k] = (1-0.5/s)*ofSquare/q-0.5*depth/steepness*ofSquare/(a[k]*a[k]);
+    }
+    return depth;
+}
+
+double cylchain::findDepth(const Wall& wall, int face, const double* position, double radius, double* gradient) {
+    const double* v = wall.vector;
+    double r[3];
+    for (int k = 0; k < 3; k++)
+        r[k] = position[k]-wall.point[k];
+    switch (wall.shape) {
+        case WallShape::Plane:
+            for (int k = 0; k < 3; k++)
+                gradient[k] = -v[k];
+            return radius-dot(v, r);
+        case WallShape::Slab: {
+            const double sign = face == 0 ? 1 : -1;
+            for (int k = 0; k < 3; k++)
+                gradient[k] = sign*v[k];
+            return sign*dot(v, r)-0.5*wall.length+radius;
+        }
+        case WallShape::Sphere:
+        case WallShape::Cylinder: {
+            const bool hasAxis = wall.shape == WallShape::Cylinder;
+            const double along = hasAxis ? dot(v, r) : 0;
+            for (int k = 0; k < 3; k++)
+                r[k] -= along*v[k];
+            const double distance = sqrt(dot(r, r));
+            const double up[] = {0, 0, 1};
+            if (!(distance > 1e-12*wall.length) && hasAxis)
+                findOrthogonal(v, gradient);
+            else
+                for (int k = 0; k < 3; k++)
+                    gradient[k] = distance > 1e-12*wall.length ? r[k]/distance : up[k];
+            return distance-wall.length+radius;
+        }
+        case WallShape::Box: {
+            const int axis = face/2;
+            const double sign = face%2 == 0 ? -1 : 1;
+            for (int k = 0; k < 3; k++)
+                gradient[k] = k == axis ? sign : 0;
+            return (sign < 0 ? wall.point[axis]-position[axis] : position[axis]-v[axis])+radius;
+        }
+        case WallShape::Ellipsoid:
+            return findDepthInEllipsoid(wall, r, gradient)+radius;
+    }
+    return 0;
+}

@@ -1,0 +1,87 @@
+#ifndef CYLCHAIN_WALLS_H_
+#define CYLCHAIN_WALLS_H_
+
+#include "mechanics/Enumerators.h"
+#include <vector>
+
+/** Regions that walls enclose. Stored Systems hold their names. */
+#define CYLCHAIN_WALL_SHAPES(ENTRY) \
+    ENTRY(Plane, "plane") \
+    ENTRY(Slab, "slab") \
+    ENTRY(Sphere, "sphere") \
+    ENTRY(Cylinder, "cylinder") \
+    ENTRY(Box, "box") \
+    ENTRY(Ellipsoid, "ellipsoid")
+
+namespace cylchain {
+
+enum class WallShape {CYLCHAIN_WALL_SHAPES(CYLCHAIN_ENUMERATOR)};
+
+template <> struct Names<WallShape> {
+    static constexpr const char* ALL[] = {CYLCHAIN_WALL_SHAPES(CYLCHAIN_NAME)};
+};
+
+/**
+ * A region that particles are kept in.
+ *
+ *     shape       point                     vector                          length
+ *     Plane       on it                     its normal, into the region     -
+ *     Slab        half-way between planes   their normal                    their distance
+ *     Sphere      the center                -                               the radius
+ *     Cylinder    on the axis               the axis                        the radius
+ *     Box         the lower corner          the upper corner                -
+ *     Ellipsoid   the center                the semi-axes                   -
+ *
+ * Normals and axes are unit vectors. Its surface has one or more faces: each plane of a slab or box is one. With the
+ * depth d of a particle's surface beyond each face, negative inside, the energy is (k/2) times the sum of d^2 over faces
+ * with d > 0. For a box that is the squared distance from the box that the particle's center has to itself.
+ */
+struct Wall {
+    WallShape shape = WallShape::Plane;
+    double point[3] = {}, vector[3] = {0, 0, 1};
+    double length = 0;
+};
+
+/** What a wall keeps in: a particle, as a sphere around it. */
+struct WallParticle {
+    int particle;
+    double radius;
+};
+
+/** A wall and what it keeps in. */
+struct WallSystem {
+    Wall wall;
+    double stiffness = 0;
+    std::vector<WallParticle> particles;
+};
+
+/** The most faces that a wall has. */
+const int MOST_FACES = 6;
+
+/** The number of faces. */
+int countFaces(const Wall& wall);
+
+/** Whether faces are planes. */
+bool isFlat(const Wall& wall);
+
+/**
+ * The largest radius, exclusive, of a particle that fits in: infinite for a plane. That of an ellipsoid is its shortest
+ * semi-axis.
+ */
+double getRoom(const Wall& wall);
+
+/**
+ * Find how deep a particle is beyond a face, negative inside. The depth of an ellipsoid is (s-1)/|grad s| with s^2 the
+ * sum of (x_i/a_i)^2, that of its surface to first order.
+ *
+ * @param position       three numbers
+ * @param radius         of the particle
+ * @param[out] gradient  how the depth changes with the position: a unit vector, but for ellipsoids; where it has no
+ *                       direction, in the middle, one is chosen
+ * @return the depth
+ */
+double findDepth(const Wall& wall, int face, const double* position, double radius, double* gradient);
+
+} // namespace cylchain
+
+#endif /*CYLCHAIN_WALLS_H_*/

@@ -1,0 +1,157 @@
+#include "dynamics/WallEquations.h"
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+using namespace cylchain;
+using namespace std;
+
+namespace {
+
+/** As for the stages of chains: see dynamics/ImplicitState-inl.h. */
+const double DIAGONAL = 1-M_SQRT1_2;
+/** The largest change of a depth in the last iteration, over the depth that thermal motion gets to. */
+const double TOLERANCE = 0.3;
+/** The same in nm, where nothing moves thermally. */
+const double LEAST_TOLERANCE = 1e-7;
+/** The number of iterations that look where faces are. */
+const int SEARCHING_ITERATIONS = 6;
+/** The most that is mirrored at a curved face, over the way to the middle. */
+const double LARGEST_MIRRORED = 0.5;
+/** Particles that a thread looks at together. */
+const int CHUNK = 256;
+
+} // namespace
+
+double cylchain::shareMirrored(double a) {
+    // Within 2 % in the surface excess for a from 0.1 to 1000; from there on, the excess itself is nothing.
+    const double scaled = 0.6*sqrt(a);
+    return scaled/(1+scaled);
+}
+
+void WallEquations::setWalls(const WallSystem* newSystem) {
+    system = newSystem;
+    numFaces = countFaces(system->wall);
+}
+
+void WallEquations::begin(const CoupledStart& start, const Loop& newLoop) {
+    loop = &newLoop;
+    begun = start.positions;
+    stepSize = start.settings.stepSize;
+    tolerance = max(LEAST_TOLERANCE, TOLERANCE*sqrt(start.settings.kT/system->stiffness));
+    const size_t count = system->particles.size();
+    places.resize(count);
+    frictions.resize(count);
+    parts.resize((count+CHUNK-1)/CHUNK);
+    (*loop)(parts.size(), [&] (int part) {
+        for (size_t i = (size_t) part*CHUNK; i < min(count, (size_t) (part+1)*CHUNK); i++) {
+            Place place;
+            place.first = system->particles[i].particle;
+            if (start.places.find(place, places[i]) && start.taken[places[i].chain])
+                frictions[i] = start.places.getFriction(places[i]);
+            else
+                places[i] = PlaceOnChain();
+        }
+    });
+}
+
+void WallEquations::beginStage(int stage, int numStages, const double*) {
+    implicit = numStages == 2 && stage == 0 ? DIAGONAL : 1;
+    reached.assign(places.size(), 0);
+    for (Part& part : parts)
+        part.states.clear();
+}
+
+double WallEquations::findDepthAt(const State& state, const double* positions) const {
+    const double* y = positions+3*system->particles[state.particle].particle;
+    const double* g = state.gradient;
+    return state.offset+g[0]*y[0]+g[1]*y[1]+g[2]*y[2];
+}
+
+void WallEquations::linearise(int iteration, const double* moved, vector<CouplingEquation>& equations) {
+    iterations = iteration;
+    const double own = implicit*system->stiffness;
+    const size_t first = equations.size();
+    for (Part& part : parts)
+        for (State& state : part.states) {
+            const WallParticle& particle = system->particles[state.particle];
+            if (iteration <= SEARCHING_ITERATIONS) {
+                const double* y = moved+3*particle.particle;
+                double* const g = state.gradient;
+                const double depth = findDepth(system->wall, state.face, y, particle.radius, g);
+                state.offset = depth-(g[0]*y[0]+g[1]*y[1]+g[2]*y[2]);
+            }
+            state.equation = -1;
+            const double beyond = findDepthAt(state, moved)+state.mirrored;
+            if (!(beyond > 0))
+                continue;
+            state.equation = equations.size()-first;
+            CouplingEquation equation;
+            equation.places[0] = places[state.particle];
+            const double* g = state.gradient;
+            for (int k = 0; k < 3; k++)
+                equation.force[k] = -own*beyond*g[k];
+            double* const k = equation.stiffness;
+            k[0] = own*g[0]*g[0];
+            k[1] = own*g[0]*g[1];
+            k[2] = own*g[0]*g[2];
+            k[3] = own*g[1]*g[1];
+            k[4] = own*g[1]*g[2];
+            k[5] = own*g[2]*g[2];
+            equations.push_back(equation);
+        }
+}
+
+double WallEquations::findMirrored(int particle, int face, double depth) const {
+    const WallParticle& own = system->particles[particle];
+    double gradient[3];
+    const double before = findDepth(system->wall, face, begun+3*own.particle, own.radius, gradient);
+    const double largest = (isFlat(system->wall) ? 1 : LARGEST_MIRRORED)*(getRoom(system->wall)-own.radius);
+    const double further = min(largest, depth-max(0.0, before));
+    return max(0.0, further)*shareMirrored(implicit*stepSize*system->stiffness/frictions[particle]);
+}
+
+bool WallEquations::finishPart(int number, const double* moves, const double* moved) {
+    Part& part = parts[number];
+    bool unfinished = false;
+    for (const State& state : part.states) {
+        const double beyond = findDepthAt(state, moved)+state.mirrored;
+        if (state.equation < 0) {
+            unfinished |= beyond > tolerance;
+            continue;
+        }
+        const double *g = state.gradient, *move = moves+3*state.equation;
+        const double change = g[0]*move[0]+g[1]*move[1]+g[2]*move[2];
+        unfinished |= !(fabs(change) <= tolerance && beyond >= -tolerance);
+    }
+    const int count = places.size();
+    for (int i = number*CHUNK; i < min(count, (number+1)*CHUNK); i++) {
+        if (places[i].pack < 0)
+            continue;
+        const WallParticle& own = system->particles[i];
+        for (int face = 0; face < numFaces; face++) {
+            if ((reached[i]>>face)&1)
+                continue;
+            State state = {i, face, 0, {}, 0, -1};
+            const double depth = findDepth(system->wall, face, moved+3*own.particle, own.radius, state.gradient);
+            // Later iterations are no predictions: others have pushed the particle.
+            if (!(depth > (iterations == 0 ? 0 : tolerance)))
+                continue;
+            reached[i] |= 1<<face;
+            if (iterations == 0)
+                state.mirrored = findMirrored(i, face, depth);
+            const double* y = moved+3*own.particle;
+            state.offset = depth-(state.gradient[0]*y[0]+state.gradient[1]*y[1]+state.gradient[2]*y[2]);
+            part.states.push_back(state);
+            unfinished = true;
+        }
+    }
+    return unfinished;
+}
+
+bool WallEquations::finishIteration(const double* moves, const double* moved) {
+    (*loop)(parts.size(), [&] (int part) {
+        parts[part].unfinished = finishPart(part, moves, moved);
+    });
+    return any_of(parts.begin(), parts.end(), [] (const Part& part) {return part.unfinished;});
+}

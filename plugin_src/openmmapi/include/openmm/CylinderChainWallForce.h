@@ -1,0 +1,145 @@
+#ifndef OPENMM_CYLINDERCHAINWALLFORCE_H_
+#define OPENMM_CYLINDERCHAINWALLFORCE_H_
+
+#include "openmm/Context.h"
+#include "openmm/Force.h"
+#include <string>
+#include <vector>
+
+namespace OpenMM {
+
+/**
+ * This class keeps particles in a region: a half space, or the inside of a slab, sphere, cylinder, box or ellipsoid.
+ *
+ * Where a sphere around a particle gets beyond the surface of the region by a depth d, the energy is (k/2) d^2.  Of a
+ * slab or box, each plane counts by itself, so that the energy of a box is that of the distance from it.  The depth of
+ * an ellipsoid is (s-1)/|grad s|, with s^2 the sum of (x_i/a_i)^2: that of its surface to first order.
+ *
+ * Three things describe a region:
+ *
+ *     shape        point                      vector                           length
+ *     "plane"      on it                      its normal, into the half space  -
+ *     "slab"       half-way between planes    their normal                     their distance
+ *     "sphere"     the center                 -                                the radius
+ *     "cylinder"   on the axis                the axis                         the radius
+ *     "box"        the lower corner           the upper corner                 -
+ *     "ellipsoid"  the center                 the semi-axes                    -
+ *
+ * With other Integrators than CylinderChainIntegrator, and with its explicit schemes, the force is taken at the present
+ * positions.  Implicit schemes have it in their equations, unless one of the particles is a virtual site.
+ *
+ * Positions are taken as they are, even in a periodic box.  After a Context has been created, the region, the stiffness
+ * and the radii may be changed: call updateParametersInContext() to copy them over.
+ */
+class CylinderChainWallForce : public Force {
+public:
+    /**
+     * Create a CylinderChainWallForce.
+     *
+     * @param shape      the name of the shape
+     * @param point      see above, measured in nm
+     * @param vector     see above; corners and semi-axes are measured in nm, directions need not be normalized
+     * @param length     see above, measured in nm
+     * @param stiffness  the stiffness k, measured in kJ/mol/nm^2
+     */
+    CylinderChainWallForce(const std::string& shape, const Vec3& point, const Vec3& vector, double length,
+            double stiffness);
+    /**
+     * Get the region.
+     *
+     * @param[out] point   see above, measured in nm
+     * @param[out] vector  see above; directions are normalized
+     * @param[out] length  see above, measured in nm
+     * @return the name of the shape
+     */
+    std::string getRegion(Vec3& point, Vec3& vector, double& length) const;
+    /**
+     * Set the region.
+     *
+     * @param shape   the name of the shape
+     * @param point   see above, measured in nm
+     * @param vector  see above; corners and semi-axes are measured in nm, directions need not be normalized
+     * @param length  see above, measured in nm
+     */
+    void setRegion(const std::string& shape, const Vec3& point, const Vec3& vector, double length);
+    /**
+     * Get the stiffness k.
+     *
+     * @return the stiffness, measured in kJ/mol/nm^2
+     */
+    double getStiffness() const {
+        return stiffness;
+    }
+    /**
+     * Set the stiffness k.
+     *
+     * @param stiffness  the stiffness, measured in kJ/mol/nm^2
+     */
+    void setStiffness(double stiffness);
+    /**
+     * Get the number of particles.
+     */
+    int getNumParticles() const {
+        return particles.size();
+    }
+    /**
+     * Add a particle.
+     *
+     * @param particle  the index of the particle
+     * @param radius    the radius of the sphere around it, measured in nm
+     * @return the index, in this Force, of the particle that was added
+     */
+    int addParticle(int particle, double radius = 0);
+    /**
+     * Get the particle that an index stands for.
+     *
+     * @param index  the index in this Force
+     * @return the index of the particle
+     */
+    int getParticle(int index) const;
+    /**
+     * Get the radius of a particle.
+     *
+     * @param index  the index in this Force
+     * @return the radius, measured in nm
+     */
+    double getParticleRadius(int index) const;
+    /**
+     * Set the radius of a particle.
+     *
+     * @param index   the index in this Force
+     * @param radius  the radius, measured in nm
+     */
+    void setParticleRadius(int index, double radius);
+    /**
+     * Copy the region, the stiffness and the radii to a Context.  Particles cannot be added in this way.
+     */
+    void updateParametersInContext(Context& context);
+    /**
+     * Get whether this Force makes use of periodic boundary conditions: it does not.
+     */
+    bool usesPeriodicBoundaryConditions() const {
+        return false;
+    }
+protected:
+    ForceImpl* createImpl() const;
+private:
+    class ParticleInfo;
+    std::string shape;
+    Vec3 point, vector;
+    double length, stiffness;
+    std::vector<ParticleInfo> particles;
+};
+
+/**
+ * A particle.
+ */
+class CylinderChainWallForce::ParticleInfo {
+public:
+    int particle;
+    double radius;
+};
+
+} // namespace OpenMM
+
+#endif /*OPENMM_CYLINDERCHAINWALLFORCE_H_*/

@@ -1,0 +1,63 @@
+#ifndef OPENMM_CYLINDERCHAINWALLFORCEIMPL_H_
+#define OPENMM_CYLINDERCHAINWALLFORCEIMPL_H_
+
+#include "couplings/Walls.h"
+#include "openmm/CylinderChainWallForce.h"
+#include "openmm/Kernel.h"
+#include "openmm/internal/ForceImpl.h"
+#include <map>
+#include <string>
+#include <vector>
+
+namespace OpenMM {
+
+/**
+ * This is the internal implementation of CylinderChainWallForce.
+ */
+class CylinderChainWallForceImpl : public ForceImpl {
+public:
+    /**
+     * While an object of this class exists, the Force contributes nothing.
+     */
+    class Exclusion {
+    public:
+        Exclusion(CylinderChainWallForceImpl& force, bool exclude) : force(force) {
+            force.excluded = exclude;
+        }
+        ~Exclusion() {
+            force.excluded = false;
+        }
+    private:
+        CylinderChainWallForceImpl& force;
+    };
+    explicit CylinderChainWallForceImpl(const CylinderChainWallForce& owner);
+    void initialize(ContextImpl& context);
+    const CylinderChainWallForce& getOwner() const {
+        return owner;
+    }
+    void updateContextState(ContextImpl&, bool&) {
+        // Nothing is modified between steps.
+    }
+    double calcForcesAndEnergy(ContextImpl& context, bool includeForces, bool includeEnergy, int groups);
+    std::map<std::string, double> getDefaultParameters() {
+        return std::map<std::string, double>();
+    }
+    std::vector<std::string> getKernelNames();
+    void updateParametersInContext(ContextImpl& context);
+    /**
+     * Get the wall and its particles in the Context.
+     */
+    const cylchain::WallSystem& getWalls() const {
+        return walls;
+    }
+private:
+    cylchain::WallSystem describe() const;
+    const CylinderChainWallForce& owner;
+    cylchain::WallSystem walls;
+    Kernel kernel;
+    bool excluded;
+};
+
+} // namespace OpenMM
+
+#endif /*OPENMM_CYLINDERCHAINWALLFORCEIMPL_H_*/

@@ -1,0 +1,99 @@
+#include "openmm/CylinderChainWallForce.h"
+#include "couplings/Walls.h"
+#include "openmm/OpenMMException.h"
+#include "openmm/internal/AssertionUtilities.h"
+#include "openmm/internal/CylinderChainWallForceImpl.h"
+#include <algorithm>
+#include <cmath>
+
+using namespace OpenMM;
+using namespace cylchain;
+using namespace std;
+
+static void require(bool condition, const string& message) {
+    if (!condition)
+        throw OpenMMException("CylinderChainWallForce: "+message);
+}
+
+static bool isFinite(const Vec3& v) {
+    return isfinite(v[0]) && isfinite(v[1]) && isfinite(v[2]);
+}
+
+CylinderChainWallForce::CylinderChainWallForce(const string& shape, const Vec3& point, const Vec3& vector,
+        double length, double stiffness) {
+    setName("CylinderChainWallForce");
+    setRegion(shape, point, vector, length);
+    setStiffness(stiffness);
+}
+
+string CylinderChainWallForce::getRegion(Vec3& point, Vec3& vector, double& length) const {
+    point = this->point;
+    vector = this->vector;
+    length = this->length;
+    return shape;
+}
+
+void CylinderChainWallForce::setRegion(const string& shape, const Vec3& point, const Vec3& vector, double length) {
+    const std::vector<string> names = namesOf<WallShape>();
+    const size_t number = find(names.begin(), names.end(), shape)-names.begin();
+    require(number < names.size(), "There is no shape '"+shape+"'");
+    require(isFinite(point) && isFinite(vector) && isfinite(length), "The region must be described by finite numbers");
+    const WallShape kind = static_cast<WallShape>(number);
+    Vec3 stored = vector;
+    if (kind == WallShape::Plane || kind == WallShape::Slab || kind == WallShape::Cylinder) {
+        const double size = sqrt(vector.dot(vector));
+        require(size > 0, "The direction of a "+shape+" cannot be the zero vector");
+        // What is normalized already stays the same to the bit.
+
+        if (fabs(size-1) > 1e-15)
+            stored = vector/size;
+    }
+    if (kind == WallShape::Slab || kind == WallShape::Sphere || kind == WallShape::Cylinder)
+        require(length > 0, "The length of a "+shape+" must be positive");
+    if (kind == WallShape::Box)
+        require(vector[0] > point[0] && vector[1] > point[1] && vector[2] > point[2],
+                "The upper corner of a box must exceed the lower one along every axis");
+    if (kind == WallShape::Ellipsoid)
+        require(vector[0] > 0 && vector[1] > 0 && vector[2] > 0, "Semi-axes must be positive");
+    this->shape = shape;
+    this->point = point;
+    this->vector = stored;
+    this->length = length;
+}
+
+void CylinderChainWallForce::setStiffness(double stiffness) {
+    require(stiffness >= 0 && isfinite(stiffness), "The stiffness cannot be negative and must be finite");
+    this->stiffness = stiffness;
+}
+
+int CylinderChainWallForce::addParticle(int particle, double radius) {
+    require(particle >= 0, "Illegal particle index: "+to_string(particle));
+    require(radius >= 0 && isfinite(radius), "A radius cannot be negative and must be finite");
+    particles.push_back({particle, radius});
+    return particles.size()-1;
+}
+
+int CylinderChainWallForce::getParticle(int index) const {
+    ASSERT_VALID_INDEX(index, particles);
+    return particles[index].particle;
+}
+
+double CylinderChainWallForce::getParticleRadius(int index) const {
+    ASSERT_VALID_INDEX(index, particles);
+    return particles[index].radius;
+}
+
+void CylinderChainWallForce::setParticleRadius(int index, double radius) {
+    ASSERT_VALID_INDEX(index, particles);
+    require(radius >= 0 && isfinite(radius), "A radius cannot be negative and must be finite");
+    particles[index].radius = radius;
+}
+
+void CylinderChainWallForce::updateParametersInContext(Context& context) {
+    dynamic_cast<CylinderChainWallForceImpl&>(getImplInContext(context)).updateParametersInContext(
+            getContextImpl(context));
+}
+
+ForceImpl* CylinderChainWallForce::createImpl() const {
+    return new CylinderChainWallForceImpl(*this);
+}

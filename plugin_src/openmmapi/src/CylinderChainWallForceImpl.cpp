@@ -1,0 +1,66 @@
+#include "openmm/internal/CylinderChainWallForceImpl.h"
+#include "openmm/CylinderChainKernels.h"
+#include "openmm/OpenMMException.h"
+#include "openmm/System.h"
+#include "openmm/internal/ContextImpl.h"
+#include <algorithm>
+
+using namespace OpenMM;
+using namespace cylchain;
+using namespace std;
+
+CylinderChainWallForceImpl::CylinderChainWallForceImpl(const CylinderChainWallForce& owner) : owner(owner),
+        excluded(false) {
+    forceGroup = owner.getForceGroup();
+}
+
+WallSystem CylinderChainWallForceImpl::describe() const {
+    WallSystem result;
+    Vec3 point, vector;
+    const string shape = owner.getRegion(point, vector, result.wall.length);
+    const std::vector<string> names = namesOf<WallShape>();
+    result.wall.shape = static_cast<WallShape>(find(names.begin(), names.end(), shape)-names.begin());
+    copy(&point[0], &point[0]+3, result.wall.point);
+    copy(&vector[0], &vector[0]+3, result.wall.vector);
+    result.stiffness = owner.getStiffness();
+    for (int i = 0; i < owner.getNumParticles(); i++) {
+        result.particles.push_back({owner.getParticle(i), owner.getParticleRadius(i)});
+        if (!(owner.getParticleRadius(i) < getRoom(result.wall)))
+            throw OpenMMException("CylinderChainWallForce: Particle "+to_string(owner.getParticle(i))+
+                    " with its radius does not fit into the "+shape);
+    }
+    return result;
+}
+
+void CylinderChainWallForceImpl::initialize(ContextImpl& context) {
+    walls = describe();
+    for (const WallParticle& own : walls.particles)
+        if (own.particle >= context.getSystem().getNumParticles())
+            throw OpenMMException("CylinderChainWallForce: Illegal particle index: "+to_string(own.particle));
+    kernel = context.getPlatform().createKernel(CalcCylinderChainWallForceKernel::Name(), context);
+    kernel.getAs<CalcCylinderChainWallForceKernel>().initialize(context.getSystem(), walls);
+}
+
+double CylinderChainWallForceImpl::calcForcesAndEnergy(ContextImpl& context, bool includeForces, bool includeEnergy,
+        int groups) {
+    if ((groups&(1<<forceGroup)) != 0 && !excluded)
+        return kernel.getAs<CalcCylinderChainWallForceKernel>().execute(context, includeForces, includeEnergy);
+    return 0.0;
+}
+
+vector<string> CylinderChainWallForceImpl::getKernelNames() {
+    return {CalcCylinderChainWallForceKernel::Name()};
+}
+
+void CylinderChainWallForceImpl::updateParametersInContext(ContextImpl& context) {
+    const WallSystem present = describe();
+    const bool same = equal(walls.particles.begin(), walls.particles.end(), present.particles.begin(),
+            present.particles.end(), [] (const WallParticle& a, const WallParticle& b) {
+                return a.particle == b.particle;
+            });
+    if (!same)
+        throw OpenMMException("CylinderChainWallForce: Particles cannot be added to a Context");
+    walls = present;
+    kernel.getAs<CalcCylinderChainWallForceKernel>().copyParametersToContext(context, walls);
+    context.systemChanged();
+}

@@ -1,0 +1,25 @@
+#ifndef OPENMM_REFERENCECALCCYLINDERCHAINWALLFORCEKERNEL_H_
+#define OPENMM_REFERENCECALCCYLINDERCHAINWALLFORCEKERNEL_H_
+
+#include "couplings/Walls.h"
+#include "openmm/CylinderChainKernels.h"
+
+namespace OpenMM {
+
+/**
+ * This kernel is invoked by CylinderChainWallForce to calculate the forces acting on the system and the energy of the
+ * system.
+ */
+class ReferenceCalcCylinderChainWallForceKernel : public CalcCylinderChainWallForceKernel {
+public:
+    ReferenceCalcCylinderChainWallForceKernel(std::string name, const Platform& platform);
+    void initialize(const System& system, const cylchain::WallSystem& walls);
+    double execute(ContextImpl& context, bool includeForces, bool includeEnergy);
+    void copyParametersToContext(ContextImpl& context, const cylchain::WallSystem& walls);
+private:
+    cylchain::WallSystem walls;
+};
+
+} // namespace OpenMM
+
+#endif /*OPENMM_REFERENCECALCCYLINDERCHAINWALLFORCEKERNEL_H_*/

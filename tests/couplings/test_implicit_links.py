@@ -1,0 +1,387 @@
+"""Links in the equations of implicit steps: forces, relaxation, bits, restarts, periodic boxes, and what goes wrong."""
+
+import numpy as np
+import openmm
+import pytest
+
+from openmm_cylchain import Crosslinks, Filaments, Flow, InstabilityError
+from support.contexts import energy_of, new_context, positions_of
+from support.linked_networks import ACTIN, MICROSECOND, LinkPotential, Network, Simulation
+from support.linked_pairs import PICONEWTON_PER_NANOMETER
+from support.solvent import TEMPERATURE, VISCOSITY
+
+SCHEMES = ("implicit", "implicit-second-order")
+BOX = 1500.0
+FORMS = {
+    "zero": LinkPotential(0.25),
+    "rest": LinkPotential(0.25, 35.0),
+    "stiff": LinkPotential(20.0, 35.0),
+    "fene": LinkPotential(0.25, 35.0, 1000.0),
+}
+
+
+def mixed_network(potential, scheme, step, periodic=False, temperature=None, flow=None, threads=1, moved=None, seed=3,
+                  precision="automatic", platform="CPU"):  # fmt: skip
+    """Filaments that are free, in a ring, planar, clamped and propelled, linked at all kinds of places.
+
+    Links of two forces: between filaments, of a place with several, at nodes and ends, within one filament, along the
+    same segment, to a point and to a particle.
+    """
+    filaments = Filaments(VISCOSITY, TEMPERATURE)
+    generator = np.random.default_rng(seed)
+    for number in range(4):
+        filaments.add_equilibrium(ACTIN, 6, seed=number + 1, start=generator.uniform(0, 200, 3))
+    filaments.add_ring(ACTIN, 9, [100, 100, 100], [0, 0, 1])
+    filaments.add_straight(ACTIN, 5, [0, 50, 80], [1, 1, 0], clamped=[0, 1])
+    filaments.add_straight(ACTIN, 4, [30, 0, 0], [1, 0, 0], propulsion=1e-4)
+    planar = Filaments(VISCOSITY, TEMPERATURE)
+    planar.add_equilibrium(ACTIN, 5, seed=11, planar=True)
+    filaments.add_nodes(ACTIN, planar[0].positions, planar=True)
+    topology, system = openmm.app.Topology(), openmm.System()
+    topology.addAtom("P", None, topology.addResidue("PRT", topology.addChain()))
+    system.addParticle(1.0)
+    if periodic:
+        system.setDefaultPeriodicBoxVectors(*(BOX * np.eye(3)))
+    positions = filaments.add_to(topology, system, [[120.0, 60.0, 40.0]])
+    links = [potential.crosslinks(), potential.crosslinks()]
+
+    def at(filament, segment, fraction):
+        return filaments.segment_place(filament, segment=segment, fraction=fraction)
+
+    pairs = [(at(i, 2, 0.3), at((i + 1) % 7, 1, 0.5)) for i in range(7)]
+    pairs += [(at(0, 2, 0.3), at(i, 3, 1.0)) for i in range(1, 4)]
+    pairs += [(at(0, 0, 0.0), at(1, 5, 1.0)), (at(2, 1, 0.2), at(2, 4, 0.9)), (at(3, 1, 0.1), at(3, 1, 0.8))]
+    pairs += [(0, at(1, 0, 0.4)), (at(2, 0, 0.0), [50.0, 60.0, 70.0]), (at(5, 0, 0.0), at(4, 0, 0.6))]
+    for number, pair in enumerate(pairs):
+        links[number % 2].add(None, *pair)
+    for one in links:
+        one.add_to(system, periodic=periodic)
+    integrator = filaments.create_integrator(
+        system, step, scheme=scheme, temperature=temperature, particle_friction=5e5, random_seed=seed, checks=False,
+        flow=flow, precision=precision,
+    )  # fmt: skip
+    positions = np.array(positions._value)
+    if moved is not None:
+        for number, nodes in enumerate(filaments.node_indices):
+            positions[nodes] += moved[number]
+    properties = {"Threads": str(threads)} if platform == "CPU" else None
+    return filaments, system, links, new_context(system, positions, integrator, platform, properties)
+
+
+def advance(context, steps):
+    context.getIntegrator().step(steps)
+    return positions_of(context)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("form", FORMS)
+def test_without_noise_steps_converge_to_explicit_ones_with_second_order(form, scheme):
+    potential, time = FORMS[form], 4e3
+    ends = {}
+    for own, steps in (("midpoint", 3200), (scheme, 4), (scheme, 8), (scheme, 16)):
+        *_, context = mixed_network(potential, own, time / steps, temperature=0.0)
+        start = positions_of(context)
+        ends[steps] = advance(context, steps)
+    moved = np.abs(ends[3200] - start).max()
+    errors = [np.abs(ends[steps] - ends[3200]).max() for steps in (4, 8, 16)]
+    assert moved > 0.1
+    # With the tolerance of Newton's method, 1 % of a segment, and of explicit steps.
+    assert errors[2] < 2e-3 * moved, (moved, errors)
+    assert errors[2] < errors[0] / 3 or errors[0] < 1e-4 * moved, (moved, errors)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("step", [0.1, 2, 50])
+def test_without_noise_a_link_relaxes_as_it_should(step, form, scheme):
+    """Two straight filaments side by side, pulled together: d' = -2 V'(d)/zeta, with the friction of half a filament."""
+    potential = FORMS[form]
+    nodes = np.zeros((1, 2, 7, 3))
+    nodes[..., 0] = 100 * np.arange(7)
+    nodes[0, 1, :, 1] = 80.0
+    network = Network((((0, 3, 0.0), (1, 3, 0.0)),), 2)
+    lengths = []
+    for own, h in ((scheme, step), ("midpoint", 0.0005)):
+        simulation = Simulation(network, potential, nodes, np.zeros((1, 0, 3)), own, h * MICROSECOND, temperature=0.0)
+        length = [80.0]
+        for _ in range(5):
+            simulation.integrator.step(round(max(step, 1) / h))
+            length.append(simulation.crosslinks[0].lengths(simulation.context)[0])
+            if own == "midpoint" and step > 2:
+                break
+        lengths.append(np.array(length))
+        assert simulation.integrator.getNumDividedSteps() == 0
+    ours, explicit = lengths
+    assert np.all(np.diff(np.abs(ours - potential.rest_length)) < 1e-9), ours
+    if step <= 2:
+        assert explicit[0] - explicit[-1] > 1
+        assert ours == pytest.approx(explicit, abs=0.02 * (explicit[0] - explicit[-1])), (ours, explicit)
+    else:
+        simulation = Simulation(network, potential, nodes, np.zeros((1, 0, 3)), scheme, step * MICROSECOND, temperature=0.0)
+        simulation.integrator.step(400)
+        assert simulation.crosslinks[0].lengths(simulation.context)[0] == pytest.approx(potential.rest_length, abs=0.01)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("step", [0.1, 5])
+def test_without_noise_energy_falls(step, form, scheme):
+    filaments, _, links, context = mixed_network(FORMS[form], scheme, step * MICROSECOND, temperature=0.0)
+    energies = [energy_of(context)]
+    for _ in range(60):
+        advance(context, 1)
+        energies.append(energy_of(context))
+    assert np.isfinite(energies).all()
+    # Propulsion puts in some.
+    assert np.all(np.diff(energies) < 1e-3 * energies[0]), energies
+    assert energies[-1] < 0.7 * energies[0]
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("form", FORMS)
+def test_threads_platforms_contexts_and_calls_change_no_bit(form, scheme):
+    ends, kinds = [], [(1, "CPU", None), (2, "CPU", None), (3, "CPU", None), (1, "Reference", None)]
+    for threads, platform, _ in kinds:
+        *_, context = mixed_network(FORMS[form], scheme, MICROSECOND, threads=threads, platform=platform)
+        ends.append(advance(context, 20))
+    _, system, _, context = mixed_network(FORMS[form], scheme, MICROSECOND)
+    start = positions_of(context)
+    duplicate = openmm.XmlSerializer.clone(system)
+    others = [
+        new_context(own, start, openmm.XmlSerializer.clone(context.getIntegrator()), "CPU", {"Threads": "1"})
+        for own in (system, duplicate)
+    ]
+    for _ in range(20):
+        for other in others:
+            advance(other, 1)
+    ends += [positions_of(other) for other in others]
+    for end in ends[1:]:
+        assert np.array_equal(ends[0], end)
+    assert np.abs(ends[0] - start).max() > 1
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("form", FORMS)
+def test_restarts_go_on_to_the_bit(form, scheme):
+    filaments, system, links, context = mixed_network(FORMS[form], scheme, MICROSECOND)
+    advance(context, 5)
+    links[0].add(context, 5, filaments.segment_place(3, segment=2, fraction=0.3))
+    links[1].set_active(context, 1, False)
+    links[0].remove(context, 2)
+    advance(context, 5)
+    checkpoint = context.createCheckpoint()
+    state = openmm.XmlSerializer.serialize(
+        context.getState(positions=True, velocities=True, parameters=True, integratorParameters=True)
+    )
+    end = advance(context, 10)
+    for kind in (0, 1):
+        *_, other_links, other = mixed_network(FORMS[form], scheme, MICROSECOND)
+        if kind == 0:
+            other.loadCheckpoint(checkpoint)
+        else:
+            other.setState(openmm.XmlSerializer.deserialize(state))
+        assert np.array_equal(advance(other, 10), end)
+        for one, same in zip(links, other_links):
+            assert one.table(context) == same.table(other)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("form", FORMS)
+def test_periodic_images_are_the_same(form, scheme):
+    generator, ends = np.random.default_rng(8), []
+    shifts = BOX * generator.integers(-2, 3, (8, 1, 3))
+    shifts[7, :, 2] = 0
+    for moved in (None, shifts):
+        filaments, _, _, context = mixed_network(FORMS[form], scheme, MICROSECOND, periodic=True, moved=moved)
+        end = advance(context, 20)
+        for number, nodes in enumerate(filaments.node_indices):
+            end[nodes] -= 0 if moved is None else moved[number]
+        ends.append(end)
+    assert ends[1] == pytest.approx(ends[0], abs=1e-5)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("form", FORMS)
+def test_mixed_precision_and_flow(form, scheme):
+    ends = []
+    for precision in ("double", "mixed"):
+        *_, context = mixed_network(FORMS[form], scheme, MICROSECOND, precision=precision)
+        start = positions_of(context)
+        ends.append(advance(context, 1))
+    assert ends[1] == pytest.approx(ends[0], abs=2e-3 * np.abs(ends[0] - start).max())
+    still = [mixed_network(FORMS[form], scheme, 1e4, temperature=0.0, flow=flow)[3]
+             for flow in (None, Flow(velocity=[1e-3, 0, 0]))]  # fmt: skip
+    ends = [advance(context, 1) for context in still]
+    particle = ends[1][0] - ends[0][0]
+    assert particle[0] == pytest.approx(10.0, rel=0.2)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_links_that_are_off_are_not_there(scheme):
+    ends = []
+    for kind in ("off", "removed"):
+        filaments, _, links, context = mixed_network(FORMS["rest"], scheme, MICROSECOND)
+        advance(context, 3)
+        links[0].set_active(context, 1, False) if kind == "off" else links[0].remove(context, 1)
+        ends.append(advance(context, 10))
+    assert np.array_equal(*ends)
+
+
+def pair(potential, distance, scheme, step, copies=1, temperature=None, links=1, change=None, seed=2):
+    network = Network((((0, 3, 0.0), (1, 3, 0.0)),) * links, 2)
+    nodes, particles = network.draw(potential, copies, np.random.default_rng(seed))
+    nodes -= nodes[:, :, 3:4]
+    nodes[:, 1, :, 0] += distance
+    if change is not None:
+        change(nodes)
+    return Simulation(network, potential, nodes, particles, scheme, step * MICROSECOND, temperature=temperature)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("rest_length", [0.0, 5.0, 35.0])
+def test_ends_that_coincide_come_apart(rest_length, scheme):
+    simulation = pair(LinkPotential(0.25, rest_length), 0.0, scheme, 1)
+    simulation.integrator.step(200)
+    assert abs(simulation.crosslinks[0].lengths(simulation.context)[0] - rest_length) < 20
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("stiffness", [1e-9, 1e4, 1e8])
+@pytest.mark.parametrize("rest_length", [0.0, 35.0])
+def test_any_stiffness(rest_length, stiffness, scheme):
+    simulation = pair(LinkPotential(stiffness, rest_length), rest_length, scheme, 1, 20)
+    energies = simulation.measure(50, 1)["links"]
+    assert np.isfinite(energies).all()
+    if stiffness > 1:
+        exact = 0.5 if rest_length else 1.5
+        assert energies.mean() == pytest.approx(exact, rel=0.15)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_thousands_of_links_on_one_place_are_one_stiff_link(scheme):
+    simulation = pair(LinkPotential(0.25), 30.0, scheme, 1, links=3000)
+    simulation.integrator.step(30)
+    # The relaxation time of all of them is 10 ns.
+    assert simulation.crosslinks[0].lengths(simulation.context)[0] < 1
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("temperature", [0.0, None])
+@pytest.mark.parametrize("potential", [LinkPotential(0.25, 35.0), LinkPotential(10.0), LinkPotential(100.0, 35.0)], ids=str)
+def test_links_that_are_stretched_by_micrometers(potential, temperature, scheme):
+    """Up to 300 nN: either the link shortens, or an error names what is wrong."""
+    simulation = pair(potential, 3000.0, scheme, 1, temperature=temperature)
+    try:
+        simulation.integrator.step(5)
+    except InstabilityError as error:
+        assert "rosslink" in str(error), str(error)
+    else:
+        assert simulation.crosslinks[0].lengths(simulation.context)[0] < 3000
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("distance", [14.9, 55.1, 80.0])
+def test_fene_links_out_of_their_range_are_refused(distance, scheme):
+    simulation = pair(LinkPotential(0.25, 35.0, 20.0), distance, scheme, 1)
+    with pytest.raises(InstabilityError, match="rosslink"):
+        simulation.integrator.step(1)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("distance", [15.001, 54.999])
+def test_fene_links_near_their_limit_come_back(distance, scheme):
+    simulation = pair(LinkPotential(0.25, 35.0, 20.0), distance, scheme, 1, 20)
+    simulation.integrator.step(50)
+    assert np.abs(simulation.crosslinks[0].extensions(simulation.context)).max() < 20
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_positions_that_are_not_finite(value, scheme):
+    def change(nodes):
+        nodes[0, 1, 4, 0] = value
+
+    simulation = pair(LinkPotential(0.25, 35.0), 35.0, scheme, 1, change=change)
+    with pytest.raises(InstabilityError, match="Filament 1.*not finite"):
+        simulation.integrator.step(1)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("form", ["zero", "rest", "stiff"])
+def test_ten_times_too_long_steps_are_right_or_counted(form, scheme):
+    potential = FORMS[form]
+    simulation = pair(potential, potential.rest_length, scheme, 1.3e4, 100)
+    simulation.integrator.step(10)
+    energies = simulation.measure(30, 1)["links"]
+    divided = simulation.integrator.getNumDividedSteps() / (200 * 40)
+    exact = potential.mean(potential.energy)
+    assert divided > 1e-3 or energies.mean() == pytest.approx(exact, rel=0.05), (divided, energies.mean(), exact)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("potential", [LinkPotential(0.25), LinkPotential(0.25, 35.0)], ids=str)
+def test_relaxation_of_a_stretched_link_is_that_of_tiny_steps(potential, scheme):
+    means = []
+    for own, step in ((scheme, 0.5), ("midpoint", 0.002)):
+        simulation = pair(potential, potential.rest_length + 40, own, step, 400, seed=5)
+        lengths = []
+        for _ in range(4):
+            simulation.integrator.step(round(5 / step))
+            nodes, _ = simulation.configuration()
+            along = nodes[:, 1, 3] - nodes[:, 0, 3]
+            lengths.append(along[:, 0] if potential.rest_length == 0 else np.linalg.norm(along, axis=1))
+        means.append(np.array(lengths) - potential.rest_length)
+    ours, tiny = (each.mean(axis=1) for each in means)
+    errors = np.hypot(*(each.std(axis=1) / 20 for each in means))
+    assert np.all(tiny[:2] > 5 * errors[:2])
+    assert np.all(np.abs(ours - tiny) < 0.05 * tiny + 4 * errors), (ours, tiny, errors)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("potential", [LinkPotential(0.25), LinkPotential(0.25, 35.0)], ids=str)
+def test_stress_after_a_step_strain_decays_as_in_tiny_steps(potential, scheme):
+    """A square of four filaments, linked at its corners and sheared at once by a tenth."""
+    network = Network(tuple(((i, 2, 1.0), ((i + 1) % 4, 0, 0.0)) for i in range(4)), 4, 3)
+    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]) * (300 + potential.rest_length)
+    square = np.zeros((4, 4, 3))
+    for i in range(4):
+        side = corners[(i + 1) % 4] - corners[i]
+        side /= np.linalg.norm(side)
+        square[i] = corners[i] + side * (100 * np.arange(4)[:, None] + 0.5 * potential.rest_length)
+    nodes = np.repeat(square[None], 300, axis=0)
+    simulation = Simulation(network, potential, nodes, np.zeros((300, 0, 3)), "implicit", 0.2 * MICROSECOND)
+    simulation.integrator.step(500)
+    start, particles = simulation.configuration()
+    centre = start.mean(axis=(1, 2), keepdims=True)
+    start = start + 0.1 * np.roll(start - centre, 1, axis=3) * [1, 0, 0]
+    curves = []
+    for own, step in ((scheme, 0.2), ("midpoint", 0.001)):
+        simulation = Simulation(network, potential, start, particles, own, step * MICROSECOND)
+        curve = []
+        for _ in range(5):
+            simulation.integrator.step(round(2 / step))
+            curve.append(network.energies(potential, *simulation.configuration())["links"].mean(axis=1))
+        curves.append(np.array(curve))
+    ours, tiny = (each.mean(axis=1) for each in curves)
+    errors = np.hypot(*(each.std(axis=1) / np.sqrt(300) for each in curves))
+    assert np.all(np.abs(ours - tiny) < 0.05 * tiny + 4 * errors), (ours, tiny, errors)
+
+
+def test_links_of_no_stiffness_and_no_links_do_nothing():
+    filaments = Filaments(VISCOSITY, TEMPERATURE)
+    filaments.add_equilibrium(ACTIN, 5, seed=1)
+    filaments.add_equilibrium(ACTIN, 5, seed=2)
+    _, system, positions = filaments.build()
+    ends = []
+    for stiffness in (None, 0.25):
+        own = openmm.XmlSerializer.clone(system)
+        if stiffness is not None:
+            links = Crosslinks(stiffness * PICONEWTON_PER_NANOMETER, 0.0)
+            links.add(None, 0, 7)
+            links.set_active(None, 0, False)
+            links.add_to(own)
+        integrator = filaments.create_integrator(own, MICROSECOND, random_seed=4, checks=False)
+        ends.append(advance(new_context(own, positions, integrator), 20))
+    assert ends[1] == pytest.approx(ends[0], abs=1e-9)
