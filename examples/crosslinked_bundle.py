@@ -57,7 +57,7 @@ nodes = np.array(filaments.node_indices)
 signs = np.where(np.arange(FILAMENTS) % 2, -1.0, 1.0)
 load = constant_force(np.where(signs > 0, nodes[:, -1], nodes[:, 0]), [0, 0, 0])
 system.addForce(load)
-integrator = filaments.create_integrator(system, STEP, random_seed=1, checks=False)
+integrator = filaments.create_integrator(system, STEP, random_seed=1)
 simulation = app.Simulation(topology, system, integrator, openmm.Platform.getPlatformByName("CPU"))
 context = simulation.context
 context.setPositions(positions)

@@ -183,6 +183,7 @@ def _add_virtual_site(system):
     return [site]
 
 
+_COLD = 1.0
 _COLD_STEPS = (1e-3, 1e-2, 0.1, 1.0)
 _WARM_STEPS = (1e-2, 0.1, 1.0)
 
@@ -190,7 +191,7 @@ _WARM_STEPS = (1e-2, 0.1, 1.0)
 def relaxed_positions(system, steps):
     """Positions in which filaments that were drawn on top of each other have come apart, and links are in equilibrium.
 
-    Filaments come apart without noise in steps that grow: where two axes nearly meet, noise lets them cross.
+    Filaments come apart in the cold, in steps that grow: where two axes nearly meet, noise would let them cross.
 
     Parameters
     ----------
@@ -205,7 +206,7 @@ def relaxed_positions(system, steps):
     """
     network = create_network(system, "implicit", _COLD_STEPS[0])
     if system.contacts:
-        network.integrator.setTemperature(0.0)
+        network.integrator.setTemperature(_COLD)
         _step(network, _COLD_STEPS, 20)
         network.integrator.setTemperature(systems.TEMPERATURE)
     _step(network, _WARM_STEPS, 50)
