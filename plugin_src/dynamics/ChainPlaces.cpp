@@ -87,6 +87,17 @@ double ChainPlaces::getFriction(const PlaceOnChain& place) const {
             segment.extensional/(segment.restLength*segment.restLength);
 }
 
+double ChainPlaces::getLateralFriction(const PlaceOnChain& place) const {
+    if (place.chain >= (int) chains.size())
+        return particles[place.chain-chains.size()].friction;
+    const Chain& chain = chains[place.chain];
+    const Segment& segment = chain.segments[place.node];
+    if (!(segment.perpendicular > 0 && segment.rotational > 0))
+        return chain.nodeFriction;
+    const double arm = (place.fraction-0.5)*segment.restLength;
+    return chain.nodeFriction+1/(1/segment.perpendicular+arm*arm/segment.rotational);
+}
+
 vector<int> ChainPlaces::getNodes(int chain) const {
     if (chain >= (int) chains.size())
         return {particles[chain-chains.size()].particle};

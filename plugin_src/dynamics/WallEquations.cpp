@@ -14,6 +14,10 @@ const double DIAGONAL = 1-M_SQRT1_2;
 const double TOLERANCE = 0.3;
 /** The same in nm, where nothing moves thermally. */
 const double LEAST_TOLERANCE = 1e-7;
+/** The number of iterations after which what is beyond a face for the first time is mirrored. */
+const int MIRRORING_ITERATIONS = 3;
+/** The number of iterations that know of no walls. */
+const int FREE_ITERATIONS = 2;
 /** The number of iterations that look where faces are. */
 const int SEARCHING_ITERATIONS = 6;
 /** The most that is mirrored at a curved face, over the way to the middle. */
@@ -48,7 +52,7 @@ void WallEquations::begin(const CoupledStart& start, const Loop& newLoop) {
             Place place;
             place.first = system->particles[i].particle;
             if (start.places.find(place, places[i]) && start.taken[places[i].chain])
-                frictions[i] = start.places.getFriction(places[i]);
+                frictions[i] = start.places.getLateralFriction(places[i]);
             else
                 places[i] = PlaceOnChain();
         }
@@ -134,16 +138,19 @@ bool WallEquations::finishPart(int number, const double* moves, const double* mo
                 continue;
             State state = {i, face, 0, {}, 0, -1};
             const double depth = findDepth(system->wall, face, moved+3*own.particle, own.radius, state.gradient);
-            // Later iterations are no predictions: others have pushed the particle.
-            if (!(depth > (iterations == 0 ? 0 : tolerance)))
+            if (!(depth > (iterations < MIRRORING_ITERATIONS ? 0 : tolerance)))
+                continue;
+            unfinished = true;
+            if (iterations < FREE_ITERATIONS-1)
                 continue;
             reached[i] |= 1<<face;
-            if (iterations == 0)
+            // Where two faces meet, a particle or rod that one has mirrored may be beyond the other. Later iterations are
+            // no predictions: others have pushed the particle.
+            if (iterations < MIRRORING_ITERATIONS)
                 state.mirrored = findMirrored(i, face, depth);
             const double* y = moved+3*own.particle;
             state.offset = depth-(state.gradient[0]*y[0]+state.gradient[1]*y[1]+state.gradient[2]*y[2]);
             part.states.push_back(state);
-            unfinished = true;
         }
     }
     return unfinished;

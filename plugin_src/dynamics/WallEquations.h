@@ -10,8 +10,8 @@ namespace cylchain {
 /**
  * Walls in an implicit step.
  *
- * The first iteration of a stage knows of none. Where it leads, y*, a particle may be beyond a face, by more than where
- * it began, x, by b = d(y*)-max(0, d(x)) with the depth d. The force on it is
+ * The first iteration of a stage knows of none. Where it and the next one lead, y*, a particle may be beyond a face, by
+ * more than where it began, x, by b = d(y*)-max(0, d(x)) with the depth d. The force on it is
  *
  *     -k (beta b+d(y)) grad d   where d(y) > -beta b
  *
@@ -49,7 +49,6 @@ private:
         /** The number of its equation in the last iteration, or -1. */
         int equation;
     };
-    /** Particles that a thread looks at together. */
     struct Part {
         std::vector<State> states;
         bool unfinished;
@@ -62,7 +61,7 @@ private:
     const double* begun = nullptr;
     double stepSize = 0, tolerance = 0, implicit = 1;
     int numFaces = 0, iterations = 0;
-    /** For each particle of the wall: where it is, the least friction that it has, and a bit for each face it has a state of. */
+    /** For each particle of the wall: where it is, its friction, and a bit for each face that it has a state of. */
     std::vector<PlaceOnChain> places;
     std::vector<double> frictions;
     std::vector<unsigned char> reached;
