@@ -79,7 +79,7 @@ class Network:
     kind: object = field(default=ACTIN)
 
     def draw(self, potential, copies, generator):
-        """Nodes (copies, filaments, nodes, 3) and particles (copies, particles, 3), in equilibrium if there is no loop."""
+        """Nodes (copies, filaments, nodes, 3) and particles (copies, particles, 3): of a tree, in equilibrium."""
         nodes = np.array(
             [
                 [draw_chain(self.kind, self.segments, TEMPERATURE, generator) for _ in range(self.filaments)]
