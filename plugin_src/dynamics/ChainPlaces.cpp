@@ -83,8 +83,13 @@ double ChainPlaces::getFriction(const PlaceOnChain& place) const {
         return particles[place.chain-chains.size()].friction;
     const Chain& chain = chains[place.chain];
     const Segment& segment = chain.segments[place.node];
-    return chain.nodeFriction+0.25*min(segment.parallel, segment.perpendicular)+
-            segment.extensional/(segment.restLength*segment.restLength);
+    return chain.nodeFriction+0.25*min(segment.parallel, segment.perpendicular);
+}
+
+int ChainPlaces::getParticle(const PlaceOnChain& place) const {
+    if (place.chain >= (int) chains.size())
+        return particles[place.chain-chains.size()].particle;
+    return chains[place.chain].nodes[place.node];
 }
 
 double ChainPlaces::getLateralFriction(const PlaceOnChain& place) const {

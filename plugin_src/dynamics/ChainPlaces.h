@@ -45,6 +45,11 @@ public:
      *         segment
      */
     bool find(const Place& place, PlaceOnChain& result) const;
+    /** The particle at a place, or at the beginning of its segment. */
+    int getParticle(const PlaceOnChain& place) const;
+    int getNumParticles() const {
+        return chainOfParticle.size();
+    }
     /** The least friction that a place has against any motion of its own. */
     double getFriction(const PlaceOnChain& place) const;
     /**

@@ -19,7 +19,9 @@ const double DIAGONAL = 1-M_SQRT1_2, NOISE_OF_FIRST = DIAGONAL/(1-DIAGONAL);
 /** The largest change of a link in the last iteration, over its thermal fluctuation. */
 const double TOLERANCE = 0.3;
 /** What counts as no change: over the change of the whole step, and over the length. */
-const double OF_CHANGE = 1e-3, OF_LENGTH = 1e-6;
+const double OF_CHANGE = 1e-3, OF_CHANGE_WITH_NOISE = 1e-5, OF_LENGTH = 1e-7;
+/** The least length for metric forces, over the rest length. */
+const double LEAST_LENGTH = 0.05;
 /** The largest error of a distance that turning leaves, over the same. */
 const double LENGTH_TOLERANCE = 0.07;
 /** Without noise: the largest change across a link in the last iteration, over its length. */
@@ -39,9 +41,10 @@ void multiply(const double* k, const double* v, double* result) {
 
 } // namespace
 
-void LinkEquations::setLinks(const vector<Link>* newLinks, const LinkBoxes& newBoxes) {
+void LinkEquations::setLinks(const vector<Link>* newLinks, const LinkBoxes& newBoxes, int newForce) {
     links = newLinks;
     boxes = newBoxes;
+    force = newForce;
 }
 
 void LinkEquations::vectorOf(const State& state, const double* positions, double* r) const {
@@ -67,12 +70,28 @@ void LinkEquations::begin(const CoupledStart& start, const Loop&) {
             continue;
         if (!start.takes(state.places[0]) || !start.takes(state.places[1]))
             continue;
+        states.push_back(state);
+    }
+    addStiffness(start.places);
+    for (State& state : states) {
         describe(start, state);
         anyTurns |= state.turns;
-        states.push_back(state);
     }
     if (kT > 0)
         drawNoise(start);
+}
+
+/** What holds each segment: links at the same place relax together. */
+void LinkEquations::addStiffness(const ChainPlaces& places) {
+    auto forPlaces = [&] (auto function) {
+        for (const State& state : states)
+            for (const PlaceOnChain& place : state.places)
+                if (place.pack >= 0)
+                    function(places.getParticle(place), state.link->stiffness);
+    };
+    stiffness.resize(places.getNumParticles());
+    forPlaces([&] (int particle, double) {stiffness[particle] = 0;});
+    forPlaces([&] (int particle, double own) {stiffness[particle] += own;});
 }
 
 void LinkEquations::describe(const CoupledStart& start, State& state) const {
@@ -87,11 +106,11 @@ void LinkEquations::describe(const CoupledStart& start, State& state) const {
         state.shift[k] = state.start[k]-direct[k];
     state.length = sqrt(dot(state.start, state.start));
     state.turns = link.restLength > 0 || hasRange(link.model);
-    double mobility = 0;
+    double rate = 0;
     for (const PlaceOnChain& place : state.places)
         if (place.pack >= 0)
-            mobility += 1/start.places.getFriction(place);
-    state.theta = max(0.5, 1-1/(stepSize*link.stiffness*mobility));
+            rate += stiffness[start.places.getParticle(place)]/start.places.getFriction(place);
+    state.theta = max(0.5, 1-1/(stepSize*rate));
     state.multiplier = 0;
     double slope;
     const double inverse = link.maximumExtension > 0 ? 1/link.maximumExtension : 0;
@@ -103,7 +122,8 @@ void LinkEquations::describe(const CoupledStart& start, State& state) const {
 void LinkEquations::drawNoise(const CoupledStart& start) {
     const NoiseKey key = {(uint32_t) start.settings.seed, (uint32_t) start.settings.level, start.settings.step};
     const size_t count = states.size();
-    chains.assign(count, 0);
+    // Each force numbers its links by itself.
+    chains.assign(count, force);
     parts.resize(count);
     normals.resize(4*count);
     for (size_t i = 0; i < count; i++)
@@ -223,7 +243,8 @@ void LinkEquations::setCompliances(const double* compliances) {
         }
         // Where a second stage follows, the distance resists by theta there.
         const double along = dot(t, response), resistance = state.response*state.theta/state.implicit;
-        const double size = kT*state.link->stiffness*(2*state.theta-1)/(state.length*(1+resistance*along));
+        const double length = max(state.length, LEAST_LENGTH*(state.link->restLength+state.link->maximumExtension));
+        const double size = kT*state.link->stiffness*(2*state.theta-1)/(length*(1+resistance*along));
         for (int k = 0; k < 3; k++)
             state.metricForce[k] = -size*(response[k]-along*t[k]);
     }
@@ -238,7 +259,8 @@ bool LinkEquations::finishIteration(const double* moves, const double* moved) {
         vectorOf(state, moved, r);
         for (int k = 0; k < 3; k++)
             ofStep += (r[k]-state.start[k])*(r[k]-state.start[k]);
-        const double least = OF_CHANGE*OF_CHANGE*ofStep+
+        const double ofChange = kT > 0 ? OF_CHANGE_WITH_NOISE : OF_CHANGE;
+        const double least = ofChange*ofChange*ofStep+
                 OF_LENGTH*OF_LENGTH*(state.length*state.length+state.link->restLength*state.link->restLength);
         const double thermal = TOLERANCE*TOLERANCE*kT/state.response;
         // Written so that NaN is not finished.
@@ -263,7 +285,7 @@ void LinkEquations::findFailures(const double* moved, vector<bool>& failed) cons
         double r[3];
         vectorOf(state, moved, r);
         const double length = sqrt(dot(r, r));
-        const bool turned = !(dot(state.start, r) > LEAST_COSINE*state.length*length);
+        const bool turned = !(dot(state.start, r) >= LEAST_COSINE*state.length*length);
         const bool left = hasRange(state.link->model) &&
                 !(fabs(length-state.link->restLength) < state.link->maximumExtension);
         if (turned || left)

@@ -13,9 +13,9 @@ namespace cylchain {
  * A link of rest length zero has the three components of r, the vector from its second place to its first, as
  * coordinates, each with the energy k q^2/2, and the force
  *
- *     -k (theta r(y)+(1-theta) r(x)-(2 theta-1)^(1/2) r_random),    theta = max(1/2, 1-zeta/hk),
+ *     -k (theta r(y)+(1-theta) r(x)-(2 theta-1)^(1/2) r_random),    theta = max(1/2, 1-1/(h sum k'/zeta)),
  *
- * with the friction zeta that its places have against each other, and r_random drawn from the equilibrium of r. Other
+ * with the friction zeta of each of its places and the stiffness k' of all links there, and r_random drawn from the equilibrium of r. Other
  * links have one coordinate q, a function of the distance, as segments have: the force -T along the mean of r(x) and
  * r(y) with
  *
@@ -29,8 +29,10 @@ public:
     /**
      * Set the links that steps have, which must exist while steps are taken, and how distances are measured. Links that
      * are on no chain are left out.
+     *
+     * @param force  a number of the force that they belong to, for their noise
      */
-    void setLinks(const std::vector<Link>* links, const LinkBoxes& boxes);
+    void setLinks(const std::vector<Link>* links, const LinkBoxes& boxes, int force);
     void begin(const CoupledStart& start, const Loop& loop) override;
     void beginStage(int stage, int numStages, const double* moved) override;
     void linearise(int iteration, const double* moved, std::vector<CouplingEquation>& equations) override;
@@ -57,6 +59,7 @@ private:
         double direction[3], distance, tension, response, multiplier;
         double metricForce[3];
     };
+    void addStiffness(const ChainPlaces& places);
     void describe(const CoupledStart& start, State& state) const;
     void drawNoise(const CoupledStart& start);
     void vectorOf(const State& state, const double* positions, double* r) const;
@@ -66,6 +69,9 @@ private:
     const double* begun = nullptr;
     double kT = 0, stepSize = 0, shareOfMetricForces = 1;
     bool anyTurns = false;
+    int force = 0;
+    /** Of all links on the segment that begins with a particle. */
+    std::vector<double> stiffness;
     std::vector<std::uint32_t> chains, parts;
     std::vector<double> normals;
 };

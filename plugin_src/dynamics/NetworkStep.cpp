@@ -46,7 +46,7 @@ void NetworkStep::setForces(const CoupledForces& forces, const double* box) {
         LinkBoxes boxes;
         boxes.distances = own.periodic ? box : NULL;
         boxes.segments = own.nearestParticles ? box : NULL;
-        links[i]->setLinks(own.links, boxes);
+        links[i]->setLinks(own.links, boxes, i);
         couplings.push_back(links[i].get());
     }
     contacts.resize(max(contacts.size(), forces.contacts.size()));
