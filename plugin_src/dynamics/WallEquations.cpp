@@ -19,7 +19,9 @@ const int MIRRORING_ITERATIONS = 3;
 /** The number of iterations that know of no walls. */
 const int FREE_ITERATIONS = 2;
 /** The number of iterations that look where faces are. */
-const int SEARCHING_ITERATIONS = 6;
+const int SEARCHING_ITERATIONS = 10;
+/** By how much a tangent plane may be wrong, over what is mirrored. */
+const double LARGEST_DEVIATION = 0.1;
 /** The most that is mirrored at a curved face, over the way to the middle. */
 const double LARGEST_MIRRORED = 0.5;
 /** Particles that a thread looks at together. */
@@ -118,15 +120,21 @@ double WallEquations::findMirrored(int particle, int face, double depth) const {
 bool WallEquations::finishPart(int number, const double* moves, const double* moved) {
     Part& part = parts[number];
     bool unfinished = false;
-    for (const State& state : part.states) {
-        const double beyond = findDepthAt(state, moved)+state.mirrored;
-        if (state.equation < 0) {
-            unfinished |= beyond > tolerance;
-            continue;
+    for (State& state : part.states) {
+        const double depth = findDepthAt(state, moved), beyond = depth+state.mirrored;
+        if (state.equation < 0)
+            state.unfinished = beyond > tolerance;
+        else {
+            const double *g = state.gradient, *move = moves+3*state.equation;
+            const double change = g[0]*move[0]+g[1]*move[1]+g[2]*move[2];
+            state.unfinished = !(fabs(change) <= tolerance && beyond >= -tolerance);
         }
-        const double *g = state.gradient, *move = moves+3*state.equation;
-        const double change = g[0]*move[0]+g[1]*move[1]+g[2]*move[2];
-        unfinished |= !(fabs(change) <= tolerance && beyond >= -tolerance);
+        // The particle may be beyond a curved face, but not beyond its tangent plane elsewhere.
+        const WallParticle& own = system->particles[state.particle];
+        double gradient[3];
+        const double real = findDepth(system->wall, state.face, moved+3*own.particle, own.radius, gradient);
+        state.unfinished |= !(real-depth <= max(tolerance, LARGEST_DEVIATION*state.mirrored));
+        unfinished |= state.unfinished;
     }
     const int count = places.size();
     for (int i = number*CHUNK; i < min(count, (number+1)*CHUNK); i++) {
@@ -136,7 +144,7 @@ bool WallEquations::finishPart(int number, const double* moves, const double* mo
         for (int face = 0; face < numFaces; face++) {
             if ((reached[i]>>face)&1)
                 continue;
-            State state = {i, face, 0, {}, 0, -1};
+            State state = {i, face, 0, {}, 0, -1, true};
             const double depth = findDepth(system->wall, face, moved+3*own.particle, own.radius, state.gradient);
             if (!(depth > (iterations < MIRRORING_ITERATIONS ? 0 : tolerance)))
                 continue;
@@ -161,4 +169,11 @@ bool WallEquations::finishIteration(const double* moves, const double* moved) {
         parts[part].unfinished = finishPart(part, moves, moved);
     });
     return any_of(parts.begin(), parts.end(), [] (const Part& part) {return part.unfinished;});
+}
+
+void WallEquations::findFailures(const double*, vector<bool>& failed) const {
+    for (const Part& part : parts)
+        for (const State& state : part.states)
+            if (state.unfinished)
+                failed[places[state.particle].chain] = true;
 }

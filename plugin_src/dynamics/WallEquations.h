@@ -30,9 +30,8 @@ public:
     void beginStage(int stage, int numStages, const double* moved) override;
     void linearise(int iteration, const double* moved, std::vector<CouplingEquation>& equations) override;
     bool finishIteration(const double* moves, const double* moved) override;
-    void findFailures(const double*, std::vector<bool>&) const override {
-        // A wall has no other side that a step could get to.
-    }
+    /** A wall has no other side that a step could get to: chains fail if iterations end before a depth has settled. */
+    void findFailures(const double* moved, std::vector<bool>& failed) const override;
     void findNeighbours(std::vector<std::pair<int, int> >&) const override {
         // Walls join no chains.
     }
@@ -48,6 +47,8 @@ private:
         double gradient[3], offset;
         /** The number of its equation in the last iteration, or -1. */
         int equation;
+        /** Whether another iteration is needed for it. */
+        bool unfinished;
     };
     struct Part {
         std::vector<State> states;
