@@ -121,7 +121,7 @@ bool WallEquations::finishPart(int number, const double* moves, const double* mo
     Part& part = parts[number];
     bool unfinished = false;
     for (State& state : part.states) {
-        const double depth = findDepthAt(state, moved), beyond = depth+state.mirrored;
+        const double beyond = findDepthAt(state, moved)+state.mirrored;
         if (state.equation < 0)
             state.unfinished = beyond > tolerance;
         else {
@@ -133,7 +133,7 @@ bool WallEquations::finishPart(int number, const double* moves, const double* mo
         const WallParticle& own = system->particles[state.particle];
         double gradient[3];
         const double real = findDepth(system->wall, state.face, moved+3*own.particle, own.radius, gradient);
-        state.unfinished |= !(real-depth <= max(tolerance, LARGEST_DEVIATION*state.mirrored));
+        state.unfinished |= !(real+state.mirrored-max(0.0, beyond) <= max(tolerance, LARGEST_DEVIATION*state.mirrored));
         unfinished |= state.unfinished;
     }
     const int count = places.size();
