@@ -35,6 +35,16 @@ double cylchain::shareMirrored(double a) {
     return scaled/(1+scaled);
 }
 
+/** Add how a force on a round face turns with it: its share of 1-g g, or of the plane across the axis of a cylinder. */
+static void addTurning(const Wall& wall, const double* g, double size, double* stiffness) {
+    const double* axis = wall.vector;
+    const double along = wall.shape == WallShape::Cylinder ? 1 : 0;
+    int entry = 0;
+    for (int i = 0; i < 3; i++)
+        for (int k = i; k < 3; k++)
+            stiffness[entry++] += size*((i == k ? 1 : 0)-g[i]*g[k]-along*axis[i]*axis[k]);
+}
+
 void WallEquations::setWalls(const WallSystem* newSystem) {
     system = newSystem;
     numFaces = countFaces(system->wall);
@@ -86,6 +96,11 @@ void WallEquations::linearise(int iteration, const double* moved, vector<Couplin
                 double* const g = state.gradient;
                 const double depth = findDepth(system->wall, state.face, y, particle.radius, g);
                 state.offset = depth-(g[0]*y[0]+g[1]*y[1]+g[2]*y[2]);
+                const WallShape shape = system->wall.shape;
+                const bool round = shape == WallShape::Sphere || shape == WallShape::Cylinder;
+                // The distance from the middle. Where it is short, there would be more stiffness than steps can have.
+                const double distance = depth-particle.radius+system->wall.length;
+                state.curvature = round ? 1/max(distance, LARGEST_MIRRORED*system->wall.length) : 0;
             }
             state.equation = -1;
             const double beyond = findDepthAt(state, moved)+state.mirrored;
@@ -104,6 +119,8 @@ void WallEquations::linearise(int iteration, const double* moved, vector<Couplin
             k[3] = own*g[1]*g[1];
             k[4] = own*g[1]*g[2];
             k[5] = own*g[2]*g[2];
+            if (iteration <= SEARCHING_ITERATIONS)
+                addTurning(system->wall, g, state.force*state.curvature, k);
             equations.push_back(equation);
         }
 }
@@ -129,6 +146,7 @@ bool WallEquations::finishPart(int number, const double* moves, const double* mo
             const double change = g[0]*move[0]+g[1]*move[1]+g[2]*move[2];
             state.unfinished = !(fabs(change) <= tolerance && beyond >= -tolerance);
         }
+        state.force = implicit*system->stiffness*max(0.0, beyond);
         // The particle may be beyond a curved face, but not beyond its tangent plane elsewhere.
         const WallParticle& own = system->particles[state.particle];
         double gradient[3];
@@ -144,7 +162,7 @@ bool WallEquations::finishPart(int number, const double* moves, const double* mo
         for (int face = 0; face < numFaces; face++) {
             if ((reached[i]>>face)&1)
                 continue;
-            State state = {i, face, 0, {}, 0, -1, true};
+            State state = {i, face, 0, {}, 0, -1, 0, 0, true};
             const double depth = findDepth(system->wall, face, moved+3*own.particle, own.radius, state.gradient);
             if (!(depth > (iterations < MIRRORING_ITERATIONS ? 0 : tolerance)))
                 continue;
@@ -152,8 +170,8 @@ bool WallEquations::finishPart(int number, const double* moves, const double* mo
             if (iterations < FREE_ITERATIONS-1)
                 continue;
             reached[i] |= 1<<face;
-            // Where two faces meet, a particle or rod that one has mirrored may be beyond the other. Later iterations are
-            // no predictions: others have pushed the particle.
+            // Where two faces meet, what one has mirrored may be beyond the other. Later iterations are no predictions:
+            // others have pushed the particle.
             if (iterations < MIRRORING_ITERATIONS)
                 state.mirrored = findMirrored(i, face, depth);
             const double* y = moved+3*own.particle;
