@@ -8,7 +8,6 @@ import openmm
 import pytest
 from openmm import unit
 
-from couplings.test_walls import SHAPES
 from openmm_cylchain import (
     F_ACTIN,
     Box,
@@ -27,6 +26,7 @@ from openmm_cylchain.dynamics.explicit_forces import ExplicitForces
 from openmm_cylchain.engines.compiled import plugin
 from support.contexts import energy_of, forces_of, new_context, positions_of
 from support.solvent import KT, TEMPERATURE, VISCOSITY
+from support.wall_shapes import SHAPES
 
 ACTIN = F_ACTIN.with_segment_length(100)
 STIFFNESS = 7.0
