@@ -33,8 +33,8 @@ template <> struct Names<WallShape> {
  *     Ellipsoid   the center                the semi-axes                   -
  *
  * Normals and axes are unit vectors. Its surface has one or more faces: each plane of a slab or box is one. With the
- * depth d of a particle's surface beyond each face, negative inside, the energy is (k/2) times the sum of d^2 over faces
- * with d > 0. For a box that is the squared distance from the box that the particle's center has to itself.
+ * depth d of a particle's surface beyond each face, negative inside, the energy is (k/2) times the sum of d^2 over
+ * faces with d > 0. For a box that is the squared distance from the box that the particle's center has to itself.
  */
 struct Wall {
     WallShape shape = WallShape::Plane;

@@ -1,4 +1,5 @@
 #include "dynamics/ContactEquations.h"
+#include "dynamics/WallEquations.h"
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -16,12 +17,17 @@ const double LARGEST_MIRRORED = 0.5;
 const double LARGEST_GAP = 0.3;
 /** The largest change of a gap in the last iteration, over the thermal fluctuation of a contact. */
 const double TOLERANCE = 0.3;
+/** After so many iterations, this times as much is enough: one contact in thousands must not keep all others waiting. */
+const int PATIENT_ITERATIONS = 11;
+const double LATE = 4;
 /** What counts as no change of a gap, over how near pairs come. */
 const double LEAST_CHANGE = 3e-3;
 /** The number of iterations that look where capsules touch. */
 const int SEARCHING_ITERATIONS = 6;
 /** The number of iterations in which a contact may pass to a neighbour. */
 const int PASSING_ITERATIONS = 3;
+/** From this iteration on, contacts that touch go on to do so, even if that takes a small force which pulls. */
+const int HOLDING_ITERATIONS = 9;
 /** Pairs that a thread looks at together. */
 const int CHUNK = 128;
 
@@ -52,6 +58,7 @@ void ContactEquations::begin(const CoupledStart& start, const Loop& newLoop) {
             places[i].direction = capsule.second < 0 ? 0 : found.fraction == 0 ? 1 : -1;
         else
             found = PlaceOnChain();
+        places[i].response = found.pack < 0 ? 0 : start.settings.stepSize/start.places.getFriction(found);
     }
     reach = REACH*diameter;
     pairs.clear();
@@ -81,7 +88,7 @@ void ContactEquations::findPairs(const double* moved) {
     for (size_t i = 0; i < places.size(); i++)
         takeNoteOf(i, moved);
     for (const ContactPair& pair : pairs)
-        states.push_back({pair, true, 0, {0, 0}, {}, -1});
+        states.push_back({pair, true, 0, {0, 0}, {}, -1, {false, false}});
 }
 
 /** Look for pairs of some capsules again; false if all that are found take part already. */
@@ -95,7 +102,7 @@ bool ContactEquations::findPairsOf(const vector<int>& capsules, const double* mo
     const size_t known = states.size();
     bool any = false;
     for (const ContactPair& pair : pairs) {
-        const State state = {pair, true, 0, {0, 0}, {}, -1};
+        const State state = {pair, true, 0, {0, 0}, {}, -1, {false, false}};
         const auto found = lower_bound(states.begin(), states.begin()+known, state, isBefore);
         if (found == states.begin()+known || isBefore(state, *found)) {
             states.push_back(state);
@@ -150,9 +157,13 @@ void ContactEquations::evaluate(State& state, const double* moved, bool first, P
         const Contact& contact = state.contacts[i];
         part.crossed |= contact.crossed;
         if (first)
-            state.mirrored[i] = min(max(0.0, -contact.gap), LARGEST_MIRRORED*diameter);
+            state.mirrored[i] = min(max(0.0, -contact.gap), LARGEST_MIRRORED*diameter)*
+                    shareMirrored(stiffness*(places[pair.a].response+places[pair.b].response));
         const double overlap = state.mirrored[i]-contact.gap;
-        if (!(overlap > 0))
+        // Contacts that open and close in turn would keep the iteration from ending.
+        const bool holds = iterations >= HOLDING_ITERATIONS && state.touched[i];
+        state.touched[i] = overlap > 0 || holds;
+        if (!state.touched[i])
             continue;
         CouplingEquation equation;
         equation.places[0] = placeOf(pair.a, contact.s);
@@ -248,7 +259,8 @@ bool ContactEquations::finishIteration(const double* moves, const double* moved)
         for (int k = 0; k < 3; k++)
             change += sqrt(normals[i+k])*fabs(moves[i+k]);
         const double least = LEAST_CHANGE*LEAST_CHANGE*reach*reach*stiffness;
-        if (!(change*change < TOLERANCE*TOLERANCE*kT+least))
+        const double tolerance = TOLERANCE*(iterations < PATIENT_ITERATIONS ? 1 : LATE);
+        if (!(change*change < tolerance*tolerance*kT+least))
             return true;
     }
     clear = !anyCross(moved);
@@ -280,7 +292,9 @@ void ContactEquations::findFailures(const double* moved, vector<bool>& failed) c
 }
 
 void ContactEquations::findNeighbours(vector<pair<int, int> >& neighbours) const {
-    for (const ContactPair& pair : pairs)
-        if (places[pair.a].place.pack >= 0 && places[pair.b].place.pack >= 0)
-            neighbours.push_back(make_pair(places[pair.a].place.chain, places[pair.b].place.chain));
+    for (const State& state : states) {
+        const PlaceOnChain &a = places[state.pair.a].place, &b = places[state.pair.b].place;
+        if (a.pack >= 0 && b.pack >= 0)
+            neighbours.push_back(make_pair(a.chain, b.chain));
+    }
 }

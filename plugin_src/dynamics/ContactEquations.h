@@ -13,10 +13,11 @@ namespace cylchain {
  * The first iteration knows of none. Where it leads, y*, and the way there show which pairs may touch; they have the gaps
  * g*, which go on being negative where two segments have passed through each other. The others have the force
  *
- *     k_c (b-g(y)) n   where g(y) < b,     b = min(-g*, b_max) where g* < 0, or else 0:
+ *     k_c (b-g(y)) n   where g(y) < b,     b = beta min(-g*, b_max) where g* < 0, or else 0:
  *
  * a predicted overlap is mirrored, as a wall would throw a diffusing particle back; with b = 0, contacts would act too
- * early by 0.58 of what diffusion moves them by in a step. Segments that have crossed in the end fail.
+ * early by 0.58 of what diffusion moves them by in a step. The share beta is that of walls, see shareMirrored(): small
+ * steps resolve a contact. Segments that have crossed in the end fail.
  *
  * Where two capsules touch may jump: from a segment to its neighbour, or between the ends of nearly parallel ones. So
  * it is looked for in the first iterations alone; after that, each pair keeps the fractions where it touches.
@@ -47,11 +48,15 @@ private:
         double mirrored[2];
         Contact contacts[2];
         int count;
+        /** Whether it touched in the last iteration. */
+        bool touched[2];
     };
     /** Where a capsule is: its place at fraction 0, and by how much the fraction grows along it. */
     struct CapsulePlace {
         PlaceOnChain place;
         double direction;
+        /** How far a unit force moves it in the step. */
+        double response;
     };
     struct Part {
         std::vector<CouplingEquation> equations;

@@ -19,7 +19,9 @@ const int MIRRORING_ITERATIONS = 3;
 /** The number of iterations that know of no walls. */
 const int FREE_ITERATIONS = 2;
 /** The number of iterations that look where faces are. */
-const int SEARCHING_ITERATIONS = 6;
+const int SEARCHING_ITERATIONS = 10;
+/** By how much a tangent plane may be wrong, over what is mirrored. */
+const double LARGEST_DEVIATION = 0.1;
 /** The most that is mirrored at a curved face, over the way to the middle. */
 const double LARGEST_MIRRORED = 0.5;
 /** Particles that a thread looks at together. */
@@ -31,6 +33,16 @@ double cylchain::shareMirrored(double a) {
     // Within 2 % in the surface excess for a from 0.1 to 1000; from there on, the excess itself is nothing.
     const double scaled = 0.6*sqrt(a);
     return scaled/(1+scaled);
+}
+
+/** Add how a force on a round face turns with it: its share of 1-g g, or of the plane across the axis of a cylinder. */
+static void addTurning(const Wall& wall, const double* g, double size, double* stiffness) {
+    const double* axis = wall.vector;
+    const double along = wall.shape == WallShape::Cylinder ? 1 : 0;
+    int entry = 0;
+    for (int i = 0; i < 3; i++)
+        for (int k = i; k < 3; k++)
+            stiffness[entry++] += size*((i == k ? 1 : 0)-g[i]*g[k]-along*axis[i]*axis[k]);
 }
 
 void WallEquations::setWalls(const WallSystem* newSystem) {
@@ -84,6 +96,11 @@ void WallEquations::linearise(int iteration, const double* moved, vector<Couplin
                 double* const g = state.gradient;
                 const double depth = findDepth(system->wall, state.face, y, particle.radius, g);
                 state.offset = depth-(g[0]*y[0]+g[1]*y[1]+g[2]*y[2]);
+                const WallShape shape = system->wall.shape;
+                const bool round = shape == WallShape::Sphere || shape == WallShape::Cylinder;
+                // The distance from the middle. Where it is short, there would be more stiffness than steps can have.
+                const double distance = depth-particle.radius+system->wall.length;
+                state.curvature = round ? 1/max(distance, LARGEST_MIRRORED*system->wall.length) : 0;
             }
             state.equation = -1;
             const double beyond = findDepthAt(state, moved)+state.mirrored;
@@ -102,6 +119,8 @@ void WallEquations::linearise(int iteration, const double* moved, vector<Couplin
             k[3] = own*g[1]*g[1];
             k[4] = own*g[1]*g[2];
             k[5] = own*g[2]*g[2];
+            if (iteration <= SEARCHING_ITERATIONS)
+                addTurning(system->wall, g, state.force*state.curvature, k);
             equations.push_back(equation);
         }
 }
@@ -118,15 +137,22 @@ double WallEquations::findMirrored(int particle, int face, double depth) const {
 bool WallEquations::finishPart(int number, const double* moves, const double* moved) {
     Part& part = parts[number];
     bool unfinished = false;
-    for (const State& state : part.states) {
+    for (State& state : part.states) {
         const double beyond = findDepthAt(state, moved)+state.mirrored;
-        if (state.equation < 0) {
-            unfinished |= beyond > tolerance;
-            continue;
+        if (state.equation < 0)
+            state.unfinished = beyond > tolerance;
+        else {
+            const double *g = state.gradient, *move = moves+3*state.equation;
+            const double change = g[0]*move[0]+g[1]*move[1]+g[2]*move[2];
+            state.unfinished = !(fabs(change) <= tolerance && beyond >= -tolerance);
         }
-        const double *g = state.gradient, *move = moves+3*state.equation;
-        const double change = g[0]*move[0]+g[1]*move[1]+g[2]*move[2];
-        unfinished |= !(fabs(change) <= tolerance && beyond >= -tolerance);
+        state.force = implicit*system->stiffness*max(0.0, beyond);
+        // The particle may be beyond a curved face, but not beyond its tangent plane elsewhere.
+        const WallParticle& own = system->particles[state.particle];
+        double gradient[3];
+        const double real = findDepth(system->wall, state.face, moved+3*own.particle, own.radius, gradient);
+        state.unfinished |= !(real+state.mirrored-max(0.0, beyond) <= max(tolerance, LARGEST_DEVIATION*state.mirrored));
+        unfinished |= state.unfinished;
     }
     const int count = places.size();
     for (int i = number*CHUNK; i < min(count, (number+1)*CHUNK); i++) {
@@ -136,7 +162,7 @@ bool WallEquations::finishPart(int number, const double* moves, const double* mo
         for (int face = 0; face < numFaces; face++) {
             if ((reached[i]>>face)&1)
                 continue;
-            State state = {i, face, 0, {}, 0, -1};
+            State state = {i, face, 0, {}, 0, -1, 0, 0, true};
             const double depth = findDepth(system->wall, face, moved+3*own.particle, own.radius, state.gradient);
             if (!(depth > (iterations < MIRRORING_ITERATIONS ? 0 : tolerance)))
                 continue;
@@ -144,8 +170,8 @@ bool WallEquations::finishPart(int number, const double* moves, const double* mo
             if (iterations < FREE_ITERATIONS-1)
                 continue;
             reached[i] |= 1<<face;
-            // Where two faces meet, a particle or rod that one has mirrored may be beyond the other. Later iterations are
-            // no predictions: others have pushed the particle.
+            // Where two faces meet, what one has mirrored may be beyond the other. Later iterations are no predictions:
+            // others have pushed the particle.
             if (iterations < MIRRORING_ITERATIONS)
                 state.mirrored = findMirrored(i, face, depth);
             const double* y = moved+3*own.particle;
@@ -161,4 +187,11 @@ bool WallEquations::finishIteration(const double* moves, const double* moved) {
         parts[part].unfinished = finishPart(part, moves, moved);
     });
     return any_of(parts.begin(), parts.end(), [] (const Part& part) {return part.unfinished;});
+}
+
+void WallEquations::findFailures(const double*, vector<bool>& failed) const {
+    for (const Part& part : parts)
+        for (const State& state : part.states)
+            if (state.unfinished)
+                failed[places[state.particle].chain] = true;
 }

@@ -10,17 +10,17 @@ namespace cylchain {
 /**
  * Walls in an implicit step.
  *
- * The first iteration of a stage knows of none. Where it and the next one lead, y*, a particle may be beyond a face, by
- * more than where it began, x, by b = d(y*)-max(0, d(x)) with the depth d. The force on it is
+ * The first two iterations of a stage know of none: one alone does not know how segments turn. Where they lead, y*, a
+ * particle may be beyond a face by b = d(y*)-max(0, d(x)) more than where it began, x, with the depth d. The force is
  *
  *     -k (beta b+d(y)) grad d   where d(y) > -beta b
  *
  * with a share beta that goes from 0 for soft walls to 1 for stiff ones. A stiff wall mirrors what diffuses into it, as
- * it would throw a diffusing particle back; with beta = 0, particles would heap up at it. The pressure on a flat wall is
- * that of the density before it with any beta; see shareMirrored() for how it is chosen.
+ * it would throw a diffusing particle back; with beta = 0, particles would heap up at it. The pressure on a flat wall
+ * is that of the density before it with any beta; see shareMirrored() for how it is chosen.
  *
- * Depths are taken from the iterate, and from the tangent plane to an iterate after some iterations. Each force is along
- * the gradient of one depth, so that faces of slabs and boxes, which are flat, are exact.
+ * Depths are taken from the iterate, and from the tangent plane to an iterate after some iterations. Each force is
+ * along the gradient of one depth, so that faces of slabs and boxes, which are flat, are exact.
  */
 class WallEquations : public ImplicitCouplings {
 public:
@@ -30,9 +30,8 @@ public:
     void beginStage(int stage, int numStages, const double* moved) override;
     void linearise(int iteration, const double* moved, std::vector<CouplingEquation>& equations) override;
     bool finishIteration(const double* moves, const double* moved) override;
-    void findFailures(const double*, std::vector<bool>&) const override {
-        // A wall has no other side that a step could get to.
-    }
+    /** A wall has no other side that a step could get to: chains fail if iterations end before a depth has settled. */
+    void findFailures(const double* moved, std::vector<bool>& failed) const override;
     void findNeighbours(std::vector<std::pair<int, int> >&) const override {
         // Walls join no chains.
     }
@@ -48,6 +47,10 @@ private:
         double gradient[3], offset;
         /** The number of its equation in the last iteration, or -1. */
         int equation;
+        /** The force that the last iteration has found, times grad d, and the second derivative of d across grad d. */
+        double force, curvature;
+        /** Whether another iteration is needed for it. */
+        bool unfinished;
     };
     struct Part {
         std::vector<State> states;
@@ -69,8 +72,8 @@ private:
 };
 
 /**
- * Get the share beta of what is beyond a wall that is mirrored, for a = h k/zeta: how stiff the wall is for the friction
- * zeta and the step h.
+ * Get the share beta of what is beyond a wall that is mirrored, for a = h k/zeta: how stiff the wall is for the
+ * friction zeta and the step h.
  *
  * With it, a particle that diffuses to a flat wall is as often beyond it as in equilibrium: the surface excess is
  * (pi k_B T/2k)^(1/2).

@@ -9,15 +9,7 @@ from openmm_cylchain import F_ACTIN, Filaments, InputError
 from openmm_cylchain.couplings.walls import Box, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere, wall_force
 from support.contexts import new_context, positions_of
 from support.solvent import KT, TEMPERATURE, VISCOSITY
-
-SHAPES = [
-    Plane([0, 0, 1], [1, 2, -2]),
-    Slab([1, 2, 3] * unit.angstrom, [0, 1, 1], 3),
-    Sphere([0.1, 0.2, 0.3], 2 * unit.nanometer),
-    Cylinder([1, 0, 0], [1, 1, 0.2], 1.5),
-    Box([-1, -2, -1], [2, 1, 1]),
-    Ellipsoid([0.1, 0, 0], [1, 2, 3]),
-]
+from support.wall_shapes import SHAPES
 
 
 def _name(shape):

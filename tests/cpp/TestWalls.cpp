@@ -1,0 +1,163 @@
+/**
+ * This tests walls: depths against formulas, energies against distances, gradients against differences of depths, and
+ * the middles of shapes, where there is no direction.
+ */
+
+#include "TestChains.h"
+#include "couplings/Walls.h"
+
+static Wall wallOf(WallShape shape, const Array& point, const Array& vector, double length) {
+    Wall wall;
+    wall.shape = shape;
+    copy(point.begin(), point.end(), wall.point);
+    copy(vector.begin(), vector.end(), wall.vector);
+    wall.length = length;
+    return wall;
+}
+
+static const vector<Wall> WALLS = {
+    wallOf(WallShape::Plane, {0.3, -0.2, 0.5}, {1./3, 2./3, -2./3}, 0),
+    wallOf(WallShape::Slab, {0.1, 0.2, 0.3}, {0, 0.6, 0.8}, 3),
+    wallOf(WallShape::Sphere, {0.1, 0.2, 0.3}, {0, 0, 0}, 2),
+    wallOf(WallShape::Cylinder, {1, 0, 0}, {0.6, 0, 0.8}, 1.5),
+    wallOf(WallShape::Box, {-1, -2, -1}, {2, 1, 1}, 0),
+    wallOf(WallShape::Ellipsoid, {0.1, 0, 0}, {1, 2, 3}, 0),
+};
+
+static double sumOfSquares(const Wall& wall, const double* x, double radius) {
+    double sum = 0, gradient[3];
+    for (int face = 0; face < countFaces(wall); face++) {
+        const double depth = max(0.0, findDepth(wall, face, x, radius, gradient));
+        sum += depth*depth;
+    }
+    return sum;
+}
+
+/** The squared depth of a point, from the formulas of shapes. */
+static double squareByHand(const Wall& wall, const double* x) {
+    const double *p = wall.point, *v = wall.vector;
+    double r[3], along = 0, square = 0;
+    for (int k = 0; k < 3; k++) {
+        r[k] = x[k]-p[k];
+        along += r[k]*v[k];
+        square += r[k]*r[k];
+    }
+    auto beyond = [] (double depth) {
+        return depth > 0 ? depth*depth : 0;
+    };
+    switch (wall.shape) {
+    case WallShape::Plane:
+        return beyond(-along);
+    case WallShape::Slab:
+        return beyond(fabs(along)-wall.length/2);
+    case WallShape::Sphere:
+        return beyond(sqrt(square)-wall.length);
+    case WallShape::Cylinder:
+        return beyond(sqrt(square-along*along)-wall.length);
+    case WallShape::Box: {
+        double sum = 0;
+        for (int k = 0; k < 3; k++)
+            sum += pow(x[k]-min(max(x[k], p[k]), v[k]), 2);
+        return sum;
+    }
+    case WallShape::Ellipsoid: {
+        double s = 0, q = 0;
+        for (int k = 0; k < 3; k++) {
+            s += pow(r[k]/v[k], 2);
+            q += pow(r[k]/(v[k]*v[k]), 2);
+        }
+        return beyond((sqrt(s)-1)*sqrt(s)/sqrt(q));
+    }
+    }
+    throw runtime_error("The tests do not know a shape");
+}
+
+static void testDepths() {
+    NormalNumbers normal(1);
+    for (const Wall& wall : WALLS) {
+        int outside = 0;
+        for (int i = 0; i < 1000; i++) {
+            Array x = normal(3);
+            for (double& value : x)
+                value *= 2;
+            const double expected = squareByHand(wall, x.data());
+            outside += expected > 0.01;
+            checkClose(expected, sumOfSquares(wall, x.data(), 0), 1+expected, 1e-12, "the squared depth");
+        }
+        check(outside > 100 && outside < 950, "points inside and outside");
+    }
+}
+
+static void testRadii() {
+    // A sphere around the particle touches where the particle is that far inside.
+    NormalNumbers normal(2);
+    for (const Wall& wall : WALLS)
+        for (int i = 0; i < 100; i++) {
+            const Array x = normal(3);
+            for (int face = 0; face < countFaces(wall); face++) {
+                double one[3], other[3];
+                const double depth = findDepth(wall, face, x.data(), 0, one);
+                checkClose(depth+0.25, findDepth(wall, face, x.data(), 0.25, other), 1, 1e-13, "a radius");
+                for (int k = 0; k < 3; k++)
+                    checkClose(one[k], other[k], 1, 0, "the direction with a radius");
+            }
+        }
+}
+
+static void testGradients() {
+    NormalNumbers normal(3);
+    const double width = 1e-5;
+    for (const Wall& wall : WALLS)
+        for (int i = 0; i < 200; i++) {
+            Array x = normal(3);
+            for (int face = 0; face < countFaces(wall); face++) {
+                double gradient[3], unused[3], square = 0;
+                findDepth(wall, face, x.data(), 0.1, gradient);
+                for (int k = 0; k < 3; k++) {
+                    const double here = x[k];
+                    x[k] = here+width;
+                    const double above = findDepth(wall, face, x.data(), 0.1, unused);
+                    x[k] = here-width;
+                    const double below = findDepth(wall, face, x.data(), 0.1, unused);
+                    x[k] = here;
+                    checkClose((above-below)/(2*width), gradient[k], 1, 1e-5, "a gradient");
+                    square += gradient[k]*gradient[k];
+                }
+                if (wall.shape != WallShape::Ellipsoid)
+                    checkClose(1, square, 1, 1e-12, "the length of a gradient");
+            }
+        }
+}
+
+static void testMiddles() {
+    for (const Wall& wall : WALLS) {
+        if (wall.shape == WallShape::Box || wall.shape == WallShape::Plane)
+            continue;
+        double gradient[3];
+        const double depth = findDepth(wall, 0, wall.point, 0, gradient);
+        checkClose(-getRoom(wall), depth, 1, 1e-12, "the depth in the middle");
+        double square = 0, along = 0;
+        for (int k = 0; k < 3; k++) {
+            square += gradient[k]*gradient[k];
+            along += gradient[k]*wall.vector[k];
+        }
+        checkClose(1, square, 1, 1e-12, "a direction in the middle");
+        if (wall.shape == WallShape::Cylinder)
+            checkClose(0, along, 1, 1e-12, "a direction across the axis");
+    }
+    checkClose(1, getRoom(WALLS[4]), 1, 0, "the room in a box");
+    check(isinf(getRoom(WALLS[0])), "the room before a plane");
+}
+
+int main() {
+    try {
+        for (auto test : {testDepths, testRadii, testGradients, testMiddles})
+            test();
+    }
+    catch (const exception& error) {
+        printf("FAILED: %s\n", error.what());
+        return 1;
+    }
+    printf("Passed\n");
+    return 0;
+}
