@@ -155,7 +155,8 @@ void ContactEquations::evaluate(State& state, const double* moved, bool first, P
         updateContacts(state, moved);
     for (int i = 0; i < state.count; i++) {
         const Contact& contact = state.contacts[i];
-        part.crossed |= contact.crossed;
+        // Where contacts are not looked for any more, anyCross() sees whether they have come back.
+        part.crossed |= contact.crossed && iterations < SEARCHING_ITERATIONS;
         if (first)
             state.mirrored[i] = min(max(0.0, -contact.gap), LARGEST_MIRRORED*diameter)*
                     shareMirrored(stiffness*(places[pair.a].response+places[pair.b].response));
