@@ -357,7 +357,7 @@ def test_filaments_do_not_cross_in_a_run():
     filaments, _, system, positions = _filaments(*_random_lines(30, 700, 9), segments=5, box=box)
     system.addForce(capsule_contact_force(filaments, system, DIAMETER))
     step = filaments.recommended_time_step(system=system)
-    assert "CylinderChainContactForce" in step.reason
+    assert any("CylinderChainContactForce" in name for name in step.bounds)
     integrator = filaments.create_integrator(system, step, random_seed=1)
     context = new_context(system, positions, integrator, "CPU")
     # What overlaps at the start may end up on either side.
