@@ -47,7 +47,8 @@ def capsule_contact_force(
     both ends of their overlap with k/2 each. What neighbouring segments see of one thing counts once, so that nothing
     is felt of joints. Forces act on the ends of segments, in proportion to where they touch.
 
-    It is explicit in every scheme. ``Filaments.recommended_time_step(system=system)`` says which step it allows.
+    The implicit schemes have it in their equations, and divide a step in which filaments would cross; others take it at
+    the start of a step. ``Filaments.recommended_time_step(system=system)`` says which step it allows.
 
     Parameters
     ----------

@@ -777,9 +777,10 @@ void ContactSearch::findPairsOf(const vector<int>& capsules, const double* x, co
     };
     sort(part.pairs.begin(), part.pairs.end(), isBefore);
     // Two capsules of those asked for have found each other twice.
-    part.pairs.erase(unique(part.pairs.begin(), part.pairs.end(), [] (const ContactPair& one, const ContactPair& other) {
+    auto isSame = [] (const ContactPair& one, const ContactPair& other) {
         return one.a == other.a && one.b == other.b;
-    }), part.pairs.end());
+    };
+    part.pairs.erase(unique(part.pairs.begin(), part.pairs.end(), isSame), part.pairs.end());
     pairs.swap(part.pairs);
 }
 

@@ -50,8 +50,8 @@ public:
     void findPairs(const double* x, const double* y, const double* box, double reach, std::vector<ContactPair>& pairs,
             const LoopRunner& run = LoopRunner());
     /**
-     * Find the same pairs as far as some capsules are in them, after a search with another y. This takes less time where
-     * they are few.
+     * Find the same pairs as far as some capsules are in them, after a search with another y. This takes less time
+     * where they are few.
      *
      * @param capsules  some capsules
      * @param slack     how far others have moved since that search, at most
@@ -78,8 +78,8 @@ public:
      *
      * @param contacts  room for two
      * @param limit     contacts with a gap that is not less are left out, which takes less time
-     * @return the number of contacts; -1 if the capsules are not nearer than the limit, and the gap of the first contact
-     *         is theirs
+     * @return the number of contacts; -1 if the capsules are not nearer than the limit, and the gap of the first
+     *         contact is theirs
      */
     int evaluate(const ContactPair& pair, const double* x, const double* y, Contact* contacts,
             double limit = std::numeric_limits<double>::infinity()) const;

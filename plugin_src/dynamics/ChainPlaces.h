@@ -53,8 +53,8 @@ public:
     /** The least friction that a place has against any motion of its own. */
     double getFriction(const PlaceOnChain& place) const;
     /**
-     * The friction that a place has against motion across its segment, which turns and moves as if it were alone: not much
-     * more than the least friction against any motion.
+     * The friction that a place has against motion across its segment, which turns and moves as if it were alone: not
+     * much more than the least friction against any motion.
      */
     double getLateralFriction(const PlaceOnChain& place) const;
     const std::vector<Chain>& getChains() const {

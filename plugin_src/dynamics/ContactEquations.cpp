@@ -17,7 +17,7 @@ const double LARGEST_MIRRORED = 0.5;
 const double LARGEST_GAP = 0.3;
 /** The largest change of a gap in the last iteration, over the thermal fluctuation of a contact. */
 const double TOLERANCE = 0.3;
-/** After so many iterations, this times as much is enough: one contact in thousands must not keep all others waiting. */
+/** After so many iterations, this times as much is enough: one contact in thousands must not keep others waiting. */
 const int PATIENT_ITERATIONS = 11;
 const double LATE = 4;
 /** What counts as no change of a gap, over how near pairs come. */

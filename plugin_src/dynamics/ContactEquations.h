@@ -10,8 +10,8 @@ namespace cylchain {
 /**
  * Contacts of capsules in an implicit step.
  *
- * The first iteration knows of none. Where it leads, y*, and the way there show which pairs may touch; they have the gaps
- * g*, which go on being negative where two segments have passed through each other. The others have the force
+ * The first iteration knows of none. Where it leads, y*, and the way there show which pairs may touch; they have the
+ * gaps g*, which go on being negative where two segments have passed through each other. The others have the force
  *
  *     k_c (b-g(y)) n   where g(y) < b,     b = beta min(-g*, b_max) where g* < 0, or else 0:
  *

@@ -34,8 +34,8 @@ struct CouplingEquation {
  *
  * Of S^T K S, what concerns one place alone, S_1^T K S_1 and S_2^T K S_2, lies inside the band of its chain and is
  * eliminated with it: that is P. The rest, X, is left to conjugate gradients with the preconditioner P, beginning with
- * P^-1 right: all residuals are forces on places of couplings then, and so are all vectors of the method; a product with
- * P^-1 is one substitution along chains. All sums are in an order that does not depend on threads.
+ * P^-1 right: all residuals are forces on places of couplings then, and so are all vectors of the method; a product
+ * with P^-1 is one substitution along chains. All sums are in an order that does not depend on threads.
  */
 class CoupledEquations {
 public:

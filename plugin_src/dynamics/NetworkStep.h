@@ -36,8 +36,8 @@ public:
      */
     void setForces(const CoupledForces& forces, const double* box);
     /**
-     * Compute the displacements of all nodes and of the coupled particles in a step, as ChainEngine::step() does. Of the
-     * result, the chain by which the step has gone wrong may be a particle: the number behind those of all chains.
+     * Compute the displacements of all nodes and of the coupled particles in a step, as ChainEngine::step() does. Of
+     * the result, the chain by which the step has gone wrong may be a particle: the number behind those of all chains.
      */
     Instability step(const double* positions, const double* forces, const double* box, const StepSettings& settings,
             double* displacements, const Loop& loop);

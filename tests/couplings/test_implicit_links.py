@@ -326,57 +326,6 @@ def test_a_hundred_times_too_long_steps_are_right_or_counted(form, scheme):
     assert divided > 1e-3 or energies.mean() == pytest.approx(exact, rel=0.05), (divided, energies.mean(), exact)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("scheme", SCHEMES)
-@pytest.mark.parametrize("potential", [LinkPotential(0.25), LinkPotential(0.25, 35.0)], ids=str)
-def test_relaxation_of_a_stretched_link_is_that_of_tiny_steps(potential, scheme):
-    means = []
-    for own, step in ((scheme, 0.5), ("midpoint", 0.002)):
-        simulation = pair(potential, potential.rest_length + 40, own, step, 400, seed=5)
-        lengths = []
-        for _ in range(4):
-            simulation.integrator.step(round(5 / step))
-            nodes, _ = simulation.configuration()
-            along = nodes[:, 1, 3] - nodes[:, 0, 3]
-            lengths.append(along[:, 0] if potential.rest_length == 0 else np.linalg.norm(along, axis=1))
-        means.append(np.array(lengths) - potential.rest_length)
-    ours, tiny = (each.mean(axis=1) for each in means)
-    errors = np.hypot(*(each.std(axis=1) / 20 for each in means))
-    assert np.all(tiny[:2] > 5 * errors[:2])
-    assert np.all(np.abs(ours - tiny) < 0.05 * tiny + 4 * errors), (ours, tiny, errors)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("scheme", SCHEMES)
-@pytest.mark.parametrize("potential", [LinkPotential(0.25), LinkPotential(0.25, 35.0)], ids=str)
-def test_stress_after_a_step_strain_decays_as_in_tiny_steps(potential, scheme):
-    """A square of four filaments, linked at its corners and sheared at once by a tenth."""
-    network = Network(tuple(((i, 2, 1.0), ((i + 1) % 4, 0, 0.0)) for i in range(4)), 4, 3)
-    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]) * (300 + potential.rest_length)
-    square = np.zeros((4, 4, 3))
-    for i in range(4):
-        side = corners[(i + 1) % 4] - corners[i]
-        side /= np.linalg.norm(side)
-        square[i] = corners[i] + side * (100 * np.arange(4)[:, None] + 0.5 * potential.rest_length)
-    nodes = np.repeat(square[None], 300, axis=0)
-    simulation = Simulation(network, potential, nodes, np.zeros((300, 0, 3)), "implicit", 0.2 * MICROSECOND)
-    simulation.integrator.step(500)
-    start, particles = simulation.configuration()
-    centre = start.mean(axis=(1, 2), keepdims=True)
-    start = start + 0.1 * np.roll(start - centre, 1, axis=3) * [1, 0, 0]
-    curves = []
-    for own, step in ((scheme, 0.2), ("midpoint", 0.001)):
-        simulation = Simulation(network, potential, start, particles, own, step * MICROSECOND)
-        curve = []
-        for _ in range(5):
-            simulation.integrator.step(round(2 / step))
-            curve.append(network.energies(potential, *simulation.configuration())["links"].mean(axis=1))
-        curves.append(np.array(curve))
-    ours, tiny = (each.mean(axis=1) for each in curves)
-    errors = np.hypot(*(each.std(axis=1) / np.sqrt(300) for each in curves))
-    assert np.all(np.abs(ours - tiny) < 0.05 * tiny + 4 * errors), (ours, tiny, errors)
-
-
 def test_links_of_no_stiffness_and_no_links_do_nothing():
     filaments = Filaments(VISCOSITY, TEMPERATURE)
     filaments.add_equilibrium(ACTIN, 5, seed=1)

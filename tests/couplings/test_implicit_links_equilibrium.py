@@ -87,8 +87,8 @@ UNMET = {
     "test_links_at_the_recommended_step_of_filaments[kind0-16-1300000000.0-0.0003-implicit-second-order]",
     "test_links_at_the_recommended_step_of_filaments[kind1-16-1300000000.0-0.001-implicit-second-order]",
 }
-"""What does not hold yet: stiff links with a rest length divide too many steps, soft ones are 1 to 3 % off in long steps,
-and filaments with stiff links have bends up to 3 % too large in scheme "implicit-second-order"."""
+"""What does not hold yet: stiff links with a rest length divide too many steps, soft ones are 1 to 3 % off in long
+steps, and filaments with stiff links have bends up to 3 % too large in scheme "implicit-second-order"."""
 
 pytestmark = pytest.mark.slow
 

@@ -63,7 +63,8 @@ static void testForcesAreDerivatives() {
             {between(0, 1, 0.3), between(4, 5, 0.8)}, {between(6, 7, 1), point(0, 0.5, 0)},
             {between(0, 1, 0.2), between(1, 2, 0.6)}, {between(0, 1, 0.2), between(1, 0, 0.3)}};
     for (StretchingModel model : {StretchingModel::Harmonic, StretchingModel::FENE})
-        for (const LinkBoxes& boxes : {LinkBoxes{nullptr, nullptr}, LinkBoxes{SMALL_BOX, nullptr}, LinkBoxes{SMALL_BOX, SMALL_BOX}})
+        for (const LinkBoxes& boxes : {LinkBoxes{nullptr, nullptr}, LinkBoxes{SMALL_BOX, nullptr},
+                    LinkBoxes{SMALL_BOX, SMALL_BOX}})
             for (auto& one : places) {
                 const Link link = entryOf(one.first, one.second, 0, 7, model).link;
                 const LinkPull pull = computePull(link, x.data(), boxes);
@@ -86,7 +87,8 @@ static void testNearestParticles() {
     // Two particles of a segment in neighboring boxes.
     const Array x = {0.1, 2, 2, 4.9, 2, 2, 0, 1, 2};
     const Link link = entryOf(between(0, 1, 0.5), at(2), 0).link;
-    checkClose(1, computePull(link, x.data(), {SMALL_BOX, SMALL_BOX}).length, 1, 1e-12, "length from the nearest image");
+    checkClose(1, computePull(link, x.data(), {SMALL_BOX, SMALL_BOX}).length, 1, 1e-12,
+            "length from the nearest image");
     check(computePull(link, x.data(), {SMALL_BOX, nullptr}).length > 2, "length from positions as they are");
 }
 

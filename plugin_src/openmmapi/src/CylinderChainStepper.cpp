@@ -35,7 +35,8 @@ static vector<int> findMobileParticles(const CylinderChainDescription& chains, c
 
 CylinderChainStepper::CylinderChainStepper(ContextImpl& context, const CylinderChainIntegrator& integrator,
         CylinderChainForceImpl& force) : context(context), integrator(integrator), chains(force.getDescription()),
-        others(context.getSystem(), integrator, chains), couplings(context, chains, others), kernel(createKernel(context, force, others)),
+        others(context.getSystem(), integrator, chains), couplings(context, chains, others),
+        kernel(createKernel(context, force, others)),
         explicitWork(getKernel().getLoop()), periodic(context.getSystem().usesPeriodicBoundaryConditions()),
         recorded(false) {
     explicitWork.initialize(findMobileParticles(chains, others));

@@ -24,8 +24,8 @@ public:
     CylinderChainStepper(ContextImpl& context, const CylinderChainIntegrator& integrator,
             CylinderChainForceImpl& force);
     /**
-     * Get the force groups whose links and contacts are in the equations of steps: those of the integrator if its scheme
-     * is implicit, or none.
+     * Get the force groups whose links and contacts are in the equations of steps: those of the integrator if its
+     * scheme is implicit, or none.
      */
     int getCoupledGroups() const;
     /**
