@@ -16,8 +16,8 @@ namespace cylchain {
  *     -k (theta r(y)+(1-theta) r(x)-(2 theta-1)^(1/2) r_random),    theta = max(1/2, 1-1/(h sum k'/zeta)),
  *
  * with the friction zeta of each of its places and the stiffness k' of all links there, and r_random drawn from the
- * equilibrium of r. Other links have one coordinate q, a function of the distance, as segments have: the force -T along the mean of r(x) and
- * r(y) with
+ * equilibrium of r. Other links have one coordinate q, a function of the distance, as segments have: the force -T along
+ * the mean of r(x) and r(y) with
  *
  *     T = k (theta q(y)+(1-theta) q(x)-(2 theta-1)^(1/2) q_random),
  *

@@ -197,6 +197,7 @@ const LinkEntry& findEntry(const LinkTable& table, int number) {
 /** Entries of a table, in the order of their numbers, and where each number is among those that were given. */
 static vector<pair<const LinkEntry*, size_t> > findEntries(const LinkTable& table, const vector<int>& numbers) {
     vector<pair<const LinkEntry*, size_t> > found;
+    found.reserve(numbers.size());
     for (size_t i = 0; i < numbers.size(); i++)
         found.emplace_back(&findEntry(table, numbers[i]), i);
     // All are of one vector.

@@ -129,7 +129,7 @@ template <class T> static vector<T> readValues(istream& stream, size_t count) {
     // One by one, so that a checkpoint which is cut off cannot ask for more memory than it has.
     vector<T> values;
     for (size_t i = 0; i < count; i++)
-        values.push_back(readValue<T>(stream));
+        values.push_back(readValue<T>(stream)); // NOLINT(performance-inefficient-vector-operation)
     return values;
 }
 
