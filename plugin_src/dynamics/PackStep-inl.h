@@ -23,7 +23,7 @@ public:
         gatherForces<W>(pack, forces, f);
         for (int i = 0; i < W; i++)
             lane(active, i) = taken[i] ? 1 : 0;
-        step.emplace(pack, settings, start, memory);
+        step.reset(new ImplicitStep<W, CLOSED>(pack, settings, start, memory));
         step->begin(f, y);
     }
     int getNumStages() const override {
@@ -91,7 +91,7 @@ private:
     Vec *y, *forcesOnNodes, *movesOfNodes;
     mutable Real active;
     typename ImplicitStep<W, CLOSED>::Memory memory;
-    std::optional<ImplicitStep<W, CLOSED> > step;
+    std::unique_ptr<ImplicitStep<W, CLOSED> > step;
     const CouplingTerm* terms;
     int numTerms, iteration;
 
