@@ -1,4 +1,5 @@
 #include "dynamics/ContactEquations.h"
+#include "dynamics/SymmetricMatrices.h"
 #include "dynamics/WallEquations.h"
 #include <algorithm>
 #include <cmath>
@@ -173,13 +174,7 @@ void ContactEquations::evaluate(State& state, const double* moved, bool first, P
         const double own = contact.weight*stiffness;
         for (int k = 0; k < 3; k++)
             equation.force[k] = own*overlap*n[k];
-        double* const k = equation.stiffness;
-        k[0] = own*n[0]*n[0];
-        k[1] = own*n[0]*n[1];
-        k[2] = own*n[0]*n[2];
-        k[3] = own*n[1]*n[1];
-        k[4] = own*n[1]*n[2];
-        k[5] = own*n[2]*n[2];
+        setOuter(own, n, equation.stiffness);
         part.equations.push_back(equation);
     }
 }

@@ -1,4 +1,5 @@
 #include "dynamics/LinkEquations.h"
+#include "dynamics/SymmetricMatrices.h"
 #include "lanes/Noise.h"
 #include <algorithm>
 #include <cmath>
@@ -31,12 +32,6 @@ const double LEAST_COSINE = -0.9;
 
 double dot(const double* a, const double* b) {
     return a[0]*b[0]+a[1]*b[1]+a[2]*b[2];
-}
-
-void multiply(const double* k, const double* v, double* result) {
-    result[0] = k[0]*v[0]+k[1]*v[1]+k[2]*v[2];
-    result[1] = k[1]*v[0]+k[3]*v[1]+k[4]*v[2];
-    result[2] = k[2]*v[0]+k[4]*v[1]+k[5]*v[2];
 }
 
 } // namespace

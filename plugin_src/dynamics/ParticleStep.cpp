@@ -1,4 +1,5 @@
 #include "dynamics/ParticleStep.h"
+#include "dynamics/SymmetricMatrices.h"
 #include "lanes/Noise.h"
 #include <algorithm>
 #include <cmath>
@@ -73,10 +74,7 @@ void ParticleStep::beginStage(int stage) {
 }
 
 void ParticleStep::solve(int particle, const double* force, double* move) const {
-    const double* m = &inverse[6*particle];
-    move[0] = m[0]*force[0]+m[1]*force[1]+m[2]*force[2];
-    move[1] = m[1]*force[0]+m[3]*force[1]+m[4]*force[2];
-    move[2] = m[2]*force[0]+m[4]*force[1]+m[5]*force[2];
+    multiply(&inverse[6*particle], force, move);
 }
 
 void ParticleStep::eliminate(const CouplingTerm* newTerms, int count, double* moves) {

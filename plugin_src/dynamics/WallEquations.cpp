@@ -1,4 +1,5 @@
 #include "dynamics/WallEquations.h"
+#include "dynamics/SymmetricMatrices.h"
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -112,15 +113,9 @@ void WallEquations::linearise(int iteration, const double* moved, vector<Couplin
             const double* g = state.gradient;
             for (int k = 0; k < 3; k++)
                 equation.force[k] = -own*beyond*g[k];
-            double* const k = equation.stiffness;
-            k[0] = own*g[0]*g[0];
-            k[1] = own*g[0]*g[1];
-            k[2] = own*g[0]*g[2];
-            k[3] = own*g[1]*g[1];
-            k[4] = own*g[1]*g[2];
-            k[5] = own*g[2]*g[2];
+            setOuter(own, g, equation.stiffness);
             if (iteration <= SEARCHING_ITERATIONS)
-                addTurning(system->wall, g, state.force*state.curvature, k);
+                addTurning(system->wall, g, state.force*state.curvature, equation.stiffness);
             equations.push_back(equation);
         }
 }
