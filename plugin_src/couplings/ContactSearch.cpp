@@ -737,7 +737,7 @@ bool ContactSearch::isExcluded(int a, int b) const {
 }
 
 void ContactSearch::findPairs(const double* x, const double* y, const double* box, double reach,
-        vector<ContactPair>& pairs, const LoopRunner& run) {
+        vector<ContactPair>& pairs, const Loop& run) {
     if (!(reach >= 0 && isfinite(reach)))
         throw invalid_argument("The reach of a search for contacts is negative or not finite");
     pairs.clear();

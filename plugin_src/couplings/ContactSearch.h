@@ -3,18 +3,12 @@
 
 #include "couplings/CapsuleGeometry.h"
 #include "couplings/Capsules.h"
-#include <functional>
+#include "mechanics/Loop.h"
 #include <limits>
 #include <memory>
 #include <vector>
 
 namespace cylchain {
-
-/**
- * Calls a function with each number from 0 to count-1, in any order, perhaps on several threads. The function throws no
- * exceptions.
- */
-typedef std::function<void(int count, const std::function<void(int)>& iteration)> LoopRunner;
 
 /**
  * Finds capsules that touch each other, and where.
@@ -38,7 +32,7 @@ public:
     bool isExcluded(int a, int b) const;
     /**
      * Find the pairs of capsules whose surfaces come within reach of each other at x or at y, or that may pass through
-     * each other in between, sorted by a and b. They do not depend on the loop runner.
+     * each other in between, sorted by a and b. They do not depend on how the loop is run.
      *
      * @param box    the three vectors of a periodic box (nine doubles, in reduced form), or NULL. Its widths must be
      *               more than twice the extent of a capsule in a step with its diameter and the reach, so that two
@@ -48,7 +42,7 @@ public:
      * @param run    runs the parts of the search; one after the other if there is none
      */
     void findPairs(const double* x, const double* y, const double* box, double reach, std::vector<ContactPair>& pairs,
-            const LoopRunner& run = LoopRunner());
+            const Loop& run = Loop());
     /**
      * Find the same pairs as far as some capsules are in them, after a search with another y. This takes less time
      * where they are few.

@@ -3,14 +3,11 @@
 
 #include "dynamics/ChainPlaces.h"
 #include "dynamics/PackStep.h"
-#include <functional>
+#include "mechanics/Loop.h"
 #include <memory>
 #include <vector>
 
 namespace cylchain {
-
-/** Calls a function with each number from 0 to count-1, in any order, maybe from several threads. */
-typedef std::function<void(int, const std::function<void(int)>&)> Loop;
 
 /** A flag for each lane of each pack. */
 typedef std::vector<std::unique_ptr<bool[]> > LaneFlags;

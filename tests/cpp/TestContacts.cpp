@@ -379,7 +379,7 @@ static FoundPairs comparePairs(const TestSystem& test, const vector<ContactPair>
 }
 
 static vector<ContactPair> findPairs(const TestSystem& test, const double* box, double reach,
-        const LoopRunner& run = LoopRunner()) {
+        const Loop& run = Loop()) {
     ContactSearch search(test.system);
     vector<ContactPair> pairs;
     search.findPairs(test.x.data(), test.y.data(), box, reach, pairs, run);
@@ -481,12 +481,12 @@ static void testLoops() {
     const double box[9] = {1200, 0, 0, 300, 1200, 0, -100, 200, 1200};
     const TestSystem test = makeSystem(generator, 100, 10, 0, 100, 30, 8, box);
     const vector<ContactPair> expected = findPairs(test, box, 20);
-    const LoopRunner backwards = [] (int count, const function<void(int)>& iteration) {
+    const Loop backwards = [] (int count, const function<void(int)>& iteration) {
         for (int i = count-1; i >= 0; i--)
             iteration(i);
     };
     for (int numThreads : {1, 2, 3, 5}) {
-        const LoopRunner run = [numThreads] (int count, const function<void(int)>& iteration) {
+        const Loop run = [numThreads] (int count, const function<void(int)>& iteration) {
             vector<thread> threads;
             for (int t = 0; t < numThreads; t++)
                 threads.emplace_back([=, &iteration] {
@@ -496,7 +496,7 @@ static void testLoops() {
             for (thread& worker : threads)
                 worker.join();
         };
-        for (const LoopRunner& runner : {run, backwards}) {
+        for (const Loop& runner : {run, backwards}) {
             const vector<ContactPair> pairs = findPairs(test, box, 20, runner);
             check(pairs.size() == expected.size(), "as many pairs");
             for (size_t i = 0; i < pairs.size(); i++)

@@ -63,7 +63,7 @@ void ReferenceCalcCylinderChainContactForceKernel::findPairs(vector<Vec3>& posit
     for (const Capsule& capsule : search->getSystem().capsules)
         diameter = max(diameter, 2*capsule.radius);
     hasList = false;
-    const LoopRunner run = [&] (int count, const function<void(int)>& iteration) {loop.run(count, iteration);};
+    const Loop run = [&] (int count, const function<void(int)>& iteration) {loop.run(count, iteration);};
     // A box that is too small for a skin may be large enough for contacts.
 
     for (skin = SKIN*diameter; ; skin = 0)
