@@ -135,7 +135,7 @@ template <int W, bool CLOSED> Instability stepPackImplicitly(const Pack& pack, c
     result.iterations = ImplicitStep<W, CLOSED>(pack, settings, start, memory).take(f, y, failed);
     for (int i = 0; i < W; i++)
         result.divided += failed[i];
-    if (result.divided > 0)
+    if (result.divided > 0 && settings.mayDivide)
         divideStep<W, CLOSED>(pack, start, f, settings, y, failed, memory);
     scatter<W>(pack, y, 1, displacements);
     for (int i = 0; i < W; i++)

@@ -12,84 +12,27 @@ template <int W> ChainEnergy addForcesTo(const Pack& pack, const double* positio
     Vector<Real>* f = x+pack.nodes;
     gatherPositions<W>(pack, positions, box, x);
     ChainEnergy energy;
-    const bool linear = isLinear(pack.bending);
-    Vector<Real> before = {}, push = {}, vectorBefore = {};
-    Real inverseBefore = {};
-    for (int s = 0; s < pack.nodes-1; s++) {
-        const Vector<Real> difference = x[s+1]-x[s];
-        const Real length = root(difference.dot(difference));
-        const Real inverse = 1/length;
-        const Vector<Real> t = difference*inverse;
-
-        // Stretching.
-        const Real stiffness = property<Real>(pack, s, Pack::Stiffness);
-        const Real extension = length-property<Real>(pack, s, Pack::RestLength);
-        const Real tension = stretchingTension(pack.stretching, stiffness, extension,
-                property<Real>(pack, s, Pack::InverseExtension));
+    ChainEnergy* const included = includeEnergy ? &energy : NULL;
+    SegmentGeometry<Real> previous = {}, current;
+    f[0] = Vector<Real> {};
+    for (int s = 0; s < pack.nodes-1; s++, previous = current) {
+        current.difference = x[s+1]-x[s];
+        current.length = root(current.difference.dot(current.difference));
+        current.inverse = 1/current.length;
+        current.tangent = current.difference*current.inverse;
+        f[s+1] = Vector<Real> {};
+        if (s > 0)
+            Elements<W>::template addForces<OnJoints>(pack, s, previous, current, f, included);
         // The last segment of an unrolled chain is there for its joint alone.
-        const bool twice = (s >= pack.segments);
-        Vector<Real> pull = twice ? Vector<Real> {} : t*tension;
-
-        // Bending at the joint with the segment before.
-        if (s > 0 && linear) {
-            const Real joint = loaded<Real>(pack.joints, s);
-            const Vector<Real> bend = difference-vectorBefore, force = bend*joint;
-            f[s-1] = f[s-1]-force;
-            f[s] = push+pull+force+force;
-            push = -force;
-            if (includeEnergy)
-                for (int i = 0; i < W; i++) {
-                    Real own = bend.dot(force);
-                    if (s < pack.nodesOfLane[i]-1)
-                        energy.bending += 0.5*lane(own, i);
-                }
-        }
-        else if (s > 0) {
-            const Real joint = loaded<Real>(pack.joints, s);
-            const Real c = before.dot(t);
-            const Vector<Real> normal = crossProduct(before, t);
-            const Real sineSquared = normal.dot(normal);
-            const Real slope = bendingSlope(pack.bending, joint, c, sineSquared);
-            const Vector<Real> first = (t-before*c)*(-slope*inverseBefore);
-            const Vector<Real> second = (before-t*c)*(-slope*inverse);
-            f[s-1] = f[s-1]-first;
-            push = push+first-second;
-            f[s] = push+pull;
-            push = second;
-            if (includeEnergy)
-                for (int i = 0; i < W; i++) {
-                    Real k = joint, cosine = c, square = sineSquared;
-                    if (s < pack.nodesOfLane[i]-1)
-                        energy.bending += bendingEnergy(pack.bending, lane(k, i), lane(cosine, i), lane(square, i));
-                }
-        }
-        else
-            f[s] = pull;
-        push = push-pull;
-        if (includeEnergy)
-            for (int i = 0; i < W; i++) {
-                if (s >= pack.segmentsOfLane[i])
-                    continue;
-                Real k = stiffness, e = extension, d = property<Real>(pack, s, Pack::InverseExtension);
-                energy.stretching += stretchingEnergy(pack.stretching, lane(k, i), lane(e, i), lane(d, i));
-            }
-        before = t;
-        vectorBefore = difference;
-        inverseBefore = inverse;
+        if (s < pack.segments)
+            Elements<W>::template addForces<OnSegments>(pack, s, current, f, included);
     }
-    f[pack.nodes-1] = push;
     if (!pack.propulsions.empty()) {
         gatherSegments<W>(pack, positions, box, x);
         addPropulsion<W>(pack, x, f);
     }
-    for (const LaneTether& tether : pack.tethers) {
-        double d[3];
-        tetherVector(pack, tether, positions, box, d);
-        lane(f[tether.node].x, tether.lane) -= tether.stiffness*d[0];
-        lane(f[tether.node].y, tether.lane) -= tether.stiffness*d[1];
-        lane(f[tether.node].z, tether.lane) -= tether.stiffness*d[2];
-        energy.tethers += 0.5*tether.stiffness*(d[0]*d[0]+d[1]*d[1]+d[2]*d[2]);
-    }
+    for (int node = 0; node < pack.ownNodes(); node++)
+        Elements<W>::template addForces<OnNodes>(pack, node, positions, box, f, included);
     for (int node = 0; node < pack.nodes; node++)
         for (int i = 0; i < W; i++) {
             const int particle = pack.particles[node*W+i];

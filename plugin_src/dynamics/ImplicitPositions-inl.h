@@ -46,11 +46,7 @@ public:
      * they have now, and the lengths that the linear equations mean.
      */
     void resetLengths(Vec* y) const {
-        rebuild(y, [&] (int s, const Vec& difference) {
-            const ImplicitSegment<Real>& segment = segments[s];
-            const Real length = larger<Real>(segment.newTangent.dot(difference), 0.5*segment.length);
-            return hasRange(pack.stretching) ? withinRange(s, length) : length;
-        });
+        rebuild(y, [&] (int s, const Vec& difference) {return Lengths<W>::meantLength(step, s, difference);});
     }
 private:
     const ImplicitState<W>& step;
@@ -79,11 +75,5 @@ private:
         const Real free = loaded<Real>(pack.free, 0);
         for (int node = 0; node < n; node++)
             y[node] = y[node]+(rest[node]+back-y[node])*free;
-    }
-    /** A length within the range of its segment. */
-    CYLCHAIN_INLINE Real withinRange(int s, Real length) const {
-        const Real rest = property<Real>(pack, s, Pack::RestLength);
-        const Real range = Scalar(1-1e-9)/(property<Real>(pack, s, Pack::InverseExtension)+TINY);
-        return larger<Real>(lesser<Real>(length, rest+range), rest-range);
     }
 };

@@ -15,7 +15,7 @@ template <class Real> struct ImplicitSegment {
     // What a stage makes of these: T = k (implicit q(y)+constant), with a part of the bend that turns with the joint.
     Vector<Real> constantBend, turningBend;
     Real implicit, constantCoordinate, constantTension, jointImplicit;
-    // Of the last iteration: the direction of the new segment, its tension and how the tension changes.
+    // Of the last iteration or stage: the direction of the new segment, its tension and how the tension changes.
     Vector<Real> newTangent;
     Real tension, response, multiplier, extra, tensionOfFlow;
     // The part of the response that stays with the nodes; what the direction of the tension lacks of the mean one; and

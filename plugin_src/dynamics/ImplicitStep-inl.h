@@ -26,8 +26,6 @@
  * docs/design/implicit_scheme.md.
  */
 
-const int NEWTON_ITERATIONS = 14, NEWTON_ITERATIONS_OF_LINEAR_BENDS = 20;
-
 /** A step of open chains or, if CLOSED, of rings. */
 template <int W, bool CLOSED> class ImplicitStep {
     typedef typename Lanes<W>::Type Real;
@@ -133,8 +131,8 @@ public:
     }
 private:
     ImplicitState<W> step;
-    ImplicitStages<W, CLOSED> stages;
-    ImplicitNoise<W, CLOSED> noise;
+    ImplicitStages<W> stages;
+    ImplicitNoise<W> noise;
     ImplicitPositions<W, CLOSED> positions;
     ImplicitEquations<W, CLOSED> equations;
     MetricForces<W, CLOSED> metricForces;
@@ -147,7 +145,7 @@ private:
     int solve(Vec* y, bool* failed) {
         Real active = splat<Real>(1);
         int iterations = 0;
-        const int most = isLinear(step.pack.bending) ? NEWTON_ITERATIONS_OF_LINEAR_BENDS : NEWTON_ITERATIONS;
+        const int most = Elements<W>::limitsOf(step.pack).iterations;
         while (iterations < most) {
             eliminate(y, iterations);
             advance(y, iterations, active);

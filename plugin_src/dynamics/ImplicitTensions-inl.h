@@ -13,7 +13,6 @@ template <int W, bool CLOSED> class ImplicitTensions {
     typedef ImplicitEquations<W, CLOSED> Equations;
     typedef typename Equations::Row Row;
     typedef typename Equations::Geometry Geometry;
-    typedef typename Equations::JointGeometry JointGeometry;
 public:
     ImplicitTensions(const ImplicitState<W>& step, Equations& equations) : step(step), equations(equations),
             pack(step.pack), segments(step.segments), change(step.change) {
@@ -74,13 +73,9 @@ void ImplicitTensions<W, CLOSED>::refineAndRecord(const Vec* y, Real active) {
         equations.describeNew(y, s, current);
         if (s > 0) {
             Row before = {}, here = {}, after = {};
-            if (isLinear(pack.bending))
-                equations.addLinearBend(s, previous, current, before, here, after);
-            else {
-                JointGeometry joint;
-                equations.describeNewJoint(s, previous, current, joint);
-                equations.addJoint(s, joint, previous, current, before, here, after);
-            }
+            typename Elements<W>::Factors factors;
+            Elements<W>::describeNew(step, s, previous, current, factors);
+            Elements<W>::template add<OnJoints>(step, s, factors, previous, current, before, here, after);
             const Vec change1 = change[s]-change[s-1], change2 = change[s+1]-change[s];
             const Vec force1 = before.right+before.diagonal*change1-before.second*change2;
             const Vec force2 = after.diagonal*change2-before.second.transposedTimes(change1)-after.right;

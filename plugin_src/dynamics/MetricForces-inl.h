@@ -78,15 +78,13 @@ private:
 
     /**
      * The friction of a segment's ends against turning, and the stiffness with which its tension turns it back, in a
-     * step. Bends that are linear in the nodes hold segments that are much shorter than what tension straightens.
+     * step.
      */
     void turningRates(int s, Real& friction, Real& tension) const {
         const Real l0 = property<Real>(pack, s, Pack::RestLength);
         friction = 0.25*property<Real>(pack, s, Pack::Perpendicular)+
                 property<Real>(pack, s, Pack::Rotational)/(l0*l0)+0.5*loaded<Real>(pack.nodeFriction, 0)+TINY;
-        if (isLinear(pack.bending))
-            friction = friction+(h/step.shareOfForces())*
-                    (loaded<Real>(pack.joints, s)+loaded<Real>(pack.joints, s+1));
+        friction = friction+(h/step.shareOfForces())*Elements<W>::template stiffnessAgainstTurning<Real>(pack, s);
         tension = (h/step.shareOfForces())*segments[s].multiplier/segments[s].length;
     }
 };

@@ -13,7 +13,7 @@ template <int W> inline NoisePlaces<W> noisePlaces(const Pack& pack) {
     NoisePlaces<W> places;
     for (int i = 0; i < W; i++) {
         reinterpret_cast<Word*>(&places.chain)[i] = pack.chain[i];
-        reinterpret_cast<Word*>(&places.part)[i] = 0;
+        reinterpret_cast<Word*>(&places.part)[i] = pack.firstNode[i];
     }
     return places;
 }

@@ -40,7 +40,7 @@ constexpr bool computesChainForces(Scheme scheme) {
         CYLCHAIN_SCHEMES(CYLCHAIN_CASE)
 #undef CYLCHAIN_CASE
     }
-    return false;
+    noOtherEntry();
 }
 
 } // namespace cylchain

@@ -4,8 +4,8 @@
  * Bends of joints as coordinates b = f (t2-t1) with the energy (stiffness/2) b^2, and their distribution in
  * equilibrium.
  *
- * Each entry of CYLCHAIN_ANGULAR_BENDING_MODELS has a struct of its name with its formulas. Bends that are linear in
- * the nodes need none.
+ * Each angular entry of CYLCHAIN_BENDING_MODELS has a struct of its name with its formulas. LinearBends-inl.h has those
+ * of bends that are linear in the nodes.
  */
 
 /** f of a bend b = f (t2-t1), and df/dc, for the cosine c. */
@@ -139,11 +139,15 @@ struct InscribedCircle : BendingFormulas {
     static constexpr bool ACCEPTS_IN_LANES = true;
 };
 
-// A formula of a model of an angle. Callers have no other ones.
-#define CYLCHAIN_CASE(entry, ...) \
-    if (model == BendingModel::entry || isLastAngular(BendingModel::entry)) \
-        return entry::CYLCHAIN_FORMULA;
-#define CYLCHAIN_DISPATCH CYLCHAIN_ANGULAR_BENDING_MODELS(CYLCHAIN_CASE)
+// A formula of an angular model. Callers have no other ones.
+#define CYLCHAIN_CASE_Angular(entry) case BendingModel::entry: return entry::CYLCHAIN_FORMULA;
+#define CYLCHAIN_CASE_Linear(entry) case BendingModel::entry: break;
+#define CYLCHAIN_CASE(entry, name, kind) CYLCHAIN_CASE_##kind(entry)
+#define CYLCHAIN_DISPATCH \
+    switch (model) { \
+        CYLCHAIN_BENDING_MODELS(CYLCHAIN_CASE) \
+    } \
+    noOtherEntry();
 
 template <class Real> inline Real bendingSlope(BendingModel model, Real stiffness, Real c, Real sineSquared) {
 #define CYLCHAIN_FORMULA slope(stiffness, c, sineSquared)
@@ -172,12 +176,16 @@ template <class Real> CYLCHAIN_INLINE void bendFactors(BendingModel model, const
             const Vector<Real>& difference2, BendFactor<Real>& factor1, BendFactor<Real>& factor2, Real number1,
             Real number2, Real& inverse1, Real& inverse2) {
     const Real numbers = number1*number2;
-#define CYLCHAIN_SHARING_CASE(entry, ...) \
+#define CYLCHAIN_SHARING_CASE_Angular(entry) \
     if (entry::SHARES_DIVISIONS && model == BendingModel::entry) \
         return entry::factors(difference1, difference2, factor1, factor2, numbers, number1, number2, inverse1, \
                 inverse2);
-    CYLCHAIN_ANGULAR_BENDING_MODELS(CYLCHAIN_SHARING_CASE)
+#define CYLCHAIN_SHARING_CASE_Linear(entry)
+#define CYLCHAIN_SHARING_CASE(entry, name, kind) CYLCHAIN_SHARING_CASE_##kind(entry)
+    CYLCHAIN_BENDING_MODELS(CYLCHAIN_SHARING_CASE)
 #undef CYLCHAIN_SHARING_CASE
+#undef CYLCHAIN_SHARING_CASE_Linear
+#undef CYLCHAIN_SHARING_CASE_Angular
     factor1 = bendFactor(model, difference1);
     factor2 = bendFactor(model, difference2);
     const Real both = 1/numbers;
@@ -224,3 +232,5 @@ template <class Real> CYLCHAIN_INLINE Real acceptedBends(BendingModel model, con
 
 #undef CYLCHAIN_DISPATCH
 #undef CYLCHAIN_CASE
+#undef CYLCHAIN_CASE_Linear
+#undef CYLCHAIN_CASE_Angular

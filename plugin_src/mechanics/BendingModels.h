@@ -4,42 +4,52 @@
 #include "mechanics/Enumerators.h"
 
 /**
- * The bending energies of a joint whose segments have tangents with the cosine c and the angle theta, for a stiffness
- * b, which is a/l0. A new one takes an entry here, the struct of its name in BendingModels-inl.h, which has its
- * formulas, and the same energy in openmm_cylchain, among BENDING_POTENTIALS.
+ * The bending energies of a joint, for a stiffness b, and the kind of its bends.
+ *
+ * Angular ones depend on the tangents of the joint's segments, which have the cosine c and the angle theta; b is a/l0:
  *
  * - KratkyPorod: b (1-c), eq. (26)
  * - Quadratic: (b/2) theta^2
  * - InscribedCircle: 2b (1-c)/(1+c), eq. (27), which diverges where a joint folds back
- */
-#define CYLCHAIN_ANGULAR_BENDING_MODELS(ENTRY) \
-    ENTRY(KratkyPorod, "kratky-porod") \
-    ENTRY(Quadratic, "quadratic") \
-    ENTRY(InscribedCircle, "inscribed-circle")
-
-/**
- * All bending energies: those of an angle, and one of the vectors u1 and u2 of the segments, whose force is linear in
- * the nodes.
  *
- * - BondDifference: (b/2) |u2-u1|^2, with b per square of a length: Panja, Barkema and van Leeuwen, Phys. Rev. E 2015,
- *   92, 032603, eq. (8)
+ * Linear ones depend on the vectors u1 and u2 of the segments, so that their forces are linear in the nodes; b is per
+ * square of a length:
+ *
+ * - BondDifference: (b/2) |u2-u1|^2: Panja, Barkema and van Leeuwen, Phys. Rev. E 2015, 92, 032603, eq. (8)
+ *
+ * A new one takes an entry here, the struct of its name in BendingModels-inl.h, which has its formulas, and the same
+ * energy in openmm_cylchain, among BENDING_POTENTIALS.
  */
 #define CYLCHAIN_BENDING_MODELS(ENTRY) \
-    CYLCHAIN_ANGULAR_BENDING_MODELS(ENTRY) \
-    ENTRY(BondDifference, "bond-difference")
+    ENTRY(KratkyPorod, "kratky-porod", Angular) \
+    ENTRY(Quadratic, "quadratic", Angular) \
+    ENTRY(InscribedCircle, "inscribed-circle", Angular) \
+    ENTRY(BondDifference, "bond-difference", Linear)
 
 namespace cylchain {
 
 enum class BendingModel {CYLCHAIN_BENDING_MODELS(CYLCHAIN_ENUMERATOR)};
 
-/** Whether the force of a joint is linear in its nodes. */
-constexpr bool isLinear(BendingModel model) {
-    return model == BendingModel::BondDifference;
+/** The kinds of bends. Steps have a kind of elements for each: see dynamics/elements. */
+enum class BendKind {Angular, Linear};
+
+/** The kind of the bends of a model. */
+constexpr BendKind kindOf(BendingModel model) {
+    switch (model) {
+#define CYLCHAIN_CASE(entry, name, kind) case BendingModel::entry: return BendKind::kind;
+        CYLCHAIN_BENDING_MODELS(CYLCHAIN_CASE)
+#undef CYLCHAIN_CASE
+    }
+    noOtherEntry();
 }
 
-/** Whether a model is the last of those of an angle. */
-constexpr bool isLastAngular(BendingModel model) {
-    return static_cast<int>(model)+1 == static_cast<int>(BendingModel::BondDifference);
+constexpr bool isAngular(BendingModel model) {
+    return kindOf(model) == BendKind::Angular;
+}
+
+/** Whether the forces of joints are linear in their nodes. */
+constexpr bool isLinear(BendingModel model) {
+    return kindOf(model) == BendKind::Linear;
 }
 
 template <> struct Names<BendingModel> {

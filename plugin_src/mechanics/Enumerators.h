@@ -35,9 +35,20 @@ template <class Enumeration> constexpr bool isEntry(Enumeration value) {
     return isEntry<Enumeration>(static_cast<int>(value));
 }
 
-/** Whether an entry is the last one. */
-template <class Enumeration> constexpr bool isLast(Enumeration value) {
-    return static_cast<int>(value) == countOf<Enumeration>()-1;
+/** The number of entries for which something holds. */
+template <class Enumeration> constexpr int countWhere(bool (*holds)(Enumeration)) {
+    int count = 0;
+    for (int i = 0; i < countOf<Enumeration>(); i++)
+        count += holds(static_cast<Enumeration>(i)) ? 1 : 0;
+    return count;
+}
+
+/**
+ * Where a switch over all entries of a list ends. What takes numbers from outside has refused those of no entry; see
+ * isEntry().
+ */
+[[noreturn]] inline void noOtherEntry() {
+    __builtin_unreachable();
 }
 
 /** The names of all entries, in the order of their numbers. */

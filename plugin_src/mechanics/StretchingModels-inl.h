@@ -15,6 +15,10 @@ inline void feneCoordinate(double inverse, double e, double& q, double& slope) {
     q = std::copysign(root, relative)/inverse+slope*(e-relative/inverse);
 }
 
+// Implicit steps draw lengths and find tensions by what these are: another model needs its own.
+static_assert(countOf<StretchingModel>() == 2 && !hasRange(StretchingModel::Harmonic) &&
+        hasRange(StretchingModel::FENE), "Tensions within a range are those of FENE, and others are harmonic");
+
 /**
  * The tension of a FENE segment in a step, as a function of its new length: it grows from minus to plus infinity
  * between the shortest and the longest length, so that for every tension there is a length in between.
@@ -93,11 +97,13 @@ struct FENE {
     }
 };
 
-// A formula of a model. Chains have no other models than those of the list: ChainEngine has seen to it.
-#define CYLCHAIN_CASE(entry, ...) \
-    if (model == StretchingModel::entry || isLast(StretchingModel::entry)) \
-        return entry::CYLCHAIN_FORMULA;
-#define CYLCHAIN_DISPATCH CYLCHAIN_STRETCHING_MODELS(CYLCHAIN_CASE)
+// A formula of a model.
+#define CYLCHAIN_CASE(entry, ...) case StretchingModel::entry: return entry::CYLCHAIN_FORMULA;
+#define CYLCHAIN_DISPATCH \
+    switch (model) { \
+        CYLCHAIN_STRETCHING_MODELS(CYLCHAIN_CASE) \
+    } \
+    noOtherEntry();
 
 template <class Real> CYLCHAIN_INLINE Real stretchingTension(StretchingModel model, Real stiffness, Real e,
             Real inverse) {

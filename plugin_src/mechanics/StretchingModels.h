@@ -29,7 +29,7 @@ constexpr bool hasRange(StretchingModel model) {
         CYLCHAIN_STRETCHING_MODELS(CYLCHAIN_CASE)
 #undef CYLCHAIN_CASE
     }
-    return false;
+    noOtherEntry();
 }
 
 } // namespace cylchain

@@ -5,6 +5,7 @@
  */
 
 #include "TestChains.h"
+#include <set>
 
 /** The positions of nodes, one after the other, that begin with a node of a chain. */
 static Array nodesFrom(const Chain& chain, int first, int count, const Array& x) {
@@ -202,7 +203,7 @@ static Array solutionNear(const vector<Chain>& chains, const Array& x, Array y, 
 
 static vector<Chain> tethered(vector<Chain> chains, const Array& x) {
     for (Chain& chain : chains)
-        for (int node : {0, 2})
+        for (int node : set<int> {0, 2, (int) chain.nodes.size()-1})
             if (node < (int) chain.nodes.size()) {
                 const double* position = &x[3*chain.nodes[node]];
                 chain.tethers.push_back({node, {position[0]+1, position[1], position[2]-1}, 25});
