@@ -1,5 +1,5 @@
 """DNA base pair by base pair: the mode-space integrator of Panja et al. beside scheme "implicit", each at its largest
-step.
+step; and one chain of up to 10^5 beads in scheme "implicit".
 
 Chains of 63 to 511 bonds of ``DSDNA_BASE_PAIRS``, on one thread, timed in turn. The step of scheme "modes" is the
 largest of Table II of Panja, Barkema and van Leeuwen, Phys. Rev. E 2015, 92, 032603, for averages and motion. That of
@@ -31,6 +31,9 @@ MODES_STEPS = {63: 10.0, 127: 50.0, 255: 100.0, 511: 100.0}
 IMPLICIT_STEPS = {63: 1e4, 127: 3e4, 255: 7e4, 511: 7e4}
 """In units of tau: see above."""
 
+STEP_OF_ONE_CHAIN = 1e4
+"""In units of tau: the recommended step."""
+
 LAG = 3
 _RESOLVED = 30
 _VISCOSITY = 602.0
@@ -40,21 +43,24 @@ OBSERVABLES = ("end_to_end", "middle_bond", "middle_bead")
 
 @dataclass(frozen=True)
 class BasePairEffort:
-    """How much is measured: numbers of bonds, chains of each, lags that motion is followed for, and timing."""
+    """How much is measured: numbers of bonds, chains of each, lags that motion is followed for, and timing; and the
+    numbers of beads of one chain."""
 
     bonds: tuple
     chains: int
     lags: int
     repetitions: int
     seconds: float
+    beads_of_one_chain: tuple
 
 
-FULL = BasePairEffort((63, 127, 255, 511), 128, 40, 9, 1.0)
-QUICK = BasePairEffort((63, 127), 64, 12, 3, 0.3)
+FULL = BasePairEffort((63, 127, 255, 511), 128, 40, 9, 1.0, (100, 1000, 10_000, 100_000))
+QUICK = BasePairEffort((63, 127), 64, 12, 3, 0.3, (100, 1000))
 
 
 def benchmark_base_pairs(effort=FULL, say=lambda message: None):
-    """Measure the simulated time per hour of both schemes, and the errors of scheme "implicit" at its step.
+    """Measure the simulated time per hour of both schemes, and the errors of scheme "implicit" at its step; and what a
+    bead of one chain takes, however long it is.
 
     Returns
     -------
@@ -86,6 +92,7 @@ def benchmark_base_pairs(effort=FULL, say=lambda message: None):
             speeds[scheme] = effort.chains * steps[bonds] * unit * _MILLISECONDS_PER_HOUR / times[name]
             rows.append(row(f"simulated_ms_per_hour_{name}", median(speeds[scheme]), "ms"))
         rows.append(row(f"implicit_over_modes_{bonds}", ratio(speeds["implicit"], speeds["modes"]), "1"))
+    rows += _rows_of_one_chain(effort, say)
     settings = {"chains": effort.chains, "lag_in_steps": LAG, "lags": effort.lags, "threads": 1}
     title = f"{effort.chains} chains of DNA base pair by base pair, one thread: simulated time per hour and chain"
     return Report(title, machine, settings, rows + errors, {})
@@ -103,6 +110,22 @@ def _context(bonds, chains, scheme, step):
     _, system, positions = filaments.build()
     integrator = filaments.create_integrator(system, step, scheme=scheme, random_seed=1, checks=False)
     return one_thread_context(system, integrator, positions)
+
+
+def _rows_of_one_chain(effort, say):
+    step = STEP_OF_ONE_CHAIN * DSDNA_BASE_PAIRS.time_unit
+    cases = []
+    for beads in effort.beads_of_one_chain:
+        say(f"building a chain of {beads} beads")
+        cases.append(Case(str(beads), stepper(_context(beads - 1, 1, "implicit", step))))
+    times = time_interleaved(cases, effort.repetitions, effort.seconds, say)
+    costs = {beads: times[str(beads)] / beads for beads in effort.beads_of_one_chain}
+    rows = [row(f"time_per_bead_{beads}", scaled(median(cost), 1e6), "us") for beads, cost in costs.items()]
+    shortest, *longer = costs
+    for beads in longer:
+        name = f"time_per_bead_{beads}_over_{shortest}"
+        rows.append(row(name, ratio(costs[beads], costs[shortest]), "1"))
+    return rows
 
 
 def _error_rows(bonds, effort, say):

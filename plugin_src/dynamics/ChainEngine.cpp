@@ -1,5 +1,6 @@
 #include "dynamics/ChainEngine.h"
 #include "dynamics/ChainPack.h"
+#include "dynamics/ChainPieces.h"
 #include "dynamics/ModePacks.h"
 #include "dynamics/PackStep.h"
 #include "dynamics/PackPlaces.h"
@@ -54,12 +55,30 @@ bool mayShareLanes(const Chain& longest, const Chain& chain) {
 }
 
 /**
- * Where single precision is right, as measured: see docs/design/implicit_scheme.md. These are for the step over the
- * relaxation time of the sharpest bends, 4 h kappa/gamma_rot, and for the stiffness of lengths, k l0^2/k_B T.
+ * Where single precision is right, as measured: see docs/design/implicit_scheme.md. This is for the stiffness of
+ * lengths, k l0^2/k_B T.
  */
-const double LARGEST_BENDING_RATE = 1e4, LARGEST_STRETCHING = 1e9;
-/** The same for bends that are linear in the nodes, 16 h kappa/xi. */
-const double LARGEST_RATE_OF_LINEAR_BENDS = 1e6;
+const double LARGEST_STRETCHING = 1e9;
+/** The same for the step over the relaxation time of the sharpest bends, 4 h kappa/gamma_rot or 16 h kappa/xi. */
+double largestBendingRate(BendKind kind) {
+    switch (kind) {
+        case BendKind::Angular:
+            return 1e4;
+        case BendKind::Linear:
+            return 1e6;
+    }
+    noOtherEntry();
+}
+/** The stiffness of a bend against turning its segments, the shorter of which has some length. */
+double turningStiffness(BendKind kind, double stiffness, double length) {
+    switch (kind) {
+        case BendKind::Angular:
+            return stiffness;
+        case BendKind::Linear:
+            return stiffness*length*length;
+    }
+    noOtherEntry();
+}
 /** The change of a length by its noise in a step, over the length. Rounding adds to it. */
 const double LEAST_CHANGE = 1e-5;
 /** The resistance of a node to its motion. Third powers of it are computed, also for a thousandth of a step. */
@@ -132,6 +151,17 @@ ChainPack<double> packed(const vector<Chain>& chains, const vector<int>& members
     return pack;
 }
 
+/** Let the chains of a pack be pieces of others. */
+void setOrigins(ChainPack<double>& pack, const vector<PieceOfChain>& origins) {
+    for (LaneTether& tether : pack.tethers)
+        tether.number = origins[pack.chain[tether.lane]].tethers[tether.number];
+    for (int lane = 0; lane < pack.lanes; lane++) {
+        const PieceOfChain& origin = origins[pack.chain[lane]];
+        pack.firstNode[lane] = origin.firstNode;
+        pack.chain[lane] = origin.chain;
+    }
+}
+
 /** Copy arrays that have a row of lanes for each node, segment or property, into lanes from one on. */
 template <class From, class To> void copyLanes(const vector<From>& from, int lanes, vector<To>& to, int allLanes,
         int firstLane) {
@@ -150,6 +180,7 @@ ChainPack<float> widened(const ChainPack<double>* first, const ChainPack<double>
         copyTo(wide.chain, pack->chain);
         copyTo(wide.nodesOfLane, pack->nodesOfLane);
         copyTo(wide.segmentsOfLane, pack->segmentsOfLane);
+        copyTo(wide.firstNode, pack->firstNode);
         copyTo(wide.particles, pack->particles);
         copyTo(wide.properties, pack->properties);
         copyTo(wide.joints, pack->joints);
@@ -226,11 +257,10 @@ private:
             const Segment& before = chain.segments[joint];
             const Segment& behind = chain.segments[joint+1];
             const double length = min(before.restLength, behind.restLength);
-            // The stiffness of a bend against turning its segments.
-            const double stiffness = chain.joints[joint]*(isLinear(chain.bending) ? length*length : 1);
+            const BendKind kind = kindOf(chain.bending);
+            const double stiffness = turningStiffness(kind, chain.joints[joint], length);
             const double friction = min(before.rotational, behind.rotational)+0.25*length*length*chain.nodeFriction;
-            bendingRate = max(bendingRate, 4*stiffness/friction/
-                    (isLinear(chain.bending) ? LARGEST_RATE_OF_LINEAR_BENDS : LARGEST_BENDING_RATE));
+            bendingRate = max(bendingRate, 4*stiffness/friction/largestBendingRate(kind));
             bending = max(bending, 4*stiffness/(length*length));
         }
         for (const Tether& tether : chain.tethers)
@@ -250,16 +280,22 @@ void SegmentForces::add(const SegmentForces& other, double weight) {
 }
 
 struct ChainEngine::Implementation {
-    explicit Implementation(const vector<Chain>& chains) : modes(chains, kernels().lanes, kernels().wide.lanes) {
+    /** Chains whose modes are used may be all or none. */
+    explicit Implementation(const vector<Chain>& ofModes) : modes(ofModes, kernels().lanes, kernels().wide.lanes) {
     }
     /** Packs are counted through all of these. Wide ones are in the order of those that they replace. */
     vector<ChainPack<double> > packs;
     vector<WidePack> wide;
     ModePacks modes;
+    /** Those of each pack in double precision whose chains are few and long, or NULL. */
+    vector<unique_ptr<ChainPieces> > pieces;
     /** Held where wide packs are made. */
     mutex making;
     bool isOfModes(int pack) const {
         return pack >= (int) (packs.size()+wide.size());
+    }
+    ChainPieces* piecesOf(int pack) const {
+        return pack < (int) pieces.size() ? pieces[pack].get() : NULL;
     }
     /** Call a function with a pack: one in double precision, a wide one, or the number of one of modes. */
     template <class Double, class Single, class Modes> decltype(auto) with(int pack, Double ofDouble, Single ofSingle,
@@ -271,10 +307,14 @@ struct ChainEngine::Implementation {
     }
 };
 
-ChainEngine::ChainEngine(const vector<Chain>& chains) : implementation(new Implementation(chains)) {
+ChainEngine::ChainEngine(const vector<Chain>& chains) : ChainEngine(chains, {}) {
+}
+
+ChainEngine::ChainEngine(const vector<Chain>& chains, const vector<PieceOfChain>& origins) {
     for (size_t i = 0; i < chains.size(); i++)
         if (!isEntry(chains[i].bending) || !isEntry(chains[i].stretching))
             throw invalid_argument("Chain "+to_string(i)+" has a model that there is not");
+    implementation.reset(new Implementation(origins.empty() ? chains : vector<Chain>()));
     // Chains of similar length come next to each other, the longest first, so that threads end together.
     vector<int> order(chains.size());
     iota(order.begin(), order.end(), 0);
@@ -294,6 +334,11 @@ ChainEngine::ChainEngine(const vector<Chain>& chains) : implementation(new Imple
         const int lanes = lanesFor(fitting);
         members.push_back(vector<int>(order.begin()+first, order.begin()+first+lanes));
         implementation->packs.push_back(packed(chains, members.back(), lanes));
+        if (!origins.empty())
+            setOrigins(implementation->packs.back(), origins);
+        const bool isLong = origins.empty() && ChainPieces::mayBeUsed(chains, members.back(), kernels().wide.lanes);
+        implementation->pieces.emplace_back(!isLong ? NULL :
+                new ChainPieces(chains, members.back(), kernels().lanes, kernels().wide.lanes));
         first += lanes;
     }
 
@@ -331,7 +376,8 @@ vector<int> ChainEngine::getPacksOfStep(const StepSettings& settings) const {
     const lock_guard<mutex> lock(implementation->making);
     for (size_t wide = 0; wide < implementation->wide.size(); wide++) {
         WidePack& pack = implementation->wide[wide];
-        if (!pack.isUsed(settings))
+        const ChainPieces* const pieces = pack.last == pack.first+1 ? implementation->piecesOf(pack.first) : NULL;
+        if (!pack.isUsed(settings) || (pieces != NULL && pieces->isUsed(settings)))
             continue;
         pack.make(implementation->packs);
         for (; next < pack.first; next++)
@@ -350,6 +396,16 @@ int ChainEngine::getNumMixedChains(const vector<int>& packs) const {
         count += implementation->with(pack, [] (const auto&) {return 0;},
                 [] (const WidePack& wide) {return wide.chains;},
                 [&] (int modes) {return implementation->modes.getNumWideChains(modes);});
+    return count;
+}
+
+int ChainEngine::getNumMixedChains(const vector<int>& packs, const StepSettings& settings) const {
+    int count = getNumMixedChains(packs);
+    for (int pack : packs) {
+        ChainPieces* const pieces = implementation->piecesOf(pack);
+        if (pieces != NULL && pieces->isUsed(settings) && pieces->isMixed(settings))
+            count += getChainsOfLanes(pack).size();
+    }
     return count;
 }
 
@@ -379,6 +435,11 @@ Instability ChainEngine::step(int pack, const double* positions, const double* f
     auto stepOf = [&] (auto function, const auto& own) {
         return function(own, positions, forces, box, settings, displacements);
     };
+    ChainPieces* const pieces = implementation->piecesOf(pack);
+    Instability result;
+    if (pieces != NULL && pieces->isUsed(settings) &&
+            pieces->step(positions, forces, box, settings, displacements, result))
+        return result;
     return implementation->with(pack, [&] (const ChainPack<double>& own) {return stepOf(kernels().step, own);},
             [&] (const WidePack& wide) {return stepOf(kernels().wide.step, *wide.pack);},
             [&] (int own) {return modes.isWide(own) ? stepOf(kernels().wide.stepOfModes, modes.getWide(own)) :

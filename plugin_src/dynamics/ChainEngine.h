@@ -1,6 +1,7 @@
 #ifndef CYLCHAIN_CHAIN_ENGINE_H_
 #define CYLCHAIN_CHAIN_ENGINE_H_
 
+#include "dynamics/BrokenCoupling.h"
 #include "dynamics/Precisions.h"
 #include "dynamics/Schemes.h"
 #include "mechanics/BackgroundFlow.h"
@@ -31,6 +32,8 @@ struct Instability {
     int divided = 0;
     /** The number of iterations that the equations of an implicit step took. */
     int iterations = 0;
+    /** Of chains that are coupled: the coupling that is at fault, if there is one. */
+    BrokenCoupling coupling = {};
 };
 
 /** The particles of a pack, each of them once, chain by chain. */
@@ -83,6 +86,14 @@ struct StepSettings {
      */
     std::vector<std::vector<SegmentForces> >* segmentForces = NULL;
     Precision precision = Precision::Double;
+    /** Whether chains whose implicit step fails take it in parts; otherwise it has failed. */
+    bool mayDivide = true;
+};
+
+/** What a chain is a piece of, whose noise it has: the number of a chain, of its first node, and of its tethers. */
+struct PieceOfChain {
+    int chain, firstNode;
+    std::vector<int> tethers;
 };
 
 /**
@@ -102,6 +113,13 @@ public:
      * @param chains   the chains; no particle may be a node of two of them. A chain without models is refused.
      */
     explicit ChainEngine(const std::vector<Chain>& chains);
+    /**
+     * Compute pieces of chains by the implicit schemes.
+     *
+     * @param chains   the pieces; each has particles of its own
+     * @param origins  what they are pieces of
+     */
+    ChainEngine(const std::vector<Chain>& chains, const std::vector<PieceOfChain>& origins);
     ~ChainEngine();
     /**
      * Get the number of packs in double precision, which hold all chains.
@@ -115,9 +133,13 @@ public:
      */
     std::vector<int> getPacksOfStep(const StepSettings& settings) const;
     /**
-     * Get the number of chains that some packs take in mixed precision.
+     * Get the number of chains that some packs take in mixed precision, if chains are coupled: see createStep().
      */
     int getNumMixedChains(const std::vector<int>& packs) const;
+    /**
+     * The same for step(), which may take long chains piece by piece. No other thread may take steps of the packs.
+     */
+    int getNumMixedChains(const std::vector<int>& packs, const StepSettings& settings) const;
     /**
      * Add the forces on the nodes of a pack, which is not a wide one.
      *
@@ -138,7 +160,8 @@ public:
     /**
      * Compute the displacements of the nodes of a pack in one step: noise, resistance, redistribution. The forces are
      * all those on the nodes; for schemes that compute those of the chains themselves, all but these. A pack that is
-     * not below getNumPacks() is for the settings that getPacksOfStep() gives it for.
+     * not below getNumPacks() is for the settings that getPacksOfStep() gives it for. A pack of few long chains takes
+     * an implicit step piece by piece, see ChainPieces.h: each pack is for one thread at a time.
      *
      * @param displacements  receives those of the pack's nodes
      * @return the first instability found, with chain = -1 if there is none

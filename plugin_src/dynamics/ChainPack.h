@@ -41,6 +41,8 @@ template <class Scalar> struct ChainPack : PackShape {
     int lanes;
     /** Number of each lane's chain, or -1, of its nodes and of its segments. */
     std::vector<int> chain, nodesOfLane, segmentsOfLane;
+    /** The number of each lane's first node in its chain, which is not zero in a piece of one. */
+    std::vector<int> firstNode;
     /** Particle of each node and lane, [node][lane]; -1 for a node that only fills up. */
     std::vector<int> particles;
     /** The same particles, each of them once, chain by chain. */
@@ -57,6 +59,8 @@ template <class Scalar> struct ChainPack : PackShape {
     std::vector<Scalar> nodeFriction, rootNodeFriction;
     /** The tethers of all lanes, by their nodes. */
     std::vector<LaneTether> tethers;
+    /** The number of the first tether of each node, or of the one that follows, and how many there are. */
+    std::vector<int> firstTethers;
     /** Half the propulsion of each segment, [segment][lane], or nothing if there is none. */
     std::vector<Scalar> propulsions;
     /** Nodes that do not come twice. */
