@@ -1,6 +1,6 @@
 """The networks of the benchmark of networks: filaments at random in a periodic box, with links and contacts."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import openmm
@@ -70,6 +70,16 @@ NETWORKS = (
 """Stiff links are in a dense box, where segments nearly touch."""
 
 
+def enlarged(system, factor):
+    """A system of so many times as many filaments and links, in a box of the same density."""
+    return replace(
+        system,
+        edge=system.edge * factor ** (1 / 3),
+        filaments=factor * system.filaments,
+        links=factor * system.links,
+    )
+
+
 @dataclass(frozen=True)
 class Network:
     """A network in a Context; ``links`` is None where there are none."""
@@ -120,8 +130,8 @@ class Network:
         return {name: energy / kT for name, energy in energies.items()}
 
 
-def create_network(system, scheme, step, positions=None, seed=1, explicit_couplings=False):
-    """A network in a Context on one thread.
+def create_network(system, scheme, step, positions=None, seed=1, explicit_couplings=False, threads=1):
+    """A network in a Context, on one thread if no more are asked for.
 
     Parameters
     ----------
@@ -136,6 +146,7 @@ def create_network(system, scheme, step, positions=None, seed=1, explicit_coupli
     explicit_couplings : bool
         Whether links and contacts are explicit in an implicit scheme, too. They are if they act on a virtual site that
         is not on a segment: one is added, which nothing touches.
+    threads : int
 
     Returns
     -------
@@ -172,7 +183,8 @@ def create_network(system, scheme, step, positions=None, seed=1, explicit_coupli
     )
     nodes = drawn if positions is None else positions
     others = np.tile(_NOWHERE, (openmm_system.getNumParticles() - len(nodes), 1))
-    context = systems.one_thread_context(openmm_system, integrator, np.concatenate([nodes, others]))
+    platform = None if threads == 1 else ("CPU", {"Threads": str(threads)})
+    context = systems.one_thread_context(openmm_system, integrator, np.concatenate([nodes, others]), platform)
     return Network(system, filaments, links, context)
 
 

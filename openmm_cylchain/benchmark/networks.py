@@ -5,6 +5,8 @@ that are soft, stiff, or of a rest length; with both. Each network is timed with
 step that is recommended for the explicit scheme "midpoint"; and with scheme "implicit" whose links and contacts are
 explicit, at the step of ``NETWORKS`` for that; all in turn. Energies begin at the same positions: what the step changes
 of them is an error of the step. Crossings are counted where contacts should prevent them.
+
+Some of the networks are timed at ten times the size as well, on one thread and on two.
 """
 
 import time
@@ -14,8 +16,8 @@ import numpy as np
 
 from ..engine_choice import choose_engine
 from ..errors import InstabilityError
-from .measurement import Case, Estimate, describe_machine, median, ratio, scaled, time_interleaved
-from .network_systems import NETWORKS, create_network, relaxed_positions
+from .measurement import Case, Estimate, describe_machine, median, processors, ratio, scaled, time_interleaved
+from .network_systems import NETWORKS, SEGMENTS, create_network, enlarged, relaxed_positions
 from .report import Report, Row, row
 
 _EXPLICIT = {
@@ -26,6 +28,9 @@ _EXPLICIT = {
 }
 REFERENCE_FACTOR = 10.0
 """How much shorter than the shortest step the one is, with the implicit scheme, that energies can be compared with."""
+
+ENLARGEMENT = 10
+"""Of the networks that are timed at another size."""
 
 _BLOCKS = 8
 _FRAMES_PER_BLOCK = 5
@@ -50,6 +55,8 @@ class NetworkEffort:
     repetitions : int
     seconds : float
         Of timing in each repetition.
+    enlarged : tuple of str
+        The networks that are timed at ENLARGEMENT times the size as well.
     """
 
     networks: tuple
@@ -59,13 +66,14 @@ class NetworkEffort:
     crossing_steps: int
     repetitions: int
     seconds: float
+    enlarged: tuple = ()
 
 
 def _with_longest_steps(networks):
     return tuple(replace(network, steps=network.steps[-1:]) for network in networks)
 
 
-FULL = NetworkEffort(NETWORKS, 300, 1e4, 30000, 300, 7, 0.7)
+FULL = NetworkEffort(NETWORKS, 300, 1e4, 30000, 300, 7, 0.7, ("contacts", "links_soft"))
 QUICK = NetworkEffort(_with_longest_steps(NETWORKS), 30, 1e3, 2000, 30, 3, 0.2)
 
 
@@ -111,10 +119,12 @@ def benchmark_networks(effort=FULL, say=lambda message: None):
     """
     choose_engine("compiled")
     machine = describe_machine()
-    cases, details, missing, explicit_steps = [], [], {}, {}
+    cases, details, missing, explicit_steps, sizes = [], [], {}, {}, []
     for system in effort.networks:
         say(f"{system.name}: relaxing")
         positions = relaxed_positions(system, effort.relaxation)
+        if system.name in effort.enlarged:
+            sizes += measure_sizes(system, positions, effort, say)
         reference = system.steps[0] / REFERENCE_FACTOR
         for step in (reference, *system.steps):
             say(f"{system.name}: energies with steps of {step:g} us")
@@ -139,7 +149,7 @@ def benchmark_networks(effort=FULL, say=lambda message: None):
                 cases.append(_case(f"{system.name}_{kind}", network))
     # Of one thread, so that other processes disturb it less.
     times = time_interleaved(cases, effort.repetitions, effort.seconds, say, clock=time.process_time)
-    rows = speed_rows(effort.networks, explicit_steps, times)
+    rows = speed_rows(effort.networks, explicit_steps, times) + sizes
     settings = {
         "steps_us": {system.name: system.steps for system in effort.networks},
         "duration_of_energies_us": effort.duration,
@@ -155,6 +165,58 @@ def benchmark_networks(effort=FULL, say=lambda message: None):
 def case_name(system, step):
     """The name of a network with an implicit step in us, as in rows."""
     return f"{system.name}_{step:g}_us"
+
+
+_RELAXATION_OF_ENLARGED = 20
+
+
+def measure_sizes(system, positions, effort, say=lambda message: None):
+    """Rows of the cost per segment of a network and of a larger one, and of the latter on two threads.
+
+    Parameters
+    ----------
+    system : NetworkSystem
+    positions : (nodes, 3) array
+        Of the smaller one.
+    effort : NetworkEffort
+    say : callable (str), optional
+
+    Returns
+    -------
+    list of Row
+    """
+    large = enlarged(system, ENLARGEMENT)
+    say(f"{large.filaments} filaments of {system.name}: relaxing")
+    relaxed = relaxed_positions(large, _RELAXATION_OF_ENLARGED)
+    cases = [_case("small", create_network(system, "implicit", system.steps[-1], positions))]
+    cases.append(_case("large", create_network(large, "implicit", system.steps[-1], relaxed)))
+    if processors() > 1:
+        network = create_network(large, "implicit", system.steps[-1], relaxed, threads=2)
+        cases.append(_case("two_threads", network))
+    return size_rows(system, time_interleaved(cases, effort.repetitions, effort.seconds, say))
+
+
+def size_rows(system, times):
+    """Rows of the cost per segment of a network and of a larger one.
+
+    Parameters
+    ----------
+    system : NetworkSystem
+    times : dict
+        Seconds per step, one for each repetition: of "small", "large", and "two_threads" if there are two.
+    """
+    segments = SEGMENTS * system.filaments
+    small = times["small"] / segments
+    large = times["large"] / (ENLARGEMENT * segments)
+    unit = "ns per segment and step"
+    rows = [
+        row(f"cost_{system.name}_{segments}_segments", scaled(median(small), 1e9), unit),
+        row(f"cost_{system.name}_{ENLARGEMENT * segments}_segments", scaled(median(large), 1e9), unit),
+        row(f"growth_of_cost_{system.name}", ratio(large, small), "1"),
+    ]
+    if "two_threads" in times:
+        rows.append(row(f"two_threads_over_one_{system.name}", ratio(times["large"], times["two_threads"]), "1"))
+    return rows
 
 
 def _case(name, network):

@@ -165,12 +165,16 @@ static int keepNear(const CoarseCapsule* capsules, const float* shifts, float re
         const Ints near = (before <= contact) | (after <= contact) | (before+after <= motion+2*margin);
         const Floats nearest = before < after ? before : after;
         const unsigned sure = bitsOf((Ints) (nearest <= contact-2*margin));
+        const Floats clearance = 0.5f*(before+after-motion)-margin;
+        const Floats distance = clearance > Floats{} ? after-margin : Floats{};
         for (unsigned bits = bitsOf(near); bits != 0; bits &= bits-1) {
             const int lane = __builtin_ctz(bits), pair = start+lane;
             if (pair >= count)
                 break;
             pairs.first[kept] = pairs.first[pair];
             pairs.second[kept] = pairs.second[pair];
+            pairs.distance[kept] = distance[lane];
+            pairs.clearance[kept] = clearance[lane];
             pairs.image[kept++] = pairs.image[pair]+((sure>>lane & 1) != 0 ? SURE : 0);
         }
     }

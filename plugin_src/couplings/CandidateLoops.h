@@ -25,9 +25,10 @@ struct CapsuleRow {
     float shift[3];
 };
 
-/** Pairs of capsules, the second one in an image. */
+/** Pairs of capsules, the second one in an image, and what keepNear() finds: see ContactPair. */
 struct CandidatePairs {
     int *first, *second, *image;
+    float *distance, *clearance;
 };
 
 /** What is added to the image of pairs that are near without doubt. */

@@ -48,6 +48,11 @@ struct ContactPair {
      * b to that of a.
      */
     signed char side;
+    /**
+     * At the end of the step, the distance of the axes is not less than this, unless they have crossed; and they have
+     * not, and will not before both have moved this far together. Zero if that is not known.
+     */
+    float distance, clearance;
 };
 
 /** Where two capsules are nearest to each other. */

@@ -18,8 +18,8 @@ const double LARGEST_PARALLEL = 1e-3;
 const double AT_END = 1e-9;
 /** Gaps that differ by less, relative to distances, are equal. */
 const double LEAST_DIFFERENCE = 1e-10;
-/** Capsules that are described together, and pairs that are looked at together. */
-const int CHUNK = 512, BATCH = 512;
+/** Capsules that are described together, those that are searched around together, and pairs looked at together. */
+const int CHUNK = 512, FEW = 8, BATCH = 512;
 /** What rounding adds to distances in single precision, over the lengths that they are made of. */
 const double SINGLE_ROUNDING = 1e-6;
 /** The error of a distance where segments are nearly parallel, over their lengths, in single precision. */
@@ -100,8 +100,17 @@ struct PlacedCapsule {
 struct Part {
     vector<ContactPair> pairs;
     vector<int> first, second, image;
+    vector<float> distance, clearance;
     CandidatePairs candidates(int from) {
-        return {first.data()+from, second.data()+from, image.data()+from};
+        return {first.data()+from, second.data()+from, image.data()+from, distance.data()+from, clearance.data()+from};
+    }
+    void makeRoom(int size) {
+        if ((int) first.size() >= size)
+            return;
+        for (vector<int>* list : {&first, &second, &image})
+            list->resize(size);
+        distance.resize(size);
+        clearance.resize(size);
     }
 };
 
@@ -208,7 +217,7 @@ struct ContactSearch::Implementation {
     void setCells();
     void searchCells(int part, const double* x, const double* y);
     int findRows(int column, int iz, CapsuleRow* rows) const;
-    void addPair(const PlacedCapsule& one, const PlacedCapsule& other, const int* images, bool sure, const double* x,
+    bool addPair(const PlacedCapsule& one, const PlacedCapsule& other, const int* images, bool sure, const double* x,
             const double* y, Part& part) const;
     bool areNeighbors(const Capsule& first, const Capsule& second) const;
     void gather(vector<ContactPair>& pairs);
@@ -400,7 +409,7 @@ void ContactSearch::Implementation::setCells() {
     const double mostCells = max(1.0, cbrt(2.0*count)+1);
     for (int k = 0; k < 3; k++) {
         if (frame.periodic && 4*largestHalf[k] > 1)
-            throw invalid_argument("The periodic box is too small for contacts: its width along vector "+
+            throw NarrowBoxError("The periodic box is too small for contacts: its width along vector "+
                     to_string(k)+" is "+to_string(frame.widths[k])+", but twice the largest extent of a capsule in a "
                     "step with its diameter and the reach of the search is "+
                     to_string(4*largestHalf[k]*frame.widths[k])+". Take a larger box or shorter segments, and "
@@ -506,8 +515,11 @@ void ContactSearch::Implementation::searchCells(int column, const double* x, con
         count = kernels.keepNear(sorted.data(), imageShifts, reach, margin, part.candidates(0), count);
         for (int i = 0; i < count; i++) {
             const int image = part.image[i]%SURE, images[3] = {image/9-1, image/3%3-1, image%3-1};
-            addPair(sortedPlaced[part.first[i]], sortedPlaced[part.second[i]], images, part.image[i] >= SURE, x, y,
-                    part);
+            if (addPair(sortedPlaced[part.first[i]], sortedPlaced[part.second[i]], images, part.image[i] >= SURE, x, y,
+                    part)) {
+                part.pairs.back().distance = part.distance[i];
+                part.pairs.back().clearance = part.clearance[i];
+            }
         }
         count = 0;
     };
@@ -522,9 +534,7 @@ void ContactSearch::Implementation::searchCells(int column, const double* x, con
             most += rows[row].last-rows[row].first;
         for (int i = first; i < last; i++) {
             rows[0] = {i+1, last, SAME_IMAGE, {0, 0, 0}};
-            if ((int) part.first.size() < count+most+PADDING)
-                for (vector<int>* list : {&part.first, &part.second, &part.image})
-                    list->resize(max(count+most, 2*BATCH)+PADDING);
+            part.makeRoom(max(count+most, 2*BATCH)+PADDING);
             count += kernels.findOverlaps(sweptBoxes, i, rows, numRows, part.candidates(count));
             if (count >= BATCH)
                 look();
@@ -571,36 +581,37 @@ void ContactSearch::Implementation::searchAround(int i, const double* x, const d
             }
 }
 
-/** Add a pair if it is near enough, in double precision where there is doubt. */
-void ContactSearch::Implementation::addPair(const PlacedCapsule& one, const PlacedCapsule& other, const int* images,
+/** Add a pair if it is near enough, in double precision where there is doubt; false if it is not. */
+bool ContactSearch::Implementation::addPair(const PlacedCapsule& one, const PlacedCapsule& other, const int* images,
         bool sure, const double* x, const double* y, Part& part) const {
     const bool inOrder = one.number < other.number;
     const PlacedCapsule &first = inOrder ? one : other, &second = inOrder ? other : one;
     const int a = first.number, b = second.number;
     if (areNeighbors(first.capsule, second.capsule) || (first.hasExclusions && isExcluded(a, b)))
-        return;
+        return false;
     // Where images are wrapped into the frame, the other one is taken by some vectors of it to where it is near.
     double number[3];
     for (int k = 0; k < 3; k++)
         number[k] = (inOrder ? 1 : -1)*(other.images[k]-one.images[k]-images[k]);
     const Vec3d shift = frame.toVector({number[0], number[1], number[2]});
-    ContactPair pair = {a, b, {shift.x, shift.y, shift.z}, 0};
+    ContactPair pair = {a, b, {shift.x, shift.y, shift.z}, 0, 0, 0};
     const SegmentPair start = {first.along, second.along, first.first-second.first+shift};
     if (!sure) {
         const double limit = first.capsule.radius+second.capsule.radius+reach;
         const double before = sqrt(findNearestPoints(start).squared);
         if (before >= limit) {
             if (x == y)
-                return;
+                return false;
             const SegmentPair end = segments(a, b, pair.shift, y);
             const double after = sqrt(findNearestPoints(end).squared);
             if (after >= limit && before+after > largestMotion(start, end))
-                return;
+                return false;
         }
     }
     const double volume = start.volume();
     pair.side = volume > 0 ? 1 : volume < 0 ? -1 : 0;
     part.pairs.push_back(pair);
+    return true;
 }
 
 /** Sort what the parts have found: by a, in one turn, then the few with the same a. */
@@ -736,6 +747,14 @@ bool ContactSearch::isExcluded(int a, int b) const {
     return implementation->isExcluded(a, b);
 }
 
+static void runParts(const Loop& run, int parts, const function<void(int)>& part) {
+    if (run)
+        run(parts, part);
+    else
+        for (int i = 0; i < parts; i++)
+            part(i);
+}
+
 void ContactSearch::findPairs(const double* x, const double* y, const double* box, double reach,
         vector<ContactPair>& pairs, const Loop& run) {
     if (!(reach >= 0 && isfinite(reach)))
@@ -745,16 +764,9 @@ void ContactSearch::findPairs(const double* x, const double* y, const double* bo
     const int count = search.system.capsules.size();
     if (count == 0)
         return;
-    auto runParts = [&] (int parts, const function<void(int)>& part) {
-        if (run)
-            run(parts, part);
-        else
-            for (int i = 0; i < parts; i++)
-                part(i);
-    };
     search.reach = reach;
     search.setFrame(x, y, box);
-    runParts((count+CHUNK-1)/CHUNK, [&] (int chunk) {
+    runParts(run, (count+CHUNK-1)/CHUNK, [&] (int chunk) {
         for (int i = chunk*CHUNK; i < min(count, (chunk+1)*CHUNK); i++)
             search.describe(i, x, y, search.described[i], search.placed[i]);
     });
@@ -763,25 +775,30 @@ void ContactSearch::findPairs(const double* x, const double* y, const double* bo
     const int columns = search.frame.cells[0]*search.frame.cells[1];
     if ((int) search.parts.size() < columns)
         search.parts.resize(columns);
-    runParts(columns, [&] (int column) {search.searchCells(column, x, y);});
+    runParts(run, columns, [&] (int column) {search.searchCells(column, x, y);});
     search.gather(pairs);
 }
 
 void ContactSearch::findPairsOf(const vector<int>& capsules, const double* x, const double* y, double slack,
-        vector<ContactPair>& pairs) const {
-    Part part;
-    for (int capsule : capsules)
-        implementation->searchAround(capsule, x, y, slack, part);
+        vector<ContactPair>& pairs, const Loop& run) const {
+    const int count = capsules.size(), chunks = (count+FEW-1)/FEW;
+    vector<Part> parts(chunks);
+    runParts(run, chunks, [&] (int chunk) {
+        for (int i = chunk*FEW; i < min(count, (chunk+1)*FEW); i++)
+            implementation->searchAround(capsules[i], x, y, slack, parts[chunk]);
+    });
+    pairs.clear();
+    for (const Part& part : parts)
+        pairs.insert(pairs.end(), part.pairs.begin(), part.pairs.end());
     auto isBefore = [] (const ContactPair& one, const ContactPair& other) {
         return one.a < other.a || (one.a == other.a && one.b < other.b);
     };
-    sort(part.pairs.begin(), part.pairs.end(), isBefore);
+    sort(pairs.begin(), pairs.end(), isBefore);
     // Two capsules of those asked for have found each other twice.
     auto isSame = [] (const ContactPair& one, const ContactPair& other) {
         return one.a == other.a && one.b == other.b;
     };
-    part.pairs.erase(unique(part.pairs.begin(), part.pairs.end(), isSame), part.pairs.end());
-    pairs.swap(part.pairs);
+    pairs.erase(unique(pairs.begin(), pairs.end(), isSame), pairs.end());
 }
 
 int ContactSearch::evaluate(const ContactPair& pair, const double* x, const double* y, Contact* contacts,

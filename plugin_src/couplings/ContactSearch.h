@@ -6,9 +6,16 @@
 #include "mechanics/Loop.h"
 #include <limits>
 #include <memory>
+#include <stdexcept>
 #include <vector>
 
 namespace cylchain {
+
+/** A periodic box is too narrow for capsules, so far as they move: two of them might meet twice. */
+class NarrowBoxError : public std::invalid_argument {
+public:
+    using std::invalid_argument::invalid_argument;
+};
 
 /**
  * Finds capsules that touch each other, and where.
@@ -36,7 +43,7 @@ public:
      *
      * @param box    the three vectors of a periodic box (nine doubles, in reduced form), or NULL. Its widths must be
      *               more than twice the extent of a capsule in a step with its diameter and the reach, so that two
-     *               capsules do not meet twice; std::invalid_argument says so if not.
+     *               capsules do not meet twice; NarrowBoxError says so if not.
      * @param reach  not negative
      * @param pairs  receives the pairs
      * @param run    runs the parts of the search; one after the other if there is none
@@ -50,9 +57,10 @@ public:
      * @param capsules  some capsules
      * @param slack     how far others have moved since that search, at most
      * @param pairs     receives the pairs, sorted by a and b
+     * @param run       runs the parts of the search; one after the other if there is none
      */
     void findPairsOf(const std::vector<int>& capsules, const double* x, const double* y, double slack,
-            std::vector<ContactPair>& pairs) const;
+            std::vector<ContactPair>& pairs, const Loop& run = Loop()) const;
     /**
      * Find the contacts of a pair at y: none, one or two. Several threads may do so at the same time. With
      * nearestImages, the box is that of the last search.

@@ -11,13 +11,19 @@ using namespace std;
 namespace {
 
 /** How near pairs come that are looked at in a step, over their diameter: further iterations move them. */
-const double REACH = 0.8;
+const double REACH = 1.1;
+/** The same where a periodic box is too narrow for that. */
+const double LEAST_REACH = 0.2;
 /** The largest overlap that is mirrored, over the same. */
-const double LARGEST_MIRRORED = 0.5;
-/** Pairs with a larger gap are only looked at again if they may have come near, over the same. */
+const double LARGEST_MIRRORED = 1;
+/** Where pairs with a larger gap are nearest is not looked for, over the same. */
 const double LARGEST_GAP = 0.3;
+/** Capsules that have travelled less touch where they did, over the same. */
+const double SAME_PLACE = 0.01;
 /** The largest change of a gap in the last iteration, over the thermal fluctuation of a contact. */
 const double TOLERANCE = 0.3;
+/** The same for the change of a gap that one of the two does not know of. */
+const double DRIFT_TOLERANCE = 0.1;
 /** After so many iterations, this times as much is enough: one contact in thousands must not keep others waiting. */
 const int PATIENT_ITERATIONS = 11;
 const double LATE = 4;
@@ -29,7 +35,7 @@ const int SEARCHING_ITERATIONS = 6;
 const int PASSING_ITERATIONS = 3;
 /** From this iteration on, contacts that touch go on to do so, even if that takes a small force which pulls. */
 const int HOLDING_ITERATIONS = 9;
-/** Pairs that a thread looks at together. */
+/** Pairs or capsules that a thread looks at together. */
 const int CHUNK = 128;
 
 } // namespace
@@ -43,13 +49,18 @@ void ContactEquations::setContacts(ContactSearch* newSearch, double newStiffness
 void ContactEquations::begin(const CoupledStart& start, const Loop& newLoop) {
     loop = &newLoop;
     begun = start.positions;
+    active = &start.active;
     kT = start.settings.kT;
+    stepSize = start.settings.stepSize;
+    mirrorDepth = findDepthOfMirror(kT, stiffness);
+    chainPlaces = &start.places;
     const vector<Capsule>& capsules = search->getSystem().capsules;
     places.resize(capsules.size());
     double diameter = 0;
-    for (size_t i = 0; i < capsules.size(); i++) {
-        const Capsule& capsule = capsules[i];
+    for (const Capsule& capsule : capsules)
         diameter = max(diameter, 2*capsule.radius);
+    runInChunks(*loop, capsules.size(), CHUNK, [&] (int i) {
+        const Capsule& capsule = capsules[i];
         Place place;
         place.first = capsule.first;
         place.second = capsule.second;
@@ -59,11 +70,14 @@ void ContactEquations::begin(const CoupledStart& start, const Loop& newLoop) {
             places[i].direction = capsule.second < 0 ? 0 : found.fraction == 0 ? 1 : -1;
         else
             found = PlaceOnChain();
-        places[i].response = found.pack < 0 ? 0 : start.settings.stepSize/start.places.getFriction(found);
-    }
-    reach = REACH*diameter;
+    });
+    reaches[0] = REACH*diameter;
+    reaches[1] = LEAST_REACH*diameter;
+    leavesBox = false;
     pairs.clear();
     states.clear();
+    watches.clear();
+    added.clear();
     searched.clear();
 }
 
@@ -84,37 +98,70 @@ void ContactEquations::takeNoteOf(int capsule, const double* moved) {
 }
 
 void ContactEquations::findPairs(const double* moved) {
-    search->findPairs(begun, moved, box, reach, pairs, *loop);
+    leavesBox = true;
+    for (int i = 0; i < 2 && leavesBox; i++)
+        try {
+            reach = reaches[i];
+            search->findPairs(begun, moved, box, reach, pairs, *loop);
+            leavesBox = false;
+        }
+        catch (const NarrowBoxError&) {
+            pairs.clear();
+        }
     searched.resize(6*places.size());
-    for (size_t i = 0; i < places.size(); i++)
+    before.resize(6*places.size());
+    runInChunks(*loop, places.size(), CHUNK, [&] (int i) {
         takeNoteOf(i, moved);
+        copy_n(&searched[6*i], 6, &before[6*i]);
+    });
+    travelled.assign(places.size(), 0.0);
+    motion.assign(places.size(), 0.0);
     for (const ContactPair& pair : pairs)
-        states.push_back({pair, true, 0, {0, 0}, {}, -1, {false, false}});
+        addState(pair);
+    numFound = states.size();
+}
+
+void ContactEquations::addState(const ContactPair& pair) {
+    states.push_back({pair, {0, 0}, {}, -1, {false, false}, {0, 0}, 0});
+    watches.push_back({pair.a, pair.b, -HUGE_VAL});
 }
 
 /** Look for pairs of some capsules again; false if all that are found take part already. */
 bool ContactEquations::findPairsOf(const vector<int>& capsules, const double* moved, double slack) {
-    search->findPairsOf(capsules, begun, moved, slack, pairs);
-    for (int capsule : capsules)
+    search->findPairsOf(capsules, begun, moved, slack, pairs, *loop);
+    for (int capsule : capsules) {
         takeNoteOf(capsule, moved);
-    auto isBefore = [] (const State& one, const State& other) {
-        return one.pair.a < other.pair.a || (one.pair.a == other.pair.a && one.pair.b < other.pair.b);
+        motion[capsule] = 0;
+    }
+    auto isBefore = [] (const Watch& one, const Watch& other) {
+        return one.a < other.a || (one.a == other.a && one.b < other.b);
     };
-    const size_t known = states.size();
     bool any = false;
-    for (const ContactPair& pair : pairs) {
-        const State state = {pair, true, 0, {0, 0}, {}, -1, {false, false}};
-        const auto found = lower_bound(states.begin(), states.begin()+known, state, isBefore);
-        if (found == states.begin()+known || isBefore(state, *found)) {
-            states.push_back(state);
+    for (const ContactPair& pair : pairs)
+        if (!binary_search(watches.begin(), watches.begin()+numFound, Watch {pair.a, pair.b, 0}, isBefore) &&
+                added.insert({{pair.a, pair.b}, (int) states.size()}).second) {
+            addState(pair);
+            mark(states.size()-1);
             any = true;
         }
-        else if (!found->near) {
-            found->near = any = true;
-            found->count = -1;
+    return any;
+}
+
+/** Mark the packs of the pairs for which a function returns true; false if there are none. */
+template <class Function> bool ContactEquations::markPairs(Function function) {
+    const int count = states.size(), chunks = (count+CHUNK-1)/CHUNK;
+    (*loop)(chunks, [&] (int chunk) {
+        parts[chunk].pairs.clear();
+        for (int i = chunk*CHUNK; i < min(count, (chunk+1)*CHUNK); i++)
+            if (function(i))
+                parts[chunk].pairs.push_back(i);
+    });
+    bool any = false;
+    for (int chunk = 0; chunk < chunks; chunk++)
+        for (int pair : parts[chunk].pairs) {
+            mark(pair);
+            any = true;
         }
-    }
-    inplace_merge(states.begin(), states.begin()+known, states.end(), isBefore);
     return any;
 }
 
@@ -130,16 +177,34 @@ void ContactEquations::updateContacts(State& state, const double* moved) const {
     }
 }
 
-void ContactEquations::evaluate(State& state, const double* moved, bool first, Part& part) const {
+/** Find b for a contact with a predicted gap. */
+double ContactEquations::findMirroredOf(const ContactPair& pair, const Contact& contact, double largest) const {
+    const double overlap = min(-contact.gap, largest), a = stiffness*(responseOf(pair.a, contact.s)+
+            responseOf(pair.b, contact.t));
+    return cylchain::findMirrored(overlap, a, mirrorDepth);
+}
+
+/** How far a unit force across a capsule moves a place on it in the step. */
+double ContactEquations::responseOf(int capsule, double fraction) const {
+    const PlaceOnChain place = placeOf(capsule, fraction);
+    return place.pack < 0 ? 0 : stepSize/chainPlaces->getLateralFriction(place);
+}
+
+void ContactEquations::evaluate(int number, const double* moved, bool first, Part& part) {
+    State& state = states[number];
+    Watch& watch = watches[number];
     const ContactPair& pair = state.pair;
-    const PlaceOnChain &a = places[pair.a].place, &b = places[pair.b].place;
-    state.near = a.pack >= 0 || b.pack >= 0;
-    if (!state.near)
+    if (!takesPart(pair.a) && !takesPart(pair.b))
         return;
     const double diameter = search->getSystem().capsules[pair.a].radius+search->getSystem().capsules[pair.b].radius;
-    if (iterations < SEARCHING_ITERATIONS || state.count < 0) {
-        // What is farther away is left out, until it may have come near. Overlaps that are mirrored count.
-        const double limit = LARGEST_GAP*diameter+max(state.mirrored[0], state.mirrored[1]);
+    const double way = travelled[pair.a]+travelled[pair.b];
+    const bool moves = iterations < SEARCHING_ITERATIONS && !(way < state.searched+SAME_PLACE*diameter);
+    double gap = HUGE_VAL;
+    // What is farther away is left out, until it may have come near. Overlaps that are mirrored count.
+    const double limit = LARGEST_GAP*diameter+max(state.mirrored[0], state.mirrored[1]);
+    if (first && pair.distance-diameter >= limit)
+        gap = pair.distance-diameter;
+    else if (state.count < 0 || moves) {
         Contact contacts[2];
         const int count = search->evaluate(pair, begun, moved, contacts, limit);
         // A contact at a joint may pass from one segment to the next and back: in the end, it must not be lost.
@@ -147,26 +212,31 @@ void ContactEquations::evaluate(State& state, const double* moved, bool first, P
             updateContacts(state, moved);
         else {
             state.count = count;
+            state.searched = way;
             copy(contacts, contacts+2, state.contacts);
-            state.near = count >= 0 || !first;
-            state.gap = contacts[0].gap;
+            gap = contacts[0].gap-max(state.mirrored[0], state.mirrored[1]);
         }
     }
     else
         updateContacts(state, moved);
+    bool touches = false;
     for (int i = 0; i < state.count; i++) {
         const Contact& contact = state.contacts[i];
         // Where contacts are not looked for any more, anyCross() sees whether they have come back.
-        part.crossed |= contact.crossed && iterations < SEARCHING_ITERATIONS;
+        if (contact.crossed && iterations < SEARCHING_ITERATIONS)
+            part.pairs.push_back(number);
         if (first)
-            state.mirrored[i] = min(max(0.0, -contact.gap), LARGEST_MIRRORED*diameter)*
-                    shareMirrored(stiffness*(places[pair.a].response+places[pair.b].response));
+            state.mirrored[i] = findMirroredOf(pair, contact, LARGEST_MIRRORED*diameter);
         const double overlap = state.mirrored[i]-contact.gap;
+        gap = min(gap, -overlap);
         // Contacts that open and close in turn would keep the iteration from ending.
         const bool holds = iterations >= HOLDING_ITERATIONS && state.touched[i];
+        if (!state.touched[i])
+            state.drift[i] = -overlap;
         state.touched[i] = overlap > 0 || holds;
         if (!state.touched[i])
             continue;
+        touches = true;
         CouplingEquation equation;
         equation.places[0] = placeOf(pair.a, contact.s);
         equation.places[1] = placeOf(pair.b, contact.t);
@@ -176,13 +246,17 @@ void ContactEquations::evaluate(State& state, const double* moved, bool first, P
             equation.force[k] = own*overlap*n[k];
         setOuter(own, n, equation.stiffness);
         part.equations.push_back(equation);
+        part.contacts.push_back(2*number+i);
     }
+    watch.due = touches || gap <= 0 ? -HUGE_VAL : way+gap;
 }
 
-void ContactEquations::linearise(int iteration, const double* moved, vector<CouplingEquation>& equations) {
+void ContactEquations::linearise(int iteration, const double* moved, vector<CouplingEquation>& all) {
     iterations = iteration;
-    normals.clear();
-    crossed = false;
+    equations = &all;
+    firstEquation = all.size();
+    contactsOfEquations.clear();
+    crossed.clear();
     if (iteration == 0 && searched.empty())
         return;
     const bool first = searched.empty();
@@ -194,97 +268,204 @@ void ContactEquations::linearise(int iteration, const double* moved, vector<Coup
     (*loop)(chunks, [&] (int chunk) {
         Part& part = parts[chunk];
         part.equations.clear();
-        part.crossed = false;
+        part.contacts.clear();
+        part.pairs.clear();
         for (int i = chunk*CHUNK; i < min(count, (chunk+1)*CHUNK); i++)
-            if (states[i].near)
-                evaluate(states[i], moved, first, part);
+            if (!(travelled[watches[i].a]+travelled[watches[i].b] < watches[i].due))
+                evaluate(i, moved, first, part);
     });
     for (int chunk = 0; chunk < chunks; chunk++) {
         const Part& part = parts[chunk];
-        crossed |= part.crossed;
-        equations.insert(equations.end(), part.equations.begin(), part.equations.end());
-        for (const CouplingEquation& equation : part.equations)
-            for (int k : {0, 3, 5})
-                normals.push_back(equation.stiffness[k]);
+        crossed.insert(crossed.end(), part.pairs.begin(), part.pairs.end());
+        all.insert(all.end(), part.equations.begin(), part.equations.end());
+        contactsOfEquations.insert(contactsOfEquations.end(), part.contacts.begin(), part.contacts.end());
+    }
+}
+
+/** Find how far some capsules have moved. */
+void ContactEquations::follow(int first, int last, const double* moved, Motion& result) {
+    const vector<Capsule>& capsules = search->getSystem().capsules;
+    result = Motion();
+    for (int i = first; i < last; i++) {
+        if (!takesPart(i)) {
+            result.include(motion[i]);
+            continue;
+        }
+        double square = 0, last = 0;
+        for (int end = 0; end < 2; end++) {
+            const double* now = moved+3*(end == 0 ? capsules[i].first : capsules[i].end());
+            const double* then = &searched[6*i+3*end];
+            double* const lately = &before[6*i+3*end];
+            double own = 0, late = 0;
+            for (int k = 0; k < 3; k++) {
+                own += (now[k]-then[k])*(now[k]-then[k]);
+                late += (now[k]-lately[k])*(now[k]-lately[k]);
+                lately[k] = now[k];
+            }
+            square = max(square, own);
+            last = max(last, late);
+        }
+        motion[i] = sqrt(square);
+        travelled[i] += sqrt(last);
+        result.include(motion[i]);
+        if (2*motion[i] > reach)
+            result.movers.push_back(i);
     }
 }
 
 /** Whether pairs that were left out may touch, or new ones: they take part from now on. */
 bool ContactEquations::anyComeNear(const double* moved) {
-    const vector<Capsule>& capsules = search->getSystem().capsules;
-    motion.resize(capsules.size());
-    double largest = 0, second = 0;
-    for (size_t i = 0; i < capsules.size(); i++) {
-        double square = 0;
-        for (int end = 0; end < 2; end++) {
-            const double* now = moved+3*(end == 0 ? capsules[i].first : capsules[i].end());
-            const double* before = &searched[6*i+3*end];
-            double own = 0;
-            for (int k = 0; k < 3; k++)
-                own += (now[k]-before[k])*(now[k]-before[k]);
-            square = max(square, own);
-        }
-        motion[i] = sqrt(square);
-        second = max(second, min(largest, motion[i]));
-        largest = max(largest, motion[i]);
+    const int count = places.size(), chunks = (count+CHUNK-1)/CHUNK;
+    motions.resize(chunks);
+    parts.resize(max(parts.size(), (states.size()+CHUNK-1)/CHUNK));
+    (*loop)(chunks, [&] (int chunk) {
+        follow(chunk*CHUNK, min(count, (chunk+1)*CHUNK), moved, motions[chunk]);
+    });
+    if (iterations < 2)
+        return true;
+    const double tolerance = TOLERANCE*sqrt(kT/stiffness)+LEAST_CHANGE*reach;
+    bool any = markPairs([&] (int i) {
+        const Watch& watch = watches[i];
+        return watch.due > 0 && travelled[watch.a]+travelled[watch.b] > watch.due+tolerance;
+    });
+    Motion all;
+    for (const Motion& motion : motions) {
+        all.include(motion.largest);
+        all.include(motion.second);
+        all.movers.insert(all.movers.end(), motion.movers.begin(), motion.movers.end());
     }
-    bool any = false;
-    for (State& state : states)
-        if (!state.near && motion[state.pair.a]+motion[state.pair.b] > state.gap) {
-            state.near = any = true;
-            state.count = -1;
-        }
     // Pairs that no search has seen were out of reach: one of the two has moved by more than half of it.
-    if (largest+second > reach) {
-        movers.clear();
-        for (size_t i = 0; i < motion.size(); i++)
-            if (2*motion[i] > reach)
-                movers.push_back(i);
-        any |= findPairsOf(movers, moved, largest);
-    }
+    if (all.largest+all.second > reach)
+        any |= findPairsOf(all.movers, moved, all.largest);
     return any;
+}
+
+/** Whether a contact has moved too much in the last iteration, or by itself since one of its packs took part. */
+bool ContactEquations::isUnfinished(int number, const double* move) {
+    const int contact = contactsOfEquations[number];
+    const CouplingEquation& equation = (*equations)[firstEquation+number];
+    // At most the squared change of the gap, times the stiffness.
+    double bound = 0;
+    for (int k = 0; k < 3; k++)
+        bound += sqrt(equation.stiffness[k == 0 ? 0 : k == 1 ? 3 : 5])*fabs(move[k]);
+    const double least = LEAST_CHANGE*LEAST_CHANGE*reach*reach*stiffness;
+    const double tolerance = TOLERANCE*(iterations < PATIENT_ITERATIONS ? 1 : LATE);
+    if (!(bound*bound < tolerance*tolerance*kT+least))
+        return true;
+    State& state = states[contact/2];
+    double& drift = state.drift[contact%2];
+    const double* n = state.contacts[contact%2].normal;
+    drift += n[0]*move[0]+n[1]*move[1]+n[2]*move[2];
+    const int a = equation.places[0].pack, b = equation.places[1].pack;
+    if (a < 0 || b < 0 || (*active)[a] == (*active)[b])
+        drift = 0;
+    return !(drift*drift*stiffness < DRIFT_TOLERANCE*DRIFT_TOLERANCE*kT+least);
 }
 
 bool ContactEquations::finishIteration(const double* moves, const double* moved) {
     clear = false;
-    if (iterations < 2 || anyComeNear(moved) || crossed)
+    unsettled = -1;
+    unfinished.assign(active->size(), 0);
+    if (leavesBox)
+        return false;
+    if (searched.empty())
         return true;
-    for (size_t i = 0; i < normals.size(); i += 3) {
-        // At most the squared change of the gap, times the stiffness.
-        double change = 0;
-        for (int k = 0; k < 3; k++)
-            change += sqrt(normals[i+k])*fabs(moves[i+k]);
-        const double least = LEAST_CHANGE*LEAST_CHANGE*reach*reach*stiffness;
-        const double tolerance = TOLERANCE*(iterations < PATIENT_ITERATIONS ? 1 : LATE);
-        if (!(change*change < tolerance*tolerance*kT+least))
-            return true;
-    }
+    bool any = anyComeNear(moved);
+    if (iterations < 2)
+        return true;
+    for (int pair : crossed)
+        mark(pair);
+    any |= !crossed.empty();
+    for (size_t i = 0; i < contactsOfEquations.size(); i++)
+        if (isUnfinished(i, moves+3*i)) {
+            mark(contactsOfEquations[i]/2);
+            if (unsettled < 0)
+                unsettled = i;
+            any = true;
+        }
+    if (any)
+        return true;
     clear = !anyCross(moved);
     return !clear;
 }
 
+bool ContactEquations::markUnfinished(PackFlags& packs) const {
+    for (size_t pack = 0; pack < packs.size(); pack++)
+        packs[pack] |= unfinished[pack];
+    return iterations >= 2;
+}
+
+/** The packs of a pair take part in the next iteration. */
+void ContactEquations::mark(int pair) {
+    for (int capsule : {watches[pair].a, watches[pair].b})
+        if (places[capsule].place.pack >= 0)
+            unfinished[places[capsule].place.pack] = 1;
+}
+
 /** Whether pairs cross elsewhere than where they were last seen to touch: they are looked at again. */
 bool ContactEquations::anyCross(const double* moved) {
-    const int count = states.size(), chunks = (count+CHUNK-1)/CHUNK;
-    (*loop)(chunks, [&] (int chunk) {
-        parts[chunk].crossed = false;
-        for (int i = chunk*CHUNK; i < min(count, (chunk+1)*CHUNK); i++)
-            if (search->crosses(states[i].pair, begun, moved)) {
-                states[i].near = parts[chunk].crossed = true;
-                states[i].count = -1;
-            }
+    return markPairs([&] (int i) {
+        const Watch& watch = watches[i];
+        if (travelled[watch.a]+travelled[watch.b] < states[i].pair.clearance)
+            return false;
+        const bool crosses = search->crosses(states[i].pair, begun, moved);
+        if (crosses) {
+            states[i].count = -1;
+            watches[i].due = -HUGE_VAL;
+        }
+        return crosses;
     });
-    return any_of(parts.begin(), parts.begin()+chunks, [] (const Part& part) {return part.crossed;});
 }
 
 void ContactEquations::findFailures(const double* moved, vector<bool>& failed) const {
     if (clear)
         return;
+    for (size_t i = 0; leavesBox && i < places.size(); i++)
+        if (places[i].place.pack >= 0)
+            failed[places[i].place.chain] = true;
     for (const State& state : states)
         if (search->crosses(state.pair, begun, moved))
             for (int capsule : {state.pair.a, state.pair.b})
                 if (places[capsule].place.pack >= 0)
                     failed[places[capsule].place.chain] = true;
+}
+
+/** The capsule whose first particle has moved most. */
+int ContactEquations::findFastest(const double* moved) const {
+    const vector<Capsule>& capsules = search->getSystem().capsules;
+    auto motionOf = [&] (const Capsule& capsule) {
+        double square = 0;
+        for (int k = 3*capsule.first; k < 3*capsule.first+3; k++)
+            square += (moved[k]-begun[k])*(moved[k]-begun[k]);
+        return square;
+    };
+    return max_element(capsules.begin(), capsules.end(), [&] (const Capsule& one, const Capsule& other) {
+        return motionOf(one) < motionOf(other);
+    })-capsules.begin();
+}
+
+bool ContactEquations::findCulprit(const double* moved, const CouplingEquation* equations,
+        BrokenCoupling& culprit) const {
+    if (leavesBox) {
+        culprit.kind = BrokenCoupling::Contact;
+        culprit.reason = BrokenCoupling::LeavesBox;
+        culprit.places[0] = describePlace(places[findFastest(moved)].place);
+        return true;
+    }
+    for (const State& state : states)
+        if (search->crosses(state.pair, begun, moved)) {
+            culprit.kind = BrokenCoupling::Contact;
+            culprit.reason = BrokenCoupling::Crosses;
+            culprit.places[0] = describePlace(places[state.pair.a].place);
+            culprit.places[1] = describePlace(places[state.pair.b].place);
+            return true;
+        }
+    if (unsettled < 0)
+        return false;
+    culprit.kind = BrokenCoupling::Contact;
+    for (int side = 0; side < 2; side++)
+        culprit.places[side] = describePlace(equations[unsettled].places[side]);
+    return true;
 }
 
 void ContactEquations::findNeighbours(vector<pair<int, int> >& neighbours) const {

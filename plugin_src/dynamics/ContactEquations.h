@@ -3,6 +3,10 @@
 
 #include "couplings/ContactSearch.h"
 #include "dynamics/ImplicitCouplings.h"
+#include <algorithm>
+#include <cstddef>
+#include <map>
+#include <utility>
 #include <vector>
 
 namespace cylchain {
@@ -13,11 +17,11 @@ namespace cylchain {
  * The first iteration knows of none. Where it leads, y*, and the way there show which pairs may touch; they have the
  * gaps g*, which go on being negative where two segments have passed through each other. The others have the force
  *
- *     k_c (b-g(y)) n   where g(y) < b,     b = beta min(-g*, b_max) where g* < 0, or else 0:
+ *     k_c (b-g(y)) n   where g(y) < b,
  *
- * a predicted overlap is mirrored, as a wall would throw a diffusing particle back; with b = 0, contacts would act too
- * early by 0.58 of what diffusion moves them by in a step. The share beta is that of walls, see shareMirrored(): small
- * steps resolve a contact. Segments that have crossed in the end fail.
+ * with b as for walls, see findMirrored(): a predicted overlap is mirrored, as a wall would throw a diffusing particle
+ * back; with b = 0, contacts would act too early by 0.58 of what diffusion moves them by in a step. Small steps resolve
+ * a contact. Segments that have crossed in the end fail.
  *
  * Where two capsules touch may jump: from a segment to its neighbour, or between the ends of nearly parallel ones. So
  * it is looked for in the first iterations alone; after that, each pair keeps the fractions where it touches.
@@ -35,56 +39,109 @@ public:
     void beginStage(int stage, int numStages, const double* moved) override;
     void linearise(int iteration, const double* moved, std::vector<CouplingEquation>& equations) override;
     bool finishIteration(const double* moves, const double* moved) override;
+    bool letsPacksRest() const override {
+        return true;
+    }
+    bool markUnfinished(PackFlags& packs) const override;
     void findFailures(const double* moved, std::vector<bool>& failed) const override;
+    bool findCulprit(const double* moved, const CouplingEquation* equations, BrokenCoupling& culprit) const override;
     void findNeighbours(std::vector<std::pair<int, int> >& neighbours) const override;
 private:
     /** A pair of capsules. */
     struct State {
         ContactPair pair;
-        /** Whether it may touch in this step; if not, the gap that it is predicted to have. */
-        bool near;
-        double gap;
         /** The overlaps that are mirrored, and where it touches. */
         double mirrored[2];
         Contact contacts[2];
         int count;
         /** Whether it touched in the last iteration. */
         bool touched[2];
+        /** By how much its gap has changed while one of its packs took no part. */
+        double drift[2];
+        /** How far its capsules had travelled when it was looked for where they touch. */
+        double searched;
+    };
+    /** What tells whether a pair is looked at: many are not. */
+    struct Watch {
+        int a, b;
+        /** How far both capsules must have travelled before they may touch. */
+        double due;
     };
     /** Where a capsule is: its place at fraction 0, and by how much the fraction grows along it. */
     struct CapsulePlace {
         PlaceOnChain place;
         double direction;
-        /** How far a unit force moves it in the step. */
-        double response;
     };
     struct Part {
         std::vector<CouplingEquation> equations;
-        bool crossed;
+        /** For each equation, twice the number of its pair, and one more for the second contact. */
+        std::vector<int> contacts;
+        /** Pairs that were crossed, or which were looked for. */
+        std::vector<int> pairs;
     };
+    /** How far some capsules have moved: the largest two motions, and who may meet others that no search has seen. */
+    struct Motion {
+        double largest = 0, second = 0;
+        std::vector<int> movers;
+        void include(double motion) {
+            second = std::max(second, std::min(largest, motion));
+            largest = std::max(largest, motion);
+        }
+    };
+    template <class Function> bool markPairs(Function function);
+    void mark(int pair);
+    bool takesPart(int capsule) const {
+        return places[capsule].place.pack >= 0 && (*active)[places[capsule].place.pack];
+    }
+    bool isUnfinished(int equation, const double* move);
+    void follow(int first, int last, const double* moved, Motion& result);
     void findPairs(const double* moved);
+    void addState(const ContactPair& pair);
     void takeNoteOf(int capsule, const double* moved);
     bool findPairsOf(const std::vector<int>& capsules, const double* moved, double slack);
-    void evaluate(State& state, const double* moved, bool first, Part& part) const;
+    double findMirroredOf(const ContactPair& pair, const Contact& contact, double largest) const;
+    double responseOf(int capsule, double fraction) const;
+    void evaluate(int pair, const double* moved, bool first, Part& part);
     void updateContacts(State& state, const double* moved) const;
     bool anyComeNear(const double* moved);
     bool anyCross(const double* moved);
+    int findFastest(const double* moved) const;
     PlaceOnChain placeOf(int capsule, double fraction) const;
     ContactSearch* search = nullptr;
     double stiffness = 0;
     const Loop* loop = nullptr;
+    const PackFlags* active = nullptr;
     const double *begun = nullptr, *box = nullptr;
-    double kT = 0, reach = 0;
+    const ChainPlaces* chainPlaces = nullptr;
+    double kT = 0, stepSize = 0, mirrorDepth = 0, reach = 0, reaches[2] = {};
     std::vector<CapsulePlace> places;
     std::vector<ContactPair> pairs;
-    std::vector<int> movers;
+    /** Those of the first search in its order, and behind them those that others have found. */
     std::vector<State> states;
-    /** Where the ends of each capsule were when its pairs were looked for, and by how much they have moved since. */
-    std::vector<double> searched, motion;
+    std::vector<Watch> watches;
+    std::size_t numFound = 0;
+    std::map<std::pair<int, int>, int> added;
+    /** Where the ends of each capsule were when its pairs were looked for. */
+    std::vector<double> searched;
+    /** Where they were after the last iteration, and how far each capsule has travelled in all since the first. */
+    std::vector<double> before, travelled;
+    /** How far it has moved since its pairs were looked for. */
+    std::vector<double> motion;
+    std::vector<Motion> motions;
     std::vector<Part> parts;
-    std::vector<double> normals;
-    /** Whether any contact was crossed where it was evaluated last, and whether none is now. */
-    bool crossed = false, clear = false;
+    /** All equations of the iteration, the first of these, and which contacts they are of, as in a part. */
+    const std::vector<CouplingEquation>* equations = nullptr;
+    std::size_t firstEquation = 0;
+    std::vector<int> contactsOfEquations;
+    /** The pairs that were crossed where they were evaluated last, and whether none is now. */
+    std::vector<int> crossed;
+    bool clear = false;
+    /** Whether capsules move too far to look for contacts in the periodic box: the step must be divided. */
+    bool leavesBox = false;
+    /** The packs that need another iteration. */
+    PackFlags unfinished;
+    /** The number of an equation that has not settled in the last iteration, or -1. */
+    int unsettled = -1;
     int iterations = 0;
 };
 

@@ -12,7 +12,15 @@ namespace {
 const double RELATIVE_TOLERANCE = 0.05;
 /** The energy of an error that is left anyway, for each pack, in units of k_B T. */
 const double LEAST_ENERGY = 1e-2;
+/**
+ * Both over these where tensions of segments are wanted that are right. These energies are those of forces in P, which
+ * is stiff where two places move as one: that of their motion in A is larger by the stiffness of the coupling over
+ * that of the chains.
+ */
+const double OF_TENSIONS = 2e-4;
 const int LARGEST_NUMBER_OF_ITERATIONS = 1000;
+/** Equations that a thread looks at together. */
+const int CHUNK = 256;
 
 /** Add the product of a symmetric matrix and a vector, times a factor. */
 inline void addProduct(const double* k, const double* v, double factor, double* result) {
@@ -23,14 +31,16 @@ inline void addProduct(const double* k, const double* v, double factor, double* 
 
 } // namespace
 
-void CoupledEquations::gatherTerms(const vector<CouplingEquation>& equations, int numPacks) {
+void CoupledEquations::gatherTerms(const vector<CouplingEquation>& equations, const PackFlags& active,
+            const Loop& loop) {
     // Sort the places by packs and nodes, by counting.
 
+    const int numPacks = active.size();
     firstOfPack.assign(numPacks+1, 0);
     auto forPlaces = [&] (auto function) {
         for (size_t i = 0; i < equations.size(); i++)
             for (int side = 0; side < 2; side++)
-                if (equations[i].places[side].pack >= 0)
+                if (equations[i].places[side].pack >= 0 && active[equations[i].places[side].pack])
                     function(equations[i].places[side], i, side);
     };
     forPlaces([&] (const PlaceOnChain& place, size_t, int) {
@@ -53,23 +63,26 @@ void CoupledEquations::gatherTerms(const vector<CouplingEquation>& equations, in
     coupled.assign(numPacks, 0);
     sums.assign(numPacks, 0.0);
     for (vector<double>* values : {&change, &residual, &response, &force, &direction, &nextDirection, &found})
-        values->assign(3*count, 0.0);
+        values->resize(3*count);
     termOf.assign(2*equations.size(), -1);
     forPlaces([&] (const PlaceOnChain& place, size_t i, int side) {
-        const int number = firstOfNode[firstOfPack[place.pack]+place.node]++;
-        termOf[2*i+side] = number;
-        CouplingTerm& term = terms[number];
+        termOf[2*i+side] = firstOfNode[firstOfPack[place.pack]+place.node]++;
+        if (termOf[2*i+1-side] >= 0)
+            coupled[place.pack] = coupled[equations[i].places[1-side].pack] = 1;
+    });
+    runInChunks(loop, termOf.size(), CHUNK, [&] (int number) {
+        if (termOf[number] < 0)
+            return;
+        const int i = number/2, side = number%2;
+        const PlaceOnChain& place = equations[i].places[side];
+        CouplingTerm& term = terms[termOf[number]];
+        partners[termOf[number]] = termOf[2*i+1-side];
         term.node = place.node;
         term.lane = place.lane;
         term.fraction = place.fraction;
         for (int k = 0; k < 3; k++)
             term.force[k] = side == 0 ? equations[i].force[k] : -equations[i].force[k];
         copy(equations[i].stiffness, equations[i].stiffness+6, term.stiffness);
-    });
-    forPlaces([&] (const PlaceOnChain& place, size_t i, int side) {
-        partners[termOf[2*i+side]] = termOf[2*i+1-side];
-        if (termOf[2*i+1-side] >= 0)
-            coupled[place.pack] = 1;
     });
 }
 
@@ -80,13 +93,17 @@ double CoupledEquations::total() const {
     return sum;
 }
 
-void CoupledEquations::solve(const vector<PackStep*>& packs, const vector<CouplingEquation>& equations, double kT,
-            const Loop& loop) {
+void CoupledEquations::solve(const vector<PackStep*>& packs, const PackFlags& active,
+            const vector<CouplingEquation>& equations, double kT, bool forTensions, const Loop& loop) {
     const int numPacks = packs.size();
-    gatherTerms(equations, numPacks);
+    const double tolerance = forTensions ? OF_TENSIONS : 1;
+    gatherTerms(equations, active, loop);
     loop(numPacks, [&] (int pack) {
-        const int first = firstTerms[pack];
-        packs[pack]->eliminate(terms.data()+first, firstTerms[pack+1]-first, change.data()+3*first);
+        const int first = firstTerms[pack], last = firstTerms[pack+1];
+        for (vector<double>* values : {&residual, &force, &direction, &found})
+            fill(values->begin()+3*first, values->begin()+3*last, 0.0);
+        if (active[pack])
+            packs[pack]->eliminate(terms.data()+first, last-first, change.data()+3*first);
     });
     auto forCoupled = [&] (auto function) {
         loop(numPacks, [&] (int pack) {
@@ -107,7 +124,8 @@ void CoupledEquations::solve(const vector<PackStep*>& packs, const vector<Coupli
     });
     iterations = 1;
     double energy = total(), ratio = 0;
-    const double least = max(RELATIVE_TOLERANCE*energy, LEAST_ENERGY*kT*numPacks);
+    const double least = tolerance*max(RELATIVE_TOLERANCE*energy,
+            LEAST_ENERGY*kT*count(active.begin(), active.end(), 1));
     while (energy > least && iterations < LARGEST_NUMBER_OF_ITERATIONS) {
         forCoupled([&] (int pack, int first, int last) {
             double sum = 0;
@@ -147,16 +165,19 @@ void CoupledEquations::solve(const vector<PackStep*>& packs, const vector<Coupli
         energy = total();
         ratio = energy/before;
     }
-    moves.assign(3*equations.size(), 0.0);
-    for (size_t i = 0; i < 2*equations.size(); i++)
-        for (int k = 0; k < 3 && termOf[i] >= 0; k++)
-            moves[3*(i/2)+k] += (i%2 == 0 ? 1 : -1)*change[3*termOf[i]+k];
+    moves.resize(3*equations.size());
+    runInChunks(loop, equations.size(), CHUNK, [&] (int i) {
+        const int first = termOf[2*i], second = termOf[2*i+1];
+        for (int k = 0; k < 3; k++)
+            moves[3*i+k] = (first >= 0 ? change[3*first+k] : 0)-(second >= 0 ? change[3*second+k] : 0);
+    });
 }
 
-void CoupledEquations::advance(const vector<PackStep*>& packs, double share, LaneFlags& unfinished,
-            const Loop& loop) {
+void CoupledEquations::advance(const vector<PackStep*>& packs, const PackFlags& active, double share,
+            LaneFlags& unfinished, const Loop& loop) {
     loop(packs.size(), [&] (int pack) {
-        packs[pack]->advance(found.data()+3*firstTerms[pack], share, unfinished[pack].get());
+        if (active[pack])
+            packs[pack]->advance(found.data()+3*firstTerms[pack], share, unfinished[pack].get());
     });
 }
 

@@ -11,6 +11,8 @@ namespace cylchain {
 
 /** A flag for each lane of each pack. */
 typedef std::vector<std::unique_ptr<bool[]> > LaneFlags;
+/** A flag for each pack. */
+typedef std::vector<char> PackFlags;
 
 /**
  * A coupling in the equations of an iteration: a force on its first place, and the opposite one on the second, and how
@@ -36,15 +38,21 @@ struct CouplingEquation {
  */
 class CoupledEquations {
 public:
-    /** Linearise all packs and solve the equations, to within a tolerance of energy. */
-    void solve(const std::vector<PackStep*>& packs, const std::vector<CouplingEquation>& equations, double kT,
-            const Loop& loop);
+    /**
+     * Linearise packs and solve the equations, to within a tolerance of energy.
+     *
+     * @param active       the packs that take part; others stay where they are
+     * @param forTensions  whether tensions of segments must be right, not moves alone
+     */
+    void solve(const std::vector<PackStep*>& packs, const PackFlags& active,
+            const std::vector<CouplingEquation>& equations, double kT, bool forTensions, const Loop& loop);
     /** For each equation, how much its first place moves against the second: three numbers. */
     const std::vector<double>& getMoves() const {
         return moves;
     }
-    /** End the iteration of all packs, with a share of the changes. */
-    void advance(const std::vector<PackStep*>& packs, double share, LaneFlags& unfinished, const Loop& loop);
+    /** End the iteration of the packs that take part, with a share of the changes. */
+    void advance(const std::vector<PackStep*>& packs, const PackFlags& active, double share, LaneFlags& unfinished,
+            const Loop& loop);
     /**
      * Find how a force on each place of each equation moves that place: two symmetric matrices for each equation. What
      * couplings pass on from chain to chain is left out, but each couplings' own stiffness at its places is there.
@@ -55,7 +63,8 @@ public:
         return iterations;
     }
 private:
-    void gatherTerms(const std::vector<CouplingEquation>& equations, int numPacks);
+    void gatherTerms(const std::vector<CouplingEquation>& equations, const PackFlags& active,
+            const Loop& loop);
     double total() const;
     /** One for each place on a chain, pack by pack, in the order of their nodes. */
     std::vector<CouplingTerm> terms;
@@ -65,7 +74,7 @@ private:
     std::vector<int> termOf;
     /** Where the terms of each pack begin. Packs that no coupling joins to another place take no part in iterations. */
     std::vector<int> firstTerms;
-    std::vector<char> coupled;
+    PackFlags coupled;
     std::vector<double> sums;
     /** Three numbers for each term: solution, residual, its response, direction and its image, and the forces found. */
     std::vector<double> change, residual, response, force, direction, nextDirection, found;

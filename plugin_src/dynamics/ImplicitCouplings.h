@@ -15,11 +15,18 @@ struct CoupledStart {
     const ChainPlaces& places;
     /** Whether each chain takes the step; others do not move. */
     const std::vector<bool>& taken;
+    /** The packs that take part in an iteration, as they are while it goes on. */
+    const PackFlags& active;
     /** Whether a place takes part: one that is on no chain or on one that takes the step. */
     bool takes(const PlaceOnChain& place) const {
         return place.pack < 0 || taken[place.chain];
     }
 };
+
+/** A place as it is reported. */
+inline BrokenCoupling::Place describePlace(const PlaceOnChain& place) {
+    return {place.chain, place.pack < 0 ? -1 : place.node};
+}
 
 /**
  * Couplings of one kind: forces between places of chains, or on places of chains, that an implicit step has in its
@@ -34,7 +41,8 @@ public:
     /** Begin a stage, see PackStep. The end of the stage before is where particles have been moved to. */
     virtual void beginStage(int stage, int numStages, const double* moved) = 0;
     /**
-     * Add the equations of an iteration, linearised where particles have been moved to.
+     * Add the equations of an iteration, linearised where particles have been moved to. Those between packs that take
+     * no part may be left out.
      *
      * @param moved  positions after the last iteration, three doubles for each particle
      */
@@ -54,10 +62,30 @@ public:
      * @return whether another iteration is needed
      */
     virtual bool finishIteration(const double* moves, const double* moved) = 0;
+    /** Whether these couplings go on for long where few packs need it, so that others had better rest. */
+    virtual bool letsPacksRest() const {
+        return false;
+    }
+    /**
+     * Mark the packs that need another iteration, after finishIteration() has said that one is needed.
+     *
+     * @return whether that is known; if not, all do
+     */
+    virtual bool markUnfinished(PackFlags&) const {
+        return false;
+    }
     /**
      * Find chains by which the step has gone wrong when the equations are solved, so that it must be divided.
      */
     virtual void findFailures(const double* moved, std::vector<bool>& failed) const = 0;
+    /**
+     * Find the coupling by which a step that cannot be divided any more has gone wrong: call it after findFailures().
+     *
+     * @param equations  the own ones of the last iteration
+     * @param culprit    receives it
+     * @return whether there is one
+     */
+    virtual bool findCulprit(const double* moved, const CouplingEquation* equations, BrokenCoupling& culprit) const = 0;
     /** Add pairs of chains that these couplings join, so that a step is divided for both. */
     virtual void findNeighbours(std::vector<std::pair<int, int> >& pairs) const = 0;
 };

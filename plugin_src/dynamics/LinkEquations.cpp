@@ -19,19 +19,34 @@ namespace {
 const double DIAGONAL = 1-M_SQRT1_2, NOISE_OF_FIRST = DIAGONAL/(1-DIAGONAL);
 /** The largest change of a link in the last iteration, over its thermal fluctuation. */
 const double TOLERANCE = 0.3;
+/** The same for links that turn, which converge linearly. */
+const double TOLERANCE_OF_TURNS = 0.1;
+/** The same for a link one end of which does not know of the change. */
+const double TOLERANCE_OF_ONE_SIDE = 0.05;
 /** What counts as no change: over the change of the whole step, and over the length. */
 const double OF_CHANGE = 1e-3, OF_CHANGE_WITH_NOISE = 1e-5, OF_LENGTH = 1e-7;
 /** The least length for metric forces, over the rest length. */
 const double LEAST_LENGTH = 0.05;
+/** The largest stiffness of a link that has a direction, over the friction of a place in a step. */
+const double LARGEST_RATE_IN_SINGLE_PRECISION = 1e3;
+/** The largest part of what resists turning that compression takes away in the equations of an iteration. */
+const double COMPRESSION = 0.8;
+/** The largest share by which the response along a direction is not that of the distance. */
+const double LARGEST_RATIO = 1.4;
 /** The largest error of a distance that turning leaves, over the same. */
 const double LENGTH_TOLERANCE = 0.07;
 /** Without noise: the largest change across a link in the last iteration, over its length. */
 const double OF_TURN = 1e-2;
-/** The least cosine of the angle by which a link may turn in a step. */
-const double LEAST_COSINE = -0.9;
+/** Links that a thread looks at together. */
+const int CHUNK = 64;
 
 double dot(const double* a, const double* b) {
     return a[0]*b[0]+a[1]*b[1]+a[2]*b[2];
+}
+
+/** Whether a link has a direction. */
+bool turns(const Link& link) {
+    return link.restLength > 0 || hasRange(link.model);
 }
 
 } // namespace
@@ -50,12 +65,27 @@ void LinkEquations::vectorOf(const State& state, const double* positions, double
         r[k] += state.shift[k]-second[k];
 }
 
-void LinkEquations::begin(const CoupledStart& start, const Loop&) {
+bool LinkEquations::needDoublePrecision(const ChainPlaces& places, double stepSize) const {
+    for (const Link& link : *links) {
+        if (!turns(link))
+            continue;
+        for (const Place& place : {link.first, link.second}) {
+            PlaceOnChain found;
+            if (places.find(place, found) &&
+                    link.stiffness*stepSize > LARGEST_RATE_IN_SINGLE_PRECISION*places.getFriction(found))
+                return true;
+        }
+    }
+    return false;
+}
+
+void LinkEquations::begin(const CoupledStart& start, const Loop& newLoop) {
+    loop = &newLoop;
+    active = &start.active;
     begun = start.positions;
     kT = start.settings.kT;
     stepSize = start.settings.stepSize;
     states.clear();
-    anyTurns = false;
     for (const Link& link : *links) {
         State state;
         state.link = &link;
@@ -68,10 +98,11 @@ void LinkEquations::begin(const CoupledStart& start, const Loop&) {
         states.push_back(state);
     }
     addStiffness(start.places);
-    for (State& state : states) {
-        describe(start, state);
-        anyTurns |= state.turns;
-    }
+    runInChunks(*loop, states.size(), CHUNK, [&] (int i) {
+        describe(start, states[i]);
+    });
+    anyTurns = any_of(states.begin(), states.end(), [] (const State& state) {return state.turns;});
+    unfinished.assign(states.size(), 0);
     if (kT > 0)
         drawNoise(start);
 }
@@ -100,18 +131,25 @@ void LinkEquations::describe(const CoupledStart& start, State& state) const {
     for (int k = 0; k < 3; k++)
         state.shift[k] = state.start[k]-direct[k];
     state.length = sqrt(dot(state.start, state.start));
-    state.turns = link.restLength > 0 || hasRange(link.model);
+    state.turns = turns(link);
     double rate = 0;
-    for (const PlaceOnChain& place : state.places)
-        if (place.pack >= 0)
-            rate += stiffness[start.places.getParticle(place)]/start.places.getFriction(place);
+    state.alone = true;
+    for (int side = 0; side < 2; side++) {
+        const PlaceOnChain& place = state.places[side];
+        if (place.pack < 0)
+            continue;
+        state.friction[side] = start.places.getFriction(place);
+        const double total = stiffness[start.places.getParticle(place)];
+        rate += total/state.friction[side];
+        state.alone &= total == link.stiffness;
+    }
     state.theta = max(0.5, 1-1/(stepSize*rate));
     state.multiplier = 0;
+    state.compliant = false;
     double slope;
     const double inverse = link.maximumExtension > 0 ? 1/link.maximumExtension : 0;
     stretchCoordinate<double>(link.model, inverse, state.length-link.restLength, state.coordinate, slope);
     fill(state.random, state.random+3, 0.0);
-    fill(state.metricForce, state.metricForce+3, 0.0);
 }
 
 void LinkEquations::drawNoise(const CoupledStart& start) {
@@ -171,8 +209,11 @@ void LinkEquations::beginStage(int stage, int numStages, const double* moved) {
 }
 
 void LinkEquations::linearise(int, const double* moved, vector<CouplingEquation>& equations) {
-    for (State& state : states) {
-        CouplingEquation equation;
+    const size_t first = equations.size();
+    equations.resize(first+states.size());
+    runInChunks(*loop, states.size(), CHUNK, [&] (int number) {
+        State& state = states[number];
+        CouplingEquation& equation = equations[first+number];
         copy(state.places, state.places+2, equation.places);
         const Link& link = *state.link;
         double r[3];
@@ -184,8 +225,7 @@ void LinkEquations::linearise(int, const double* moved, vector<CouplingEquation>
                 equation.force[i] = -link.stiffness*(state.implicit*r[i]+state.constant[i]);
             k[0] = k[3] = k[5] = state.response;
             k[1] = k[2] = k[4] = 0;
-            equations.push_back(equation);
-            continue;
+            return;
         }
         state.distance = sqrt(dot(r, r));
         if (hasRange(link.model)) {
@@ -201,24 +241,29 @@ void LinkEquations::linearise(int, const double* moved, vector<CouplingEquation>
             state.response = link.stiffness*state.implicit;
             state.tension = link.stiffness*(state.implicit*(state.distance-link.restLength)+state.constant[0]);
         }
+        // The gradient between start and end: its product with the change of r is the change of the distance.
         double* const m = state.direction;
+        const double perSum = 1/max(state.length+state.distance, LEAST);
         for (int i = 0; i < 3; i++)
-            m[i] = state.start[i]+r[i];
-        const double size = sqrt(dot(m, m));
+            m[i] = perSum*(state.start[i]+r[i]);
+        const double square = dot(m, m);
+        double metricForce[3];
+        const double ratio = describeMetric(state, r, metricForce);
+        state.slope = ratio*state.response;
+        // Compression lets links turn, up to a part of what resists. What others at the same place do is not known.
+        const double compliance = max(state.compliance[0], max(state.compliance[3], state.compliance[5]));
+        const double least = state.compliant && state.alone ? -COMPRESSION/compliance : 0;
+        const double turning = max(least, state.multiplier*perSum);
+        const double rest = state.slope-turning/max(square, LEAST);
         for (int i = 0; i < 3; i++)
-            m[i] = size > 0 ? m[i]/size : 0;
-        const double turning = max(0.0, 0.5*state.multiplier/max(state.distance, 1e-9*(1+link.restLength)));
-        const double rest = state.response-turning;
-        for (int i = 0; i < 3; i++)
-            equation.force[i] = shareOfMetricForces*state.metricForce[i]-state.tension*m[i];
+            equation.force[i] = shareOfMetricForces*metricForce[i]-state.tension*m[i];
         k[0] = turning+rest*m[0]*m[0];
         k[1] = rest*m[0]*m[1];
         k[2] = rest*m[0]*m[2];
         k[3] = turning+rest*m[1]*m[1];
         k[4] = rest*m[1]*m[2];
         k[5] = turning+rest*m[2]*m[2];
-        equations.push_back(equation);
-    }
+    });
 }
 
 void LinkEquations::setCompliances(const double* compliances) {
@@ -226,68 +271,114 @@ void LinkEquations::setCompliances(const double* compliances) {
         State& state = states[i];
         if (!state.turns)
             continue;
-        double response[3] = {};
+        fill(state.compliance, state.compliance+6, 0.0);
         const double* t = state.direction;
         for (int side = 0; side < 2; side++) {
+            if (state.places[side].pack < 0)
+                continue;
             // The compliances are those with the link's own stiffness at the place.
-            double ofSide[3];
-            multiply(compliances+12*i+6*side, t, ofSide);
-            const double without = 1/max(1e-6, 1-state.response*dot(t, ofSide));
-            for (int k = 0; k < 3; k++)
-                response[k] += ofSide[k]*without;
+            const double* own = compliances+12*i+6*side;
+            double along[3], outer[6];
+            multiply(own, t, along);
+            const double largest = 1+state.response*stepSize/state.friction[side];
+            const double without = 1/max(1/largest, 1-state.response*dot(t, along));
+            setOuter(state.response*without, along, outer);
+            for (int k = 0; k < 6; k++)
+                state.compliance[k] += own[k]+outer[k];
         }
-        // Where a second stage follows, the distance resists by theta there.
-        const double along = dot(t, response), resistance = state.response*state.theta/state.implicit;
-        const double length = max(state.length, LEAST_LENGTH*(state.link->restLength+state.link->maximumExtension));
-        const double size = kT*state.link->stiffness*(2*state.theta-1)/(length*(1+resistance*along));
-        for (int k = 0; k < 3; k++)
-            state.metricForce[k] = -size*(response[k]-along*t[k]);
+        state.compliant = true;
     }
+}
+
+/**
+ * Find the metric force, and by how much the response along the direction must be larger than that of the distance, so
+ * that a force along the direction changes the distance as it does.
+ */
+double LinkEquations::describeMetric(const State& state, const double* r, double* force) const {
+    fill(force, force+3, 0.0);
+    if (!state.compliant)
+        return 1;
+    const double* const m = state.direction;
+    double response[3];
+    multiply(state.compliance, m, response);
+    const double along = dot(m, response);
+    const double least = LEAST_LENGTH*(state.link->restLength+state.link->maximumExtension);
+    const double before = max(state.length, least), after = max(state.distance, least);
+    // Where a second stage follows, the distance resists by theta there.
+    const double resistance = state.response*state.theta/state.implicit;
+    const double size = kT*state.link->stiffness*state.theta*0.5*(1/before+1/after)/(1+resistance*along);
+    for (int k = 0; k < 3; k++)
+        force[k] = -size*(response[k]-along*m[k]);
+    const double ofDistance = dot(r, response)/max(state.distance, LEAST);
+    return along > 0 ? min(LARGEST_RATIO, max(1/LARGEST_RATIO, ofDistance/along)) : 1;
+}
+
+bool LinkEquations::isUnfinished(State& state, const double* move, const double* moved) const {
+    double r[3], square = dot(move, move), ofStep = 0;
+    vectorOf(state, moved, r);
+    for (int k = 0; k < 3; k++)
+        ofStep += (r[k]-state.start[k])*(r[k]-state.start[k]);
+    const double ofChange = kT > 0 ? OF_CHANGE_WITH_NOISE : OF_CHANGE;
+    const double least = ofChange*ofChange*ofStep+
+            OF_LENGTH*OF_LENGTH*(state.length*state.length+state.link->restLength*state.link->restLength);
+    const int a = state.places[0].pack, b = state.places[1].pack;
+    const bool oneSided = a >= 0 && b >= 0 && (*active)[a] != (*active)[b];
+    const double tolerance = oneSided ? TOLERANCE_OF_ONE_SIDE : state.turns ? TOLERANCE_OF_TURNS : TOLERANCE;
+    const double fluctuation = kT/state.response, thermal = tolerance*tolerance*fluctuation;
+    state.change = state.response*square;
+    // Written so that NaN is not finished.
+    if (!state.turns)
+        return !(square <= thermal+least);
+    const double along = dot(state.direction, move);
+    state.multiplier = state.tension+state.slope*along;
+    const double error = (square-along*along)/(2*LENGTH_TOLERANCE*max(state.length, LEAST));
+    bool result = !(along*along <= thermal+least);
+    result |= kT > 0 && !(error*error <= fluctuation+least);
+    result |= kT == 0 && !(square <= OF_TURN*OF_TURN*state.length*state.length+least);
+    return result;
 }
 
 bool LinkEquations::finishIteration(const double* moves, const double* moved) {
-    bool unfinished = false;
-    for (size_t i = 0; i < states.size(); i++) {
-        State& state = states[i];
-        const double* move = moves+3*i;
-        double r[3], square = dot(move, move), ofStep = 0;
-        vectorOf(state, moved, r);
-        for (int k = 0; k < 3; k++)
-            ofStep += (r[k]-state.start[k])*(r[k]-state.start[k]);
-        const double ofChange = kT > 0 ? OF_CHANGE_WITH_NOISE : OF_CHANGE;
-        const double least = ofChange*ofChange*ofStep+
-                OF_LENGTH*OF_LENGTH*(state.length*state.length+state.link->restLength*state.link->restLength);
-        const double thermal = TOLERANCE*TOLERANCE*kT/state.response;
-        // Written so that NaN is not finished.
-        if (!state.turns) {
-            unfinished |= !(square <= thermal+least);
-            continue;
-        }
-        const double along = dot(state.direction, move);
-        state.multiplier = state.tension+state.response*along;
-        const double error = (square-along*along)/(2*LENGTH_TOLERANCE*max(state.length, LEAST));
-        unfinished |= !(along*along <= thermal+least);
-        unfinished |= kT > 0 && !(error*error <= thermal/(TOLERANCE*TOLERANCE)+least);
-        unfinished |= kT == 0 && !(square <= OF_TURN*OF_TURN*state.length*state.length+least);
-    }
-    return unfinished;
+    runInChunks(*loop, states.size(), CHUNK, [&] (int i) {
+        unfinished[i] = isUnfinished(states[i], moves+3*i, moved);
+    });
+    return find(unfinished.begin(), unfinished.end(), 1) != unfinished.end();
+}
+
+/** Whether a link cannot be solved, or has left the range of its potential. */
+bool LinkEquations::hasFailed(size_t number, const double* moved) const {
+    const State& state = states[number];
+    double r[3];
+    vectorOf(state, moved, r);
+    const double length = sqrt(dot(r, r));
+    const bool left = hasRange(state.link->model) &&
+            !(fabs(length-state.link->restLength) < state.link->maximumExtension);
+    return unfinished[number] != 0 || left;
 }
 
 void LinkEquations::findFailures(const double* moved, vector<bool>& failed) const {
-    for (const State& state : states) {
-        if (!state.turns)
-            continue;
-        double r[3];
-        vectorOf(state, moved, r);
-        const double length = sqrt(dot(r, r));
-        const bool turned = !(dot(state.start, r) >= LEAST_COSINE*state.length*length);
-        const bool left = hasRange(state.link->model) &&
-                !(fabs(length-state.link->restLength) < state.link->maximumExtension);
-        if (turned || left)
-            for (const PlaceOnChain& place : state.places)
+    for (size_t i = 0; i < states.size(); i++)
+        if (hasFailed(i, moved))
+            for (const PlaceOnChain& place : states[i].places)
                 if (place.pack >= 0)
                     failed[place.chain] = true;
-    }
+}
+
+bool LinkEquations::findCulprit(const double* moved, const CouplingEquation*, BrokenCoupling& culprit) const {
+    // The one that is farthest from its solution.
+    size_t number = states.size();
+    for (size_t i = 0; i < states.size(); i++)
+        if (hasFailed(i, moved) && (number == states.size() || states[i].change > states[number].change))
+            number = i;
+    if (number == states.size())
+        return false;
+    const State& state = states[number];
+    culprit.kind = BrokenCoupling::Link;
+    culprit.reason = unfinished[number] != 0 ? BrokenCoupling::NotSolved : BrokenCoupling::LeavesRange;
+    culprit.link = state.link->number;
+    for (int side = 0; side < 2; side++)
+        culprit.places[side] = describePlace(state.places[side]);
+    return true;
 }
 
 void LinkEquations::findNeighbours(vector<pair<int, int> >& pairs) const {

@@ -16,13 +16,19 @@ namespace cylchain {
  *     -k (theta r(y)+(1-theta) r(x)-(2 theta-1)^(1/2) r_random),    theta = max(1/2, 1-1/(h sum k'/zeta)),
  *
  * with the friction zeta of each of its places and the stiffness k' of all links there, and r_random drawn from the
- * equilibrium of r. Other links have one coordinate q, a function of the distance, as segments have: the force -T along
- * the mean of r(x) and r(y) with
+ * equilibrium of r. Other links have one coordinate q, a function of the distance d, as segments have: the force -T J
+ * with
  *
- *     T = k (theta q(y)+(1-theta) q(x)-(2 theta-1)^(1/2) q_random),
+ *     T = k (theta q(y)+(1-theta) q(x)-(2 theta-1)^(1/2) q_random),    J = (r(x)+r(y))/(d(x)+d(y)).
  *
- * a stiffness T/2d against turning, and the metric force -k_B T k (2 theta-1) H C t/(1+k theta t.C t) with the Hessian
- * H = (1-t t)/d of the distance and the compliance C of its places.
+ * J is a discrete gradient: J.(r(y)-r(x)) = d(y)-d(x), however far a link turns. With it, steps there and back differ
+ * by the energy of the link, as detailed balance wants it, and by the ratio of the determinants of their equations,
+ * which the metric force makes up for, with the compliance C of its places without the link:
+ *
+ *     -k_B T k theta (C J-J (J.C J)) (1/d(x)+1/d(y))/2 / (1+k theta J.C J).
+ *
+ * The equations of an iteration have J J^T in place of the product of J with the new direction, and T/(d(x)+d(y))
+ * across.
  */
 class LinkEquations : public ImplicitCouplings {
 public:
@@ -33,6 +39,10 @@ public:
      * @param force  a number of the force that they belong to, for their noise
      */
     void setLinks(const std::vector<Link>* links, const LinkBoxes& boxes, int force);
+    /**
+     * Whether a link is so stiff in one direction that a step in single precision loses the digits of what lies across.
+     */
+    bool needDoublePrecision(const ChainPlaces& places, double stepSize) const;
     void begin(const CoupledStart& start, const Loop& loop) override;
     void beginStage(int stage, int numStages, const double* moved) override;
     void linearise(int iteration, const double* moved, std::vector<CouplingEquation>& equations) override;
@@ -42,6 +52,7 @@ public:
     void setCompliances(const double* compliances) override;
     bool finishIteration(const double* moves, const double* moved) override;
     void findFailures(const double* moved, std::vector<bool>& failed) const override;
+    bool findCulprit(const double* moved, const CouplingEquation* equations, BrokenCoupling& culprit) const override;
     void findNeighbours(std::vector<std::pair<int, int> >& pairs) const override;
 private:
     /** What a step keeps of a link. */
@@ -56,14 +67,25 @@ private:
         /** What a stage makes of these: the force is -k (implicit q(y)+constant). */
         double implicit, constant[3];
         /** Of the last iteration: direction, distance, tension, its response, and the tension after it. */
-        double direction[3], distance, tension, response, multiplier;
-        double metricForce[3];
+        double direction[3], distance, tension, response, slope, multiplier;
+        /** The least friction of its places, and how they move apart by a force between them, without this link. */
+        double friction[2], compliance[6];
+        bool compliant, alone;
+        /** The squared change of the last iteration, times the response. */
+        double change;
     };
     void addStiffness(const ChainPlaces& places);
     void describe(const CoupledStart& start, State& state) const;
     void drawNoise(const CoupledStart& start);
+    bool isUnfinished(State& state, const double* move, const double* moved) const;
+    bool hasFailed(std::size_t number, const double* moved) const;
+    double describeMetric(const State& state, const double* r, double* force) const;
     void vectorOf(const State& state, const double* positions, double* r) const;
     std::vector<State> states;
+    /** Whether each needs another iteration. */
+    std::vector<char> unfinished;
+    const Loop* loop = nullptr;
+    const PackFlags* active = nullptr;
     const std::vector<Link>* links = nullptr;
     LinkBoxes boxes;
     const double* begun = nullptr;

@@ -9,6 +9,8 @@ using namespace std;
 namespace {
 
 const int NEWTON_ITERATIONS = 30;
+/** The same where links turn, which several of them at one place do slowly. */
+const int NEWTON_ITERATIONS_OF_TURNING_LINKS = 50;
 /**
  * Contacts that open and close in turn keep Newton's method from ending. After so many iterations, only this share of
  * each change is made.
@@ -109,7 +111,11 @@ void NetworkStep::choosePacks(const StepSettings& settings) {
 }
 
 Instability NetworkStep::step(const double* positions, const double* forces, const double* box,
-            const StepSettings& settings, double* displacements, const Loop& loop) {
+            const StepSettings& given, double* displacements, const Loop& loop) {
+    StepSettings settings = given;
+    for (const unique_ptr<LinkEquations>& own : links)
+        if (own->needDoublePrecision(places, settings.stepSize))
+            settings.precision = Precision::Double;
     choosePacks(settings);
     iterations = substitutions = 0;
     const size_t numChains = places.getNumChains();
@@ -122,8 +128,10 @@ Instability NetworkStep::step(const double* positions, const double* forces, con
     }
     const vector<bool> divided = findComponents(failed);
     result.divided = count(divided.begin(), divided.end(), true);
-    if (!divide({positions, forces, box, settings, divided, loop}, 1, displacements, failed))
+    if (!divide({positions, forces, box, settings, divided, loop}, 1, displacements, failed)) {
         result.chain = find(failed.begin(), failed.end(), true)-failed.begin();
+        result.coupling = findCulprit();
+    }
     result.iterations = iterations;
     return result;
 }
@@ -136,7 +144,7 @@ bool NetworkStep::attempt(const Attempt& attempt, double* displacements, vector<
             flags[pack][lane] = chains[lane] >= 0 && attempt.taken[chains[lane]];
         steps[pack]->begin(attempt.positions, attempt.forces, attempt.box, attempt.settings, flags[pack].get());
     });
-    const CoupledStart start = {attempt.positions, attempt.settings, places, attempt.taken};
+    const CoupledStart start = {attempt.positions, attempt.settings, places, attempt.taken, active};
     for (ImplicitCouplings* own : couplings)
         own->begin(start, attempt.loop);
     copy(attempt.positions, attempt.positions+moved.size(), moved.begin());
@@ -173,21 +181,26 @@ bool NetworkStep::iterate(const Attempt& attempt, int stage) {
     });
     for (ImplicitCouplings* own : couplings)
         own->beginStage(stage, steps[0]->getNumStages(), moved.data());
-    vector<size_t> first(couplings.size()+1);
-    for (int iteration = 0; iteration < NEWTON_ITERATIONS; iteration++) {
+    active.assign(numPacks, 1);
+    vector<size_t>& first = firstEquations;
+    first.resize(couplings.size()+1);
+    const bool turns = any_of(couplings.begin(), couplings.end(), [] (const ImplicitCouplings* own) {
+        return own->needsCompliances();
+    });
+    const int most = turns ? NEWTON_ITERATIONS_OF_TURNING_LINKS : NEWTON_ITERATIONS;
+    for (int iteration = 0; iteration < most; iteration++) {
         equations.clear();
         for (size_t i = 0; i < couplings.size(); i++) {
             first[i] = equations.size();
             couplings[i]->linearise(iteration, moved.data(), equations);
         }
         first[couplings.size()] = equations.size();
-        coupled.solve(stepsOfPacks, equations, attempt.settings.kT, attempt.loop);
+        // What the first stage takes for taut segments stays as it is for the second one.
+        const bool forTensions = iteration == 0 && stage == 0 && steps[0]->getNumStages() > 1;
+        coupled.solve(stepsOfPacks, active, equations, attempt.settings.kT, forTensions, attempt.loop);
         substitutions += coupled.getNumIterations();
         if (iteration == 0 && stage == 0) {
-            const bool needed = any_of(couplings.begin(), couplings.end(), [] (const ImplicitCouplings* own) {
-                return own->needsCompliances();
-            });
-            if (needed) {
+            if (turns) {
                 coupled.findCompliances(stepsOfPacks, compliances, attempt.loop);
                 for (size_t i = 0; i < couplings.size(); i++)
                     if (couplings[i]->needsCompliances())
@@ -195,22 +208,38 @@ bool NetworkStep::iterate(const Attempt& attempt, int stage) {
             }
         }
         const double share = iteration < UNDAMPED_ITERATIONS ? 1 : DAMPING;
-        coupled.advance(stepsOfPacks, share, unfinished, attempt.loop);
+        coupled.advance(stepsOfPacks, active, share, unfinished, attempt.loop);
         iterations++;
         attempt.loop(numPacks, [&] (int pack) {
-            steps[pack]->getPositions(attempt.positions, moved.data());
+            if (active[pack])
+                steps[pack]->getPositions(attempt.positions, moved.data());
         });
-        bool more = false;
-        for (size_t i = 0; i < couplings.size(); i++)
-            more |= couplings[i]->finishIteration(coupled.getMoves().data()+3*first[i], moved.data());
-        for (int pack = 0; pack < numPacks; pack++) {
-            const size_t lanes = chainsOfLanes[pack].size();
-            more |= any_of(unfinished[pack].get(), unfinished[pack].get()+lanes, [] (bool flag) {return flag;});
-        }
-        if (!more)
+        if (!finishIteration(first))
             return true;
     }
     return false;
+}
+
+/** Find the packs that need another iteration; false if there are none. */
+bool NetworkStep::finishIteration(const vector<size_t>& first) {
+    PackFlags next(active.size(), 0);
+    bool unknown = false;
+    for (size_t i = 0; i < couplings.size(); i++)
+        if (couplings[i]->finishIteration(coupled.getMoves().data()+3*first[i], moved.data()))
+            unknown |= !couplings[i]->markUnfinished(next);
+    for (size_t pack = 0; pack < active.size(); pack++) {
+        const size_t lanes = chainsOfLanes[pack].size();
+        next[pack] |= any_of(unfinished[pack].get(), unfinished[pack].get()+lanes, [] (bool flag) {return flag;});
+    }
+    const bool any = unknown || find(next.begin(), next.end(), 1) != next.end();
+    // A few contacts take many iterations. Without any, all packs end together, and rests would not pay.
+    const bool rests = any_of(couplings.begin(), couplings.end(), [] (const ImplicitCouplings* own) {
+        return own->letsPacksRest();
+    });
+    if (unknown || !rests)
+        next.assign(next.size(), 1);
+    active.swap(next);
+    return any;
 }
 
 bool NetworkStep::divide(const Attempt& whole, int division, double* displacements, vector<bool>& failed) {
@@ -256,6 +285,21 @@ bool NetworkStep::divide(const Attempt& whole, int division, double* displacemen
         displacements[k] = total[k];
     });
     return true;
+}
+
+/** Find the coupling by which the last attempt has failed: one that is known to be wrong comes first. */
+BrokenCoupling NetworkStep::findCulprit() const {
+    BrokenCoupling result;
+    for (size_t i = 0; i < couplings.size(); i++) {
+        BrokenCoupling culprit;
+        if (!couplings[i]->findCulprit(moved.data(), equations.data()+firstEquations[i], culprit))
+            continue;
+        culprit.force = i;
+        if (result.kind == BrokenCoupling::None || (result.reason == BrokenCoupling::NotSolved &&
+                culprit.reason != BrokenCoupling::NotSolved))
+            result = culprit;
+    }
+    return result;
 }
 
 vector<bool> NetworkStep::findComponents(const vector<bool>& failed) const {

@@ -7,6 +7,7 @@
 #include "dynamics/ImplicitCouplings.h"
 #include "dynamics/LinkEquations.h"
 #include "dynamics/WallEquations.h"
+#include <cstddef>
 #include <memory>
 #include <vector>
 
@@ -50,7 +51,9 @@ private:
     void setParticles(const std::vector<CoupledParticle>& particles);
     bool attempt(const Attempt& attempt, double* displacements, std::vector<bool>& failed);
     bool iterate(const Attempt& attempt, int stage);
+    bool finishIteration(const std::vector<std::size_t>& first);
     bool divide(const Attempt& whole, int division, double* displacements, std::vector<bool>& failed);
+    BrokenCoupling findCulprit() const;
     std::vector<bool> findComponents(const std::vector<bool>& failed) const;
     void choosePacks(const StepSettings& settings);
     const ChainEngine& engine;
@@ -66,8 +69,12 @@ private:
     std::vector<PackStep*> stepsOfPacks;
     CoupledEquations coupled;
     std::vector<CouplingEquation> equations;
+    /** Where those of each kind of couplings begin. */
+    std::vector<std::size_t> firstEquations;
     std::vector<double> moved, compliances;
     LaneFlags unfinished, flags;
+    /** The packs that take part in an iteration: the others have converged, and nothing holds them otherwise. */
+    PackFlags active;
     int iterations = 0, substitutions = 0;
 };
 

@@ -42,16 +42,22 @@ template <class Scalar> ChainPack<Scalar> emptyPack(const PackShape& shape, int 
     static_cast<PackShape&>(pack) = shape;
     pack.lanes = lanes;
     pack.chain.resize(lanes, -1);
+    pack.firstNode.resize(lanes, 0);
     pack.nodesOfLane.resize(lanes);
     pack.segmentsOfLane.resize(lanes);
     pack.particles.resize((std::size_t) pack.nodes*lanes, -1);
     return pack;
 }
 
+/** Bring the tethers of a pack, which are all there, into the order of their nodes. */
 template <class Scalar> void sortTethers(ChainPack<Scalar>& pack) {
     std::stable_sort(pack.tethers.begin(), pack.tethers.end(), [] (const LaneTether& a, const LaneTether& b) {
         return a.node < b.node;
     });
+    pack.firstTethers.assign(pack.nodes+1, 0);
+    for (const LaneTether& tether : pack.tethers)
+        for (int node = tether.node+1; node <= pack.nodes; node++)
+            pack.firstTethers[node]++;
 }
 
 } // namespace cylchain

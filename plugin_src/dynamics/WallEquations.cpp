@@ -17,6 +17,10 @@ const double TOLERANCE = 0.3;
 const double LEAST_TOLERANCE = 1e-7;
 /** The number of iterations after which what is beyond a face for the first time is mirrored. */
 const int MIRRORING_ITERATIONS = 3;
+/** How stiff a wall or contact is that mirrors at a depth of its own. */
+const double LEAST_STIFF = 1;
+/** How far beyond a wall particles are now and then, over the depth at which they are mirrored. */
+const double LARGEST_DEPTH = 3;
 /** The number of iterations that know of no walls. */
 const int FREE_ITERATIONS = 2;
 /** The number of iterations that look where faces are. */
@@ -30,10 +34,17 @@ const int CHUNK = 256;
 
 } // namespace
 
-double cylchain::shareMirrored(double a) {
-    // Within 2 % in the surface excess for a from 0.1 to 1000; from there on, the excess itself is nothing.
-    const double scaled = 0.6*sqrt(a);
-    return scaled/(1+scaled);
+double cylchain::findMirrored(double overlap, double a, double depth) {
+    if (a < LEAST_STIFF) {
+        // Within 2 % in the surface excess for a from 0.1 on.
+        const double scaled = 0.6*sqrt(a);
+        return max(0.0, overlap)*scaled/(1+scaled);
+    }
+    return -depth+max(0.0, overlap-depth)*(1+2/a);
+}
+
+double cylchain::findDepthOfMirror(double kT, double stiffness) {
+    return sqrt(0.5*M_PI*kT/stiffness);
 }
 
 /** Add how a force on a round face turns with it: its share of 1-g g, or of the plane across the axis of a cylinder. */
@@ -55,6 +66,7 @@ void WallEquations::begin(const CoupledStart& start, const Loop& newLoop) {
     loop = &newLoop;
     begun = start.positions;
     stepSize = start.settings.stepSize;
+    mirrorDepth = findDepthOfMirror(start.settings.kT, system->stiffness);
     tolerance = max(LEAST_TOLERANCE, TOLERANCE*sqrt(start.settings.kT/system->stiffness));
     const size_t count = system->particles.size();
     places.resize(count);
@@ -120,13 +132,14 @@ void WallEquations::linearise(int iteration, const double* moved, vector<Couplin
         }
 }
 
-double WallEquations::findMirrored(int particle, int face, double depth) const {
+double WallEquations::findMirroredOf(int particle, int face, double depth) const {
     const WallParticle& own = system->particles[particle];
     double gradient[3];
     const double before = findDepth(system->wall, face, begun+3*own.particle, own.radius, gradient);
     const double largest = (isFlat(system->wall) ? 1 : LARGEST_MIRRORED)*(getRoom(system->wall)-own.radius);
-    const double further = min(largest, depth-max(0.0, before));
-    return max(0.0, further)*shareMirrored(implicit*stepSize*system->stiffness/frictions[particle]);
+    // What begins farther beyond the wall than thermal motion gets to comes back without being thrown.
+    const double further = depth-max(0.0, before-LARGEST_DEPTH*mirrorDepth);
+    return findMirrored(min(largest, further), implicit*stepSize*system->stiffness/frictions[particle], mirrorDepth);
 }
 
 bool WallEquations::finishPart(int number, const double* moves, const double* moved) {
@@ -159,16 +172,18 @@ bool WallEquations::finishPart(int number, const double* moves, const double* mo
                 continue;
             State state = {i, face, 0, {}, 0, -1, 0, 0, true};
             const double depth = findDepth(system->wall, face, moved+3*own.particle, own.radius, state.gradient);
-            if (!(depth > (iterations < MIRRORING_ITERATIONS ? 0 : tolerance)))
+            // Where two faces meet, what one has mirrored may be beyond the other. Later iterations are no predictions:
+            // others have pushed the particle.
+            const bool predicts = iterations < MIRRORING_ITERATIONS;
+            if (!(depth > (predicts ? 0 : tolerance)))
+                continue;
+            state.mirrored = findMirroredOf(i, face, predicts ? depth : 0);
+            if (!(depth+state.mirrored > (predicts ? 0 : tolerance)))
                 continue;
             unfinished = true;
             if (iterations < FREE_ITERATIONS-1)
                 continue;
             reached[i] |= 1<<face;
-            // Where two faces meet, what one has mirrored may be beyond the other. Later iterations are no predictions:
-            // others have pushed the particle.
-            if (iterations < MIRRORING_ITERATIONS)
-                state.mirrored = findMirrored(i, face, depth);
             const double* y = moved+3*own.particle;
             state.offset = depth-(state.gradient[0]*y[0]+state.gradient[1]*y[1]+state.gradient[2]*y[2]);
             part.states.push_back(state);
@@ -189,4 +204,15 @@ void WallEquations::findFailures(const double*, vector<bool>& failed) const {
         for (const State& state : part.states)
             if (state.unfinished)
                 failed[places[state.particle].chain] = true;
+}
+
+bool WallEquations::findCulprit(const double*, const CouplingEquation*, BrokenCoupling& culprit) const {
+    for (const Part& part : parts)
+        for (const State& state : part.states)
+            if (state.unfinished) {
+                culprit.kind = BrokenCoupling::Wall;
+                culprit.places[0] = describePlace(places[state.particle]);
+                return true;
+            }
+    return false;
 }

@@ -129,7 +129,25 @@ def test_explicit_couplings_are_explicit(name):
         network.integrator.step(20)
         energies.append(network.energies()["bending"])
         assert before == pytest.approx(create_network(system, "implicit", 1e-3, positions).energies())
-    assert energies[1] > 5.0 * energies[0]
+    assert energies[1] > 3.0 * energies[0]
+
+
+def test_costs_of_sizes():
+    disturbance = np.array([1.0, 3.0, 1.0])
+    times = {"small": 2e-3 * disturbance, "large": 30e-3 * disturbance, "two_threads": 20e-3 * disturbance}
+    rows = {row.name: row for row in networks.size_rows(BY_NAME["contacts"], times)}
+    assert rows["cost_contacts_2000_segments"].value == pytest.approx(1000.0)
+    assert rows["cost_contacts_20000_segments"].value == pytest.approx(1500.0)
+    assert rows["growth_of_cost_contacts"].value == pytest.approx(1.5)
+    assert rows["two_threads_over_one_contacts"].value == pytest.approx(1.5)
+    del times["two_threads"]
+    assert len(networks.size_rows(BY_NAME["contacts"], times)) == 3
+
+
+def test_enlarged_networks_have_the_same_density():
+    system = network_systems.enlarged(BY_NAME["links_soft"], 8)
+    assert (system.filaments, system.links) == (1600, 8000)
+    assert system.edge == pytest.approx(2400.0)
 
 
 def test_rows_of_errors():
@@ -164,7 +182,7 @@ def test_benchmark_of_networks(monkeypatch, tmp_path, capsys):
         return measurement.time_interleaved(cases, repetitions, 1e-3)
 
     systems = tuple(small(name, steps=BY_NAME[name].steps[-1:]) for name in BY_NAME)
-    monkeypatch.setattr(networks, "QUICK", networks.NetworkEffort(systems, 5, 200.0, 100, 10, 2, 1e-3))
+    monkeypatch.setattr(networks, "QUICK", networks.NetworkEffort(systems, 5, 200.0, 100, 10, 2, 1e-3, ("contacts",)))
     monkeypatch.setattr(networks, "time_interleaved", quickly)
     path = tmp_path / "result.json"
     assert cli.main(["benchmark", "networks", "--quick", "--json", str(path)]) == 0
@@ -181,4 +199,5 @@ def test_benchmark_of_networks(monkeypatch, tmp_path, capsys):
         assert 0 <= rows[f"divided_steps_{step}"]["value"] < 1
         assert (f"link_energy_{step}" in rows) == bool(system.links)
         assert (f"crossings_{step}" in rows) == system.contacts
+    assert rows["growth_of_cost_contacts"]["value"] > 0
     assert "energies in k_BT" in capsys.readouterr().out

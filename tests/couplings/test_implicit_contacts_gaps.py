@@ -1,62 +1,51 @@
-"""Gaps of rods, and of a rod and a sphere, in implicit steps against draws of the equilibrium by other means."""
+"""Gaps of two filaments, or of one and a sphere, in implicit steps, against draws of the equilibrium by other means."""
 
 import numpy as np
+import pytest
 
 from openmm_cylchain import F_ACTIN, Filaments, capsule_contact_force
 from openmm_cylchain.engines.compiled import plugin
 from support.contexts import new_context, positions_of
+from support.gap_draws import draw_distances, filament_distance
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 
-ROD = F_ACTIN.with_segment_length(100)
 LENGTH = 100.0
+ACTIN = F_ACTIN.with_segment_length(LENGTH)
 DIAMETER = 30.0
 STIFFNESS = 80 * KT / DIAMETER**2
 # Links between the middles, with exact equilibrium at any step, keep the two together.
-LINK = KT / 50**2
+SPREAD = 50.0
 # Distances: gaps of 10 nm and more.
 EDGES = np.arange(40.0, 81.0, 5.0)
-# At 10 us, two segments diffuse against each other by 0.6 diameters.
-LARGEST_STEP = 1e7
 FRICTION = 2.9e5
 
 
-def _to_segment(point, start, along):
-    fraction = np.einsum("ij,ij->i", point - start, along) / np.einsum("ij,ij->i", along, along)
-    return np.linalg.norm(point - start - np.clip(fraction, 0, 1)[:, None] * along, axis=1)
-
-
-def _distance(start, p, other, q):
-    """Of two segments: that of an end of one from the other, or of the lines where these are nearest within both."""
-    ends = [_to_segment(start, other, q), _to_segment(start + p, other, q)]
-    ends += [_to_segment(other, start, p), _to_segment(other + q, start, p)]
-    normal = np.cross(p, q)
-    square = np.einsum("ij,ij->i", normal, normal)
-    between = other - start
-    s = np.einsum("ij,ij->i", np.cross(between, q), normal) / square
-    t = np.einsum("ij,ij->i", np.cross(between, p), normal) / square
-    within = (s > 0) & (s < 1) & (t > 0) & (t < 1)
-    lines = np.abs(np.einsum("ij,ij->i", between, normal)) / np.sqrt(square)
-    return np.where(within, lines, np.min(ends, axis=0))
-
-
-def _shares(counts):
+def _shares(distances, weights=None):
+    """Of the distances within the edges."""
+    counts = np.histogram(distances, EDGES, weights=weights)[0]
     return counts / counts.sum()
 
 
-def _expected(sphere, count=3000000):
-    generator = np.random.default_rng(7)
-    counts = np.zeros(len(EDGES) - 1)
-    for _ in range(count // 250000):
-        between = generator.normal(0, np.sqrt(KT / LINK), (250000, 3))
-        p, q = (LENGTH * v / np.linalg.norm(v, axis=1)[:, None] for v in generator.normal(size=(2, 250000, 3)))
-        distances = _to_segment(between, -0.5 * p, p) if sphere else _distance(-0.5 * p, p, between - 0.5 * q, q)
-        # Beyond the diameter contacts have no energy.
-        counts += np.histogram(distances, EDGES)[0]
-    return _shares(counts)
+def _expected(segments, sphere):
+    draws = [
+        draw_distances(
+            segments,
+            LENGTH,
+            ACTIN.joint_stiffness / KT,
+            SPREAD,
+            DIAMETER,
+            STIFFNESS / KT,
+            200000,
+            seed=seed,
+            sphere=sphere,
+        )
+        for seed in range(15 if segments == 1 else 8)
+    ]
+    return _shares(*(np.concatenate(values) for values in zip(*draws)))
 
 
-def _found(sphere, scheme, step, samples, pairs=400):
-    """Shares of the distances, and their standard errors."""
+def _pairs(segments, sphere, pairs):
+    """Filaments in a System with contacts and links, and the particles of each pair."""
     generator = np.random.default_rng(1)
     filaments = Filaments(VISCOSITY, TEMPERATURE)
     centers = 3000.0 * np.array(list(np.ndindex(8, 8, 8)))[:pairs]
@@ -64,44 +53,66 @@ def _found(sphere, scheme, step, samples, pairs=400):
         for height in (0, 45) if not sphere else (0,):
             direction = generator.normal(size=3)
             direction /= np.linalg.norm(direction)
-            filaments.add_straight(ROD, 1, center + [0, 0, height] - 0.5 * LENGTH * direction, direction)
+            start = center + [0, 0, height] - 0.5 * segments * LENGTH * direction
+            filaments.add_straight(ACTIN, segments, start, direction)
     _, system, positions = filaments.build()
     nodes = np.array(filaments.node_indices)
     spheres = [system.addParticle(1.0) for _ in range(pairs)] if sphere else []
     positions = np.vstack([positions._value, centers + [0, 0, 45]]) if sphere else positions
+    first, second = (nodes, np.array(spheres)[:, None]) if sphere else (nodes[::2], nodes[1::2])
     options = {"particles": spheres, "particle_diameter": DIAMETER} if sphere else {}
     system.addForce(capsule_contact_force(filaments, system, DIAMETER, STIFFNESS, **options))
-    links = plugin.CylinderChainLinkForce()
-    for pair in range(pairs):
-        first = [int(node) for node in nodes[pair if sphere else 2 * pair]] + [0.5]
-        second = [spheres[pair], -1, 0.0] if sphere else [int(node) for node in nodes[2 * pair + 1]] + [0.5]
-        links.addLink(*first, *second, links.Harmonic, 0.0, LINK, 1.0)
+    links, middle = plugin.CylinderChainLinkForce(), segments // 2
+    for one, other in zip(first, second):
+        places = [[int(one[middle]), int(one[middle + 1]), 0.5]]
+        places.append([int(other[0]), -1, 0.0] if sphere else [int(other[middle]), int(other[middle + 1]), 0.5])
+        links.addLink(*places[0], *places[1], links.Harmonic, 0.0, KT / SPREAD**2, 1.0)
     system.addForce(links)
+    return filaments, system, positions, first, second
+
+
+def _check(segments, sphere, scheme, share_of_step, samples, pairs=400):
+    filaments, system, positions, first, second = _pairs(segments, sphere, pairs)
+    friction = FRICTION if sphere else None
+    allowed = filaments.recommended_time_step(scheme, system=system, particle_friction=friction).allowed
+    # What contacts allow: filaments of several segments relax faster.
+    step = share_of_step * next(value for name, value in allowed.items() if name.endswith("segments in contact"))
     integrator = filaments.create_integrator(
-        system, step, scheme=scheme, random_seed=1, checks=False, particle_friction=FRICTION if sphere else None
+        system, step, scheme=scheme, random_seed=1, checks=False, particle_friction=friction
     )
     context = new_context(system, positions, integrator, "CPU", {"Threads": "1"})
     integrator.step(int(1e9 / step))
-    histograms = []
+    distances = []
     for _ in range(samples):
-        integrator.step(max(1, int(4e6 / step)))
-        positions = positions_of(context)
-        starts, along = positions[nodes[:, 0]], positions[nodes[:, 1]] - positions[nodes[:, 0]]
-        if sphere:
-            distances = _to_segment(positions[spheres], starts, along)
-        else:
-            distances = _distance(starts[::2], along[::2], starts[1::2], along[1::2])
-        histograms.append(np.histogram(distances, EDGES)[0])
-    blocks = np.array([_shares(block.sum(axis=0)) for block in np.array_split(histograms, 20)])
-    return _shares(np.sum(histograms, axis=0)), blocks.std(axis=0, ddof=1) / np.sqrt(20)
-
-
-def _check(sphere, scheme, step, samples):
-    found, errors = _found(sphere, scheme, step, samples)
-    ratios, errors = found / _expected(sphere), errors / found
+        integrator.step(max(1, round(4e6 / step)))
+        particles = positions_of(context)
+        distances.append(filament_distance(*(particles[own].swapaxes(0, 1) for own in (first, second))))
+    blocks = np.array([_shares(np.concatenate(block)) for block in np.array_split(distances, 20)])
+    found, errors = _shares(np.concatenate(distances)), blocks.std(axis=0, ddof=1) / np.sqrt(20)
+    ratios, errors = found / _expected(segments, sphere), errors / found
     assert (4 * errors < 0.05).all(), errors
     assert (np.abs(ratios - 1) < 0.05).all(), ratios
 
 
-def test_gaps_of_a_sphere_at_a_tenth_of_the_largest_step():
-    _check(True, "implicit", LARGEST_STEP / 10, 700)
+def test_gaps_of_two_rods_at_the_recommended_step():
+    _check(1, False, "implicit", 1.0, 1200)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("share_of_step", [1.0, 0.5])
+@pytest.mark.parametrize(
+    "segments, sphere, scheme",
+    [
+        (1, True, "implicit"),
+        (3, False, "implicit"),
+        (1, False, "implicit-second-order"),
+        (3, False, "implicit-second-order"),
+    ],
+)
+def test_gaps_at_the_recommended_step(segments, sphere, scheme, share_of_step):
+    _check(segments, sphere, scheme, share_of_step, 1500)
+
+
+@pytest.mark.slow
+def test_gaps_of_two_rods_at_half_the_recommended_step():
+    _check(1, False, "implicit", 0.5, 1200)

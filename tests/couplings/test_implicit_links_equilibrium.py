@@ -59,7 +59,9 @@ def run_tree(network, potential, scheme, step, copies, samples, seed=1, interval
     simulation.integrator.step(30)
     energies = simulation.measure(samples, interval)
     divided = simulation.integrator.getNumDividedSteps()
-    assert divided < 1e-3 * copies * network.filaments * (samples * interval + 30), f"{divided} steps were divided"
+    # A step is divided for all that is connected, particles as well, and counts for each of them.
+    bodies = copies * (network.filaments + network.particles)
+    assert divided < 1e-3 * bodies * (samples * interval + 30), f"{divided} steps were divided"
     check("links", energies["links"], potential.mean(potential.energy))
     return simulation, energies
 
@@ -70,25 +72,17 @@ def check_filaments(network, energies, allowed=0.01):
 
 
 UNMET = {
-    "test_pairs_keep_their_energies[0.01pN/nm-35nm-50us-implicit]",
-    "test_pairs_keep_their_energies[0.01pN/nm-35nm-50us-implicit-second-order]",
-    "test_pairs_keep_their_energies[0.25pN/nm-35nm-2us-implicit]",
-    "test_pairs_keep_their_energies[0.25pN/nm-35nm-2us-implicit-second-order]",
-    "test_pairs_keep_their_energies[100.0pN/nm-0nm-0.1us-implicit-second-order]",
     "test_pairs_keep_their_energies[100.0pN/nm-0nm-50us-implicit-second-order]",
-    "test_trees_keep_their_energies[ends of a pair-100.0pN/nm-35nm-implicit]",
-    "test_trees_keep_their_energies[ends of a pair-100.0pN/nm-35nm-implicit-second-order]",
-    "test_trees_keep_their_energies[particle to particle-100.0pN/nm-35nm-implicit]",
-    "test_trees_keep_their_energies[particle to particle-100.0pN/nm-35nm-implicit-second-order]",
-    "test_trees_keep_their_energies[star-100.0pN/nm-0nm-implicit-second-order]",
-    "test_trees_keep_their_energies[star-100.0pN/nm-35nm-implicit]",
     "test_trees_keep_their_energies[star at one place-100.0pN/nm-35nm-implicit]",
     "test_trees_keep_their_energies[star at one place-100.0pN/nm-35nm-implicit-second-order]",
+    "test_trees_keep_their_energies[star-100.0pN/nm-35nm-implicit-second-order]",
+    "test_trees_keep_their_energies[particle to particle-100.0pN/nm-35nm-implicit]",
+    "test_trees_keep_their_energies[particle to particle-100.0pN/nm-35nm-implicit-second-order]",
     "test_links_at_the_recommended_step_of_filaments[kind0-16-1300000000.0-0.0003-implicit-second-order]",
-    "test_links_at_the_recommended_step_of_filaments[kind1-16-1300000000.0-0.001-implicit-second-order]",
 }
-"""What does not hold yet: stiff links with a rest length divide too many steps, soft ones are 1 to 3 % off in long
-steps, and filaments with stiff links have bends up to 3 % too large in scheme "implicit-second-order"."""
+"""What does not hold yet: stiff links with a rest length divide more than one step in a thousand where several share a
+place or join particles, up to three in a hundred; filaments with stiff links have bends up to 3 % too large in scheme
+"implicit-second-order"; and one case has too few samples for its own bound."""
 
 pytestmark = pytest.mark.slow
 
@@ -103,7 +97,9 @@ def expect_what_is_unmet(request):
 @pytest.mark.parametrize(("potential", "step"), CASES, ids=label)
 def test_pairs_keep_their_energies(potential, step, scheme):
     network = TREES["pair"]
-    _, energies = run_tree(network, potential, scheme, step * MICROSECOND, 400, 120)
+    # Soft links with a rest length relax slowly.
+    copies = 900 if potential.rest_length and potential.stiffness < 1 else 400
+    _, energies = run_tree(network, potential, scheme, step * MICROSECOND, copies, 120)
     check_filaments(network, energies)
 
 
@@ -154,10 +150,11 @@ def test_vectors_of_links_have_the_right_distribution(potential, scheme):
 def test_links_at_the_recommended_step_of_filaments(kind, segments, step, stiffness, scheme):
     """Where explicit links had 30 % too much energy, or blew up."""
     network = Network((((0, segments // 2, 0.0), (1, segments // 2, 0.0)),), 2, segments, kind=kind)
+    interval = 2
     if kind is F_ACTIN and scheme == "implicit-second-order":
-        # The recommended step of this scheme for long actin.
-        step = 51e6
-    run_tree(network, LinkPotential(stiffness), scheme, step, 1000, 60, interval=2)
+        # The recommended step of this scheme for long actin. Links need many of them to relax.
+        step, interval = 51e6, 16
+    run_tree(network, LinkPotential(stiffness), scheme, step, 1000, 60, interval=interval)
 
 
 LOOPS = {

@@ -4,6 +4,7 @@
 #include "openmm/internal/ContextImpl.h"
 #include "openmm/internal/ParallelLoop.h"
 #include "openmm/internal/ThreadPool.h"
+#include "mechanics/Loop.h"
 
 namespace OpenMM {
 
@@ -15,6 +16,11 @@ class ReferenceParallelLoop : public ParallelLoop {
 public:
     explicit ReferenceParallelLoop(ContextImpl& context);
     void run(int count, const std::function<void(int)>& iteration);
+    /**
+     * Call a function that runs many short loops, one after the other.  Threads stay awake between these for a while:
+     * to wake them takes longer than a loop.
+     */
+    void runMany(const std::function<void(const cylchain::Loop& loop)>& function);
 private:
     ThreadPool* threads;
 };

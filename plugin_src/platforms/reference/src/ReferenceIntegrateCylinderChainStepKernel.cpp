@@ -67,7 +67,7 @@ Instability ReferenceIntegrateCylinderChainStepKernel::displaceChains(ContextImp
         result.divided += instability.divided;
     }
     if (result.chain == -1)
-        mixedChains = engine.getNumMixedChains(packs);
+        mixedChains = engine.getNumMixedChains(packs, settings);
     return result;
 }
 
@@ -86,9 +86,11 @@ Instability ReferenceIntegrateCylinderChainStepKernel::displaceCoupledChains(Con
         versionOfNetwork = chainKernel->getEngineVersion();
     }
     network->setForces(coupled, &data.periodicBoxVectors[0][0]);
-    const Instability result = network->step(&(*data.positions)[0][0], &(*data.forces)[0][0],
-            chainKernel->getBox(context), settings, &displacements[0][0],
-            [&] (int count, const function<void(int)>& iteration) {loop.run(count, iteration);});
+    Instability result;
+    loop.runMany([&] (const Loop& loops) {
+        result = network->step(&(*data.positions)[0][0], &(*data.forces)[0][0], chainKernel->getBox(context), settings,
+                &displacements[0][0], loops);
+    });
     if (result.chain != -1)
         return result;
     const vector<int> packs = engine.getPacksOfStep(settings);
@@ -214,5 +216,5 @@ void ReferenceIntegrateCylinderChainStepKernel::moveAdvanced(ContextImpl& contex
     exchangePositions(context, count*settings.stepSize, count);
     const ChainEngine& engine = chainKernel->getEngine();
     if (count > 0)
-        mixedChains = engine.getNumMixedChains(engine.getPacksOfStep(settings));
+        mixedChains = engine.getNumMixedChains(engine.getPacksOfStep(settings), settings);
 }
