@@ -76,6 +76,13 @@ def available_engines() -> dict[str, str | None]:
     return {"portable": None, "compiled": _why_compiled_is_missing()}
 
 
+def load_plugin() -> Any:
+    """The module of the compiled plugin; None where that engine is missing: then no System has a force of it."""
+    if available_engines()["compiled"] is not None:
+        return None
+    return importlib.import_module(".plugin", __package__)
+
+
 def _why_compiled_is_missing():
     try:
         importlib.import_module(_MODULES["compiled"])

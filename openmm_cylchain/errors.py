@@ -12,23 +12,41 @@ class InstabilityError(RuntimeError):
     ----------
     filament, segment : int or None
         Which segment of which filament; None where a particle outside filaments is at fault, or it is not known.
+    other_filament, other_segment : int or None
+        What the segment would pass through, or is linked with, in an implicit step that cannot be solved.
     particle : int or None
         Which particle outside filaments.
+    link : int or None
+        The number of a crosslink that is at fault.
     step : int or None
         In which step, counting from 1.
     """
 
-    def __init__(self, message="", *, filament=None, segment=None, particle=None, step=None):
+    def __init__(
+        self,
+        message="",
+        *,
+        filament=None,
+        segment=None,
+        particle=None,
+        step=None,
+        link=None,
+        other_filament=None,
+        other_segment=None,
+    ):
         super().__init__(message)
         self.filament = filament
         self.segment = segment
         self.particle = particle
         self.step = step
+        self.link = link
+        self.other_filament = other_filament
+        self.other_segment = other_segment
 
     @property
     def place(self) -> dict[str, int | None]:
         """The attributes by their names, for an error with another text."""
-        return {"filament": self.filament, "segment": self.segment, "particle": self.particle, "step": self.step}
+        return dict(vars(self))
 
 
 # Text and place of the last error of a PythonForce. OpenMM hands on the text alone, as that of an OpenMMException.

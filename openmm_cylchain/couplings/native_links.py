@@ -1,13 +1,12 @@
 """Crosslinks that the compiled engine computes: a CylinderChainLinkForce."""
 
-import importlib
 from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
 import openmm
 
-from ..engine_choice import available_engines
+from ..engine_choice import load_plugin
 from ..errors import InputError
 from ..units.types import FloatArray, IntArray
 from .crosslink_tables import CrosslinkTable
@@ -17,22 +16,15 @@ from .link_store import LinkStore, not_of_this_system, unknown_crosslinks
 _CHANGES = 256
 
 
-def _load_plugin():
-    # None where the compiled engine is missing: then no System has a force of it.
-    if available_engines()["compiled"] is not None:
-        return None
-    return importlib.import_module("..plugin", __package__)
-
-
 def is_of_compiled_engine(system: openmm.System) -> bool:
     """Whether a System has filaments of the compiled engine."""
-    plugin = _load_plugin()
+    plugin = load_plugin()
     return plugin is not None and any(plugin.CylinderChainForce.isinstance(force) for force in system.getForces())
 
 
 def is_link_force(force: openmm.Force) -> bool:
     """Whether a force of a System is a CylinderChainLinkForce."""
-    plugin = _load_plugin()
+    plugin = load_plugin()
     return plugin is not None and plugin.CylinderChainLinkForce.isinstance(force)
 
 
@@ -68,7 +60,7 @@ class NativeLinks(LinkStore):
         """Those of a force of a System, or None if it is no such force, or its links differ in their potential."""
         if not is_link_force(force):
             return None
-        plugin = _load_plugin()
+        plugin = load_plugin()
         own = plugin.CylinderChainLinkForce.cast(force)
         models, links = own.getStretchingModelNames(), own.getLinks()
         number, rest, stiffness, extension = (getattr(one, "_value", one) for one in own.getDefaultLinkParameters())
@@ -90,7 +82,7 @@ class NativeLinks(LinkStore):
         defaults: tuple[float, float, float],
     ) -> "tuple[NativeLinks, openmm.Force]":
         """Make the force of a System."""
-        plugin = _load_plugin()
+        plugin = load_plugin()
         kind = plugin.CylinderChainLinkForce
         force = kind()
         number = kind.getStretchingModelNames().index(model)
@@ -129,7 +121,7 @@ class NativeLinks(LinkStore):
 
     def boxes(self, context: openmm.Context, state: openmm.State) -> tuple[FloatArray | None, FloatArray | None]:
         """See LinkStore."""
-        plugin = _load_plugin()
+        plugin = load_plugin()
         box = state.getPeriodicBoxVectors(asNumpy=True)._value
         forces = [one for one in context.getSystem().getForces() if plugin.CylinderChainForce.isinstance(one)]
         nearest = any(one.usesPeriodicBoundaryConditions() for one in forces)
@@ -171,7 +163,7 @@ class NativeLinks(LinkStore):
         return force.getStretchingModelNames().index(self.model)
 
     def _force_in(self, context):
-        kind = _load_plugin().CylinderChainLinkForce
+        kind = load_plugin().CylinderChainLinkForce
         # The System keeps what they are, so none of them is kept here.
         forces = [force for force in context.getSystem().getForces() if kind.isinstance(force)]
         if self._order is None:

@@ -6,6 +6,10 @@ z2 move against each other by the mean square 2 k_B T dt (1/z1 + 1/z2) along eac
 two filaments touch, which would often be predicted on the wrong sides of each other. Links of rest length zero have no
 direction, and do not bind.
 
+A place in contact moves as a segment does, or as the end of a filament that is short: that of a rod of n segments has
+the mobility (1/zeta + l0^2/(4 zeta_r))/n across it, with the friction zeta and zeta_r of a segment that moves and
+turns, which is four times that of its middle.
+
 Measured for F-actin in segments of 100 nm: the distribution of gaps beyond 10 nm is right to 5 % at that step, for
 contacts of 30 nm; beyond it, more and more steps must be divided.
 """
@@ -63,12 +67,13 @@ def steps_of_couplings(
     kT = thermal_energy(temperature)
     if not coupled or kT == 0.0:
         return []
-    mobility = _mobilities(filaments, system, particle_friction)
+    mobility = mobilities(filaments, system, particle_friction)
+    mobility_in_contact = _mobilities_in_contact(filaments, mobility)
     steps = []
     for index, force in coupled:
         label = f"{force.getName()} (force {index})"
         capsules = as_capsule_contact_force(force)
-        found = _contacts(capsules, mobility) if capsules is not None else _links(force, filaments, mobility)
+        found = _contacts(capsules, mobility_in_contact) if capsules is not None else _links(force, filaments, mobility)
         if found is None:
             continue
         distance, total, what, of_what = found
@@ -80,8 +85,8 @@ def steps_of_couplings(
     return steps
 
 
-def _mobilities(filaments: FilamentCollection, system: openmm.System, particle_friction: Numbers | None) -> FloatArray:
-    # Of all particles; zero for those that do not move.
+def mobilities(filaments: FilamentCollection, system: openmm.System, particle_friction: Numbers | None) -> FloatArray:
+    """Of all particles of a System, across segments; zero for those that do not move. In nm^2 mol/(kJ ps)."""
     mobility = np.zeros(system.getNumParticles())
     for filament, nodes in zip(filaments, filaments.node_indices):
         friction = filament.type.segment_friction(filaments.viscosity, filaments.temperature, filament.segments)
@@ -91,6 +96,19 @@ def _mobilities(filaments: FilamentCollection, system: openmm.System, particle_f
     others, frictions = describe_other_particles(system, np.concatenate(filaments.node_indices), particle_friction)
     mobility[others] = 1.0 / np.asarray(frictions, dtype=float)
     return mobility
+
+
+def _mobilities_in_contact(filaments, mobility):
+    # Of ends of filaments that are as short as they can turn.
+    result = mobility.copy()
+    for filament, nodes in zip(filaments, filaments.node_indices):
+        friction = filament.type.segment_friction(filaments.viscosity, filaments.temperature, filament.segments)
+        if filament.closed or not (friction.perpendicular > 0.0 and friction.rotational > 0.0):
+            continue
+        length = filament.type.segment_lengths(filament.segments, filament.closed).max()
+        end = (1.0 / friction.perpendicular + length**2 / (4.0 * friction.rotational)) / filament.segments
+        result[nodes] = np.maximum(result[nodes], end)
+    return result
 
 
 def _contacts(force, mobility):

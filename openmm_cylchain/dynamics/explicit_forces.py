@@ -28,6 +28,7 @@ from ..couplings.pulling import is_constant_force
 from ..couplings.walls import WALL_NAME, as_filament_wall_force
 from ..errors import TimeStepWarning
 from ..filaments.collection import FilamentCollection
+from ..kinetics.binding_force import find_binding_force, is_binding_force
 from ..units.types import FloatArray, Indices, IntArray, Numbers
 from .coupled_step import is_coupled
 from .mobility import FilamentResponse
@@ -392,6 +393,8 @@ class ExplicitForces:
         links = Crosslinks.of_force(force)
         if links is not None or is_link_force(force):
             return None if links is None else self._crosslinks(links, label)
+        if is_binding_force(force):
+            return [] if self._scheme in IMPLICIT_SCHEMES else self._linkers(label)
         if force.getName().startswith("CylinderChain") or isinstance(force, _WITHOUT_STIFFNESS):
             return []
         if isinstance(force, openmm.HarmonicBondForce):
@@ -421,17 +424,23 @@ class ExplicitForces:
             stiffness = links.thermal_stiffness(table, self._filaments.temperature)
             first, second = (self._holders(table.places, side) for side in (0, 1))
             return [Springs(label, "crosslink", table.numbers, first, second, stiffness)]
-        # Those to come may join any two places: ends of filaments move most.
+        return [self._to_come(label, "crosslink", links.thermal_stiffness(None, self._filaments.temperature))]
+
+    def _linkers(self, label):
+        linkers = find_binding_force(self._system)
+        kinds = range(linkers.getNumLinkerTypes())
+        stiffness = max((linkers.getLinkerTypeParameters(kind)[3] for kind in kinds), default=0.0)
+        return [self._to_come(label, "linker", stiffness)] if stiffness > 0.0 else []
+
+    def _to_come(self, label, what, stiffness):
+        # What may join any two places: ends of filaments move most.
         ends = [int(node) for nodes in self._filaments.node_indices for node in nodes[[0, -1]]]
         first, second = np.array(ends), np.roll(ends, 2)
         if len(self._filaments) == 1:
             first, second = first[:1], np.array(ends[1:])
-        stiffness = np.full(len(first), links.thermal_stiffness(None, self._filaments.temperature))
-        return [
-            Springs(
-                label, "crosslink to come, on the end of filament", np.arange(len(first)) // 2, first, second, stiffness
-            )
-        ]
+        numbers = np.arange(len(first)) // 2
+        item = f"{what} to come, on the end of filament"
+        return Springs(label, item, numbers, first, second, np.full(len(first), stiffness))
 
     def _holders(self, places, side):
         # Particles, and numbers behind all of them for places between two. Fixed points are nowhere.

@@ -13,6 +13,7 @@ from ..mechanics.flow import Flow
 from ..units.types import Numbers, Scalar
 from .coupled_step import steps_of_couplings
 from .explicit_forces import ExplicitForces
+from .kinetic_step import steps_of_kinetics
 from .recommended_step import contact_diffusion_step, contact_time_step, recommended_time_step
 from .schemes import IMPLICIT_SCHEMES, check_scheme
 from .time_step import TimeStep, shortest
@@ -43,6 +44,7 @@ def recommended_step_of(
         steps += _steps_of_diffusion(filaments, system, temperature, confidence, scheme)
         if scheme in IMPLICIT_SCHEMES:
             steps += steps_of_couplings(filaments, system, temperature, particle_friction)
+        steps += steps_of_kinetics(filaments, system, scheme, temperature)
         steps.append(ExplicitForces(system, filaments, scheme, particle_friction).recommended_step())
     return shortest(steps)
 

@@ -17,6 +17,7 @@ from ..dynamics.schemes import SCHEMES as ALL_SCHEMES
 from ..dynamics.step_watch import DividedSteps, ExplicitWork
 from ..dynamics.time_step import as_step
 from ..errors import InputError, InstabilityError, instability_in_force
+from ..kinetics.binding_force import find_binding_force, make_binding_force
 from ..mechanics.flow import Flow, as_flow
 from ..mechanics.potentials import BENDING_MODELS as ALL_BENDING_MODELS
 from ..mechanics.potentials import STRETCHING_POTENTIALS
@@ -84,6 +85,8 @@ _OTHER_FRICTION = 1.0
 class CompiledEngine(Engine):
     """The compiled engine: a CylinderChainForce and a CylinderChainIntegrator, on the Reference and CPU platforms."""
 
+    has_linkers = True
+
     def add_forces(self, system, placed, stretching_force_group, bending_force_group):
         """Add one CylinderChainForce, with one force group for stretching and bending."""
         if stretching_force_group != bending_force_group:
@@ -98,6 +101,8 @@ class CompiledEngine(Engine):
         for tether in placed.tethers:
             force.addTether(tether.filament, tether.node, openmm.Vec3(*tether.point), tether.stiffness)
         system.addForce(force)
+        if placed.linkers:
+            system.addForce(make_binding_force(placed.linkers, placed.filaments, placed.temperature, placed.periodic))
 
     def create_integrator(self, system, placed, settings):
         """Create a NativeIntegrator."""
@@ -118,6 +123,10 @@ class CompiledEngine(Engine):
         )
         for particle, friction in zip(others, frictions):
             integrator.setParticleFriction(int(particle), float(friction))
+        linkers = find_binding_force(system)
+        if linkers is not None:
+            linkers.setTemperature(settings.temperature)
+            linkers.setRandomNumberSeed(settings.random_seed)
         return integrator
 
     def flow_of(self, context):
@@ -333,6 +342,9 @@ class NativeIntegrator(CylinderChainIntegrator):
         message = str(error).replace("outside chains", "outside filaments")
         if error.chain is not None and error.chain < len(self._labels):
             message = self._labels[error.chain] + message.removeprefix(f"Chain {error.chain}")
+        if error.other_chain is not None and error.other_chain < len(self._labels):
+            label = self._labels[error.other_chain]
+            message = message.replace(f" of chain {error.other_chain}", f" of {label[0].lower()}{label[1:]}")
         if error.kind == "torn-chain":
             return InputError(f"{message} (openmm_cylchain.make_whole).")
         if error.kind == "length-out-of-range":
@@ -340,9 +352,10 @@ class NativeIntegrator(CylinderChainIntegrator):
         if error.kind == "unknown-links":
             return InputError(f"{message}.")
         if error.kind == "link-out-of-range":
-            return InstabilityError(message + self._advice)
+            return InstabilityError(message + self._advice, link=error.link)
         if error.kind in ("unstable-chain", "unstable-particle"):
-            place = {"filament": error.chain, "segment": error.segment, "particle": error.particle, "step": error.step}
+            place = {"filament": error.chain, "other_filament": error.other_chain}
+            place |= {name: getattr(error, name) for name in ("segment", "other_segment", "particle", "link", "step")}
             return InstabilityError(message + self._advice, **place)
         return error
 

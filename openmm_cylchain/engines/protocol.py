@@ -8,6 +8,7 @@ import numpy as np
 import openmm
 
 from ..filaments.filament import Filament, Tether
+from ..kinetics.linkers import Linkers
 from ..mechanics.flow import Flow
 
 
@@ -26,6 +27,10 @@ class PlacedFilaments:
         Of the solvent, in kJ ps/(mol nm^3).
     temperature : float
         For the friction of segments, in K.
+    linkers : tuple of Linkers
+        What binds to filaments and unbinds.
+    periodic : bool
+        Whether linkers join nearest periodic images.
     """
 
     filaments: tuple[Filament, ...]
@@ -33,6 +38,8 @@ class PlacedFilaments:
     tethers: tuple[Tether, ...]
     viscosity: float
     temperature: float
+    linkers: tuple[Linkers, ...] = ()
+    periodic: bool = False
 
     @property
     def nodes(self) -> np.ndarray:
@@ -70,6 +77,9 @@ class IntegratorSettings:
 
 class Engine(ABC):
     """What computes filaments. It keeps nothing of its own: state belongs to the Context."""
+
+    has_linkers = False
+    """Whether it knows linkers that bind to filaments and unbind."""
 
     @abstractmethod
     def add_forces(

@@ -25,8 +25,10 @@ enum class NoiseKind : std::uint32_t {
      * a mode, by its number, where modes are what is moved: three for its motion.
      */
     Node = 5,
-    /** Of a link between places of chains, by its number, with zero for the chain: for its coordinates. */
-    Link = 6
+    /** Of a link between places of chains, by its number, with that of its force for the chain: for its coordinates. */
+    Link = 6,
+    /** Of a linker that binds and unbinds, by its number, with that of its force for the chain: when, where and how. */
+    Linker = 7
 };
 
 /**

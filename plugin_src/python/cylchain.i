@@ -18,6 +18,7 @@ namespace std {
 
 %{
 #include "openmm/CylinderChainException.h"
+#include "openmm/CylinderChainBindingForce.h"
 #include "openmm/CylinderChainContactForce.h"
 #include "openmm/CylinderChainForce.h"
 #include "openmm/CylinderChainIntegrator.h"
@@ -55,8 +56,9 @@ static PyObject* newException(PyObject* type, const std::exception& e) {
     if (own == NULL)
         return PyObject_CallFunction(type, "s", e.what());
     const CylinderChainException::Place& place = own->getPlace();
-    return PyObject_CallFunction(type, "ssNNNNN", e.what(), own->getKindName(), newNumber(place.chain),
-            newNumber(place.segment), newNumber(place.particle), newNumber(place.step), newNumber(place.link));
+    return PyObject_CallFunction(type, "ssNNNNNNN", e.what(), own->getKindName(), newNumber(place.chain),
+            newNumber(place.segment), newNumber(place.particle), newNumber(place.step), newNumber(place.link),
+            newNumber(place.otherChain), newNumber(place.otherSegment));
 }
 
 static void raiseException(const std::exception& e) {
@@ -119,7 +121,7 @@ static void raiseException(const std::exception& e) {
 }
 
 %apply int& OUTPUT {int& bendingModel, int& stretchingModel, int& chain, int& node, int& particle, int& steps,
-        int& particles, int& chain1, int& segment1, int& chain2, int& segment2};
+        int& particles, int& chain1, int& segment1, int& chain2, int& segment2, int& hand1, int& hand2};
 
 %typemap(in, numinputs=0) Vec3& point (OpenMM::Vec3 value) {
     $1 = &value;
@@ -201,13 +203,15 @@ static bool takeNumbers(PyObject* object, std::vector<T>& values) {
 }
 %typemap(argout) const std::vector<double>& fractions {
 }
-%apply std::vector<int>& numbers {std::vector<int>& ends, std::vector<int>& models, std::vector<int>& active};
+%apply std::vector<int>& numbers {std::vector<int>& ends, std::vector<int>& models, std::vector<int>& active,
+        std::vector<int>& types, std::vector<int>& anchors, std::vector<int>& chains};
 %apply const std::vector<int>& numbers {const std::vector<int>& ends, const std::vector<int>& models,
-        const std::vector<int>& active};
+        const std::vector<int>& active, const std::vector<int>& types, const std::vector<int>& anchors,
+        const std::vector<int>& chains};
 %apply std::vector<double>& tensions {std::vector<double>& fractions, std::vector<double>& points,
-        std::vector<double>& parameters};
+        std::vector<double>& parameters, std::vector<double>& places};
 %apply const std::vector<double>& fractions {const std::vector<double>& points,
-        const std::vector<double>& parameters};
+        const std::vector<double>& parameters, const std::vector<double>& places};
 
 %typemap(in, numinputs=0) std::vector<Vec3>& vectors (std::vector<OpenMM::Vec3> value) {
     $1 = &value;
@@ -225,7 +229,11 @@ static bool takeNumbers(PyObject* object, std::vector<T>& values) {
 %apply double& OUTPUT {double& restLength, double& stretchingStiffness, double& maximumExtension,
         double& parallelFriction, double& perpendicularFriction, double& rotationalFriction,
         double& extensionalFriction, double& length, double& stiffness, double& stretching, double& bending,
-        double& propulsion, double& work};
+        double& propulsion, double& work, double& bindingRate, double& reach, double& unbindingRate,
+        double& strainShare, double& unbindingForce, double& catchRate, double& catchForce, double& speed,
+        double& stallForce, double& volume, double& concentration};
+%apply bool& OUTPUT {bool& walksBackward, bool& holdsAtEnds, bool& sameChain};
+%apply long long& OUTPUT {long long& bindings, long long& unbindings};
 
 %pythoncode %{
 import openmm
@@ -241,9 +249,12 @@ class CylinderChainException(openmm.OpenMMException):
             "unknown-links", "nothing-recorded"}
     chain, segment, particle, step, link : int or None
         None where it is not known. Steps count from 1.
+    other_chain, other_segment : int or None
+        The other segment of a contact or link.
     """
 
-    def __init__(self, message="", kind=None, chain=None, segment=None, particle=None, step=None, link=None):
+    def __init__(self, message="", kind=None, chain=None, segment=None, particle=None, step=None, link=None,
+                 other_chain=None, other_segment=None):
         super().__init__(message)
         self.kind = kind
         self.chain = chain
@@ -251,6 +262,8 @@ class CylinderChainException(openmm.OpenMMException):
         self.particle = particle
         self.step = step
         self.link = link
+        self.other_chain = other_chain
+        self.other_segment = other_segment
 
 
 _LENGTH = unit.nanometer
@@ -387,6 +400,7 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %enddef
 
 %concreteClass(CylinderChainForce, Force)
+%concreteClass(CylinderChainBindingForce, Force)
 %concreteClass(CylinderChainContactForce, Force)
 %concreteClass(CylinderChainLinkForce, Force)
 %concreteClass(CylinderChainWallForce, Force)
@@ -399,6 +413,9 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %ignore OpenMM::CylinderChainContactForce::SphereInfo;
 %ignore OpenMM::CylinderChainContactForce::ExclusionInfo;
 %ignore OpenMM::CylinderChainWallForce::ParticleInfo;
+%ignore OpenMM::CylinderChainBindingForce::getState;
+%ignore OpenMM::CylinderChainBindingForce::getHand;
+%ignore OpenMM::CylinderChainBindingForce::getLinkerType;
 %ignore OpenMM::CylinderChainLinkForce::getTable;
 %ignore OpenMM::CylinderChainLinkForce::setTable;
 %import "mechanics/Enumerators.h"
@@ -407,6 +424,7 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %import "dynamics/Schemes.h"
 %import "dynamics/Precisions.h"
 %include "openmm/CylinderChainForce.h"
+%include "openmm/CylinderChainBindingForce.h"
 %include "openmm/CylinderChainContactForce.h"
 %include "openmm/CylinderChainLinkForce.h"
 %include "openmm/CylinderChainWallForce.h"

@@ -1,13 +1,22 @@
 #include "openmm/internal/ChainCouplings.h"
+#include "openmm/OpenMMException.h"
 #include "openmm/System.h"
 #include <algorithm>
+#include <cmath>
+#include <sstream>
 
 using namespace OpenMM;
 using namespace cylchain;
 using namespace std;
 
+static string asText(double number) {
+    stringstream text;
+    text << number;
+    return text.str();
+}
+
 ChainCouplings::ChainCouplings(ContextImpl& context, const CylinderChainDescription& chains,
-        const OtherParticles& others) : system(context.getSystem()), others(others) {
+        const OtherParticles& others) : context(context), system(context.getSystem()), others(others) {
     before.assign(system.getNumParticles(), -1);
     behind.assign(system.getNumParticles(), -1);
     isNode.assign(system.getNumParticles(), false);
@@ -24,7 +33,14 @@ ChainCouplings::ChainCouplings(ContextImpl& context, const CylinderChainDescript
     for (ForceImpl* impl : context.getForceImpls()) {
         CylinderChainLinkForceImpl* ofLinks = dynamic_cast<CylinderChainLinkForceImpl*>(impl);
         if (ofLinks != NULL)
-            links.push_back({ofLinks, -1, false});
+            links.push_back({{ofLinks, false}, -1});
+        CylinderChainBindingForceImpl* ofLinkers = dynamic_cast<CylinderChainBindingForceImpl*>(impl);
+        if (ofLinkers != NULL) {
+            const vector<Place>& anchors = ofLinkers->getAnchors();
+            linkers.push_back({ofLinkers, all_of(anchors.begin(), anchors.end(), [&] (const Place& anchor) {
+                return canTake(anchor);
+            })});
+        }
         CylinderChainWallForceImpl* ofWalls = dynamic_cast<CylinderChainWallForceImpl*>(impl);
         if (ofWalls != NULL) {
             const vector<WallParticle>& particles = ofWalls->getWalls().particles;
@@ -44,6 +60,33 @@ ChainCouplings::ChainCouplings(ContextImpl& context, const CylinderChainDescript
             return canTake(place);
         });
         contacts.push_back({ofContacts, taken});
+    }
+}
+
+void ChainCouplings::refuseNarrowBox(const CylinderChainDescription& chains) const {
+    double longest = 0;
+    for (const Chain& chain : chains.getChains())
+        for (const Segment& segment : chain.segments)
+            longest = max(longest, segment.restLength);
+    Vec3 a, b, c;
+    context.getPeriodicBoxVectors(a, b, c);
+    const Vec3 faces[] = {b.cross(c), c.cross(a), a.cross(b)};
+    double narrowest = INFINITY;
+    for (const Vec3& face : faces)
+        narrowest = min(narrowest, a[0]*b[1]*c[2]/sqrt(face.dot(face)));
+    for (const Contacts& own : contacts) {
+        if (!own.taken || !own.force->usesPeriodicBoundaryConditions())
+            continue;
+        double diameter = 0;
+        for (const Capsule& capsule : own.force->getSearch().getSystem().capsules)
+            diameter = max(diameter, 2*capsule.radius);
+        const double needed = 2*(longest+DIAMETERS_OF_BOX*diameter);
+        if (narrowest < needed)
+            throw OpenMMException("The periodic box is too small for contacts in implicit steps: it is "+
+                    asText(narrowest)+" nm wide between two of its faces, but segments of "+asText(longest)+
+                    " nm with contacts of "+asText(diameter)+" nm need twice their length and "+
+                    asText(DIAMETERS_OF_BOX)+" diameters, "+asText(needed)+
+                    " nm. Take a larger box or shorter segments");
     }
 }
 
@@ -72,31 +115,19 @@ void ChainCouplings::update() {
     }
 }
 
-bool ChainCouplings::isTaken(const Links& own, int groups) const {
-    return own.taken && (groups&(1<<own.force->getOwner().getForceGroup())) != 0;
-}
-
-bool ChainCouplings::isTaken(const Contacts& own, int groups) const {
-    return own.taken && (groups&(1<<own.force->getOwner().getForceGroup())) != 0;
-}
-
-bool ChainCouplings::isTaken(const Walls& own, int groups) const {
-    return own.taken && (groups&(1<<own.force->getOwner().getForceGroup())) != 0;
-}
-
 ChainCouplings::Exclusion::Exclusion(ChainCouplings& couplings, int groups) {
     if (groups == 0)
         return;
     couplings.update();
-    for (const Links& own : couplings.links)
-        if (couplings.isTaken(own, groups))
-            links.emplace_back(new CylinderChainLinkForceImpl::Exclusion(*own.force, true));
-    for (const Contacts& own : couplings.contacts)
-        if (couplings.isTaken(own, groups))
-            contacts.emplace_back(new CylinderChainContactForceImpl::Exclusion(*own.force, true));
-    for (const Walls& own : couplings.walls)
-        if (couplings.isTaken(own, groups))
-            walls.emplace_back(new CylinderChainWallForceImpl::Exclusion(*own.force, true));
+    auto exclude = [&] (const auto& all) {
+        for (const auto& own : all)
+            if (own.isTaken(groups))
+                exclusions.emplace_back(new StepForceImpl::Exclusion(*own.force));
+    };
+    exclude(couplings.links);
+    exclude(couplings.linkers);
+    exclude(couplings.contacts);
+    exclude(couplings.walls);
 }
 
 void ChainCouplings::addParticle(const Place& place, vector<int>& particles) const {
@@ -111,24 +142,36 @@ const CoupledForces& ChainCouplings::describe(int groups, double friction) {
     forces.contacts.clear();
     forces.walls.clear();
     forces.particles.clear();
+    owners.clear();
     vector<int> particles;
     for (const Links& own : links) {
         const vector<Link>& present = own.force->getLinks();
-        if (!isTaken(own, groups) || present.empty())
+        if (!own.isTaken(groups) || present.empty())
             continue;
         forces.links.push_back({&present, own.force->getOwner().usesPeriodicBoundaryConditions(),
                 own.force->takesNearestParticles()});
+        owners.push_back(&own.force->getOwner());
         for (const Link& link : present) {
             addParticle(link.first, particles);
             addParticle(link.second, particles);
         }
     }
+    for (const Linkers& own : linkers) {
+        if (!own.isTaken(groups) || own.force->getLinks().empty())
+            continue;
+        forces.links.push_back({&own.force->getLinks(), own.force->getOwner().usesPeriodicBoundaryConditions(),
+                own.force->takesNearestParticles()});
+        owners.push_back(&own.force->getOwner());
+        for (const Place& anchor : own.force->getAnchors())
+            addParticle(anchor, particles);
+    }
     for (const Contacts& own : contacts) {
         const vector<Capsule>& capsules = own.force->getSearch().getSystem().capsules;
-        if (!isTaken(own, groups) || capsules.empty() || own.force->getStiffness() == 0)
+        if (!own.isTaken(groups) || capsules.empty() || own.force->getStiffness() == 0)
             continue;
         forces.contacts.push_back({&own.force->getSearch(), own.force->getStiffness(),
                 own.force->usesPeriodicBoundaryConditions()});
+        owners.push_back(&own.force->getOwner());
         for (const Capsule& capsule : capsules) {
             Place place;
             place.first = capsule.first;
@@ -138,9 +181,10 @@ const CoupledForces& ChainCouplings::describe(int groups, double friction) {
     }
     for (const Walls& own : walls) {
         const WallSystem& present = own.force->getWalls();
-        if (!isTaken(own, groups) || present.particles.empty() || present.stiffness == 0)
+        if (!own.isTaken(groups) || present.particles.empty() || present.stiffness == 0)
             continue;
         forces.walls.push_back(&present);
+        owners.push_back(&own.force->getOwner());
         for (const WallParticle& wallParticle : present.particles) {
             Place place;
             place.first = wallParticle.particle;
@@ -152,4 +196,8 @@ const CoupledForces& ChainCouplings::describe(int groups, double friction) {
     for (int particle : particles)
         forces.particles.push_back({particle, 1/others.getMobility(particle, friction)});
     return forces;
+}
+
+const Force& ChainCouplings::getForce(const BrokenCoupling& coupling) const {
+    return *owners[coupling.force];
 }

@@ -8,9 +8,9 @@ using namespace OpenMM;
 using namespace cylchain;
 using namespace std;
 
-CylinderChainContactForceImpl::CylinderChainContactForceImpl(const CylinderChainContactForce& owner) : owner(owner),
-        stiffness(owner.getStiffness()), periodic(owner.usesPeriodicBoundaryConditions()), excluded(false) {
-    forceGroup = owner.getForceGroup();
+CylinderChainContactForceImpl::CylinderChainContactForceImpl(const CylinderChainContactForce& owner) :
+        StepForceImpl(owner), owner(owner), stiffness(owner.getStiffness()),
+        periodic(owner.usesPeriodicBoundaryConditions()) {
 }
 
 int CylinderChainContactForceImpl::getNumSegments(int chain) const {
@@ -57,7 +57,7 @@ void CylinderChainContactForceImpl::initialize(ContextImpl& context) {
 
 double CylinderChainContactForceImpl::calcForcesAndEnergy(ContextImpl& context, bool includeForces,
         bool includeEnergy, int groups) {
-    if ((groups&(1<<forceGroup)) != 0 && !excluded)
+    if (isIn(groups) && !isExcluded())
         return kernel.getAs<CalcCylinderChainContactForceKernel>().execute(context, includeForces, includeEnergy);
     return 0.0;
 }

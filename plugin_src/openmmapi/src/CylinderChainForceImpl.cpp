@@ -7,8 +7,8 @@
 using namespace OpenMM;
 using namespace std;
 
-CylinderChainForceImpl::CylinderChainForceImpl(const CylinderChainForce& owner) : owner(owner), excluded(false) {
-    forceGroup = owner.getForceGroup();
+CylinderChainForceImpl::CylinderChainForceImpl(const CylinderChainForce& owner) : StepForceImpl(owner),
+        owner(owner) {
 }
 
 void CylinderChainForceImpl::initialize(ContextImpl& context) {
@@ -30,7 +30,7 @@ void CylinderChainForceImpl::initialize(ContextImpl& context) {
 
 double CylinderChainForceImpl::calcForcesAndEnergy(ContextImpl& context, bool includeForces, bool includeEnergy,
         int groups) {
-    if ((groups&(1<<forceGroup)) != 0 && !excluded)
+    if (isIn(groups) && !isExcluded())
         return kernel.getAs<CalcCylinderChainForceKernel>().execute(context, includeForces, includeEnergy);
     return 0.0;
 }

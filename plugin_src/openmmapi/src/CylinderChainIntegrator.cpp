@@ -8,10 +8,12 @@
 #include "openmm/internal/CylinderChainForceImpl.h"
 #include "openmm/internal/CylinderChainStepper.h"
 #include "openmm/internal/LinkStorage.h"
+#include "openmm/internal/LinkerStorage.h"
 #include "openmm/internal/OSRngSeed.h"
 #include "openmm/serialization/SerializationNode.h"
 #include <cmath>
 #include <istream>
+#include <optional>
 #include <ostream>
 
 using namespace OpenMM;
@@ -232,8 +234,10 @@ void CylinderChainIntegrator::step(int steps) {
     countAfterSteps = context->getStepCount();
     const bool includesChains = (getIntegrationForceGroups()&(1<<chains->getOwner().getForceGroup())) != 0;
     for (int done = 0; done < steps;) {
-        if (context->updateContextState())
-            followsOn = false;
+        // A parameter of the Context counts the steps of linkers: that alone changes nothing.
+
+        const bool follows = followsOn;
+        followsOn = !context->updateContextState() && follows;
 
         // Where there are only chains, several steps are taken at once.  The first one is not among them, because
         // OpenMM checks that positions have been set, nor is one that blows up.
@@ -251,8 +255,9 @@ void CylinderChainIntegrator::step(int steps) {
         {
             // Most schemes compute the forces of the chains themselves, and implicit ones those of links and contacts.
 
-            const bool excluded = computesChainForces(static_cast<cylchain::Scheme>(scheme));
-            CylinderChainForceImpl::Exclusion exclusion(*chains, excluded);
+            optional<StepForceImpl::Exclusion> exclusion;
+            if (computesChainForces(static_cast<cylchain::Scheme>(scheme)))
+                exclusion.emplace(*chains);
             ChainCouplings::Exclusion couplings(stepper->getCouplings(), stepper->getCoupledGroups());
             context->calcForcesAndEnergy(true, false, getIntegrationForceGroups());
         }
@@ -275,7 +280,7 @@ uint64_t CylinderChainIntegrator::findNextStep() const {
 }
 
 void CylinderChainIntegrator::createCheckpoint(ostream& stream) const {
-    const int version = 4;
+    const int version = 5;
     stream.write((const char*) &version, sizeof(version));
     stream.write((const char*) &noiseLevel, sizeof(noiseLevel));
     stream.write((const char*) &noiseSeed, sizeof(noiseSeed));
@@ -284,6 +289,7 @@ void CylinderChainIntegrator::createCheckpoint(ostream& stream) const {
     const Vec3 flow[] = {flowVelocity, flowGradient[0], flowGradient[1], flowGradient[2], flowOrigin};
     stream.write((const char*) flow, sizeof(flow));
     writeLinks(stream, *context);
+    writeLinkers(stream, *context);
 }
 
 void CylinderChainIntegrator::loadCheckpoint(istream& stream) {
@@ -295,11 +301,13 @@ void CylinderChainIntegrator::loadCheckpoint(istream& stream) {
     stream.read((char*) &steps, sizeof(steps));
     Vec3 flow[5];
     stream.read((char*) flow, sizeof(flow));
-    if (!stream || version < 3 || version > 4 || level < 0 || level > getLargestPathLevel())
+    if (!stream || version < 3 || version > 5 || level < 0 || level > getLargestPathLevel())
         throw OpenMMException("loadCheckpoint: Checkpoint was not created with this version of "
                 "CylinderChainIntegrator");
     if (version > 3)
         readLinks(stream, *context);
+    if (version > 4)
+        readLinkers(stream, *context);
     setFlow(flow[0], flow[1], flow[2], flow[3], flow[4]);
     noiseLevel = level;
     noiseSeed = seed;
@@ -308,20 +316,22 @@ void CylinderChainIntegrator::loadCheckpoint(istream& stream) {
 }
 
 void CylinderChainIntegrator::serializeParameters(SerializationNode& node) const {
-    node.setIntProperty("version", 4);
+    node.setIntProperty("version", 5);
     node.setIntProperty("pathLevel", noiseLevel);
     node.setLongProperty("stepsTaken", findNextStep());
     const Vec3 flow[] = {flowVelocity, flowGradient[0], flowGradient[1], flowGradient[2], flowOrigin};
     for (const Vec3& vector : flow)
         node.createChildNode("Flow").setDoubleProperty("x", vector[0]).setDoubleProperty("y", vector[1])
                 .setDoubleProperty("z", vector[2]);
-    if (context != NULL)
+    if (context != NULL) {
         writeLinks(node, *context);
+        writeLinkers(node, *context);
+    }
 }
 
 void CylinderChainIntegrator::deserializeParameters(const SerializationNode& node) {
     const int version = node.getIntProperty("version");
-    if (version < 1 || version > 4)
+    if (version < 1 || version > 5)
         throw OpenMMException("Unsupported version number");
 
     // The same time on the path, or the next step after it.
@@ -329,8 +339,10 @@ void CylinderChainIntegrator::deserializeParameters(const SerializationNode& nod
     const int level = node.getIntProperty("pathLevel", 0);
     if (level < 0 || level > getLargestPathLevel())
         throw OpenMMException("Illegal path level: "+to_string(level));
-    if (context != NULL)
+    if (context != NULL) {
         readLinks(node, *context);
+        readLinkers(node, *context);
+    }
     stepsTaken = node.getLongProperty("stepsTaken");
     countAfterSteps = -1;
     if (noiseLevel >= level)

@@ -12,9 +12,8 @@
 using namespace OpenMM;
 using namespace std;
 
-CylinderChainLinkForceImpl::CylinderChainLinkForceImpl(const CylinderChainLinkForce& owner) : owner(owner),
-        context(NULL), upToDate(false), version(0), nearestParticles(false), excluded(false) {
-    forceGroup = owner.getForceGroup();
+CylinderChainLinkForceImpl::CylinderChainLinkForceImpl(const CylinderChainLinkForce& owner) : StepForceImpl(owner),
+        owner(owner), context(NULL), upToDate(false), version(0), nearestParticles(false) {
 }
 
 void CylinderChainLinkForceImpl::initialize(ContextImpl& context) {
@@ -121,7 +120,7 @@ const vector<cylchain::Link>& CylinderChainLinkForceImpl::getLinks() {
 
 double CylinderChainLinkForceImpl::calcForcesAndEnergy(ContextImpl& context, bool includeForces, bool includeEnergy,
         int groups) {
-    if ((groups&(1<<forceGroup)) == 0)
+    if (!isIn(groups))
         return 0.0;
 
     // An implicit step computes the forces itself, but it must begin within the range of each link.
@@ -130,11 +129,11 @@ double CylinderChainLinkForceImpl::calcForcesAndEnergy(ContextImpl& context, boo
     const bool anyRange = any_of(present.begin(), present.end(), [] (const cylchain::Link& link) {
         return hasRange(link.model);
     });
-    if (excluded && !anyRange)
+    if (isExcluded() && !anyRange)
         return 0.0;
     int outOfRange = -1;
     const double energy = kernel.getAs<CalcCylinderChainLinkForceKernel>().execute(context, present,
-            includeForces && !excluded, includeEnergy && !excluded, outOfRange);
+            includeForces && !isExcluded(), includeEnergy && !isExcluded(), outOfRange);
     if (outOfRange != -1)
         reportLink(outOfRange);
     return energy;

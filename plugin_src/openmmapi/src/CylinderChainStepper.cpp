@@ -1,4 +1,5 @@
 #include "openmm/internal/CylinderChainStepper.h"
+#include "couplings/Links.h"
 #include "mechanics/BrokenSegment.h"
 #include "mechanics/PeriodicBox.h"
 #include "openmm/CylinderChainException.h"
@@ -39,6 +40,8 @@ CylinderChainStepper::CylinderChainStepper(ContextImpl& context, const CylinderC
         kernel(createKernel(context, force, others)),
         explicitWork(getKernel().getLoop()), periodic(context.getSystem().usesPeriodicBoundaryConditions()),
         recorded(false) {
+    if (isImplicit(static_cast<Scheme>(integrator.getScheme())))
+        couplings.refuseNarrowBox(chains);
     explicitWork.initialize(findMobileParticles(chains, others));
 }
 
@@ -190,6 +193,8 @@ void CylinderChainStepper::step(uint64_t seed, int level, uint64_t step, bool fo
     const CoupledForces& coupled = couplings.describe(getCoupledGroups(), integrator.getFriction());
     const Instability found = coupled.empty() ? getKernel().displaceChains(context, settings) :
             getKernel().displaceCoupledChains(context, settings, coupled);
+    if (found.chain != -1 && found.coupling.kind != BrokenCoupling::None && areForcesFinite())
+        reportCoupling(found.coupling, coupled, settings);
     if (found.chain >= (int) chains.getChains().size())
         reportParticle(coupled.particles[found.chain-chains.getChains().size()].particle, settings);
     if (found.chain != -1)
@@ -302,6 +307,89 @@ void CylinderChainStepper::reportInstability(int chain, const StepSettings& sett
             "Use a smaller time step, or look for overlapping particles or excessive forces.";
     throw CylinderChainException(CylinderChainException::UnstableChain, {chain, broken.segment, -1, step},
             message.str());
+}
+
+bool CylinderChainStepper::areForcesFinite() {
+    const vector<Vec3>& forces = getKernel().getForces(context);
+    return all_of(forces.begin(), forces.end(), [] (const Vec3& force) {return isfinite(norm(force));});
+}
+
+string CylinderChainStepper::describeLink(const BrokenCoupling& coupling, const CoupledForces& coupled) const {
+    const CoupledForces::Links& links = coupled.links[coupling.force];
+    double box[9];
+    getBox(box);
+    const LinkBoxes boxes = {links.periodic ? box : NULL, links.nearestParticles ? box : NULL};
+    const auto link = find_if(links.links->begin(), links.links->end(), [&] (const Link& one) {
+        return one.number == coupling.link;
+    });
+    vector<Vec3> positions = getPositions();
+    const LinkPull pull = computePull(*link, &positions[0][0], boxes);
+    stringstream text;
+    text.precision(3);
+    text << pull.length << " nm long and has a force of " <<
+            norm(Vec3(pull.force[0], pull.force[1], pull.force[2])) << " kJ/mol/nm";
+    return text.str();
+}
+
+void CylinderChainStepper::reportCoupling(const BrokenCoupling& coupling, const CoupledForces& coupled,
+        const StepSettings& settings) {
+    const int numChains = chains.getChains().size();
+    auto isSegment = [&] (const BrokenCoupling::Place& place) {return place.chain >= 0 && place.chain < numChains;};
+    auto particleOf = [&] (const BrokenCoupling::Place& place) {
+        return place.chain < numChains ? -1 : coupled.particles[place.chain-numChains].particle;
+    };
+    auto describe = [&] (const BrokenCoupling::Place& place) {
+        if (isSegment(place))
+            return "segment "+to_string(place.segment)+" of chain "+to_string(place.chain);
+        const int particle = particleOf(place);
+        return particle < 0 ? string("what does not move") : "particle "+to_string(particle);
+    };
+
+    // The first one is a segment, or at least a particle.
+
+    BrokenCoupling::Place first = coupling.places[0], second = coupling.places[1];
+    if (!isSegment(first) && (isSegment(second) || first.chain < 0))
+        swap(first, second);
+    CylinderChainException::Place place;
+    place.step = settings.step+1;
+    place.particle = max(particleOf(first), particleOf(second));
+    stringstream message;
+    if (isSegment(first)) {
+        place.chain = first.chain;
+        place.segment = first.segment;
+        message << "Chain " << first.chain << " has blown up at segment " << first.segment;
+    }
+    else
+        message << "Particle " << place.particle << ", outside chains, has blown up";
+    if (isSegment(second)) {
+        place.otherChain = second.chain;
+        place.otherSegment = second.segment;
+    }
+    message << " in step " << place.step << ": ";
+    switch (coupling.kind) {
+        case BrokenCoupling::Contact:
+            if (coupling.reason == BrokenCoupling::Crosses)
+                message << "it would pass through " << describe(second) << ", however short the parts of the step";
+            else if (coupling.reason == BrokenCoupling::LeavesBox)
+                message << "it moves too far for the periodic box, which must be wider than twice what a segment with "
+                        "its diameter passes over in a step";
+            else
+                message << "its contact with " << describe(second) << " cannot be solved";
+            break;
+        case BrokenCoupling::Link:
+            place.link = coupling.link;
+            message << "link " << place.link << " to " << describe(second) <<
+                    (coupling.reason == BrokenCoupling::LeavesRange ? " would leave the range of its potential" :
+                    " cannot be solved") <<
+                    ". It is " << describeLink(coupling, coupled);
+            break;
+        default:
+            message << "a wall cannot hold it";
+    }
+    message << " (" << couplings.getForce(coupling).getName() << "). Positions are those before this step. "
+            "Use a smaller time step, or look for overlapping particles or excessive forces.";
+    throw CylinderChainException(place.chain >= 0 ? CylinderChainException::UnstableChain :
+            CylinderChainException::UnstableParticle, place, message.str());
 }
 
 void CylinderChainStepper::reportParticle(int particle, const StepSettings& settings) const {

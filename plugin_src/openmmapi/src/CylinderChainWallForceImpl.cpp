@@ -9,9 +9,8 @@ using namespace OpenMM;
 using namespace cylchain;
 using namespace std;
 
-CylinderChainWallForceImpl::CylinderChainWallForceImpl(const CylinderChainWallForce& owner) : owner(owner),
-        excluded(false) {
-    forceGroup = owner.getForceGroup();
+CylinderChainWallForceImpl::CylinderChainWallForceImpl(const CylinderChainWallForce& owner) : StepForceImpl(owner),
+        owner(owner) {
 }
 
 WallSystem CylinderChainWallForceImpl::describe() const {
@@ -43,7 +42,7 @@ void CylinderChainWallForceImpl::initialize(ContextImpl& context) {
 
 double CylinderChainWallForceImpl::calcForcesAndEnergy(ContextImpl& context, bool includeForces, bool includeEnergy,
         int groups) {
-    if ((groups&(1<<forceGroup)) != 0 && !excluded)
+    if (isIn(groups) && !isExcluded())
         return kernel.getAs<CalcCylinderChainWallForceKernel>().execute(context, includeForces, includeEnergy);
     return 0.0;
 }

@@ -1,5 +1,6 @@
 #include "openmm/internal/LinkStorage.h"
 #include "openmm/OpenMMException.h"
+#include "openmm/internal/CheckpointValues.h"
 #include "openmm/internal/CylinderChainLinkForceImpl.h"
 #include "openmm/internal/LinkDescription.h"
 #include "openmm/serialization/SerializationNode.h"
@@ -109,27 +110,17 @@ static void giveTables(const vector<LinkTable>& tables, ContextImpl& context) {
         forces[i]->setTable(tables[i]);
 }
 
-template <class T> static void writeValue(ostream& stream, const T& value) {
-    stream.write(reinterpret_cast<const char*>(&value), sizeof(value));
-}
+static const char* const WITHIN = "the links of a CylinderChainLinkForce";
 
 template <class T> static void writeValues(ostream& stream, const vector<T>& values) {
     stream.write(reinterpret_cast<const char*>(values.data()), values.size()*sizeof(T));
-}
-
-template <class T> static T readValue(istream& stream) {
-    T value = T();
-    stream.read(reinterpret_cast<char*>(&value), sizeof(value));
-    if (!stream)
-        throw OpenMMException("loadCheckpoint: The checkpoint ends within the links of a CylinderChainLinkForce");
-    return value;
 }
 
 template <class T> static vector<T> readValues(istream& stream, size_t count) {
     // One by one, so that a checkpoint which is cut off cannot ask for more memory than it has.
     vector<T> values;
     for (size_t i = 0; i < count; i++)
-        values.push_back(readValue<T>(stream)); // NOLINT(performance-inefficient-vector-operation)
+        values.push_back(readValue<T>(stream, WITHIN)); // NOLINT(performance-inefficient-vector-operation)
     return values;
 }
 
@@ -152,11 +143,11 @@ void writeLinks(ostream& stream, ContextImpl& context) {
 
 void readLinks(istream& stream, ContextImpl& context) {
     vector<LinkTable> tables;
-    const int numTables = readValue<int>(stream);
+    const int numTables = readValue<int>(stream, WITHIN);
     for (int i = 0; i < numTables; i++) {
         StoredTable stored;
-        stored.nextNumber = readValue<int>(stream);
-        const size_t count = max(0, readValue<int>(stream));
+        stored.nextNumber = readValue<int>(stream, WITHIN);
+        const size_t count = max(0, readValue<int>(stream, WITHIN));
         stored.numbers = readValues<int>(stream, count);
         stored.active = readValues<int>(stream, count);
         stored.columns.ends = readValues<int>(stream, 4*count);

@@ -46,6 +46,10 @@ public:
          * The number of the link.
          */
         long long link = -1;
+        /**
+         * The other segment of a contact or link.
+         */
+        int otherChain = -1, otherSegment = -1;
     };
     CylinderChainException(Kind kind, const Place& place, const std::string& message);
     ~CylinderChainException();

@@ -6,6 +6,7 @@
 #include "couplings/Walls.h"
 #include "dynamics/ChainEngine.h"
 #include "dynamics/CoupledForces.h"
+#include "kinetics/Linkers.h"
 #include "openmm/KernelImpl.h"
 #include "openmm/Platform.h"
 #include "openmm/System.h"
@@ -14,6 +15,7 @@
 #include "openmm/internal/CylinderChainDescription.h"
 #include "openmm/internal/OtherParticles.h"
 #include "openmm/internal/ParallelLoop.h"
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -169,6 +171,45 @@ public:
      * @param walls    the wall and its particles
      */
     virtual void copyParametersToContext(ContextImpl& context, const cylchain::WallSystem& walls) = 0;
+};
+
+/**
+ * This kernel is invoked by CylinderChainBindingForce to let linkers walk, bind and unbind.
+ */
+class UpdateCylinderChainLinkersKernel : public KernelImpl {
+public:
+    static std::string Name() {
+        return "UpdateCylinderChainLinkers";
+    }
+    UpdateCylinderChainLinkersKernel(std::string name, const Platform& platform) : KernelImpl(name, platform) {
+    }
+    /**
+     * Initialize the kernel.
+     *
+     * @param system            the kinds of hands and linkers
+     * @param chains            the chains of the System
+     * @param periodic          whether distances are those of nearest periodic images
+     * @param nearestParticles  whether the two particles of a place are taken as their nearest images
+     */
+    virtual void initialize(const cylchain::LinkerSystem& system, const std::vector<cylchain::Chain>& chains,
+            bool periodic, bool nearestParticles) = 0;
+    /**
+     * Take a step of the linkers, in which particles do not move.
+     *
+     * @param context     the context in which to execute this kernel
+     * @param state       the linkers of the context
+     * @param kT          the thermal energy
+     * @param stepSize    how long the step is
+     * @param seed        the seed of the random numbers
+     * @param force       the number of the Force among those of the System
+     * @return the number of a linker the rates of which are too large for the step, or -1
+     */
+    virtual long long execute(ContextImpl& context, cylchain::LinkerState& state, double kT, double stepSize,
+            std::uint32_t seed, int force) = 0;
+    /**
+     * Describe the springs of linkers that join two places.
+     */
+    virtual void describe(const cylchain::LinkerState& state, std::vector<cylchain::Link>& links) = 0;
 };
 
 /**

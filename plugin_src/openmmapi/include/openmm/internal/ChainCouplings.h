@@ -3,6 +3,7 @@
 
 #include "dynamics/CoupledForces.h"
 #include "openmm/internal/ContextImpl.h"
+#include "openmm/internal/CylinderChainBindingForceImpl.h"
 #include "openmm/internal/CylinderChainContactForceImpl.h"
 #include "openmm/internal/CylinderChainDescription.h"
 #include "openmm/internal/CylinderChainLinkForceImpl.h"
@@ -14,7 +15,7 @@
 namespace OpenMM {
 
 /**
- * The links, contacts and walls of a Context that implicit steps have in their equations.
+ * The links, linkers, contacts and walls of a Context that implicit steps have in their equations.
  *
  * A Force is among them if all of its places are on segments of chains, at particles, or do not move.  If not, it stays
  * an ordinary Force.
@@ -22,6 +23,15 @@ namespace OpenMM {
 class ChainCouplings {
 public:
     ChainCouplings(ContextImpl& context, const CylinderChainDescription& chains, const OtherParticles& others);
+    /**
+     * In an implicit step, a periodic box must be wider than twice the sum of the longest segment and so many of the
+     * largest diameters: contacts are looked for beyond the surfaces of segments, and on their way.
+     */
+    static constexpr double DIAMETERS_OF_BOX = 2;
+    /**
+     * Throw an exception if the periodic box of the Context is too narrow for contacts in implicit steps.
+     */
+    void refuseNarrowBox(const CylinderChainDescription& chains) const;
     /**
      * While an object of this class exists, the Forces that implicit steps take contribute nothing.
      */
@@ -32,9 +42,7 @@ public:
          */
         Exclusion(ChainCouplings& couplings, int groups);
     private:
-        std::vector<std::unique_ptr<CylinderChainLinkForceImpl::Exclusion> > links;
-        std::vector<std::unique_ptr<CylinderChainContactForceImpl::Exclusion> > contacts;
-        std::vector<std::unique_ptr<CylinderChainWallForceImpl::Exclusion> > walls;
+        std::vector<std::unique_ptr<StepForceImpl::Exclusion> > exclusions;
     };
     /**
      * Describe the forces that an implicit step takes.
@@ -43,26 +51,30 @@ public:
      * @param friction  the friction of particles outside chains that have none of their own, divided by their mass
      */
     const cylchain::CoupledForces& describe(int groups, double friction);
+    /**
+     * Get the Force that a coupling of the last forces described belongs to.
+     */
+    const Force& getForce(const cylchain::BrokenCoupling& coupling) const;
 private:
-    struct Links {
-        CylinderChainLinkForceImpl* force;
+    // A force, and whether implicit steps can take it.
+
+    template <class Impl> struct Coupling {
+        Impl* force;
+        bool taken;
+        bool isTaken(int groups) const {
+            return taken && force->isIn(groups);
+        }
+    };
+    struct Links : Coupling<CylinderChainLinkForceImpl> {
         long long version;
-        bool taken;
     };
-    struct Contacts {
-        CylinderChainContactForceImpl* force;
-        bool taken;
-    };
-    struct Walls {
-        CylinderChainWallForceImpl* force;
-        bool taken;
-    };
+    typedef Coupling<CylinderChainBindingForceImpl> Linkers;
+    typedef Coupling<CylinderChainContactForceImpl> Contacts;
+    typedef Coupling<CylinderChainWallForceImpl> Walls;
     bool canTake(const cylchain::Place& place) const;
     void update();
-    bool isTaken(const Links& own, int groups) const;
-    bool isTaken(const Contacts& own, int groups) const;
-    bool isTaken(const Walls& own, int groups) const;
     void addParticle(const cylchain::Place& place, std::vector<int>& particles) const;
+    ContextImpl& context;
     const System& system;
     const OtherParticles& others;
     // The nodes before and behind a particle in its chain, or -1.
@@ -70,9 +82,13 @@ private:
     std::vector<int> before, behind;
     std::vector<bool> isNode;
     std::vector<Links> links;
+    std::vector<Linkers> linkers;
     std::vector<Contacts> contacts;
     std::vector<Walls> walls;
     cylchain::CoupledForces forces;
+    // The Forces of the forces above: links, contacts, walls.
+
+    std::vector<const Force*> owners;
 };
 
 } // namespace OpenMM

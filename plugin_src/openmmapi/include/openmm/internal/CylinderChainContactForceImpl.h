@@ -4,7 +4,7 @@
 #include "couplings/ContactSearch.h"
 #include "openmm/CylinderChainContactForce.h"
 #include "openmm/Kernel.h"
-#include "openmm/internal/ForceImpl.h"
+#include "openmm/internal/StepForceImpl.h"
 #include <map>
 #include <memory>
 #include <string>
@@ -15,29 +15,12 @@ namespace OpenMM {
 /**
  * This is the internal implementation of CylinderChainContactForce.
  */
-class CylinderChainContactForceImpl : public ForceImpl {
+class CylinderChainContactForceImpl : public StepForceImpl {
 public:
-    /**
-     * While an object of this class exists, the Force contributes nothing.
-     */
-    class Exclusion {
-    public:
-        Exclusion(CylinderChainContactForceImpl& force, bool exclude) : force(force) {
-            force.excluded = exclude;
-        }
-        ~Exclusion() {
-            force.excluded = false;
-        }
-    private:
-        CylinderChainContactForceImpl& force;
-    };
     explicit CylinderChainContactForceImpl(const CylinderChainContactForce& owner);
     void initialize(ContextImpl& context);
     const CylinderChainContactForce& getOwner() const {
         return owner;
-    }
-    void updateContextState(ContextImpl&, bool&) {
-        // Nothing is modified between steps.
     }
     double calcForcesAndEnergy(ContextImpl& context, bool includeForces, bool includeEnergy, int groups);
     std::map<std::string, double> getDefaultParameters() {
@@ -70,7 +53,6 @@ private:
     double stiffness;
     bool periodic;
     Kernel kernel;
-    bool excluded;
 };
 
 } // namespace OpenMM

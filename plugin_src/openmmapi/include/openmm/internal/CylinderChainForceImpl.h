@@ -4,7 +4,7 @@
 #include "openmm/CylinderChainForce.h"
 #include "openmm/Kernel.h"
 #include "openmm/internal/CylinderChainDescription.h"
-#include "openmm/internal/ForceImpl.h"
+#include "openmm/internal/StepForceImpl.h"
 #include <map>
 #include <memory>
 #include <string>
@@ -16,29 +16,12 @@ namespace OpenMM {
 /**
  * This is the internal implementation of CylinderChainForce.
  */
-class CylinderChainForceImpl : public ForceImpl {
+class CylinderChainForceImpl : public StepForceImpl {
 public:
-    /**
-     * While an object of this class exists, the Force contributes nothing.
-     */
-    class Exclusion {
-    public:
-        Exclusion(CylinderChainForceImpl& force, bool exclude) : force(force) {
-            force.excluded = exclude;
-        }
-        ~Exclusion() {
-            force.excluded = false;
-        }
-    private:
-        CylinderChainForceImpl& force;
-    };
     explicit CylinderChainForceImpl(const CylinderChainForce& owner);
     void initialize(ContextImpl& context);
     const CylinderChainForce& getOwner() const {
         return owner;
-    }
-    void updateContextState(ContextImpl&, bool&) {
-        // Nothing is modified between steps.
     }
     double calcForcesAndEnergy(ContextImpl& context, bool includeForces, bool includeEnergy, int groups);
     std::map<std::string, double> getDefaultParameters() {
@@ -64,7 +47,6 @@ private:
     const CylinderChainForce& owner;
     std::unique_ptr<CylinderChainDescription> description;
     Kernel kernel;
-    bool excluded;
 };
 
 } // namespace OpenMM

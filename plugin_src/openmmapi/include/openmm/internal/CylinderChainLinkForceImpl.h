@@ -4,7 +4,7 @@
 #include "couplings/LinkTable.h"
 #include "openmm/CylinderChainLinkForce.h"
 #include "openmm/Kernel.h"
-#include "openmm/internal/ForceImpl.h"
+#include "openmm/internal/StepForceImpl.h"
 #include <map>
 #include <string>
 #include <vector>
@@ -17,29 +17,12 @@ namespace OpenMM {
  * Which they are is said by a parameter of the Context, the digest of their table.  Where that has changed, because the
  * Context has got a State or a checkpoint, the links follow as soon as they are looked at.
  */
-class CylinderChainLinkForceImpl : public ForceImpl {
+class CylinderChainLinkForceImpl : public StepForceImpl {
 public:
-    /**
-     * While an object of this class exists, the Force contributes nothing.
-     */
-    class Exclusion {
-    public:
-        Exclusion(CylinderChainLinkForceImpl& force, bool exclude) : force(force) {
-            force.excluded = exclude;
-        }
-        ~Exclusion() {
-            force.excluded = false;
-        }
-    private:
-        CylinderChainLinkForceImpl& force;
-    };
     explicit CylinderChainLinkForceImpl(const CylinderChainLinkForce& owner);
     void initialize(ContextImpl& context);
     const CylinderChainLinkForce& getOwner() const {
         return owner;
-    }
-    void updateContextState(ContextImpl&, bool&) {
-        // Nothing is modified between steps.
     }
     double calcForcesAndEnergy(ContextImpl& context, bool includeForces, bool includeEnergy, int groups);
     std::map<std::string, double> getDefaultParameters();
@@ -92,7 +75,7 @@ private:
 
     bool upToDate;
     long long version;
-    bool nearestParticles, excluded;
+    bool nearestParticles;
 };
 
 } // namespace OpenMM

@@ -10,6 +10,7 @@
 #include "openmm/internal/ExplicitWork.h"
 #include "openmm/internal/OtherParticles.h"
 #include <cstdint>
+#include <string>
 #include <vector>
 
 namespace OpenMM {
@@ -86,7 +87,11 @@ private:
     cylchain::StepSettings describeStep(std::uint64_t seed, int level, std::uint64_t step);
     void recordForces(cylchain::StepSettings& settings, bool records);
     void takeNoteOfForces(const cylchain::StepSettings& settings, bool followsOn);
+    bool areForcesFinite();
     void reportInstability(int chain, const cylchain::StepSettings& settings);
+    void reportCoupling(const cylchain::BrokenCoupling& coupling, const cylchain::CoupledForces& coupled,
+            const cylchain::StepSettings& settings);
+    std::string describeLink(const cylchain::BrokenCoupling& coupling, const cylchain::CoupledForces& coupled) const;
     void reportParticle(int particle, const cylchain::StepSettings& settings) const;
     std::vector<Vec3> getPositions() const;
     void getBox(double* box) const;

@@ -4,7 +4,7 @@
 #include "couplings/Walls.h"
 #include "openmm/CylinderChainWallForce.h"
 #include "openmm/Kernel.h"
-#include "openmm/internal/ForceImpl.h"
+#include "openmm/internal/StepForceImpl.h"
 #include <map>
 #include <string>
 #include <vector>
@@ -14,29 +14,12 @@ namespace OpenMM {
 /**
  * This is the internal implementation of CylinderChainWallForce.
  */
-class CylinderChainWallForceImpl : public ForceImpl {
+class CylinderChainWallForceImpl : public StepForceImpl {
 public:
-    /**
-     * While an object of this class exists, the Force contributes nothing.
-     */
-    class Exclusion {
-    public:
-        Exclusion(CylinderChainWallForceImpl& force, bool exclude) : force(force) {
-            force.excluded = exclude;
-        }
-        ~Exclusion() {
-            force.excluded = false;
-        }
-    private:
-        CylinderChainWallForceImpl& force;
-    };
     explicit CylinderChainWallForceImpl(const CylinderChainWallForce& owner);
     void initialize(ContextImpl& context);
     const CylinderChainWallForce& getOwner() const {
         return owner;
-    }
-    void updateContextState(ContextImpl&, bool&) {
-        // Nothing is modified between steps.
     }
     double calcForcesAndEnergy(ContextImpl& context, bool includeForces, bool includeEnergy, int groups);
     std::map<std::string, double> getDefaultParameters() {
@@ -55,7 +38,6 @@ private:
     const CylinderChainWallForce& owner;
     cylchain::WallSystem walls;
     Kernel kernel;
-    bool excluded;
 };
 
 } // namespace OpenMM

@@ -1,0 +1,101 @@
+"""The recommended step of linkers that bind to filaments, walk along them and unbind.
+
+Their equilibrium does not depend on the step. How fast things happen does, since filaments stand still while linkers
+bind, walk and unbind, and linkers while filaments move:
+
+- a hand should rarely unbind and bind again within a step: ``k dt`` is a fifth at most, with the rate k of unbinding,
+  under the stall force if load changes it;
+- a hand should walk by a fifth of its reach at most;
+- a hand that walks against its spring relaxes towards its stall force with the rate k_s v/F_s, of which a step should
+  take a fifth at most (walking is explicit; at once, it is stopped where its spring stalls it);
+- implicit steps lose the direction of a spring that has a rest length when its ends diffuse by that, as those of
+  crosslinks: see ``coupled_step``.
+"""
+
+import numpy as np
+import openmm
+
+from ..filaments.collection import FilamentCollection
+from ..kinetics.binding_force import find_binding_force
+from ..units.quantities import thermal_energy
+from ..units.types import FloatArray
+from .coupled_step import RELATIVE_MOTION, mobilities
+from .schemes import IMPLICIT_SCHEMES
+from .time_step import TimeStep
+
+SHARE_OF_RATE = 0.2
+"""The largest product of a step and a rate."""
+
+SHARE_OF_REACH = 0.2
+"""How far a hand may walk in a step, over its reach."""
+
+
+def steps_of_kinetics(
+    filaments: FilamentCollection, system: openmm.System, scheme: str, temperature: float
+) -> list[TimeStep]:
+    """The TimeSteps of the linkers of a System; none where there are no linkers.
+
+    Parameters
+    ----------
+    filaments : Filaments
+        In the System.
+    system : openmm.System
+    scheme : str
+    temperature : float
+        Of the bath, in K.
+
+    Returns
+    -------
+    list of TimeStep
+        One for each type of linkers.
+    """
+    force = find_binding_force(system)
+    if force is None:
+        return []
+    mobility = mobilities(filaments, system, None)
+    # Of the two filaments that move most.
+    largest = np.sort([mobility[nodes[0]] for nodes in filaments.node_indices])[::-1]
+    steps = []
+    for number in range(force.getNumLinkerTypes()):
+        first, second, rest, stiffness, _ = force.getLinkerTypeParameters(number)
+        label = f"{force.getName()}: type {number}"
+        allowed: dict[str, float] = {}
+        for hand in dict.fromkeys(hand for hand in (first, second) if hand >= 0):
+            for what, step in _steps_of_hand(force, hand, stiffness):
+                name = f"{label}, {what}"
+                allowed[name] = min(step, allowed.get(name, np.inf))
+        if scheme in IMPLICIT_SCHEMES and rest > 0.0 and temperature > 0.0:
+            together = _together(largest, first < 0)
+            if together > 0.0:
+                bound = rest**2 / (2.0 * thermal_energy(temperature) * together)
+                allowed[f"{label}, its ends diffuse against each other by {RELATIVE_MOTION:g} of its rest length"] = (
+                    RELATIVE_MOTION**2 * bound
+                )
+        if allowed:
+            reason = min(allowed, key=allowed.__getitem__)
+            bounds = {name: step / SHARE_OF_RATE for name, step in allowed.items()}
+            steps.append(TimeStep(allowed[reason], reason, bounds, allowed))
+    return steps
+
+
+def _together(largest: FloatArray, anchored: bool) -> float:
+    return float(largest[0] if anchored or len(largest) == 1 else largest[0] + largest[1])
+
+
+def _steps_of_hand(force, hand, stiffness):
+    _, reach, unbinding = force.getHandParameters(hand)
+    _, unbinding_force, catch, catch_force = force.getHandUnbinding(hand)
+    speed, stall = force.getHandWalking(hand)[:2]
+    rates = [unbinding + catch]
+    if stall > 0.0 and unbinding_force > 0.0:
+        rates.append(
+            unbinding * np.exp(min(stall / unbinding_force, 500.0))
+            + catch * (np.exp(-stall / catch_force) if catch_force > 0.0 else 1.0)
+        )
+    if max(rates) > 0.0:
+        yield f"a hand unbinds with the rate {max(rates) * 1e12:.3g}/s", SHARE_OF_RATE / max(rates)
+    if speed != 0.0:
+        yield f"a hand walks by {SHARE_OF_REACH:g} of its reach", SHARE_OF_REACH * reach / abs(speed)
+        if stall > 0.0 and stiffness > 0.0:
+            rate = stiffness * abs(speed) / stall
+            yield "a hand that walks relaxes to its stall force", SHARE_OF_RATE / rate

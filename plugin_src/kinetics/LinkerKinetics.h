@@ -1,0 +1,123 @@
+#ifndef CYLCHAIN_LINKER_KINETICS_H_
+#define CYLCHAIN_LINKER_KINETICS_H_
+
+#include "couplings/Contours.h"
+#include "couplings/Links.h"
+#include "kinetics/Linkers.h"
+#include "kinetics/RandomNumbers.h"
+#include "kinetics/SegmentCells.h"
+#include "mechanics/Loop.h"
+#include <cstdint>
+#include <unordered_set>
+#include <vector>
+
+namespace cylchain {
+
+/** A step in which linkers bind, unbind and walk. */
+struct KineticStep {
+    /** Those of all particles, which do not move. */
+    const double* positions;
+    LinkBoxes boxes;
+    /** The volume of linkers that are not bound, if theirs is not given. */
+    double volume;
+    double stepSize;
+    std::uint32_t seed;
+    /** The number of the Force, to which random numbers belong. */
+    std::uint32_t force;
+};
+
+/**
+ * Linkers that bind to chains, walk along them and unbind.
+ *
+ * In a step, hands that are bound walk first. Then each linker is a Markov process in continuous time, in which all
+ * chains stand still: with c the rate of binding per length, the reach R, the volume v = (4 pi/3) (R_1 R_2)^(3/2), and
+ * U the energy of the spring between two places,
+ *
+ *     unbound -> one hand bound           c v/V for each length of chains, V the volume of unbound linkers,
+ *     one hand bound -> both hands bound  c exp(-(1-lambda) U/k_B T) for each length of chains within reach,
+ *     a hand unbinds                      k exp(lambda U/k_B T), or k exp(F/F_u), plus k_c exp(-F/F_c).
+ *
+ * With the first law of unbinding, without speed, and if no place within which the spring counts is out of reach, the
+ * process and its inverse are equally likely in equilibrium, whatever the step is. Binding is drawn by thinning: places
+ * are proposed along all segments around, and accepted by their energy.
+ *
+ * Random numbers belong to the seed, the number of the step and that of the linker. Linkers are independent of each
+ * other, except for sites that hold one hand each: what happens to linkers whose hands bind to sites is in the order of
+ * time.
+ */
+class LinkerKinetics {
+public:
+    /**
+     * @param chains  the chains of the System; they are not needed any more afterwards
+     */
+    LinkerKinetics(const LinkerSystem& system, const std::vector<Chain>& chains);
+    /** Set the temperature. */
+    void setTemperature(double kT) {
+        system.kT = kT;
+    }
+    /**
+     * Take a step.
+     *
+     * @return the number of a linker the rates of which are too large for the step, or -1
+     */
+    long long advance(LinkerState& state, const KineticStep& step, const Loop& loop);
+    /** Describe the springs of linkers that join two places. */
+    void describe(const LinkerState& state, std::vector<Link>& links) const;
+private:
+    /** Between the two places of a linker: from the first to the second, and what the spring does. */
+    struct Spring {
+        double vector[3] = {0, 0, 0}, distance = 0, energy = 0, force = 0;
+    };
+    /** Where hands are that bind to sites: numbers of chain, spacing and site. */
+    typedef std::unordered_set<std::uint64_t> Sites;
+    struct Event;
+    struct Pending;
+    struct Count {
+        std::uint64_t bindings = 0, unbindings = 0;
+        long long failed = -1;
+    };
+    bool usesSites(const LinkerType& type) const;
+    Place placeOf(const Linker& linker, int side) const;
+    Spring measure(const Linker& linker, const KineticStep& step) const;
+    double energyOf(const LinkerType& type, double distance) const;
+    double reduced(double energy) const;
+    double proposalRate(const Hand& hand) const;
+    double unbindingRate(const Hand& hand, double energy, double force) const;
+    double captureRate(const LinkerType& type, int side, const KineticStep& step) const;
+    double pull(const Linker& linker, int side, const Spring& spring, const KineticStep& step, double& stiffness) const;
+    double speedUnder(const Hand& hand, double pull) const;
+    void walk(Linker& linker, const KineticStep& step, Count& count) const;
+    bool draw(const Linker& linker, const KineticStep& step, Pending& next) const;
+    void apply(Linker& linker, const KineticStep& step, Pending& next, Sites* sites, Count& count) const;
+    void findThresholds(const KineticStep& step);
+    void takeTogether(LinkerState& state, const KineticStep& step, Count& count);
+    bool proposePlace(const Linker& linker, int side, const KineticStep& step, RandomNumbers& random,
+            const Sites* sites, HandPlace& found) const;
+    bool captureAnywhere(const Linker& linker, int side, RandomNumbers& random, const Sites* sites,
+            HandPlace& found) const;
+    void hop(Linker& linker, int side, int direction, Sites* sites, Count& count) const;
+    std::uint64_t siteOf(const Hand& hand, const HandPlace& place) const;
+    double countSites(const Hand& hand, int chain) const;
+    bool toSite(const Hand& hand, HandPlace& place) const;
+    void bind(Linker& linker, int side, const HandPlace& place, Sites* sites, Count& count) const;
+    void unbind(Linker& linker, int side, Sites* sites, Count& count) const;
+    LinkerSystem system;
+    Contours contours;
+    /** For each hand, which chains it binds to, and the sums of their lengths in the order of Hand::chains. */
+    std::vector<std::vector<char> > binds;
+    std::vector<std::vector<double> > sums;
+    /** For each hand, the number of its spacing among different ones, or -1 if it needs no sites. */
+    std::vector<int> spacings;
+    /** Of each type of linkers, whether hands need sites, and whether they walk. */
+    std::vector<char> needsSites, walks;
+    std::vector<double> thresholds;
+    double largestReach = 0;
+    bool anySites = false, anyConcentration = false;
+    SegmentCells cells;
+    std::vector<std::uint32_t> forces, numbers, words;
+    std::vector<Count> counts;
+};
+
+} // namespace cylchain
+
+#endif /*CYLCHAIN_LINKER_KINETICS_H_*/

@@ -1,0 +1,114 @@
+#ifndef CYLCHAIN_LINKERS_H_
+#define CYLCHAIN_LINKERS_H_
+
+#include "couplings/Place.h"
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace cylchain {
+
+/**
+ * How a hand binds to filaments, walks along them and unbinds. Lengths along a filament are those of its segments at
+ * rest.
+ */
+struct Hand {
+    /** The rate of binding per length of filament, where that strains no spring. */
+    double bindingRate = 0;
+    /** The largest distance between the other hand, or the anchor, and the place where it binds. */
+    double reach = 0;
+    /** The rate of unbinding without load, k. */
+    double unbindingRate = 0;
+    /**
+     * The share lambda of the energy U of the spring that speeds up unbinding: it binds with exp(-(1-lambda) U/k_B T)
+     * and unbinds with k exp(lambda U/k_B T).
+     */
+    double strainShare = 0;
+    /** If positive, unbinding has the rate k exp(F/F_u) under the load F: Bell's law. */
+    double unbindingForce = 0;
+    /** A second pathway has the rate k_c exp(-F/F_c): k_c, and F_c if it is not zero. */
+    double catchRate = 0, catchForce = 0;
+    /** The speed without load, towards the plus end; towards the minus end if negative. */
+    double speed = 0;
+    /** The load that stops it. */
+    double stallForce = 0;
+    /** Whether a load above that makes it walk backward. */
+    bool walksBackward = false;
+    /** Whether it stays at the end to which it has walked, or lets go. */
+    bool holdsAtEnds = false;
+    /** If positive, it binds to sites this far apart along filaments, which hold one hand each. */
+    double siteSpacing = 0;
+    /** Whether the rate of unbinding depends on what the spring does. */
+    bool isLoaded() const {
+        return strainShare > 0 || unbindingForce > 0 || (catchRate > 0 && catchForce > 0);
+    }
+    /** The chains to which it binds, in ascending order. */
+    std::vector<int> chains;
+};
+
+/** Linkers of a kind: two hands on a spring, or a hand on a spring that is anchored. */
+struct LinkerType {
+    /** The numbers of hands; the first is -1 if linkers are anchored. */
+    int hands[2] = {-1, -1};
+    double stiffness = 0, restLength = 0;
+    /** Whether both hands may bind to the same chain. */
+    bool sameChain = false;
+    /**
+     * Linkers that are not bound are anywhere in this volume; that of the periodic box if it is zero. Where their
+     * concentration is kept, the volume has no effect.
+     */
+    double volume = 0;
+    /** If not negative, there are always this many unbound linkers in a volume, beside those that are bound. */
+    double concentration = -1;
+};
+
+/** Where a hand is bound. */
+struct HandPlace {
+    /** -1 if it is not. */
+    int chain = -1;
+    /** The length along the chain from its minus end. */
+    double position = 0;
+    bool isBound() const {
+        return chain >= 0;
+    }
+};
+
+/** A linker. */
+struct Linker {
+    /** Its number among all linkers there have ever been: its random numbers belong to it. */
+    std::uint32_t number = 0;
+    int type = 0;
+    /** The number of the anchor in the place of its first hand, or -1. */
+    int anchor = -1;
+    HandPlace hands[2];
+    bool isHeld(int side) const {
+        return hands[side].isBound() || (side == 0 && anchor >= 0);
+    }
+    /** Whether its spring joins two places. */
+    bool pulls() const {
+        return isHeld(0) && isHeld(1);
+    }
+};
+
+/** All that changes while linkers bind and unbind. */
+struct LinkerState {
+    /** In the order of their numbers. */
+    std::vector<Linker> linkers;
+    std::uint32_t nextNumber = 0;
+    /** How many steps have been taken. */
+    std::uint64_t steps = 0;
+    /** How often hands have bound and unbound. */
+    std::uint64_t bindings = 0, unbindings = 0;
+};
+
+/** Kinds of linkers, what they are anchored at, and the temperature. */
+struct LinkerSystem {
+    std::vector<Hand> hands;
+    std::vector<LinkerType> types;
+    std::vector<Place> anchors;
+    double kT = 0;
+};
+
+} // namespace cylchain
+
+#endif /*CYLCHAIN_LINKERS_H_*/

@@ -1,0 +1,324 @@
+#ifndef OPENMM_CYLINDERCHAINBINDINGFORCE_H_
+#define OPENMM_CYLINDERCHAINBINDINGFORCE_H_
+
+#include "kinetics/Linkers.h"
+#include "openmm/Context.h"
+#include "openmm/Force.h"
+#include "openmm/Vec3.h"
+#include <vector>
+
+namespace OpenMM {
+
+/**
+ * This class describes linkers that bind to filaments, walk along them and unbind: crosslinkers and motors.
+ *
+ * A linker is a spring, with the energy (k/2) (d-d0)^2 of its length d, between two hands that bind to the chains of
+ * the CylinderChainForce of the System; or between an anchor, which is a particle or a point that does not move, and
+ * one hand.  Before each step of any Integrator, hands that are bound walk, and then all linkers bind and unbind at
+ * random as long as the step takes, while chains stand still.  With c the rate of binding per length, the reach R, the
+ * energy U and the tension F of the spring,
+ *
+ *     a linker that is not bound     binds one hand with the rate c v/V for each length of filament, where V is the
+ *                                    volume of unbound linkers, and v = (4 pi/3) (R1 R2)^(3/2);
+ *     a linker with one hand bound   binds the other one with the rate c exp(-(1-lambda) U/kT) for each length of
+ *                                    filament within its reach;
+ *     a hand that is bound           unbinds with the rate k exp(lambda U/kT), or k exp(|F|/Fu), to which a second
+ *                                    pathway adds kc exp(-|F|/Fc).
+ *
+ * With the first law of unbinding and without speed, equilibrium is that of the energies, whatever the step is.
+ * Lengths along a filament are those of its segments at rest, from its first node, the minus end, to its last, the plus
+ * end.
+ *
+ * Which linkers there are and where they are bound belongs to each Context; this object holds what every new Context
+ * begins with.  A parameter of the Context counts the steps that they have taken.  CylinderChainIntegrator writes them
+ * into its checkpoints, and into States that hold the parameters of the Integrator.  With other Integrators, save what
+ * getLinkersInContext() returns beside the State, and give it to setLinkersInContext().
+ */
+class CylinderChainBindingForce : public Force {
+public:
+    /**
+     * Create a CylinderChainBindingForce.
+     *
+     * @param temperature  the temperature T, measured in K; that of a CylinderChainIntegrator counts instead
+     */
+    explicit CylinderChainBindingForce(double temperature);
+    /**
+     * Get the temperature, measured in K.
+     */
+    double getTemperature() const {
+        return temperature;
+    }
+    /**
+     * Set the temperature, measured in K.
+     */
+    void setTemperature(double temperature);
+    /**
+     * Get the random number seed; with 0, each Context chooses one.
+     */
+    int getRandomNumberSeed() const {
+        return randomNumberSeed;
+    }
+    /**
+     * Set the random number seed.  With 0, each Context chooses one.
+     */
+    void setRandomNumberSeed(int seed) {
+        randomNumberSeed = seed;
+    }
+    /**
+     * Get the number of kinds of hands.
+     */
+    int getNumHands() const {
+        return hands.size();
+    }
+    /**
+     * Add a kind of hands.
+     *
+     * @param bindingRate    the rate of binding per length of filament, c, measured in 1/(ps nm)
+     * @param reach          how far from the other hand or the anchor it binds, R, measured in nm
+     * @param unbindingRate  the rate of unbinding without load, k, measured in 1/ps
+     * @param chains         the chains that it binds to
+     * @return the number of the kind
+     */
+    int addHand(double bindingRate, double reach, double unbindingRate, const std::vector<int>& chains);
+    /**
+     * Get the parameters of a kind of hands.
+     *
+     * @param hand                the number of the kind
+     * @param[out] bindingRate    the rate of binding per length of filament, measured in 1/(ps nm)
+     * @param[out] reach          how far it binds, measured in nm
+     * @param[out] unbindingRate  the rate of unbinding without load, measured in 1/ps
+     */
+    void getHandParameters(int hand, double& bindingRate, double& reach, double& unbindingRate) const;
+    /**
+     * Get the chains that a kind of hands binds to.
+     */
+    const std::vector<int>& getHandChains(int hand) const;
+    /**
+     * Get how load makes a kind of hands unbind.
+     *
+     * @param hand                 the number of the kind
+     * @param[out] strainShare     lambda
+     * @param[out] unbindingForce  Fu, measured in kJ/mol/nm, or 0 if there is none
+     * @param[out] catchRate       kc, measured in 1/ps
+     * @param[out] catchForce      Fc, measured in kJ/mol/nm, or 0 if the second pathway does not depend on the force
+     */
+    void getHandUnbinding(int hand, double& strainShare, double& unbindingForce, double& catchRate,
+            double& catchForce) const;
+    /**
+     * Set how load makes a kind of hands unbind.  All are 0 unless this is called.
+     *
+     * @param hand            the number of the kind
+     * @param strainShare     lambda, from 0 to 1; it must be 0 if Fu is given
+     * @param unbindingForce  Fu, measured in kJ/mol/nm, or 0 if there is none
+     * @param catchRate       kc, measured in 1/ps
+     * @param catchForce      Fc, measured in kJ/mol/nm, or 0 if the second pathway does not depend on the force
+     */
+    void setHandUnbinding(int hand, double strainShare, double unbindingForce, double catchRate, double catchForce);
+    /**
+     * Get how a kind of hands walks.
+     *
+     * @param hand                the number of the kind
+     * @param[out] speed          the speed without load, towards the plus end if positive, measured in nm/ps
+     * @param[out] stallForce     the load at which it stops, measured in kJ/mol/nm, or 0 if no load changes its speed
+     * @param[out] walksBackward  whether it walks backward under larger loads
+     * @param[out] holdsAtEnds    whether it stays at the end of a filament to which it has walked, or unbinds there
+     */
+    void getHandWalking(int hand, double& speed, double& stallForce, bool& walksBackward, bool& holdsAtEnds) const;
+    /**
+     * Set how a kind of hands walks: with the speed v0 (1+F/Fs) where F is the force of the spring along the direction
+     * of walking, at most 2 v0, and at least 0, or -v0 if it walks backward.  A hand does not walk unless this is
+     * called.
+     *
+     * @param hand           the number of the kind
+     * @param speed          the speed without load, v0, towards the plus end if positive, measured in nm/ps
+     * @param stallForce     Fs, measured in kJ/mol/nm, or 0 if no load changes the speed
+     * @param walksBackward  whether it walks backward under larger loads
+     * @param holdsAtEnds    whether it stays at the end of a filament to which it has walked, or unbinds there
+     */
+    void setHandWalking(int hand, double speed, double stallForce, bool walksBackward, bool holdsAtEnds);
+    /**
+     * Get the distance of binding sites along filaments, measured in nm, or 0 if a kind of hands binds anywhere.
+     */
+    double getHandSiteSpacing(int hand) const;
+    /**
+     * Set the distance of binding sites along filaments, measured in nm; 0 if hands bind anywhere.  A site holds one
+     * hand, of all kinds with the same distance of sites.
+     */
+    void setHandSiteSpacing(int hand, double spacing);
+    /**
+     * Get the number of types of linkers.
+     */
+    int getNumLinkerTypes() const {
+        return types.size();
+    }
+    /**
+     * Add a type of linkers.
+     *
+     * @param hand1       the kind of the first hand, or -1 if linkers of this type are anchored
+     * @param hand2       the kind of the second hand
+     * @param restLength  the rest length d0, measured in nm
+     * @param stiffness   the stiffness k, measured in kJ/mol/nm^2
+     * @param sameChain   whether both hands may bind to the same chain
+     * @return the number of the type
+     */
+    int addLinkerType(int hand1, int hand2, double restLength, double stiffness, bool sameChain);
+    /**
+     * Get the parameters of a type of linkers.
+     *
+     * @param type             the number of the type
+     * @param[out] hand1       the kind of the first hand, or -1 if linkers of this type are anchored
+     * @param[out] hand2       the kind of the second hand
+     * @param[out] restLength  the rest length d0, measured in nm
+     * @param[out] stiffness   the stiffness k, measured in kJ/mol/nm^2
+     * @param[out] sameChain   whether both hands may bind to the same chain
+     */
+    void getLinkerTypeParameters(int type, int& hand1, int& hand2, double& restLength, double& stiffness,
+            bool& sameChain) const;
+    /**
+     * Get where linkers of a type are while they are not bound.
+     *
+     * @param type                the number of the type
+     * @param[out] volume         the volume in which they are, measured in nm^3, or 0 if it is that of the periodic box
+     * @param[out] concentration  their number per nm^3 if that does not change, or -1
+     */
+    void getLinkerTypeReservoir(int type, double& volume, double& concentration) const;
+    /**
+     * Set where linkers of a type are while they are not bound.
+     *
+     * @param type           the number of the type
+     * @param volume         the volume in which they are, measured in nm^3, or 0 if it is that of the periodic box
+     * @param concentration  their number per nm^3 if that does not change, or -1 if there are as many as were added
+     */
+    void setLinkerTypeReservoir(int type, double volume, double concentration);
+    /**
+     * Get the number of anchors.
+     */
+    int getNumAnchors() const {
+        return anchors.size();
+    }
+    /**
+     * Add an anchor at a particle that is not part of a chain.
+     *
+     * @return the number of the anchor
+     */
+    int addParticleAnchor(int particle);
+    /**
+     * Add an anchor at a point that does not move.
+     *
+     * @param point  the point, measured in nm
+     * @return the number of the anchor
+     */
+    int addPointAnchor(const Vec3& point);
+    /**
+     * Get an anchor.
+     *
+     * @param anchor         the number of the anchor
+     * @param[out] particle  its particle, or -1 if it is a point
+     * @param[out] point     the point, measured in nm
+     */
+    void getAnchor(int anchor, int& particle, Vec3& point) const;
+    /**
+     * Get the number of linkers.
+     */
+    int getNumLinkers() const {
+        return state.linkers.size();
+    }
+    /**
+     * Add linkers that are not bound.
+     *
+     * @param type   their type, the linkers of which are not anchored
+     * @param count  how many
+     */
+    void addLinkers(int type, int count);
+    /**
+     * Add a linker at an anchor, with a hand that is not bound.
+     *
+     * @param type    its type
+     * @param anchor  the number of the anchor
+     */
+    void addAnchoredLinker(int type, int anchor);
+    /**
+     * Get all linkers at once.
+     *
+     * @param[out] numbers     their numbers, in ascending order
+     * @param[out] types       the type of each
+     * @param[out] anchors     the anchor of each, or -1
+     * @param[out] chains      the chains to which the two hands of each are bound, -1 where they are not
+     * @param[out] places      the lengths along these chains from their minus ends, measured in nm
+     * @param[out] nextNumber  the number that the next linker will have
+     */
+    void getLinkers(std::vector<int>& numbers, std::vector<int>& types, std::vector<int>& anchors,
+            std::vector<int>& chains, std::vector<double>& places, int& nextNumber) const;
+    /**
+     * Replace all linkers.
+     *
+     * @param numbers     their numbers, in ascending order
+     * @param types       the type of each
+     * @param anchors     the anchor of each, or -1
+     * @param chains      the chains to which the two hands of each are bound, -1 where they are not
+     * @param places      the lengths along these chains from their minus ends, measured in nm
+     * @param nextNumber  the number that the next linker will have
+     */
+    void setLinkers(const std::vector<int>& numbers, const std::vector<int>& types, const std::vector<int>& anchors,
+            const std::vector<int>& chains, const std::vector<double>& places, int nextNumber);
+    /**
+     * Get all linkers of a Context at once, like getLinkers().
+     */
+    void getLinkersInContext(Context& context, std::vector<int>& numbers, std::vector<int>& types,
+            std::vector<int>& anchors, std::vector<int>& chains, std::vector<double>& places, int& nextNumber) const;
+    /**
+     * Replace all linkers of a Context, like setLinkers().
+     */
+    void setLinkersInContext(Context& context, const std::vector<int>& numbers, const std::vector<int>& types,
+            const std::vector<int>& anchors, const std::vector<int>& chains, const std::vector<double>& places,
+            int nextNumber) const;
+    /**
+     * Get how often hands of a Context have bound and unbound.
+     *
+     * @param context          the Context
+     * @param[out] bindings    how often a hand has bound
+     * @param[out] unbindings  how often a hand has unbound
+     */
+    void getNumEventsInContext(Context& context, long long& bindings, long long& unbindings) const;
+    /**
+     * Get whether distances are those of nearest periodic images.
+     */
+    bool usesPeriodicBoundaryConditions() const {
+        return periodic;
+    }
+    /**
+     * Set whether distances are those of nearest periodic images.  They are not unless this is called.
+     */
+    void setUsesPeriodicBoundaryConditions(bool periodic) {
+        this->periodic = periodic;
+    }
+    /**
+     * Get the linkers that every new Context begins with.  This is for internal use.
+     */
+    const cylchain::LinkerState& getState() const {
+        return state;
+    }
+    /**
+     * Get the description of a kind of hands.  This is for internal use.
+     */
+    const cylchain::Hand& getHand(int hand) const;
+    /**
+     * Get the description of a type of linkers.  This is for internal use.
+     */
+    const cylchain::LinkerType& getLinkerType(int type) const;
+protected:
+    ForceImpl* createImpl() const;
+private:
+    cylchain::Hand& handOf(int hand);
+    double temperature;
+    int randomNumberSeed;
+    bool periodic;
+    std::vector<cylchain::Hand> hands;
+    std::vector<cylchain::LinkerType> types;
+    std::vector<cylchain::Place> anchors;
+    cylchain::LinkerState state;
+};
+
+} // namespace OpenMM
+
+#endif /*OPENMM_CYLINDERCHAINBINDINGFORCE_H_*/

@@ -1,0 +1,94 @@
+#ifndef OPENMM_CYLINDERCHAINBINDINGFORCEIMPL_H_
+#define OPENMM_CYLINDERCHAINBINDINGFORCEIMPL_H_
+
+#include "couplings/Links.h"
+#include "kinetics/Linkers.h"
+#include "openmm/CylinderChainBindingForce.h"
+#include "openmm/Kernel.h"
+#include "openmm/internal/StepForceImpl.h"
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace OpenMM {
+
+/**
+ * This is the internal implementation of CylinderChainBindingForce.  It holds the linkers of a Context.
+ *
+ * A parameter of the Context has the number of steps that they have taken.  Where that is another one, because the
+ * Context has got a State or a checkpoint that does not say where linkers were, there is nothing to go on with.
+ */
+class CylinderChainBindingForceImpl : public StepForceImpl {
+public:
+    explicit CylinderChainBindingForceImpl(const CylinderChainBindingForce& owner);
+    void initialize(ContextImpl& context);
+    const CylinderChainBindingForce& getOwner() const {
+        return owner;
+    }
+    void updateContextState(ContextImpl& context, bool& forcesInvalid);
+    double calcForcesAndEnergy(ContextImpl& context, bool includeForces, bool includeEnergy, int groups);
+    std::map<std::string, double> getDefaultParameters();
+    std::vector<std::string> getKernelNames();
+    /**
+     * Get the springs of linkers that join two places, in the order of their numbers.
+     */
+    const std::vector<cylchain::Link>& getLinks();
+    /**
+     * Get the linkers of the Context.  An exception is thrown if they are not known.
+     */
+    const cylchain::LinkerState& getState();
+    /**
+     * Get the linkers that were known last.
+     */
+    const cylchain::LinkerState& getKnownState() const {
+        return state;
+    }
+    /**
+     * Give the Context other linkers, whether its present ones are known or not.
+     */
+    void setState(const cylchain::LinkerState& replaced);
+    /**
+     * Get the places of anchors.
+     */
+    const std::vector<cylchain::Place>& getAnchors() const {
+        return system.anchors;
+    }
+    /**
+     * Get the seed of this Context.
+     */
+    std::uint32_t getSeed() const {
+        return seed;
+    }
+    /**
+     * Set the seed of this Context.
+     */
+    void setSeed(std::uint32_t replaced) {
+        seed = replaced;
+    }
+    /**
+     * Get whether the two particles of a place are taken as their nearest images.
+     */
+    bool takesNearestParticles() const {
+        return nearestParticles;
+    }
+private:
+    void follow() const;
+    void accept();
+    double getTemperature() const;
+    const CylinderChainBindingForce& owner;
+    ContextImpl* context;
+    Kernel linkerKernel, linkKernel;
+    std::string parameter;
+    cylchain::LinkerState state;
+    cylchain::LinkerSystem system;
+    std::vector<double> lengths;
+    std::vector<cylchain::Link> links;
+    std::uint32_t seed;
+    int number;
+    bool upToDate, nearestParticles, wasExcluded;
+};
+
+} // namespace OpenMM
+
+#endif /*OPENMM_CYLINDERCHAINBINDINGFORCEIMPL_H_*/

@@ -1,0 +1,35 @@
+#ifndef OPENMM_LINKERDESCRIPTION_H_
+#define OPENMM_LINKERDESCRIPTION_H_
+
+#include "kinetics/Linkers.h"
+#include <cstddef>
+#include <vector>
+
+namespace OpenMM {
+
+/**
+ * Linkers as columns of numbers, which is how CylinderChainBindingForce gives and takes them.
+ */
+struct LinkerColumns {
+    std::vector<int> numbers, types, anchors, chains;
+    std::vector<double> places;
+    int nextNumber = 0;
+    LinkerColumns() = default;
+    explicit LinkerColumns(const cylchain::LinkerState& state);
+    /**
+     * Put linkers together; an exception is thrown unless the columns have the same number of rows, and numbers ascend.
+     */
+    std::vector<cylchain::Linker> getLinkers() const;
+};
+
+/**
+ * Throw an exception unless linkers fit their types, the anchors and the chains.
+ *
+ * @param lengths  the lengths of chains; positions along them are not looked at if there are none
+ */
+void checkLinkers(const std::vector<cylchain::Linker>& linkers, const cylchain::LinkerSystem& system,
+        const std::vector<double>& lengths);
+
+} // namespace OpenMM
+
+#endif /*OPENMM_LINKERDESCRIPTION_H_*/

@@ -1,0 +1,282 @@
+#include "openmm/CylinderChainBindingForce.h"
+#include "openmm/OpenMMException.h"
+#include "openmm/internal/AssertionUtilities.h"
+#include "openmm/internal/CylinderChainBindingForceImpl.h"
+#include "openmm/internal/LinkerDescription.h"
+#include <algorithm>
+#include <climits>
+#include <cmath>
+#include <string>
+
+using namespace OpenMM;
+using namespace cylchain;
+using namespace std;
+
+static void require(bool condition, const string& message) {
+    if (!condition)
+        throw OpenMMException("CylinderChainBindingForce: "+message);
+}
+
+static void requireNotNegative(double value, const char* name) {
+    require(value >= 0 && isfinite(value), string("The ")+name+" cannot be negative and must be finite");
+}
+
+CylinderChainBindingForce::CylinderChainBindingForce(double temperature) : randomNumberSeed(0), periodic(false) {
+    setName("CylinderChainBindingForce");
+    setTemperature(temperature);
+}
+
+void CylinderChainBindingForce::setTemperature(double temperature) {
+    requireNotNegative(temperature, "temperature");
+    this->temperature = temperature;
+}
+
+int CylinderChainBindingForce::addHand(double bindingRate, double reach, double unbindingRate,
+        const vector<int>& chains) {
+    requireNotNegative(bindingRate, "rate of binding");
+    requireNotNegative(unbindingRate, "rate of unbinding");
+    require(reach > 0 && isfinite(reach), "The reach must be positive and finite");
+    Hand hand;
+    hand.bindingRate = bindingRate;
+    hand.reach = reach;
+    hand.unbindingRate = unbindingRate;
+    hand.chains = chains;
+    sort(hand.chains.begin(), hand.chains.end());
+    for (size_t i = 0; i < chains.size(); i++) {
+        require(hand.chains[i] >= 0, "Illegal chain index: "+to_string(hand.chains[i]));
+        require(i == 0 || hand.chains[i] > hand.chains[i-1], "Chain "+to_string(hand.chains[i])+" is named twice");
+    }
+    hands.push_back(hand);
+    return hands.size()-1;
+}
+
+const Hand& CylinderChainBindingForce::getHand(int hand) const {
+    ASSERT_VALID_INDEX(hand, hands);
+    return hands[hand];
+}
+
+Hand& CylinderChainBindingForce::handOf(int hand) {
+    ASSERT_VALID_INDEX(hand, hands);
+    return hands[hand];
+}
+
+void CylinderChainBindingForce::getHandParameters(int hand, double& bindingRate, double& reach,
+        double& unbindingRate) const {
+    const Hand& own = getHand(hand);
+    bindingRate = own.bindingRate;
+    reach = own.reach;
+    unbindingRate = own.unbindingRate;
+}
+
+const vector<int>& CylinderChainBindingForce::getHandChains(int hand) const {
+    return getHand(hand).chains;
+}
+
+void CylinderChainBindingForce::getHandUnbinding(int hand, double& strainShare, double& unbindingForce,
+        double& catchRate, double& catchForce) const {
+    const Hand& own = getHand(hand);
+    strainShare = own.strainShare;
+    unbindingForce = own.unbindingForce;
+    catchRate = own.catchRate;
+    catchForce = own.catchForce;
+}
+
+void CylinderChainBindingForce::setHandUnbinding(int hand, double strainShare, double unbindingForce,
+        double catchRate, double catchForce) {
+    Hand& own = handOf(hand);
+    require(strainShare >= 0 && strainShare <= 1, "The share of strain in unbinding must be between 0 and 1");
+    requireNotNegative(unbindingForce, "force of unbinding");
+    requireNotNegative(catchRate, "rate of the second pathway of unbinding");
+    requireNotNegative(catchForce, "force of the second pathway of unbinding");
+    require(strainShare == 0 || unbindingForce == 0,
+            "Unbinding depends on the energy of the spring or on its force: give one of them");
+    own.strainShare = strainShare;
+    own.unbindingForce = unbindingForce;
+    own.catchRate = catchRate;
+    own.catchForce = catchForce;
+}
+
+void CylinderChainBindingForce::getHandWalking(int hand, double& speed, double& stallForce, bool& walksBackward,
+        bool& holdsAtEnds) const {
+    const Hand& own = getHand(hand);
+    speed = own.speed;
+    stallForce = own.stallForce;
+    walksBackward = own.walksBackward;
+    holdsAtEnds = own.holdsAtEnds;
+}
+
+void CylinderChainBindingForce::setHandWalking(int hand, double speed, double stallForce, bool walksBackward,
+        bool holdsAtEnds) {
+    Hand& own = handOf(hand);
+    require(isfinite(speed), "The speed must be finite");
+    requireNotNegative(stallForce, "stall force");
+    own.speed = speed;
+    own.stallForce = stallForce;
+    own.walksBackward = walksBackward;
+    own.holdsAtEnds = holdsAtEnds;
+}
+
+double CylinderChainBindingForce::getHandSiteSpacing(int hand) const {
+    return getHand(hand).siteSpacing;
+}
+
+void CylinderChainBindingForce::setHandSiteSpacing(int hand, double spacing) {
+    requireNotNegative(spacing, "distance of sites");
+    handOf(hand).siteSpacing = spacing;
+}
+
+int CylinderChainBindingForce::addLinkerType(int hand1, int hand2, double restLength, double stiffness,
+        bool sameChain) {
+    require(hand1 >= -1 && hand1 < getNumHands(), "Illegal hand: "+to_string(hand1));
+    require(hand2 >= 0 && hand2 < getNumHands(), "Illegal hand: "+to_string(hand2));
+    requireNotNegative(restLength, "rest length");
+    requireNotNegative(stiffness, "stiffness");
+    LinkerType type;
+    type.hands[0] = hand1;
+    type.hands[1] = hand2;
+    type.restLength = restLength;
+    type.stiffness = stiffness;
+    type.sameChain = sameChain;
+    types.push_back(type);
+    return types.size()-1;
+}
+
+const LinkerType& CylinderChainBindingForce::getLinkerType(int type) const {
+    ASSERT_VALID_INDEX(type, types);
+    return types[type];
+}
+
+void CylinderChainBindingForce::getLinkerTypeParameters(int type, int& hand1, int& hand2, double& restLength,
+        double& stiffness, bool& sameChain) const {
+    const LinkerType& own = getLinkerType(type);
+    hand1 = own.hands[0];
+    hand2 = own.hands[1];
+    restLength = own.restLength;
+    stiffness = own.stiffness;
+    sameChain = own.sameChain;
+}
+
+void CylinderChainBindingForce::getLinkerTypeReservoir(int type, double& volume, double& concentration) const {
+    volume = getLinkerType(type).volume;
+    concentration = getLinkerType(type).concentration;
+}
+
+void CylinderChainBindingForce::setLinkerTypeReservoir(int type, double volume, double concentration) {
+    ASSERT_VALID_INDEX(type, types);
+    requireNotNegative(volume, "volume");
+    require(concentration == -1 || (concentration >= 0 && isfinite(concentration)),
+            "The concentration cannot be negative and must be finite");
+    require(concentration == -1 || types[type].hands[0] >= 0, "Anchored linkers have no concentration");
+    types[type].volume = volume;
+    types[type].concentration = concentration;
+}
+
+int CylinderChainBindingForce::addParticleAnchor(int particle) {
+    require(particle >= 0, "Illegal particle index: "+to_string(particle));
+    Place place;
+    place.first = particle;
+    anchors.push_back(place);
+    return anchors.size()-1;
+}
+
+int CylinderChainBindingForce::addPointAnchor(const Vec3& point) {
+    Place place;
+    for (int k = 0; k < 3; k++) {
+        require(isfinite(point[k]), "The point of an anchor must be finite");
+        place.point[k] = point[k];
+    }
+    anchors.push_back(place);
+    return anchors.size()-1;
+}
+
+void CylinderChainBindingForce::getAnchor(int anchor, int& particle, Vec3& point) const {
+    ASSERT_VALID_INDEX(anchor, anchors);
+    particle = anchors[anchor].first;
+    point = Vec3(anchors[anchor].point[0], anchors[anchor].point[1], anchors[anchor].point[2]);
+}
+
+void CylinderChainBindingForce::addLinkers(int type, int count) {
+    const LinkerType& own = getLinkerType(type);
+    require(count >= 0 && count <= INT_MAX-(int) state.nextNumber, "Illegal number of linkers: "+to_string(count));
+    require(own.hands[0] >= 0, "Linkers of type "+to_string(type)+" are anchored: use addAnchoredLinker()");
+    require(own.concentration < 0, "Linkers of type "+to_string(type)+" have a concentration instead of a number");
+    for (int i = 0; i < count; i++) {
+        Linker linker;
+        linker.number = state.nextNumber++;
+        linker.type = type;
+        state.linkers.push_back(linker);
+    }
+}
+
+void CylinderChainBindingForce::addAnchoredLinker(int type, int anchor) {
+    require(getLinkerType(type).hands[0] == -1, "Linkers of type "+to_string(type)+" have two hands and no anchor");
+    ASSERT_VALID_INDEX(anchor, anchors);
+    Linker linker;
+    linker.number = state.nextNumber++;
+    linker.type = type;
+    linker.anchor = anchor;
+    state.linkers.push_back(linker);
+}
+
+static void giveColumns(const LinkerState& state, vector<int>& numbers, vector<int>& types, vector<int>& anchors,
+        vector<int>& chains, vector<double>& places, int& nextNumber) {
+    const LinkerColumns columns(state);
+    numbers = columns.numbers;
+    types = columns.types;
+    anchors = columns.anchors;
+    chains = columns.chains;
+    places = columns.places;
+    nextNumber = columns.nextNumber;
+}
+
+void CylinderChainBindingForce::getLinkers(vector<int>& numbers, vector<int>& types, vector<int>& anchors,
+        vector<int>& chains, vector<double>& places, int& nextNumber) const {
+    giveColumns(state, numbers, types, anchors, chains, places, nextNumber);
+}
+
+static LinkerColumns columnsOf(const vector<int>& numbers, const vector<int>& types, const vector<int>& anchors,
+        const vector<int>& chains, const vector<double>& places, int nextNumber) {
+    LinkerColumns columns;
+    columns.numbers = numbers;
+    columns.types = types;
+    columns.anchors = anchors;
+    columns.chains = chains;
+    columns.places = places;
+    columns.nextNumber = nextNumber;
+    return columns;
+}
+
+void CylinderChainBindingForce::setLinkers(const vector<int>& numbers, const vector<int>& types,
+        const vector<int>& anchors, const vector<int>& chains, const vector<double>& places, int nextNumber) {
+    const vector<Linker> linkers = columnsOf(numbers, types, anchors, chains, places, nextNumber).getLinkers();
+    checkLinkers(linkers, {hands, this->types, this->anchors, 0.0}, {});
+    state.linkers = linkers;
+    state.nextNumber = nextNumber;
+}
+
+void CylinderChainBindingForce::getLinkersInContext(Context& context, vector<int>& numbers, vector<int>& types,
+        vector<int>& anchors, vector<int>& chains, vector<double>& places, int& nextNumber) const {
+    CylinderChainBindingForceImpl& impl = dynamic_cast<CylinderChainBindingForceImpl&>(getImplInContext(context));
+    giveColumns(impl.getState(), numbers, types, anchors, chains, places, nextNumber);
+}
+
+void CylinderChainBindingForce::setLinkersInContext(Context& context, const vector<int>& numbers,
+        const vector<int>& types, const vector<int>& anchors, const vector<int>& chains, const vector<double>& places,
+        int nextNumber) const {
+    CylinderChainBindingForceImpl& impl = dynamic_cast<CylinderChainBindingForceImpl&>(getImplInContext(context));
+    LinkerState replaced = impl.getKnownState();
+    replaced.linkers = columnsOf(numbers, types, anchors, chains, places, nextNumber).getLinkers();
+    replaced.nextNumber = nextNumber;
+    impl.setState(replaced);
+}
+
+void CylinderChainBindingForce::getNumEventsInContext(Context& context, long long& bindings,
+        long long& unbindings) const {
+    CylinderChainBindingForceImpl& impl = dynamic_cast<CylinderChainBindingForceImpl&>(getImplInContext(context));
+    bindings = impl.getState().bindings;
+    unbindings = impl.getState().unbindings;
+}
+
+ForceImpl* CylinderChainBindingForce::createImpl() const {
+    return new CylinderChainBindingForceImpl(*this);
+}

@@ -1,0 +1,171 @@
+#include "openmm/internal/CylinderChainBindingForceImpl.h"
+#include "couplings/Contours.h"
+#include "openmm/CylinderChainException.h"
+#include "openmm/CylinderChainForce.h"
+#include "openmm/CylinderChainIntegrator.h"
+#include "openmm/CylinderChainKernels.h"
+#include "openmm/OpenMMException.h"
+#include "openmm/System.h"
+#include "openmm/internal/ContextImpl.h"
+#include "openmm/internal/CylinderChainDescription.h"
+#include "openmm/internal/LinkerDescription.h"
+#include "openmm/internal/OSRngSeed.h"
+#include "openmm/reference/SimTKOpenMMRealType.h"
+#include <algorithm>
+
+using namespace OpenMM;
+using namespace std;
+
+static void require(bool condition, const string& message) {
+    if (!condition)
+        throw OpenMMException("CylinderChainBindingForce: "+message);
+}
+
+CylinderChainBindingForceImpl::CylinderChainBindingForceImpl(const CylinderChainBindingForce& owner) :
+        StepForceImpl(owner), owner(owner), context(NULL), seed(0), number(0), upToDate(false),
+        nearestParticles(false), wasExcluded(false) {
+}
+
+void CylinderChainBindingForceImpl::initialize(ContextImpl& context) {
+    this->context = &context;
+    const System& ofContext = context.getSystem();
+
+    // Each such Force of a System has a parameter of its own.
+
+    const CylinderChainForce* chains = NULL;
+    int before = 0;
+    for (int i = 0; i < ofContext.getNumForces(); i++) {
+        const Force* force = &ofContext.getForce(i);
+        if (force == &owner)
+            number = before;
+        if (dynamic_cast<const CylinderChainBindingForce*>(force) != NULL)
+            before++;
+        if (dynamic_cast<const CylinderChainForce*>(force) != NULL)
+            chains = dynamic_cast<const CylinderChainForce*>(force);
+    }
+    require(chains != NULL, "The System has no CylinderChainForce with chains to bind to");
+    parameter = "CylinderChainLinkers"+to_string(number);
+    nearestParticles = chains->usesPeriodicBoundaryConditions();
+    const CylinderChainDescription description(ofContext, *chains);
+    const cylchain::Contours contours(description.getChains());
+    lengths.clear();
+    for (int chain = 0; chain < contours.getNumChains(); chain++)
+        lengths.push_back(contours.getLength(chain));
+    system = {};
+    Vec3 box[3];
+    context.getPeriodicBoxVectors(box[0], box[1], box[2]);
+    const double room = 0.5*min(min(box[0][0], box[1][1]), box[2][2]);
+    for (int i = 0; i < owner.getNumHands(); i++) {
+        system.hands.push_back(owner.getHand(i));
+        const cylchain::Hand& hand = system.hands.back();
+        require(hand.chains.empty() || hand.chains.back() < contours.getNumChains(),
+                "Hand "+to_string(i)+" binds to a chain that does not exist");
+        require(!owner.usesPeriodicBoundaryConditions() || hand.reach < room, "The reach of hand "+to_string(i)+
+                " must be less than half of the periodic box, which is "+to_string(2*room)+" nm wide");
+    }
+    for (int i = 0; i < owner.getNumLinkerTypes(); i++) {
+        system.types.push_back(owner.getLinkerType(i));
+        const cylchain::LinkerType& type = system.types.back();
+        require(type.hands[0] < 0 || type.volume > 0 || type.concentration >= 0 ||
+                ofContext.usesPeriodicBoundaryConditions(), "Linkers of type "+to_string(i)+
+                " need a volume or a concentration, since there is no periodic box");
+    }
+    for (int i = 0; i < owner.getNumAnchors(); i++) {
+        cylchain::Place place;
+        Vec3 point;
+        owner.getAnchor(i, place.first, point);
+        require(place.first < ofContext.getNumParticles(), "Anchor "+to_string(i)+
+                " is at a particle that does not exist");
+        for (int k = 0; k < 3; k++)
+            place.point[k] = point[k];
+        system.anchors.push_back(place);
+    }
+    state = owner.getState();
+    checkLinkers(state.linkers, system, lengths);
+    seed = (uint32_t) (owner.getRandomNumberSeed() == 0 ? osrngseed() : owner.getRandomNumberSeed());
+    linkerKernel = context.getPlatform().createKernel(UpdateCylinderChainLinkersKernel::Name(), context);
+    linkerKernel.getAs<UpdateCylinderChainLinkersKernel>().initialize(system, description.getChains(),
+            owner.usesPeriodicBoundaryConditions(), nearestParticles);
+    linkKernel = context.getPlatform().createKernel(CalcCylinderChainLinkForceKernel::Name(), context);
+    linkKernel.getAs<CalcCylinderChainLinkForceKernel>().initialize(ofContext, owner.usesPeriodicBoundaryConditions(),
+            nearestParticles);
+    upToDate = false;
+}
+
+double CylinderChainBindingForceImpl::getTemperature() const {
+    const CylinderChainIntegrator* integrator = dynamic_cast<const CylinderChainIntegrator*>(
+            &context->getIntegrator());
+    return integrator == NULL ? owner.getTemperature() : integrator->getTemperature();
+}
+
+map<string, double> CylinderChainBindingForceImpl::getDefaultParameters() {
+    return {{parameter, (double) state.steps}};
+}
+
+vector<string> CylinderChainBindingForceImpl::getKernelNames() {
+    return {UpdateCylinderChainLinkersKernel::Name(), CalcCylinderChainLinkForceKernel::Name()};
+}
+
+void CylinderChainBindingForceImpl::follow() const {
+    if (context->getParameter(parameter) == (double) state.steps)
+        return;
+    throw CylinderChainException(CylinderChainException::UnknownLinks, {},
+            "CylinderChainBindingForce: Where the linkers of this Context are is not known: it has got a State or "
+            "checkpoint of another time that does not say it. Give it the linkers that belong to it by "
+            "setLinkersInContext(), or Filaments.set_linkers() in Python. The checkpoints of a "
+            "CylinderChainIntegrator, and States that hold its parameters (getState(integratorParameters=True)), "
+            "restore linkers themselves");
+}
+
+void CylinderChainBindingForceImpl::accept() {
+    upToDate = false;
+    context->setParameter(parameter, (double) state.steps);
+}
+
+void CylinderChainBindingForceImpl::updateContextState(ContextImpl& context, bool& forcesInvalid) {
+    follow();
+    const double stepSize = context.getIntegrator().getStepSize();
+    if (!(stepSize > 0))
+        return;
+    const size_t before = getLinks().size();
+    const long long failed = linkerKernel.getAs<UpdateCylinderChainLinkersKernel>().execute(context, state,
+            BOLTZ*getTemperature(), stepSize, seed, number);
+    accept();
+    require(failed == -1, "The hands of linker "+to_string(failed)+" bind, unbind or walk more than a hundred thousand "
+            "times within a step: use a smaller step, or look at the rates");
+    // An implicit step computes the forces itself.
+    if (!wasExcluded && (before > 0 || !getLinks().empty()))
+        forcesInvalid = true;
+}
+
+const vector<cylchain::Link>& CylinderChainBindingForceImpl::getLinks() {
+    follow();
+    if (!upToDate) {
+        linkerKernel.getAs<UpdateCylinderChainLinkersKernel>().describe(state, links);
+        upToDate = true;
+    }
+    return links;
+}
+
+const cylchain::LinkerState& CylinderChainBindingForceImpl::getState() {
+    follow();
+    return state;
+}
+
+void CylinderChainBindingForceImpl::setState(const cylchain::LinkerState& replaced) {
+    checkLinkers(replaced.linkers, system, lengths);
+    state = replaced;
+    accept();
+}
+
+double CylinderChainBindingForceImpl::calcForcesAndEnergy(ContextImpl& context, bool includeForces,
+        bool includeEnergy, int groups) {
+    if (!isIn(groups))
+        return 0.0;
+    wasExcluded = isExcluded();
+    if (isExcluded())
+        return 0.0;
+    int outOfRange = -1;
+    return linkKernel.getAs<CalcCylinderChainLinkForceKernel>().execute(context, getLinks(), includeForces,
+            includeEnergy, outOfRange);
+}

@@ -1,0 +1,109 @@
+#include "openmm/internal/LinkerDescription.h"
+#include "openmm/OpenMMException.h"
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <string>
+#include <tuple>
+
+using namespace cylchain;
+using namespace std;
+
+namespace OpenMM {
+
+static void refuse(const string& message) {
+    throw OpenMMException("CylinderChainBindingForce: "+message);
+}
+
+LinkerColumns::LinkerColumns(const LinkerState& state) : nextNumber(state.nextNumber) {
+    for (const Linker& linker : state.linkers) {
+        numbers.push_back(linker.number);
+        types.push_back(linker.type);
+        anchors.push_back(linker.anchor);
+        for (const HandPlace& hand : linker.hands) {
+            chains.push_back(hand.chain);
+            places.push_back(hand.position);
+        }
+    }
+}
+
+static void checkColumn(const char* name, size_t size, size_t expected) {
+    if (size != expected)
+        refuse(string("There must be ")+to_string(expected)+" "+name+", but there are "+to_string(size));
+}
+
+vector<Linker> LinkerColumns::getLinkers() const {
+    const size_t count = numbers.size();
+    checkColumn("types", types.size(), count);
+    checkColumn("anchors", anchors.size(), count);
+    checkColumn("chains", chains.size(), 2*count);
+    checkColumn("places", places.size(), 2*count);
+    vector<Linker> linkers;
+    linkers.reserve(count);
+    for (size_t i = 0; i < count; i++) {
+        if (numbers[i] < 0 || (i > 0 && numbers[i] <= numbers[i-1]))
+            refuse("The numbers of linkers must ascend from 0 on");
+        Linker linker;
+        linker.number = numbers[i];
+        linker.type = types[i];
+        linker.anchor = anchors[i];
+        for (int side = 0; side < 2; side++)
+            if (chains[2*i+side] != -1) {
+                linker.hands[side].chain = chains[2*i+side];
+                linker.hands[side].position = places[2*i+side];
+            }
+        linkers.push_back(linker);
+    }
+    if (nextNumber < 0 || (count > 0 && nextNumber <= numbers.back()))
+        refuse("The next number must be above those of all linkers");
+    return linkers;
+}
+
+void checkLinkers(const vector<Linker>& linkers, const LinkerSystem& system, const vector<double>& lengths) {
+    // Sites by chain, spacing and number.
+    set<tuple<int, double, long long> > sites;
+    for (const Linker& linker : linkers) {
+        const string name = "Linker "+to_string(linker.number);
+        if (linker.type < 0 || linker.type >= (int) system.types.size())
+            refuse(name+" has an illegal type: "+to_string(linker.type));
+        const LinkerType& type = system.types[linker.type];
+        if (linker.anchor < -1 || linker.anchor >= (int) system.anchors.size())
+            refuse(name+" has an illegal anchor: "+to_string(linker.anchor));
+        if ((linker.anchor == -1) != (type.hands[0] >= 0))
+            refuse(name+(linker.anchor == -1 ? " has no anchor, but those of its type have one" :
+                    " has an anchor, but those of its type have two hands"));
+        if (type.concentration >= 0 && !linker.isHeld(0) && !linker.isHeld(1))
+            refuse(name+" is not bound, but those of its type are only counted while they are bound: their "
+                    "concentration is given");
+        for (int side = 0; side < 2; side++) {
+            const HandPlace& place = linker.hands[side];
+            if (!place.isBound()) {
+                if (place.chain < -1)
+                    refuse(name+" is bound to an illegal chain: "+to_string(place.chain));
+                continue;
+            }
+            if (type.hands[side] < 0)
+                refuse(name+" has an anchor in the place of its first hand, but is bound with it");
+            const Hand& hand = system.hands[type.hands[side]];
+            if (!binary_search(hand.chains.begin(), hand.chains.end(), place.chain))
+                refuse(name+" is bound to chain "+to_string(place.chain)+", to which its hand does not bind");
+            if (!(place.position >= 0))
+                refuse(name+" is bound at an illegal position along chain "+to_string(place.chain));
+            if (lengths.empty())
+                continue;
+            const double length = lengths[place.chain];
+            if (!(place.position <= length*(1+1e-9)))
+                refuse(name+" is bound "+to_string(place.position)+" nm along chain "+to_string(place.chain)+
+                        ", which is only "+to_string(length)+" nm long");
+            if (hand.siteSpacing > 0) {
+                const long long site = (long long) floor(place.position/hand.siteSpacing);
+                if (site >= floor(length/hand.siteSpacing+1e-9) ||
+                        !sites.insert(make_tuple(place.chain, hand.siteSpacing, site)).second)
+                    refuse(name+" is bound to site "+to_string(site)+" of chain "+to_string(place.chain)+
+                            ", which does not exist or is taken");
+            }
+        }
+    }
+}
+
+} // namespace OpenMM

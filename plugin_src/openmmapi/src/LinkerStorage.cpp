@@ -1,0 +1,149 @@
+#include "openmm/internal/LinkerStorage.h"
+#include "openmm/OpenMMException.h"
+#include "openmm/internal/CheckpointValues.h"
+#include "openmm/internal/CylinderChainBindingForceImpl.h"
+#include "openmm/internal/LinkerDescription.h"
+#include "openmm/serialization/SerializationNode.h"
+#include <algorithm>
+#include <istream>
+#include <ostream>
+#include <string>
+#include <vector>
+
+using namespace cylchain;
+using namespace std;
+
+namespace OpenMM {
+
+static const char* const CHAIN_PROPERTIES[] = {"chain1", "chain2"};
+static const char* const PLACE_PROPERTIES[] = {"place1", "place2"};
+
+void writeLinkerState(SerializationNode& node, const LinkerState& state) {
+    const LinkerColumns columns(state);
+    node.setIntProperty("nextNumber", columns.nextNumber).setLongProperty("steps", state.steps)
+            .setLongProperty("bindings", state.bindings).setLongProperty("unbindings", state.unbindings);
+    for (size_t i = 0; i < columns.numbers.size(); i++) {
+        SerializationNode& linker = node.createChildNode("Linker");
+        linker.setIntProperty("number", columns.numbers[i]).setIntProperty("type", columns.types[i]);
+        if (columns.anchors[i] >= 0)
+            linker.setIntProperty("anchor", columns.anchors[i]);
+        for (int side = 0; side < 2; side++)
+            if (columns.chains[2*i+side] >= 0)
+                linker.setIntProperty(CHAIN_PROPERTIES[side], columns.chains[2*i+side])
+                        .setDoubleProperty(PLACE_PROPERTIES[side], columns.places[2*i+side]);
+    }
+}
+
+LinkerState readLinkerState(const SerializationNode& node) {
+    LinkerColumns columns;
+    columns.nextNumber = node.getIntProperty("nextNumber");
+    for (const SerializationNode& linker : node.getChildren()) {
+        columns.numbers.push_back(linker.getIntProperty("number"));
+        columns.types.push_back(linker.getIntProperty("type"));
+        columns.anchors.push_back(linker.getIntProperty("anchor", -1));
+        for (int side = 0; side < 2; side++) {
+            columns.chains.push_back(linker.getIntProperty(CHAIN_PROPERTIES[side], -1));
+            columns.places.push_back(linker.getDoubleProperty(PLACE_PROPERTIES[side], 0));
+        }
+    }
+    LinkerState state;
+    state.linkers = columns.getLinkers();
+    state.nextNumber = columns.nextNumber;
+    state.steps = node.getLongProperty("steps", 0);
+    state.bindings = node.getLongProperty("bindings", 0);
+    state.unbindings = node.getLongProperty("unbindings", 0);
+    return state;
+}
+
+static vector<CylinderChainBindingForceImpl*> findForces(ContextImpl& context) {
+    vector<CylinderChainBindingForceImpl*> forces;
+    for (ForceImpl* impl : context.getForceImpls()) {
+        CylinderChainBindingForceImpl* force = dynamic_cast<CylinderChainBindingForceImpl*>(impl);
+        if (force != NULL)
+            forces.push_back(force);
+    }
+    return forces;
+}
+
+static void giveStates(const vector<LinkerState>& states, const vector<uint32_t>& seeds, ContextImpl& context) {
+    // Of a System without such Forces, or an earlier version: it says nothing about linkers.
+
+    if (states.empty())
+        return;
+    const vector<CylinderChainBindingForceImpl*> forces = findForces(context);
+    if (states.size() != forces.size())
+        throw OpenMMException("CylinderChainIntegrator: The State or checkpoint has the linkers of "+
+                to_string(states.size())+" CylinderChainBindingForces, but the System has "+
+                to_string(forces.size()));
+    for (size_t i = 0; i < forces.size(); i++) {
+        forces[i]->setState(states[i]);
+        if (!seeds.empty())
+            forces[i]->setSeed(seeds[i]);
+    }
+}
+
+static const char* const WITHIN = "the linkers of a CylinderChainBindingForce";
+
+void writeLinkers(ostream& stream, ContextImpl& context) {
+    const vector<CylinderChainBindingForceImpl*> forces = findForces(context);
+    writeValue(stream, (int) forces.size());
+    for (CylinderChainBindingForceImpl* force : forces) {
+        const LinkerState& state = force->getState();
+        for (uint64_t value : {(uint64_t) force->getSeed(), (uint64_t) state.nextNumber, state.steps, state.bindings,
+                state.unbindings, (uint64_t) state.linkers.size()})
+            writeValue(stream, value);
+        for (const Linker& linker : state.linkers) {
+            writeValue(stream, linker.number);
+            writeValue(stream, linker.type);
+            writeValue(stream, linker.anchor);
+            for (const HandPlace& hand : linker.hands) {
+                writeValue(stream, hand.chain);
+                writeValue(stream, hand.position);
+            }
+        }
+    }
+}
+
+void readLinkers(istream& stream, ContextImpl& context) {
+    vector<LinkerState> states;
+    vector<uint32_t> seeds;
+    const int count = readValue<int>(stream, WITHIN);
+    for (int i = 0; i < count; i++) {
+        LinkerState state;
+        seeds.push_back(readValue<uint64_t>(stream, WITHIN));
+        state.nextNumber = readValue<uint64_t>(stream, WITHIN);
+        state.steps = readValue<uint64_t>(stream, WITHIN);
+        state.bindings = readValue<uint64_t>(stream, WITHIN);
+        state.unbindings = readValue<uint64_t>(stream, WITHIN);
+        const uint64_t linkers = readValue<uint64_t>(stream, WITHIN);
+        for (uint64_t j = 0; j < linkers; j++) {
+            // One by one, so that a checkpoint which is cut off cannot ask for more memory than it has.
+            Linker linker;
+            linker.number = readValue<uint32_t>(stream, WITHIN);
+            linker.type = readValue<int>(stream, WITHIN);
+            linker.anchor = readValue<int>(stream, WITHIN);
+            for (HandPlace& hand : linker.hands) {
+                hand.chain = readValue<int>(stream, WITHIN);
+                hand.position = readValue<double>(stream, WITHIN);
+            }
+            state.linkers.push_back(linker);
+        }
+        states.push_back(state);
+    }
+    giveStates(states, seeds, context);
+}
+
+void writeLinkers(SerializationNode& node, ContextImpl& context) {
+    for (CylinderChainBindingForceImpl* force : findForces(context))
+        writeLinkerState(node.createChildNode("Linkers"), force->getState());
+}
+
+void readLinkers(const SerializationNode& node, ContextImpl& context) {
+    vector<LinkerState> states;
+    for (const SerializationNode& child : node.getChildren())
+        if (child.getName() == "Linkers")
+            states.push_back(readLinkerState(child));
+    giveStates(states, {}, context);
+}
+
+} // namespace OpenMM

@@ -1,0 +1,30 @@
+#ifndef OPENMM_REFERENCEUPDATECYLINDERCHAINLINKERSKERNEL_H_
+#define OPENMM_REFERENCEUPDATECYLINDERCHAINLINKERSKERNEL_H_
+
+#include "ReferenceParallelLoop.h"
+#include "kinetics/LinkerKinetics.h"
+#include "openmm/CylinderChainKernels.h"
+#include <memory>
+
+namespace OpenMM {
+
+/**
+ * This kernel lets the linkers of a CylinderChainBindingForce walk, bind and unbind.
+ */
+class ReferenceUpdateCylinderChainLinkersKernel : public UpdateCylinderChainLinkersKernel {
+public:
+    ReferenceUpdateCylinderChainLinkersKernel(std::string name, const Platform& platform, ContextImpl& context);
+    void initialize(const cylchain::LinkerSystem& system, const std::vector<cylchain::Chain>& chains, bool periodic,
+            bool nearestParticles);
+    long long execute(ContextImpl& context, cylchain::LinkerState& state, double kT, double stepSize,
+            std::uint32_t seed, int force);
+    void describe(const cylchain::LinkerState& state, std::vector<cylchain::Link>& links);
+private:
+    ReferenceParallelLoop loop;
+    std::unique_ptr<cylchain::LinkerKinetics> kinetics;
+    bool periodic, nearestParticles;
+};
+
+} // namespace OpenMM
+
+#endif /*OPENMM_REFERENCEUPDATECYLINDERCHAINLINKERSKERNEL_H_*/

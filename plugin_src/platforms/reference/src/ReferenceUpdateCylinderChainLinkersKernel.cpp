@@ -1,0 +1,40 @@
+#include "ReferenceUpdateCylinderChainLinkersKernel.h"
+#include "openmm/reference/ReferencePlatform.h"
+
+using namespace OpenMM;
+using namespace cylchain;
+using namespace std;
+
+static ReferencePlatform::PlatformData& extractData(ContextImpl& context) {
+    return *reinterpret_cast<ReferencePlatform::PlatformData*>(context.getPlatformData());
+}
+
+ReferenceUpdateCylinderChainLinkersKernel::ReferenceUpdateCylinderChainLinkersKernel(string name,
+        const Platform& platform, ContextImpl& context) : UpdateCylinderChainLinkersKernel(name, platform),
+        loop(context), periodic(false), nearestParticles(false) {
+}
+
+void ReferenceUpdateCylinderChainLinkersKernel::initialize(const LinkerSystem& system, const vector<Chain>& chains,
+        bool periodic, bool nearestParticles) {
+    kinetics.reset(new LinkerKinetics(system, chains));
+    this->periodic = periodic;
+    this->nearestParticles = nearestParticles;
+}
+
+long long ReferenceUpdateCylinderChainLinkersKernel::execute(ContextImpl& context, LinkerState& state,
+        double kT, double stepSize, uint32_t seed, int force) {
+    ReferencePlatform::PlatformData& data = extractData(context);
+    Vec3* const box = data.periodicBoxVectors;
+    KineticStep step = {&(*data.positions)[0][0], LinkBoxes(), box[0][0]*box[1][1]*box[2][2], stepSize, seed,
+            static_cast<uint32_t>(force)};
+    step.boxes.distances = periodic ? &box[0][0] : NULL;
+    step.boxes.segments = nearestParticles ? &box[0][0] : NULL;
+    kinetics->setTemperature(kT);
+    return kinetics->advance(state, step, [&] (int count, const function<void(int)>& iteration) {
+        loop.run(count, iteration);
+    });
+}
+
+void ReferenceUpdateCylinderChainLinkersKernel::describe(const LinkerState& state, vector<Link>& links) {
+    kinetics->describe(state, links);
+}

@@ -1,0 +1,96 @@
+#include "openmm/serialization/CylinderChainBindingForceProxy.h"
+#include "openmm/CylinderChainBindingForce.h"
+#include "openmm/OpenMMException.h"
+#include "openmm/internal/LinkerDescription.h"
+#include "openmm/internal/LinkerStorage.h"
+#include "openmm/serialization/SerializationNode.h"
+#include <memory>
+
+using namespace OpenMM;
+using namespace std;
+
+CylinderChainBindingForceProxy::CylinderChainBindingForceProxy() : SerializationProxy("CylinderChainBindingForce") {
+}
+
+void CylinderChainBindingForceProxy::serialize(const void* object, SerializationNode& node) const {
+    node.setIntProperty("version", 1);
+    const CylinderChainBindingForce& force = *reinterpret_cast<const CylinderChainBindingForce*>(object);
+    node.setIntProperty("forceGroup", force.getForceGroup());
+    node.setStringProperty("name", force.getName());
+    node.setDoubleProperty("temperature", force.getTemperature()).setIntProperty("randomSeed",
+            force.getRandomNumberSeed()).setBoolProperty("usesPeriodic", force.usesPeriodicBoundaryConditions());
+    SerializationNode& hands = node.createChildNode("Hands");
+    for (int i = 0; i < force.getNumHands(); i++) {
+        const cylchain::Hand& hand = force.getHand(i);
+        SerializationNode& child = hands.createChildNode("Hand");
+        child.setDoubleProperty("bindingRate", hand.bindingRate).setDoubleProperty("reach", hand.reach)
+                .setDoubleProperty("unbindingRate", hand.unbindingRate)
+                .setDoubleProperty("strainShare", hand.strainShare)
+                .setDoubleProperty("unbindingForce", hand.unbindingForce)
+                .setDoubleProperty("catchRate", hand.catchRate).setDoubleProperty("catchForce", hand.catchForce)
+                .setDoubleProperty("speed", hand.speed).setDoubleProperty("stallForce", hand.stallForce)
+                .setBoolProperty("walksBackward", hand.walksBackward)
+                .setBoolProperty("holdsAtEnds", hand.holdsAtEnds).setDoubleProperty("siteSpacing", hand.siteSpacing);
+        for (int chain : hand.chains)
+            child.createChildNode("Chain").setIntProperty("index", chain);
+    }
+    SerializationNode& types = node.createChildNode("LinkerTypes");
+    for (int i = 0; i < force.getNumLinkerTypes(); i++) {
+        const cylchain::LinkerType& type = force.getLinkerType(i);
+        types.createChildNode("LinkerType").setIntProperty("hand1", type.hands[0])
+                .setIntProperty("hand2", type.hands[1]).setDoubleProperty("restLength", type.restLength)
+                .setDoubleProperty("stiffness", type.stiffness).setBoolProperty("sameChain", type.sameChain)
+                .setDoubleProperty("volume", type.volume).setDoubleProperty("concentration", type.concentration);
+    }
+    SerializationNode& anchors = node.createChildNode("Anchors");
+    for (int i = 0; i < force.getNumAnchors(); i++) {
+        int particle;
+        Vec3 point;
+        force.getAnchor(i, particle, point);
+        anchors.createChildNode("Anchor").setIntProperty("particle", particle).setDoubleProperty("x", point[0])
+                .setDoubleProperty("y", point[1]).setDoubleProperty("z", point[2]);
+    }
+    writeLinkerState(node.createChildNode("Linkers"), force.getState());
+}
+
+void* CylinderChainBindingForceProxy::deserialize(const SerializationNode& node) const {
+    if (node.getIntProperty("version") != 1)
+        throw OpenMMException("Unsupported version number");
+    unique_ptr<CylinderChainBindingForce> force(new CylinderChainBindingForce(node.getDoubleProperty("temperature")));
+    force->setForceGroup(node.getIntProperty("forceGroup"));
+    force->setName(node.getStringProperty("name"));
+    force->setRandomNumberSeed(node.getIntProperty("randomSeed"));
+    force->setUsesPeriodicBoundaryConditions(node.getBoolProperty("usesPeriodic"));
+    for (auto& hand : node.getChildNode("Hands").getChildren()) {
+        vector<int> chains;
+        for (auto& chain : hand.getChildren())
+            chains.push_back(chain.getIntProperty("index"));
+        const int number = force->addHand(hand.getDoubleProperty("bindingRate"), hand.getDoubleProperty("reach"),
+                hand.getDoubleProperty("unbindingRate"), chains);
+        force->setHandUnbinding(number, hand.getDoubleProperty("strainShare"),
+                hand.getDoubleProperty("unbindingForce"), hand.getDoubleProperty("catchRate"),
+                hand.getDoubleProperty("catchForce"));
+        force->setHandWalking(number, hand.getDoubleProperty("speed"), hand.getDoubleProperty("stallForce"),
+                hand.getBoolProperty("walksBackward"), hand.getBoolProperty("holdsAtEnds"));
+        force->setHandSiteSpacing(number, hand.getDoubleProperty("siteSpacing"));
+    }
+    for (auto& type : node.getChildNode("LinkerTypes").getChildren()) {
+        const int number = force->addLinkerType(type.getIntProperty("hand1"), type.getIntProperty("hand2"),
+                type.getDoubleProperty("restLength"), type.getDoubleProperty("stiffness"),
+                type.getBoolProperty("sameChain"));
+        force->setLinkerTypeReservoir(number, type.getDoubleProperty("volume"),
+                type.getDoubleProperty("concentration"));
+    }
+    for (auto& anchor : node.getChildNode("Anchors").getChildren()) {
+        const int particle = anchor.getIntProperty("particle");
+        if (particle >= 0)
+            force->addParticleAnchor(particle);
+        else
+            force->addPointAnchor(Vec3(anchor.getDoubleProperty("x"), anchor.getDoubleProperty("y"),
+                    anchor.getDoubleProperty("z")));
+    }
+    const LinkerColumns linkers(readLinkerState(node.getChildNode("Linkers")));
+    force->setLinkers(linkers.numbers, linkers.types, linkers.anchors, linkers.chains, linkers.places,
+            linkers.nextNumber);
+    return force.release();
+}

@@ -1,0 +1,493 @@
+/**
+ * This tests linkers on chains that stand still: numbers and places in equilibrium against partition functions, for
+ * steps over a factor of a hundred; laws of unbinding and walking; sites that hold one hand each.
+ */
+
+#include "TestChains.h"
+#include "kinetics/LinkerKinetics.h"
+#include <algorithm>
+#include <map>
+
+const double KT = 4.0;
+
+/** Rods of some segments that stand still. */
+struct Rods {
+    vector<Chain> chains;
+    Array x;
+    void add(const double* start, const double* direction, int segments, double length) {
+        Chain chain;
+        chain.bending = (BendingModel) 0;
+        chain.stretching = StretchingModel::Harmonic;
+        for (int i = 0; i <= segments; i++) {
+            chain.nodes.push_back(x.size()/3);
+            chain.fixed.push_back(true);
+            for (int k = 0; k < 3; k++)
+                x.push_back(start[k]+i*length*direction[k]);
+        }
+        Segment segment = {length, 1, 0, 1, 1, 1, 1};
+        chain.segments.assign(segments, segment);
+        chain.joints.assign(segments-1, 1);
+        chains.push_back(chain);
+    }
+};
+
+static const Loop SERIAL = [] (int count, const function<void(int)>& iteration) {
+    for (int i = 0; i < count; i++)
+        iteration(i);
+};
+
+static const Loop BACKWARDS = [] (int count, const function<void(int)>& iteration) {
+    for (int i = count-1; i >= 0; i--)
+        iteration(i);
+};
+
+static Hand handOf(double bindingRate, double reach, double unbindingRate, const vector<int>& chains) {
+    Hand hand;
+    hand.bindingRate = bindingRate;
+    hand.reach = reach;
+    hand.unbindingRate = unbindingRate;
+    hand.chains = chains;
+    return hand;
+}
+
+static LinkerState freeLinkers(int count, int type = 0) {
+    LinkerState state;
+    for (int i = 0; i < count; i++) {
+        Linker linker;
+        linker.number = state.nextNumber++;
+        linker.type = type;
+        state.linkers.push_back(linker);
+    }
+    return state;
+}
+
+static KineticStep stepOf(const Array& x, double size, const double* box = NULL) {
+    KineticStep step = {x.data(), LinkBoxes(), 1e6, size, 11, 0};
+    step.boxes.distances = box;
+    return step;
+}
+
+/** Within four standard errors, of averages over blocks, and able to tell 5 %. */
+struct Mean {
+    vector<double> blocks;
+    double sum = 0;
+    long count = 0;
+    void add(double value) {
+        sum += value;
+        count++;
+    }
+    void endBlock() {
+        blocks.push_back(sum/count);
+        sum = count = 0;
+    }
+    void check(const string& what, double expected) const {
+        double mean = 0, square = 0;
+        for (double value : blocks)
+            mean += value/blocks.size();
+        for (double value : blocks)
+            square += (value-mean)*(value-mean);
+        const double error = sqrt(square/(blocks.size()*(blocks.size()-1.0)));
+        // Written so that NaN fails.
+        if (!(4*error < 0.05*fabs(expected) && fabs(mean-expected) < 4*error))
+            throw runtime_error(what+": found "+to_string(mean)+" +- "+to_string(error)+", expected "+
+                    to_string(expected));
+    }
+};
+
+/** What numbers and places are expected of a linker on two rods, by sums over places. */
+struct Expected {
+    double unbound, one, both, square;
+};
+
+static Expected expectedOn(const Rods& rods, const LinkerSystem& system, double volume) {
+    const Hand &a = system.hands[0], &b = system.hands[1];
+    const LinkerType& type = system.types[0];
+    const Contours contours(rods.chains);
+    const double inVolume = 4*M_PI/3*pow(a.reach*b.reach, 1.5)/volume;
+    const double ofA = a.bindingRate/a.unbindingRate, ofB = b.bindingRate/b.unbindingRate;
+    double one = 0, both = 0, square = 0;
+    for (int i = 0; i < 2; i++) {
+        one += inVolume*contours.getLength(i)*(ofA+ofB);
+        const double length = contours.getLength(i), other = contours.getLength(1-i);
+        const int points = 1500;
+        for (int p = 0; p < points; p++)
+            for (int q = 0; q < points; q++) {
+                double u[3], v[3], d = 0;
+                const double s = length*(p+0.5)/points, t = other*(q+0.5)/points;
+                locate(contours.findPlace(i, s), rods.x.data(), NULL, u);
+                locate(contours.findPlace(1-i, t), rods.x.data(), NULL, v);
+                for (int k = 0; k < 3; k++)
+                    d += (u[k]-v[k])*(u[k]-v[k]);
+                d = sqrt(d);
+                if (d > a.reach)
+                    continue;
+                const double energy = 0.5*type.stiffness*(d-type.restLength)*(d-type.restLength);
+                const double weight = inVolume*ofA*ofB*exp(-energy/system.kT)*length*other/points/points;
+                both += weight;
+                square += weight*(s-0.5*length)*(s-0.5*length);
+            }
+    }
+    const double all = 1+one+both;
+    return {1/all, one/all, both/all, square/both};
+}
+
+static void checkEquilibrium(const Rods& rods, double stiffness, double restLength, double reach, double share,
+        double stepSize) {
+    LinkerSystem system;
+    system.kT = KT;
+    system.hands = {handOf(0.3, reach, 1, {0, 1}), handOf(0.6, reach, 0.5, {0, 1})};
+    system.hands[0].strainShare = share;
+    system.hands[1].strainShare = 0.5*share;
+    LinkerType type;
+    type.hands[0] = 0;
+    type.hands[1] = 1;
+    type.stiffness = stiffness;
+    type.restLength = restLength;
+    system.types = {type};
+    KineticStep step = stepOf(rods.x, stepSize);
+    step.volume = 3e9;
+    const Expected expected = expectedOn(rods, system, step.volume);
+    LinkerKinetics kinetics(system, rods.chains);
+    LinkerState state = freeLinkers(1500);
+    // Longer than a hand stays bound.
+    const int interval = max(1, (int) (3/stepSize)), blocks = 20, samples = 5;
+    for (int i = 0; i < 10*interval; i++)
+        kinetics.advance(state, step, SERIAL);
+    Mean unbound, one, both, square;
+    for (int block = 0; block < blocks; block++) {
+        for (int sample = 0; sample < samples; sample++) {
+            for (int i = 0; i < interval; i++)
+                kinetics.advance(state, step, SERIAL);
+            for (const Linker& linker : state.linkers) {
+                const int bound = linker.hands[0].isBound()+linker.hands[1].isBound();
+                unbound.add(bound == 0);
+                one.add(bound == 1);
+                both.add(bound == 2);
+                if (bound == 2) {
+                    const double middle = 0.5*200;
+                    square.add(pow(linker.hands[0].position-middle, 2));
+                }
+            }
+        }
+        for (Mean* mean : {&unbound, &one, &both, &square})
+            mean->endBlock();
+    }
+    unbound.check("unbound", expected.unbound);
+    one.check("one hand bound", expected.one);
+    both.check("both hands bound", expected.both);
+    square.check("places", expected.square);
+}
+
+static const double ORIGIN[] = {0, 0, 0}, ALONG_X[] = {1, 0, 0};
+
+/** With steps over a factor of a hundred. */
+static void testEquilibriumOnRods() {
+    Rods crossed, parallel;
+    const double a[] = {-100, 0, 0}, b[] = {0, -60, 20}, c[] = {-90, 0, 20}, y[] = {0.6, 0.8, 0};
+    crossed.add(a, ALONG_X, 4, 50);
+    crossed.add(b, y, 2, 100);
+    parallel.add(a, ALONG_X, 2, 100);
+    parallel.add(c, ALONG_X, 5, 40);
+    checkEquilibrium(crossed, 0.02, 0, 120, 0, 0.1);
+    checkEquilibrium(crossed, 0.02, 0, 120, 0, 10);
+    checkEquilibrium(parallel, 0.05, 30, 70, 0.6, 0.2);
+    // Where the spring counts beyond what is in reach, linkers do not get there while chains stand still.
+    checkEquilibrium(crossed, 0.01, 0, 50, 0.3, 0.3);
+}
+
+/** A system of linkers with one hand, at anchors that are points. */
+static LinkerSystem anchoredSystem(const Hand& hand, double stiffness, const double* point) {
+    LinkerSystem system;
+    system.kT = KT;
+    system.hands = {hand};
+    LinkerType type;
+    type.hands[1] = 0;
+    type.stiffness = stiffness;
+    system.types = {type};
+    Place anchor;
+    copy(point, point+3, anchor.point);
+    system.anchors = {anchor};
+    return system;
+}
+
+static LinkerState boundLinkers(int count, double position) {
+    LinkerState state = freeLinkers(count);
+    for (Linker& linker : state.linkers) {
+        linker.anchor = 0;
+        linker.hands[1].chain = 0;
+        linker.hands[1].position = position;
+    }
+    return state;
+}
+
+static int countBound(const LinkerState& state) {
+    return count_if(state.linkers.begin(), state.linkers.end(), [] (const Linker& linker) {
+        return linker.hands[1].isBound();
+    });
+}
+
+/** Bound linkers, none of which binds again, become fewer exponentially, whatever the step is. */
+static void checkLifetimes(const Hand& hand, double rate, const string& what) {
+    Rods rods;
+    rods.add(ORIGIN, ALONG_X, 2, 100);
+    const double point[] = {50, 30, 40};
+    LinkerKinetics kinetics(anchoredSystem(hand, 0.1, point), rods.chains);
+    for (double stepSize : {0.02/rate, 0.7/rate}) {
+        const int number = 40000, steps = (int) round(1.4/(stepSize*rate));
+        LinkerState state = boundLinkers(number, 50);
+        for (int i = 0; i < steps; i++)
+            kinetics.advance(state, stepOf(rods.x, stepSize), SERIAL);
+        const double share = exp(-1.4), error = sqrt(share*(1-share)/number);
+        checkClose(share, countBound(state)/(double) number, 4*error, 1, what);
+    }
+}
+
+static void testUnbindingUnderLoad() {
+    // The spring is 50 long, so that its force is 5 and its energy 125.
+    Hand hand = handOf(0, 100, 0.3, {0});
+    checkLifetimes(hand, 0.3, "no law");
+    hand.unbindingForce = 2;
+    checkLifetimes(hand, 0.3*exp(2.5), "Bell's law");
+    hand.catchRate = 20;
+    hand.catchForce = 1.5;
+    checkLifetimes(hand, 0.3*exp(2.5)+20*exp(-5/1.5), "catch and slip");
+    hand = handOf(0, 100, 0.3, {0});
+    hand.strainShare = 0.1;
+    checkLifetimes(hand, 0.3*exp(0.1*125/KT), "strain");
+}
+
+/** Under a spring so soft that its force stays what it is. */
+static void testSpeedUnderLoad() {
+    Rods rods;
+    rods.add(ORIGIN, ALONG_X, 100, 10);
+    for (double force : {-9.0, -3.0, -1.0, 0.0, 1.0, 30.0})
+        for (int direction : {1, -1})
+            for (bool backward : {false, true}) {
+                Hand hand = handOf(0, 100, 0, {0});
+                hand.speed = 2*direction;
+                hand.stallForce = 4;
+                hand.walksBackward = backward;
+                const double far = 1e6;
+                const double point[] = {500+(force*direction > 0 ? far : -far), 0, 0};
+                LinkerKinetics kinetics(anchoredSystem(hand, fabs(force)/far, point), rods.chains);
+                LinkerState state = boundLinkers(1, 500);
+                for (int i = 0; i < 50; i++)
+                    kinetics.advance(state, stepOf(rods.x, 0.5), SERIAL);
+                const double speed = 2*min(2.0, max(backward ? -1.0 : 0.0, 1+force/4));
+                checkClose(direction*speed, (state.linkers[0].hands[1].position-500)/25, 1, 1e-3, "speed");
+            }
+}
+
+/** However long the step is, a spring stops a hand at its stall force. */
+static void testStalling() {
+    Rods rods;
+    rods.add(ORIGIN, ALONG_X, 100, 10);
+    Hand hand = handOf(0, 1000, 0, {0});
+    hand.speed = 2;
+    hand.stallForce = 4;
+    const double point[] = {500, 0, 0};
+    for (double stepSize : {0.1, 1.0, 100.0}) {
+        LinkerKinetics kinetics(anchoredSystem(hand, 0.05, point), rods.chains);
+        LinkerState state = boundLinkers(1, 500);
+        for (int i = 0; i < 10+6000/stepSize; i++) {
+            kinetics.advance(state, stepOf(rods.x, stepSize), SERIAL);
+            check(state.linkers[0].hands[1].position < 580.001, "it passes where it should stall");
+        }
+        checkClose(580, state.linkers[0].hands[1].position, 1, 0.01, "stall");
+    }
+}
+
+static void testRunLengthsAndEnds() {
+    Rods rods;
+    rods.add(ORIGIN, ALONG_X, 2000, 10);
+    Hand hand = handOf(0, 100, 0.5, {0});
+    hand.speed = 50;
+    const double point[] = {0, 0, 0};
+    LinkerKinetics kinetics(anchoredSystem(hand, 0, point), rods.chains);
+    // Where they unbind is not kept: what is lost between two steps has run this far.
+    Mean runs;
+    for (int block = 0; block < 20; block++) {
+        LinkerState state = boundLinkers(2000, 0);
+        double sum = 0;
+        for (int i = 0; i < 400; i++) {
+            const int before = countBound(state);
+            kinetics.advance(state, stepOf(rods.x, 0.1), SERIAL);
+            sum += (before-countBound(state))*50*0.1*(i+1);
+            state.steps += 1000*block;
+        }
+        runs.add(sum/2000);
+        runs.endBlock();
+    }
+    // Within a step, it walks before it may unbind.
+    runs.check("run length", 50*0.1/(1-exp(-0.5*0.1)));
+    for (bool holds : {false, true}) {
+        hand.unbindingRate = 0;
+        hand.holdsAtEnds = holds;
+        LinkerKinetics short_(anchoredSystem(hand, 0, point), rods.chains);
+        LinkerState state = boundLinkers(1, 19990);
+        for (int i = 0; i < 3; i++)
+            short_.advance(state, stepOf(rods.x, 0.1), SERIAL);
+        check(countBound(state) == (holds ? 1 : 0), "what it does at the end");
+        check(!holds || state.linkers[0].hands[1].position == 20000, "where it stays");
+    }
+}
+
+/** Sites hold one hand each: of N sites with the weight w each, N w/(1+w) are taken where there is a concentration. */
+static void testSites() {
+    Rods rods;
+    rods.add(ORIGIN, ALONG_X, 9, 11);
+    LinkerSystem system;
+    system.kT = KT;
+    system.hands = {handOf(0.05, 10, 0.4, {0}), handOf(0, 10, 1, {})};
+    system.hands[0].siteSpacing = 2.5;
+    LinkerType type;
+    type.hands[0] = 0;
+    type.hands[1] = 1;
+    type.concentration = 1e-3;
+    system.types = {type};
+    const double weight = 0.05*2.5/0.4*4*M_PI/3*1000*1e-3;
+    for (double stepSize : {0.05, 2.0}) {
+        LinkerKinetics kinetics(system, rods.chains);
+        LinkerState state;
+        Mean taken;
+        for (int block = 0; block < 30; block++) {
+            for (int i = 0; i < 200; i++) {
+                kinetics.advance(state, stepOf(rods.x, stepSize), SERIAL);
+                vector<double> places;
+                for (const Linker& linker : state.linkers)
+                    places.push_back(linker.hands[0].position);
+                sort(places.begin(), places.end());
+                check(adjacent_find(places.begin(), places.end()) == places.end(), "two hands on a site");
+                check(places.empty() || (places[0] >= 1.25 && places.back() <= 39*2.5-1.25), "no site there");
+                taken.add(state.linkers.size());
+            }
+            if (block > 0)
+                taken.endBlock();
+        }
+        taken.check("sites that are taken", 39*weight/(1+weight));
+    }
+}
+
+/** Neither threads nor the box in which positions are given matter. */
+static void testThreadsAndImages() {
+    Rods rods;
+    const double a[] = {-100, 0, 0}, b[] = {-90, 0, 20};
+    rods.add(a, ALONG_X, 4, 50);
+    rods.add(b, ALONG_X, 5, 40);
+    LinkerSystem system;
+    system.kT = KT;
+    system.hands = {handOf(0.3, 60, 1, {0, 1}), handOf(0.6, 60, 0.5, {0, 1})};
+    system.hands[1].speed = 0.5;
+    LinkerType type;
+    type.hands[0] = 0;
+    type.hands[1] = 1;
+    type.stiffness = 0.05;
+    system.types = {type};
+    const double box[] = {500, 0, 0, 70, 500, 0, -60, 40, 500};
+    Array wrapped = rods.x;
+    for (size_t node = 5; node < rods.x.size()/3; node++)
+        for (int k = 0; k < 3; k++)
+            wrapped[3*node+k] += 2*box[3+k]-box[6+k];
+    vector<LinkerState> states(3, freeLinkers(1500));
+    for (int i = 0; i < 60; i++) {
+        const KineticStep steps[] = {stepOf(rods.x, 0.2, box), stepOf(rods.x, 0.2, box), stepOf(wrapped, 0.2, box)};
+        for (int copy = 0; copy < 3; copy++) {
+            LinkerKinetics kinetics(system, rods.chains);
+            KineticStep own = steps[copy];
+            own.volume = 1e8;
+            kinetics.advance(states[copy], own, copy == 1 ? BACKWARDS : SERIAL);
+        }
+    }
+    check(states[0].bindings > 1000 && states[0].unbindings > 500, "nothing happens");
+    for (size_t i = 0; i < states[0].linkers.size(); i++)
+        for (int side = 0; side < 2; side++) {
+            const HandPlace& place = states[0].linkers[i].hands[side];
+            for (int copy = 1; copy < 3; copy++) {
+                const HandPlace& other = states[copy].linkers[i].hands[side];
+                // Of a point, those around it are drawn in the order of cells, which the box shifts.
+                if (copy == 1)
+                    check(place.chain == other.chain && place.position == other.position, "threads");
+            }
+        }
+    const auto both = [] (const LinkerState& state) {
+        return (double) count_if(state.linkers.begin(), state.linkers.end(), [] (const Linker& linker) {
+            return linker.pulls();
+        });
+    };
+    check(both(states[0]) > 100, "few are bound");
+    checkClose(both(states[0]), both(states[2]), 4*sqrt(2*both(states[0])), 1, "images");
+}
+
+static void testSegmentsAround() {
+    NormalNumbers normal(3);
+    const double box[] = {300, 0, 0, 70, 280, 0, -60, 40, 310};
+    Rods rods;
+    for (int i = 0; i < 80; i++) {
+        Array start = normal(3), direction = normal(3);
+        double size = 0;
+        for (double value : direction)
+            size += value*value;
+        for (int k = 0; k < 3; k++) {
+            start[k] *= 200;
+            direction[k] /= sqrt(size);
+        }
+        rods.add(start.data(), direction.data(), 3, 25);
+    }
+    const Contours contours(rods.chains);
+    for (const double* ofCells : {(const double*) NULL, box})
+        for (double reach : {5.0, 40.0, 90.0}) {
+            SegmentCells cells;
+            cells.build(contours, rods.x.data(), reach, ofCells, NULL);
+            for (int i = 0; i < 200; i++) {
+                Array point = normal(3);
+                for (double& value : point)
+                    value *= 250;
+                const int cell = cells.findCell(point.data());
+                // By their middles.
+                map<pair<int, double>, SegmentPiece> around;
+                for (int number = 0; number < cells.countAround(cell); number++) {
+                    const SegmentPiece& piece = cells.getAround(cell, number);
+                    check(around.insert({{piece.segment, piece.start}, piece}).second, "a piece is there twice");
+                    check(piece.length <= min(25.0, reach)*(1+1e-12) && piece.length <= cells.getLongest(),
+                            "its length");
+                }
+                for (int s = 0; s < contours.getNumSegments(); s++)
+                    for (double fraction = 0; fraction < 1.01; fraction += 0.125) {
+                        double vector[3], square = 0;
+                        for (int k = 0; k < 3; k++)
+                            vector[k] = (1-fraction)*rods.x[3*contours.getFirst(s)+k]+
+                                    fraction*rods.x[3*contours.getSecond(s)+k]-point[k];
+                        if (ofCells != NULL)
+                            takeToNearestImage(vector, ofCells);
+                        for (double component : vector)
+                            square += component*component;
+                        const double along = 25*fraction;
+                        const bool found = any_of(around.begin(), around.end(), [&] (const auto& entry) {
+                            const SegmentPiece& piece = entry.second;
+                            return piece.segment == s && along > piece.start-1e-9 &&
+                                    along < piece.start+piece.length+1e-9;
+                        });
+                        check(square > reach*reach || found, "a place in reach is not found");
+                    }
+            }
+        }
+}
+
+int main() {
+    try {
+        testSegmentsAround();
+        testUnbindingUnderLoad();
+        testSpeedUnderLoad();
+        testStalling();
+        testRunLengthsAndEnds();
+        testSites();
+        testThreadsAndImages();
+        testEquilibriumOnRods();
+    }
+    catch (const exception& e) {
+        printf("exception: %s\n", e.what());
+        return 1;
+    }
+    printf("Done\n");
+    return 0;
+}
