@@ -20,9 +20,13 @@ from .filaments.attachments import Attachment
 from .filaments.filament import Filament, Tether
 from .filaments.filament_type import DSDNA, F_ACTIN, MICROTUBULE, FilamentType
 from .filaments.segment_place import SegmentPlace
+from .kinetics.crosslinker import Crosslinker
+from .kinetics.hand import Hand
+from .kinetics.linker_table import LinkerTable
+from .kinetics.presets import ALPHA_ACTININ, DYNEIN, FILAMIN, KINESIN_1, MYOSIN_II
 from .mechanics.flow import Flow
 from .mechanics.friction import EndCorrections, SegmentFriction, stokes_friction
-from .output.reporters import CrosslinkReporter, FilamentReporter, TensionReporter, TetherReporter
+from .output.reporters import CrosslinkReporter, FilamentReporter, LinkerReporter, TensionReporter, TetherReporter
 from .output.structure_files import write_lammps_data, write_psf
 from .systems.filaments import Filaments
 from .systems.periodic import make_trajectory_whole, make_whole, remove_jumps
@@ -31,6 +35,7 @@ from .systems.step_check_results import ObservableCheck, StepCheck
 from .version import __version__
 
 __all__ = [
+    "ALPHA_ACTININ",
     "Attachment",
     "BeadSpringType",
     "Box",
@@ -38,22 +43,30 @@ __all__ = [
     "ContactWarning",
     "CrosslinkReporter",
     "CrosslinkTable",
+    "Crosslinker",
     "Crosslinks",
     "Cylinder",
     "DSDNA",
     "DSDNA_BASE_PAIRS",
+    "DYNEIN",
     "Ellipsoid",
     "EndCorrections",
     "EquilibrationWarning",
+    "FILAMIN",
     "F_ACTIN",
     "Filament",
     "FilamentReporter",
     "FilamentType",
+    "Hand",
+    "KINESIN_1",
+    "LinkerReporter",
+    "LinkerTable",
     "Filaments",
     "Flow",
     "InputError",
     "InstabilityError",
     "MICROTUBULE",
+    "MYOSIN_II",
     "ObservableCheck",
     "Plane",
     "SegmentFriction",

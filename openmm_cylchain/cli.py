@@ -7,6 +7,7 @@ Exit codes: 0 done, 1 the simulation blew up, a file could not be written or res
 import argparse
 import json
 import math
+import re
 import sys
 import warnings
 from dataclasses import replace
@@ -130,7 +131,11 @@ def _add_benchmarks(parser):
         "networks", help="links and contacts in implicit steps beside explicit ones: 200 filaments, ten minutes"
     )
     networks.set_defaults(command=_benchmark_networks)
-    for benchmark in (engines, scaling, time_step, bead_spring, base_pairs, networks):
+    kinetics = benchmarks.add_parser(
+        "kinetics", help="motors and crosslinkers: a contractile bundle at several steps, most of an hour"
+    )
+    kinetics.set_defaults(command=_benchmark_kinetics)
+    for benchmark in (engines, scaling, time_step, bead_spring, base_pairs, networks, kinetics):
         benchmark.add_argument("--quick", action="store_true", help="a rough measurement within a minute")
         benchmark.add_argument("--json", metavar="FILE", help="write machine, settings and results to FILE as well")
 
@@ -162,16 +167,17 @@ def _run(options):
         _say("interrupted", interruption)
         raise SystemExit(128 + interruption.signal_number) from None
 
-    from .runs.summary import format_summary, load_trajectory, summarise, write_summary
+    from .runs.summary import format_summary, load_trajectory, summarise, summarise_linkers, write_summary
     from .runs.summary_figure import write_figure
 
     directory = RunDirectory(options.output)
     trajectory = load_trajectory(configuration, directory)
     groups = summarise(configuration, trajectory)
-    write_summary(configuration, directory, groups)
+    linkers = summarise_linkers(configuration, directory)
+    write_summary(configuration, directory, groups, linkers)
     write_figure(configuration, directory, trajectory)
     print()
-    print(format_summary(configuration, groups))
+    print(format_summary(configuration, groups, linkers))
     print(f"\nWritten to {directory.path}: {directory.summary.name}, {directory.figure.name}")
 
 
@@ -211,8 +217,35 @@ def _time_step(options):
         print(f"  {'in this configuration':<36} {format_time(settings.time_step, 4):>12}")
         step = replace(recommended, step=settings.time_step)
         print(f"  dynamics at that step: {step.describe_dynamics()}")
+    if configuration.linkers:
+        _step_of_linkers(configuration)
     if options.check:
         _check_time_step(configuration, options)
+
+
+def _step_of_linkers(configuration):
+    from .kinetics.binding_force import BINDING_FORCE_NAME
+    from .runs.configuration import linker_labels
+    from .runs.initial_state import recommended_step_of_network
+    from .units.text import format_time
+
+    settings = configuration.simulation
+    recommended = recommended_step_of_network(
+        configuration.solvent,
+        configuration.filaments,
+        configuration.box,
+        configuration.linkers,
+        settings.engine,
+        settings.scheme,
+    )
+    print("with linkers")
+    labels = linker_labels(configuration)
+    for name, allowed in recommended.allowed.items():
+        match = re.fullmatch(rf"{BINDING_FORCE_NAME}: type (\d+), (.*)", name)
+        if match is not None and math.isfinite(allowed):
+            print(f"  {format_time(allowed, 4):>12}  allowed by {labels[int(match[1])]}: {match[2]}")
+    print(f"  {'recommended':<36} {format_time(recommended.step, 4):>12}  ({recommended.reason})")
+    print(f"  {'in this configuration':<36} {format_time(settings.time_step, 4):>12}")
 
 
 def _check_time_step(configuration, options):
@@ -316,6 +349,12 @@ def _benchmark_networks(options):
     from .benchmark.networks import FULL, QUICK, benchmark_networks
 
     _benchmark(options, lambda say: benchmark_networks(QUICK if options.quick else FULL, say))
+
+
+def _benchmark_kinetics(options):
+    from .benchmark.kinetics import FULL, QUICK, benchmark_kinetics
+
+    _benchmark(options, lambda say: benchmark_kinetics(QUICK if options.quick else FULL, say=say))
 
 
 def _benchmark(options, measure):

@@ -18,6 +18,7 @@ FLOORS = (
     ("theory",),
     ("output",),
     ("couplings",),
+    ("kinetics",),
     ("dynamics",),
     ("engines",),
     ("analysis",),

@@ -23,6 +23,11 @@ CASES = [
     ("periodic_box", "periodic", 40, 40, 60 + 8 * 17, 8 * 16),
     ("dense_network", "network", 40, 40, 120 * 11, 120 * 10),
     ("filaments_in_a_vesicle", "vesicle", 40, 40, 24 + 24 * (13 + 1), 24 * 12),
+    ("contractile_bundle", "bundle", 40, 40, 434, 394),
+    ("gliding_assay", "assay", 60, 60, 12 * 9, 12 * 8),
+    ("sliding_microtubules", "sliding", 60, 60, 12 * 9, 12 * 8),
+    ("aster", "aster", 40, 40, 60 * 5, 60 * 4),
+    ("rearranging_network", "network", 200, 20, 140 * 11, 140 * 10),
     ("crosslinked_bundle", "bundle", 40, 40, 6 * 31, 6 * 30),
     ("force_extension", "dna", 200, 100, 24 * 21, 24 * 20),
 ]

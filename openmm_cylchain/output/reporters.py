@@ -1,7 +1,8 @@
-"""Reporters of filaments, their tension, tethers and crosslinks, for ``simulation.reporters`` of OpenMM's app layer.
+"""Reporters of filaments, tension, tethers, crosslinks and linkers, for ``simulation.reporters`` of OpenMM's app layer.
 
-They write CSV with a line for each filament, joint, tether or crosslink and report, which tables and spreadsheets read
-as it is, and keep what they wrote as NumPy arrays. Positions are taken as they are, not wrapped into a periodic box.
+They write CSV with a line for each filament, joint, tether, crosslink or type of linkers and report, which tables and
+spreadsheets read as it is, and keep what they wrote as NumPy arrays.
+Positions are taken as they are, not wrapped into a periodic box.
 
 With ``append=True`` they go on with a file that exists; a line that a killed run has left unfinished is cut off. A run
 that goes on from a checkpoint older than its last report writes the reports in between once more, as OpenMM's reporters
@@ -25,6 +26,11 @@ from ..mechanics.tension import axial_tensions, filament_tensions
 from ..units.quantities import whole_number
 from ..units.types import FloatArray, IntArray
 from .files import TextFile
+from .linker_records import LINKER_COLUMNS, LinkedFilaments, LinkerFile, measure_linkers
+
+
+class LinkedFilamentCollection(FilamentCollection, LinkedFilaments, Protocol):
+    """What a LinkerReporter sees of a Filaments object."""
 
 
 class MeasuredCrosslinks(Protocol):
@@ -92,13 +98,12 @@ class _TableReporter(ABC):
 
     def close(self) -> None:
         """Close the file, if the reporter has opened it."""
-        if self._owned and self._file is not None:
+        if getattr(self, "_owned", False) and self._file is not None:
             self._file.close()
             self._file = None
 
     def __del__(self) -> None:
-        if getattr(self, "_owned", False):
-            self.close()
+        self.close()
 
 
 def _cut_unfinished_line(path, header):
@@ -365,3 +370,79 @@ class CrosslinkReporter(_TableReporter):
         index = self._columns.index(column)
         kind = int if column.startswith("particle") else float
         return np.array([row[index] for rows in self._rows for row in rows], dtype=kind)
+
+
+class LinkerReporter(FilamentsReporter):
+    """Reports how many linkers are bound, and the tension of their springs, a line for each type of ``add_linkers``.
+
+    Columns: ``unbound``, ``one_hand_bound`` and ``both_hands_bound`` count linkers, with an anchor for a hand;
+    ``mean_tension`` and ``maximum_tension`` are those of linkers that join two places, in kJ/(mol nm), positive where
+    they pull, NaN if there are none; ``bindings`` and ``unbindings`` are events of hands of all types together since
+    the start. ``reporter["both_hands_bound"]`` is an array (reports, types).
+
+    Where each linker with a hand that is bound is goes to a file of its own, ``places``, that ``numpy.load`` reads as
+    one array of records: ``step``, ``number``, ``type``, ``anchor``, ``filaments`` and ``arc_lengths`` (as in
+    LinkerTable), ``places`` (2, 3) in nm, NaN for a hand that is not bound, in a periodic box the second next to the
+    first, and ``tension`` in kJ/(mol nm).
+
+    Parameters
+    ----------
+    file : str, Path, file object or None
+        None keeps the arrays alone.
+    reportInterval : int
+        In steps.
+    filaments : Filaments
+        With linkers.
+    append : bool
+        Go on with files that exist.
+    places : str or Path, optional
+        A file such as "linkers.npy".
+
+    Raises
+    ------
+    InputError
+        If there are no linkers, or a file to go on with is not one of this reporter.
+
+    Examples
+    --------
+    >>> reporter = LinkerReporter("linkers.csv", 100, filaments, places="linkers.npy")  # doctest: +SKIP
+    >>> simulation.reporters.append(reporter)  # doctest: +SKIP
+    >>> records = np.load("linkers.npy")  # doctest: +SKIP
+    >>> last = records[records["step"] == records["step"][-1]]  # doctest: +SKIP
+    """
+
+    _columns = LINKER_COLUMNS
+    _thing = "linkers"
+    _include = ()
+
+    def __init__(
+        self,
+        file: TextFile | None,
+        reportInterval: int,  # noqa: N803 - OpenMM's name
+        filaments: LinkedFilamentCollection,
+        append: bool = False,
+        places: str | Path | None = None,
+    ) -> None:
+        if not filaments.linkers:
+            raise InputError("There are no linkers to report: call add_linkers first.")
+        if places is not None and not isinstance(places, (str, Path)):
+            raise InputError(f"places must be the path of a file, or None, but is {places!r}.")
+        self._linkers = filaments
+        self._places: LinkerFile | None = None
+        super().__init__(file, reportInterval, filaments, append)
+        if places is not None:
+            self._places = LinkerFile(Path(places), -1 if append and Path(places).exists() else None)
+
+    def _table(self, simulation, state):
+        rows, records = measure_linkers(self._linkers, simulation.context, simulation.currentStep)
+        if self._places is not None:
+            self._places.write(records)
+        return range(len(rows)), rows
+
+    def close(self) -> None:
+        """Close the files that the reporter has opened."""
+        super().close()
+        places: LinkerFile | None = getattr(self, "_places", None)
+        if places is not None:
+            places.close()
+            self._places = None

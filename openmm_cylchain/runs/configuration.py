@@ -1,7 +1,9 @@
 """The configuration of a run: a TOML file with units, read into frozen dataclasses and checked.
 
     [solvent]            temperature, viscosity
+    [box]                optional: edges of a periodic box
     [[filament]]         one or more: type or a description, segments, count, start, position, direction, clamped
+    [[linkers]]          any number: crosslinkers and motors; type or hands, how many, and what is changed
     [simulation]         scheme, time_step, duration, report_interval, checkpoint_interval, seed, engine, platform,
                          precision
 
@@ -23,10 +25,15 @@ from ..errors import InputError
 from ..filaments.chain_type import ChainType
 from ..filaments.filament_type import DSDNA, F_ACTIN, MICROTUBULE, FilamentType
 from ..filaments.placement import clamped_nodes
+from ..kinetics.crosslinker import Crosslinker
+from ..kinetics.hand import AT_ENDS, Hand
+from ..kinetics.linkers import as_linkers
+from ..kinetics.presets import PRESETS as LINKER_PRESETS
 from ..mechanics.friction import EndCorrections
 from ..units import quantities as units
 from ..units.text import example as example_of
 from ..units.text import format_time, parse_quantity
+from .initial_state import recommended_step_of_network
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -51,7 +58,10 @@ class Solvent:
 
 @dataclass(frozen=True)
 class FilamentGroup:
-    """One [[filament]] table: ``count`` filaments of one type, length and start; lengths in nm."""
+    """One [[filament]] table: ``count`` filaments of one type, length and start; lengths in nm.
+
+    ``linked`` says whether linkers bind to them.
+    """
 
     type: ChainType
     segments: int
@@ -60,6 +70,19 @@ class FilamentGroup:
     position: tuple
     direction: tuple
     clamped: tuple
+    linked: bool = False
+
+
+@dataclass(frozen=True)
+class LinkerGroup:
+    """One [[linkers]] table; lengths in nm, anchors as points or as numbers of particles."""
+
+    kind: Crosslinker
+    count: int
+    concentration: float
+    volume: float
+    anchors: tuple
+    bound: int
 
 
 @dataclass(frozen=True)
@@ -79,13 +102,15 @@ class SimulationSettings:
 
 @dataclass(frozen=True)
 class Configuration:
-    """Everything that a run needs; ``text`` is the file that it was read from."""
+    """Everything that a run needs; ``text`` is the file that it was read from, ``box`` the edges of a box in nm."""
 
     title: str
     solvent: Solvent
     filaments: tuple
     simulation: SimulationSettings
     text: str = dataclasses.field(compare=False, repr=False)
+    box: tuple | None = None
+    linkers: tuple = ()
 
 
 def read_configuration(path):
@@ -124,11 +149,16 @@ def parse_configuration(text):
         entries = tomllib.loads(text.replace("\r\n", "\n"))
     except tomllib.TOMLDecodeError as error:
         raise InputError(f'not valid TOML: {error}. Texts, quantities among them, need quotes: "360 nm".') from None
-    top = _Table(entries, "the configuration", ("title", "solvent", "filament", "simulation"))
+    top = _Table(entries, "the configuration", ("title", "solvent", "box", "filament", "linkers", "simulation"))
     solvent = _solvent(top.table("solvent", _SOLVENT_KEYS))
+    box = _box(top.table("box", _BOX_KEYS)) if "box" in top else None
+    if not top.get("filament", [], ""):
+        raise InputError("There is no [[filament]] table: add one for every kind of filament.")
     filaments = tuple(_filament_group(table, solvent) for table in top.tables("filament", _FILAMENT_KEYS))
-    simulation = _simulation(top.table("simulation", _SIMULATION_KEYS), solvent, filaments)
-    return Configuration(top.text("title", ""), solvent, filaments, simulation, text)
+    linkers = tuple(_linker_group(table, filaments, box) for table in top.tables("linkers", _LINKER_KEYS))
+    filaments = tuple(dataclasses.replace(group, linked=_is_linked(group, linkers)) for group in filaments)
+    simulation = _simulation(top.table("simulation", _SIMULATION_KEYS), solvent, filaments, box, linkers)
+    return Configuration(top.text("title", ""), solvent, filaments, simulation, text, box, linkers)
 
 
 def changed_keys(first, second):
@@ -136,11 +166,25 @@ def changed_keys(first, second):
     names = [] if first.title == second.title else ["title"]
     for table in ("solvent", "simulation"):
         names += _changed_fields(getattr(first, table), getattr(second, table), f"[{table}]")
+    if first.box != second.box:
+        names.append("[box] edges")
+    if len(first.linkers) != len(second.linkers):
+        names.append("the number of [[linkers]] tables")
+    for number, (one, other) in enumerate(zip(first.linkers, second.linkers), start=1):
+        names += _changed_fields(one, other, f"[[linkers]] number {number}:")
     if len(first.filaments) != len(second.filaments):
         return [*names, "the number of [[filament]] tables"]
     for number, (one, other) in enumerate(zip(first.filaments, second.filaments), start=1):
         names += _changed_fields(one, other, f"[[filament]] number {number}:")
     return names
+
+
+def linker_labels(configuration):
+    """A name for each [[linkers]] table, distinct if there are several."""
+    names = [own.kind.name for own in configuration.linkers]
+    return [
+        name if names.count(name) == 1 else f"{name} (table {number})" for number, name in enumerate(names, start=1)
+    ]
 
 
 def _changed_fields(first, second, label):
@@ -184,8 +228,6 @@ class _Table:
         entries = self.get(key, [], "")
         if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
             raise InputError(f"{key!r} must be a list of tables: write [[{key}]] with two brackets before each.")
-        if not entries:
-            raise InputError(f"There is no [[{key}]] table: add one for every kind of filament.")
         return [_Table(entry, f"[[{key}]] number {number}:", keys) for number, entry in enumerate(entries, start=1)]
 
     def quantity(self, key, unit, default=_REQUIRED, zero_allowed=False):
@@ -199,6 +241,8 @@ class _Table:
 
     def whole_number(self, key, minimum, default=_REQUIRED, example="64"):
         value = self.get(key, default, example)
+        if value is default:
+            return default
         if isinstance(value, bool) or not isinstance(value, int):
             raise InputError(f"{self.name(key)} must be a whole number, but is {value!r}.")
         if value < minimum:
@@ -217,6 +261,12 @@ class _Table:
             raise InputError(
                 f"{self.name(key)} must be one of {', '.join(choices)}, but is {value!r}.{_close_match(value, choices)}"
             )
+        return value
+
+    def flag(self, key):
+        value = self.entries[key]
+        if not isinstance(value, bool):
+            raise InputError(f"{self.name(key)} must be true or false, without quotes, but is {value!r}.")
         return value
 
     def number(self, key, default):
@@ -247,6 +297,8 @@ def _suggestion(key, keys):
         ("[solvent]", _SOLVENT_KEYS),
         ("[simulation]", _SIMULATION_KEYS),
         ("[[filament]]", _FILAMENT_KEYS),
+        ("[[linkers]]", _LINKER_KEYS),
+        ("the hand of [[linkers]]", _HAND_KEYS),
     ):
         if key in known and known is not keys:
             return f" It belongs to {table}."
@@ -449,6 +501,192 @@ def _without_alternatives(properties):
     return changed
 
 
+_BOX_KEYS = ("edges",)
+
+
+def _box(table):
+    table.get("edges", _REQUIRED, _EDGES)
+    edges = table.triple("edges", lambda text, name: parse_quantity(text, units.LENGTH, name), _EDGES)
+    if min(edges) <= 0.0:
+        raise InputError(f"{table.name('edges')} must be positive, but are {table.entries['edges']}.")
+    return edges
+
+
+_EDGES = '["1 um", "1 um", "1 um"]'
+
+_HAND_QUANTITIES = {
+    "binding_rate": units.RATE,
+    "reach": units.LENGTH,
+    "unbinding_rate": units.RATE,
+    "unbinding_force": units.FORCE,
+    "catch_rate": units.RATE,
+    "catch_force": units.FORCE,
+    "speed": units.VELOCITY,
+    "stall_force": units.FORCE,
+    "site_spacing": units.LENGTH,
+}
+_HAND_KEYS = (*_HAND_QUANTITIES, "strain_share", "walks_backward", "at_end", "binds_to")
+_LINKER_KEYS = (
+    "type",
+    "name",
+    "hand",
+    "hands",
+    "stiffness",
+    "rest_length",
+    "same_filament",
+    "count",
+    "concentration",
+    "volume",
+    "anchors",
+    "bound",
+)
+_HAND_EXAMPLE = '{ binding_rate = "10 1/s", reach = "50 nm", unbinding_rate = "0.3 1/s" }'
+
+
+def _linker_group(table, filaments, box):
+    kind = _linker_kind(table)
+    group = LinkerGroup(
+        kind=kind,
+        count=table.whole_number("count", 0, None, "1000"),
+        concentration=table.quantity("concentration", units.NUMBER_DENSITY, None, zero_allowed=True),
+        volume=table.quantity("volume", units.VOLUME, None),
+        anchors=_anchors(table, sum(own.count * (own.segments + 1) for own in filaments)),
+        bound=table.whole_number("bound", 0, 0, "100"),
+    )
+    try:
+        as_linkers(kind, group.count, group.concentration, group.volume, group.anchors, group.bound, 0)
+    except InputError as error:
+        raise _named(table, error) from None
+    if box is None and group.count is not None and group.volume is None:
+        raise InputError(
+            f"{table.label} Linkers that are not bound are in a volume: add a periodic [box] with edges = {_EDGES}, or "
+            'to this table a line such as volume = "1 um^3".'
+        )
+    names = sorted({own.type.name for own in filaments})
+    for hand in kind.hands:
+        if box is not None and hand.reach >= 0.5 * min(box):
+            raise InputError(
+                f"{table.label} The reach of a hand, {hand.reach:g} nm, must be less than half of the shortest edge of "
+                f"the box, {min(box):g} nm."
+            )
+        if not any(hand.binds(own.type) for own in filaments):
+            raise InputError(
+                f"{table.label} A hand binds to filaments of the type {' or '.join(hand.binds_to)}, but those of the "
+                f'configuration are {", ".join(names)}: change it, as in hand = {{ binds_to = "{names[0]}" }}.'
+            )
+    return group
+
+
+def _is_linked(group, linkers):
+    return any(hand.binds(group.type) for own in linkers for hand in own.kind.hands)
+
+
+def _linker_kind(table):
+    preset = LINKER_PRESETS[table.choice("type", LINKER_PRESETS)] if "type" in table else None
+    properties = {}
+    if "stiffness" in table:
+        properties["stiffness"] = table.quantity("stiffness", units.STIFFNESS)
+    if "rest_length" in table:
+        properties["rest_length"] = table.quantity("rest_length", units.LENGTH, zero_allowed=True)
+    if "same_filament" in table:
+        properties["same_filament"] = table.flag("same_filament")
+    if "name" in table:
+        properties["name"] = table.text("name")
+    try:
+        hands = _hands(table, preset)
+        if hands is not None:
+            properties["hands"] = hands
+        if preset is not None:
+            return dataclasses.replace(preset, **properties)
+        table.get("stiffness", _REQUIRED, f'"{example_of(units.STIFFNESS)}"')
+        return Crosslinker(**properties)
+    except InputError as error:
+        raise _named(table, error) from None
+
+
+def _hands(table, preset):
+    if "hand" in table and "hands" in table:
+        raise InputError(f"{table.label} give hand, for two equal ones, or hands, not both.")
+    if "hands" in table:
+        tables = table.get("hands", [], "")
+        if not isinstance(tables, list) or len(tables) != 2 or not all(isinstance(own, dict) for own in tables):
+            raise InputError(
+                f"{table.name('hands')} must be a list of two tables, as in [{_HAND_EXAMPLE}, {{ ... }}], but is "
+                f"{tables!r}."
+            )
+        first = (None, None) if preset is None else preset.hands
+        return tuple(
+            _hand(_Table(own, table.name(f"hands[{number}]"), _HAND_KEYS), changed)
+            for number, (own, changed) in enumerate(zip(tables, first))
+        )
+    if "hand" not in table:
+        if preset is None:
+            raise InputError(
+                f"{table.label} lacks the key 'type': name a preset ({', '.join(LINKER_PRESETS)}), or describe the "
+                f"linker with stiffness, rest_length and hand = {_HAND_EXAMPLE}"
+            )
+        return None
+    entries = table.get("hand", {}, "")
+    if not isinstance(entries, dict):
+        raise InputError(f"{table.name('hand')} must be a table, as in hand = {_HAND_EXAMPLE}, but is {entries!r}.")
+    own = _Table(entries, table.name("hand"), _HAND_KEYS)
+    return _hand(own, None) if preset is None else tuple(_hand(own, changed) for changed in preset.hands)
+
+
+def _hand(table, changed):
+    properties = {}
+    for key, unit in _HAND_QUANTITIES.items():
+        if key in table:
+            properties[key] = parse_quantity(table.entries[key], unit, table.name(key))
+    if "strain_share" in table:
+        properties["strain_share"] = table.number("strain_share", 0.0)
+    if "walks_backward" in table:
+        properties["walks_backward"] = table.flag("walks_backward")
+    if "at_end" in table:
+        properties["at_end"] = table.choice("at_end", AT_ENDS)
+    if "binds_to" in table:
+        properties["binds_to"] = _binds_to(table)
+    if changed is None:
+        for key in ("binding_rate", "reach", "unbinding_rate"):
+            table.get(key, _REQUIRED, f'"{example_of(_HAND_QUANTITIES[key])}"')
+    try:
+        return Hand(**properties) if changed is None else dataclasses.replace(changed, **properties)
+    except InputError as error:
+        # Hands begin their messages with their own name.
+        raise InputError(f"{table.label}: {str(error).removeprefix('Hand: ')}") from None
+
+
+def _binds_to(table):
+    names = table.get("binds_to", [], "")
+    names = [names] if isinstance(names, str) else names
+    if not isinstance(names, list) or not names or not all(isinstance(name, str) for name in names):
+        raise InputError(
+            f"{table.name('binds_to')} must be a name of a type of filaments, or a list of them, as in "
+            f'["F_ACTIN"], but is {names!r}.'
+        )
+    return tuple(PRESETS[name].name if name in PRESETS else name for name in names)
+
+
+def _anchors(table, particles):
+    if "anchors" not in table:
+        return None
+    entries = table.entries["anchors"]
+    example = '[["0 nm", "0 nm", "0 nm"], ["100 nm", "0 nm", "0 nm"]]'
+    name = table.name("anchors")
+    if not isinstance(entries, list) or not entries:
+        raise InputError(f"{name} must be a list of points, as in {example}, or of numbers of nodes, as in [0, 64].")
+    if all(isinstance(own, int) and not isinstance(own, bool) for own in entries):
+        if not 0 <= min(entries) <= max(entries) < particles:
+            raise InputError(f"{name} must be numbers of nodes between 0 and {particles - 1}, but are {entries}.")
+        return tuple(entries)
+    points = []
+    for index, own in enumerate(entries):
+        if not isinstance(own, list) or len(own) != 3:
+            raise InputError(f"{name}[{index}] must be a point, as in {example}, but is {own!r}.")
+        points.append(tuple(parse_quantity(text, units.LENGTH, f"{name}[{index}]") for text in own))
+    return tuple(points)
+
+
 _SIMULATION_KEYS = (
     "scheme",
     "time_step",
@@ -462,12 +700,18 @@ _SIMULATION_KEYS = (
 )
 
 
-def _simulation(table, solvent, filaments):
+def _simulation(table, solvent, filaments, box, linkers):
     engine = table.choice("engine", ENGINES, None)
+    if linkers and engine == "portable":
+        raise InputError(f'{table.name("engine")} has no [[linkers]]: leave it out, or write "compiled".')
     scheme = table.choice("scheme", SCHEMES, None) or default_scheme(engine)
     report = table.quantity("report_interval", units.TIME)
     if table.text("time_step", example='"recommended"') == "recommended":
-        time_step = _recommended_divisor(report, scheme, solvent, filaments)
+        if linkers:
+            largest = recommended_step_of_network(solvent, filaments, box, linkers, engine, scheme).step
+        else:
+            largest = _recommended_of(scheme, solvent, filaments)
+        time_step = _divisor(report, largest)
     else:
         time_step = table.quantity("time_step", units.TIME)
     steps_per_report = _multiple(table.name("report_interval"), report, "time_step", time_step)
@@ -493,13 +737,16 @@ def _simulation(table, solvent, filaments):
     )
 
 
-def _recommended_divisor(report, scheme, solvent, filaments):
-    # The largest step that fits into a report interval a whole number of times and exceeds the recommendation, which
-    # is no sharper than that, by at most 0.1 %.
-    largest = min(
+def _recommended_of(scheme, solvent, filaments):
+    return min(
         recommended_time_step(group.type, solvent.viscosity, solvent.temperature, scheme, group.segments).step
         for group in filaments
     )
+
+
+def _divisor(report, largest):
+    # The largest step that fits into a report interval a whole number of times and exceeds the recommendation, which
+    # is no sharper than that, by at most 0.1 %.
     return report / max(1, math.ceil(report / largest * (1.0 - 1e-3)))
 
 

@@ -13,17 +13,16 @@ from openmm import app, unit
 from ..dynamics.precision import PRECISIONS
 from ..engines.description import describe_lengths, filament_label
 from ..errors import InputError, InstabilityError
-from ..filaments import shapes
 from ..mechanics.broken_segment import find_broken_segment
 from ..output.files import write_atomically
+from ..output.linker_records import LinkerFile, measure_linkers
 from ..output.progress import RunProgress
 from ..output.structure_files import write_lammps_data, write_psf
-from ..systems.filaments import Filaments
 from ..systems.step_check import check_time_step
-from ..theory import chain_mean_square_end_to_end
 from ..units.quantities import thermal_energy
 from ..units.text import format_time
-from .run_directory import Checkpoint, EnergyTable, RunDirectory, TrajectoryFile
+from .initial_state import box_vectors, place_filaments
+from .run_directory import ENERGY_COLUMNS, LINKER_TABLE_COLUMNS, Checkpoint, ReportTable, RunDirectory, TrajectoryFile
 
 _SECONDS_BETWEEN_CHECKS = 0.2
 
@@ -41,8 +40,9 @@ def run(configuration, output, resume=False):
 
     Files in the output directory: ``configuration.toml``, ``topology.cif``, the same for VMD (``topology.psf``) and
     OVITO (``topology.data``), ``trajectory.dcd`` (the initial configuration and one frame per report interval),
-    ``energies.csv`` and ``checkpoint.chk``. A resumed run ends with the same frames, to the bit, as one that was never
-    interrupted.
+    ``energies.csv`` and ``checkpoint.chk``; with linkers also ``linkers.csv`` (how many are bound, their tensions) and
+    ``linkers.npy`` (where each one is, see ``LinkerReporter``). A resumed run ends with the same files, to the bit, as
+    one that was never interrupted.
 
     Parameters
     ----------
@@ -87,10 +87,7 @@ def run(configuration, output, resume=False):
 
 
 def create_filaments(configuration):
-    """Filaments with the initial positions that a configuration asks for.
-
-    Filaments without a position are laid out side by side on a grid in the xy plane, centred on the origin;
-    they do not interact, so that is for the eye and for the digits of the single-precision trajectory.
+    """Filaments with their initial positions, and linkers, that a configuration asks for; see ``place_filaments``.
 
     Parameters
     ----------
@@ -100,52 +97,20 @@ def create_filaments(configuration):
     -------
     Filaments
     """
-    solvent = configuration.solvent
-    filaments = Filaments(solvent.viscosity, solvent.temperature, configuration.simulation.engine)
-    centers = _grid_centers(configuration)
-    for group in configuration.filaments:
-        for _ in range(group.count):
-            nodes = _shape(group, configuration, len(filaments))
-            if group.position is None:
-                nodes += next(centers) - nodes.mean(axis=0)
-            else:
-                nodes += group.position
-            filaments.add_nodes(group.type, nodes, group.clamped)
-    return filaments
-
-
-def _shape(group, configuration, number):
-    # Nodes with the first one at the origin. Each filament has a seed of its own.
-    kind, origin, label = group.type, (0.0, 0.0, 0.0), f"Filament {number}"
-    if group.start == "straight":
-        return shapes.straight(kind, group.segments, origin, group.direction or (1.0, 0.0, 0.0), label)
-    generator = np.random.default_rng([configuration.simulation.seed, number])
-    temperature = configuration.solvent.temperature
-    return shapes.drawn(
-        kind, group.segments, temperature, generator, origin, group.direction, group.clamped, False, label
+    settings = configuration.simulation
+    return place_filaments(
+        configuration.solvent,
+        configuration.filaments,
+        configuration.box,
+        configuration.linkers,
+        settings.engine,
+        settings.seed,
     )
-
-
-def _grid_centers(configuration):
-    groups = [group for group in configuration.filaments if group.position is None]
-    count = sum(group.count for group in groups)
-    spacing = 1.1 * max((_extent(group, configuration.solvent.temperature) for group in groups), default=0.0)
-    columns = int(np.ceil(np.sqrt(count)))
-    rows = int(np.ceil(count / max(columns, 1)))
-    for number in range(count):
-        row, column = divmod(number, columns)
-        yield spacing * np.array([column - 0.5 * (columns - 1), 0.5 * (rows - 1) - row, 0.0])
-
-
-def _extent(group, temperature):
-    if group.start == "straight":
-        return group.segments * group.type.segment_length
-    return np.sqrt(chain_mean_square_end_to_end(group.type, group.segments, temperature))
 
 
 def _create_simulation(configuration, filaments):
     settings = configuration.simulation
-    topology, system, positions = filaments.build()
+    topology, system, positions = filaments.build(box_vectors(configuration.box))
     platform, properties = _platform(settings, filaments.engine)
     integrator = filaments.create_integrator(
         system,
@@ -186,7 +151,7 @@ def check_step(configuration, seconds=20.0, say=lambda message: None):
     """
     settings = configuration.simulation
     filaments = create_filaments(configuration)
-    _, system, positions = filaments.build()
+    _, system, positions = filaments.build(box_vectors(configuration.box))
     platform, properties = _platform(settings, filaments.engine)
     # An interruption that Python raises within a step may end as an error of OpenMM.
     with _Signals() as signals:
@@ -198,7 +163,7 @@ def check_step(configuration, seconds=20.0, say=lambda message: None):
             scheme=settings.scheme,
             seconds=seconds,
             random_seed=settings.seed,
-            equilibrium=all(group.start == "equilibrium" for group in configuration.filaments),
+            equilibrium=all(group.start == "equilibrium" and not group.linked for group in configuration.filaments),
             platform=platform,
             properties=properties,
             say=say,
@@ -262,7 +227,7 @@ def _restore(context, checkpoint, engine):
 
 
 class _Recorder:
-    # Advances the simulation and writes frames, energies and checkpoints at their times.
+    # Advances the simulation and writes frames, energies, linkers and checkpoints at their times.
 
     def __init__(self, configuration, filaments, simulation, directory, checkpoint):
         self._settings = configuration.simulation
@@ -284,8 +249,16 @@ class _Recorder:
             settings.steps_per_report,
             self._checkpoint,
         )
-        self._energies = EnergyTable(self._directory.energies, self._checkpoint)
-        with contextlib.closing(self._trajectory), contextlib.closing(self._energies), _Signals() as signals:
+        begun = self._checkpoint
+        self._energies = ReportTable(self._directory.energies, ENERGY_COLUMNS, begun and begun.energies_size)
+        files = [self._trajectory, self._energies]
+        if self._filaments.linkers:
+            self._linkers = ReportTable(self._directory.linkers, LINKER_TABLE_COLUMNS, begun and begun.linkers_size)
+            self._places = LinkerFile(self._directory.linker_places, begun and begun.linker_records)
+            files += [self._linkers, self._places]
+        with contextlib.ExitStack() as stack, _Signals() as signals:
+            for file in files:
+                stack.enter_context(contextlib.closing(file))
             if self._checkpoint is None:
                 self._report()
             self._progress = RunProgress(settings.steps, self._step, settings.time_step)
@@ -340,6 +313,11 @@ class _Recorder:
                 self._mean_end_to_end_distance(positions),
             ),
         )
+        if self._filaments.linkers:
+            rows, records = measure_linkers(self._filaments, context, self._step)
+            for number, row in enumerate(rows):
+                self._linkers.write(self._step, (self._step * self._settings.time_step, number, *row))
+            self._places.write(records)
 
     def _energies_of(self, positions):
         stretching = bending = 0.0
@@ -380,6 +358,8 @@ class _Recorder:
                 trajectory_size=size,
                 trajectory_header=header,
                 energies_size=self._energies.synchronise(),
+                linkers_size=self._linkers.synchronise() if self._filaments.linkers else 0,
+                linker_records=self._places.synchronise() if self._filaments.linkers else 0,
                 state=self._simulation.context.createCheckpoint(),
             )
         )

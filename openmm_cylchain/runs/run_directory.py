@@ -31,6 +31,8 @@ class Checkpoint:
     trajectory_header: bytes
     energies_size: int
     state: bytes
+    linkers_size: int = 0
+    linker_records: int = 0
 
 
 class RunDirectory:
@@ -50,6 +52,8 @@ class RunDirectory:
         self.topology_data = self.path / "topology.data"
         self.trajectory = self.path / "trajectory.dcd"
         self.energies = self.path / "energies.csv"
+        self.linkers = self.path / "linkers.csv"
+        self.linker_places = self.path / "linkers.npy"
         self.checkpoint = self.path / "checkpoint.chk"
         self.summary = self.path / "summary.json"
         self.figure = self.path / "summary.png"
@@ -97,7 +101,8 @@ class RunDirectory:
         return None
 
     def _check_vacant(self, configuration, resume):
-        for path in (self.trajectory, self.checkpoint, self.energies, self.topology, self.summary, self.figure):
+        results = (self.trajectory, self.checkpoint, self.energies, self.linkers, self.linker_places)
+        for path in (*results, self.topology, self.summary, self.figure):
             if path.exists():
                 advice = "but no configuration.toml to resume it with:" if resume else "continue it with --resume, or"
                 raise InputError(
@@ -128,6 +133,8 @@ class RunDirectory:
             "trajectory_size": checkpoint.trajectory_size,
             "trajectory_header": checkpoint.trajectory_header.hex(),
             "energies_size": checkpoint.energies_size,
+            "linkers_size": checkpoint.linkers_size,
+            "linker_records": checkpoint.linker_records,
             "state_size": len(checkpoint.state),
         }
         write_atomically(self.checkpoint, json.dumps(header).encode() + b"\n" + checkpoint.state)
@@ -147,6 +154,8 @@ class RunDirectory:
                 trajectory_size=header["trajectory_size"],
                 trajectory_header=bytes.fromhex(header["trajectory_header"]),
                 energies_size=header["energies_size"],
+                linkers_size=header["linkers_size"],
+                linker_records=header["linker_records"],
                 state=state,
             )
         except (ValueError, KeyError, TypeError):
@@ -245,27 +254,44 @@ ENERGY_COLUMNS = (
 )
 
 
-class EnergyTable:
-    """A table of comma-separated values, a line per report, that can be continued.
+LINKER_TABLE_COLUMNS = (
+    "step",
+    "time (ps)",
+    "linkers",
+    "unbound",
+    "one hand bound",
+    "both hands bound",
+    "mean tension (kJ/mol/nm)",
+    "maximum tension (kJ/mol/nm)",
+    "bindings of all linkers",
+    "unbindings of all linkers",
+)
+"""A line per report and [[linkers]] table, which are counted from 0."""
+
+
+class ReportTable:
+    """A table of comma-separated values that can be continued.
 
     Parameters
     ----------
     path : Path
-    checkpoint : Checkpoint, optional
-        Where to continue; a new file if not given.
+    columns : sequence of str
+    size : int, optional
+        Of the file, where to continue; a new file if not given.
     """
 
-    def __init__(self, path, checkpoint=None):
-        if checkpoint is None:
+    def __init__(self, path, columns, size=None):
+        if size is None:
             self._file = open(path, "w+b")
-            self._file.write((",".join(ENERGY_COLUMNS) + "\n").encode())
+            self._file.write((",".join(columns) + "\n").encode())
         else:
-            self._file = _open_at(path, checkpoint.energies_size)
+            self._file = _open_at(path, size)
             self._file.seek(0, os.SEEK_END)
 
     def write(self, step, values):
         """Append a line: the step and a number for each further column (NaN where it has no meaning)."""
-        self._file.write(",".join([str(step), *(repr(float(value)) for value in values)]).encode() + b"\n")
+        cells = (str(value) if isinstance(value, int) else repr(float(value)) for value in values)
+        self._file.write(",".join([str(step), *cells]).encode() + b"\n")
         self._file.flush()
 
     def synchronise(self):
@@ -281,5 +307,12 @@ class EnergyTable:
 
 def read_energies(path):
     """Read an energy table: a dict of arrays by the names of ENERGY_COLUMNS."""
-    values = np.atleast_2d(np.loadtxt(path, delimiter=",", skiprows=1))
+    values = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
     return dict(zip(ENERGY_COLUMNS, values.T))
+
+
+def read_linkers(path):
+    """Read a table of linkers: a dict of arrays (reports, [[linkers]] tables) by the names of LINKER_TABLE_COLUMNS."""
+    values = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
+    types = int(values[:, LINKER_TABLE_COLUMNS.index("linkers")].max()) + 1
+    return dict(zip(LINKER_TABLE_COLUMNS, np.moveaxis(values.reshape(-1, types, values.shape[1]), 2, 0)))

@@ -27,9 +27,11 @@ from ..bead_spring.bead_spring_type import BeadSpringType
 from ..errors import EquilibrationWarning, InputError
 from ..filaments.equilibrium import SegmentLengthDistribution
 from ..output.files import write_atomically
-from ..units.quantities import thermal_energy
+from ..units.quantities import AVOGADRO, thermal_energy
 from ..units.text import format_time
 from ..version import __version__
+from .configuration import linker_labels
+from .run_directory import read_linkers
 
 _WORMLIKE = "the same, theory of the wormlike chain (25)"
 _ENOUGH_FILAMENTS = 8
@@ -80,6 +82,28 @@ class GroupSummary:
     notes: tuple
 
 
+@dataclass(frozen=True)
+class LinkerSummary:
+    """Linkers of one [[linkers]] table: means over the last half of a run, and the largest tension of all of it.
+
+    Numbers of linkers with standard errors from their fluctuations in time; tensions in pN, None where none pulled.
+    """
+
+    name: str
+    unbound: float
+    unbound_error: float
+    one_hand_bound: float
+    one_hand_bound_error: float
+    both_hands_bound: float
+    both_hands_bound_error: float
+    mean_tension: float
+    largest_tension: float
+
+
+PICONEWTON = 1e-15 * AVOGADRO * 1e-9
+"""In kJ/(mol nm)."""
+
+
 def load_trajectory(configuration, directory):
     """The trajectory of a run as an mdtraj.Trajectory with its times in ps."""
     topology = mdtraj.load_topology(str(directory.topology))
@@ -128,9 +152,9 @@ def group_labels(configuration):
 def is_in_equilibrium(group):
     """Whether the exact averages of the free chain hold for a group from its first frame on.
 
-    One clamped node leaves lengths and angles alone; several hold the chain.
+    One clamped node leaves lengths and angles alone; several hold the chain, and linkers pull at it.
     """
-    return group.start == "equilibrium" and len(group.clamped) <= 1
+    return group.start == "equilibrium" and len(group.clamped) <= 1 and not group.linked
 
 
 def summarise(configuration, trajectory):
@@ -152,6 +176,46 @@ def summarise(configuration, trajectory):
         _summarise_group(configuration, group, list(members), label, trajectory)
         for group, members, label in zip(configuration.filaments, group_members(configuration), labels)
     ]
+
+
+def summarise_linkers(configuration, directory):
+    """What the linkers of a run did.
+
+    Parameters
+    ----------
+    configuration : Configuration
+    directory : RunDirectory
+
+    Returns
+    -------
+    list of LinkerSummary
+        One for each [[linkers]] table.
+    """
+    if not configuration.linkers:
+        return []
+    table = read_linkers(directory.linkers)
+    names = linker_labels(configuration)
+    return [_summarise_linkers(name, {key: table[key][:, n] for key in table}) for n, name in enumerate(names)]
+
+
+def _summarise_linkers(name, table):
+    # Two values at least, which a standard error needs.
+    late = slice(min(len(table["step"]) // 2, len(table["step"]) - 2), None)
+    states = {}
+    for state in ("unbound", "one hand bound", "both hands bound"):
+        mean, error = mean_with_error(table[state][late, None])
+        states[state.replace(" ", "_")] = mean
+        states[f"{state.replace(' ', '_')}_error"] = error
+    pulling = table["both hands bound"][late]
+    tensions = np.nan_to_num(table["mean tension (kJ/mol/nm)"][late])
+    largest = table["maximum tension (kJ/mol/nm)"]
+    largest = largest[~np.isnan(largest)]
+    return LinkerSummary(
+        name=name,
+        **states,
+        mean_tension=float(np.average(tensions, weights=pulling)) / PICONEWTON if pulling.any() else None,
+        largest_tension=float(largest.max()) / PICONEWTON if len(largest) else None,
+    )
 
 
 def _summarise_group(configuration, group, members, label, trajectory):
@@ -298,6 +362,8 @@ def _notes(configuration, group, members, trajectory, short):
         )
     if len(group.clamped) > 1:
         yield "Several nodes are clamped: the exact values are those of free chains, so they are not compared."
+    if group.linked:
+        yield "Linkers bind to these filaments: the exact values are those of free chains, so they are not compared."
     if group.count >= _ENOUGH_FILAMENTS:
         yield (
             f"Errors: standard error of the time averages of {group.count} independent filaments, which holds "
@@ -327,7 +393,7 @@ def _rounding_share(configuration, group, trajectory):
     return variance * group.type.segment_stiffness / thermal_energy(configuration.solvent.temperature)
 
 
-def write_summary(configuration, directory, groups):
+def write_summary(configuration, directory, groups, linkers=()):
     """Write the summary as JSON into the directory of the run."""
     settings = configuration.simulation
     content = {
@@ -340,6 +406,7 @@ def write_summary(configuration, directory, groups):
         "time step (ps)": settings.time_step,
         "simulated time (ps)": settings.steps * settings.time_step,
         "groups": [asdict(group) for group in groups],
+        **({"linkers": [asdict(own) for own in linkers]} if linkers else {}),
     }
     write_atomically(directory.summary, (json.dumps(content, indent=2, allow_nan=False) + "\n").encode())
 
@@ -355,7 +422,7 @@ _EXPLANATIONS = {
 }
 
 
-def format_summary(configuration, groups):
+def format_summary(configuration, groups, linkers=()):
     """The summary as text for a terminal."""
     settings = configuration.simulation
     lines = [
@@ -364,9 +431,27 @@ def format_summary(configuration, groups):
     ]
     for group in groups:
         lines += ["", group.label, *_table(group.observables), *(f"  {note}" for note in group.notes)]
+    if linkers:
+        lines += [
+            "",
+            *_linker_table(linkers),
+            "  Means over the last half of the run; the largest tension of all of it.",
+        ]
     verdicts = {observable.verdict for group in groups for observable in group.observables}
     lines += ["", *(text for verdict, text in _EXPLANATIONS.items() if verdict in verdicts)]
     return "\n".join(lines).rstrip()
+
+
+def _linker_table(linkers):
+    rows = [("linkers", "unbound", "one hand", "both hands", "mean tension (pN)", "largest (pN)")]
+    for own in linkers:
+        states = [
+            f"{getattr(own, state):.4g} ± {getattr(own, f'{state}_error'):.1g}"
+            for state in ("unbound", "one_hand_bound", "both_hands_bound")
+        ]
+        tensions = ["-" if force is None else f"{force:.3g}" for force in (own.mean_tension, own.largest_tension)]
+        rows.append((own.name, *states, *tensions))
+    return _aligned(rows, (0,))
 
 
 def _table(observables):
@@ -387,8 +472,11 @@ def _table(observables):
                 observable.verdict,
             )
         )
+    return _aligned(rows, (0, len(rows[0]) - 1))
+
+
+def _aligned(rows, left):
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    left = (0, len(widths) - 1)
     return [
         "  ".join(
             ["", *(cell.ljust(widths[i]) if i in left else cell.rjust(widths[i]) for i, cell in enumerate(row))]

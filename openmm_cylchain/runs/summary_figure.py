@@ -12,8 +12,9 @@ from ..analysis.trajectories import joint_cosines, node_positions, segment_lengt
 from ..output.files import write_atomically
 from ..units.quantities import thermal_energy
 from ..units.text import time_unit
-from .run_directory import read_energies
-from .summary import group_labels, group_members, is_in_equilibrium, mean_energies
+from .configuration import linker_labels
+from .run_directory import read_energies, read_linkers
+from .summary import PICONEWTON, group_labels, group_members, is_in_equilibrium, mean_energies
 
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
 _STRETCHING_COLOUR, _BENDING_COLOUR = "#D55E00", "#0072B2"
@@ -30,10 +31,11 @@ def write_figure(configuration, directory, trajectory):
     trajectory : mdtraj.Trajectory
         See ``summary.load_trajectory``.
     """
-    figure = Figure(figsize=(12, 9.5), layout="constrained")
+    rows = 3 if configuration.linkers else 2
+    figure = Figure(figsize=(12, 4.75 * rows), layout="constrained")
     FigureCanvasAgg(figure)
     figure.get_layout_engine().set(w_pad=0.12, h_pad=0.12, hspace=0.03, wspace=0.03)
-    axes = figure.subplots(2, 2)
+    axes = figure.subplots(rows, 2)
     if configuration.title:
         figure.suptitle(configuration.title, fontsize=_FONT_SIZE + 3)
     groups = [
@@ -50,6 +52,11 @@ def write_figure(configuration, directory, trajectory):
         _draw_joint_angles(axes[1, 1], groups, temperature, trajectory)
     else:
         _draw_segment_lengths(axes[1, 1], groups, temperature, trajectory)
+    if configuration.linkers:
+        labels, table = linker_labels(configuration), read_linkers(directory.linkers)
+        _draw_linkers(axes[0, 0], labels, directory.linker_places)
+        _draw_numbers_bound(axes[2, 0], labels, table)
+        _draw_tensions(axes[2, 1], labels, table)
     for axis in axes.flat:
         axis.title.set_fontsize(_FONT_SIZE + 1)
         axis.xaxis.label.set_fontsize(_FONT_SIZE)
@@ -130,6 +137,64 @@ def _draw_scale_bar(axis):
         va="top",
         fontsize=_FONT_SIZE,
     )
+
+
+def _draw_linkers(axis, labels, path):
+    # Those that join two places in the last frame, in front of the filaments.
+    records = np.load(path, mmap_mode="r")
+    last = records[records["step"] == records["step"][-1]] if len(records) else records
+    for number in range(len(labels)):
+        places = last["places"][last["type"] == number]
+        ends = places[~np.isnan(places).any(axis=(1, 2))]
+        lines = np.concatenate([ends, np.full((len(ends), 1, 3), np.nan)], axis=1).reshape(-1, 3)
+        axis.plot(lines[:, 0], lines[:, 1], color=_linker_colour(number), linewidth=1.4, zorder=3)
+
+
+def _linker_colour(number):
+    # Those behind the colours of groups of filaments, as far as there are as many.
+    return _COLOURS[-1 - number % len(_COLOURS)]
+
+
+def _draw_numbers_bound(axis, labels, table):
+    name, length = _time_unit(table["time (ps)"][-1, 0])
+    time = table["time (ps)"][:, 0] / length
+    for number, label in enumerate(labels):
+        for state, line in (("both hands bound", "-"), ("one hand bound", ":")):
+            axis.plot(
+                time,
+                table[state][:, number],
+                line,
+                color=_linker_colour(number),
+                linewidth=1.5,
+                label=f"{label}, {state.removesuffix(' bound')}",
+            )
+    axis.set_xlim(time[0], time[-1])
+    axis.set_ylim(bottom=0.0)
+    axis.set_xlabel(f"time ({name})")
+    axis.set_ylabel("linkers")
+    axis.set_title("Linkers that are bound")
+    _legend(axis, loc="best")
+
+
+def _draw_tensions(axis, labels, table):
+    name, length = _time_unit(table["time (ps)"][-1, 0])
+    time = table["time (ps)"][:, 0] / length
+    for number, label in enumerate(labels):
+        for which, line, width in (("mean", "-", 1.5), ("maximum", ":", 1.0)):
+            axis.plot(
+                time,
+                table[f"{which} tension (kJ/mol/nm)"][:, number] / PICONEWTON,
+                line,
+                color=_linker_colour(number),
+                linewidth=width,
+                label=f"{label}, {'largest' if which == 'maximum' else which}",
+            )
+    axis.axhline(0.0, color="0.7", linewidth=0.8, zorder=0)
+    axis.set_xlim(time[0], time[-1])
+    axis.set_xlabel(f"time ({name})")
+    axis.set_ylabel("tension (pN)")
+    axis.set_title("Tension of linkers with both hands bound")
+    _legend(axis, loc="best")
 
 
 def _draw_energies(axis, groups, temperature, energies):

@@ -33,6 +33,10 @@ from ..filaments.chain_type import ChainType
 from ..filaments.filament import Filament, Tether
 from ..filaments.placement import named_nodes
 from ..filaments.segment_place import SegmentPlace
+from ..kinetics.binding_force import find_binding_force, places_of, pulls_of, set_table, table_of
+from ..kinetics.crosslinker import Crosslinker
+from ..kinetics.linker_table import LinkerTable
+from ..kinetics.linkers import LinkerPulls, Linkers, as_linkers
 from ..mechanics.flow import Flow, as_flow
 from ..mechanics.redistribution import ChainSet
 from ..mechanics.tension import components_along, filament_tensions
@@ -90,6 +94,8 @@ class Filaments:
         self._filaments: list[Filament] = []
         self._tethers: list[Tether] = []
         self._tethered_nodes: set[tuple[int, int]] = set()
+        self._linkers: list[Linkers] = []
+        self._periodic = False
         # By Context: what has moved there, by number.
         self._moved_tethers: WeakKeyDictionary[Any, dict[int, Tether]] = WeakKeyDictionary()
         self._attachments: list[Attachment] = []
@@ -443,6 +449,117 @@ class Filaments:
         self._beads[filament] = [self._attach(bead) for bead in beads]
         return list(self._beads[filament])
 
+    def add_linkers(
+        self,
+        kind: Crosslinker,
+        count: int | None = None,
+        *,
+        concentration: Scalar | None = None,
+        volume: Scalar | None = None,
+        anchors: Indices | Vectors | None = None,
+        bound: int = 0,
+        seed: int = 0,
+    ) -> int:
+        """Add linkers that bind to filaments, walk along them and unbind: crosslinkers or motors.
+
+        While they are not bound, they are anywhere: a linker binds its first hand with the rate
+        ``binding_rate/(2 reach) v/V`` for each length of filament, where V is the volume in which unbound linkers are
+        and v = (4 pi/3) R^3 with the reach R (of hands that differ, the geometric mean of both v). How many there are
+        of them, and where they are bound, belongs to each Context: ``linkers_in``.
+
+        In every step, filaments stand still while linkers bind and unbind as long as the step takes; then filaments
+        move, with the springs of linkers in their equations if the scheme is implicit.
+
+        Parameters
+        ----------
+        kind : Crosslinker
+        count : int
+            How many there are. Or give one of the next two.
+        concentration : 1/length^3, or amount/length^3
+            Of those that are not bound, if that does not change.
+        anchors : (n,) int or (n, 3) length
+            Particles of the System, or points, to which n linkers are tied, in the place of their first hands.
+        volume : length^3, optional
+            V; that of the periodic box if not given.
+        bound : int
+            How many begin with their first hand bound, at random places; of those with anchors, their only one.
+        seed : int
+            Of these places.
+
+        Returns
+        -------
+        int
+            The number of their type, for tables.
+
+        Raises
+        ------
+        InputError
+            For a value that is missing or wrong; with the portable engine, which has no linkers; or if the filaments
+            are in a System already.
+        """
+        if not self._engine.has_linkers:
+            raise InputError(
+                f"The {self._engine_name} engine has no linkers that bind and unbind; use the compiled one, or "
+                "Crosslinks, which are added and removed from Python."
+            )
+        if self._nodes is not None:
+            raise InputError("These filaments are already in a System: add linkers before.")
+        self._linkers.append(as_linkers(kind, count, concentration, volume, anchors, bound, seed))
+        return len(self._linkers) - 1
+
+    @property
+    def linkers(self) -> tuple[Linkers, ...]:
+        """Tuple of the types of linkers, in the order of their numbers, as they were added."""
+        return tuple(self._linkers)
+
+    def linkers_in(self, context: openmm.Context) -> LinkerTable:
+        """The linkers of a Context, and where they are bound: a LinkerTable.
+
+        Raises
+        ------
+        InputError
+            If there are none, or the Context has got a State that does not say where linkers are.
+        """
+        return table_of(self._binding_force(context), context)
+
+    def set_linkers(self, context: openmm.Context, table: LinkerTable) -> None:
+        """Give a Context other linkers.
+
+        Raises
+        ------
+        InputError
+            For linkers that do not fit their types, the anchors or the filaments.
+        """
+        set_table(self._binding_force(context), context, table)
+
+    def linker_pulls(self, context: openmm.Context) -> LinkerPulls:
+        """What the springs of linkers do that join two places in a Context: a LinkerPulls."""
+        return pulls_of(*self._seen_linkers(context))
+
+    def linker_places(self, context: openmm.Context) -> unit.Quantity:
+        """Where the two ends of each linker of ``linkers_in`` are in a Context: (n, 2, 3) in nm, NaN where not bound.
+
+        In a periodic box, the second end is at the image that is nearest to the first one.
+        """
+        return places_of(*self._seen_linkers(context)) * unit.nanometer
+
+    def linker_events(self, context: openmm.Context) -> tuple[int, int]:
+        """How often hands have bound and unbound in a Context since the start, with all that its checkpoint knew."""
+        bindings, unbindings = self._binding_force(context).getNumEventsInContext(context)
+        return int(bindings), int(unbindings)
+
+    def _seen_linkers(self, context):
+        force, state = self._binding_force(context), context.getState(positions=True)
+        positions = state.getPositions(asNumpy=True)._value
+        box = state.getPeriodicBoxVectors(asNumpy=True)._value if force.usesPeriodicBoundaryConditions() else None
+        return force, table_of(force, context), self._filaments, self.node_indices, positions, box
+
+    def _binding_force(self, context):
+        force = find_binding_force(context.getSystem())
+        if force is None:
+            raise InputError("There are no linkers here: add them by add_linkers, before the filaments are built.")
+        return force
+
     def build(
         self, box_vectors: BoxVectors | None = None, stretching_force_group: int = 0, bending_force_group: int = 0
     ) -> tuple[app.Topology, openmm.System, unit.Quantity]:
@@ -519,12 +636,20 @@ class Filaments:
             names = [self._attachments[index].name for index in self._attachments_of[number]]
             add_to_topology(topology, filament, f"F{number}", names)
         add_noninteracting_entries(system, len(positions), self._coinciding())
+        self._periodic = topology.getPeriodicBoxVectors() is not None or system.usesPeriodicBoundaryConditions()
         self._engine.add_forces(system, self._placed(), stretching_force_group, bending_force_group)
         return np.concatenate(everything) * unit.nanometer
 
     def _placed(self):
-        filaments, tethers = tuple(self._filaments), tuple(self._tethers)
-        return PlacedFilaments(filaments, tuple(self.node_indices), tethers, self._viscosity, self._temperature)
+        return PlacedFilaments(
+            tuple(self._filaments),
+            tuple(self.node_indices),
+            tuple(self._tethers),
+            self._viscosity,
+            self._temperature,
+            tuple(self._linkers),
+            self._periodic,
+        )
 
     def _add_attachments(self, system, number):
         # Those of one filament; returns their positions.
@@ -658,9 +783,9 @@ class Filaments:
             above zero temperature, without flow, while 4 h K/gamma_rot is at most 10^4, k l0^2/k_BT at most 10^9, and
             noise changes lengths by 10^-5 of themselves in a step, or more.
             Positions and forces are in double precision, and other filaments altogether. "automatic" does so where it
-            is faster as well, about twice as fast: where there are enough filaments of similar length. With the
-            portable engine it is the same as "double". ``integrator.getNumMixedPrecisionChains()`` says for how many
-            filaments the last step did so.
+            is faster as well, about twice as fast: where there are enough filaments of similar length, or few that are
+            long. With the portable engine it is the same as "double".
+            ``integrator.getNumMixedPrecisionChains()`` says for how many filaments the last step did so.
 
         Returns
         -------

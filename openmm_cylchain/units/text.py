@@ -14,11 +14,15 @@ from .quantities import (
     LENGTH,
     MASS,
     MASS_PER_LENGTH,
+    NUMBER_DENSITY,
+    RATE,
     ROTATIONAL_FRICTION,
     STIFFNESS,
     TEMPERATURE,
     TIME,
+    VELOCITY,
     VISCOSITY,
+    VOLUME,
 )
 
 _EXAMPLES = {
@@ -33,6 +37,10 @@ _EXAMPLES = {
     MASS: ("mass", "650 Da"),
     ROTATIONAL_FRICTION: ("rotational friction", "7e4 pN*nm*us"),
     MASS_PER_LENGTH: ("mass per length", "3500 Da/nm"),
+    RATE: ("rate", "10 1/s"),
+    VELOCITY: ("velocity", "0.5 um/s"),
+    VOLUME: ("volume", "1 um^3"),
+    NUMBER_DENSITY: ("concentration", "1 uM"),
 }
 """What to call a quantity with such a unit, and how people write one."""
 
@@ -100,10 +108,11 @@ def _parse_unit(unit, target, name):
 
 def _convert(number, unit, target, name):
     registry = _registry()
-    symbol = target.get_symbol()
+    # pint reads "1/ps", not "/ps".
+    symbol = re.sub("^/", "1/", target.get_symbol())
     quantity = registry.Quantity(number, unit)
     candidates = [quantity]
-    if "mol" in symbol:
+    if "mol" in symbol or target is NUMBER_DENSITY:
         candidates.append(quantity.to_base_units() * (AVOGADRO / registry.mole))
     elif "Da" in symbol:
         candidates.append(quantity.to_base_units() * (registry.mole / AVOGADRO))

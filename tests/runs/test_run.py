@@ -7,9 +7,6 @@ import os
 import re
 import shutil
 import signal
-import subprocess
-import sys
-import time
 
 import mdtraj
 import numpy as np
@@ -22,6 +19,7 @@ from openmm_cylchain.runs.configuration import parse_configuration, read_configu
 from openmm_cylchain.runs.run import create_filaments, run
 from openmm_cylchain.runs.run_directory import RunDirectory, read_energies
 from openmm_cylchain.runs.summary import format_summary, load_trajectory, summarise
+from support.commands import finish, start, wait_for_size
 from support.contexts import positions_of
 
 SHORT = """
@@ -47,7 +45,6 @@ seed = 5
 """
 
 FRAMES = 61
-COMMAND = [sys.executable, "-m", "openmm_cylchain.cli", "run"]
 
 
 def configured(tmp_path, text=SHORT, **changes):
@@ -58,29 +55,6 @@ def configured(tmp_path, text=SHORT, **changes):
     path = tmp_path / "input.toml"
     path.write_text(text)
     return str(path)
-
-
-def start(config, output, *options):
-    return subprocess.Popen(
-        [*COMMAND, config, "--output", str(output), *options],
-        cwd=output.parent,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-
-
-def finish(process):
-    output, errors = process.communicate(timeout=60)
-    return process.returncode, output, errors
-
-
-def wait_for_size(path, size, process):
-    deadline = time.monotonic() + 30
-    while not (path.exists() and path.stat().st_size >= size):
-        assert process.poll() is None, process.communicate()
-        assert time.monotonic() < deadline
-        time.sleep(0.002)
 
 
 def frame_bytes(path):

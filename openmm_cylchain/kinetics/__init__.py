@@ -1,0 +1,1 @@
+"""Crosslinkers and motors: linkers whose hands bind to filaments, walk along them and unbind."""

@@ -1,0 +1,235 @@
+"""The CylinderChainBindingForce of a System: linkers of the compiled engine."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import openmm
+
+from ..engine_choice import load_plugin
+from ..errors import InputError
+from ..filaments.filament import Filament
+from ..mechanics.geometry import to_nearest_images
+from ..units.types import FloatArray, IntArray
+from .hand import Hand
+from .linker_table import LinkerTable
+from .linkers import LinkerPulls, Linkers
+
+BINDING_FORCE_NAME = "Linkers"
+
+
+def is_binding_force(force: openmm.Force) -> bool:
+    """Whether a force of a System is a CylinderChainBindingForce."""
+    plugin = load_plugin()
+    return plugin is not None and plugin.CylinderChainBindingForce.isinstance(force)
+
+
+def find_binding_force(system: openmm.System) -> Any:
+    """The CylinderChainBindingForce of a System, or None."""
+    for force in system.getForces():
+        if is_binding_force(force):
+            return load_plugin().CylinderChainBindingForce.cast(force)
+    return None
+
+
+def make_binding_force(
+    linkers: Sequence[Linkers], filaments: Sequence[Filament], temperature: float, periodic: bool
+) -> openmm.Force:
+    """The force of linkers that bind to filaments, which are the chains of a System in their order.
+
+    Parameters
+    ----------
+    linkers : sequence of Linkers
+        The types of linkers, in the order of their numbers.
+    filaments : sequence of Filament
+    temperature : float
+        In K.
+    periodic : bool
+        Whether distances are those of nearest periodic images.
+
+    Raises
+    ------
+    InputError
+        If there is nothing that a hand binds to, or no site for all that are to begin bound.
+    """
+    force = load_plugin().CylinderChainBindingForce(temperature)
+    force.setName(BINDING_FORCE_NAME)
+    force.setUsesPeriodicBoundaryConditions(periodic)
+    hands: dict[Hand, int] = {}
+    columns: list[Any] = [[], [], [], []]
+    for own in linkers:
+        numbers = []
+        for hand in own.kind.hands:
+            if hand not in hands:
+                hands[hand] = _add_hand(force, hand, filaments, own.kind.name)
+            numbers.append(hands[hand])
+        first = -1 if own.anchors is not None else numbers[0]
+        number = force.addLinkerType(
+            first, numbers[1], own.kind.rest_length, own.kind.stiffness, own.kind.same_filament
+        )
+        density = -1.0 if own.concentration is None else own.concentration
+        force.setLinkerTypeReservoir(number, own.volume or 0.0, density)
+        anchors = np.full(own.count, -1)
+        if own.anchors is not None:
+            anchors = np.array([_add_anchor(force, anchor) for anchor in own.anchors], dtype=int)
+        chains, places = np.full((own.count, 2), -1), np.zeros((own.count, 2))
+        side = 0 if own.anchors is None else 1
+        generator = np.random.default_rng((own.seed, number))
+        where = _random_places(own.kind.hands[side], filaments, own.bound, generator, own.kind.name)
+        chains[: own.bound, side], places[: own.bound, side] = where
+        for column, values in zip(columns, (np.full(own.count, number), anchors, chains, places)):
+            column.append(values)
+    rows: list[list[Any]] = [np.concatenate(column).ravel().tolist() for column in columns]
+    count = len(rows[0])
+    force.setLinkers(list(range(count)), *rows, count)
+    return force
+
+
+def contour_of(filament: Filament) -> FloatArray:
+    """Where the segments of a filament begin along it, with segments at rest, and its length: (segments + 1,) in nm."""
+    return np.concatenate([[0.0], np.cumsum(filament.type.segment_lengths(filament.segments, filament.closed))])
+
+
+def _add_hand(force, hand, filaments, name):
+    chains = [number for number, filament in enumerate(filaments) if hand.binds(filament.type)]
+    if not chains:
+        raise InputError(
+            f"Linkers {name!r}: a hand binds to filaments of the type {' or '.join(hand.binds_to)}, of which there are "
+            "none: change its binds_to."
+        )
+    number = force.addHand(hand.rate_per_length, hand.reach, hand.unbinding_rate, chains)
+    force.setHandUnbinding(
+        number, hand.strain_share, hand.unbinding_force or 0.0, hand.catch_rate, hand.catch_force or 0.0
+    )
+    force.setHandWalking(number, hand.speed, hand.stall_force or 0.0, hand.walks_backward, hand.at_end == "hold")
+    force.setHandSiteSpacing(number, hand.site_spacing or 0.0)
+    return number
+
+
+def _add_anchor(force, anchor):
+    if np.ndim(anchor) == 0:
+        return force.addParticleAnchor(int(anchor))
+    return force.addPointAnchor(openmm.Vec3(*(float(x) for x in anchor)))
+
+
+def _random_places(hand, filaments, count, generator, name):
+    # Uniform along filaments; of sites, each once.
+    lengths = np.array([contour_of(f)[-1] if hand.binds(f.type) else 0.0 for f in filaments])
+    if count == 0:
+        return np.zeros(0, dtype=int), np.zeros(0)
+    if hand.site_spacing is not None:
+        sites = np.floor(lengths / hand.site_spacing + 1e-9).astype(int)
+        if count > sites.sum():
+            raise InputError(
+                f"Linkers {name!r}: {count} are to begin bound, but there are only {sites.sum()} sites for them."
+            )
+        chosen = np.sort(generator.choice(sites.sum(), count, replace=False))
+        ends = np.cumsum(sites)
+        chains = np.searchsorted(ends, chosen, side="right")
+        return chains, (chosen - (ends - sites)[chains] + 0.5) * hand.site_spacing
+    chains = generator.choice(len(lengths), count, p=lengths / lengths.sum())
+    return chains, generator.uniform(0.0, lengths[chains])
+
+
+def table_of(force: Any, context: openmm.Context) -> LinkerTable:
+    """The linkers of a Context."""
+    columns = force.getLinkersInContext(context)
+    numbers, types, anchors, chains, places = (np.array(column) for column in columns[:5])
+    return LinkerTable(
+        numbers.astype(int),
+        types.astype(int),
+        anchors.astype(int),
+        chains.astype(int).reshape(-1, 2),
+        places.astype(float).reshape(-1, 2),
+        columns[5],
+    )
+
+
+def set_table(force: Any, context: openmm.Context, table: LinkerTable) -> None:
+    """Give a Context the linkers of a table.
+
+    Raises
+    ------
+    InputError
+        For linkers that do not fit their types, the anchors or the filaments.
+    """
+    columns = [np.asarray(column).ravel().tolist() for column in (
+        table.numbers, table.types, table.anchors, table.filaments, table.arc_lengths
+    )]  # fmt: skip
+    try:
+        force.setLinkersInContext(context, *columns, int(table.next_number))
+    except openmm.OpenMMException as error:
+        raise InputError(str(error).removeprefix("CylinderChainBindingForce: ")) from None
+
+
+def pulls_of(
+    force: Any,
+    table: LinkerTable,
+    filaments: Sequence[Filament],
+    nodes: Sequence[IntArray],
+    positions: FloatArray,
+    box: FloatArray | None,
+) -> LinkerPulls:
+    """What the springs of linkers do; arguments are those of ``places_of``."""
+    pulling = table.held == 2
+    places = places_of(force, table, filaments, nodes, positions, box)[pulling]
+    vectors = places[:, 1] - places[:, 0]
+    distance = np.linalg.norm(vectors, axis=1)
+    parameters = np.array([force.getLinkerTypeParameters(i)[2:4] for i in range(force.getNumLinkerTypes())])
+    rest, stiffness = parameters[table.types[pulling]].T
+    with np.errstate(invalid="ignore", divide="ignore"):
+        directions = np.where(distance[:, None] > 0.0, vectors / distance[:, None], 0.0)
+    forces = (stiffness * (distance - rest))[:, None] * directions
+    return LinkerPulls(table.numbers[pulling], table.types[pulling], places, distance, forces)
+
+
+def places_of(
+    force: Any,
+    table: LinkerTable,
+    filaments: Sequence[Filament],
+    nodes: Sequence[IntArray],
+    positions: FloatArray,
+    box: FloatArray | None,
+) -> FloatArray:
+    """Where the two ends of linkers hold something: (n, 2, 3) in nm, NaN where they do not.
+
+    Parameters
+    ----------
+    force : CylinderChainBindingForce
+    table : LinkerTable
+    filaments : sequence of Filament
+    nodes : sequence of (n,) int arrays
+        The particles of each filament.
+    positions : (particles, 3) array
+        In nm.
+    box : (3, 3) array or None
+        Periodic box vectors if distances are those of nearest images: then a second end is at that of its first one.
+    """
+    places = np.full((len(table), 2, 3), np.nan)
+    chains, along = np.asarray(table.filaments), np.asarray(table.arc_lengths)
+    contours = [contour_of(filament) for filament in filaments]
+    minus = np.concatenate([own[: filament.segments] for filament, own in zip(filaments, nodes)])
+    plus = np.concatenate([np.roll(own, -1)[: filament.segments] for filament, own in zip(filaments, nodes)])
+    # Of all filaments, one behind the other.
+    begins = np.cumsum([0.0, *(contour[-1] for contour in contours)])
+    starts = np.concatenate([begin + contour[:-1] for begin, contour in zip(begins, contours)])
+    sizes = np.concatenate([np.diff(contour) for contour in contours])
+    first = np.cumsum([0, *(filament.segments for filament in filaments)])
+    for side in (0, 1):
+        on = chains[:, side] >= 0
+        chain = chains[on, side]
+        position = begins[chain] + along[on, side]
+        segment = np.clip(np.searchsorted(starts, position, side="right") - 1, first[chain], first[chain + 1] - 1)
+        between = _nearest(positions[plus[segment]] - positions[minus[segment]], box)
+        fraction = (position - starts[segment]) / sizes[segment]
+        places[on, side] = positions[minus[segment]] + fraction[:, None] * between
+    for row in np.flatnonzero(np.asarray(table.anchors) >= 0):
+        particle, point = force.getAnchor(int(table.anchors[row]))
+        places[row, 0] = positions[particle] if particle >= 0 else getattr(point, "_value", point)
+    both = table.held == 2
+    places[both, 1] = places[both, 0] + _nearest(places[both, 1] - places[both, 0], box)
+    return places
+
+
+def _nearest(vectors, box):
+    return vectors if box is None else to_nearest_images(vectors, box)

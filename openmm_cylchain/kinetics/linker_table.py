@@ -1,0 +1,65 @@
+"""LinkerTable: which linkers there are, and where their hands are bound."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+from ..units.types import BoolArray, FloatArray, IntArray
+
+STATES = ("unbound", "one hand bound", "both hands bound")
+"""What a linker may be, by how many of its ends hold something; an anchored linker always holds its anchor."""
+
+
+@dataclass(frozen=True)
+class LinkerTable:
+    """The linkers of a Context at one time. It does not change.
+
+    Attributes
+    ----------
+    numbers : (n,) int array
+        Of linkers, ascending: a linker keeps its number as long as it is there.
+    types : (n,) int array
+        What ``Filaments.add_linkers`` returned for its type.
+    anchors : (n,) int array
+        The number of the anchor in the place of the first hand, or -1.
+    filaments : (n, 2) int array
+        To which filaments the two hands are bound; -1 where they are not.
+    arc_lengths : (n, 2) float array
+        Where, as lengths along the filaments with segments at rest, in nm, from their minus ends.
+    next_number : int
+        The number of the next linker.
+    """
+
+    numbers: IntArray
+    types: IntArray
+    anchors: IntArray
+    filaments: IntArray
+    arc_lengths: FloatArray
+    next_number: int
+
+    def __post_init__(self) -> None:
+        count = len(self.numbers)
+        shapes = {"types": (count,), "anchors": (count,), "filaments": (count, 2), "arc_lengths": (count, 2)}
+        for name, shape in shapes.items():
+            if np.shape(getattr(self, name)) != shape:
+                raise InputError(f"LinkerTable: {name} must have the shape {shape}.")
+
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+    @property
+    def bound(self) -> BoolArray:
+        """Which hands are bound: a bool array (n, 2)."""
+        return np.asarray(self.filaments) >= 0
+
+    @property
+    def held(self) -> IntArray:
+        """How many ends of each linker hold something, a filament or an anchor: an int array (n,) of 0, 1 and 2."""
+        return self.bound.sum(axis=1) + (np.asarray(self.anchors) >= 0)
+
+    def counts(self, linker_type: int | None = None) -> tuple[int, int, int]:
+        """How many linkers, of a type or of all, are in each state of ``STATES``."""
+        held = self.held if linker_type is None else self.held[np.asarray(self.types) == linker_type]
+        unbound, one, both = np.bincount(held, minlength=3)
+        return int(unbound), int(one), int(both)

@@ -1,0 +1,155 @@
+"""Crosslinkers and motors with numbers from the literature.
+
+Rates and speeds depend on temperature, salt and ATP by factors of two and more, and many numbers have not been measured
+but are what models take: each docstring says which. Rates of binding are chosen, since what a hand meets depends on its
+reach and the stiffness of the spring. A preset with other values is made by ``dataclasses.replace``.
+
+Papers
+------
+Coppin, Pierce, Hsu, Vale, PNAS 1997, 94, 8539. Ferrer, Lee, Chen, Pelz, Nakamura, Kamm, Lang, PNAS 2008, 105, 9221.
+Kerssemakers, Howard, Hess, Diez, PNAS 2006, 103, 15812. Kuhlman, Ellis, Critchley, Bagshaw, FEBS Lett. 1994, 339, 297.
+Leduc et al., PNAS 2004, 101, 17096. Mallik, Carter, Lex, King, Gross, Nature 2004, 427, 649. Müller, Klumpp, Lipowsky,
+PNAS 2008, 105, 4609. Popov, Komianos, Papoian, PLoS Comput. Biol. 2016, 12, e1004877 (MEDYAN). Schnitzer, Visscher,
+Block, Nat. Cell Biol. 2000, 2, 718. Svoboda, Block, Cell 1994, 77, 773.
+"""
+
+from openmm import unit
+
+from ..filaments.filament_type import F_ACTIN, MICROTUBULE
+from .crosslinker import Crosslinker
+from .hand import Hand
+
+_NM = unit.nanometer
+_PN = unit.piconewton
+_UM = unit.micrometer
+_S = unit.second
+
+ALPHA_ACTININ = Crosslinker(
+    name="alpha-actinin",
+    hands=Hand(
+        binding_rate=35 / _S,
+        reach=50 * _NM,
+        unbinding_rate=0.3 / _S,
+        unbinding_force=17.1 * _PN,
+        binds_to=[F_ACTIN],
+    ),
+    stiffness=8 * _PN / _NM,
+    rest_length=35 * _NM,
+)
+"""alpha-actinin, a short and stiff crosslinker of actin.
+
+- unbinding 0.3/s, ``unbinding_force`` 17.1 pN (k_BT at 25 C over a bond length of 0.24 nm), stiffness 8 pN/nm, length
+  30 to 40 nm: as MEDYAN takes them (Popov et al. 2016). Measured are rupture forces of 40 to 80 pN at 4 to 50 pN/s
+  (Ferrer et al. 2008), and 1.5/s at 15 C and 9.6/s at 25 C for its actin-binding domain alone (Kuhlman et al. 1994).
+- ``binding_rate`` is chosen: one hand in solution binds to actin, a site every 2.7 nm, with K_d = 1 uM; the
+  actin-binding domain has 0.83 uM at 15 C and 2.4 uM at 25 C (Kuhlman et al. 1994).
+"""
+
+FILAMIN = Crosslinker(
+    name="filamin",
+    hands=Hand(
+        binding_rate=2.7 / _S,
+        reach=180 * _NM,
+        unbinding_rate=0.3 / _S,
+        unbinding_force=17.1 * _PN,
+        binds_to=[F_ACTIN],
+    ),
+    stiffness=0.1 * _PN / _NM,
+    rest_length=150 * _NM,
+)
+"""Filamin, a long and soft crosslinker of actin.
+
+- length: a dimer of two arms of about 80 nm; network models take 150 nm.
+- unbinding as for ALPHA_ACTININ, which is an assumption: both have similar rupture forces of 40 to 80 pN (Ferrer et al.
+  2008).
+- stiffness 0.1 pN/nm: a value that network models use, not measured; filamin is no harmonic spring.
+- ``binding_rate`` is chosen: one hand in solution binds to actin, a site every 2.7 nm, with K_d = 1 uM, an assumption.
+"""
+
+MYOSIN_II = Crosslinker(
+    name="myosin II",
+    hands=Hand(
+        binding_rate=18 / _S,
+        reach=225 * _NM,
+        unbinding_rate=0.42 / _S,
+        speed=0.5 * _UM / _S,
+        stall_force=4 * _PN,
+        binds_to=[F_ACTIN],
+    ),
+    stiffness=0.1 * _PN / _NM,
+    rest_length=200 * _NM,
+)
+"""A bipolar filament of nonmuscle myosin II, as network simulators take it: each hand stands for the heads of one half.
+
+These are effective values of models, not measurements of one molecule:
+
+- 22 heads a side, of 15 to 30, that bind with k_on = 0.2/s and unbind with k_off = 1.7/s, and act over 175 to 225 nm,
+  as in MEDYAN (Popov et al. 2016). Together they let go with N k_on/((1 + k_on/k_off)^N - 1) = 0.42/s (Klumpp,
+  Lipowsky, PNAS 2005, 102, 17284), and the first of them binds with N k_on = 4.4/s: that is what a straight filament at
+  200 nm from the other hand meets. Load does not change these rates here; in MEDYAN it is a catch bond.
+- speed 0.5 um/s, ``stall_force`` 4 pN, stiffness 0.1 pN/nm: of the order that models with effective hands take, such as
+  Cytosim; ATP is not limiting. MEDYAN lets a filament stall at much larger forces.
+"""
+
+KINESIN_1 = Crosslinker(
+    name="kinesin-1",
+    hands=Hand(
+        binding_rate=15 / _S,
+        reach=50 * _NM,
+        unbinding_rate=0.8 / _S,
+        unbinding_force=3 * _PN,
+        speed=0.8 * _UM / _S,
+        stall_force=6 * _PN,
+        binds_to=[MICROTUBULE],
+    ),
+    stiffness=0.3 * _PN / _NM,
+    rest_length=30 * _NM,
+)
+"""Kinesin-1, at saturating ATP and room temperature, on a surface or a particle (``anchors``).
+
+Without anchors it is a complex of two of them, whose length and stiffness are those of one: two in series have
+``rest_length`` 60 nm and half of the stiffness.
+
+- speed 0.8 um/s, ``stall_force`` 6 pN (Svoboda, Block 1994; Schnitzer, Visscher, Block 2000: 5 to 8 pN).
+- unbinding 0.8/s, so that it runs 1 um; ``unbinding_force`` 3 pN (Müller et al. 2008, from Schnitzer et al. 2000).
+- length: it holds its cargo 17 nm above a microtubule (Kerssemakers et al. 2006), whose radius is 12.5 nm.
+- stiffness 0.3 pN/nm (Coppin et al. 1997); the spring resists compression as well, which a kinesin hardly does.
+- ``binding_rate`` is chosen: 5/s (Leduc et al. 2004, kinesins on vesicles) for a straight filament at the rest length.
+
+It binds anywhere, not to sites every 8 nm: a line with such sites would hold one motor each, and a microtubule has 13
+protofilaments. ``site_spacing`` has them.
+"""
+
+DYNEIN = Crosslinker(
+    name="dynein",
+    hands=Hand(
+        binding_rate=5.4 / _S,
+        reach=70 * _NM,
+        unbinding_rate=0.27 / _S,
+        unbinding_force=0.75 * _PN,
+        speed=-0.65 * _UM / _S,
+        stall_force=1.1 * _PN,
+        binds_to=[MICROTUBULE],
+    ),
+    stiffness=0.3 * _PN / _NM,
+    rest_length=50 * _NM,
+)
+"""Cytoplasmic dynein of mammals, at saturating ATP, on a surface or a particle (``anchors``); it walks to minus ends.
+
+Without anchors it is a complex of two of them, as KINESIN_1.
+
+- speed 0.65 um/s, ``stall_force`` 1.1 pN (Mallik et al. 2004), unbinding 0.27/s, ``unbinding_force`` 0.75 pN, and 1.6/s
+  with which it binds: as Müller et al. 2008 take them, the last two from a fit. Others find stall forces of 4 pN, with
+  adaptors, to 7 pN.
+- length 50 nm and stiffness 0.3 pN/nm: about the size of the molecule, and the stiffness of kinesin, assumptions.
+- ``binding_rate`` is chosen: 1.6/s for a straight filament at the rest length.
+"""
+
+PRESETS = {
+    "ALPHA_ACTININ": ALPHA_ACTININ,
+    "FILAMIN": FILAMIN,
+    "MYOSIN_II": MYOSIN_II,
+    "KINESIN_1": KINESIN_1,
+    "DYNEIN": DYNEIN,
+}
+"""Crosslinkers by the names that users and configurations use."""

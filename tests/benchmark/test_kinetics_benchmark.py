@@ -1,0 +1,167 @@
+"""The benchmark of kinetics: its bundle, its rows from given courses and timings, and that it runs."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from openmm import unit
+from scipy.integrate import quad
+
+from openmm_cylchain import cli
+from openmm_cylchain.benchmark import kinetic_systems, kinetics, measurement
+from openmm_cylchain.benchmark.kinetic_systems import BundleSystem, create_bundle, relaxed_positions
+from openmm_cylchain.benchmark.kinetics import Course
+
+SMALL = BundleSystem(filaments=8, motors=20, crosslinkers=15, length=2500.0)
+THERMAL_ENERGY = 8.31446261815324e-3 * 298.15
+
+
+@pytest.fixture(scope="module")
+def relaxed():
+    return relaxed_positions(SMALL, 5)
+
+
+def test_rates_are_those_of_filaments_at_the_rest_length():
+    """The rate per length, integrated over a filament in reach, is 1/s."""
+    end = np.sqrt(80.0**2 - 50.0**2)
+    for kind in kinetic_systems.linker_types(SMALL):
+
+        def weight(s, stiffness=kind.stiffness):
+            return np.exp(-0.5 * stiffness * (np.hypot(50.0, s) - 50.0) ** 2 / THERMAL_ENERGY)
+
+        whole = quad(weight, -end, end)[0]
+        assert kind.hands[0].rate_per_length * whole == pytest.approx(1e-12, rel=1e-9)
+
+
+def test_motors_and_crosslinkers_are_those_of_the_benchmark():
+    motor, crosslinker = kinetic_systems.linker_types(SMALL)
+    force, micrometer = unit.piconewton * unit.AVOGADRO_CONSTANT_NA, unit.micrometer
+    in_plain = (100 * force / micrometer).value_in_unit(unit.kilojoule_per_mole / unit.nanometer**2)
+    assert motor.stiffness == pytest.approx(in_plain)
+    assert crosslinker.stiffness == pytest.approx(0.8 * in_plain)
+    assert motor.rest_length == crosslinker.rest_length == 50.0
+    hand = motor.hands[0]
+    assert hand.speed == pytest.approx((0.5 * micrometer / unit.second)._value * 1e3 * 1e-12)
+    assert hand.stall_force == pytest.approx((4 * force).value_in_unit(unit.kilojoule_per_mole / unit.nanometer))
+    assert crosslinker.hands[0].unbinding_rate == 0.0 and crosslinker.hands[0].speed == 0.0
+
+
+def test_bundle_of_the_benchmark_is_what_it_says():
+    bundle = create_bundle(BundleSystem(), 1.0)
+    segments = np.array([len(nodes) - 1 for nodes in bundle.nodes])
+    assert len(segments) == 150
+    assert segments.mean() == pytest.approx(20.0, abs=4 * 6.0 / np.sqrt(150))
+    assert segments.std() == pytest.approx(6.0, rel=0.25)
+    positions = bundle.positions()
+    assert np.abs(positions[:, 0]).max() <= 2500.0
+    assert np.hypot(positions[:, 1], positions[:, 2]).max() <= 90.0 + 1e-9
+    forward = np.array([positions[nodes[-1], 0] > positions[nodes[0], 0] for nodes in bundle.nodes])
+    assert 0.3 < forward.mean() < 0.7
+    table = bundle.linkers()
+    assert table.counts(0) == table.counts(1) == (0, 1000, 0)
+
+
+def test_energies_are_those_of_the_context(relaxed):
+    bundle = create_bundle(SMALL, 1000.0, positions=relaxed)
+    bundle.integrator.step(2000)
+    energies = bundle.energies()
+    assert min(energies["bending"], energies["stretching"], energies["motor"], energies["crosslinker"]) > 0.0
+    potential = bundle.context.getState(energy=True).getPotentialEnergy()._value
+    assert sum(energies.values()) * THERMAL_ENERGY == pytest.approx(potential, rel=1e-6)
+
+
+def test_filaments_on_top_of_each_other_come_apart(relaxed):
+    crowded = replace(SMALL, filaments=60)
+    before = create_bundle(crowded, 1.0).energies()["contact"]
+    after = create_bundle(crowded, 1.0, positions=relaxed_positions(crowded, 5)).energies()["contact"]
+    assert before > 100.0
+    assert after < 0.05 * before
+
+
+def test_bundle_without_contacts_has_none():
+    crowded = replace(SMALL, filaments=60)
+    assert create_bundle(crowded, 1.0).energies()["contact"] > 100.0
+    assert create_bundle(replace(crowded, contacts=False), 1.0).energies()["contact"] == 0.0
+
+
+def test_length_of_filaments_that_lie_evenly():
+    bundle = create_bundle(replace(SMALL, filaments=1, motors=0, crosslinkers=0), 1.0)
+    segments = len(bundle.nodes[0]) - 1
+    assert bundle.length() == pytest.approx(50.0 * np.sqrt(segments**2 - 1), rel=1e-6)
+
+
+def test_course(relaxed):
+    course = kinetics.follow(create_bundle(SMALL, 1000.0, positions=relaxed), 1000.0, 40e3, 4)
+    np.testing.assert_allclose(course.times, [10e3, 20e3, 30e3, 40e3])
+    assert {name: values.shape for name, values in course.energies.items()} == dict.fromkeys(
+        ("bending", "stretching", "motor", "crosslinker", "contact", "wall"), (4,)
+    )
+    assert (course.numbers["motor"].sum(axis=1) == 20).all()
+    assert (course.numbers["crosslinker"].sum(axis=1) == 15).all()
+    assert (course.numbers["crosslinker"][:, 0] == 0).all()
+    np.testing.assert_allclose(course.shortening, 1.0 - course.lengths[1:] / course.lengths[0])
+    assert 0 <= course.divided < 1
+
+
+def given_courses(factor, shift):
+    """Of two seeds, with energies that differ by ``shift`` between them."""
+    times = np.array([1e5, 2e5])
+    for own in (-shift, shift):
+        energies = {name: factor * np.array([50.0, 100.0 + own]) for name in ("bending", "motor", "crosslinker")}
+        numbers = {"motor": np.array([[1, 5, 4], [0, 4, 6]])}
+        yield Course(times, energies, numbers, np.array([1000.0, 950.0, 900.0]), 0.25)
+
+
+def test_rows_of_courses():
+    rows = kinetics.course_rows("bundle_2000_us", list(given_courses(1.0, 3.0)), 7)
+    values = {row.name: row for row in rows}
+    assert values["bending_energy_bundle_2000_us"].value == 100.0
+    assert values["bending_energy_bundle_2000_us"].error == pytest.approx(3.0)
+    assert values["motor_both_hands_bound_bundle_2000_us"].value == 6.0
+    assert values["crossings_bundle_2000_us"].value == 7.0
+    assert values["divided_steps_bundle_2000_us"].value == 0.25
+    assert values["shortening_bundle_2000_us_at_0.1_s"].value == pytest.approx(0.05)
+    assert values["shortening_bundle_2000_us_at_0.2_s"].value == pytest.approx(0.1)
+    assert len(values) == len(rows)
+
+
+def test_ratios_to_the_reference():
+    courses = {200.0: list(given_courses(1.0, 3.0)), 2000.0: list(given_courses(1.5, 4.0))}
+    rows = {row.name: row for row in kinetics.ratio_rows("bundle", [2000.0], courses)}
+    bending = rows["bending_energy_over_reference_bundle_2000_us"]
+    assert bending.value == pytest.approx(1.5)
+    assert bending.error == pytest.approx(1.5 * 0.05)
+    assert rows["shortening_over_reference_bundle_2000_us"].value == pytest.approx(1.0)
+
+
+def test_speeds():
+    times = {"bundle_1000_us": np.array([2e-3, 2e-3]), "bundle_5000_us": np.array([4e-2, 4e-2])}
+    rows = {row.name: row.value for row in kinetics.speed_rows("bundle", (1000.0, 5000.0), times)}
+    assert rows["time_per_step_bundle_1000_us"] == pytest.approx(2.0)
+    assert rows["simulated_seconds_per_second_bundle_1000_us"] == pytest.approx(0.5)
+    assert rows["time_per_step_bundle"] == rows["time_per_step_bundle_5000_us"] == pytest.approx(40.0)
+    assert rows["simulated_seconds_per_second_bundle"] == pytest.approx(0.125)
+
+
+def test_benchmark_of_kinetics(monkeypatch, tmp_path, capsys):
+    def quickly(cases, repetitions, seconds, say=None, minimum_steps=1, clock=None):
+        return measurement.time_interleaved(cases, repetitions, 1e-3)
+
+    bare = replace(SMALL, name="bare", contacts=False)
+    monkeypatch.setattr(kinetics, "QUICK", kinetics.KineticsEffort((SMALL, bare), (1000.0,), 2, 2e4, 2, 2, 3, 2, 1e-3))
+    monkeypatch.setattr(kinetics, "time_interleaved", quickly)
+    path = tmp_path / "result.json"
+    assert cli.main(["benchmark", "kinetics", "--quick", "--json", str(path)]) == 0
+    content = json.loads(path.read_text())
+    rows = {row["name"]: row for row in content["rows"]}
+    assert len(rows) == len(content["rows"])
+    assert content["missing"] == {}
+    assert rows["simulated_seconds_per_second_bundle"]["value"] > 0
+    assert rows["bending_energy_over_reference_bundle_1000_us"]["error"] > 0
+    assert rows["crossings_bundle_1000_us"]["value"] == 0
+    assert "crossings_bundle_100_us" not in rows
+    assert rows["simulated_seconds_per_second_bare"]["value"] > 0
+    assert "crossings_bare_1000_us" not in rows
+    output = capsys.readouterr().out
+    assert "Shortening" in output and "energies in k_BT" in output

@@ -1,0 +1,141 @@
+"""Linkers on what moves: equilibrium of binding and motion together, whatever the step; motors that move filaments."""
+
+from dataclasses import replace
+
+import numpy as np
+import openmm
+import pytest
+
+from openmm_cylchain import F_ACTIN, MICROTUBULE, Crosslinker, Crosslinks, Filaments, Hand
+from support.contexts import new_context
+from support.solvent import KT, TEMPERATURE, VISCOSITY
+
+SECOND = 1e12
+PICONEWTON = 0.602214076
+
+
+def fixed_filament(filaments, segments, start):
+    """A filament of which only the last node moves, far from all else."""
+    nodes = np.array(start) + 100.0 * np.arange(segments + 1)[:, None] * np.array([1.0, 0.0, 0.0])
+    return filaments.add_nodes(F_ACTIN.with_segment_length(100.0), nodes, clamped=range(segments))
+
+
+def expected_binding(weight, stiffness, rest_length, trap, above):
+    """The ratio of bound and unbound copies, and the mean squared length of the spring, by sums over places."""
+    width = np.sqrt(KT / trap)
+    y = above + width * np.linspace(-6, 6, 161)[:, None, None]
+    z = width * np.linspace(-6, 6, 161)[None, :, None]
+    s = np.linspace(-90.0, 90.0, 361)
+    density = np.exp(-((y - above) ** 2 + z**2) / (2.0 * width**2))
+    distance = np.sqrt(y**2 + z**2 + s**2)
+    bound = density * np.exp(-stiffness * (distance - rest_length) ** 2 / (2.0 * KT))
+    ratio = weight * bound.sum() * (s[1] - s[0]) / density.sum()
+    return ratio, (bound * distance**2).sum() / bound.sum()
+
+
+@pytest.mark.parametrize(
+    ("rest_length", "step", "strain_share"), [(0.0, 0.03, 0.0), (0.0, 2.0, 0.4), (25.0, 0.2, 0.4), (25.0, 2.0, 0.0)]
+)
+def test_binding_and_motion_are_in_equilibrium_together(step, rest_length, strain_share):
+    """Of particles in traps above a filament, each with a hand: how many are bound, and how far their springs reach.
+
+    Steps are in units of the relaxation of a particle in its trap, in which a hand unbinds about once.
+    """
+    copies, trap, stiffness, above = 80, 0.05 * PICONEWTON, 0.1 * PICONEWTON, 15.0
+    friction = 1e6
+    relaxation = friction / trap
+    filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
+    fixed_filament(filaments, 2 * copies + 4, (0.0, 0.0, 0.0))
+    hand = Hand(binding_rate=80.0 / relaxation, reach=90.0, unbinding_rate=1.0 / relaxation, strain_share=strain_share)
+    centres = np.column_stack([200.0 * np.arange(copies) + 150.0, np.full(copies, above), np.zeros(copies)])
+    system, topology = openmm.System(), openmm.app.Topology()
+    chain = topology.addChain()
+    for _ in range(copies):
+        system.addParticle(1.0)
+        topology.addAtom("P", None, topology.addResidue("P", chain))
+    filaments.add_linkers(
+        Crosslinker(hands=hand, stiffness=stiffness, rest_length=rest_length), anchors=np.arange(copies)
+    )
+    positions = filaments.add_to(topology, system, centres)
+    traps = Crosslinks(stiffness=trap, rest_length=0.0)
+    for particle, centre in enumerate(centres):
+        traps.add(None, particle, centre)
+    traps.add_to(system)
+    integrator = filaments.create_integrator(
+        system, step * relaxation, particle_friction=friction, random_seed=3, checks=False
+    )
+    context = new_context(system, positions, integrator)
+    interval = max(1, round(1.5 / step))
+    integrator.step(8 * interval)
+    bound, squares = [], []
+    for _ in range(150):
+        integrator.step(interval)
+        bound.append(filaments.linkers_in(context).bound[:, 1].mean())
+        lengths = filaments.linker_pulls(context).lengths
+        squares.append((lengths**2).mean())
+    weight = hand.rate_per_length / hand.unbinding_rate
+    ratio, square = expected_binding(weight, stiffness, rest_length, trap, above)
+    for values, exact in ((bound, ratio / (1.0 + ratio)), (squares, square)):
+        means = np.reshape(values, (15, -1)).mean(axis=1)
+        error = means.std(ddof=1) / np.sqrt(len(means))
+        assert 4.0 * error < 0.06 * exact
+        assert abs(np.mean(values) - exact) < 0.01 * exact + 4.0 * error
+
+
+def test_fixed_motors_make_a_filament_glide_at_their_speed():
+    filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
+    filaments.add_straight(F_ACTIN.with_segment_length(100.0), 20, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    speed = 1000.0 / SECOND
+    hand = Hand(
+        binding_rate=200.0 / SECOND, reach=40.0, unbinding_rate=5.0 / SECOND, speed=speed, stall_force=6.0 * PICONEWTON
+    )
+    generator = np.random.default_rng(1)
+    points = np.column_stack([generator.uniform(-4000.0, 2000.0, 1200), generator.normal(0.0, 10.0, (1200, 2))])
+    filaments.add_linkers(Crosslinker(hands=hand, stiffness=0.1 * PICONEWTON), anchors=points)
+    _, system, positions = filaments.build()
+    step = 1e-4 * SECOND
+    assert filaments.recommended_time_step(system=system).step > step
+    integrator = filaments.create_integrator(system, step, random_seed=2, checks=False)
+    context = new_context(system, positions, integrator)
+    integrator.step(2000)
+    nodes = filaments.node_indices[0]
+    start = context.getState(positions=True).getPositions(asNumpy=True)._value[nodes].mean(axis=0)
+    integrator.step(10000)
+    end = context.getState(positions=True).getPositions(asNumpy=True)._value[nodes].mean(axis=0)
+    # Towards the plus end they walk, so the filament goes the other way.
+    assert (end - start)[0] == pytest.approx(-1000.0, rel=0.03)
+    assert np.linalg.norm((end - start)[1:]) < 60.0
+
+
+def test_motors_with_two_hands_slide_antiparallel_filaments():
+    filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
+    kind = MICROTUBULE.with_segment_length(500.0)
+    filaments.add_straight(kind, 12, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    filaments.add_straight(kind, 12, (6000.0, 20.0, 0.0), (-1.0, 0.0, 0.0))
+    speed = 400.0 / SECOND
+    hand = Hand(binding_rate=0.0, reach=80.0, unbinding_rate=0.0, speed=speed, stall_force=6.0 * PICONEWTON)
+    motor = Crosslinker(hands=hand, stiffness=0.2 * PICONEWTON)
+    filaments.add_linkers(motor, count=30, volume=1e9)
+    _, system, positions = filaments.build()
+    integrator = filaments.create_integrator(system, 5e-5 * SECOND, random_seed=2, checks=False)
+    context = new_context(system, positions, integrator)
+    # Each begins on both, where they face each other.
+    along = np.linspace(1500.0, 4500.0, 30)
+    table = replace(
+        filaments.linkers_in(context),
+        filaments=np.tile([0, 1], (30, 1)),
+        arc_lengths=np.column_stack([along, 6000.0 - along]),
+    )
+    filaments.set_linkers(context, table)
+
+    def offset():
+        # Of the second filament against the first one, along both.
+        x = context.getState(positions=True).getPositions(asNumpy=True)._value
+        first, second = (x[nodes] for nodes in filaments.node_indices)
+        axis = (first[-1] - first[0]) - (second[-1] - second[0])
+        return (second.mean(axis=0) - first.mean(axis=0)) @ axis / np.linalg.norm(axis)
+
+    start = offset()
+    integrator.step(10000)
+    # Hands walk to the plus end of either filament, so each is pushed towards its minus end.
+    assert offset() - start == pytest.approx(2 * 400.0 * 0.5, rel=0.02)
