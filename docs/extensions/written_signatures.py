@@ -1,0 +1,50 @@
+"""Signatures as they are written, so that a type reads ``Scalar`` and not ``float | openmm.unit.quantity.Quantity``."""
+
+import ast
+import dataclasses
+import inspect
+import textwrap
+
+
+def setup(app):
+    """Replace the signatures that autodoc would write."""
+    app.connect("autodoc-process-signature", _write_signature)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
+
+
+def _write_signature(app, what, name, thing, options, signature, return_annotation):
+    if what == "class":
+        if dataclasses.is_dataclass(thing) and "__init__" in vars(thing):
+            return _signature_of_fields(thing), None
+        thing = vars(thing).get("__init__")
+    thing = inspect.unwrap(getattr(thing, "__func__", thing)) if thing is not None else None
+    if not inspect.isfunction(thing) or thing.__module__.split(".")[0] != "openmm_cylchain":
+        return None
+    (function,) = ast.parse(textwrap.dedent(inspect.getsource(thing))).body
+    arguments = function.args
+    if "." in thing.__qualname__ and not any("staticmethod" in ast.unparse(one) for one in function.decorator_list):
+        del (arguments.posonlyargs or arguments.args)[0]
+    returned = ast.unparse(function.returns) if function.returns and what != "class" else None
+    return f"({ast.unparse(arguments)})", returned
+
+
+def _signature_of_fields(kind):
+    written = {}
+    for base in reversed(kind.__mro__):
+        if dataclasses.is_dataclass(base):
+            (tree,) = ast.parse(textwrap.dedent(inspect.getsource(base))).body
+            written |= {line.target.id: line for line in tree.body if isinstance(line, ast.AnnAssign)}
+    texts, keywords = [], False
+    for field in dataclasses.fields(kind):
+        if not field.init:
+            continue
+        if field.kw_only and not keywords:
+            texts.append("*")
+            keywords = True
+        text = f"{field.name}: {ast.unparse(written[field.name].annotation)}"
+        if field.default is not dataclasses.MISSING:
+            text += f" = {field.default!r}"
+        elif field.default_factory is not dataclasses.MISSING:
+            text += " = ..."
+        texts.append(text)
+    return f"({', '.join(texts)})"
