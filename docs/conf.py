@@ -16,7 +16,7 @@ extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
-    "written_signatures",
+    "docstrings",
     "equations",
     "repository_files",
     "page_scripts",

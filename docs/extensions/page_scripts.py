@@ -17,9 +17,17 @@ def script_of(page):
 
 
 def setup(app):
-    """Write the scripts into the built site."""
+    """Write the scripts into the built site, and a link to each on its page."""
+    app.connect("source-read", _add_link)
     app.connect("build-finished", _write_scripts)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
+
+
+def _add_link(app, page, source):
+    if page.startswith("tutorials/") and BLOCK.search(source[0]):
+        name = page.split("/")[1]
+        title, text = source[0].split("\n", 1)
+        source[0] = f'{title}\n\n<p><a href="{name}.py" download>The whole program: {name}.py</a></p>\n{text}'
 
 
 def _write_scripts(app, exception):

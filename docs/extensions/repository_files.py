@@ -6,6 +6,7 @@ A page of an example begins with its description and its picture.
 import ast
 import html
 import posixpath
+import re
 from pathlib import Path
 
 from docutils import nodes
@@ -28,6 +29,7 @@ logger = logging.getLogger(__name__)
 
 def setup(app):
     """Register the transform of links and the pages that they lead to."""
+    app.connect("source-read", _read_root_files)
     app.connect("builder-inited", lambda app: setattr(app, "linked_files", set(_examples())))
     app.add_post_transform(FileLinks)
     app.connect("html-collect-pages", _file_pages)
@@ -36,6 +38,20 @@ def setup(app):
 
 def _examples():
     return (path.relative_to(ROOT).as_posix() for path in sorted((ROOT / "examples").glob("*.py")))
+
+
+def _read_root_files(app, page, source):
+    """Pages of files at the root have their text; links to such files lead to the pages."""
+    for name, own in PAGES.items():
+        if page == own and page != "index":
+            source[0] = re.sub(r"\]\((?!https?:|#)", "](../", (ROOT / name).read_text()).replace("](../docs/", "](")
+    here = posixpath.dirname(page)
+    for name, target in PAGES.items():
+        source[0] = re.sub(
+            rf"\]\((?:\.\./)+{re.escape(name)}(#[^)]*)?\)",
+            lambda link, target=target: f"]({posixpath.relpath(target, here or '.')}.md{link[1] or ''})",
+            source[0],
+        )
 
 
 class FileLinks(SphinxPostTransform):
@@ -47,7 +63,6 @@ class FileLinks(SphinxPostTransform):
     def run(self, **kwargs):
         """Replace all of a page."""
         for node in list(self.document.findall(addnodes.download_reference)):
-            path = (Path(self.env.srcdir) / self.env.docname).parent.joinpath(node["reftarget"]).resolve()
             path = Path(self.env.relfn2path(node["reftarget"], self.env.docname)[1]).resolve()
             if not path.is_file() or not path.is_relative_to(ROOT) or path.suffix == ".png":
                 logger.warning("no file of the repository: %s", node["reftarget"], location=node)

@@ -1,15 +1,25 @@
-"""Signatures as they are written, so that a type reads ``Scalar`` and not ``float | openmm.unit.quantity.Quantity``."""
+"""Docstrings and signatures as they are written.
+
+A type reads ``Scalar`` and not ``float | openmm.unit.quantity.Quantity``, and a bar in an equation is a bar.
+"""
 
 import ast
 import dataclasses
 import inspect
+import re
 import textwrap
 
 
 def setup(app):
-    """Replace the signatures that autodoc would write."""
+    """Replace the signatures that autodoc would write, and keep bars."""
+    app.connect("autodoc-process-docstring", _keep_bars)
     app.connect("autodoc-process-signature", _write_signature)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
+
+
+def _keep_bars(app, what, name, thing, options, lines):
+    """To reStructuredText, text between bars is a substitution."""
+    lines[:] = re.sub(r"(``.*?``)|\|", lambda match: match[1] or r"\|", "\n".join(lines), flags=re.DOTALL).split("\n")
 
 
 def _write_signature(app, what, name, thing, options, signature, return_annotation):
