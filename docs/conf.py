@@ -21,6 +21,7 @@ extensions = [
     "repository_files",
     "page_scripts",
     "command_help",
+    "built_links",
 ]
 exclude_patterns = ["extensions", "_build"]
 nitpicky = False

@@ -1,7 +1,7 @@
 """The Python of a tutorial as a script: ``python docs/extensions/page_scripts.py PAGE.md`` runs it in this folder.
 
-The blocks of a tutorial, one after the other, are a whole program, which writes the page's picture. The built site has it
-as a file beside each tutorial.
+The blocks of a tutorial, one after the other, are a whole program, which writes the page's picture. The built site
+has it as a file beside each tutorial.
 """
 
 import re

@@ -132,7 +132,7 @@ class Filaments:
 
     @property
     def node_indices(self) -> list[IntArray]:
-        """List of arrays: the particle indices of the nodes of every filament, once they are in a System."""
+        """Particle indices of the nodes, a list of an array for each filament, once they are in a System."""
         self._refuse_unless_built()
         return self._nodes
 
@@ -154,7 +154,7 @@ class Filaments:
 
     @property
     def bead_indices(self) -> list[IntArray]:
-        """List of arrays: the particle indices of the beads of every filament, once they are in a System."""
+        """Particle indices of the beads, a list of an array for each filament, once they are in a System."""
         self._refuse_unless_built()
         return [self._attachment_indices[self._beads.get(number, [])] for number in range(len(self))]
 
