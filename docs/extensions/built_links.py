@@ -1,4 +1,4 @@
-"""Every link within the built site leads to a file that is there, and to a place on its page; nothing comes from outside."""
+"""Links within the built site lead to files and places that are there, and nothing is loaded from outside."""
 
 import re
 from functools import cache

@@ -21,7 +21,7 @@ LANGUAGES = {"python", "toml", "sh", "bash", "text", "mermaid", "{toctree}", "{c
 # That of the README is in tests/test_readme.py.
 PYTHON_PAGES = [page for page in PAGES if blocks_of(page, "python") and page.name != "README.md"]
 # Pages whose blocks take more than a few seconds.
-SLOW = {"docs/tutorials/force_extension.md", "docs/tutorials/dna_persistence_length.md"}
+SLOW = {f"docs/tutorials/{name}.md" for name in ("contractile_bundle", "dna_persistence_length", "force_extension")}
 
 FILAMENTS_IN_A_SYSTEM = """
 import openmm
@@ -163,7 +163,18 @@ def test_commands_exist_with_these_options(capsys):
         elif program == "python" and words[1].endswith(".py"):
             assert (ROOT / words[1]).exists(), (name_of(page), words)
         else:
-            known = {"python3", "python", "pip", "pytest", "apt", "cmake", "ctest", "pre-commit", "mypy", "ruff"}
+            known = {
+                "python3",
+                "python",
+                "pip",
+                "pytest",
+                "apt",
+                "cmake",
+                "ctest",
+                "pre-commit",
+                "mypy",
+                "sphinx-build",
+            }
             assert program in known or shutil.which(program), (name_of(page), words)
     assert checked >= 6
 
