@@ -39,6 +39,12 @@ def _write_signature(app, what, name, thing, options, signature, return_annotati
 
 
 def _signature_of_fields(kind):
+    (tree,) = ast.parse(textwrap.dedent(inspect.getsource(kind))).body
+    for line in ast.walk(tree):
+        # What may be given, where attributes hold something else.
+        if isinstance(line, ast.FunctionDef) and line.name == "__init__":
+            del (line.args.posonlyargs or line.args.args)[0]
+            return f"({ast.unparse(line.args)})"
     written = {}
     for base in reversed(kind.__mro__):
         if dataclasses.is_dataclass(base):

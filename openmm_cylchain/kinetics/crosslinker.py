@@ -23,7 +23,7 @@ class Crosslinker:
     hands : Hand, or two of them
         One Hand stands for two equal ones, or for that of a linker which is anchored at its other end.
     stiffness : energy/length^2
-        k.
+        k of the spring.
     rest_length : length
         d0; may be zero.
     same_filament : bool
