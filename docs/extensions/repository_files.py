@@ -44,7 +44,9 @@ def _read_root_files(app, page, source):
     """Pages of files at the root have their text; links to such files lead to the pages."""
     for name, own in PAGES.items():
         if page == own and page != "index":
+            app.env.note_dependency(str(ROOT / name))
             source[0] = re.sub(r"\]\((?!https?:|#)", "](../", (ROOT / name).read_text()).replace("](../docs/", "](")
+    source[0] = re.sub(r"^```mermaid\n(.*?)^```$", _table_of_flowchart, source[0], flags=re.DOTALL | re.MULTILINE)
     here = posixpath.dirname(page)
     for name, target in PAGES.items():
         source[0] = re.sub(
@@ -52,6 +54,18 @@ def _read_root_files(app, page, source):
             lambda link, target=target: f"]({posixpath.relpath(target, here or '.')}.md{link[1] or ''})",
             source[0],
         )
+
+
+_NODE = re.compile(r"(\w+)(?:\[\"([^\"]*)\"\]|\{(\w+)\})")
+
+
+def _table_of_flowchart(block):
+    """A flowchart of Mermaid, which needs a script of its own to be drawn, as a table of its arrows."""
+    labels = {match[1]: match[2] or match[3] for match in _NODE.finditer(block[1])}
+    rows = ["| from | by | to |", "|---|---|---|"]
+    for start, by, end in re.findall(r"(\w+) -->(?:\|\"?([^|\"]*)\"?\|)? (\w+)", _NODE.sub(r"\1", block[1])):
+        rows.append(f"| {labels[start]} | {by} | {labels[end]} |".replace("<br>", ", "))
+    return "\n".join(rows)
 
 
 class FileLinks(SphinxPostTransform):
