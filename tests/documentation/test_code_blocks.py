@@ -140,7 +140,7 @@ def commands_of(block):
     """Commands of this package in a shell block: lists of words."""
     text = block.text.replace("\\\n", " ")
     for line in re.split(r"\n|&&", text):
-        words = shlex.split(line, comments=True)
+        words = [word for word in shlex.split(line, comments=True) if not re.match(r"[A-Z_]+=", word)]
         if words:
             yield words
 
