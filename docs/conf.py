@@ -24,12 +24,10 @@ extensions = [
     "built_links",
 ]
 exclude_patterns = ["extensions", "_build"]
-nitpicky = False
 
 # Pages are Markdown that GitHub shows as well: equations between dollars, headings with names to link to.
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 4
-suppress_warnings = ["misc.highlighting_failure"]
 highlight_language = "none"
 pygments_style = "tango"
 pygments_dark_style = "github-dark"
