@@ -9,6 +9,7 @@ from ..errors import InputError
 from .quantities import (
     AVOGADRO,
     BENDING_RIGIDITY,
+    DIFFUSION,
     FORCE,
     FRICTION,
     LENGTH,
@@ -34,6 +35,7 @@ _EXAMPLES = {
     FORCE: ("force", "1100 pN"),
     BENDING_RIGIDITY: ("bending rigidity", "2.2e7 pN*nm^2"),
     FRICTION: ("friction", "1.91e-12 kg/s"),
+    DIFFUSION: ("diffusion coefficient", "1 um^2/s"),
     MASS: ("mass", "650 Da"),
     ROTATIONAL_FRICTION: ("rotational friction", "7e4 pN*nm*us"),
     MASS_PER_LENGTH: ("mass per length", "3500 Da/nm"),
@@ -51,6 +53,11 @@ _NUMBER_AND_UNIT = re.compile(rf"\s*({_NUMBER})\s*(.*?)\s*", re.IGNORECASE)
 def example(target: unit.Unit) -> str:
     """How people write a quantity in the unit ``target``, such as "360 nm"."""
     return _EXAMPLES[target][1]
+
+
+def kind_of(target: unit.Unit) -> str:
+    """What to call a quantity in the unit ``target``, such as "length"."""
+    return _EXAMPLES[target][0]
 
 
 @functools.cache
