@@ -7,7 +7,6 @@ Exit codes: 0 done, 1 the simulation blew up, a file could not be written or res
 import argparse
 import json
 import math
-import re
 import sys
 import warnings
 from dataclasses import replace
@@ -217,33 +216,24 @@ def _time_step(options):
         print(f"  {'in this configuration':<36} {format_time(settings.time_step, 4):>12}")
         step = replace(recommended, step=settings.time_step)
         print(f"  dynamics at that step: {step.describe_dynamics()}")
-    if configuration.linkers:
-        _step_of_linkers(configuration)
+    _step_of_system(configuration)
     if options.check:
         _check_time_step(configuration, options)
 
 
-def _step_of_linkers(configuration):
-    from .kinetics.binding_force import BINDING_FORCE_NAME
-    from .runs.configuration import linker_labels
-    from .runs.initial_state import recommended_step_of_network
+def _step_of_system(configuration):
+    from .runs.configuration import named_bound
+    from .runs.initial_state import recommended_step, stands_alone
     from .units.text import format_time
 
+    if stands_alone(configuration):
+        return
     settings = configuration.simulation
-    recommended = recommended_step_of_network(
-        configuration.solvent,
-        configuration.filaments,
-        configuration.box,
-        configuration.linkers,
-        settings.engine,
-        settings.scheme,
-    )
-    print("with linkers")
-    labels = linker_labels(configuration)
+    recommended = recommended_step(configuration, settings.scheme, settings.engine, settings.seed)
+    print("with all that acts on them")
     for name, allowed in recommended.allowed.items():
-        match = re.fullmatch(rf"{BINDING_FORCE_NAME}: type (\d+), (.*)", name)
-        if match is not None and math.isfinite(allowed):
-            print(f"  {format_time(allowed, 4):>12}  allowed by {labels[int(match[1])]}: {match[2]}")
+        if math.isfinite(allowed):
+            print(f"  {format_time(allowed, 4):>12}  allowed by {named_bound(configuration, name)}")
     print(f"  {'recommended':<36} {format_time(recommended.step, 4):>12}  ({recommended.reason})")
     print(f"  {'in this configuration':<36} {format_time(settings.time_step, 4):>12}")
 

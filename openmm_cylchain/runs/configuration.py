@@ -6,12 +6,14 @@ the table and the key, and says what to do.
 """
 
 import dataclasses
+import re
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 from ..engine_choice import choose_engine
 from ..errors import InputError
+from ..kinetics.binding_force import BINDING_FORCE_NAME
 from ..mechanics.flow import Flow
 from .initial_state import recommended_step
 from .keys import ConfigurationError, Place, Text
@@ -36,7 +38,7 @@ from .tables.linkers import HAND, LINKERS, binds_to, read_linkers
 from .tables.particles import PARTICLES, read_particles
 from .tables.simulation import SIMULATION, SimulationSettings, read_seed, read_simulation
 from .tables.solvent import BOX, FLOW, SOLVENT, Solvent, read_flow, read_solvent
-from .toml_lines import line_of, lines_of
+from .toml_lines import lines_of
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -55,7 +57,7 @@ class Configuration:
     """Everything that a run needs.
 
     ``text`` is the file that it was read from, ``box`` the edges of a box in nm, ``tables`` what was read from each
-    table by its name, and ``start_files`` the paths of files that filaments start from.
+    table by its name, ``start_files`` the paths of files that filaments start from, and ``lines`` where entries stand.
     """
 
     title: str
@@ -74,6 +76,7 @@ class Configuration:
     links: tuple = ()
     tables: dict = dataclasses.field(default_factory=dict, compare=False, repr=False)
     start_files: tuple = dataclasses.field(default=(), compare=False)
+    lines: dict = dataclasses.field(default_factory=dict, compare=False, repr=False)
 
 
 def read_configuration(path):
@@ -104,7 +107,7 @@ def read_configuration(path):
         return parse_configuration(text, path.parent)
     except InputError as error:
         separator = ", " if str(error).startswith("line ") else ": "
-        raise ConfigurationError(f"{path}{separator}{error}", getattr(error, "path", ())) from None
+        raise InputError(f"{path}{separator}{error}") from None
 
 
 def parse_configuration(text, folder="."):
@@ -117,19 +120,16 @@ def parse_configuration(text, folder="."):
     except (ValueError, RecursionError) as error:
         # Numbers of thousands of digits, and lists within lists.
         raise InputError(f"not valid TOML: {error}.") from None
+    lines = lines_of(text_of_lines, entries)
     try:
-        try:
-            return _configuration(entries, text, Path(folder))
-        except UnknownKeyError as error:
-            raise error.with_suggestion(_OWNERS) from None
+        return _configuration(entries, text, Path(folder), lines)
+    except UnknownKeyError as error:
+        raise error.with_suggestion(_OWNERS).with_line(lines) from None
     except ConfigurationError as error:
-        line = line_of(lines_of(text_of_lines, entries), error.path)
-        if line is None:
-            raise
-        raise ConfigurationError(f"line {line}: {error}", error.path) from None
+        raise error.with_line(lines) from None
 
 
-def _configuration(raw, text, folder):
+def _configuration(raw, text, folder, lines):
     tables = _read_tables(raw)
     title = Text().read(raw.get("title", ""), Place("title", ("title",)))
     (solvent,) = map(read_solvent, tables["solvent"])
@@ -154,6 +154,7 @@ def _configuration(raw, text, folder):
         tuple(read_link(own, groups) for own in tables["link"]),
         tables,
         tuple(_start_files(tables["filament"], folder)),
+        lines,
     )
     _check_engine(settings, configuration)
     configuration = dataclasses.replace(configuration, filaments=_disturbed(configuration))
@@ -275,3 +276,9 @@ def linker_labels(configuration):
     return [
         name if names.count(name) == 1 else f"{name} (table {number})" for number, name in enumerate(names, start=1)
     ]
+
+
+def named_bound(configuration, name):
+    """The name of a bound on the step of a configuration, with the labels of its linkers."""
+    match = re.fullmatch(rf"{BINDING_FORCE_NAME}: type (\d+), (.*)", name)
+    return name if match is None else f"{linker_labels(configuration)[int(match[1])]}: {match[2]}"

@@ -1,6 +1,6 @@
 """From a configuration to a System: filaments and particles where they begin, and all that acts on them.
 
-It calls what users call from Python: the methods of ``Filaments``, ``Crosslinks``, ``capsule_contact_force`` and others.
+It calls what users call from Python: methods of ``Filaments`` and ``Crosslinks``, ``capsule_contact_force`` and others.
 """
 
 from dataclasses import dataclass
@@ -58,6 +58,13 @@ def build_system(configuration, engine, seed, linkers=True):
     -------
     BuiltSystem
     """
+    try:
+        return _built(configuration, engine, seed, linkers)
+    except ConfigurationError as error:
+        raise error.with_line(configuration.lines) from None
+
+
+def _built(configuration, engine, seed, linkers):
     filaments = place_filaments(configuration, engine, seed, linkers)
     topology, system, positions = filaments.build(box_vectors(configuration.box))
     positions, spheres, radii, friction = _add_particles(configuration, seed, topology, system, positions)
@@ -82,9 +89,9 @@ def build_system(configuration, engine, seed, linkers=True):
     return BuiltSystem(filaments, topology, system, positions, friction, configuration.flow, count)
 
 
-def recommended_step(configuration, scheme, engine, seed):
-    """The TimeStep that is recommended for a configuration, whose simulation may still be None."""
-    alone = not (
+def stands_alone(configuration):
+    """Whether nothing but the solvent at rest acts on filaments."""
+    return not (
         configuration.linkers
         or configuration.links
         or configuration.contacts
@@ -94,7 +101,11 @@ def recommended_step(configuration, scheme, engine, seed):
         or configuration.particles
         or configuration.flow
     )
-    if alone:
+
+
+def recommended_step(configuration, scheme, engine, seed):
+    """The TimeStep that is recommended for a configuration, whose simulation may still be None."""
+    if stands_alone(configuration):
         # The same without building thousands of filaments.
         solvent = configuration.solvent.viscosity, configuration.solvent.temperature
         steps = (
@@ -188,8 +199,9 @@ def _inside(group, temperature, seed, number, places):
         if group.inside.contains(nodes):
             return nodes
     raise ConfigurationError(
-        f"[[filament]] number {group.table}: filament {number} of {group.segments} segments does not fit into its region: "
-        f"none of {_ATTEMPTS} random places has all of its nodes inside. Take shorter filaments or a larger region.",
+        f"[[filament]] number {group.table}: filament {number} of {group.segments} segments does not fit into its "
+        f"region: none of {_ATTEMPTS} random places has all of its nodes inside. Take shorter filaments or a "
+        "larger region.",
         ("filament", group.table - 1, "inside"),
     )
 

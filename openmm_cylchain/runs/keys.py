@@ -12,6 +12,7 @@ from ..errors import InputError
 from ..units import quantities as units
 from ..units.text import example as example_of
 from ..units.text import kind_of, parse_quantity
+from .toml_lines import line_of
 
 REQUIRED = object()
 """The default of a key that must be given."""
@@ -45,6 +46,11 @@ class ConfigurationError(InputError):
     def __init__(self, message, path=()):
         super().__init__(message)
         self.path = path
+
+    def with_line(self, lines):
+        """The same with its line in front, if it is known; ``lines`` are those of ``toml_lines.lines_of``."""
+        line = line_of(lines, self.path)
+        return self if line is None else ConfigurationError(f"line {line}: {self}")
 
 
 @dataclass(frozen=True)

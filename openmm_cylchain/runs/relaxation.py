@@ -45,7 +45,7 @@ def relaxed_positions(configuration, built):
                 integrator.step(_STEPS)
     except (InstabilityError, OpenMMException) as error:
         raise InputError(
-            f"[contacts] filaments that overlap at first have not come apart: {error} Begin with fewer filaments, with a "
-            "smaller diameter or time_step, or set relax = false."
+            f"[contacts] filaments that overlap at first have not come apart: {error} Begin with fewer filaments, "
+            "with a smaller diameter or time_step, or set relax = false."
         ) from None
     return context.getState(positions=True).getPositions(asNumpy=True)

@@ -189,8 +189,8 @@ class RunDirectory:
             ) from None
         if configuration != self._digest_of_configuration():
             raise InputError(
-                f"{self.configuration} has been changed since the run was started: put back what it was, or start a new "
-                "run in another directory."
+                f"{self.configuration} has been changed since the run was started: put back what it was, or start a "
+                "new run in another directory."
             )
         return checkpoint
 

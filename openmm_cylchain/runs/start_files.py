@@ -83,8 +83,8 @@ def read_start(folder, place, name, topology, frame, numbers, type_name):
     for number, (nodes, _) in enumerate(chains):
         if nodes.ndim != 2 or nodes.shape[1] != 3 or len(nodes) < 2 or not np.all(np.isfinite(nodes)):
             raise place.error(
-                f"{name!r}: filament {number} has the shape {nodes.shape}; it must be two nodes or more of three finite "
-                "coordinates."
+                f"{name!r}: filament {number} has the shape {nodes.shape}; it must be two nodes or more of three "
+                "finite coordinates."
             )
     if not chains:
         raise place.error(f"{name!r} has no filaments.")

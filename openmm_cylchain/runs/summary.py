@@ -152,9 +152,10 @@ def group_labels(configuration):
 def is_in_equilibrium(group):
     """Whether the exact averages of the free chain hold for a group from its first frame on.
 
-    One clamped node leaves lengths and angles alone; several hold the chain, and linkers pull at it.
+    One clamped node, or one tether, leaves lengths and angles alone; several hold the chain, and linkers pull at it.
     """
-    return group.start == "equilibrium" and len(group.clamped) <= 1 and not group.linked
+    free = not (group.disturbed or group.planar or group.closed)
+    return free and group.start == "equilibrium" and len(group.clamped) <= 1
 
 
 def summarise(configuration, trajectory):
@@ -245,7 +246,9 @@ def _series(group, temperature, trajectory, members):
     kT = thermal_energy(temperature)
     kind = group.type
     if isinstance(kind, BeadSpringType):
-        yield from _series_of_beads(kind, group.segments, temperature, trajectory, members)
+        # Nothing is known of rings of beads.
+        if not group.closed:
+            yield from _series_of_beads(kind, group.segments, temperature, trajectory, members)
         return
     lengths = np.stack(segment_lengths(trajectory, members), axis=1)
     distribution = SegmentLengthDistribution(kind, temperature)
@@ -256,7 +259,7 @@ def _series(group, temperature, trajectory, members):
         theory.stretching_energy_mean(kind, temperature) / kT,
     )
     yield "segment length", "nm", lengths.mean(axis=2), float(distribution.mean(lambda length: length))
-    if group.segments > 1:
+    if group.joints:
         cosines = np.stack(joint_cosines(trajectory, members), axis=1)
         if kind.bending_rigidity > 0:
             yield (
@@ -266,7 +269,8 @@ def _series(group, temperature, trajectory, members):
                 theory.bending_energy_mean(kind, temperature) / kT,
             )
         yield "cosine of joint angle", "", cosines.mean(axis=2), theory.mean_joint_cosine(kind, temperature)
-    yield from _end_to_end(kind, group.segments, temperature, trajectory, members)
+    if not group.closed:
+        yield from _end_to_end(kind, group.segments, temperature, trajectory, members)
 
 
 def _series_of_beads(kind, bonds, temperature, trajectory, members):
@@ -315,7 +319,7 @@ def _mean_with_error(series):
 
 def _persistence_length(group, temperature, trajectory, members, comparable):
     # In chains of beads, mean cosines depend on the place along the chain.
-    if group.segments < 2 or group.type.bending_rigidity == 0 or isinstance(group.type, BeadSpringType):
+    if group.closed or group.segments < 2 or group.type.bending_rigidity == 0 or isinstance(group.type, BeadSpringType):
         return []
     try:
         with warnings.catch_warnings():
@@ -352,7 +356,7 @@ def _notes(configuration, group, members, trajectory, short):
             "Started straight, not in equilibrium: the averages contain the relaxation, so they are not compared "
             "with equilibrium."
         )
-    bends = group.segments > 1 and trajectory.n_frames >= FEWEST_FRAMES_OF_DRIFT
+    bends = group.segments > 1 and not group.closed and trajectory.n_frames >= FEWEST_FRAMES_OF_DRIFT
     drift = bending_drift(trajectory, members) if bends else 0.0
     if abs(drift) > SIGNIFICANT_DRIFT:
         yield (
@@ -362,8 +366,14 @@ def _notes(configuration, group, members, trajectory, short):
         )
     if len(group.clamped) > 1:
         yield "Several nodes are clamped: the exact values are those of free chains, so they are not compared."
-    if group.linked:
-        yield "Linkers bind to these filaments: the exact values are those of free chains, so they are not compared."
+    if group.disturbed:
+        reasons = "; ".join(_DISTURBANCES[name] for name in group.disturbed)
+        yield f"{reasons[0].upper()}{reasons[1:]}: the exact values are those of free chains, so they are not compared."
+    if group.closed or group.planar:
+        what = "rings" if group.closed else "planar"
+        yield f"They are {what}: the exact values are those of open chains in space, so they are not compared."
+    if group.start == "file":
+        yield "Started from a file: whether that is equilibrium is not known, so nothing is compared with it."
     if group.count >= _ENOUGH_FILAMENTS:
         yield (
             f"Errors: standard error of the time averages of {group.count} independent filaments, which holds "
@@ -410,6 +420,17 @@ def write_summary(configuration, directory, groups, linkers=()):
     }
     write_atomically(directory.summary, (json.dumps(content, indent=2, allow_nan=False) + "\n").encode())
 
+
+_DISTURBANCES = {
+    "linkers": "linkers bind to these filaments",
+    "links": "links join them",
+    "contacts": "contacts keep them apart",
+    "walls": "walls confine them",
+    "forces": "constant forces pull at them",
+    "tethers": "tethers hold them in several places",
+    "flow": "the solvent flows",
+    "propulsion": "they propel themselves",
+}
 
 _EXPLANATIONS = {
     "agrees": f"agrees: within {_AGREEMENT_SIGMA:g} standard errors.",

@@ -3,6 +3,7 @@
 import io
 
 import numpy as np
+from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from scipy.integrate import trapezoid
@@ -31,6 +32,13 @@ def write_figure(configuration, directory, trajectory):
     trajectory : mdtraj.Trajectory
         See ``summary.load_trajectory``.
     """
+    # Titles and names are of users: "$" is no mathematics in them.
+    with rc_context({"text.parse_math": False}):
+        image = _draw(configuration, directory, trajectory)
+    write_atomically(directory.figure, image)
+
+
+def _draw(configuration, directory, trajectory):
     rows = 3 if configuration.linkers else 2
     figure = Figure(figsize=(12, 4.75 * rows), layout="constrained")
     FigureCanvasAgg(figure)
@@ -48,7 +56,7 @@ def write_figure(configuration, directory, trajectory):
     _draw_conformations(axes[0, 0], groups, trajectory)
     _draw_energies(axes[0, 1], groups, temperature, read_energies(directory.energies))
     _draw_tangent_correlation(axes[1, 0], groups, temperature, trajectory)
-    if any(group.segments > 1 for group, *_ in groups):
+    if any(group.joints for group, *_ in groups):
         _draw_joint_angles(axes[1, 1], groups, temperature, trajectory)
     else:
         _draw_segment_lengths(axes[1, 1], groups, temperature, trajectory)
@@ -64,7 +72,7 @@ def write_figure(configuration, directory, trajectory):
         axis.tick_params(labelsize=_FONT_SIZE - 1)
     image = io.BytesIO()
     figure.savefig(image, format="png", dpi=130)
-    write_atomically(directory.figure, image.getvalue())
+    return image.getvalue()
 
 
 def _legend(axis, **options):
@@ -203,15 +211,16 @@ def _draw_energies(axis, groups, temperature, energies):
     time = energies["time (ps)"] / length
     kinds = [group for group, *_ in groups]
     segments = np.array([group.count * group.segments for group in kinds])
-    joints = np.array([group.count * (group.segments - 1) for group in kinds])
+    joints = np.array([group.count * group.joints for group in kinds])
     stretching, bending = np.array([mean_energies(group, temperature) for group in kinds]).T / kT
     curves = [("stretching", "segment", np.average(stretching, weights=segments), _STRETCHING_COLOUR)]
     if np.any(joints * bending):
         curves.append(("bending", "joint", np.average(bending, weights=joints), _BENDING_COLOUR))
+    free = "exact" if all(map(is_in_equilibrium, kinds)) else "free chains"
     for label, per, exact, colour in curves:
         values = energies[f"{label} energy per {per} (kT)"]
         axis.plot(time, values, color=colour, linewidth=1.0, alpha=0.8, label=f"{label}, per {per}")
-        axis.axhline(exact, color=colour, linewidth=1.8, linestyle="--", label=f"exact in equilibrium: {exact:.4g}")
+        axis.axhline(exact, color=colour, linewidth=1.8, linestyle="--", label=f"{free} in equilibrium: {exact:.4g}")
     axis.set_xlim(time[0], time[-1])
     bottom, top = axis.get_ylim()
     axis.set_ylim(min(0.0, bottom), top + 0.28 * (top - min(0.0, bottom)))
@@ -223,12 +232,12 @@ def _draw_energies(axis, groups, temperature, energies):
 
 def _draw_tangent_correlation(axis, groups, temperature, trajectory):
     axis.set_title("Correlation of tangents along a filament")
-    drawn = [entry for entry in groups if entry[0].segments > 1]
+    drawn = [entry for entry in groups if entry[0].segments > 1 and not entry[0].closed]
     unit, scale = _length_unit(max(group.segments * group.type.segment_length for group, *_ in groups))
     axis.set_xlabel(f"distance s along the filament ({unit})")
     axis.set_ylabel("⟨t(0)·t(s)⟩")
     if not drawn:
-        axis.text(0.5, 0.5, "single segments", transform=axis.transAxes, ha="center", fontsize=_FONT_SIZE)
+        axis.text(0.5, 0.5, "single segments or rings", transform=axis.transAxes, ha="center", fontsize=_FONT_SIZE)
         return
     for group, members, label, colour in drawn:
         correlation = tangent_correlation(trajectory, members)
@@ -271,7 +280,7 @@ def _format_length(length):
 def _draw_joint_angles(axis, groups, temperature, trajectory):
     kT = thermal_energy(temperature)
     for group, members, label, colour in groups:
-        if group.segments < 2:
+        if not group.joints:
             continue
         cosines = np.clip(np.concatenate([c.ravel() for c in joint_cosines(trajectory, members)]), -1.0, 1.0)
         angles = np.degrees(np.arccos(cosines))

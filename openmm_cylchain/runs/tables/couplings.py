@@ -8,7 +8,6 @@ from ..keys import (
     Choice,
     Either,
     Flag,
-    Inline,
     Key,
     Listing,
     Number,

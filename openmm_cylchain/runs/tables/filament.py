@@ -9,7 +9,7 @@ from ...filaments.chain_type import ChainType
 from ...filaments.placement import clamped_nodes
 from ...filaments.shapes import MINIMUM_RING
 from ...units import quantities as units
-from ..keys import REQUIRED, Choice, Either, Flag, Inline, Key, Listing, Quantity, Text, Whole, direction, point
+from ..keys import Choice, Either, Flag, Inline, Key, Listing, Quantity, Text, Whole, direction, point
 from ..start_files import read_start
 from ..table import TableKind
 from .filament_types import TYPE_KEYS, read_filament_type
@@ -205,8 +205,8 @@ def _count(entries, region, box):
     count = round(entries["concentration"] * volume)
     if not 1 <= count <= MOST_NODES:
         raise entries.at("concentration").error(
-            f"makes {count} filaments in a volume of {1e-9 * volume:.4g} um^3: choose it so that there are some, and no "
-            f"more than {MOST_NODES}."
+            f"makes {count} filaments in a volume of {1e-9 * volume:.4g} um^3: choose it so that there are some, and "
+            f"no more than {MOST_NODES}."
         )
     return count
 

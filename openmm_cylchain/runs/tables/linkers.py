@@ -58,8 +58,8 @@ class _Anchors:
             return _ANCHOR_REGION.read(value, place)
         if not isinstance(value, list) or not value:
             raise place.error(
-                f"must be a list of points, as in {self.example}, or of numbers of nodes, as in [0, 64], or a region, as "
-                "in { count = 1000, lower = [...], upper = [...] }"
+                f"must be a list of points, as in {self.example}, or of numbers of nodes, as in [0, 64], or a region, "
+                "as in { count = 1000, lower = [...], upper = [...] }"
             )
         if all(isinstance(own, int) and not isinstance(own, bool) for own in value):
             return tuple(value)

@@ -29,8 +29,8 @@ PARTICLES = TableKind(
         Key("diffusion", Quantity(units.DIFFUSION), None, "In place of that: k_B T over the friction."),
         Key("fixed", Flag(), False, "They do not move."),
     ),
-    "Spheres that diffuse, beside filaments. Filaments push them where there are [contacts], walls keep them in; they do "
-    "not push each other.",
+    "Spheres that diffuse, beside filaments. Filaments push them where there are [contacts], walls keep them in; they "
+    "do not push each other.",
     repeated=True,
 )
 
