@@ -251,8 +251,17 @@ def _disturbed(configuration):
             "propulsion": group.propulsion != 0.0,
         }
         disturbed = tuple(name for name, there in reasons.items() if there)
-        groups.append(dataclasses.replace(group, disturbed=disturbed))
+        tension = _tension_of(numbers, configuration.pulls) if disturbed == ("forces",) else None
+        groups.append(dataclasses.replace(group, disturbed=disturbed, tension=tension))
     return tuple(groups)
+
+
+def _tension_of(numbers, pulls):
+    # That of all filaments of a group, if it is the only force on them.
+    found = [pull for pull in pulls if numbers & set(pull.filaments)]
+    if len(found) > 1 or found[0].tension is None or not numbers <= set(found[0].filaments):
+        return None
+    return found[0].tension, found[0].direction
 
 
 def changed_keys(first, second):

@@ -1,26 +1,26 @@
 """The page about configurations in ``docs``, from the same lists of keys that read them.
 
-    python -m openmm_cylchain.runs.reference > docs/configuration.md
+python -m openmm_cylchain.runs.reference > docs/configuration.md
 """
 
 from .configuration import TABLES
-from .keys import REQUIRED, Inline, Pair
+from .keys import REQUIRED, Choice, Inline, Pair
 from .table import TableKind
 
 _INTRODUCTION = """# The file of a run
 
-Every key of the TOML file that `openmm-cylchain run` reads; [the guide](guide.md#runs-from-a-file) says how to begin one.
+Every key of the TOML file that `openmm-cylchain run` reads; [the guide](guide.md#runs-from-a-file) says how to begin.
 This page is made from the list of keys that reads the file, and so is the schema that `openmm-cylchain schema` prints.
 
 Quantities are texts with a number and a unit: `"360 nm"`, `"0.1 pN/nm"`, `"1.71 mPa*s"`. Points are lists of three
-lengths, directions lists of three numbers. `[table]` is written once, `[[table]]` any number of times. At the top, before
-all tables, there may be a `title`.
+lengths, directions lists of three numbers. `[table]` is written once, `[[table]]` any number of times. At the top,
+before all tables, there may be a `title`.
 """
 
 _FILES = """
-`file` is an array of positions in nm, `.npy` of the shape (filaments, nodes, 3) or (nodes, 3), or `.npz` with several of
-them; or `.cif`, a structure that a run or `app.PDBxFile` has written; or a trajectory, `.dcd`, with its `topology` and a
-`frame`. It is looked for beside the configuration; a run keeps a copy in its directory.
+`file` is an array of positions in nm, `.npy` of the shape (filaments, nodes, 3) or (nodes, 3), or `.npz` with several
+of them; or `.cif`, a structure that a run or `app.PDBxFile` has written; or a trajectory, `.dcd`, with its `topology`
+and a `frame`. It is looked for beside the configuration; a run keeps a copy in its directory.
 """
 
 
@@ -48,6 +48,8 @@ def _section(kind, level, title):
 
 def _value(key):
     text = key.kind.text
+    if isinstance(key.kind, Choice):
+        return text
     return f"{text}: `{key.kind.example}`" if "..." not in key.kind.example and '"' + "'" not in text else text
 
 

@@ -152,7 +152,7 @@ class RunDirectory:
             "linker_records": checkpoint.linker_records,
             "state_size": len(checkpoint.state),
         }
-        header["digest"] = _digest(header, checkpoint.state)
+        header["digest"] = digest_of_checkpoint(header, checkpoint.state)
         write_atomically(self.checkpoint, json.dumps(header).encode() + b"\n" + checkpoint.state)
 
     def _digest_of_configuration(self):
@@ -167,7 +167,7 @@ class RunDirectory:
             if header["format"] != _MAGIC:
                 raise ValueError
             self._check_version(header["version"])
-            if header.pop("digest") != _digest(header, state):
+            if header.pop("digest") != digest_of_checkpoint(header, state):
                 raise ValueError
             configuration = header["configuration"]
             checkpoint = Checkpoint(
@@ -202,8 +202,8 @@ class RunDirectory:
             )
 
 
-def _digest(header, state):
-    # Of all that a checkpoint says.
+def digest_of_checkpoint(header, state):
+    """SHA-256 of all that a checkpoint says: of its header, a dict, and of OpenMM's checkpoint, in bytes."""
     return hashlib.sha256(json.dumps(header, sort_keys=True).encode() + b"\n" + state).hexdigest()
 
 

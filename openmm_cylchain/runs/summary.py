@@ -34,6 +34,7 @@ from .configuration import linker_labels
 from .run_directory import read_linkers
 
 _WORMLIKE = "the same, theory of the wormlike chain (25)"
+_EXTENSION = "extension along the tension, second half of the run"
 _ENOUGH_FILAMENTS = 8
 _AGREEMENT_SIGMA = 3.0
 _AGREEMENT_FRACTION = 0.05
@@ -222,13 +223,19 @@ def _summarise_linkers(name, table):
 def _summarise_group(configuration, group, members, label, trajectory):
     observables, short = [], []
     comparable = is_in_equilibrium(group)
-    for name, unit, series, exact in _series(group, configuration.solvent.temperature, trajectory, members):
+    temperature = configuration.solvent.temperature
+    for name, unit, series, exact in _series(group, temperature, trajectory, members):
         value, error = _mean_with_error(series)
         slow = len(members) < _ENOUGH_FILAMENTS and statistical_inefficiency(series) > len(series) / 10
         if slow and name != _WORMLIKE:
             short.append(name)
         observables.append(_compared(name, unit, value, error, exact, comparable))
-    observables += _persistence_length(group, configuration.solvent.temperature, trajectory, members, comparable)
+    if has_exact_extension(group):
+        series = extensions(group, trajectory, members)
+        value, error = _mean_with_error(series)
+        exact = float(theory.chain_extension(group.type, group.segments, group.tension[0], temperature))
+        observables.append(_compared(_EXTENSION, "nm", value, error, exact, True))
+    observables += _persistence_length(group, temperature, trajectory, members, comparable)
     return GroupSummary(
         label=label,
         type=group.type.name,
@@ -239,6 +246,18 @@ def _summarise_group(configuration, group, members, label, trajectory):
         observables=tuple(observables),
         notes=tuple(_notes(configuration, group, members, trajectory, short)),
     )
+
+
+def has_exact_extension(group):
+    """Whether the exact extension of a group under its tension is known."""
+    plain = not (group.closed or group.planar or group.clamped or isinstance(group.type, BeadSpringType))
+    return plain and group.tension is not None and group.tension[0] >= 0.0
+
+
+def extensions(group, trajectory, members):
+    """Extensions R.e along the tension of a group in nm, in the second half of a run: (frames, filaments)."""
+    direction = np.array(group.tension[1]) / np.linalg.norm(group.tension[1])
+    return end_to_end_vectors(trajectory[trajectory.n_frames // 2 :], members) @ direction
 
 
 def _series(group, temperature, trajectory, members):

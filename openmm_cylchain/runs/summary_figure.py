@@ -9,13 +9,22 @@ from matplotlib.figure import Figure
 from scipy.integrate import trapezoid
 
 from .. import theory
+from ..analysis.statistics import mean_with_error
 from ..analysis.trajectories import joint_cosines, node_positions, segment_lengths, tangent_correlation
 from ..output.files import write_atomically
 from ..units.quantities import thermal_energy
 from ..units.text import time_unit
 from .configuration import linker_labels
 from .run_directory import read_energies, read_linkers
-from .summary import PICONEWTON, group_labels, group_members, is_in_equilibrium, mean_energies
+from .summary import (
+    PICONEWTON,
+    extensions,
+    group_labels,
+    group_members,
+    has_exact_extension,
+    is_in_equilibrium,
+    mean_energies,
+)
 
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
 _STRETCHING_COLOUR, _BENDING_COLOUR = "#D55E00", "#0072B2"
@@ -56,7 +65,9 @@ def _draw(configuration, directory, trajectory):
     _draw_conformations(axes[0, 0], groups, trajectory)
     _draw_energies(axes[0, 1], groups, temperature, read_energies(directory.energies))
     _draw_tangent_correlation(axes[1, 0], groups, temperature, trajectory)
-    if any(group.joints for group, *_ in groups):
+    if any(has_exact_extension(group) for group, *_ in groups):
+        _draw_extensions(axes[1, 1], groups, temperature, trajectory)
+    elif any(group.joints for group, *_ in groups):
         _draw_joint_angles(axes[1, 1], groups, temperature, trajectory)
     else:
         _draw_segment_lengths(axes[1, 1], groups, temperature, trajectory)
@@ -310,6 +321,27 @@ def _draw_joint_angles(axis, groups, temperature, trajectory):
     axis.set_ylabel("probability density (1/degree)")
     axis.set_title("Joint angles")
     _legend(axis, loc="upper right")
+
+
+def _draw_extensions(axis, groups, temperature, trajectory):
+    # Against the tension, in units of the length at rest; a curve for each kind of filament.
+    axis.set_title("Extension along the tension, second half of the run")
+    axis.set_xlabel("tension (pN)")
+    axis.set_ylabel("extension / length at rest")
+    kinds = {}
+    for group, members, label, colour in groups:
+        if has_exact_extension(group):
+            kinds.setdefault((group.type, group.segments), []).append(group.tension[0])
+            length = group.segments * group.type.segment_length
+            value, error = mean_with_error(extensions(group, trajectory, members) / length)
+            force = group.tension[0] / PICONEWTON
+            axis.errorbar(force, value, error, fmt="o", color=colour, capsize=2.5, label=label)
+    for (kind, segments), tensions in kinds.items():
+        force = np.linspace(0.0, max(tensions), 40)
+        exact = theory.chain_extension(kind, segments, force, temperature) / (segments * kind.segment_length)
+        axis.plot(force / PICONEWTON, exact, color="0.4", linestyle="--", linewidth=1.8, label=f"exact, {kind.name}")
+    axis.set_xlim(left=0.0)
+    _legend(axis, loc="best")
 
 
 def _draw_segment_lengths(axis, groups, temperature, trajectory):

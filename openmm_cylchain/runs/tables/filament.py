@@ -84,7 +84,8 @@ class FilamentGroup:
     """Filaments of one [[filament]] table that have as many segments; lengths in nm.
 
     ``table`` is the number of the table, from 1; ``disturbed`` what makes them no free chains, in words: links, walls
-    and so on. ``positions`` are those of a file, for each filament.
+    and so on; ``tension`` that of their ends in kJ/(mol nm), with its direction, if nothing else is. ``positions`` are
+    those of a file, for each filament.
     """
 
     type: ChainType
@@ -103,6 +104,7 @@ class FilamentGroup:
     propulsion: float = 0.0
     table: int = 1
     disturbed: tuple = ()
+    tension: tuple | None = None
     positions: tuple | None = dataclasses.field(default=None, compare=False, repr=False)
 
     @property

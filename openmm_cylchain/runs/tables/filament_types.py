@@ -5,6 +5,7 @@ import dataclasses
 from ...bead_spring.bead_spring_type import DSDNA_BASE_PAIRS, BeadSpringType
 from ...filaments.filament_type import DSDNA, F_ACTIN, MICROTUBULE, FilamentType
 from ...mechanics.friction import EndCorrections
+from ...mechanics.potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
 from ...units import quantities as units
 from ..keys import Choice, Inline, Key, Number, Quantity, Text, Whole, WordOrQuantity
 from ..table import TableKind
@@ -49,8 +50,8 @@ _SHARED_KEYS = ("name", "diameter", "bending_rigidity", "persistence_length", "t
 TYPE_KEYS = (
     Key("type", Choice(tuple(PRESETS)), None, "A preset, of which any property can be changed by the keys below."),
     Key("name", Text('"DNA"'), None, "Of a type of one's own: up to 5 letters or digits."),
-    Key("bending_model", Text('"quadratic"'), None, "See `FilamentType`."),
-    Key("stretching_model", Text('"fene"'), None, "See `FilamentType`."),
+    Key("bending_model", Choice(tuple(BENDING_POTENTIALS)), None, "See `FilamentType`."),
+    Key("stretching_model", Choice(tuple(STRETCHING_POTENTIALS)), None, "See `FilamentType`."),
     *(
         Key(name, Quantity(unit, "zero" if name == "bending_rigidity" else "positive"), None, text)
         for name, (unit, text) in _QUANTITIES.items()

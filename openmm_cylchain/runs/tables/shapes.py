@@ -36,7 +36,7 @@ REGION = TableKind(
     "inside",
     (
         Key("shape", Choice(_BOUNDED), REQUIRED, "Of the region."),
-        *_KEYS,
+        *(key for key in _KEYS if key.name not in ("normal", "thickness")),
         Key("length", Quantity(units.LENGTH), None, "Of a cylinder, half of it on either side of its point."),
     ),
     "A region in which filaments or particles begin.",
