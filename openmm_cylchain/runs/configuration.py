@@ -57,7 +57,8 @@ class Configuration:
     """Everything that a run needs.
 
     ``text`` is the file that it was read from, ``box`` the edges of a box in nm, ``tables`` what was read from each
-    table by its name, ``start_files`` the paths of files that filaments start from, and ``lines`` where entries stand.
+    table by its name, ``start_files`` the digests of files that filaments start from by their paths, ``lines`` where
+    entries stand.
     """
 
     title: str
@@ -75,7 +76,7 @@ class Configuration:
     pulls: tuple = ()
     links: tuple = ()
     tables: dict = dataclasses.field(default_factory=dict, compare=False, repr=False)
-    start_files: tuple = dataclasses.field(default=(), compare=False)
+    start_files: dict = dataclasses.field(default_factory=dict, compare=False)
     lines: dict = dataclasses.field(default_factory=dict, compare=False, repr=False)
 
 
@@ -153,7 +154,7 @@ def _configuration(raw, text, folder, lines):
         tuple(read_pull(own, groups) for own in tables["pull"]),
         tuple(read_link(own, groups) for own in tables["link"]),
         tables,
-        tuple(_start_files(tables["filament"], folder)),
+        dict(_start_files(tables["filament"], folder)),
         lines,
     )
     _check_engine(settings, configuration)
@@ -211,7 +212,8 @@ def _start_files(tables, folder):
     for entries in tables:
         for name in ("file", "topology"):
             if name in entries:
-                yield find_start_file(folder, entries[name])
+                path = find_start_file(folder, entries[name])
+                yield path, digest_of(path)
 
 
 def _check_engine(settings, configuration):
@@ -274,7 +276,7 @@ def changed_keys(first, second):
             continue
         for before, after in zip(one, other):
             names += [f"{before.label} {key}" for key in kind.names if before.values[key] != after.values[key]]
-    if [digest_of(path) for path in first.start_files] != [digest_of(path) for path in second.start_files]:
+    if list(first.start_files.values()) != list(second.start_files.values()):
         names.append("the content of a file to start from")
     return names
 

@@ -105,7 +105,7 @@ class RunDirectory:
 
     def _keep_start_files(self, paths):
         # The configuration is read again from here, and must find them whatever becomes of the originals.
-        names = [path.name for path in dict.fromkeys(paths)]
+        names = [path.name for path in paths]
         if len(set(names)) < len(names):
             raise InputError(
                 f"Files to start from must have different names, because the run keeps copies, but are {names}."

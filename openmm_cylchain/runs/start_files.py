@@ -7,6 +7,7 @@ import mdtraj
 import numpy as np
 
 from ..analysis.trajectories import filament_nodes, ring_filaments
+from .silence import silenced_c_library
 
 COPIES = "start_files"
 """A folder beside a configuration that has copies of the files that it starts from: a run keeps them there."""
@@ -68,7 +69,8 @@ def read_start(folder, place, name, topology, frame, numbers, type_name):
         if suffix in _ARRAYS:
             chains, names = _arrays(path), None
         else:
-            chains, names = _structure(path, None if topology is None else find_start_file(folder, topology), frame)
+            with silenced_c_library():
+                chains, names = _structure(path, None if topology is None else find_start_file(folder, topology), frame)
     except Exception as error:  # Readers of damaged files raise whatever comes.
         raise place.error(f"{name!r} cannot be read: {error}") from None
     if numbers is not None:

@@ -1,11 +1,7 @@
 """The summary of a run: observables of its trajectory against theory, as JSON, a table and a figure."""
 
-import contextlib
-import ctypes
 import json
 import math
-import os
-import sys
 import warnings
 from dataclasses import asdict, dataclass
 
@@ -32,6 +28,7 @@ from ..units.text import format_time
 from ..version import __version__
 from .configuration import linker_labels
 from .run_directory import read_linkers
+from .silence import silenced_c_library
 
 _WORMLIKE = "the same, theory of the wormlike chain (25)"
 _EXTENSION = "extension along the tension, second half of the run"
@@ -108,29 +105,11 @@ PICONEWTON = 1e-15 * AVOGADRO * 1e-9
 def load_trajectory(configuration, directory):
     """The trajectory of a run as an mdtraj.Trajectory with its times in ps."""
     topology = mdtraj.load_topology(str(directory.topology))
-    with _silenced_c_library():
+    with silenced_c_library():
         trajectory = mdtraj.load_dcd(str(directory.trajectory), top=topology)
     settings = configuration.simulation
     trajectory.time = np.arange(trajectory.n_frames) * settings.steps_per_report * settings.time_step
     return trajectory
-
-
-@contextlib.contextmanager
-def _silenced_c_library():
-    # mdtraj's reader of DCD files prints two lines about the format from C.
-    if os.name != "posix":
-        yield
-        return
-    sys.stdout.flush()
-    standard_output, nowhere = os.dup(1), os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 1)
-    try:
-        yield
-    finally:
-        ctypes.CDLL(None).fflush(None)
-        os.dup2(standard_output, 1)
-        os.close(standard_output)
-        os.close(nowhere)
 
 
 def group_members(configuration):
