@@ -37,7 +37,7 @@ _RANGES = {
     units.NUMBER_DENSITY: (1e-27, 1e6),
 }
 
-_UNSIGNED = r"\+?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*[^\s\d.].*"
+_UNSIGNED = r"\+?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*(\s1\s*/|[(°A-Za-zµμÅ]).*"
 
 
 class ConfigurationError(InputError):

@@ -48,6 +48,8 @@ _EXAMPLES = {
 
 _NUMBER = r"[-+]?(?:(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?|nan|inf)"
 _NUMBER_AND_UNIT = re.compile(rf"\s*({_NUMBER})\s*(.*?)\s*", re.IGNORECASE)
+# Units begin with a letter, or with "1/": pint would skip what comes before, as in "3,1 K" and "3 1 K".
+_UNIT = re.compile(r"\(*(?:1\s*/\s*\(*)?[^\W\d_°]|°")
 
 
 def example(target: unit.Unit) -> str:
@@ -90,7 +92,7 @@ def parse_quantity(text: str, target: unit.Unit, name: str) -> float:
         raise InputError(f"{name} must be a text with a number and a unit, {written}, but is {text!r}.")
     # pint alone would read "1,71 nm" as 171 nm and "nm" as 1 nm.
     match = _NUMBER_AND_UNIT.fullmatch(text)
-    if match is None:
+    if match is None or not text.isprintable():
         raise InputError(f"{name} must be a number and a unit, {written}, but is {text!r}.")
     number, unit = float(match[1]), match[2]
     if number - number != 0:
@@ -104,6 +106,8 @@ def _parse_unit(unit, target, name):
     import pint
 
     try:
+        if _UNIT.match(unit) is None:
+            raise ValueError
         return _registry().parse_units(unit)
     except pint.UndefinedUnitError as error:
         reason = str(error).replace(" in the unit registry", "")
