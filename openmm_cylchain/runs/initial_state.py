@@ -21,8 +21,8 @@ from ..systems.filaments import Filaments
 from ..theory import chain_mean_square_end_to_end
 from .keys import ConfigurationError
 
-_ATTEMPTS = 2000
-"""To place a filament within a region."""
+_ATTEMPTS, _NODES_OF_ATTEMPTS = 2000, 10**5
+"""To place a filament within a region: how often, and how many nodes may be drawn for it if it is long."""
 
 
 @dataclass(frozen=True)
@@ -193,17 +193,25 @@ def _flat(group, nodes, height=None):
 
 
 def _inside(group, temperature, seed, number, places):
-    for attempt in range(_ATTEMPTS):
+    attempts = _attempts(group)
+    for attempt in range(attempts):
         nodes = _shape(group, temperature, seed, number, places, attempt)
         nodes = _flat(group, nodes + group.inside.draw(places) - nodes.mean(axis=0), group.height)
         if group.inside.contains(nodes):
             return nodes
     raise ConfigurationError(
         f"[[filament]] number {group.table}: filament {number} of {group.segments} segments does not fit into its "
-        f"region: none of {_ATTEMPTS} random places has all of its nodes inside. Take shorter filaments or a "
+        f"region: none of {attempts} random places has all of its nodes inside. Take shorter filaments or a "
         "larger region.",
         ("filament", group.table - 1, "inside"),
     )
+
+
+def _attempts(group):
+    # One for a straight filament that fits nowhere.
+    if group.start == "straight" and group.segments * group.type.segment_length > group.inside.diameter:
+        return 1
+    return max(20, min(_ATTEMPTS, _NODES_OF_ATTEMPTS // group.nodes))
 
 
 def _shape(group, temperature, seed, number, places, attempt=0):

@@ -142,6 +142,11 @@ def test_anchors(anchors, expected):
         ('name = "motor"', 'nome = "motor"', ["[[linkers]] number 2: has an unknown key 'nome'", "'name'"]),
         ('"60 nm"', '"60 pN"', ["[[linkers]] number 2: hand reach has the unit", '"360 nm"']),
         ('"60 nm"', '"0 nm"', ["line 21: [[linkers]] number 2: hand reach must be positive"]),
+        (
+            '"60 nm"',
+            '"0.09 nm"',
+            ["number 2: The reach of a hand, 0.09 nm, must be at least a thousandth of a segment"],
+        ),
         ('reach = "60 nm", ', "", ["number 2: hand lacks the key 'reach': add a line such as reach ="]),
         ('"1e5 1/s"', '"200"', ["hand binding_rate needs a unit", '"10 1/s"']),
         ('"-0.5 um/s"', '"-0.5 um"', ["hand speed has the unit", '"0.5 um/s"']),

@@ -86,6 +86,8 @@ HAND = TableKind(
     "A hand, see `Hand`.",
     owner="the hand of [[linkers]]",
 )
+# Of a segment: the search for hands that bind cuts it into pieces of their reach.
+_LEAST_REACH = 1e-3
 _HAND_EXAMPLE = '{ binding_rate = "10 1/s", reach = "50 nm", unbinding_rate = "0.3 1/s" }'
 
 _ANCHOR_REGION = TableKind(
@@ -148,6 +150,12 @@ def read_linkers(entries, groups, box, seed):
             raise entries.error(
                 f"The reach of a hand, {hand.reach:g} nm, must be less than half of the shortest edge of "
                 f"the box, {min(box):g} nm."
+            )
+        longest = max((own.type.segment_length for own in groups if hand.binds(own.type)), default=0.0)
+        if hand.reach < _LEAST_REACH * longest:
+            raise entries.error(
+                f"The reach of a hand, {hand.reach:g} nm, must be at least a thousandth of a segment, "
+                f"{_LEAST_REACH * longest:g} nm."
             )
         if not any(hand.binds(own.type) for own in groups):
             raise entries.error(

@@ -90,6 +90,11 @@ class Region:
             return 4.0 / 3.0 * np.pi * float(np.prod(shape.semi_axes))
         return float(np.prod(self._upper - self._lower))
 
+    @property
+    def diameter(self):
+        """Of the box around it in nm: no two points of it are further apart."""
+        return float(np.linalg.norm(self._upper - self._lower))
+
     def _bounds(self):
         shape = self._shape
         if isinstance(shape, Box):
