@@ -61,7 +61,7 @@ def main(arguments=None):
 
 
 def _resumable(options):
-    return options.command is _run
+    return options.command is _run and options.output is not None and Path(options.output).is_dir()
 
 
 def _say(kind, message):

@@ -59,6 +59,8 @@ class RunDirectory:
         self.checkpoint = self.path / "checkpoint.chk"
         self.summary = self.path / "summary.json"
         self.figure = self.path / "summary.png"
+        # As it was when the directory was claimed.
+        self._configuration_digest = None
 
     def __enter__(self):
         if self.path.exists() and not self.path.is_dir():
@@ -97,10 +99,12 @@ class RunDirectory:
         """
         if resume and self.configuration.exists():
             self._check_same(configuration)
+            self._configuration_digest = self._digest_of_configuration()
             return self._read_checkpoint()
         self._check_vacant(configuration, resume)
         self._keep_start_files(configuration.start_files)
         write_atomically(self.configuration, configuration.text.encode())
+        self._configuration_digest = self._digest_of_configuration()
         return None
 
     def _keep_start_files(self, paths):
@@ -141,7 +145,7 @@ class RunDirectory:
         """Replace the checkpoint; the trajectory and the energies must be on disk already."""
         header = {
             "format": _MAGIC,
-            "configuration": self._digest_of_configuration(),
+            "configuration": self._configuration_digest,
             "version": __version__,
             "step": checkpoint.step,
             "engine": checkpoint.engine,
@@ -187,7 +191,7 @@ class RunDirectory:
                 f"{self.checkpoint} is damaged or of another version: the run cannot be resumed. Delete it to start "
                 "from the beginning with --resume."
             ) from None
-        if configuration != self._digest_of_configuration():
+        if configuration != self._configuration_digest:
             raise InputError(
                 f"{self.configuration} has been changed since the run was started: put back what it was, or start a "
                 "new run in another directory."

@@ -371,6 +371,35 @@ def test_configuration_of_a_run_that_was_edited_is_refused(tmp_path, unbroken, c
     assert main(["run", configured(tmp_path), "--output", output, "--resume"]) == 0
 
 
+def test_configuration_that_is_edited_while_the_run_goes_on_is_refused(tmp_path, capsys, monkeypatch):
+    output = tmp_path / "out"
+    edited = SHORT.replace("310 K", "311 K")
+    config = configured(tmp_path)
+    step = app.Simulation.step
+
+    def edit(simulation, steps):
+        (output / "configuration.toml").write_text(edited)
+        step(simulation, steps)
+
+    monkeypatch.setattr(app.Simulation, "step", edit)
+    run(read_configuration(config), output)
+    config = configured(tmp_path, edited)
+    assert_refused(["run", config, "--output", str(output), "--resume"], capsys, "configuration.toml has been changed")
+
+
+def test_directory_that_is_removed_cannot_be_resumed(tmp_path, capsys, monkeypatch):
+    output = tmp_path / "out"
+
+    def step(simulation, steps):
+        shutil.rmtree(output)
+
+    monkeypatch.setattr(app.Simulation, "step", step)
+    config = configured(tmp_path, duration='"0.2 us"', checkpoint_interval='"0.2 us"')
+    assert main(["run", config, "--output", str(output)]) == 1
+    errors = capsys.readouterr().err
+    assert "No such file or directory" in errors and "--resume" not in errors
+
+
 def test_title_may_be_anything_on_one_line(tmp_path, capsys):
     short = SHORT.replace('"12 us"', '"0.4 us"').replace('"0.6 us"', '"0.4 us"')
     for number, title in enumerate(("$x^$", r"\frac{", "${x", "a_b^c", "<&>")):
