@@ -125,7 +125,7 @@ def group_labels(configuration):
         for group in configuration.filaments
     ]
     if len(set(labels)) < len(labels):
-        labels = [f"{label} (table {number})" for number, label in enumerate(labels, start=1)]
+        labels = [f"{label} (table {group.table})" for label, group in zip(labels, configuration.filaments)]
     return labels
 
 

@@ -432,6 +432,7 @@ def test_portable_engine_has_walls_links_and_pulls():
         (PULL, 'tension = "2 pN"', 'force = ["1 pN", "0 pN", "0 pN"]', "lacks the key 'node'"),
         (PULL, 'tension = "2 pN"', 'tension = "2 pN"\nnode = 1', "node belongs to a force"),
         (CONTACTS, "15 nm", "-15 nm", "line 10: [contacts] diameter must be positive"),
+        (CONTACTS, "15 nm", "0.1 nm", "line 10: .*diameter is 0.1 nm, but filaments are 6 nm thick"),
         (CONTACTS, "diameter", "diametre", "Did you mean 'diameter'"),
         (PARTICLES, "50 nm", "50 um^2", "diameter has the unit"),
         (PARTICLES, "[[particles]]", '[[particles]]\nname = "NOD"', "'NOD' is that of nodes"),

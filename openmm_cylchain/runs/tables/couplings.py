@@ -56,6 +56,9 @@ WALL = TableKind(
     repeated=True,
 )
 
+# Of the diameter of filaments. Steps would have to be divided again and again to resolve contacts of less.
+_LEAST_DIAMETER = 0.1
+
 _NUMBERS = Either(
     (
         (list, Listing(Whole(0, None, "0"), "numbers of filaments", "[0, 1]")),
@@ -186,8 +189,14 @@ class LinkGroup:
     label: str
 
 
-def read_contacts(entries):
-    """The Contacts of a [contacts] table."""
+def read_contacts(entries, groups):
+    """The Contacts of a [contacts] table, for FilamentGroups."""
+    thinnest = min(group.type.diameter for group in groups)
+    if entries["diameter"] < _LEAST_DIAMETER * thinnest:
+        raise entries.at("diameter").error(
+            f"is {entries['diameter']:g} nm, but filaments are {thinnest:g} nm thick: they touch at their diameter, or "
+            "further apart."
+        )
     return Contacts(**entries.values)
 
 
