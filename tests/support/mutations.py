@@ -93,7 +93,7 @@ def _mutated_line(lines, number, generator):
     if kind == 4 and any(character.isdigit() for character in value):
         digits = [index for index, character in enumerate(value) if character.isdigit()]
         place = digits[generator.integers(len(digits))]
-        new = ("-1", "0", "e99", "9999", ".", "nan", ",")[generator.integers(7)]
+        new = ("-1", "0", "e99", "99", ".", "nan", ",")[generator.integers(7)]
         return [f"{key} = {value[:place]}{new}{value[place + 1 :]}"]
     if kind == 5 and len(value) > 2:
         place = int(generator.integers(len(value)))
