@@ -7,7 +7,6 @@ Exit codes: 0 done, 1 the simulation blew up, a file could not be written or res
 import argparse
 import json
 import math
-import re
 import sys
 import warnings
 from dataclasses import replace
@@ -15,6 +14,7 @@ from pathlib import Path
 
 from .engine_choice import ENGINES
 from .errors import InputError, InstabilityError, TimeStepWarning
+from .runs.beginnings import START_NAMES
 from .version import __version__
 
 _FAILED, _WRONG_INPUT, _WRONG_STEP, _KEYBOARD_INTERRUPT = 1, 2, 3, 130
@@ -61,7 +61,7 @@ def main(arguments=None):
 
 
 def _resumable(options):
-    return options.command is _run
+    return options.command is _run and options.output is not None and Path(options.output).is_dir()
 
 
 def _say(kind, message):
@@ -77,9 +77,13 @@ def _parser():
 
     run = commands.add_parser("run", help="simulate a configuration and compare it with theory")
     run.add_argument("configuration", metavar="CONFIG", help="TOML file that describes filaments, solvent and run")
-    run.add_argument("--output", metavar="DIR", required=True, help="directory for the files of the run")
+    run.add_argument("--output", metavar="DIR", help="directory for the files of the run; needed but for --dry-run")
     run.add_argument("--resume", action="store_true", help="continue the run in DIR from its last checkpoint")
+    run.add_argument(
+        "--dry-run", action="store_true", help="only say what would be built, how long it takes and how large it gets"
+    )
     run.set_defaults(command=_run)
+    _add_beginnings(commands)
 
     timestep = commands.add_parser("timestep", help="print the bounds on the time step and the recommended step")
     timestep.add_argument("configuration", metavar="CONFIG", help="TOML file that describes filaments and solvent")
@@ -100,6 +104,15 @@ def _parser():
     information = commands.add_parser("info", help="print versions, engines and platforms, and why one is missing")
     information.set_defaults(command=_information)
     return parser
+
+
+def _add_beginnings(commands):
+    new = commands.add_parser("new", help="write a commented configuration to begin with")
+    new.add_argument("kind", metavar="KIND", choices=START_NAMES, help=", ".join(START_NAMES))
+    new.add_argument("file", metavar="FILE", nargs="?", help="KIND.toml if not given; never overwritten")
+    new.set_defaults(command=_new)
+    schema = commands.add_parser("schema", help="print the JSON schema of configurations, for editors")
+    schema.set_defaults(command=_schema)
 
 
 def _add_benchmarks(parser):
@@ -161,6 +174,13 @@ def _run(options):
     from .runs.run_directory import RunDirectory
 
     configuration = read_configuration(options.configuration)
+    if options.dry_run:
+        from .runs.dry_run import format_dry_run
+
+        print(format_dry_run(configuration))
+        return
+    if options.output is None:
+        raise InputError("Say where the files of the run go: --output DIR, or give --dry-run.")
     try:
         run(configuration, options.output, options.resume)
     except RunInterrupted as interruption:
@@ -179,6 +199,19 @@ def _run(options):
     print()
     print(format_summary(configuration, groups, linkers))
     print(f"\nWritten to {directory.path}: {directory.summary.name}, {directory.figure.name}")
+
+
+def _new(options):
+    from .runs.beginnings import write_start
+
+    path = write_start(options.kind, options.file)
+    print(f"Written: {path}. Run it with\n    openmm-cylchain run {path} --output {path.stem}")
+
+
+def _schema(options):
+    from .runs.schema import format_schema
+
+    print(format_schema())
 
 
 _BOUND_LABELS = {
@@ -217,33 +250,24 @@ def _time_step(options):
         print(f"  {'in this configuration':<36} {format_time(settings.time_step, 4):>12}")
         step = replace(recommended, step=settings.time_step)
         print(f"  dynamics at that step: {step.describe_dynamics()}")
-    if configuration.linkers:
-        _step_of_linkers(configuration)
+    _step_of_system(configuration)
     if options.check:
         _check_time_step(configuration, options)
 
 
-def _step_of_linkers(configuration):
-    from .kinetics.binding_force import BINDING_FORCE_NAME
-    from .runs.configuration import linker_labels
-    from .runs.initial_state import recommended_step_of_network
+def _step_of_system(configuration):
+    from .runs.configuration import named_bound
+    from .runs.initial_state import recommended_step, stands_alone
     from .units.text import format_time
 
+    if stands_alone(configuration):
+        return
     settings = configuration.simulation
-    recommended = recommended_step_of_network(
-        configuration.solvent,
-        configuration.filaments,
-        configuration.box,
-        configuration.linkers,
-        settings.engine,
-        settings.scheme,
-    )
-    print("with linkers")
-    labels = linker_labels(configuration)
+    recommended = recommended_step(configuration, settings.scheme, settings.engine, settings.seed)
+    print("with all that acts on them")
     for name, allowed in recommended.allowed.items():
-        match = re.fullmatch(rf"{BINDING_FORCE_NAME}: type (\d+), (.*)", name)
-        if match is not None and math.isfinite(allowed):
-            print(f"  {format_time(allowed, 4):>12}  allowed by {labels[int(match[1])]}: {match[2]}")
+        if math.isfinite(allowed):
+            print(f"  {format_time(allowed, 4):>12}  allowed by {named_bound(configuration, name)}")
     print(f"  {'recommended':<36} {format_time(recommended.step, 4):>12}  ({recommended.reason})")
     print(f"  {'in this configuration':<36} {format_time(settings.time_step, 4):>12}")
 

@@ -18,7 +18,7 @@ import openmm
 from ..filaments.collection import FilamentCollection
 from ..kinetics.binding_force import find_binding_force
 from ..units.quantities import thermal_energy
-from ..units.types import FloatArray
+from ..units.types import FloatArray, Numbers
 from .coupled_step import RELATIVE_MOTION, mobilities
 from .schemes import IMPLICIT_SCHEMES
 from .time_step import TimeStep
@@ -31,7 +31,11 @@ SHARE_OF_REACH = 0.2
 
 
 def steps_of_kinetics(
-    filaments: FilamentCollection, system: openmm.System, scheme: str, temperature: float
+    filaments: FilamentCollection,
+    system: openmm.System,
+    scheme: str,
+    temperature: float,
+    particle_friction: Numbers | None = None,
 ) -> list[TimeStep]:
     """The TimeSteps of the linkers of a System; none where there are no linkers.
 
@@ -43,6 +47,8 @@ def steps_of_kinetics(
     scheme : str
     temperature : float
         Of the bath, in K.
+    particle_friction
+        As for ``create_integrator``.
 
     Returns
     -------
@@ -52,7 +58,7 @@ def steps_of_kinetics(
     force = find_binding_force(system)
     if force is None:
         return []
-    mobility = mobilities(filaments, system, None)
+    mobility = mobilities(filaments, system, particle_friction)
     # Of the two filaments that move most.
     largest = np.sort([mobility[nodes[0]] for nodes in filaments.node_indices])[::-1]
     steps = []

@@ -44,7 +44,7 @@ def recommended_step_of(
         steps += _steps_of_diffusion(filaments, system, temperature, confidence, scheme)
         if scheme in IMPLICIT_SCHEMES:
             steps += steps_of_couplings(filaments, system, temperature, particle_friction)
-        steps += steps_of_kinetics(filaments, system, scheme, temperature)
+        steps += steps_of_kinetics(filaments, system, scheme, temperature, particle_friction)
         steps.append(ExplicitForces(system, filaments, scheme, particle_friction).recommended_step())
     return shortest(steps)
 

@@ -1,46 +1,153 @@
-"""Where the filaments of a configuration begin, and its linkers."""
+"""From a configuration to a System: filaments and particles where they begin, and all that acts on them.
+
+It calls what users call from Python: methods of ``Filaments`` and ``Crosslinks``, ``capsule_contact_force`` and others.
+"""
+
+from dataclasses import dataclass
 
 import numpy as np
+import openmm
+from openmm import app, unit
+from scipy.spatial import cKDTree
 
+from ..couplings.capsule_contacts import capsule_contact_force
+from ..couplings.crosslinks import Crosslinks
+from ..couplings.pulling import constant_force, constant_tension
+from ..couplings.walls import filament_wall_force, wall_force
+from ..dynamics.recommended_step import recommended_time_step
+from ..errors import InputError
 from ..filaments import shapes
 from ..systems.filaments import Filaments
 from ..theory import chain_mean_square_end_to_end
+from .keys import ConfigurationError
+
+_ATTEMPTS, _NODES_OF_ATTEMPTS = 2000, 10**5
+"""To place a filament within a region: how often, and how many nodes may be drawn for it if it is long."""
 
 
-def place_filaments(solvent, groups, box, linkers, engine, seed):
-    """Filaments with their initial positions, and linkers.
+@dataclass(frozen=True)
+class BuiltSystem:
+    """Filaments in a System with all forces, and what their integrator needs."""
 
-    Filaments without a position are laid out side by side on a grid in the xy plane, centred on the origin, for the eye
-    and for the digits of the single-precision trajectory. In a periodic box, their middles are at random places in it,
-    and those that begin straight without a direction have random ones.
+    filaments: Filaments
+    topology: app.Topology
+    system: openmm.System
+    positions: unit.Quantity
+    particle_friction: np.ndarray | None
+    flow: object
+    links: int
+
+    def arguments(self):
+        """Keyword arguments of ``create_integrator``, ``recommended_time_step`` and ``check_time_step``."""
+        return {"particle_friction": self.particle_friction, "flow": self.flow}
+
+
+def build_system(configuration, engine, seed, linkers=True):
+    """The System of a configuration.
 
     Parameters
     ----------
-    solvent : Solvent
-    groups : sequence of FilamentGroup
-    box : (3,) tuple or None
-        Edges of a periodic box in nm.
-    linkers : sequence of LinkerGroup
+    configuration : Configuration
     engine : {"compiled", "portable"} or None
     seed : int
+        Of random places and shapes.
+    linkers : bool
+        Whether to have those.
+
+    Returns
+    -------
+    BuiltSystem
+    """
+    try:
+        return _built(configuration, engine, seed, linkers)
+    except ConfigurationError as error:
+        raise error.with_line(configuration.lines) from None
+
+
+def _built(configuration, engine, seed, linkers):
+    filaments = place_filaments(configuration, engine, seed, linkers)
+    topology, system, positions = filaments.build(box_vectors(configuration.box))
+    positions, spheres, radii, friction = _add_particles(configuration, seed, topology, system, positions)
+    count = _add_links(configuration, filaments, system, seed)
+    if configuration.contacts is not None:
+        own = configuration.contacts
+        force = capsule_contact_force(
+            filaments,
+            system,
+            own.diameter,
+            own.stiffness,
+            spheres,
+            2.0 * radii if len(spheres) else None,
+            own.excluded_neighbors,
+            periodic=configuration.box is not None,
+        )
+        system.addForce(force)
+    for own in configuration.walls:
+        system.addForce(_wall(own, filaments, system, spheres, radii))
+    for own in configuration.pulls:
+        system.addForce(_pull(own, filaments))
+    return BuiltSystem(filaments, topology, system, positions, friction, configuration.flow, count)
+
+
+def stands_alone(configuration):
+    """Whether nothing but the solvent at rest acts on filaments."""
+    return not (
+        configuration.linkers
+        or configuration.links
+        or configuration.contacts
+        or configuration.walls
+        or configuration.pulls
+        or configuration.tethers
+        or configuration.particles
+        or configuration.flow
+    )
+
+
+def recommended_step(configuration, scheme, engine, seed):
+    """The TimeStep that is recommended for a configuration, whose simulation may still be None."""
+    if stands_alone(configuration):
+        # The same without building thousands of filaments.
+        solvent = configuration.solvent.viscosity, configuration.solvent.temperature
+        steps = (
+            recommended_time_step(own.type, *solvent, scheme, own.segments, own.closed)
+            for own in configuration.filaments
+        )
+        return min(steps, key=lambda step: step.step)
+    built = build_system(configuration, engine, seed)
+    return built.filaments.recommended_time_step(scheme, system=built.system, **built.arguments())
+
+
+def place_filaments(configuration, engine, seed, linkers=True):
+    """Filaments with their initial positions, tethers and linkers.
+
+    Filaments without a position are laid out side by side on a grid in the xy plane, centred on the origin, for the eye
+    and for the digits of the single-precision trajectory. In a periodic box, their middles are at random places in it,
+    and those that begin straight without a direction have random ones. With ``inside``, all of their nodes are in it.
+
+    Parameters
+    ----------
+    configuration : Configuration
+    engine : {"compiled", "portable"} or None
+    seed : int
+    linkers : bool
 
     Returns
     -------
     Filaments
     """
+    solvent, box = configuration.solvent, configuration.box
     filaments = Filaments(solvent.viscosity, solvent.temperature, engine)
-    centers = _grid_centers(groups, solvent.temperature) if box is None else None
-    for group in groups:
-        for _ in range(group.count):
+    centers = _grid_centers(configuration.filaments, solvent.temperature) if box is None else None
+    for group in configuration.filaments:
+        for index in range(group.count):
             number = len(filaments)
-            places = None if box is None else np.random.default_rng([seed, number, 1])
-            nodes = _shape(group, solvent.temperature, seed, number, places)
-            if group.position is not None:
-                nodes += group.position
-            else:
-                nodes += (next(centers) if box is None else places.uniform(0.0, box)) - nodes.mean(axis=0)
-            filaments.add_nodes(group.type, nodes, group.clamped)
-    for own in linkers:
+            places = np.random.default_rng([seed, number, 1])
+            _add(filaments, group, _nodes(group, index, solvent.temperature, seed, number, places, box, centers))
+    for own in configuration.tethers:
+        for number in own.filaments:
+            point = filaments[number].positions[own.node] if own.point is None else own.point
+            filaments.add_tether(number, own.node, point, own.stiffness)
+    for own in configuration.linkers if linkers else ():
         anchors = None if own.anchors is None else np.array(own.anchors)
         filaments.add_linkers(
             own.kind,
@@ -54,34 +161,81 @@ def place_filaments(solvent, groups, box, linkers, engine, seed):
     return filaments
 
 
-def recommended_step_of_network(solvent, groups, box, linkers, engine, scheme):
-    """The TimeStep that is recommended for filaments with linkers; arguments as for ``place_filaments``."""
-    filaments = place_filaments(solvent, groups, box, linkers, engine, 1)
-    _, system, _ = filaments.build(box_vectors(box))
-    return filaments.recommended_time_step(scheme, system=system)
-
-
 def box_vectors(box):
     """Vectors of a rectangular periodic box with three edges, or None if there is none."""
     return None if box is None else np.diag(box)
 
 
-def _shape(group, temperature, seed, number, places):
+def _add(filaments, group, nodes):
+    filaments.add_nodes(
+        group.type, nodes, group.clamped, closed=group.closed, planar=group.planar, propulsion=group.propulsion
+    )
+
+
+def _nodes(group, index, temperature, seed, number, places, box, centers):
+    if group.positions is not None:
+        return _flat(group, group.positions[index].copy())
+    if group.inside is not None:
+        return _inside(group, temperature, seed, number, places)
+    free = box is not None
+    nodes = _shape(group, temperature, seed, number, places if free else None)
+    if group.position is not None:
+        return nodes + (np.array(group.position) - (nodes.mean(axis=0) if group.closed else 0.0))
+    center = places.uniform(0.0, box) if free else next(centers)
+    return _flat(group, nodes + center - nodes.mean(axis=0), group.height)
+
+
+def _flat(group, nodes, height=None):
+    # Those of planar filaments have one z, to the bit.
+    if group.planar:
+        nodes[:, 2] = nodes[0, 2] if height is None else height
+    return nodes
+
+
+def _inside(group, temperature, seed, number, places):
+    attempts = _attempts(group)
+    for attempt in range(attempts):
+        nodes = _shape(group, temperature, seed, number, places, attempt)
+        nodes = _flat(group, nodes + group.inside.draw(places) - nodes.mean(axis=0), group.height)
+        if group.inside.contains(nodes):
+            return nodes
+    raise ConfigurationError(
+        f"[[filament]] number {group.table}: filament {number} of {group.segments} segments does not fit into its "
+        f"region: none of {attempts} random places has all of its nodes inside. Take shorter filaments or a "
+        "larger region.",
+        ("filament", group.table - 1, "inside"),
+    )
+
+
+def _attempts(group):
+    # One for a straight filament that fits nowhere.
+    if group.start == "straight" and group.segments * group.type.segment_length > group.inside.diameter:
+        return 1
+    return max(20, min(_ATTEMPTS, _NODES_OF_ATTEMPTS // group.nodes))
+
+
+def _shape(group, temperature, seed, number, places, attempt=0):
     # Nodes with the first one at the origin. Each filament has a seed of its own.
     kind, origin, label = group.type, (0.0, 0.0, 0.0), f"Filament {number}"
+    if group.closed:
+        return shapes.ring(kind, group.segments, origin, group.normal, label)
+    direction = group.direction
+    generator = np.random.default_rng([seed, number, *([2, attempt] if attempt else [])])
+    if direction is not None and group.orientation == "nematic":
+        direction = np.array(direction) * (1.0 if np.random.default_rng([seed, number, 3]).uniform() < 0.5 else -1.0)
     if group.start == "straight":
-        direction = group.direction
         if direction is None:
             direction = (1.0, 0.0, 0.0) if places is None else places.normal(size=3)
+            if group.planar:
+                direction = (*direction[:2], 0.0)
         return shapes.straight(kind, group.segments, origin, direction, label)
-    generator = np.random.default_rng([seed, number])
     return shapes.drawn(
-        kind, group.segments, temperature, generator, origin, group.direction, group.clamped, False, label
+        kind, group.segments, temperature, generator, origin, direction, group.clamped, group.planar, label
     )
 
 
 def _grid_centers(groups, temperature):
-    groups = [group for group in groups if group.position is None]
+    groups = [group for group in groups if group.position is None and group.inside is None and group.positions is None]
     count = sum(group.count for group in groups)
     spacing = 1.1 * max((_extent(group, temperature) for group in groups), default=0.0)
     columns = int(np.ceil(np.sqrt(count)))
@@ -92,6 +246,119 @@ def _grid_centers(groups, temperature):
 
 
 def _extent(group, temperature):
+    if group.closed:
+        return group.segments * group.type.segment_length / np.pi
     if group.start == "straight":
         return group.segments * group.type.segment_length
     return np.sqrt(chain_mean_square_end_to_end(group.type, group.segments, temperature))
+
+
+def _add_particles(configuration, seed, topology, system, positions):
+    # Behind the filaments. All positions, and the indices, radii and friction of particles.
+    everything, spheres, radii, friction = [positions.value_in_unit(unit.nanometer)], [], [], []
+    for number, own in enumerate(configuration.particles):
+        chain = topology.addChain(f"P{number}")
+        for place in range(own.count):
+            topology.addAtom("P", None, topology.addResidue(own.name, chain, str(place + 1)))
+            # Motion does not depend on a mass, except that those without one stay.
+            spheres.append(system.addParticle(0.0 if own.fixed else 1.0))
+            radii.append(0.5 * own.diameter)
+            friction.append(own.friction)
+        everything.append(own.places(np.random.default_rng([seed, number, 4]), configuration.box))
+    return (
+        np.concatenate(everything) * unit.nanometer,
+        spheres,
+        np.array(radii),
+        np.array(friction) if spheres else None,
+    )
+
+
+def _wall(own, filaments, system, spheres, radii):
+    if filaments.engine == "compiled":
+        room = own.shape.room
+        for radius in radii:
+            if radius >= room:
+                raise InputError(f"A particle with a radius of {radius:g} nm does not fit into a [[wall]].")
+        return filament_wall_force(
+            filaments, system, own.shape, own.stiffness, own.distance, spheres, radii if len(spheres) else 0.0
+        )
+    nodes = [int(node) for nodes in filaments.node_indices for node in nodes]
+    return wall_force(own.shape, own.stiffness, [*nodes, *spheres])
+
+
+def _pull(own, filaments):
+    if own.force is None:
+        return constant_tension(filaments, own.tension, own.direction, own.filaments)
+    return constant_force([int(filaments.node_indices[number][own.node]) for number in own.filaments], own.force)
+
+
+def _add_links(configuration, filaments, system, seed):
+    # One force for each model; how many links there are.
+    count = 0
+    for model in ("harmonic", "fene"):
+        groups = [(number, own) for number, own in enumerate(configuration.links) if own.model == model]
+        if not groups:
+            continue
+        _, first = groups[0]
+        links = Crosslinks(first.stiffness, first.rest_length or 0.0, model, first.maximum_extension)
+        for number, own in groups:
+            pairs = _pairs(own, filaments, configuration.box, np.random.default_rng([seed, number, 5]))
+            for one, other, distance in pairs:
+                rest = distance if own.rest_length is None else own.rest_length
+                links.add(None, one, other, own.stiffness, rest, own.maximum_extension)
+            count += len(pairs)
+        links.add_to(system, periodic=configuration.box is not None)
+    return count
+
+
+def _pairs(own, filaments, box, generator):
+    # Pairs of places, with their distances in nm.
+    if own.between is None:
+        return _random_pairs(own, filaments, box, generator)
+    places, points = zip(*(_place(entries, filaments) for entries in own.between))
+    return [(*places, float(np.linalg.norm(_nearest(points[1] - points[0], box))))]
+
+
+def _nearest(vectors, box):
+    return vectors if box is None else vectors - np.round(vectors / box) * box
+
+
+def _place(entries, filaments):
+    if entries["point"] is not None:
+        return entries["point"], np.array(entries["point"])
+    number, nodes = entries["filament"], filaments[entries["filament"]].positions
+    if entries["node"] is not None:
+        return int(filaments.node_indices[number][entries["node"]]), nodes[entries["node"]]
+    place = filaments.segment_place(number, entries["arc_length"], entries["segment"], entries["fraction"])
+    return place, _position_of(place, filaments, number)
+
+
+def _position_of(place, filaments, number):
+    first = filaments.node_indices[number][0]
+    nodes = filaments[number].positions
+    return (1.0 - place.fraction) * nodes[place.first - first] + place.fraction * nodes[place.second - first]
+
+
+def _random_pairs(own, filaments, box, generator):
+    places, points, owners = [], [], []
+    for number, filament in enumerate(filaments):
+        length = float(filament.type.segment_lengths(filament.segments, filament.closed).sum())
+        spacing = 0.5 * filament.type.segment_length if own.spacing is None else own.spacing
+        # In the middle of equal parts, so that ends have no more links than other places.
+        parts = max(1, int(length / spacing + 1e-9))
+        for part in range(parts):
+            place = filaments.segment_place(number, arc_length=length * (part + 0.5) / parts)
+            places.append(place)
+            points.append(_position_of(place, filaments, number))
+            owners.append(number)
+    points, owners = np.array(points), np.array(owners)
+    if box is not None and own.within >= 0.5 * min(box):
+        raise InputError(f"{own.label} within must be less than half of the shortest edge of the box, {min(box):g} nm.")
+    wrapped = points if box is None else np.mod(points, box) % box
+    found = cKDTree(wrapped, boxsize=box).query_pairs(own.within, output_type="ndarray")
+    found = found[owners[found[:, 0]] != owners[found[:, 1]]]
+    found = found[np.lexsort((found[:, 1], found[:, 0]))]
+    if own.count is not None and len(found) > own.count:
+        found = found[np.sort(generator.choice(len(found), own.count, replace=False))]
+    distances = np.linalg.norm(_nearest(points[found[:, 1]] - points[found[:, 0]], box), axis=1)
+    return [(places[one], places[other], float(length)) for (one, other), length in zip(found, distances)]

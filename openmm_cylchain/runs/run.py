@@ -21,7 +21,8 @@ from ..output.structure_files import write_lammps_data, write_psf
 from ..systems.step_check import check_time_step
 from ..units.quantities import thermal_energy
 from ..units.text import format_time
-from .initial_state import box_vectors, place_filaments
+from .initial_state import build_system, place_filaments
+from .relaxation import relaxed_positions
 from .run_directory import ENERGY_COLUMNS, LINKER_TABLE_COLUMNS, Checkpoint, ReportTable, RunDirectory, TrajectoryFile
 
 _SECONDS_BETWEEN_CHECKS = 0.2
@@ -60,8 +61,8 @@ def run(configuration, output, resume=False):
     RunInterrupted
         After SIGINT or SIGTERM.
     """
-    filaments = create_filaments(configuration)
-    simulation, positions = _create_simulation(configuration, filaments)
+    simulation, built = create_simulation(configuration)
+    filaments = built.filaments
     with RunDirectory(output) as directory:
         checkpoint = directory.claim(configuration, resume)
         settings = configuration.simulation
@@ -71,6 +72,7 @@ def run(configuration, output, resume=False):
         if checkpoint is None:
             if resume:
                 print("No checkpoint yet: starting from the beginning.")
+            positions = relaxed_positions(configuration, built)
             _write_topology(directory, simulation, positions)
             simulation.context.setPositions(positions)
         else:
@@ -98,29 +100,36 @@ def create_filaments(configuration):
     Filaments
     """
     settings = configuration.simulation
-    return place_filaments(
-        configuration.solvent,
-        configuration.filaments,
-        configuration.box,
-        configuration.linkers,
-        settings.engine,
-        settings.seed,
-    )
+    return place_filaments(configuration, settings.engine, settings.seed)
 
 
-def _create_simulation(configuration, filaments):
+def create_simulation(configuration):
+    """The Simulation of a configuration, without positions, and its BuiltSystem.
+
+    Parameters
+    ----------
+    configuration : Configuration
+
+    Raises
+    ------
+    InputError
+        If it cannot be built, or the platform cannot simulate it.
+    """
     settings = configuration.simulation
-    topology, system, positions = filaments.build(box_vectors(configuration.box))
+    built = build_system(configuration, settings.engine, settings.seed)
+    filaments = built.filaments
     platform, properties = _platform(settings, filaments.engine)
     integrator = filaments.create_integrator(
-        system,
+        built.system,
         settings.time_step,
         scheme=settings.scheme,
         random_seed=settings.seed,
+        checks=settings.checks,
         precision=_of_filaments(settings, filaments.engine) or "automatic",
+        **built.arguments(),
     )
     try:
-        return app.Simulation(topology, system, integrator, platform, properties), positions
+        return app.Simulation(built.topology, built.system, integrator, platform, properties), built
     except openmm.OpenMMException as error:
         raise InputError(
             f'[simulation] platform = "{settings.platform}" cannot be used: {error}. "Reference" always can.'
@@ -150,20 +159,24 @@ def check_step(configuration, seconds=20.0, say=lambda message: None):
         After SIGINT or SIGTERM.
     """
     settings = configuration.simulation
-    filaments = create_filaments(configuration)
-    _, system, positions = filaments.build(box_vectors(configuration.box))
-    platform, properties = _platform(settings, filaments.engine)
+    built = build_system(configuration, settings.engine, settings.seed)
+    positions = relaxed_positions(configuration, built)
+    platform, properties = _platform(settings, built.filaments.engine)
     # An interruption that Python raises within a step may end as an error of OpenMM.
     with _Signals() as signals:
         check = check_time_step(
-            filaments,
-            system,
+            built.filaments,
+            built.system,
             positions,
             settings.time_step,
             scheme=settings.scheme,
             seconds=seconds,
             random_seed=settings.seed,
-            equilibrium=all(group.start == "equilibrium" and not group.linked for group in configuration.filaments),
+            equilibrium=all(
+                group.start == "equilibrium" and not group.disturbed and not group.planar
+                for group in configuration.filaments
+            ),
+            **built.arguments(),
             platform=platform,
             properties=properties,
             say=say,
@@ -197,6 +210,8 @@ def _platform(settings, engine):
                 f"[simulation] precision cannot be chosen on the platform {settings.platform}: leave it out."
             )
         properties["Precision"] = settings.precision
+    if settings.threads is not None:
+        properties["Threads"] = str(settings.threads)
     return platform, properties
 
 
@@ -238,7 +253,7 @@ class _Recorder:
         self._checkpoint = checkpoint
         self._step = 0 if checkpoint is None else checkpoint.step
         self._segments = sum(filament.segments for filament in filaments)
-        self._joints = sum(filament.segments - 1 for filament in filaments)
+        self._joints = sum(filament.segments - (not filament.closed) for filament in filaments)
 
     def run_to_end(self):
         settings = self._settings

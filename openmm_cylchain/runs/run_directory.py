@@ -4,6 +4,7 @@ The checkpoint records how long the trajectory and the energies were when it was
 one step once they are safely on disk, so whatever is written behind that point can be cut off again.
 """
 
+import hashlib
 import json
 import os
 from dataclasses import dataclass
@@ -16,8 +17,9 @@ from ..errors import InputError
 from ..output.files import write_atomically
 from ..version import __version__
 from .configuration import changed_keys, read_configuration
+from .start_files import COPIES
 
-_MAGIC = "openmm-cylchain checkpoint 1"
+_MAGIC = "openmm-cylchain checkpoint 2"
 _DCD_HEADER_SIZE = 92
 
 
@@ -57,6 +59,8 @@ class RunDirectory:
         self.checkpoint = self.path / "checkpoint.chk"
         self.summary = self.path / "summary.json"
         self.figure = self.path / "summary.png"
+        # As it was when the directory was claimed.
+        self._configuration_digest = None
 
     def __enter__(self):
         if self.path.exists() and not self.path.is_dir():
@@ -95,10 +99,24 @@ class RunDirectory:
         """
         if resume and self.configuration.exists():
             self._check_same(configuration)
+            self._configuration_digest = self._digest_of_configuration()
             return self._read_checkpoint()
         self._check_vacant(configuration, resume)
+        self._keep_start_files(configuration.start_files)
         write_atomically(self.configuration, configuration.text.encode())
+        self._configuration_digest = self._digest_of_configuration()
         return None
+
+    def _keep_start_files(self, paths):
+        # The configuration is read again from here, and must find them whatever becomes of the originals.
+        names = [path.name for path in paths]
+        if len(set(names)) < len(names):
+            raise InputError(
+                f"Files to start from must have different names, because the run keeps copies, but are {names}."
+            )
+        for path in paths:
+            (self.path / COPIES).mkdir(exist_ok=True)
+            write_atomically(self.path / COPIES / path.name, path.read_bytes())
 
     def _check_vacant(self, configuration, resume):
         results = (self.trajectory, self.checkpoint, self.energies, self.linkers, self.linker_places)
@@ -127,6 +145,7 @@ class RunDirectory:
         """Replace the checkpoint; the trajectory and the energies must be on disk already."""
         header = {
             "format": _MAGIC,
+            "configuration": self._configuration_digest,
             "version": __version__,
             "step": checkpoint.step,
             "engine": checkpoint.engine,
@@ -137,7 +156,11 @@ class RunDirectory:
             "linker_records": checkpoint.linker_records,
             "state_size": len(checkpoint.state),
         }
+        header["digest"] = digest_of_checkpoint(header, checkpoint.state)
         write_atomically(self.checkpoint, json.dumps(header).encode() + b"\n" + checkpoint.state)
+
+    def _digest_of_configuration(self):
+        return hashlib.sha256(self.configuration.read_bytes()).hexdigest()
 
     def _read_checkpoint(self):
         if not self.checkpoint.exists():
@@ -145,9 +168,12 @@ class RunDirectory:
         line, _, state = self.checkpoint.read_bytes().partition(b"\n")
         try:
             header = json.loads(line)
-            if header["format"] != _MAGIC or header["state_size"] != len(state):
+            if header["format"] != _MAGIC:
                 raise ValueError
-            version = header["version"]
+            self._check_version(header["version"])
+            if header.pop("digest") != digest_of_checkpoint(header, state):
+                raise ValueError
+            configuration = header["configuration"]
             checkpoint = Checkpoint(
                 step=header["step"],
                 engine=header["engine"],
@@ -158,12 +184,18 @@ class RunDirectory:
                 linker_records=header["linker_records"],
                 state=state,
             )
-        except (ValueError, KeyError, TypeError):
+        except InputError:
+            raise
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
             raise InputError(
                 f"{self.checkpoint} is damaged or of another version: the run cannot be resumed. Delete it to start "
                 "from the beginning with --resume."
             ) from None
-        self._check_version(version)
+        if configuration != self._configuration_digest:
+            raise InputError(
+                f"{self.configuration} has been changed since the run was started: put back what it was, or start a "
+                "new run in another directory."
+            )
         return checkpoint
 
     def _check_version(self, version):
@@ -172,6 +204,11 @@ class RunDirectory:
                 f"The run in {self.path} was started with openmm_cylchain {version}, and this is {__version__}: resume "
                 "it with that version, or start it again in another directory."
             )
+
+
+def digest_of_checkpoint(header, state):
+    """SHA-256 of all that a checkpoint says: of its header, a dict, and of OpenMM's checkpoint, in bytes."""
+    return hashlib.sha256(json.dumps(header, sort_keys=True).encode() + b"\n" + state).hexdigest()
 
 
 def _try_lock(file):

@@ -1,11 +1,7 @@
 """The summary of a run: observables of its trajectory against theory, as JSON, a table and a figure."""
 
-import contextlib
-import ctypes
 import json
 import math
-import os
-import sys
 import warnings
 from dataclasses import asdict, dataclass
 
@@ -32,8 +28,10 @@ from ..units.text import format_time
 from ..version import __version__
 from .configuration import linker_labels
 from .run_directory import read_linkers
+from .silence import silenced_c_library
 
 _WORMLIKE = "the same, theory of the wormlike chain (25)"
+_EXTENSION = "extension along the tension, second half of the run"
 _ENOUGH_FILAMENTS = 8
 _AGREEMENT_SIGMA = 3.0
 _AGREEMENT_FRACTION = 0.05
@@ -107,29 +105,11 @@ PICONEWTON = 1e-15 * AVOGADRO * 1e-9
 def load_trajectory(configuration, directory):
     """The trajectory of a run as an mdtraj.Trajectory with its times in ps."""
     topology = mdtraj.load_topology(str(directory.topology))
-    with _silenced_c_library():
+    with silenced_c_library():
         trajectory = mdtraj.load_dcd(str(directory.trajectory), top=topology)
     settings = configuration.simulation
     trajectory.time = np.arange(trajectory.n_frames) * settings.steps_per_report * settings.time_step
     return trajectory
-
-
-@contextlib.contextmanager
-def _silenced_c_library():
-    # mdtraj's reader of DCD files prints two lines about the format from C.
-    if os.name != "posix":
-        yield
-        return
-    sys.stdout.flush()
-    standard_output, nowhere = os.dup(1), os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 1)
-    try:
-        yield
-    finally:
-        ctypes.CDLL(None).fflush(None)
-        os.dup2(standard_output, 1)
-        os.close(standard_output)
-        os.close(nowhere)
 
 
 def group_members(configuration):
@@ -145,16 +125,17 @@ def group_labels(configuration):
         for group in configuration.filaments
     ]
     if len(set(labels)) < len(labels):
-        labels = [f"{label} (table {number})" for number, label in enumerate(labels, start=1)]
+        labels = [f"{label} (table {group.table})" for label, group in zip(labels, configuration.filaments)]
     return labels
 
 
 def is_in_equilibrium(group):
     """Whether the exact averages of the free chain hold for a group from its first frame on.
 
-    One clamped node leaves lengths and angles alone; several hold the chain, and linkers pull at it.
+    One clamped node, or one tether, leaves lengths and angles alone; several hold the chain, and linkers pull at it.
     """
-    return group.start == "equilibrium" and len(group.clamped) <= 1 and not group.linked
+    free = not (group.disturbed or group.planar or group.closed)
+    return free and group.start == "equilibrium" and len(group.clamped) <= 1
 
 
 def summarise(configuration, trajectory):
@@ -221,13 +202,19 @@ def _summarise_linkers(name, table):
 def _summarise_group(configuration, group, members, label, trajectory):
     observables, short = [], []
     comparable = is_in_equilibrium(group)
-    for name, unit, series, exact in _series(group, configuration.solvent.temperature, trajectory, members):
+    temperature = configuration.solvent.temperature
+    for name, unit, series, exact in _series(group, temperature, trajectory, members):
         value, error = _mean_with_error(series)
         slow = len(members) < _ENOUGH_FILAMENTS and statistical_inefficiency(series) > len(series) / 10
         if slow and name != _WORMLIKE:
             short.append(name)
         observables.append(_compared(name, unit, value, error, exact, comparable))
-    observables += _persistence_length(group, configuration.solvent.temperature, trajectory, members, comparable)
+    if has_exact_extension(group):
+        series = extensions(group, trajectory, members)
+        value, error = _mean_with_error(series)
+        exact = float(theory.chain_extension(group.type, group.segments, group.tension[0], temperature))
+        observables.append(_compared(_EXTENSION, "nm", value, error, exact, True))
+    observables += _persistence_length(group, temperature, trajectory, members, comparable)
     return GroupSummary(
         label=label,
         type=group.type.name,
@@ -240,12 +227,26 @@ def _summarise_group(configuration, group, members, label, trajectory):
     )
 
 
+def has_exact_extension(group):
+    """Whether the exact extension of a group under its tension is known."""
+    plain = not (group.closed or group.planar or group.clamped or isinstance(group.type, BeadSpringType))
+    return plain and group.tension is not None and group.tension[0] >= 0.0
+
+
+def extensions(group, trajectory, members):
+    """Extensions R.e along the tension of a group in nm, in the second half of a run: (frames, filaments)."""
+    direction = np.array(group.tension[1]) / np.linalg.norm(group.tension[1])
+    return end_to_end_vectors(trajectory[trajectory.n_frames // 2 :], members) @ direction
+
+
 def _series(group, temperature, trajectory, members):
     # (name, unit, (frames, filaments) averages, exact value) of every observable that is a plain average.
     kT = thermal_energy(temperature)
     kind = group.type
     if isinstance(kind, BeadSpringType):
-        yield from _series_of_beads(kind, group.segments, temperature, trajectory, members)
+        # Nothing is known of rings of beads.
+        if not group.closed:
+            yield from _series_of_beads(kind, group.segments, temperature, trajectory, members)
         return
     lengths = np.stack(segment_lengths(trajectory, members), axis=1)
     distribution = SegmentLengthDistribution(kind, temperature)
@@ -256,7 +257,7 @@ def _series(group, temperature, trajectory, members):
         theory.stretching_energy_mean(kind, temperature) / kT,
     )
     yield "segment length", "nm", lengths.mean(axis=2), float(distribution.mean(lambda length: length))
-    if group.segments > 1:
+    if group.joints:
         cosines = np.stack(joint_cosines(trajectory, members), axis=1)
         if kind.bending_rigidity > 0:
             yield (
@@ -266,7 +267,8 @@ def _series(group, temperature, trajectory, members):
                 theory.bending_energy_mean(kind, temperature) / kT,
             )
         yield "cosine of joint angle", "", cosines.mean(axis=2), theory.mean_joint_cosine(kind, temperature)
-    yield from _end_to_end(kind, group.segments, temperature, trajectory, members)
+    if not group.closed:
+        yield from _end_to_end(kind, group.segments, temperature, trajectory, members)
 
 
 def _series_of_beads(kind, bonds, temperature, trajectory, members):
@@ -315,7 +317,7 @@ def _mean_with_error(series):
 
 def _persistence_length(group, temperature, trajectory, members, comparable):
     # In chains of beads, mean cosines depend on the place along the chain.
-    if group.segments < 2 or group.type.bending_rigidity == 0 or isinstance(group.type, BeadSpringType):
+    if group.closed or group.segments < 2 or group.type.bending_rigidity == 0 or isinstance(group.type, BeadSpringType):
         return []
     try:
         with warnings.catch_warnings():
@@ -352,7 +354,7 @@ def _notes(configuration, group, members, trajectory, short):
             "Started straight, not in equilibrium: the averages contain the relaxation, so they are not compared "
             "with equilibrium."
         )
-    bends = group.segments > 1 and trajectory.n_frames >= FEWEST_FRAMES_OF_DRIFT
+    bends = group.segments > 1 and not group.closed and trajectory.n_frames >= FEWEST_FRAMES_OF_DRIFT
     drift = bending_drift(trajectory, members) if bends else 0.0
     if abs(drift) > SIGNIFICANT_DRIFT:
         yield (
@@ -362,8 +364,14 @@ def _notes(configuration, group, members, trajectory, short):
         )
     if len(group.clamped) > 1:
         yield "Several nodes are clamped: the exact values are those of free chains, so they are not compared."
-    if group.linked:
-        yield "Linkers bind to these filaments: the exact values are those of free chains, so they are not compared."
+    if group.disturbed:
+        reasons = "; ".join(_DISTURBANCES[name] for name in group.disturbed)
+        yield f"{reasons[0].upper()}{reasons[1:]}: the exact values are those of free chains, so they are not compared."
+    if group.closed or group.planar:
+        what = "rings" if group.closed else "planar"
+        yield f"They are {what}: the exact values are those of open chains in space, so they are not compared."
+    if group.start == "file":
+        yield "Started from a file: whether that is equilibrium is not known, so nothing is compared with it."
     if group.count >= _ENOUGH_FILAMENTS:
         yield (
             f"Errors: standard error of the time averages of {group.count} independent filaments, which holds "
@@ -410,6 +418,17 @@ def write_summary(configuration, directory, groups, linkers=()):
     }
     write_atomically(directory.summary, (json.dumps(content, indent=2, allow_nan=False) + "\n").encode())
 
+
+_DISTURBANCES = {
+    "linkers": "linkers bind to these filaments",
+    "links": "links join them",
+    "contacts": "contacts keep them apart",
+    "walls": "walls confine them",
+    "forces": "constant forces pull at them",
+    "tethers": "tethers hold them in several places",
+    "flow": "the solvent flows",
+    "propulsion": "they propel themselves",
+}
 
 _EXPLANATIONS = {
     "agrees": f"agrees: within {_AGREEMENT_SIGMA:g} standard errors.",

@@ -3,18 +3,28 @@
 import io
 
 import numpy as np
+from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from scipy.integrate import trapezoid
 
 from .. import theory
+from ..analysis.statistics import mean_with_error
 from ..analysis.trajectories import joint_cosines, node_positions, segment_lengths, tangent_correlation
 from ..output.files import write_atomically
 from ..units.quantities import thermal_energy
 from ..units.text import time_unit
 from .configuration import linker_labels
 from .run_directory import read_energies, read_linkers
-from .summary import PICONEWTON, group_labels, group_members, is_in_equilibrium, mean_energies
+from .summary import (
+    PICONEWTON,
+    extensions,
+    group_labels,
+    group_members,
+    has_exact_extension,
+    is_in_equilibrium,
+    mean_energies,
+)
 
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
 _STRETCHING_COLOUR, _BENDING_COLOUR = "#D55E00", "#0072B2"
@@ -31,6 +41,13 @@ def write_figure(configuration, directory, trajectory):
     trajectory : mdtraj.Trajectory
         See ``summary.load_trajectory``.
     """
+    # Titles and names are of users: "$" is no mathematics in them.
+    with rc_context({"text.parse_math": False}):
+        image = _draw(configuration, directory, trajectory)
+    write_atomically(directory.figure, image)
+
+
+def _draw(configuration, directory, trajectory):
     rows = 3 if configuration.linkers else 2
     figure = Figure(figsize=(12, 4.75 * rows), layout="constrained")
     FigureCanvasAgg(figure)
@@ -48,7 +65,9 @@ def write_figure(configuration, directory, trajectory):
     _draw_conformations(axes[0, 0], groups, trajectory)
     _draw_energies(axes[0, 1], groups, temperature, read_energies(directory.energies))
     _draw_tangent_correlation(axes[1, 0], groups, temperature, trajectory)
-    if any(group.segments > 1 for group, *_ in groups):
+    if any(has_exact_extension(group) for group, *_ in groups):
+        _draw_extensions(axes[1, 1], groups, temperature, trajectory)
+    elif any(group.joints for group, *_ in groups):
         _draw_joint_angles(axes[1, 1], groups, temperature, trajectory)
     else:
         _draw_segment_lengths(axes[1, 1], groups, temperature, trajectory)
@@ -64,7 +83,7 @@ def write_figure(configuration, directory, trajectory):
         axis.tick_params(labelsize=_FONT_SIZE - 1)
     image = io.BytesIO()
     figure.savefig(image, format="png", dpi=130)
-    write_atomically(directory.figure, image.getvalue())
+    return image.getvalue()
 
 
 def _legend(axis, **options):
@@ -203,15 +222,16 @@ def _draw_energies(axis, groups, temperature, energies):
     time = energies["time (ps)"] / length
     kinds = [group for group, *_ in groups]
     segments = np.array([group.count * group.segments for group in kinds])
-    joints = np.array([group.count * (group.segments - 1) for group in kinds])
+    joints = np.array([group.count * group.joints for group in kinds])
     stretching, bending = np.array([mean_energies(group, temperature) for group in kinds]).T / kT
     curves = [("stretching", "segment", np.average(stretching, weights=segments), _STRETCHING_COLOUR)]
     if np.any(joints * bending):
         curves.append(("bending", "joint", np.average(bending, weights=joints), _BENDING_COLOUR))
+    free = "exact" if all(map(is_in_equilibrium, kinds)) else "free chains"
     for label, per, exact, colour in curves:
         values = energies[f"{label} energy per {per} (kT)"]
         axis.plot(time, values, color=colour, linewidth=1.0, alpha=0.8, label=f"{label}, per {per}")
-        axis.axhline(exact, color=colour, linewidth=1.8, linestyle="--", label=f"exact in equilibrium: {exact:.4g}")
+        axis.axhline(exact, color=colour, linewidth=1.8, linestyle="--", label=f"{free} in equilibrium: {exact:.4g}")
     axis.set_xlim(time[0], time[-1])
     bottom, top = axis.get_ylim()
     axis.set_ylim(min(0.0, bottom), top + 0.28 * (top - min(0.0, bottom)))
@@ -223,12 +243,12 @@ def _draw_energies(axis, groups, temperature, energies):
 
 def _draw_tangent_correlation(axis, groups, temperature, trajectory):
     axis.set_title("Correlation of tangents along a filament")
-    drawn = [entry for entry in groups if entry[0].segments > 1]
+    drawn = [entry for entry in groups if entry[0].segments > 1 and not entry[0].closed]
     unit, scale = _length_unit(max(group.segments * group.type.segment_length for group, *_ in groups))
     axis.set_xlabel(f"distance s along the filament ({unit})")
     axis.set_ylabel("⟨t(0)·t(s)⟩")
     if not drawn:
-        axis.text(0.5, 0.5, "single segments", transform=axis.transAxes, ha="center", fontsize=_FONT_SIZE)
+        axis.text(0.5, 0.5, "single segments or rings", transform=axis.transAxes, ha="center", fontsize=_FONT_SIZE)
         return
     for group, members, label, colour in drawn:
         correlation = tangent_correlation(trajectory, members)
@@ -271,7 +291,7 @@ def _format_length(length):
 def _draw_joint_angles(axis, groups, temperature, trajectory):
     kT = thermal_energy(temperature)
     for group, members, label, colour in groups:
-        if group.segments < 2:
+        if not group.joints:
             continue
         cosines = np.clip(np.concatenate([c.ravel() for c in joint_cosines(trajectory, members)]), -1.0, 1.0)
         angles = np.degrees(np.arccos(cosines))
@@ -301,6 +321,27 @@ def _draw_joint_angles(axis, groups, temperature, trajectory):
     axis.set_ylabel("probability density (1/degree)")
     axis.set_title("Joint angles")
     _legend(axis, loc="upper right")
+
+
+def _draw_extensions(axis, groups, temperature, trajectory):
+    # Against the tension, in units of the length at rest; a curve for each kind of filament.
+    axis.set_title("Extension along the tension, second half of the run")
+    axis.set_xlabel("tension (pN)")
+    axis.set_ylabel("extension / length at rest")
+    kinds = {}
+    for group, members, label, colour in groups:
+        if has_exact_extension(group):
+            kinds.setdefault((group.type, group.segments), []).append(group.tension[0])
+            length = group.segments * group.type.segment_length
+            value, error = mean_with_error(extensions(group, trajectory, members) / length)
+            force = group.tension[0] / PICONEWTON
+            axis.errorbar(force, value, error, fmt="o", color=colour, capsize=2.5, label=label)
+    for (kind, segments), tensions in kinds.items():
+        force = np.linspace(0.0, max(tensions), 40)
+        exact = theory.chain_extension(kind, segments, force, temperature) / (segments * kind.segment_length)
+        axis.plot(force / PICONEWTON, exact, color="0.4", linestyle="--", linewidth=1.8, label=f"exact, {kind.name}")
+    axis.set_xlim(left=0.0)
+    _legend(axis, loc="best")
 
 
 def _draw_segment_lengths(axis, groups, temperature, trajectory):

@@ -25,6 +25,7 @@ STIFFNESS = unit.kilojoule_per_mole / unit.nanometer**2
 BENDING_RIGIDITY = unit.kilojoule_per_mole * unit.nanometer
 FRICTION = unit.kilojoule_per_mole * unit.picosecond / unit.nanometer**2
 ROTATIONAL_FRICTION = unit.kilojoule_per_mole * unit.picosecond
+DIFFUSION = unit.nanometer**2 / unit.picosecond
 VISCOSITY = unit.kilojoule_per_mole * unit.picosecond / unit.nanometer**3
 MASS = unit.dalton
 MASS_PER_LENGTH = unit.dalton / unit.nanometer

@@ -9,6 +9,7 @@ from ..errors import InputError
 from .quantities import (
     AVOGADRO,
     BENDING_RIGIDITY,
+    DIFFUSION,
     FORCE,
     FRICTION,
     LENGTH,
@@ -34,6 +35,7 @@ _EXAMPLES = {
     FORCE: ("force", "1100 pN"),
     BENDING_RIGIDITY: ("bending rigidity", "2.2e7 pN*nm^2"),
     FRICTION: ("friction", "1.91e-12 kg/s"),
+    DIFFUSION: ("diffusion coefficient", "1 um^2/s"),
     MASS: ("mass", "650 Da"),
     ROTATIONAL_FRICTION: ("rotational friction", "7e4 pN*nm*us"),
     MASS_PER_LENGTH: ("mass per length", "3500 Da/nm"),
@@ -46,11 +48,18 @@ _EXAMPLES = {
 
 _NUMBER = r"[-+]?(?:(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?|nan|inf)"
 _NUMBER_AND_UNIT = re.compile(rf"\s*({_NUMBER})\s*(.*?)\s*", re.IGNORECASE)
+# Units begin with a letter, or with "1/": pint would skip what comes before, as in "3,1 K" and "3 1 K".
+_UNIT = re.compile(r"\(*(?:1\s*/\s*\(*)?[^\W\d_°]|°")
 
 
 def example(target: unit.Unit) -> str:
     """How people write a quantity in the unit ``target``, such as "360 nm"."""
     return _EXAMPLES[target][1]
+
+
+def kind_of(target: unit.Unit) -> str:
+    """What to call a quantity in the unit ``target``, such as "length"."""
+    return _EXAMPLES[target][0]
 
 
 @functools.cache
@@ -83,7 +92,7 @@ def parse_quantity(text: str, target: unit.Unit, name: str) -> float:
         raise InputError(f"{name} must be a text with a number and a unit, {written}, but is {text!r}.")
     # pint alone would read "1,71 nm" as 171 nm and "nm" as 1 nm.
     match = _NUMBER_AND_UNIT.fullmatch(text)
-    if match is None:
+    if match is None or not text.isprintable():
         raise InputError(f"{name} must be a number and a unit, {written}, but is {text!r}.")
     number, unit = float(match[1]), match[2]
     if number - number != 0:
@@ -97,6 +106,8 @@ def _parse_unit(unit, target, name):
     import pint
 
     try:
+        if _UNIT.match(unit) is None:
+            raise ValueError
         return _registry().parse_units(unit)
     except pint.UndefinedUnitError as error:
         reason = str(error).replace(" in the unit registry", "")

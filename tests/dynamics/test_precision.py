@@ -13,7 +13,7 @@ from openmm_cylchain import F_ACTIN, Filaments, Flow, InputError
 from openmm_cylchain.dynamics.precision import check_precision
 from openmm_cylchain.engines.compiled import PRECISIONS, CylinderChainIntegrator
 from openmm_cylchain.runs import configuration
-from openmm_cylchain.runs.run import _create_simulation, create_filaments
+from openmm_cylchain.runs.run import create_simulation
 from support.chain_energies import energies_of, exact_energies
 from support.contexts import new_context, positions_of
 from support.solvent import KT, TEMPERATURE, VISCOSITY
@@ -98,16 +98,16 @@ def test_configuration_has_the_precision_of_filaments(tmp_path):
     for name in ("automatic", "mixed", "double"):
         path.write_text(text.replace("PRECISION", name))
         settings = configuration.read_configuration(path)
-        simulation, _ = _create_simulation(settings, create_filaments(settings))
+        simulation, _ = create_simulation(settings)
         assert simulation.integrator.getPrecision() == PRECISIONS[name]
     path.write_text(text.replace("PRECISION", "single"))
     settings = configuration.read_configuration(path)
     with pytest.raises(InputError, match="precision cannot be chosen on the platform Reference"):
-        _create_simulation(settings, create_filaments(settings))
+        create_simulation(settings)
     path.write_text(text.replace("PRECISION", "mixed").replace("compiled", "portable"))
     settings = configuration.read_configuration(path)
     with pytest.raises(InputError, match="precision cannot be chosen on the platform Reference"):
-        _create_simulation(settings, create_filaments(settings))
+        create_simulation(settings)
 
 
 @pytest.mark.parametrize("scheme", ["implicit", "implicit-second-order"])

@@ -15,6 +15,7 @@ from openmm_cylchain.output.linker_records import LINKER_RECORD
 from openmm_cylchain.runs.configuration import changed_keys, parse_configuration, read_configuration
 from openmm_cylchain.runs.run import create_filaments
 from openmm_cylchain.runs.run_directory import read_linkers
+from support.checkpoints import resealed
 from support.commands import finish, start, wait_for_size
 from support.repository import EXAMPLES
 
@@ -140,7 +141,12 @@ def test_anchors(anchors, expected):
         ('"ALPHA_ACTININ"', '"ACTININ"', ["[[linkers]] number 1: type must be one of ALPHA_ACTININ", "Did you mean"]),
         ('name = "motor"', 'nome = "motor"', ["[[linkers]] number 2: has an unknown key 'nome'", "'name'"]),
         ('"60 nm"', '"60 pN"', ["[[linkers]] number 2: hand reach has the unit", '"360 nm"']),
-        ('"60 nm"', '"0 nm"', ["[[linkers]] number 2: hand: reach must be positive"]),
+        ('"60 nm"', '"0 nm"', ["line 21: [[linkers]] number 2: hand reach must be positive"]),
+        (
+            '"60 nm"',
+            '"0.09 nm"',
+            ["number 2: The reach of a hand, 0.09 nm, must be at least a thousandth of a segment"],
+        ),
         ('reach = "60 nm", ', "", ["number 2: hand lacks the key 'reach': add a line such as reach ="]),
         ('"1e5 1/s"', '"200"', ["hand binding_rate needs a unit", '"10 1/s"']),
         ('"-0.5 um/s"', '"-0.5 um"', ["hand speed has the unit", '"0.5 um/s"']),
@@ -149,7 +155,11 @@ def test_anchors(anchors, expected):
         (MOTOR, "", ["[[linkers]] number 2: lacks the key 'type'", "KINESIN_1", "hand = {"]),
         (MOTOR, "hand = 3", ["[[linkers]] number 2: hand must be a table", "but is 3"]),
         (MOTOR, "hands = []", ["number 2: hands must be a list of two tables", "but is []"]),
-        (MOTOR, f"{MOTOR}\nhands = []", ["give hand, for two equal ones, or hands, not both"]),
+        (
+            MOTOR,
+            f'{MOTOR}\nhands = [{{ reach = "1 nm" }}, {{}}]',
+            ["give hand, for two equal ones, or hands, not both"],
+        ),
         ("speed =", "rest_length =", ["number 2: hand has an unknown key 'rest_length'", "belongs to [[linkers]]"]),
         ('name = "motor"', 'speed = "1 um/s"', ["unknown key 'speed'", "belongs to the hand of [[linkers]]"]),
         ("stall_force =", "unbinding_force = 3, stall_force =", ["hand unbinding_force must be a text with a number"]),
@@ -275,10 +285,7 @@ def test_linkers_that_are_gone_are_refused(tmp_path, unbroken, capsys):
     output.mkdir()
     for path in unbroken.iterdir():
         (output / path.name).write_bytes(path.read_bytes())
-    header, _, state = (output / "checkpoint.chk").read_bytes().partition(b"\n")
-    content = json.loads(header)
-    content["step"] = 780
-    (output / "checkpoint.chk").write_bytes(json.dumps(content).encode() + b"\n" + state)
+    (output / "checkpoint.chk").write_bytes(resealed((output / "checkpoint.chk").read_bytes(), step=780))
     records = (output / "linkers.npy").read_bytes()
     (output / "linkers.npy").write_bytes(records[:300])
     arguments = ["run", str(output / "configuration.toml"), "--output", str(output), "--resume"]

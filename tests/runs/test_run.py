@@ -19,6 +19,7 @@ from openmm_cylchain.runs.configuration import parse_configuration, read_configu
 from openmm_cylchain.runs.run import create_filaments, run
 from openmm_cylchain.runs.run_directory import RunDirectory, read_energies
 from openmm_cylchain.runs.summary import format_summary, load_trajectory, summarise
+from support.checkpoints import resealed
 from support.commands import finish, start, wait_for_size
 from support.contexts import positions_of
 
@@ -325,12 +326,88 @@ def test_damaged_run_is_refused(tmp_path, unbroken, capsys):
     assert_refused(arguments, capsys, "checkpoint.chk is damaged")
     checkpoint.write_bytes(re.sub(rb'"version": "[^"]*"', b'"version": "0.0.1"', content))
     assert_refused(arguments, capsys, "started with openmm_cylchain 0.0.1")
-    checkpoint.write_bytes(re.sub(rb'"engine": "[^"]*"', b'"engine": "other"', content).replace(b"1200", b"1140"))
+    checkpoint.write_bytes(resealed(content, engine="other", step=1140))
     assert_refused(arguments, capsys, "started with the other engine")
-    checkpoint.write_bytes(content.replace(b'"step": 1200', b'"step": 1140'))
+    checkpoint.write_bytes(resealed(content, step=1140))
     with open(tmp_path / "out" / "trajectory.dcd", "r+b") as file:
         file.truncate(1000)
     assert_refused(arguments, capsys, "trajectory.dcd is missing or shorter")
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        *(("step", value) for value in (-1, 0, 1140, 10**9)),
+        *((f"{file}_size", value) for file in ("energies", "trajectory", "linkers") for value in (-1, 7, 10**9)),
+        ("linker_records", 3),
+        ("trajectory_header", ""),
+        ("state_size", 5),
+        ("configuration", "0" * 64),
+        ("digest", "0" * 64),
+        ("digest", None),
+    ],
+)
+def test_checkpoint_that_was_edited_is_refused(tmp_path, unbroken, capsys, name, value):
+    output = copied(unbroken, tmp_path)
+    checkpoint = tmp_path / "out" / "checkpoint.chk"
+    line, _, state = checkpoint.read_bytes().partition(b"\n")
+    checkpoint.write_bytes(json.dumps({**json.loads(line), name: value}).encode() + b"\n" + state)
+    before = (tmp_path / "out" / "trajectory.dcd").read_bytes()
+    assert_refused(["run", configured(tmp_path), "--output", output, "--resume"], capsys, "checkpoint.chk is damaged")
+    assert (tmp_path / "out" / "trajectory.dcd").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [("310 K", "600 K"), ("seed = 5", "seed = 6"), ("[solvent]", "# a\n[solvent]")]
+)
+def test_configuration_of_a_run_that_was_edited_is_refused(tmp_path, unbroken, capsys, old, new):
+    """In its directory, and what is given with it."""
+    output = copied(unbroken, tmp_path)
+    edited = SHORT.replace(old, new)
+    (tmp_path / "out" / "configuration.toml").write_text(edited)
+    config = configured(tmp_path, edited)
+    assert_refused(["run", config, "--output", output, "--resume"], capsys, "configuration.toml has been changed")
+    (tmp_path / "out" / "configuration.toml").write_text(SHORT)
+    assert main(["run", configured(tmp_path), "--output", output, "--resume"]) == 0
+
+
+def test_configuration_that_is_edited_while_the_run_goes_on_is_refused(tmp_path, capsys, monkeypatch):
+    output = tmp_path / "out"
+    edited = SHORT.replace("310 K", "311 K")
+    config = configured(tmp_path)
+    step = app.Simulation.step
+
+    def edit(simulation, steps):
+        (output / "configuration.toml").write_text(edited)
+        step(simulation, steps)
+
+    monkeypatch.setattr(app.Simulation, "step", edit)
+    run(read_configuration(config), output)
+    config = configured(tmp_path, edited)
+    assert_refused(["run", config, "--output", str(output), "--resume"], capsys, "configuration.toml has been changed")
+
+
+def test_directory_that_is_removed_cannot_be_resumed(tmp_path, capsys, monkeypatch):
+    output = tmp_path / "out"
+
+    def step(simulation, steps):
+        shutil.rmtree(output)
+
+    monkeypatch.setattr(app.Simulation, "step", step)
+    config = configured(tmp_path, duration='"0.2 us"', checkpoint_interval='"0.2 us"')
+    assert main(["run", config, "--output", str(output)]) == 1
+    errors = capsys.readouterr().err
+    assert "No such file or directory" in errors and "--resume" not in errors
+
+
+def test_title_may_be_anything_on_one_line(tmp_path, capsys):
+    short = SHORT.replace('"12 us"', '"0.4 us"').replace('"0.6 us"', '"0.4 us"')
+    for number, title in enumerate(("$x^$", r"\frac{", "${x", "a_b^c", "<&>")):
+        config = configured(tmp_path, short.replace('"short"', f"'{title}'"))
+        assert main(["run", config, "--output", str(tmp_path / str(number))]) == 0
+        assert (tmp_path / str(number) / "summary.png").stat().st_size > 10000
+    config = configured(tmp_path, short.replace('"short"', r'"two\nlines"'))
+    assert_refused(["run", config, "--output", str(tmp_path / "no")], capsys, "line 2: title must be one line")
 
 
 def test_output_that_is_a_file_is_refused(tmp_path, capsys):

@@ -1,0 +1,78 @@
+"""The page about configurations in ``docs``, from the same lists of keys that read them.
+
+python -m openmm_cylchain.runs.reference > docs/configuration.md
+"""
+
+from .configuration import TABLES
+from .keys import REQUIRED, Choice, Inline, Pair
+from .table import TableKind
+
+_INTRODUCTION = """# The file of a run
+
+Every key of the TOML file that `openmm-cylchain run` reads; [the guide](guide.md#runs-from-a-file) says how to begin.
+This page is made from the list of keys that reads the file, and so is the schema that `openmm-cylchain schema` prints.
+
+Quantities are texts with a number and a unit: `"360 nm"`, `"0.1 pN/nm"`, `"1.71 mPa*s"`. Points are lists of three
+lengths, directions lists of three numbers. `[table]` is written once, `[[table]]` any number of times. At the top,
+before all tables, there may be a `title`.
+"""
+
+_FILES = """
+`file` is an array of positions in nm, `.npy` of the shape (filaments, nodes, 3) or (nodes, 3), or `.npz` with several
+of them; or `.cif`, a structure that a run or `app.PDBxFile` has written; or a trajectory, `.dcd`, with its `topology`
+and a `frame`. It is looked for beside the configuration; a run keeps a copy in its directory.
+"""
+
+
+def reference_page():
+    """The page as Markdown."""
+    parts = [_INTRODUCTION]
+    for kind in TABLES:
+        parts += _section(kind, "##", kind.header)
+        if kind.name == "filament":
+            parts.append(_FILES)
+    return "\n".join(parts)
+
+
+def _section(kind, level, title):
+    needed = " (required)" if kind.required else ""
+    yield f"{level} `{title}`{needed}\n\n{kind.text}\n\n| key | value | meaning |\n|---|---|---|"
+    inner = []
+    for key in kind.keys:
+        yield f"| `{key.name}` | {_value(key)} | {_meaning(key)} |"
+        inner += _tables_in(key)
+    yield ""
+    for name, table in inner:
+        yield from _section(table, "###", f"{name} of {title}")
+
+
+def _value(key):
+    text = key.kind.text
+    if isinstance(key.kind, Choice):
+        return text
+    return f"{text}: `{key.kind.example}`" if "..." not in key.kind.example and '"' + "'" not in text else text
+
+
+def _meaning(key):
+    if key.default is REQUIRED:
+        return f"Required. {key.text}"
+    if key.default in (None, ()):
+        return key.text
+    return f"{key.text} Default: {_written(key.default)}."
+
+
+def _written(value):
+    if isinstance(value, bool):
+        return f"`{str(value).lower()}`"
+    if isinstance(value, tuple):
+        return f"({', '.join(f'{item:g}' for item in value)})"
+    return f'`"{value}"`' if isinstance(value, str) else f"{value:g}"
+
+
+def _tables_in(key):
+    if isinstance(key.kind, (Inline, Pair)) and isinstance(key.kind.table, TableKind):
+        yield key.name, key.kind.table
+
+
+if __name__ == "__main__":
+    print(reference_page(), end="")

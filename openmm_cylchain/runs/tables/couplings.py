@@ -1,0 +1,314 @@
+"""[contacts], [[wall]], [[tether]], [[pull]] and [[link]]: what acts on filaments, beside linkers."""
+
+from dataclasses import dataclass
+
+from ...units import quantities as units
+from ..keys import (
+    REQUIRED,
+    Choice,
+    Either,
+    Flag,
+    Key,
+    Listing,
+    Number,
+    Pair,
+    Quantity,
+    Triple,
+    Whole,
+    direction,
+    point,
+)
+from ..table import TableKind
+from .shapes import SHAPE_KEYS, read_shape
+
+CONTACTS = TableKind(
+    "contacts",
+    (
+        Key("diameter", Quantity(units.LENGTH), REQUIRED, "Distance of two axes at which filaments touch."),
+        Key(
+            "stiffness", Quantity(units.STIFFNESS), None, "Of a contact; without it, two filaments cross for 40 k_B T."
+        ),
+        Key("excluded_neighbors", Whole(0, 10**6, "2"), None, "Segments of one filament that do not touch each other."),
+        Key(
+            "relax",
+            Flag("false"),
+            True,
+            "Whether filaments that are drawn on top of each other come apart before the run.",
+        ),
+    ),
+    "Filaments do not pass through each other: their segments are capsules, see `capsule_contact_force`. [[particles]] "
+    "with a diameter take part as spheres.",
+)
+
+WALL = TableKind(
+    "wall",
+    (
+        *SHAPE_KEYS,
+        Key("stiffness", Quantity(units.STIFFNESS), REQUIRED, "Of the spring that pushes back."),
+        Key(
+            "distance",
+            Quantity(units.LENGTH, "zero"),
+            0.0,
+            "That axes of filaments keep from the wall, such as their radius.",
+        ),
+    ),
+    "A wall around all filaments and particles, see `filament_wall_force`.",
+    repeated=True,
+)
+
+# Of the diameter of filaments. Steps would have to be divided again and again to resolve contacts of less.
+_LEAST_DIAMETER = 0.1
+
+_NUMBERS = Either(
+    (
+        (list, Listing(Whole(0, None, "0"), "numbers of filaments", "[0, 1]")),
+        (object, Whole(0, None, "0")),
+    )
+)
+_WHICH = (
+    Key(
+        "filament", _NUMBERS, None, "Number of a filament, or a list of them, counted from 0 in the order of the file."
+    ),
+    Key("table", Whole(1, None, "1"), None, "Number of a [[filament]] table, counted from 1: all of its filaments."),
+)
+
+TETHER = TableKind(
+    "tether",
+    (
+        *_WHICH,
+        Key("node", Whole(-(10**9), 10**9, "0"), REQUIRED, "Its number in the filament; -1 is the last one."),
+        Key("point", point(), None, "Where the node is held; where it begins if not given."),
+        Key("stiffness", Quantity(units.STIFFNESS), REQUIRED, "Of the spring."),
+    ),
+    "A spring from a node of a filament to a point, such as an optical trap, see `Filaments.add_tether`.",
+    repeated=True,
+)
+
+PULL = TableKind(
+    "pull",
+    (
+        *_WHICH,
+        Key(
+            "tension", Quantity(units.FORCE, "any"), None, "On both ends, in opposite directions; negative to compress."
+        ),
+        Key("direction", direction(), (1.0, 0.0, 0.0), "Of the tension, on the last node."),
+        Key("node", Whole(-(10**9), 10**9, "-1"), None, "On which the force acts."),
+        Key("force", Triple(Quantity(units.FORCE, "any"), '["1 pN", "0 pN", "0 pN"]'), None, "On that node."),
+    ),
+    "Constant forces: a tension, or a force on one node of each filament.",
+    repeated=True,
+)
+
+_PLACE = TableKind(
+    "place",
+    (
+        Key("filament", Whole(0, None, "0"), None, "Number of a filament."),
+        Key("arc_length", Quantity(units.LENGTH, "zero"), None, "Distance from its first node along it."),
+        Key("segment", Whole(-(10**9), 10**9, "0"), None, "Number of its segment, in place of an arc_length."),
+        Key("fraction", Number("0.5"), None, "Place on that segment, 0 to 1."),
+        Key("node", Whole(-(10**9), 10**9, "0"), None, "Number of its node, in place of a segment."),
+        Key("point", point(), None, "A fixed point, in place of a filament."),
+    ),
+    "A place on a filament, or a point.",
+)
+_PLACES = '[{ filament = 0, arc_length = "1 um" }, { filament = 1, node = 0 }]'
+
+LINK = TableKind(
+    "link",
+    (
+        Key("between", Pair(_PLACE, _PLACES), None, "Two places that are joined."),
+        Key("within", Quantity(units.LENGTH), None, "In place of that: random pairs of places on filaments this near."),
+        Key("count", Whole(0, 10**7, "100"), None, "How many random ones at most; all if not given."),
+        Key(
+            "spacing", Quantity(units.LENGTH), None, "Of places along filaments that random ones join; half a segment."
+        ),
+        Key("stiffness", Quantity(units.STIFFNESS), REQUIRED, "Of the spring."),
+        Key(
+            "rest_length", Quantity(units.LENGTH, "zero"), None, "Of the spring; without it, at rest as the run begins."
+        ),
+        Key("model", Choice(("harmonic", "fene")), "harmonic", "Of the spring."),
+        Key("maximum_extension", Quantity(units.LENGTH), None, "Of a FENE spring."),
+    ),
+    "Springs that stay: one between two places, or random ones between filaments, see `Crosslinks`.",
+    repeated=True,
+)
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """The [contacts] table; lengths in nm."""
+
+    diameter: float
+    stiffness: float | None
+    excluded_neighbors: int | None
+    relax: bool
+
+
+@dataclass(frozen=True)
+class Wall:
+    """A [[wall]] table; the distance in nm."""
+
+    shape: object
+    stiffness: float
+    distance: float
+
+
+@dataclass(frozen=True)
+class TetherGroup:
+    """A [[tether]] table: a node of each of some filaments; the point in nm, or None."""
+
+    filaments: tuple
+    node: int
+    point: tuple | None
+    stiffness: float
+
+
+@dataclass(frozen=True)
+class Pull:
+    """A [[pull]] table: a tension of some filaments, or else a force on a node of each."""
+
+    filaments: tuple
+    tension: float | None
+    direction: tuple
+    node: int | None
+    force: tuple | None
+
+
+@dataclass(frozen=True)
+class LinkGroup:
+    """A [[link]] table: a pair of places, as dicts, or else random links; lengths in nm."""
+
+    between: tuple | None
+    within: float | None
+    count: int | None
+    spacing: float | None
+    stiffness: float
+    rest_length: float | None
+    model: str
+    maximum_extension: float | None
+    label: str
+
+
+def read_contacts(entries, groups):
+    """The Contacts of a [contacts] table, for FilamentGroups."""
+    thinnest = min(group.type.diameter for group in groups)
+    if entries["diameter"] < _LEAST_DIAMETER * thinnest:
+        raise entries.at("diameter").error(
+            f"is {entries['diameter']:g} nm, but filaments are {thinnest:g} nm thick: they touch at their diameter, or "
+            "further apart."
+        )
+    return Contacts(**entries.values)
+
+
+def read_wall(entries):
+    """The Wall of a [[wall]] table."""
+    shape = read_shape(entries)
+    if entries["distance"] >= shape.room:
+        raise entries.at("distance").error(f"must be below {shape.room:g} nm to fit into the shape.")
+    return Wall(shape, entries["stiffness"], entries["distance"])
+
+
+def read_tether(entries, groups):
+    """The TetherGroup of a [[tether]] table."""
+    numbers = _filaments(entries, groups)
+    _check_node(entries, numbers, groups)
+    return TetherGroup(numbers, entries["node"], entries["point"], entries["stiffness"])
+
+
+def read_pull(entries, groups):
+    """The Pull of a [[pull]] table."""
+    entries.only_one("tension", "force")
+    if "force" in entries:
+        entries.require("node")
+        entries.refuse(("direction",), "belongs to a tension.")
+    else:
+        entries.require("tension")
+        entries.refuse(("node",), "belongs to a force.")
+    numbers = _filaments(entries, groups)
+    if "node" in entries:
+        _check_node(entries, numbers, groups)
+    return Pull(numbers, entries["tension"], entries["direction"], entries["node"], entries["force"])
+
+
+def read_link(entries, groups):
+    """The LinkGroup of a [[link]] table."""
+    entries.only_one("between", "within")
+    if "between" in entries:
+        entries.refuse(("count", "spacing"), "belongs to random links, within a distance.")
+        for place in entries["between"]:
+            _check_place(place, groups)
+        if all("point" in place for place in entries["between"]):
+            raise entries.at("between").error("must have a filament: two points cannot be joined.")
+    elif "within" not in entries:
+        raise entries.error(f'lacks its places: add a line such as between = {_PLACES}, or within = "30 nm".')
+    if (entries["model"] == "fene") != ("maximum_extension" in entries):
+        raise entries.error('maximum_extension must be given for model = "fene", and only for it.')
+    values = entries.values
+    between = None if entries["between"] is None else tuple(place.values for place in entries["between"])
+    return LinkGroup(**{**values, "between": between}, label=entries.label)
+
+
+def _filaments(entries, groups):
+    # Numbers of the filaments that a table means.
+    entries.only_one("filament", "table")
+    if "table" in entries:
+        numbers, first = [], 0
+        for group in groups:
+            numbers += range(first, first + group.count) if group.table == entries["table"] else ()
+            first += group.count
+        if not numbers:
+            raise entries.at("table").error(f"is {entries['table']}, but there is no such [[filament]] table.")
+        return tuple(numbers)
+    entries.require("filament")
+    numbers = entries["filament"] if isinstance(entries["filament"], tuple) else (entries["filament"],)
+    for number in numbers:
+        _check_filament(entries, number, groups)
+    if len(set(numbers)) < len(numbers):
+        raise entries.at("filament").error(f"must name different filaments, but is {list(numbers)}.")
+    return numbers
+
+
+def _check_filament(entries, number, groups):
+    count = sum(group.count for group in groups)
+    if number >= count:
+        raise entries.at("filament").error(f"{number} does not exist; there are {count}, counted from 0.")
+
+
+def _group_of(number, groups):
+    for group in groups:
+        if number < group.count:
+            return group
+        number -= group.count
+    raise IndexError(number)
+
+
+def _check_node(entries, numbers, groups):
+    for number in numbers:
+        nodes = _group_of(number, groups).nodes
+        if not -nodes <= entries["node"] < nodes:
+            raise entries.at("node").error(
+                f"{entries['node']} does not exist in filament {number}; there are {nodes}, counted from 0."
+            )
+
+
+def _check_place(place, groups):
+    if "point" in place:
+        place.refuse(("filament", "arc_length", "segment", "fraction", "node"), "cannot be with a point.")
+        return
+    place.require("filament")
+    _check_filament(place, place["filament"], groups)
+    place.only_one("arc_length", "segment", "node")
+    if not place.given("arc_length", "segment", "node"):
+        raise place.error("lacks a place on the filament: give an arc_length, a segment or a node.")
+    if "fraction" in place:
+        place.require("segment")
+        if not 0.0 <= place["fraction"] <= 1.0:
+            raise place.at("fraction").error(f"must be between 0 and 1, but is {place['fraction']:g}.")
+    if "node" in place:
+        _check_node(place, (place["filament"],), groups)
+    group = _group_of(place["filament"], groups)
+    if "segment" in place and not -group.segments <= place["segment"] < group.segments:
+        raise place.at("segment").error(f"{place['segment']} does not exist; there are {group.segments}.")
+    length = float(group.type.segment_lengths(group.segments, group.closed).sum())
+    if "arc_length" in place and place["arc_length"] > length * (1.0 + 1e-9):
+        raise place.at("arc_length").error(f"is beyond the end of the filament, which is {length:g} nm long.")

@@ -1,0 +1,256 @@
+"""[[filament]]: filaments of one kind, how many, and where they begin."""
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...filaments.chain_type import ChainType
+from ...filaments.placement import clamped_nodes
+from ...filaments.shapes import MINIMUM_RING
+from ...units import quantities as units
+from ..keys import Choice, Either, Flag, Inline, Key, Listing, Quantity, Text, Whole, direction, point
+from ..start_files import read_start
+from ..table import TableKind
+from .filament_types import TYPE_KEYS, read_filament_type
+from .shapes import REGION, REGION_EXAMPLE, Region
+
+STARTS = ("equilibrium", "straight")
+MOST_NODES = 10**7
+"""Of a configuration: more than that would not fit into the memory of a computer of today."""
+
+_ORIENTATIONS = ("polar", "nematic")
+_SEGMENTS = Whole(1, MOST_NODES, "64")
+_FROM_FILE = ("segments", "count", "concentration", "start", "position", "direction", "orientation", "inside", "normal")
+
+FILAMENT = TableKind(
+    "filament",
+    (
+        Key(
+            "segments",
+            Either(((list, Listing(_SEGMENTS, "whole numbers", "[8, 10, 12]")), (object, _SEGMENTS))),
+            None,
+            "Of a filament; a list has the lengths that filaments have in turn.",
+        ),
+        Key("count", Whole(1, MOST_NODES, "10"), None, "How many there are; 1 if not given."),
+        Key("concentration", Quantity(units.NUMBER_DENSITY), None, "In place of that: in the box, or in inside."),
+        Key(
+            "start", Choice(STARTS), None, 'Their shape at first: "equilibrium" if not given, drawn from the exact one.'
+        ),
+        Key("position", point(), None, "Of the first node, or of the centre of a ring."),
+        Key("direction", direction(), None, "Of the first segment; random if not given."),
+        Key(
+            "orientation",
+            Choice(_ORIENTATIONS),
+            "polar",
+            'Whether all have the direction, or, "nematic", half of them the opposite one.',
+        ),
+        Key("inside", Inline(REGION, REGION_EXAMPLE), None, "A region in which filaments begin at random places."),
+        Key(
+            "clamped",
+            Listing(Whole(-MOST_NODES, MOST_NODES, "0"), "node numbers", "[0]", 0),
+            (),
+            "Nodes that do not move; -1 is the last one.",
+        ),
+        Key("closed", Flag(), False, "A ring, which begins as a regular polygon."),
+        Key("normal", direction(), (0.0, 0.0, 1.0), "Of the plane of a ring."),
+        Key("planar", Flag(), False, "The filament moves in a plane of constant z."),
+        Key("height", Quantity(units.LENGTH, "any"), 0.0, "z of that plane, where no position is given."),
+        Key(
+            "propulsion",
+            Quantity(units.FORCE, "any"),
+            0.0,
+            "Of self-propelled filaments, on each segment along its tangent.",
+        ),
+        Key("file", Text('"start.npz"'), None, "Start from a file: see below."),
+        Key("topology", Text('"topology.cif"'), None, "Of a file that is a trajectory."),
+        Key("frame", Whole(-(10**12), 10**12, "-1"), None, "Of a trajectory; the last one if not given."),
+        Key(
+            "filaments",
+            Listing(Whole(0, None, "0"), "numbers of filaments", "[0, 1]"),
+            None,
+            "Those of the file, counted from 0; all of this type if not given.",
+        ),
+        *TYPE_KEYS,
+    ),
+    "Filaments of one kind.",
+    repeated=True,
+    required=True,
+)
+
+
+@dataclass(frozen=True)
+class FilamentGroup:
+    """Filaments of one [[filament]] table that have as many segments; lengths in nm.
+
+    ``table`` is the number of the table, from 1; ``disturbed`` what makes them no free chains, in words: links, walls
+    and so on; ``tension`` that of their ends in kJ/(mol nm), with its direction, if nothing else is. ``positions`` are
+    those of a file, for each filament.
+    """
+
+    type: ChainType
+    segments: int
+    count: int
+    start: str
+    position: tuple | None
+    direction: tuple | None
+    clamped: tuple
+    orientation: str = "polar"
+    inside: Region | None = None
+    closed: bool = False
+    normal: tuple = (0.0, 0.0, 1.0)
+    planar: bool = False
+    height: float = 0.0
+    propulsion: float = 0.0
+    table: int = 1
+    disturbed: tuple = ()
+    tension: tuple | None = None
+    positions: tuple | None = dataclasses.field(default=None, compare=False, repr=False)
+
+    @property
+    def nodes(self):
+        """Nodes of each filament."""
+        return self.segments + (not self.closed)
+
+    @property
+    def joints(self):
+        """Joints of each filament."""
+        return self.segments - (not self.closed)
+
+    @property
+    def linked(self):
+        """Whether linkers bind to them."""
+        return "linkers" in self.disturbed
+
+
+def read_filaments(entries, table, solvent, box, folder):
+    """The FilamentGroups of a [[filament]] table, one for each length.
+
+    Parameters
+    ----------
+    entries : Entries
+    table : int
+        Its number, from 1.
+    solvent : Solvent
+    box : (3,) tuple or None
+    folder : Path
+        That files are named from.
+    """
+    kind = read_filament_type(entries, solvent)
+    groups = (_from_file if "file" in entries else _placed)(entries, kind, box, folder)
+    own = {"planar": True} if entries["planar"] else {}
+    common = {"propulsion": entries["propulsion"], "height": entries["height"], "table": table}
+    finished = []
+    for group in groups:
+        with entries.naming():
+            clamped = clamped_nodes(entries["clamped"], group.nodes, entries.label.rstrip(":"))
+            kind.segment_friction(solvent.viscosity, solvent.temperature, group.segments)
+        finished.append(dataclasses.replace(group, clamped=clamped, **own, **common))
+    return finished
+
+
+def _placed(entries, kind, box, folder):
+    entries.refuse(("topology", "frame", "filaments"), "belongs to a file.")
+    entries.require("segments")
+    entries.only_one("count", "concentration")
+    entries.only_one("position", "inside")
+    region = None if entries["inside"] is None else Region(entries["inside"])
+    if "orientation" in entries and "direction" not in entries:
+        raise entries.at("orientation").error("needs a direction: add a line such as direction = [1, 0, 0]")
+    if entries["closed"]:
+        entries.refuse(("start", "direction", "orientation"), "cannot be with closed: rings begin as regular polygons.")
+    else:
+        entries.refuse(("normal",), "belongs to closed = true.")
+    _check_plane(entries)
+    lengths = entries["segments"] if isinstance(entries["segments"], tuple) else (entries["segments"],)
+    if entries["closed"] and min(lengths) < MINIMUM_RING:
+        raise entries.at("segments").error(f"must be at least {MINIMUM_RING} in a ring, but is {min(lengths)}.")
+    count = _count(entries, region, box)
+    shares = {}
+    for number, length in enumerate(lengths):
+        shares[length] = shares.get(length, 0) + (count - number + len(lengths) - 1) // len(lengths)
+    for length, share in shares.items():
+        if share:
+            yield FilamentGroup(
+                kind,
+                length,
+                share,
+                "ring" if entries["closed"] else entries["start"] or "equilibrium",
+                entries["position"],
+                entries["direction"],
+                (),
+                entries["orientation"],
+                region,
+                entries["closed"],
+                entries["normal"],
+            )
+
+
+def _check_plane(entries):
+    if not entries["planar"]:
+        entries.refuse(("height",), "belongs to planar = true.")
+        return
+    if "position" in entries:
+        entries.refuse(("height",), "cannot be with a position.")
+    if entries["direction"] is not None and entries["direction"][2] != 0.0:
+        raise entries.at("direction").error("must lie in the xy plane, because these filaments are planar.")
+    if entries["closed"] and entries["normal"][:2] != (0.0, 0.0):
+        raise entries.at("normal").error("must be along z, because these filaments are planar.")
+
+
+def _count(entries, region, box):
+    if "concentration" not in entries:
+        return entries["count"] or 1
+    if region is None and box is None:
+        raise entries.at("concentration").error(f"needs a volume: add a [box], or inside = {REGION_EXAMPLE}")
+    volume = float(np.prod(box)) if region is None else region.volume
+    count = round(entries["concentration"] * volume)
+    if not 1 <= count <= MOST_NODES:
+        raise entries.at("concentration").error(
+            f"makes {count} filaments in a volume of {1e-9 * volume:.4g} um^3: choose it so that there are some, and "
+            f"no more than {MOST_NODES}."
+        )
+    return count
+
+
+def _from_file(entries, kind, box, folder):
+    entries.refuse(_FROM_FILE, "cannot be with a file, which says it.")
+    chains = read_start(
+        folder,
+        entries.at("file"),
+        entries["file"],
+        entries["topology"],
+        entries["frame"],
+        entries["filaments"],
+        kind.name,
+    )
+    shapes = {}
+    for nodes, closed in chains:
+        closed = closed or entries["closed"]
+        _check_lengths(entries, kind, nodes, closed, box)
+        shapes.setdefault((len(nodes) - (not closed), closed), []).append(_whole(nodes, box))
+    for (segments, closed), positions in shapes.items():
+        if segments < (MINIMUM_RING if closed else 1):
+            raise entries.at("file").error(f"has a filament of {segments} segments.")
+        yield FilamentGroup(
+            kind, segments, len(positions), "file", None, None, (), closed=closed, positions=tuple(positions)
+        )
+
+
+def _whole(nodes, box):
+    # Each node at the image that is nearest to the one before it.
+    if box is None:
+        return nodes
+    jumps = np.round(np.diff(nodes, axis=0) / box)
+    return nodes - np.concatenate([np.zeros((1, 3)), np.cumsum(jumps, axis=0)]) * box
+
+
+def _check_lengths(entries, kind, nodes, closed, box):
+    nodes = _whole(nodes, box)
+    vectors = np.diff(nodes, axis=0, append=nodes[:1]) if closed else np.diff(nodes, axis=0)
+    lengths = np.linalg.norm(vectors, axis=1)
+    if len(lengths) and not (0.5 * kind.segment_length < lengths.min() and lengths.max() < 2.0 * kind.segment_length):
+        raise entries.at("file").error(
+            f"has segments of {lengths.min():.4g} to {lengths.max():.4g} nm, but those of {kind.name} are of "
+            f"{kind.segment_length:g} nm: change segment_length, or the file (lengths in arrays are in nm)."
+        )

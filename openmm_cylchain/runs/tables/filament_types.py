@@ -1,0 +1,148 @@
+"""Filament types in a configuration: presets, what is changed of them, and descriptions of one's own."""
+
+import dataclasses
+
+from ...bead_spring.bead_spring_type import DSDNA_BASE_PAIRS, BeadSpringType
+from ...filaments.filament_type import DSDNA, F_ACTIN, MICROTUBULE, FilamentType
+from ...mechanics.friction import EndCorrections
+from ...mechanics.potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
+from ...units import quantities as units
+from ..keys import Choice, Inline, Key, Number, Quantity, Text, Whole, WordOrQuantity
+from ..table import TableKind
+
+PRESETS = {"F_ACTIN": F_ACTIN, "DSDNA": DSDNA, "MICROTUBULE": MICROTUBULE, "DSDNA_BASE_PAIRS": DSDNA_BASE_PAIRS}
+"""Filament types by the names that a configuration uses."""
+
+_CORRECTIONS = TableKind(
+    "end_corrections",
+    tuple(
+        Key(field.name, Number(f"{field.default}"), field.default, "Of a cylinder's friction, eq. (20).")
+        for field in dataclasses.fields(EndCorrections)
+    ),
+    "End corrections of friction.",
+)
+
+_QUANTITIES = {
+    "diameter": (units.LENGTH, "Of the filament."),
+    "segment_length": (units.LENGTH, "At rest."),
+    "bending_rigidity": (units.BENDING_RIGIDITY, "Of the filament; joints are those of the paper, a/l0."),
+    "persistence_length": (units.LENGTH, "Of the chain of segments, in place of a bending_rigidity."),
+    "temperature": (units.TEMPERATURE, "Of that persistence_length; the solvent's if not given."),
+    "stretching_stiffness": (units.STIFFNESS, "Of one segment."),
+    "stretching_modulus": (units.FORCE, "In place of that: stiffness times length of a segment."),
+    "maximum_extension": (units.LENGTH, 'Of a segment with stretching_model = "fene".'),
+    "extension_relaxation_time": (units.TIME, "Of the length of a segment."),
+    "extensional_friction": (units.ROTATIONAL_FRICTION, "In place of that."),
+    "mass_per_length": (units.MASS_PER_LENGTH, "For other programs: motion does not depend on it."),
+}
+_TEXTS = ("name", "bending_model", "stretching_model")
+_CYLINDER_KEYS = (*_TEXTS, *_QUANTITIES, "friction_length", "end_corrections")
+_BEAD_QUANTITIES = {
+    "bead_spacing": (units.LENGTH, "Of a chain of beads: at rest."),
+    "bead_friction": (units.FRICTION, "Of a bead."),
+    "bead_mass": (units.MASS, "Of a bead: motion does not depend on it."),
+}
+_BEAD_NUMBERS = ("nu", "reduced_temperature")
+_BEAD_KEYS = (*_BEAD_QUANTITIES, *_BEAD_NUMBERS, "coarse_graining")
+# Of both.
+_SHARED_KEYS = ("name", "diameter", "bending_rigidity", "persistence_length", "temperature", "stretching_modulus")
+
+TYPE_KEYS = (
+    Key("type", Choice(tuple(PRESETS)), None, "A preset, of which any property can be changed by the keys below."),
+    Key("name", Text('"DNA"'), None, "Of a type of one's own: up to 5 letters or digits."),
+    Key("bending_model", Choice(tuple(BENDING_POTENTIALS)), None, "See `FilamentType`."),
+    Key("stretching_model", Choice(tuple(STRETCHING_POTENTIALS)), None, "See `FilamentType`."),
+    *(
+        Key(name, Quantity(unit, "zero" if name == "bending_rigidity" else "positive"), None, text)
+        for name, (unit, text) in _QUANTITIES.items()
+    ),
+    Key("friction_length", WordOrQuantity(("segment", "filament"), units.LENGTH), None, "Of eq. (20)."),
+    Key("end_corrections", Inline(_CORRECTIONS, "{ parallel = -0.114 }"), None, "Of eq. (20)."),
+    *(Key(name, Quantity(unit), None, text) for name, (unit, text) in _BEAD_QUANTITIES.items()),
+    Key(
+        "nu", Number("0.35"), None, "Of a chain of beads, with reduced_temperature: see `BeadSpringType.from_reduced`."
+    ),
+    Key("reduced_temperature", Number("0.034"), None, "See nu."),
+    Key("coarse_graining", Whole(1, 10**6, "2"), 1, "Beads of the type that become one."),
+)
+"""Of a [[filament]] table: what kind of filament it is."""
+
+# Setting one of a pair in a preset takes the place of the other.
+_EXCLUSIVE = (
+    ("bending_rigidity", "persistence_length"),
+    ("stretching_stiffness", "stretching_modulus"),
+    ("extension_relaxation_time", "extensional_friction"),
+)
+
+
+def read_filament_type(entries, solvent):
+    """The FilamentType or BeadSpringType of a [[filament]] table."""
+    if not entries.given("type", "name"):
+        raise entries.error(
+            f"lacks the key 'type': name a preset ({', '.join(PRESETS)}), or describe the filament "
+            "with name, diameter, segment_length and the other properties of a FilamentType, or with bead_spacing and "
+            "those of a BeadSpringType."
+        )
+    preset = PRESETS[entries["type"]] if "type" in entries else None
+    with entries.naming():
+        if isinstance(preset, BeadSpringType) or (preset is None and "bead_spacing" in entries):
+            return _bead_spring_type(entries, solvent, preset)
+        return _cylinder_type(entries, solvent, preset)
+
+
+def _cylinder_type(entries, solvent, preset):
+    entries.refuse(_BEAD_KEYS, "belongs to a chain of beads: give its bead_spacing, or the type DSDNA_BASE_PAIRS.")
+    properties = entries.given(*_CYLINDER_KEYS)
+    if "end_corrections" in properties:
+        properties["end_corrections"] = EndCorrections(**properties["end_corrections"].values)
+    if "persistence_length" in properties:
+        properties.setdefault("temperature", solvent.temperature)
+    else:
+        entries.refuse(("temperature",), "belongs to persistence_length; give both.")
+    if preset is None:
+        entries.require("diameter", "segment_length")
+        return FilamentType(**properties)
+    if "segment_length" in properties:
+        preset = preset.with_segment_length(properties.pop("segment_length"))
+    return dataclasses.replace(preset, **_without_alternatives(properties)) if properties else preset
+
+
+def _without_alternatives(properties):
+    changed = dict(properties)
+    if "bending_rigidity" in properties:
+        changed["temperature"] = None
+    for pair in _EXCLUSIVE:
+        if any(key in properties for key in pair):
+            for key in pair:
+                changed.setdefault(key, None)
+    return changed
+
+
+def _bead_spring_type(entries, solvent, preset):
+    own = [key for key in _CYLINDER_KEYS if key not in _SHARED_KEYS]
+    entries.refuse(own, "belongs to a chain of cylinders, but this one has beads.")
+    properties = entries.given(*_SHARED_KEYS, *_BEAD_QUANTITIES)
+    numbers = entries.given(*_BEAD_NUMBERS)
+    if numbers and (preset is not None or len(numbers) < len(_BEAD_NUMBERS)):
+        raise entries.error("nu and reduced_temperature go together, in a description without a type.")
+    if numbers or "persistence_length" in properties:
+        properties.setdefault("temperature", solvent.temperature)
+    else:
+        entries.refuse(("temperature",), "belongs to persistence_length, or to reduced_temperature.")
+    return _bead_spring(entries, preset, properties, numbers).coarse_grained(entries["coarse_graining"])
+
+
+def _bead_spring(entries, preset, properties, numbers):
+    if preset is not None:
+        # Attributes of a type hold its bending_rigidity alone.
+        alternatives = {"bending_rigidity": None} if "persistence_length" in properties else {}
+        return dataclasses.replace(preset, **{**alternatives, **properties}) if properties else preset
+    entries.require("name", "diameter", "bead_friction")
+    if not numbers:
+        entries.require("stretching_modulus")
+        return BeadSpringType(**properties)
+    entries.refuse(
+        ("bending_rigidity", "persistence_length", "stretching_modulus"),
+        "belongs to a description without nu and reduced_temperature.",
+    )
+    return BeadSpringType.from_reduced(**properties, **numbers)

@@ -1,0 +1,229 @@
+"""[[linkers]]: crosslinkers and motors that bind, walk and unbind."""
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...errors import InputError
+from ...kinetics.crosslinker import Crosslinker
+from ...kinetics.hand import AT_ENDS, Hand
+from ...kinetics.linkers import as_linkers
+from ...kinetics.presets import PRESETS
+from ...units import quantities as units
+from ..keys import REQUIRED, Choice, Flag, Inline, Key, Number, Pair, Quantity, Text, Whole, point
+from ..table import Entries, TableKind
+from .filament_types import PRESETS as FILAMENT_PRESETS
+from .solvent import EDGES
+
+_QUANTITIES = {
+    "binding_rate": (units.RATE, "zero", "Of a hand that has filaments within reach."),
+    "reach": (units.LENGTH, "positive", "How far a hand binds."),
+    "unbinding_rate": (units.RATE, "zero", "Without a load."),
+    "unbinding_force": (units.FORCE, "positive", "At which it is e times as fast."),
+    "catch_rate": (units.RATE, "zero", "Of a catch bond: of unbinding without a load, which loads slow down."),
+    "catch_force": (units.FORCE, "positive", "At which that is e times as slow."),
+    "speed": (units.VELOCITY, "any", "Of walking towards the last node; negative towards the first."),
+    "stall_force": (units.FORCE, "positive", "At which a hand stands still."),
+    "site_spacing": (units.LENGTH, "positive", "Of sites that a hand occupies alone."),
+}
+
+
+class _Names:
+    """Names of filament types: one, or a list of them."""
+
+    example = '"F_ACTIN"'
+    text = "a name of a type of filaments, or a list of them"
+
+    def read(self, value, place):
+        names = [value] if isinstance(value, str) else value
+        if not isinstance(names, list) or not names or not all(isinstance(name, str) for name in names):
+            raise place.error(
+                f'must be a name of a type of filaments, or a list of them, as in ["F_ACTIN"], but is {names!r}.'
+            )
+        return tuple(FILAMENT_PRESETS[name].name if name in FILAMENT_PRESETS else name for name in names)
+
+    def schema(self):
+        return {"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}, "minItems": 1}]}
+
+
+class _Anchors:
+    """Points, numbers of nodes, or a region in which points are drawn."""
+
+    example = '[["0 nm", "0 nm", "0 nm"], ["100 nm", "0 nm", "0 nm"]]'
+    text = "a list of points or of numbers of nodes, or a table"
+
+    def read(self, value, place):
+        if isinstance(value, dict):
+            return _ANCHOR_REGION.read(value, place)
+        if not isinstance(value, list) or not value:
+            raise place.error(
+                f"must be a list of points, as in {self.example}, or of numbers of nodes, as in [0, 64], or a region, "
+                "as in { count = 1000, lower = [...], upper = [...] }"
+            )
+        if all(isinstance(own, int) and not isinstance(own, bool) for own in value):
+            return tuple(value)
+        for index, own in enumerate(value):
+            if not isinstance(own, list) or len(own) != 3:
+                raise place.item(index).error(f"must be a point, as in {self.example}, but is {own!r}.")
+        return tuple(point().read(own, place.item(index)) for index, own in enumerate(value))
+
+    def schema(self):
+        numbers = {"type": "array", "items": {"type": "integer", "minimum": 0}, "minItems": 1}
+        points = {"type": "array", "items": point().schema(), "minItems": 1}
+        return {"anyOf": [points, numbers, _ANCHOR_REGION.schema()]}
+
+
+HAND = TableKind(
+    "hand",
+    (
+        *(Key(name, Quantity(unit, least), None, text) for name, (unit, least, text) in _QUANTITIES.items()),
+        Key("strain_share", Number("0.5"), None, "Share of a spring's energy that binding feels, see `Hand`."),
+        Key("walks_backward", Flag(), None, "Whether a load above the stall force drives it back."),
+        Key("at_end", Choice(AT_ENDS), None, "What a hand does at the end of a filament."),
+        Key("binds_to", _Names(), None, "Names of filament types; all if not given."),
+    ),
+    "A hand, see `Hand`.",
+    owner="the hand of [[linkers]]",
+)
+# Of a segment: the search for hands that bind cuts it into pieces of their reach.
+_LEAST_REACH = 1e-3
+_HAND_EXAMPLE = '{ binding_rate = "10 1/s", reach = "50 nm", unbinding_rate = "0.3 1/s" }'
+
+_ANCHOR_REGION = TableKind(
+    "anchors",
+    (
+        Key("count", Whole(1, 10**7, "1000"), REQUIRED, "How many."),
+        Key("lower", point(), REQUIRED, "Corner of a box in which they are at random; it may be flat."),
+        Key("upper", point(), REQUIRED, "The opposite corner."),
+    ),
+    "Anchors at random places.",
+)
+LINKERS = TableKind(
+    "linkers",
+    (
+        Key("type", Choice(tuple(PRESETS)), None, "A preset, of which any property can be changed by the keys below."),
+        Key("name", Text('"motor"'), None, "Of linkers of one's own."),
+        Key("hand", Inline(HAND, _HAND_EXAMPLE), None, "Of two equal hands."),
+        Key("hands", Pair(HAND, f"[{_HAND_EXAMPLE}, {{ ... }}]"), None, "Two that differ."),
+        Key("stiffness", Quantity(units.STIFFNESS), None, "Of the spring between the hands."),
+        Key("rest_length", Quantity(units.LENGTH, "zero"), None, "Of that spring."),
+        Key("same_filament", Flag(), None, "Whether both hands may bind to one filament."),
+        Key("count", Whole(0, 10**7, "1000"), None, "How many there are."),
+        Key("concentration", Quantity(units.NUMBER_DENSITY, "zero"), None, "In place of that: of unbound ones."),
+        Key("volume", Quantity(units.VOLUME), None, "Of unbound ones; that of the box if not given."),
+        Key("anchors", _Anchors(), None, "Points to which they are tied, one each, in place of their first hands."),
+        Key("bound", Whole(0, 10**7, "100"), 0, "How many begin with one hand bound, at random places."),
+    ),
+    "Crosslinkers or motors that bind to filaments, walk along them and unbind; `docs/kinetics.md` has their laws.",
+    repeated=True,
+)
+
+
+@dataclass(frozen=True)
+class LinkerGroup:
+    """One [[linkers]] table; lengths in nm, anchors as points or as numbers of particles."""
+
+    kind: Crosslinker
+    count: int | None
+    concentration: float | None
+    volume: float | None
+    anchors: tuple | None
+    bound: int
+
+
+def read_linkers(entries, groups, box, seed):
+    """The LinkerGroup of a [[linkers]] table, for FilamentGroups; the seed is that of anchors at random places."""
+    anchors = _anchor_points(entries, sum(own.count * own.nodes for own in groups), seed)
+    names = ("count", "concentration", "volume")
+    group = LinkerGroup(_kind(entries), *(entries[name] for name in names), anchors, entries["bound"])
+    with entries.naming():
+        as_linkers(group.kind, group.count, group.concentration, group.volume, group.anchors, group.bound, 0)
+    if box is None and group.count is not None and group.volume is None:
+        raise entries.error(
+            f"Linkers that are not bound are in a volume: add a periodic [box] with edges = {EDGES.example}, or "
+            'to this table a line such as volume = "1 um^3".'
+        )
+    names = sorted({own.type.name for own in groups})
+    for hand in group.kind.hands:
+        if box is not None and hand.reach >= 0.5 * min(box):
+            raise entries.error(
+                f"The reach of a hand, {hand.reach:g} nm, must be less than half of the shortest edge of "
+                f"the box, {min(box):g} nm."
+            )
+        longest = max((own.type.segment_length for own in groups if hand.binds(own.type)), default=0.0)
+        if hand.reach < _LEAST_REACH * longest:
+            raise entries.error(
+                f"The reach of a hand, {hand.reach:g} nm, must be at least a thousandth of a segment, "
+                f"{_LEAST_REACH * longest:g} nm."
+            )
+        if not any(hand.binds(own.type) for own in groups):
+            raise entries.error(
+                f"A hand binds to filaments of the type {' or '.join(hand.binds_to)}, but those of the "
+                f'configuration are {", ".join(names)}: change it, as in hand = {{ binds_to = "{names[0]}" }}.'
+            )
+    return group
+
+
+def binds_to(group, linkers):
+    """Whether linkers bind to the filaments of a FilamentGroup."""
+    return any(hand.binds(group.type) for own in linkers for hand in own.kind.hands)
+
+
+def _kind(entries):
+    preset = PRESETS[entries["type"]] if "type" in entries else None
+    properties = entries.given("stiffness", "rest_length", "same_filament", "name")
+    with entries.naming():
+        hands = _hands(entries, preset)
+        if hands is not None:
+            properties["hands"] = hands
+        if preset is not None:
+            return dataclasses.replace(preset, **properties)
+        entries.require("stiffness")
+        return Crosslinker(**properties)
+
+
+def _hands(entries, preset):
+    if "hand" in entries and "hands" in entries:
+        raise entries.error("give hand, for two equal ones, or hands, not both.")
+    if "hands" in entries:
+        first = (None, None) if preset is None else preset.hands
+        return tuple(_hand(own, changed) for own, changed in zip(entries["hands"], first))
+    if "hand" in entries:
+        own = entries["hand"]
+        return _hand(own, None) if preset is None else tuple(_hand(own, changed) for changed in preset.hands)
+    if preset is None:
+        raise entries.error(
+            f"lacks the key 'type': name a preset ({', '.join(PRESETS)}), or describe the linker with stiffness, "
+            f"rest_length and hand = {_HAND_EXAMPLE}"
+        )
+    return None
+
+
+def _hand(entries, changed):
+    properties = entries.given(*HAND.names)
+    if changed is None:
+        entries.require("binding_rate", "reach", "unbinding_rate")
+    with entries.naming():
+        try:
+            return Hand(**properties) if changed is None else dataclasses.replace(changed, **properties)
+        except InputError as error:
+            # Hands begin their messages with their own name.
+            raise InputError(f"{entries.label}: {str(error).removeprefix('Hand: ')}") from None
+
+
+def _anchor_points(entries, nodes, seed):
+    anchors = entries["anchors"]
+    if anchors is None:
+        return None
+    if isinstance(anchors, Entries):
+        lower, upper = np.array(anchors["lower"]), np.array(anchors["upper"])
+        if np.any(lower > upper):
+            raise anchors.at("upper").error("must not be below lower.")
+        generator = np.random.default_rng([seed, *entries.place.path[1:]])
+        return tuple(map(tuple, generator.uniform(lower, upper, (anchors["count"], 3)).tolist()))
+    if isinstance(anchors[0], int) and not 0 <= min(anchors) <= max(anchors) < nodes:
+        raise entries.at("anchors").error(
+            f"must be numbers of nodes between 0 and {nodes - 1}, but are {list(anchors)}."
+        )
+    return anchors

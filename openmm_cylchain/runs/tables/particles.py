@@ -1,0 +1,90 @@
+"""[[particles]]: spheres beside filaments."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...mechanics.friction import stokes_friction
+from ...units import quantities as units
+from ...units.quantities import thermal_energy
+from ..keys import REQUIRED, Flag, Inline, Key, Listing, Quantity, Text, Whole, point
+from ..table import TableKind
+from .filament import MOST_NODES
+from .shapes import REGION, REGION_EXAMPLE, Region
+
+PARTICLES = TableKind(
+    "particles",
+    (
+        Key("name", Text('"BEAD"'), "PRT", "Up to 5 letters or digits, for structure files."),
+        Key("diameter", Quantity(units.LENGTH), REQUIRED, "Of a sphere: for its friction, contacts and walls."),
+        Key("count", Whole(1, MOST_NODES, "100"), None, "How many begin at random places."),
+        Key(
+            "positions",
+            Listing(point(), "points", '[["0 nm", "0 nm", "0 nm"]]'),
+            None,
+            "In place of that: where they begin.",
+        ),
+        Key("inside", Inline(REGION, REGION_EXAMPLE), None, "A region of random places; the box if not given."),
+        Key("friction", Quantity(units.FRICTION), None, "That of Stokes if not given."),
+        Key("diffusion", Quantity(units.DIFFUSION), None, "In place of that: k_B T over the friction."),
+        Key("fixed", Flag(), False, "They do not move."),
+    ),
+    "Spheres that diffuse, beside filaments. Filaments push them where there are [contacts], walls keep them in; they "
+    "do not push each other.",
+    repeated=True,
+)
+
+
+@dataclass(frozen=True)
+class ParticleGroup:
+    """A [[particles]] table; lengths in nm, friction in kJ ps/(mol nm^2)."""
+
+    name: str
+    diameter: float
+    count: int
+    positions: tuple | None
+    inside: Region | None
+    friction: float
+    fixed: bool
+
+    def places(self, generator, box):
+        """Where they begin: (count, 3) positions in nm."""
+        if self.positions is not None:
+            return np.array(self.positions)
+        if self.inside is not None:
+            return np.array([self.inside.draw(generator) for _ in range(self.count)])
+        return generator.uniform(0.0, box, (self.count, 3))
+
+
+def read_particles(entries, solvent, box):
+    """The ParticleGroup of a [[particles]] table."""
+    if not (entries["name"].isalnum() and entries["name"].isascii() and len(entries["name"]) <= 5):
+        raise entries.at("name").error(f"must be 1 to 5 letters or digits, but is {entries['name']!r}.")
+    if entries["name"] in ("NOD", "ATT", "BED"):
+        raise entries.at("name").error(f"{entries['name']!r} is that of nodes: choose another.")
+    entries.only_one("count", "positions")
+    if "positions" in entries:
+        entries.refuse(("inside",), "cannot be with positions.")
+    else:
+        entries.require("count")
+        if box is None:
+            entries.require("inside")
+    entries.only_one(
+        "friction",
+        "diffusion",
+    )
+    friction = entries["friction"]
+    if "diffusion" in entries:
+        friction = thermal_energy(solvent.temperature) / entries["diffusion"]
+    if friction is None:
+        friction = stokes_friction(entries["diameter"], solvent.viscosity)
+    positions = entries["positions"]
+    return ParticleGroup(
+        entries["name"],
+        entries["diameter"],
+        entries["count"] if positions is None else len(positions),
+        positions,
+        None if entries["inside"] is None else Region(entries["inside"]),
+        friction,
+        entries["fixed"],
+    )

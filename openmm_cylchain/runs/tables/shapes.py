@@ -1,0 +1,120 @@
+"""Shapes in a configuration: of walls, and of regions in which filaments and particles begin."""
+
+import numpy as np
+
+from ...couplings.walls import Box, Cylinder, Ellipsoid, Plane, Slab, Sphere
+from ...units import quantities as units
+from ..keys import REQUIRED, Choice, Key, Quantity, direction, point
+from ..table import TableKind
+
+_SHAPES = {
+    "plane": (Plane, ("point", "normal")),
+    "slit": (Slab, ("point", "normal", "thickness")),
+    "sphere": (Sphere, ("center", "radius")),
+    "cylinder": (Cylinder, ("point", "axis", "radius")),
+    "box": (Box, ("lower", "upper")),
+    "ellipsoid": (Ellipsoid, ("center", "semi_axes")),
+}
+_BOUNDED = ("sphere", "cylinder", "box", "ellipsoid")
+_ORIGIN = (0.0, 0.0, 0.0)
+
+_KEYS = (
+    Key("point", point(), _ORIGIN, "On a plane, half-way between those of a slit, or on the axis of a cylinder."),
+    Key("normal", direction(), (0.0, 0.0, 1.0), "Of a plane, to the side of the filaments, or of a slit."),
+    Key("thickness", Quantity(units.LENGTH), None, "Of a slit."),
+    Key("center", point(), _ORIGIN, "Of a sphere or an ellipsoid."),
+    Key("radius", Quantity(units.LENGTH), None, "Of a sphere or a cylinder."),
+    Key("axis", direction(), (1.0, 0.0, 0.0), "Of a cylinder."),
+    Key("lower", point(), None, "Corner of a box, along the axes of space."),
+    Key("upper", point(), None, "The opposite corner."),
+    Key("semi_axes", point(), None, "Of an ellipsoid along x, y and z."),
+)
+SHAPE_KEYS = (Key("shape", Choice(tuple(_SHAPES)), REQUIRED, "What filaments are kept in."), *_KEYS)
+"""Of walls."""
+
+REGION = TableKind(
+    "inside",
+    (
+        Key("shape", Choice(_BOUNDED), REQUIRED, "Of the region."),
+        *(key for key in _KEYS if key.name not in ("normal", "thickness")),
+        Key("length", Quantity(units.LENGTH), None, "Of a cylinder, half of it on either side of its point."),
+    ),
+    "A region in which filaments or particles begin.",
+)
+REGION_EXAMPLE = '{ shape = "sphere", radius = "1 um" }'
+
+
+def read_shape(entries):
+    """The Shape of a table with SHAPE_KEYS; those that its shape does not have are refused."""
+    kind, names = _SHAPES[entries["shape"]]
+    every = {key.name for key in _KEYS}
+    entries.refuse(sorted(every - set(names)), f"is none of a {entries['shape']}: that has {', '.join(names)}.")
+    entries.require(*(name for name in names if entries[name] is None))
+    with entries.naming():
+        return kind(*(np.array(entries[name]) if isinstance(entries[name], tuple) else entries[name] for name in names))
+
+
+class Region:
+    """A bounded region: positions are drawn in it, and asked whether they are in it.
+
+    Parameters
+    ----------
+    entries : Entries
+        Of REGION.
+    """
+
+    def __init__(self, entries):
+        self._shape = read_shape(entries)
+        self._length = entries["length"]
+        if entries["shape"] == "cylinder":
+            entries.require("length")
+        else:
+            entries.refuse(("length",), "belongs to a cylinder.")
+        self._values = entries.values
+        self._lower, self._upper = self._bounds()
+
+    def __eq__(self, other):
+        return isinstance(other, Region) and self._values == other._values
+
+    __hash__ = None
+
+    @property
+    def volume(self):
+        """In nm^3."""
+        shape = self._shape
+        if isinstance(shape, Sphere):
+            return 4.0 / 3.0 * np.pi * shape.radius**3
+        if isinstance(shape, Cylinder):
+            return np.pi * shape.radius**2 * self._length
+        if isinstance(shape, Ellipsoid):
+            return 4.0 / 3.0 * np.pi * float(np.prod(shape.semi_axes))
+        return float(np.prod(self._upper - self._lower))
+
+    @property
+    def diameter(self):
+        """Of the box around it in nm: no two points of it are further apart."""
+        return float(np.linalg.norm(self._upper - self._lower))
+
+    def _bounds(self):
+        shape = self._shape
+        if isinstance(shape, Box):
+            return shape.lower, shape.upper
+        if isinstance(shape, Cylinder):
+            reach = 0.5 * self._length * np.abs(shape.axis) + shape.radius * np.sqrt(1.0 - shape.axis**2)
+            return shape.point - reach, shape.point + reach
+        reach = shape.semi_axes if isinstance(shape, Ellipsoid) else np.full(3, shape.radius)
+        return shape.center - reach, shape.center + reach
+
+    def draw(self, generator):
+        """A random point in it: a (3,) array in nm."""
+        while True:
+            point = generator.uniform(self._lower, self._upper)
+            if self.contains(point):
+                return point
+
+    def contains(self, positions):
+        """Whether all positions (..., 3) in nm are in it."""
+        inside = self._shape.square_depth(positions) == 0.0
+        if self._length is not None:
+            inside &= np.abs((np.asarray(positions) - self._shape.point) @ self._shape.axis) <= 0.5 * self._length
+        return bool(np.all(inside))
