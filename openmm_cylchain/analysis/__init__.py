@@ -1,7 +1,8 @@
-"""Analysis of trajectories of filaments, which mdtraj has read; ``statistics`` has the errors of correlated series."""
+"""Analysis of runs, which ``load`` reads, and of trajectories in mdtraj; ``statistics`` has errors of series."""
 
 from . import statistics
 from .crossings import CrossingCounter, Crossings, find_crossings
+from .runs import Run, RunFilament, load
 from .trajectories import (
     MeanSquareDisplacement,
     TangentCorrelation,
@@ -26,6 +27,8 @@ __all__ = [
     "CrossingCounter",
     "Crossings",
     "MeanSquareDisplacement",
+    "Run",
+    "RunFilament",
     "TangentCorrelation",
     "bending_drift",
     "bending_mode_amplitudes",
@@ -35,6 +38,7 @@ __all__ = [
     "filament_nodes",
     "find_crossings",
     "joint_cosines",
+    "load",
     "mean_square_displacement",
     "node_positions",
     "persistence_length",

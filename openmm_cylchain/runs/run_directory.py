@@ -7,13 +7,13 @@ one step once they are safely on disk, so whatever is written behind that point 
 import json
 import os
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from openmm import app
 
 from ..errors import InputError
 from ..output.files import write_atomically
+from ..output.run_files import RunFiles, try_lock
 from ..version import __version__
 from .configuration import changed_keys, read_configuration
 
@@ -35,7 +35,7 @@ class Checkpoint:
     linker_records: int = 0
 
 
-class RunDirectory:
+class RunDirectory(RunFiles):
     """A directory that one run at a time writes into; a context manager that holds its lock.
 
     Parameters
@@ -44,26 +44,12 @@ class RunDirectory:
         Made if it does not exist.
     """
 
-    def __init__(self, path):
-        self.path = Path(path)
-        self.configuration = self.path / "configuration.toml"
-        self.topology = self.path / "topology.cif"
-        self.topology_psf = self.path / "topology.psf"
-        self.topology_data = self.path / "topology.data"
-        self.trajectory = self.path / "trajectory.dcd"
-        self.energies = self.path / "energies.csv"
-        self.linkers = self.path / "linkers.csv"
-        self.linker_places = self.path / "linkers.npy"
-        self.checkpoint = self.path / "checkpoint.chk"
-        self.summary = self.path / "summary.json"
-        self.figure = self.path / "summary.png"
-
     def __enter__(self):
         if self.path.exists() and not self.path.is_dir():
             raise InputError(f"The output directory {self.path} is a file: choose another name.")
         self.path.mkdir(parents=True, exist_ok=True)
-        self._lock = open(self.path / ".lock", "a+b")
-        if not _try_lock(self._lock):
+        self._lock = open(self.lock, "a+b")
+        if not try_lock(self._lock):
             self._lock.close()
             raise InputError(
                 f"Another run is writing into {self.path}: wait until it ends, or choose another output directory."
@@ -172,22 +158,6 @@ class RunDirectory:
                 f"The run in {self.path} was started with openmm_cylchain {version}, and this is {__version__}: resume "
                 "it with that version, or start it again in another directory."
             )
-
-
-def _try_lock(file):
-    try:
-        import fcntl
-    except ImportError:
-        import msvcrt
-
-        lock, arguments = msvcrt.locking, (msvcrt.LK_NBLCK, 1)
-    else:
-        lock, arguments = fcntl.flock, (fcntl.LOCK_EX | fcntl.LOCK_NB,)
-    try:
-        lock(file.fileno(), *arguments)
-    except (BlockingIOError, PermissionError):
-        return False
-    return True
 
 
 def _open_at(path, size):
