@@ -25,6 +25,7 @@ FLOORS = (
     ("systems",),
     ("",),
     ("runs",),
+    ("rendering",),
     ("benchmark",),
     ("reproduce",),
     ("cli",),

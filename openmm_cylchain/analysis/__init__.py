@@ -2,6 +2,7 @@
 
 from . import statistics
 from .crossings import CrossingCounter, Crossings, find_crossings
+from .order import director, order_parameter, order_tensor
 from .runs import Run, RunFilament, load
 from .trajectories import (
     MeanSquareDisplacement,
@@ -34,6 +35,7 @@ __all__ = [
     "bending_mode_amplitudes",
     "centers_of_mass",
     "contour_lengths",
+    "director",
     "end_to_end_vectors",
     "filament_nodes",
     "find_crossings",
@@ -41,6 +43,8 @@ __all__ = [
     "load",
     "mean_square_displacement",
     "node_positions",
+    "order_parameter",
+    "order_tensor",
     "persistence_length",
     "radii_of_gyration",
     "ring_filaments",
