@@ -26,6 +26,7 @@ FLOORS = (
     ("",),
     ("runs",),
     ("rendering",),
+    ("export",),
     ("benchmark",),
     ("reproduce",),
     ("cli",),

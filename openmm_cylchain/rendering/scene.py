@@ -13,14 +13,11 @@ from ..errors import InputError
 from ..mechanics.geometry import joint_cosines, segment_vectors
 from ..units.quantities import AVOGADRO
 from ..units.types import FloatArray, IntArray
+from .colors import filament_colors, linker_color
 from .tubes import Tubes
 
 COLORINGS = ("type", "tension", "orientation", "bending")
 
-# Of Okabe and Ito, which the color-blind can tell apart.
-_FILAMENT_COLORS = ("#0072B2", "#009E73", "#56B4E9", "#6B6B6B")
-_LINKER_COLORS = ("#E69F00", "#D55E00", "#CC79A7", "#F0E442")
-_GREYS = ("#333333", "#8A8A8A", "#5E5E5E", "#B0B0B0")  # Of linkers where colors of filaments are numbers.
 _LINE_COLOR, _LINE_WIDTH = np.array([0.62, 0.64, 0.68]), 0.0011
 _VISIBLE = 0.009  # Of the extent of the scene: what a tube is wide at least.
 _ROUND = 72
@@ -97,7 +94,7 @@ class Scene:
         """Everything in a frame."""
         parts = list(self._fixed)
         values = None if self.scale is None else _values(self.run, self.look, self._director, frame)
-        colors = _type_colors(self.run)
+        colors = filament_colors(self.run)
         for number, (own, nodes) in enumerate(zip(self.run.filaments, self.run.nodes(frame))):
             ends = np.stack([nodes, np.roll(nodes, -1, axis=0)], axis=1)[: own.segments]
             color = np.tile(_rgb(colors[own.type.name]), (own.segments, 1))
@@ -115,7 +112,7 @@ class Scene:
         parts = []
         for kind in range(len(self.run.linker_types)):
             places = np.asarray(records["places"][records["type"] == kind], dtype=float)
-            color = _rgb(_linker_color(self.look, kind))
+            color = _rgb(linker_color(kind, self.scale is not None))
             there = ~np.isnan(places).any(axis=2)
             springs, _ = self._wrapped(places[there.all(axis=1)])
             hands, _ = self._wrapped(np.repeat(places[there][:, None], 2, axis=1))
@@ -167,10 +164,12 @@ def make_scene(run: Run, look: Look, frames: list[int]) -> Scene:
         diameters = own if look.diameter == 0.0 else np.full(len(own), look.diameter)
     # Tubes stand out from the points by half their width.
     points = np.concatenate([points + 0.5 * diameters.max(), points - 0.5 * diameters.max()])
-    colors = _type_colors(run)
+    colors = filament_colors(run)
     legend = [(name, color, "filament") for name, color in colors.items()] if look.color == "type" else []
     if look.linkers:
-        legend += [(own.name, _linker_color(look, kind), "linker") for kind, own in enumerate(run.linker_types)]
+        legend += [
+            (own.name, linker_color(kind, look.color != "type"), "linker") for kind, own in enumerate(run.linker_types)
+        ]
     axis = director(np.concatenate(_segments(run, frames[0]))) if look.color == "orientation" else None
     scale = _color_scale(run, look, axis, frames)
     fixed = _lines(_outlines(run, points), _LINE_WIDTH * extent)
@@ -192,16 +191,6 @@ def _framed_points(run, look, frames):
     if walls:
         ends.extend(np.concatenate(walls))
     return np.array(ends)
-
-
-def _type_colors(run):
-    names = dict.fromkeys(own.type.name for own in run.filaments)
-    return {name: _FILAMENT_COLORS[number % len(_FILAMENT_COLORS)] for number, name in enumerate(names)}
-
-
-def _linker_color(look, kind):
-    colors = _LINKER_COLORS if look.color == "type" else _GREYS
-    return colors[kind % len(colors)]
 
 
 def _rgb(color):
