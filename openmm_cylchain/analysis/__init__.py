@@ -2,6 +2,7 @@
 
 from . import statistics
 from .crossings import CrossingCounter, Crossings, find_crossings
+from .networks import contact_map, contraction, filament_distances, mesh_size
 from .order import director, order_parameter, order_tensor
 from .runs import Run, RunFilament, load
 from .trajectories import (
@@ -34,14 +35,18 @@ __all__ = [
     "bending_drift",
     "bending_mode_amplitudes",
     "centers_of_mass",
+    "contact_map",
     "contour_lengths",
+    "contraction",
     "director",
     "end_to_end_vectors",
+    "filament_distances",
     "filament_nodes",
     "find_crossings",
     "joint_cosines",
     "load",
     "mean_square_displacement",
+    "mesh_size",
     "node_positions",
     "order_parameter",
     "order_tensor",
