@@ -5,6 +5,7 @@ from .crossings import CrossingCounter, Crossings, find_crossings
 from .networks import contact_map, contraction, filament_distances, mesh_size
 from .order import director, order_parameter, order_tensor
 from .runs import Run, RunFilament, load
+from .stress import Stress, stress
 from .trajectories import (
     MeanSquareDisplacement,
     TangentCorrelation,
@@ -31,6 +32,7 @@ __all__ = [
     "MeanSquareDisplacement",
     "Run",
     "RunFilament",
+    "Stress",
     "TangentCorrelation",
     "bending_drift",
     "bending_mode_amplitudes",
@@ -55,6 +57,7 @@ __all__ = [
     "ring_filaments",
     "segment_lengths",
     "statistics",
+    "stress",
     "tangent_correlation",
     "tangents",
 ]

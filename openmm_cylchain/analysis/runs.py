@@ -45,12 +45,15 @@ class RunFilament:
         In nm.
     ring : bool
         Whether the last node is joined to the first.
+    clamped : tuple of int
+        Nodes that do not move, counted along the filament.
     """
 
     type: Any
     nodes: IntArray
     diameter: float
     ring: bool
+    clamped: tuple[int, ...] = ()
 
     @property
     def segments(self) -> int:
@@ -152,7 +155,8 @@ class Run:
         largest = max(np.abs(self.positions(frame)).max() for frame in (0, -1))
         return 0.1 * float(np.spacing(np.float32(10.0 * largest)))
 
-    def _warn_of_rounding(self):
+    def warn_of_rounding(self) -> None:
+        """Warn (PrecisionWarning) of positions that are coarser than thermal fluctuations, see ``load``."""
         widths = [np.sqrt(thermal_energy(self.temperature) / own.type.segment_stiffness) for own in self.filaments]
         if self.coordinate_resolution > _COARSE * min(widths):
             warnings.warn(
@@ -263,7 +267,7 @@ class Run:
         frame, average = self._frame(frame), whole_number(average, 1, "average")
         first = max(0, frame - (average - 1) // 2)
         frames = range(first, min(len(self), first + average))
-        self._warn_of_rounding()
+        self.warn_of_rounding()
         totals = [np.zeros(own.segments) for own in self.filaments]
         for each in frames:
             for own, nodes, total in zip(self.filaments, self.nodes(each), totals):
@@ -273,7 +277,7 @@ class Run:
 
 
 def _filament(own: DescribedFilament) -> RunFilament:
-    return RunFilament(own.type, np.array(own.nodes, dtype=int), own.diameter, own.ring)
+    return RunFilament(own.type, np.array(own.nodes, dtype=int), own.diameter, own.ring, own.clamped)
 
 
 def load(path: str | Path, incomplete: bool = False) -> Run:
@@ -332,7 +336,7 @@ def load(path: str | Path, incomplete: bool = False) -> Run:
             "incomplete=True (--incomplete)."
         )
     run = Run(files, description, min(frames, expected), energies)
-    run._warn_of_rounding()
+    run.warn_of_rounding()
     return run
 
 
