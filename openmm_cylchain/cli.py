@@ -14,6 +14,8 @@ from pathlib import Path
 
 from .engine_choice import ENGINES
 from .errors import InputError, InstabilityError, TimeStepWarning
+from .export import command as export
+from .rendering import command as rendering
 from .runs.beginnings import START_NAMES
 from .version import __version__
 
@@ -99,6 +101,8 @@ def _parser():
     timestep.add_argument("--json", metavar="FILE", help="write the results of the check to FILE as well")
     timestep.set_defaults(command=_time_step)
 
+    rendering.add_command(commands)
+    export.add_command(commands)
     _add_benchmarks(commands.add_parser("benchmark", help="measure speed and memory on this machine"))
     _add_reproductions(commands.add_parser("reproduce", help="compute the results of a paper again"))
     information = commands.add_parser("info", help="print versions, engines and platforms, and why one is missing")

@@ -78,5 +78,9 @@ class EquilibrationWarning(UserWarning):
     """A trajectory whose start differs from its end by more than chance: averages over it contain the relaxation."""
 
 
+class PrecisionWarning(UserWarning):
+    """Positions of a trajectory whose single precision is coarser than what is computed from them."""
+
+
 class TimeStepWarning(UserWarning):
     """A time step that is too long: above a bound, which the message names, or by what a run shows of it."""

@@ -25,6 +25,8 @@ FLOORS = (
     ("systems",),
     ("",),
     ("runs",),
+    ("rendering",),
+    ("export",),
     ("benchmark",),
     ("reproduce",),
     ("cli",),

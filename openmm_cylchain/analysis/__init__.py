@@ -1,7 +1,11 @@
-"""Analysis of trajectories of filaments, which mdtraj has read; ``statistics`` has the errors of correlated series."""
+"""Analysis of runs, which ``load`` reads, and of trajectories in mdtraj; ``statistics`` has errors of series."""
 
 from . import statistics
 from .crossings import CrossingCounter, Crossings, find_crossings
+from .networks import contact_map, contraction, filament_distances, mesh_size
+from .order import director, order_parameter, order_tensor
+from .runs import Run, RunFilament, load
+from .stress import Stress, stress
 from .trajectories import (
     MeanSquareDisplacement,
     TangentCorrelation,
@@ -26,22 +30,34 @@ __all__ = [
     "CrossingCounter",
     "Crossings",
     "MeanSquareDisplacement",
+    "Run",
+    "RunFilament",
+    "Stress",
     "TangentCorrelation",
     "bending_drift",
     "bending_mode_amplitudes",
     "centers_of_mass",
+    "contact_map",
     "contour_lengths",
+    "contraction",
+    "director",
     "end_to_end_vectors",
+    "filament_distances",
     "filament_nodes",
     "find_crossings",
     "joint_cosines",
+    "load",
     "mean_square_displacement",
+    "mesh_size",
     "node_positions",
+    "order_parameter",
+    "order_tensor",
     "persistence_length",
     "radii_of_gyration",
     "ring_filaments",
     "segment_lengths",
     "statistics",
+    "stress",
     "tangent_correlation",
     "tangents",
 ]

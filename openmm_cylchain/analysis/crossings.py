@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 from ..errors import InputError
 from ..filaments.collection import FilamentCollection
 from ..units.quantities import LENGTH, in_units_of, positive
-from ..units.types import BoxVectors, FloatArray, IntArray, Scalar, Vectors
+from ..units.types import BoolArray, BoxVectors, FloatArray, IntArray, Scalar, Vectors
 
 # Of the width of a bracket around the time of a crossing: 2^-52.
 _BISECTIONS = 52
@@ -141,14 +141,16 @@ class CrossingCounter:
 
 
 @dataclass(frozen=True)
-class _Pairs:
-    # Two segments each, and the vector by which the second one is shifted to the image in question.
-    first: np.ndarray
-    second: np.ndarray
-    shift: np.ndarray
+class Pairs:
+    """Pairs of points by their numbers, and the vectors by which the second is shifted to the image in question."""
 
-    def where(self, wanted):
-        return _Pairs(self.first[wanted], self.second[wanted], self.shift[wanted])
+    first: IntArray
+    second: IntArray
+    shift: FloatArray
+
+    def where(self, wanted: BoolArray) -> "Pairs":
+        """Those that are wanted."""
+        return Pairs(self.first[wanted], self.second[wanted], self.shift[wanted])
 
 
 class _Segments:
@@ -185,7 +187,7 @@ class _Segments:
         starts = positions[self._minus]
         radius = float(np.linalg.norm(vectors, axis=1).max()) + margin
         # Rounding must not lose a pair at the very end of the radius.
-        pairs = _pairs_of_points(starts + 0.5 * vectors, radius * (1.0 + 1e-9), box)
+        pairs = pairs_of_points(starts + 0.5 * vectors, radius * (1.0 + 1e-9), box)
         same_chain = self._chain[pairs.first] == self._chain[pairs.second]
         apart = np.abs(self._number[pairs.first] - self._number[pairs.second])
         close = (apart <= 1) | (apart == self._around[self._chain[pairs.first]])
@@ -225,11 +227,11 @@ def _box(box_vectors):
     return box
 
 
-def _pairs_of_points(points, radius, box):
-    # All pairs within the radius, with every image of a periodic box: each once, the lower number first.
+def pairs_of_points(points: FloatArray, radius: float, box: FloatArray | None) -> Pairs:
+    """All pairs within a radius, with every image of a periodic box: each once, the lower number first."""
     if box is None:
         pairs = cKDTree(points).query_pairs(radius, output_type="ndarray")
-        return _Pairs(pairs[:, 0], pairs[:, 1], np.zeros((len(pairs), 3)))
+        return Pairs(pairs[:, 0], pairs[:, 1], np.zeros((len(pairs), 3)))
     inverse = np.linalg.inv(box)
     reach = radius * np.linalg.norm(inverse, axis=0)
     if np.any(reach > 1.0):
@@ -253,7 +255,7 @@ def _pairs_of_points(points, radius, box):
     # original with an image of a lower one comes again as an image of the original with the lower one.
     found = found[(found[:, 0] < len(points)) & (copy[found[:, 0]] < copy[found[:, 1]])]
     first, second = copy[found[:, 0]], copy[found[:, 1]]
-    return _Pairs(first, second, (shift[found[:, 1]] - cells[second] + cells[first]) @ box)
+    return Pairs(first, second, (shift[found[:, 1]] - cells[second] + cells[first]) @ box)
 
 
 def segment_distances(p: FloatArray, q: FloatArray, w: FloatArray) -> FloatArray:

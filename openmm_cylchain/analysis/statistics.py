@@ -6,12 +6,13 @@ copies (filaments, segments), which are pooled.
 
 import logging
 import math
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from ..errors import InputError
+from ..errors import EquilibrationWarning, InputError
 from ..units.quantities import DIMENSIONLESS, TIME, in_units_of, positive, whole_number
 from ..units.types import FloatArray, Numbers, Scalar
 
@@ -105,6 +106,76 @@ def mean_with_error(series: npt.ArrayLike) -> tuple[float, float]:
     if _is_constant(copies):
         return mean, 0.0
     return mean, float(np.sqrt(np.var(copies, ddof=1) * statistical_inefficiency(copies) / copies.size))
+
+
+FEWEST_INDEPENDENT_SAMPLES = 20
+"""Below which ``mean_in_equilibrium`` warns: an error from n samples is itself uncertain by (2n)^(-1/2), here 16 %."""
+
+
+@dataclass(frozen=True)
+class EquilibriumMean:
+    """A mean over the part of a series that is in equilibrium.
+
+    Attributes
+    ----------
+    mean, standard_error : float
+    first_frame : int
+        From which on the series is in equilibrium; frames before it are left out.
+    independent_samples : float
+        How many independent samples the rest is worth.
+    """
+
+    mean: float
+    standard_error: float
+    first_frame: int
+    independent_samples: float
+
+
+def mean_in_equilibrium(series: npt.ArrayLike) -> EquilibriumMean:
+    """Mean of a series without the frames in which it relaxes, and its standard error.
+
+    The first frame is the one from which on the series has most independent samples (pymbar; Chodera, J. Chem. Theory
+    Comput. 2016, 12, 1799).
+
+    Parameters
+    ----------
+    series : (frames,) array
+
+    Returns
+    -------
+    EquilibriumMean
+
+    Raises
+    ------
+    InputError
+        For fewer than 8 frames, or values that are not finite.
+
+    Warns
+    -----
+    EquilibrationWarning
+        If fewer than 20 independent samples are left, so that the error itself is not known, or the series relaxes in
+        more than half of its frames: the run is too short.
+    """
+    values = _series(series)
+    if values.ndim != 1 or len(values) < FEWEST_FRAMES_OF_DRIFT:
+        raise InputError(
+            f"series must be an array of {FEWEST_FRAMES_OF_DRIFT} frames at least, but has the shape {values.shape}."
+        )
+    if _is_constant(values):
+        return EquilibriumMean(float(values.mean()), 0.0, 0, float(len(values)))
+    first, inefficiency, _ = _pymbar_timeseries().detect_equilibration(values, nskip=max(1, len(values) // 200))
+    rest = values[int(first) :]
+    samples = len(rest) / float(inefficiency)
+    error = float(np.sqrt(np.var(rest, ddof=1) / samples)) if len(rest) > 1 else math.nan
+    if samples < FEWEST_INDEPENDENT_SAMPLES or first > len(values) // 2:
+        longer = max(2.0, 2.0 * FEWEST_INDEPENDENT_SAMPLES / samples)
+        warnings.warn(
+            f"The run is too short for its error bar: from frame {int(first)} of {len(values)} on it is worth "
+            f"{samples:.3g} independent samples. Run it at least {longer:.0f} times as long.",
+            EquilibrationWarning,
+            stacklevel=2,
+        )
+    return EquilibriumMean(float(rest.mean()), error, int(first), samples)
 
 
 SIGNIFICANT_DRIFT = 4.0

@@ -21,6 +21,7 @@ from ..output.structure_files import write_lammps_data, write_psf
 from ..systems.step_check import check_time_step
 from ..units.quantities import thermal_energy
 from ..units.text import format_time
+from .description import describe
 from .initial_state import build_system, place_filaments
 from .relaxation import relaxed_positions
 from .run_directory import ENERGY_COLUMNS, LINKER_TABLE_COLUMNS, Checkpoint, ReportTable, RunDirectory, TrajectoryFile
@@ -39,11 +40,11 @@ class RunInterrupted(Exception):  # noqa: N818 - not an error
 def run(configuration, output, resume=False):
     """Run a configuration, or continue it, until its end.
 
-    Files in the output directory: ``configuration.toml``, ``topology.cif``, the same for VMD (``topology.psf``) and
-    OVITO (``topology.data``), ``trajectory.dcd`` (the initial configuration and one frame per report interval),
-    ``energies.csv`` and ``checkpoint.chk``; with linkers also ``linkers.csv`` (how many are bound, their tensions) and
-    ``linkers.npy`` (where each one is, see ``LinkerReporter``). A resumed run ends with the same files, to the bit, as
-    one that was never interrupted.
+    Files in the output directory: ``configuration.toml``, ``description.json`` (what ``analysis.load`` needs to know),
+    ``topology.cif``, the same for VMD (``topology.psf``) and OVITO (``topology.data``), ``trajectory.dcd`` (the initial
+    configuration and one frame per report interval), ``energies.csv`` and ``checkpoint.chk``; with linkers also
+    ``linkers.csv`` (how many are bound, their tensions) and ``linkers.npy`` (where each one is, see
+    ``LinkerReporter``). A resumed run ends with the same files, to the bit, as one that was never interrupted.
 
     Parameters
     ----------
@@ -74,6 +75,7 @@ def run(configuration, output, resume=False):
                 print("No checkpoint yet: starting from the beginning.")
             positions = relaxed_positions(configuration, built)
             _write_topology(directory, simulation, positions)
+            describe(configuration, filaments, simulation.system).write(directory.description)
             simulation.context.setPositions(positions)
         else:
             _restore(simulation.context, checkpoint, filaments.engine)

@@ -8,13 +8,13 @@ import hashlib
 import json
 import os
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from openmm import app
 
 from ..errors import InputError
 from ..output.files import write_atomically
+from ..output.run_files import RunFiles, try_lock
 from ..version import __version__
 from .configuration import changed_keys, read_configuration
 from .start_files import COPIES
@@ -37,7 +37,7 @@ class Checkpoint:
     linker_records: int = 0
 
 
-class RunDirectory:
+class RunDirectory(RunFiles):
     """A directory that one run at a time writes into; a context manager that holds its lock.
 
     Parameters
@@ -47,18 +47,7 @@ class RunDirectory:
     """
 
     def __init__(self, path):
-        self.path = Path(path)
-        self.configuration = self.path / "configuration.toml"
-        self.topology = self.path / "topology.cif"
-        self.topology_psf = self.path / "topology.psf"
-        self.topology_data = self.path / "topology.data"
-        self.trajectory = self.path / "trajectory.dcd"
-        self.energies = self.path / "energies.csv"
-        self.linkers = self.path / "linkers.csv"
-        self.linker_places = self.path / "linkers.npy"
-        self.checkpoint = self.path / "checkpoint.chk"
-        self.summary = self.path / "summary.json"
-        self.figure = self.path / "summary.png"
+        super().__init__(path)
         # As it was when the directory was claimed.
         self._configuration_digest = None
 
@@ -66,8 +55,8 @@ class RunDirectory:
         if self.path.exists() and not self.path.is_dir():
             raise InputError(f"The output directory {self.path} is a file: choose another name.")
         self.path.mkdir(parents=True, exist_ok=True)
-        self._lock = open(self.path / ".lock", "a+b")
-        if not _try_lock(self._lock):
+        self._lock = open(self.lock, "a+b")
+        if not try_lock(self._lock):
             self._lock.close()
             raise InputError(
                 f"Another run is writing into {self.path}: wait until it ends, or choose another output directory."
@@ -209,22 +198,6 @@ class RunDirectory:
 def digest_of_checkpoint(header, state):
     """SHA-256 of all that a checkpoint says: of its header, a dict, and of OpenMM's checkpoint, in bytes."""
     return hashlib.sha256(json.dumps(header, sort_keys=True).encode() + b"\n" + state).hexdigest()
-
-
-def _try_lock(file):
-    try:
-        import fcntl
-    except ImportError:
-        import msvcrt
-
-        lock, arguments = msvcrt.locking, (msvcrt.LK_NBLCK, 1)
-    else:
-        lock, arguments = fcntl.flock, (fcntl.LOCK_EX | fcntl.LOCK_NB,)
-    try:
-        lock(file.fileno(), *arguments)
-    except (BlockingIOError, PermissionError):
-        return False
-    return True
 
 
 def _open_at(path, size):

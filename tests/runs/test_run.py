@@ -84,6 +84,7 @@ def test_files_of_a_run(unbroken):
         ".lock",
         "checkpoint.chk",
         "configuration.toml",
+        "description.json",
         "energies.csv",
         "summary.json",
         "summary.png",

@@ -1,0 +1,379 @@
+"""A run of ``openmm-cylchain run`` as one object: times, filaments, linkers, energies; for mdtraj and MDAnalysis."""
+
+import csv
+import warnings
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import mdtraj
+import numpy as np
+import numpy.typing as npt
+
+from ..couplings.walls import Box, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere
+from ..errors import InputError, PrecisionWarning
+from ..mechanics.geometry import segment_vectors
+from ..output.dcd_frames import DCDFrames
+from ..output.linker_records import LINKER_RECORD
+from ..output.run_description import DescribedFilament, DescribedLinkers, RunDescription, read_run_description
+from ..output.run_files import RunFiles
+from ..units.quantities import thermal_energy, whole_number
+from ..units.types import FloatArray, Indices, IntArray
+
+_COARSE = 0.2
+_SHAPES = {
+    "plane": lambda point, vector, length: Plane(point, vector),
+    "slab": Slab,
+    "sphere": lambda point, vector, length: Sphere(point, length),
+    "cylinder": Cylinder,
+    "box": lambda point, vector, length: Box(point, vector),
+    "ellipsoid": lambda point, vector, length: Ellipsoid(point, vector),
+}
+
+
+@dataclass(frozen=True)
+class RunFilament:
+    """A filament of a run.
+
+    Attributes
+    ----------
+    type : FilamentType or BeadSpringType
+    nodes : (n,) int array
+        Particles, in order along the filament.
+    diameter : float
+        In nm.
+    ring : bool
+        Whether the last node is joined to the first.
+    clamped : tuple of int
+        Nodes that do not move, counted along the filament.
+    """
+
+    type: Any
+    nodes: IntArray
+    diameter: float
+    ring: bool
+    clamped: tuple[int, ...] = ()
+
+    @property
+    def segments(self) -> int:
+        """Number of segments."""
+        return len(self.nodes) - (0 if self.ring else 1)
+
+
+class Run:
+    """A run that has been simulated into a directory; ``load`` makes it.
+
+    Positions are those of the trajectory, in single precision, and are read when they are asked for. Filaments are
+    whole: nothing is wrapped into a periodic box.
+
+    Attributes
+    ----------
+    path : Path
+    title : str
+    temperature : float
+        In K.
+    time_step : float
+        In ps.
+    times : (frames,) array
+        Of the frames, in ps, in double precision.
+    steps : (frames,) int array
+    box : (3, 3) array or None
+        Vectors of a periodic box in nm.
+    filaments : tuple of RunFilament
+    linker_types : tuple
+        Of the kinds of linkers, with ``name``, ``stiffness`` in kJ/(mol nm^2) and ``rest_length`` in nm.
+    walls : tuple of Shape
+        Those of ``filament_wall_force``.
+    energies : dict of (frames,) arrays
+        By the headers of ``energies.csv``.
+    complete : bool
+        Whether the run has come to its end.
+    """
+
+    def __init__(self, files: RunFiles, description: RunDescription, frames: int, energies: dict[str, Any]) -> None:
+        self._files = files
+        self._description = description
+        self._dcd = DCDFrames(files.trajectory)
+        self.path = files.path
+        self.title = description.title
+        self.temperature = description.temperature
+        self.time_step = description.time_step
+        self.steps: IntArray = energies["step"][:frames].astype(int)
+        self.times: FloatArray = energies["time (ps)"][:frames]
+        self.energies: dict[str, FloatArray] = {name: values[:frames] for name, values in energies.items()}
+        self.box: FloatArray | None = None if description.box is None else np.array(description.box)
+        self.filaments = tuple(_filament(own) for own in description.filaments)
+        self.linker_types: tuple[DescribedLinkers, ...] = description.linkers
+        self.walls: tuple[Shape, ...] = tuple(
+            _SHAPES[own.shape](own.point, own.vector, own.length) for own in description.walls
+        )
+        self.complete = frames == description.steps // description.steps_per_frame + 1
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        return len(self.times)
+
+    def __repr__(self) -> str:
+        kinds = f"{len(self.filaments)} filaments" + (", linkers" if self.linker_types else "")
+        return f"<Run {self.path}: {len(self)} frames, {kinds}>"
+
+    def positions(self, frame: int) -> FloatArray:
+        """Positions (particles, 3) in nm of a frame; a negative one counts from the end."""
+        return self._dcd.positions(self._frame(frame))
+
+    def _frame(self, frame):
+        if isinstance(frame, bool) or not isinstance(frame, (int, np.integer)) or not -len(self) <= frame < len(self):
+            raise InputError(f"The run in {self.path} has the frames 0 to {len(self) - 1}, but not {frame!r}.")
+        return int(frame) % len(self)
+
+    @cached_property
+    def linkers(self) -> list[npt.NDArray[Any]]:
+        """Linkers with a hand that is bound: for each frame an array of records.
+
+        Fields: ``number``, ``type`` (in ``linker_types``), ``anchor``, ``filaments``, ``arc_lengths``, ``places``
+        (2, 3) in nm and ``tension`` in kJ/(mol nm), as those of ``LinkerReporter``. Empty without linkers.
+        """
+        if not self.linker_types:
+            return [np.zeros(0, LINKER_RECORD)] * len(self)
+        records = np.load(self._files.linker_places, mmap_mode="r")
+        begins, ends = (np.searchsorted(records["step"], self.steps, side) for side in ("left", "right"))
+        return [records[begin:end] for begin, end in zip(begins, ends)]
+
+    @cached_property
+    def linker_table(self) -> dict[str, FloatArray]:
+        """Numbers and tensions of linkers: (frames, types) arrays by the headers of ``linkers.csv``."""
+        if not self.linker_types:
+            return {}
+        table = _read_table(self._files.linkers)
+        count = len(self.linker_types)
+        return {name: values[: count * len(self)].reshape(-1, count) for name, values in table.items()}
+
+    @cached_property
+    def coordinate_resolution(self) -> float:
+        """Distance in nm of the numbers that positions are rounded to in the trajectory, at its largest coordinate."""
+        largest = max(np.abs(self.positions(frame)).max() for frame in (0, -1))
+        return 0.1 * float(np.spacing(np.float32(10.0 * largest)))
+
+    def warn_of_rounding(self) -> None:
+        """Warn (PrecisionWarning) of positions that are coarser than thermal fluctuations, see ``load``."""
+        widths = [np.sqrt(thermal_energy(self.temperature) / own.type.segment_stiffness) for own in self.filaments]
+        if self.coordinate_resolution > _COARSE * min(widths):
+            warnings.warn(
+                f"Positions in {self._files.trajectory} are rounded to {self.coordinate_resolution:.2g} nm, for they "
+                f"are far from the origin, but lengths of segments fluctuate by {min(widths):.2g} nm: shapes that are "
+                "computed from them are wrong. Energies in energies.csv are right. Simulate nearer to the origin.",
+                PrecisionWarning,
+                stacklevel=4,
+            )
+
+    def mdtraj(self, frames: slice | Indices | None = None) -> mdtraj.Trajectory:
+        """An ``mdtraj.Trajectory`` with times in ps (in double precision), bonds and the periodic box.
+
+        Parameters
+        ----------
+        frames : slice or list of int, optional
+            All if not given.
+        """
+        chosen = self._chosen(frames)
+        topology = mdtraj.load_topology(str(self._files.topology))
+        xyz = np.array([self.positions(frame) for frame in chosen], dtype=np.float32)
+        trajectory = mdtraj.Trajectory(xyz, topology, time=self.times[chosen])
+        if self.box is not None:
+            trajectory.unitcell_vectors = np.repeat(self.box[None], len(chosen), axis=0)
+        return trajectory
+
+    def _chosen(self, frames):
+        if frames is None:
+            return np.arange(len(self))
+        if isinstance(frames, slice):
+            chosen = np.arange(len(self))[frames]
+        else:
+            chosen = np.array([self._frame(frame) for frame in np.atleast_1d(frames)], dtype=int)
+        if not len(chosen):
+            raise InputError("frames selects no frame.")
+        return chosen
+
+    def mdanalysis(self) -> Any:
+        """An ``MDAnalysis.Universe`` with times in ps, bonds, radii, the periodic box, and positions in angstrom.
+
+        Each filament is a segment (``segid``) with a residue for each node. All frames are held in memory.
+
+        Raises
+        ------
+        InputError
+            If MDAnalysis is not installed.
+        """
+        try:
+            import MDAnalysis
+            from MDAnalysis.coordinates.memory import MemoryReader
+        except ImportError:
+            raise InputError(
+                "A Universe needs MDAnalysis: install it, as in pip install 'openmm-cylchain[mdanalysis]'."
+            ) from None
+        topology = mdtraj.load_topology(str(self._files.topology))
+        atoms, residues = list(topology.atoms), list(topology.residues)
+        universe = MDAnalysis.Universe.empty(
+            len(atoms),
+            n_residues=len(residues),
+            n_segments=topology.n_chains,
+            atom_resindex=[atom.residue.index for atom in atoms],
+            residue_segindex=[residue.chain.index for residue in residues],
+        )
+        radii = np.zeros(len(atoms))
+        for own in self.filaments:
+            radii[own.nodes] = 5.0 * own.diameter
+        names = [atom.name for atom in atoms]
+        universe.add_TopologyAttr("names", names)
+        universe.add_TopologyAttr("types", [self._type_names.get(i, name) for i, name in enumerate(names)])
+        universe.add_TopologyAttr("radii", radii)
+        universe.add_TopologyAttr("resnames", [residue.name for residue in residues])
+        universe.add_TopologyAttr("resids", [residue.resSeq for residue in residues])
+        universe.add_TopologyAttr("segids", [f"F{number}" for number in range(topology.n_chains)])
+        universe.add_TopologyAttr("bonds", [(one.index, other.index) for one, other in topology.bonds])
+        xyz = np.array([10.0 * self.positions(frame) for frame in range(len(self))], dtype=np.float32)
+        dimensions = None
+        if self.box is not None:
+            dimensions = np.array([*(10.0 * np.diag(self.box)), 90.0, 90.0, 90.0], dtype=np.float32)
+        spacing = self._description.steps_per_frame * self.time_step
+        universe.load_new(xyz, format=MemoryReader, order="fac", dt=spacing, dimensions=dimensions)
+        return universe
+
+    @property
+    def _type_names(self):
+        return {int(node): own.type.name for own in self.filaments for node in own.nodes}
+
+    def nodes(self, frame: int) -> list[FloatArray]:
+        """Positions (nodes, 3) in nm of the nodes of each filament in a frame."""
+        positions = self.positions(frame)
+        return [positions[own.nodes] for own in self.filaments]
+
+    def segment_tensions(self, frame: int, average: int = 1) -> list[FloatArray]:
+        """Tensions dV_el/dl of the segments of each filament in kJ/(mol nm), averaged over frames about one.
+
+        They hold the thermal fluctuation ``(k k_BT)^(1/2)`` of a stiff spring, which an average over n independent
+        frames brings down by n^(1/2).
+
+        Parameters
+        ----------
+        frame : int
+        average : int
+            Over how many frames, fewer at the ends of the run.
+
+        Returns
+        -------
+        list of (segments,) arrays
+        """
+        frame, average = self._frame(frame), whole_number(average, 1, "average")
+        first = max(0, frame - (average - 1) // 2)
+        frames = range(first, min(len(self), first + average))
+        self.warn_of_rounding()
+        totals = [np.zeros(own.segments) for own in self.filaments]
+        for each in frames:
+            for own, nodes, total in zip(self.filaments, self.nodes(each), totals):
+                lengths = np.linalg.norm(segment_vectors(nodes, own.ring), axis=1)
+                total += own.type.stretching_derivatives(lengths, own.ring)
+        return [total / len(frames) for total in totals]
+
+
+def _filament(own: DescribedFilament) -> RunFilament:
+    return RunFilament(own.type, np.array(own.nodes, dtype=int), own.diameter, own.ring, own.clamped)
+
+
+def load(path: str | Path, incomplete: bool = False) -> Run:
+    """Load the directory that ``openmm-cylchain run`` has written.
+
+    Parameters
+    ----------
+    path : str or Path
+    incomplete : bool
+        Take a run that goes on still, was interrupted or has blown up, as far as its frames are whole.
+
+    Returns
+    -------
+    Run
+
+    Raises
+    ------
+    InputError
+        If the directory holds no run, or one that is not at its end (unless ``incomplete``), or a damaged one.
+
+    Warns
+    -----
+    PrecisionWarning
+        If positions are so far from the origin that their single precision is coarser than thermal fluctuations.
+
+    Examples
+    --------
+    >>> run = load("output_f_actin")  # doctest: +SKIP
+    >>> run.mdtraj(slice(100, None))  # doctest: +SKIP
+    """
+    files = RunFiles(path)
+    if not files.path.is_dir():
+        raise InputError(f"{path} is not a directory: give that of `openmm-cylchain run --output`.")
+    if not files.description.exists():
+        reason = "its files are those of an older version" if files.trajectory.exists() else "nothing has run into it"
+        raise InputError(f"{path} is not the directory of a run: it has no {files.description.name}, {reason}.")
+    if not incomplete and files.is_being_written:
+        raise InputError(
+            f"The run in {path} is still going on: wait until it ends, or take what there is with incomplete=True "
+            "(--incomplete)."
+        )
+    description = read_run_description(files.description)
+    needed = [files.topology, files.trajectory, files.energies]
+    needed += [files.linkers, files.linker_places] if description.linkers else []
+    for file in needed:
+        if not file.exists():
+            raise InputError(f"{path} lacks {file.name}: the run has not begun, or its files were moved.")
+    frames, energies = _whole_frames(files, description)
+    expected = description.steps // description.steps_per_frame + 1
+    if frames == 0:
+        raise InputError(f"The run in {path} has not a frame that is whole.")
+    if frames < expected and not incomplete:
+        raise InputError(
+            f"The run in {path} is incomplete: it has {frames} of {expected} frames. Continue it with "
+            f"`openmm-cylchain run {files.configuration} --output {path} --resume`, or take what there is with "
+            "incomplete=True (--incomplete)."
+        )
+    run = Run(files, description, min(frames, expected), energies)
+    run.warn_of_rounding()
+    return run
+
+
+def _whole_frames(files, description):
+    # A kill may come between the writing of one file and of the next.
+    energies = _read_table(files.energies)
+    dcd = DCDFrames(files.trajectory)
+    if dcd.particles != description.particles:
+        raise InputError(
+            f"{files.trajectory} has {dcd.particles} particles, but {files.description.name} {description.particles}: "
+            "they are not of one run."
+        )
+    frames = min(len(energies["step"]), len(dcd))
+    expected = np.arange(frames) * description.steps_per_frame
+    if not np.array_equal(energies["step"][:frames], expected):
+        raise InputError(f"{files.energies} does not have a line for each frame of the run.")
+    if description.linkers:
+        table = _read_table(files.linkers)
+        kinds = len(description.linkers)
+        frames = min(frames, len(table["step"]) // kinds)
+        recorded = np.load(files.linker_places, mmap_mode="r")["step"]
+        held = (table["one hand bound"] + table["both hands bound"])[kinds * (frames - 1) : kinds * frames].sum()
+        unfinished = held > 0 and (len(recorded) == 0 or recorded[-1] < expected[frames - 1])
+        if frames <= description.steps // description.steps_per_frame and unfinished:
+            frames -= 1
+    return frames, energies
+
+
+def _read_table(path):
+    # Of lines that are whole: a kill may leave a part of the last.
+    with open(path, newline="") as file:
+        lines = [line for line in file if line.endswith("\n")]
+    if not lines:
+        raise InputError(f"{path} is empty.")
+    names = next(csv.reader(lines[:1]))
+    try:
+        values = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]])
+        return dict(zip(names, values.reshape(len(lines) - 1, len(names)).T))
+    except ValueError:
+        raise InputError(f"{path} is damaged: its lines do not fit {lines[0].strip()!r}.") from None

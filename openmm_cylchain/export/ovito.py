@@ -1,0 +1,101 @@
+"""A run as a GSD file for OVITO: nodes and bound hands as particles with radii, segments and linkers as bonds."""
+
+from pathlib import Path
+
+import numpy as np
+
+from ..analysis.runs import Run
+from ..errors import InputError
+from .drawn import check_path, linker_lines, thickness
+
+_ANGSTROM = 10.0  # in a nm
+
+
+def write_ovito(run: Run, path: str | Path) -> None:
+    """Write all frames of a run for OVITO, in angstrom.
+
+    Particles are the nodes of filaments and the hands of linkers that are bound, with the names of their types and
+    radii; bonds are segments and springs of linkers, so that their number changes from frame to frame. ``time_ps`` is
+    an attribute of each frame, beside its step. Without a periodic box, the cell is three times as wide as what it
+    holds.
+
+    Parameters
+    ----------
+    run : Run
+        See ``analysis.load``.
+    path : str or Path
+        Ends in ``.gsd``.
+
+    Raises
+    ------
+    InputError
+        If the package gsd is not installed.
+    """
+    path = check_path(path, ".gsd")
+    try:
+        import gsd.hoomd
+    except ImportError:
+        raise InputError(
+            "Files for OVITO need the package gsd: install it, as in pip install 'openmm-cylchain[ovito]'."
+        ) from None
+    names = list(dict.fromkeys(own.type.name for own in run.filaments))
+    hands = [f"{own.name} hand" for own in run.linker_types]
+    springs = [own.name for own in run.linker_types]
+    center, cell = _cell(run)
+    segments = np.concatenate([_bonds(own) for own in run.filaments])
+    kinds = np.concatenate([np.full(own.segments, names.index(own.type.name)) for own in run.filaments])
+    order = np.concatenate([own.nodes for own in run.filaments])
+    position_of = np.zeros(order.max() + 1, dtype=int)
+    position_of[order] = np.arange(len(order))
+    types = np.concatenate([np.full(len(own.nodes), names.index(own.type.name)) for own in run.filaments])
+    diameters = np.concatenate([np.full(len(own.nodes), own.diameter) for own in run.filaments])
+    temporary = path.with_name(f".{path.stem}.new.gsd")
+    try:
+        with gsd.hoomd.open(str(temporary), mode="w") as file:
+            for frame in range(len(run)):
+                positions, bonds = [run.positions(frame)[order]], [position_of[segments]]
+                particle_types, bond_types, widths = [types], [kinds], [diameters]
+                count = len(order)
+                for kind in range(len(run.linker_types)):
+                    lines, places = linker_lines(run, frame, kind)
+                    # Ends of springs are particles of their own, at the places of hands or anchors.
+                    ends = np.concatenate([lines.reshape(-1, 3), places])
+                    positions.append(ends)
+                    bonds.append(count + np.arange(2 * len(lines)).reshape(-1, 2))
+                    particle_types.append(np.full(len(ends), len(names) + kind))
+                    bond_types.append(np.full(len(lines), len(names) + kind))
+                    widths.append(np.full(len(ends), 1.2 * thickness(run)))
+                    count += len(ends)
+                snapshot = gsd.hoomd.Frame()
+                snapshot.configuration.step = int(run.steps[frame])
+                snapshot.configuration.box = _ANGSTROM * cell
+                snapshot.particles.N = count
+                snapshot.particles.types = names + hands
+                snapshot.particles.typeid = np.concatenate(particle_types)
+                snapshot.particles.position = _ANGSTROM * (np.concatenate(positions) - center)
+                snapshot.particles.diameter = _ANGSTROM * np.concatenate(widths)
+                snapshot.bonds.N = sum(len(own) for own in bonds)
+                snapshot.bonds.types = names + springs
+                snapshot.bonds.group = np.concatenate(bonds)
+                snapshot.bonds.typeid = np.concatenate(bond_types)
+                snapshot.log["time_ps"] = np.array([run.times[frame]])
+                file.append(snapshot)
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _bonds(own):
+    first, last = own.nodes, np.roll(own.nodes, -1)
+    return np.stack([first, last], axis=1)[: own.segments]
+
+
+def _cell(run):
+    # HOOMD's box: edges and tilts; its middle is the origin.
+    if run.box is not None:
+        (a, _, _), (xy, b, _), (xz, yz, c) = run.box
+        return 0.5 * run.box.sum(axis=0), np.array([a, b, c, xy / b, xz / c, yz / c]) * [1, 1, 1, 0.1, 0.1, 0.1]
+    frames = [run.positions(frame) for frame in range(len(run))]
+    lower, upper = np.min(frames, axis=(0, 1)), np.max(frames, axis=(0, 1))
+    edge = 3.0 * float(np.max(upper - lower)) + 1.0
+    return 0.5 * (lower + upper), np.array([edge, edge, edge, 0.0, 0.0, 0.0])

@@ -1,0 +1,121 @@
+"""A run as a Simularium file (JSON): filaments as fibers, linkers as fibers of two points and hands as spheres."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..analysis.runs import Run
+from ..output.files import write_atomically
+from ..rendering.colors import filament_colors, linker_color
+from ..units.text import time_unit
+from ..version import __version__
+from .drawn import check_path, linker_lines, thickness
+
+_SPHERE, _FIBER = 1000.0, 1001.0
+
+
+def write_simularium(run: Run, path: str | Path) -> None:
+    """Write all frames of a run for the Simularium viewer, https://simularium.allencell.org.
+
+    The format is version 3 of the trajectory, version 1 of its frames, https://github.com/simularium. Lengths are in
+    nm, about the middle of the box; times are in the unit of the last frame. A filament keeps its number from frame to
+    frame, linkers do not. A ring goes on to its first node.
+
+    Parameters
+    ----------
+    run : Run
+        See ``analysis.load``.
+    path : str or Path
+        Ends in ``.simularium``.
+    """
+    path = check_path(path, ".simularium")
+    name, length = time_unit(float(run.times[-1]) if run.times[-1] > 0 else run.time_step)
+    types, mapping = _types(run)
+    center, size = _box(run)
+    content = {
+        "trajectoryInfo": {
+            "version": 3,
+            "timeUnits": {"magnitude": 1.0, "name": {"us": "µs"}.get(name, name)},
+            "timeStepSize": float(run.times[1] - run.times[0]) / length if len(run) > 1 else 0.0,
+            "totalSteps": len(run),
+            "spatialUnits": {"magnitude": 1.0, "name": "nm"},
+            "size": dict(zip("xyz", map(float, size))),
+            "cameraDefault": {
+                "position": {"x": 0.0, "y": 0.0, "z": 1.6 * float(max(size))},
+                "lookAtPosition": {"x": 0.0, "y": 0.0, "z": 0.0},
+                "upVector": {"x": 0.0, "y": 1.0, "z": 0.0},
+                "fovDegrees": 50.0,
+            },
+            "typeMapping": mapping,
+            "trajectoryTitle": run.title or run.path.name,
+            "modelInfo": {"title": run.title or run.path.name, "version": f"openmm-cylchain {__version__}"},
+        },
+        "spatialData": {
+            "version": 1,
+            "msgType": 1,
+            "bundleStart": 0,
+            "bundleSize": len(run),
+            "bundleData": [
+                {
+                    "frameNumber": frame,
+                    "time": float(run.times[frame]) / length,
+                    "data": _agents(run, frame, types, center),
+                }
+                for frame in range(len(run))
+            ],
+        },
+        "plotData": {"version": 1, "data": []},
+    }
+    write_atomically(path, json.dumps(content, allow_nan=False, separators=(",", ":")).encode())
+
+
+def _types(run):
+    # Numbers of types of agents, by what they are.
+    numbers: dict[tuple[str, str | int], int] = {}
+    mapping: dict[str, Any] = {}
+    agents: list[tuple[tuple[str, str | int], str, str, str]] = [
+        (("filament", name), name, "FIBER", color) for name, color in filament_colors(run).items()
+    ]
+    for kind, own in enumerate(run.linker_types):
+        label = own.name if [one.name for one in run.linker_types].count(own.name) == 1 else f"{own.name} {kind + 1}"
+        agents.append((("linker", kind), label, "FIBER", linker_color(kind)))
+        agents.append((("hand", kind), f"{label}#hand", "SPHERE", linker_color(kind)))
+    for number, (key, label, shape, color) in enumerate(agents):
+        numbers[key] = number
+        mapping[str(number)] = {"name": label, "geometry": {"displayType": shape, "url": "", "color": color}}
+    return numbers, mapping
+
+
+def _box(run):
+    if run.box is not None:
+        return 0.5 * run.box.sum(axis=0), np.abs(run.box).sum(axis=0)
+    frames = [run.positions(frame) for frame in np.unique(np.linspace(0, len(run) - 1, 20).astype(int))]
+    lower, upper = np.min(frames, axis=(0, 1)), np.max(frames, axis=(0, 1))
+    return 0.5 * (lower + upper), 1.1 * (upper - lower) + thickness(run)
+
+
+def _agents(run, frame, types, center):
+    data: list[float] = []
+    for number, (own, nodes) in enumerate(zip(run.filaments, run.nodes(frame))):
+        points = np.concatenate([nodes, nodes[:1]]) if own.ring else nodes
+        data += _agent(_FIBER, number, types["filament", own.type.name], 0.5 * own.diameter, points - center)
+    number = len(run.filaments)
+    radius = 0.5 * thickness(run)
+    for kind in range(len(run.linker_types)):
+        lines, hands = linker_lines(run, frame, kind)
+        for line in lines:
+            data += _agent(_FIBER, number, types["linker", kind], 0.5 * radius, line - center)
+            number += 1
+        for hand in hands:
+            data += _agent(_SPHERE, number, types["hand", kind], 1.2 * radius, np.zeros((0, 3)), hand - center)
+            number += 1
+    return data
+
+
+def _agent(shape, number, kind, radius, points, position=(0.0, 0.0, 0.0)):
+    # Digits that a viewer shows.
+    numbers = np.round(points, 4).ravel().tolist()
+    place = np.round(position, 4).tolist()
+    return [shape, float(number), float(kind), *place, 0.0, 0.0, 0.0, radius, float(len(numbers)), *numbers]

@@ -1,0 +1,117 @@
+"""A run as a script for VMD: the trajectory with thick bonds and colors, linkers, the box and a clock."""
+
+from pathlib import Path
+
+import numpy as np
+
+from ..analysis.runs import Run
+from ..output.files import write_atomically
+from ..rendering.colors import filament_colors, linker_color
+from ..units.text import time_unit
+from .drawn import check_path, linker_lines, thickness
+
+_ANGSTROM = 10.0
+_FIRST_COLOR = 17  # Those before have a meaning of their own in VMD.
+
+_PROCEDURES = """
+proc draw_frame {args} {
+    global molecule times time_unit links link_colors link_radius corner
+    set frame [molinfo $molecule get frame]
+    graphics $molecule delete all
+    graphics $molecule color black
+    graphics $molecule text $corner "[lindex $times $frame] $time_unit" size 1.2
+    foreach color $link_colors lines [lindex $links $frame] {
+        graphics $molecule color $color
+        foreach {first second} $lines {
+            graphics $molecule cylinder $first $second radius $link_radius resolution 8
+            graphics $molecule sphere $first radius [expr {1.6 * $link_radius}] resolution 8
+            graphics $molecule sphere $second radius [expr {1.6 * $link_radius}] resolution 8
+        }
+    }
+}
+trace add variable vmd_frame($molecule) write draw_frame
+draw_frame
+display resetview
+"""
+
+
+def write_vmd(run: Run, path: str | Path) -> None:
+    """Write a script that opens a run in VMD: ``vmd -e FILE``.
+
+    It loads ``topology.psf`` and ``trajectory.dcd`` from the directory of the run, which must stay where it is. Bonds
+    are as thick as filaments, or as can be seen. Linkers that join two places are drawn for each frame, and the time,
+    which VMD does not read from DCD files.
+
+    Parameters
+    ----------
+    run : Run
+        See ``analysis.load``.
+    path : str or Path
+        Ends in ``.tcl``.
+    """
+    path = check_path(path, ".tcl")
+    directory = run.path.resolve()
+    extent = float(np.linalg.norm(np.ptp(run.positions(-1), axis=0)))
+    name, length = time_unit(float(run.times[-1]))
+    lines = [
+        f"set molecule [mol new {_word(directory / 'topology.psf')} type psf waitfor all]",
+        f"mol addfile {_word(directory / 'trajectory.dcd')} type dcd last {len(run) - 1} waitfor all molid $molecule",
+        f"mol rename $molecule {_word(run.title or run.path.name)}",
+        "mol delrep 0 $molecule",
+        "color Display Background white",
+        "display projection Perspective",
+    ]
+    # Licorice knows the radius of bonds.
+    widest = max(own.diameter for own in run.filaments)
+    for number, (kind, color) in enumerate(filament_colors(run).items()):
+        diameter = max(own.diameter for own in run.filaments if own.type.name == kind)
+        radius = _ANGSTROM * 0.5 * max(diameter, 0.006 * extent * diameter / widest)
+        lines += [
+            _color(_FIRST_COLOR + number, color),
+            f"mol representation Licorice {radius:.6g} 12 12",
+            f"mol selection {{resname {_word(kind)}}}",
+            f"mol color ColorID {_FIRST_COLOR + number}",
+            "mol material AOChalky",
+            "mol addrep $molecule",
+        ]
+    first = _FIRST_COLOR + len(filament_colors(run))
+    lines += [_color(first + kind, linker_color(kind)) for kind in range(len(run.linker_types))]
+    if run.box is not None:
+        edges = " ".join(f"{_ANGSTROM * edge:.8g}" for edge in np.diag(run.box))
+        lines += ["package require pbctools", f"pbc set {{{edges}}} -all -molid $molecule", "pbc box -molid $molecule"]
+    times = " ".join(f"{time / length:.6g}" for time in run.times)
+    colors = " ".join(str(first + kind) for kind in range(len(run.linker_types)))
+    corner = _ANGSTROM * run.positions(-1).max(axis=0)
+    lines += [
+        f"set times {{{times}}}",
+        f"set time_unit {name}",
+        f"set link_colors {{{colors}}}",
+        f"set link_radius {_ANGSTROM * 0.5 * max(0.5 * thickness(run), 0.003 * extent):.6g}",
+        f"set corner {_point(corner / _ANGSTROM)}",
+        "set links {}",
+        *(f"lappend links {{{_links(run, frame)}}}" for frame in range(len(run))),
+    ]
+    write_atomically(path, ("\n".join(lines) + "\n" + _PROCEDURES).encode())
+
+
+def _links(run, frame):
+    kinds = []
+    for kind in range(len(run.linker_types)):
+        ends, _ = linker_lines(run, frame, kind)
+        kinds.append("{" + " ".join(_point(place) for place in ends.reshape(-1, 3)) + "}")
+    return " ".join(kinds)
+
+
+def _point(place):
+    return "{" + " ".join(f"{_ANGSTROM * x:.7g}" for x in place) + "}"
+
+
+def _color(number, color):
+    parts = " ".join(f"{int(color[i : i + 2], 16) / 255:.4f}" for i in (1, 3, 5))
+    return f"color change rgb {number} {parts}"
+
+
+def _word(text):
+    # As one word of Tcl, whatever is in it.
+    quoted = "".join(f"\\{letter}" if letter in '\\"$[]{} ;\t' else letter for letter in str(text))
+    return quoted.replace("\n", " ") or "{}"

@@ -1,0 +1,53 @@
+"""Frames of a DCD file as OpenMM writes it, read one by one without reading the file whole."""
+
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from ..units.types import FloatArray
+
+_ANGSTROM = 0.1  # in nm
+
+
+class DCDFrames:
+    """The whole frames of a DCD file; one that a killed run has left unfinished does not count.
+
+    Parameters
+    ----------
+    path : Path
+
+    Attributes
+    ----------
+    particles : int
+
+    Raises
+    ------
+    InputError
+        If the file is no DCD file of OpenMM.
+    """
+
+    def __init__(self, path: Path) -> None:
+        with open(path, "rb") as file:
+            header = file.read(276)
+        words = np.frombuffer(header[: len(header) // 4 * 4], dtype="<i4")
+        # Three records: numbers, two lines of title, how many particles.
+        if len(header) < 276 or header[4:8] != b"CORD" or words[0] != 84 or words[23] != 164 or words[66] != 4:
+            raise InputError(f"{path} is not a DCD trajectory of a run.")
+        self.particles = int(words[67])
+        fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
+        if words[12]:
+            fields += [("before_cell", "<i4"), ("cell", "<f8", (6,)), ("after_cell", "<i4")]
+        for axis in "xyz":
+            fields += [(f"before_{axis}", "<i4"), (axis, "<f4", (self.particles,)), (f"after_{axis}", "<i4")]
+        frame = np.dtype(fields)
+        count = (path.stat().st_size - 276) // frame.itemsize
+        self._frames = np.memmap(path, frame, "r", 276, (count,)) if count else np.zeros(0, frame)
+
+    def __len__(self) -> int:
+        return len(self._frames)
+
+    def positions(self, frame: int) -> FloatArray:
+        """Positions (particles, 3) in nm."""
+        record = self._frames[frame]
+        return _ANGSTROM * np.stack([record[axis] for axis in "xyz"], axis=1).astype(float)

@@ -1,0 +1,98 @@
+"""What is written on a picture: a legend or a scale of colors, a scale bar and a clock."""
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from ..filaments.filament_type import DSDNA, F_ACTIN, MICROTUBULE
+from ..units.text import time_unit
+from ..units.types import FloatArray
+from .camera import Camera
+from .scene import Scene
+
+_FULL_NAMES = {F_ACTIN.name: "actin", DSDNA.name: "DNA", MICROTUBULE.name: "microtubules"}
+_INK = "#222222"
+
+
+def annotated(image: FloatArray, camera: Camera, scene: Scene, time: float, last_time: float) -> FloatArray:
+    """An image with its annotations, (height, width, 3) as whole numbers from 0 to 255.
+
+    Parameters
+    ----------
+    image : (height, width, 3) array
+        sRGB between 0 and 1.
+    camera : Camera
+    scene : Scene
+    time, last_time : float
+        Of the picture and at the end of its film, in ps.
+    """
+    height, width = image.shape[:2]
+    figure = Figure(figsize=(width / 100, height / 100), dpi=100)
+    canvas = FigureCanvasAgg(figure)
+    figure.patch.set_alpha(0.0)
+    text = 0.165 * np.sqrt(width * height) / 10.0
+    _draw_legend(figure, scene, text)
+    _draw_scale_bar(figure, camera, text)
+    name, length = time_unit(last_time) if last_time > 0 else time_unit(1.0)
+    name = name.replace("us", "µs")
+    digits = max(0, 2 - int(np.floor(np.log10(max(last_time / length, 1e-12)))))
+    clock = f"{time / length:.{digits}f} {name}"
+    figure.text(0.975, 0.97, clock, ha="right", va="top", fontsize=1.1 * text, color=_INK)
+    canvas.draw()
+    drawn = np.asarray(canvas.buffer_rgba()).astype(float) / 255.0
+    opacity = drawn[..., 3:]
+    # Agg blends onto its own background, so that colors are those of full opacity.
+    result = drawn[..., :3] * opacity + image * (1.0 - opacity)
+    return np.round(255.0 * np.clip(result, 0.0, 1.0)).astype(np.uint8)
+
+
+def _draw_legend(figure, scene, text):
+    handles = []
+    for label, color, kind in scene.legend:
+        if kind == "filament":
+            label = _FULL_NAMES.get(label, label)
+            handles.append(Line2D([], [], color=color, linewidth=0.45 * text, solid_capstyle="round", label=label))
+        else:
+            handles.append(
+                Line2D([], [], color=color, linewidth=0.15 * text, marker="o", markersize=0.55 * text, label=label)
+            )
+    if handles:
+        figure.legend(
+            handles=handles,
+            loc="upper left",
+            bbox_to_anchor=(0.01, 0.985),
+            fontsize=text,
+            frameon=False,
+            labelcolor=_INK,
+            handlelength=1.6,
+        )
+    if scene.scale is not None:
+        axis = figure.add_axes((0.955, 0.3, 0.014, 0.4))
+        shown = ScalarMappable(Normalize(scene.scale.lowest, scene.scale.highest), scene.scale.map)
+        bar = figure.colorbar(shown, cax=axis)
+        axis.yaxis.set_ticks_position("left")
+        axis.yaxis.set_label_position("left")
+        bar.set_label(scene.scale.label, fontsize=text, color=_INK)
+        bar.outline.set_visible(False)
+        axis.tick_params(labelsize=0.9 * text, colors=_INK, length=0.25 * text)
+
+
+def scale_bar_length(camera: Camera) -> float:
+    """A round length in nm of at most a quarter of the picture's width in the plane through its center."""
+    longest = 0.25 * camera.width / camera.scale
+    decade = 10.0 ** np.floor(np.log10(longest))
+    return float(max(step * decade for step in (1, 2, 5) if step * decade <= longest))
+
+
+def _draw_scale_bar(figure, camera, text):
+    length = scale_bar_length(camera)
+    name, unit = next((name, unit) for name, unit in (("mm", 1e6), ("µm", 1e3), ("nm", 0.0)) if length >= unit)
+    part = length * camera.scale / camera.width
+    figure.add_artist(
+        Line2D([0.025, 0.025 + part], [0.035, 0.035], color=_INK, linewidth=0.3 * text, solid_capstyle="butt")
+    )
+    label = f"{length / (unit or 1.0):g} {name}"
+    figure.text(0.025 + 0.5 * part, 0.05, label, ha="center", va="bottom", fontsize=text, color=_INK)

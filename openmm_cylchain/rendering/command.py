@@ -1,0 +1,100 @@
+"""The command ``openmm-cylchain render``."""
+
+import math
+
+from ..errors import InputError
+
+
+def add_command(commands):
+    """Add ``render`` to the subcommands of an argparse parser."""
+    parser = commands.add_parser("render", help="draw a picture or a film of a run")
+    parser.add_argument("run", metavar="RUN", help="directory of a run")
+    parser.add_argument("--output", metavar="FILE", required=True, help=".png, or with --film .gif, .mp4 or .webm")
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument("--frame", type=int, metavar="N", help="from 0; -1, the default, is the last")
+    what.add_argument("--film", action="store_true", help="a film of all frames, or of those of --frames")
+    parser.add_argument("--frames", metavar="A:B:C", help="of a film: from A to before B, every C-th, as in Python")
+    parser.add_argument("--fps", type=float, metavar="N", help="frames per second of a film, 20 if not given")
+    parser.add_argument("--turn", type=float, default=0.0, metavar="DEGREES", help="turn the camera during a film")
+    parser.add_argument(
+        "--color",
+        default="type",
+        metavar="BY",
+        help="of filaments: type (default), tension, orientation (angle to the director) or bending",
+    )
+    parser.add_argument("--average", type=int, default=1, metavar="N", help="frames over which tensions are averaged")
+    parser.add_argument(
+        "--diameter", metavar="D", help='of all tubes, as in "20 nm", or true; visible ones if not given'
+    )
+    parser.add_argument("--size", default="960x720", metavar="WxH", help="in pixels, 960x720 if not given")
+    parser.add_argument("--projection", default="perspective", metavar="P", help="perspective (default), orthographic")
+    parser.add_argument("--view", metavar="X,Y,Z", help="the direction in which the camera looks")
+    parser.add_argument("--whole", action="store_true", help="let filaments leave the periodic box")
+    parser.add_argument("--no-linkers", action="store_true", help="draw filaments alone")
+    parser.add_argument("--incomplete", action="store_true", help="draw a run that is not at its end")
+    parser.set_defaults(command=_render)
+
+
+def _render(options):
+    if not options.film and (options.frames is not None or options.fps is not None or options.turn):
+        raise InputError("--frames, --fps and --turn belong to --film: give that, too.")
+
+    from ..analysis.runs import load
+    from ..output.progress import ProgressMessages
+    from .pictures import View, write_film, write_picture
+    from .scene import Look
+
+    look = Look(options.color, _diameter(options.diameter), options.whole, not options.no_linkers, options.average)
+    direction = None if options.view is None else _numbers(options.view, ",", 3, "--view")
+    view = View(_size(options.size), options.projection, direction, options.turn)
+    run = load(options.run, options.incomplete)
+    if options.film:
+        progress = ProgressMessages()
+        try:
+            frames_per_second = 20.0 if options.fps is None else options.fps
+            write_film(run, options.output, _frames(options.frames, len(run)), frames_per_second, look, view, progress)
+        finally:
+            progress.finish()
+    else:
+        write_picture(run, -1 if options.frame is None else options.frame, options.output, look, view)
+    print(f"Written to {options.output}")
+
+
+def _frames(text, count):
+    if text is None:
+        return None
+    try:
+        frames = list(range(count)[slice(*(int(part) if part else None for part in text.split(":")))])
+    except (ValueError, TypeError):
+        raise InputError(f"--frames must be such as 100:200:2, but is {text!r}.") from None
+    if not frames:
+        raise InputError(f"--frames {text} selects none of the {count} frames.")
+    return frames
+
+
+def _diameter(text):
+    from ..units.quantities import LENGTH
+    from ..units.text import parse_quantity
+
+    if text is None:
+        return None
+    if text == "true":
+        return 0.0
+    value = parse_quantity(text, LENGTH, "--diameter")
+    if not value > 0.0:
+        raise InputError(f"--diameter must be positive, or true, but is {text!r}.")
+    return value
+
+
+def _size(text):
+    return tuple(int(edge) for edge in _numbers(text, "x", 2, "--size"))
+
+
+def _numbers(text, separator, count, name):
+    try:
+        numbers = tuple(float(part) for part in text.split(separator))
+    except ValueError:
+        numbers = ()
+    if len(numbers) != count or not all(map(math.isfinite, numbers)):
+        raise InputError(f"{name} must be {count} numbers with {separator!r} between them, but is {text!r}.")
+    return numbers

@@ -1,0 +1,191 @@
+"""Pictures (PNG) and films (GIF, MP4, WebM) of runs."""
+
+import io
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from ..analysis.runs import Run
+from ..errors import InputError
+from ..output.files import check_output_path, write_atomically
+from ..units.types import FloatArray
+from .annotations import annotated
+from .camera import camera_on
+from .scene import Look, make_scene
+from .shading import shaded_image
+
+PICTURES, FILMS = (".png",), (".gif", ".mp4", ".webm")
+_BACKGROUND = np.array([1.0, 1.0, 1.0])
+_CODECS = {
+    ".mp4": ("libx264", ["-crf", "20", "-preset", "medium"]),
+    ".webm": ("libvpx-vp9", ["-crf", "30", "-b:v", "0"]),
+}
+
+
+@dataclass(frozen=True)
+class View:
+    """From where and how large a run is seen.
+
+    Attributes
+    ----------
+    size : (width, height) in pixels, even
+    projection : {"perspective", "orthographic"}
+    direction : (3,) sequence or None
+        In which the camera looks; chosen if None.
+    turn : float
+        Degrees by which the camera turns about the vertical in a film.
+    """
+
+    size: tuple[int, int] = (960, 720)
+    projection: str = "perspective"
+    direction: tuple[float, float, float] | None = None
+    turn: float = 0.0
+
+    def __post_init__(self) -> None:
+        if min(self.size) < 100 or max(self.size) > 8000 or any(edge % 2 for edge in self.size):
+            raise InputError(f"size must be two even numbers of pixels from 100 to 8000, but is {self.size!r}.")
+
+
+def images(run: Run, frames: list[int], look: Look, view: View) -> Iterator[FloatArray]:
+    """Pictures (height, width, 3) of frames, as whole numbers from 0 to 255, all with one framing."""
+    scene = make_scene(run, look, frames)
+    direction = None if view.direction is None else np.array(view.direction)
+    for number, frame in enumerate(frames):
+        turn = view.turn * number / max(len(frames) - 1, 1)
+        camera = camera_on(scene.points, view.size, view.projection, direction, turn)
+        # What is thinner than a pixel would be broken lines.
+        image = shaded_image(camera, scene.tubes(frame).at_least(0.4 / camera.scale), _BACKGROUND)
+        yield annotated(image, camera, scene, float(run.times[frame]), float(run.times[frames[-1]]))
+
+
+def write_picture(run: Run, frame: int, path: str | Path, look: Look | None = None, view: View | None = None) -> None:
+    """Draw a frame into a PNG file.
+
+    Parameters
+    ----------
+    run : Run
+        See ``analysis.load``.
+    frame : int
+        A negative one counts from the end.
+    path : str or Path
+        Ends in ``.png``.
+    look : Look, optional
+    view : View, optional
+
+    Raises
+    ------
+    InputError
+        For a frame that there is not, or a path that cannot be written or has another ending.
+    """
+    _check_path(path, PICTURES, "a picture")
+    run.positions(frame)
+    (image,) = images(run, [frame % len(run)], look or Look(), view or View())
+    data = io.BytesIO()
+    Image.fromarray(image).save(data, format="png", optimize=True)
+    write_atomically(Path(path), data.getvalue())
+
+
+def write_film(
+    run: Run,
+    path: str | Path,
+    frames: list[int] | None = None,
+    frames_per_second: float = 20.0,
+    look: Look | None = None,
+    view: View | None = None,
+    say: Callable[[str], None] = lambda message: None,
+) -> None:
+    """Draw frames into a film: GIF, or MP4 and WebM, which need imageio-ffmpeg.
+
+    Parameters
+    ----------
+    run : Run
+        See ``analysis.load``.
+    path : str or Path
+        Ends in ``.gif``, ``.mp4`` or ``.webm``.
+    frames : list of int, optional
+        All if not given.
+    frames_per_second : float
+    look : Look, optional
+    view : View, optional
+    say : callable (str), optional
+        Told how far it is.
+
+    Raises
+    ------
+    InputError
+        For frames that there are not, a path that cannot be written or has another ending, and if imageio-ffmpeg is
+        needed and missing.
+    """
+    _check_path(path, FILMS, "a film")
+    path = Path(path)
+    if not 0.0 < frames_per_second <= 100.0:
+        raise InputError(f"A film has more than 0 and up to 100 frames per second, but not {frames_per_second!r}.")
+    frames = list(range(len(run))) if frames is None else [int(frame) for frame in frames]
+    if not frames:
+        raise InputError("A film needs a frame at least.")
+    for frame in frames:
+        run.positions(frame)
+    frames = [frame % len(run) for frame in frames]
+    writer = _write_gif if path.suffix == ".gif" else _write_video
+    drawn = images(run, frames, look or Look(), view or View())
+    temporary = path.with_name(f".{path.stem}.new{path.suffix}")
+    try:
+        writer(_told(drawn, len(frames), say), temporary, frames_per_second)
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _told(drawn, count, say):
+    for number, image in enumerate(drawn, 1):
+        say(f"frame {number} of {count}")
+        yield image
+
+
+def _check_path(path, endings, what):
+    if Path(path).suffix not in endings:
+        raise InputError(f"{what[0].upper()}{what[1:]} is a file that ends in {' or '.join(endings)}, but not {path}.")
+    check_output_path(path)
+    if Path(path).suffix in _CODECS:
+        _ffmpeg()
+
+
+def _ffmpeg():
+    try:
+        import imageio_ffmpeg
+    except ImportError:
+        raise InputError(
+            "MP4 and WebM films need imageio-ffmpeg: install it, as in pip install 'openmm-cylchain[render]', or write "
+            "a GIF."
+        ) from None
+    return imageio_ffmpeg
+
+
+def _write_gif(drawn, path, frames_per_second):
+    # One palette for all frames, or colors would flicker.
+    pictures = [Image.fromarray(image) for image in drawn]
+    palette = pictures[len(pictures) // 2].quantize(255, Image.Quantize.MEDIANCUT)
+    indexed = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
+    indexed[0].save(
+        path, format="gif", save_all=True, append_images=indexed[1:], duration=1000.0 / frames_per_second, loop=0
+    )
+
+
+def _write_video(drawn, path, frames_per_second):
+    codec, options = _CODECS[path.suffix]
+    writer = None
+    try:
+        for image in drawn:
+            if writer is None:
+                size = (image.shape[1], image.shape[0])
+                writer = _ffmpeg().write_frames(
+                    str(path), size, fps=frames_per_second, codec=codec, output_params=options, macro_block_size=2
+                )
+                writer.send(None)
+            writer.send(np.ascontiguousarray(image))
+    finally:
+        if writer is not None:
+            writer.close()

@@ -1,0 +1,242 @@
+"""Pictures and films of runs: what is in them, and what is refused."""
+
+import shutil
+import sys
+
+import imageio_ffmpeg
+import numpy as np
+import pytest
+from PIL import Image
+
+from openmm_cylchain import InputError, Plane, Slab, Sphere, analysis
+from openmm_cylchain.cli import main
+from openmm_cylchain.couplings.walls import Box, Cylinder, Ellipsoid
+from openmm_cylchain.rendering.annotations import scale_bar_length
+from openmm_cylchain.rendering.camera import camera_on
+from openmm_cylchain.rendering.pictures import View, images, write_film
+from openmm_cylchain.rendering.scene import COLORINGS, Look, make_scene
+from support.small_runs import NETWORK, TWO_TYPES, simulated
+
+SIZE = ["--size", "160x120"]
+SMALL = View(size=(160, 120))
+BLUE, GREEN, ORANGE = (0, 114, 178), (0, 158, 115), (230, 159, 0)
+
+
+@pytest.fixture(scope="module")
+def two_types(tmp_path_factory):
+    return simulated(tmp_path_factory.mktemp("two"), TWO_TYPES)
+
+
+@pytest.fixture(scope="module")
+def network(tmp_path_factory):
+    return simulated(tmp_path_factory.mktemp("network"), NETWORK)
+
+
+def picture(run, tmp_path, *options):
+    path = tmp_path / "picture.png"
+    assert main(["render", str(run), "--output", str(path), *options]) == 0
+    return np.asarray(Image.open(path)).astype(int)
+
+
+def hue_of(image, color):
+    """How many pixels have about the direction of a color, less its white."""
+    wanted = max(color) - np.array(color)
+    own = image.max(axis=2, keepdims=True) - image
+    size = np.linalg.norm(own, axis=2)
+    return np.sum((size > 40) & (own @ wanted > 0.97 * size * np.linalg.norm(wanted)))
+
+
+def test_a_picture_of_a_network(network, tmp_path):
+    image = picture(network, tmp_path, "--size", "320x240")
+    assert image.shape == (240, 320, 3)
+    assert tuple(np.median(image.reshape(-1, 3), axis=0)) == (255, 255, 255)
+    assert hue_of(image, BLUE) > 1000 and hue_of(image, ORANGE) > 100
+    bare = picture(network, tmp_path, "--size", "320x240", "--no-linkers")
+    assert hue_of(bare, ORANGE) < 20 < hue_of(bare, BLUE)
+
+
+def test_types_have_colors(two_types, tmp_path):
+    image = picture(two_types, tmp_path, "--size", "320x240", "--diameter", "50 nm")
+    assert hue_of(image, BLUE) > 100 and hue_of(image, GREEN) > 100
+
+
+def test_frames_differ_and_repeat(two_types, tmp_path):
+    last, first, again = (picture(two_types, tmp_path, *SIZE, "--frame", n) for n in ("-1", "0", "30"))
+    assert np.any(last != first)
+    np.testing.assert_array_equal(last, again)
+
+
+@pytest.mark.parametrize("options", [["--projection", "orthographic"], ["--view", "0,1,0"], ["--whole"]])
+def test_views_differ(network, tmp_path, options):
+    assert np.any(picture(network, tmp_path, *SIZE) != picture(network, tmp_path, *SIZE, *options))
+
+
+def test_the_scale_bar_is_as_long_as_it_says(network):
+    run = analysis.load(network)
+    view = View(size=(400, 300), projection="orthographic")
+    (image,) = images(run, [0], Look(), view)
+    camera = camera_on(make_scene(run, Look(), [0]).points, view.size, view.projection)
+    # Dark pixels without color, in the lowest rows.
+    bar = np.flatnonzero(
+        np.all(image[-14:-4, :200].max(axis=2) < 60, axis=0) | np.any(image[-14:-4, :200].max(axis=2) < 60, axis=0)
+    )
+    assert np.all(np.diff(bar) == 1)
+    assert len(bar) == pytest.approx(scale_bar_length(camera) * camera.scale, abs=2.0)
+
+
+@pytest.mark.parametrize("color", COLORINGS)
+def test_colorings(two_types, color):
+    run = analysis.load(two_types)
+    scene = make_scene(run, Look(color, average=3), [4, 9])
+    colors = scene.tubes(9).colors
+    assert colors.shape == (3 * 6 + 2, 3)
+    tangents = [np.diff(nodes, axis=0) for nodes in run.nodes(9)]
+    tangents = [own / np.linalg.norm(own, axis=1, keepdims=True) for own in tangents]
+    if color == "type":
+        expected = np.array([BLUE] * 18 + [GREEN] * 2) / 255.0
+    elif color == "tension":
+        expected = scene.scale.colors(np.concatenate(run.segment_tensions(9, 3)) / 0.602214076)
+    elif color == "orientation":
+        axis = analysis.director(np.concatenate([np.diff(nodes, axis=0) for nodes in run.nodes(4)]))
+        expected = scene.scale.colors(np.degrees(np.arccos(np.abs(np.concatenate(tangents) @ axis))))
+    else:
+        angles = [np.degrees(np.arccos(np.sum(own[1:] * own[:-1], axis=1))) for own in tangents]
+        expected = scene.scale.colors(
+            np.concatenate([np.r_[own[0], 0.5 * (own[1:] + own[:-1]), own[-1]] for own in angles])
+        )
+    np.testing.assert_allclose(colors, expected, atol=1e-6)
+
+
+def test_tubes_are_as_wide_as_asked(two_types):
+    run = analysis.load(two_types)
+    true = make_scene(run, Look(diameter=0.0), [0]).tubes(0)
+    np.testing.assert_allclose(2.0 * true.radii, [6.0] * 18 + [run.filaments[3].diameter] * 2)
+    assert set(make_scene(run, Look(diameter=30.0), [0]).tubes(0).radii) == {15.0}
+    # Of visible ones, the thickest is a hundredth of the scene wide, the others in proportion.
+    visible = make_scene(run, Look(), [0]).diameters
+    assert visible[0] / visible[3] == pytest.approx(6.0 / run.filaments[3].diameter)
+    assert visible[3] > 20.0
+
+
+def test_linkers_are_drawn_where_they_are(network):
+    run = analysis.load(network)
+    bare, full = (make_scene(run, Look(whole=True, linkers=shown), [6]).tubes(6) for shown in (False, True))
+    records = run.linkers[6]
+    there = ~np.isnan(records["places"]).any(axis=2)
+    assert len(full.ends) - len(bare.ends) == there.all(axis=1).sum() + there.sum()
+    drawn = {tuple(np.round(place, 3)) for place in full.ends[len(bare.ends) :].reshape(-1, 3)}
+    assert drawn == {tuple(np.round(place.astype(float), 3)) for place in records["places"][there]}
+
+
+WALLS = [
+    Sphere([100, 0, 0], 3000),
+    Ellipsoid([0, 0, 0], [3000, 2000, 1000]),
+    Cylinder([0, 0, 0], [1, 1, 0], 2000),
+    Box([-2000] * 3, [3000] * 3),
+    Slab([0, 0, 10], [0, 0, 1], 900),
+    Plane([0, 0, -500], [0, 1, 1]),
+]
+
+
+@pytest.mark.parametrize("wall", WALLS, ids=lambda wall: type(wall).__name__)
+def test_walls_are_drawn_where_they_are(two_types, wall):
+    run = analysis.load(two_types)
+    bare = make_scene(run, Look(), [0])
+    run.walls = (wall,)
+    scene = make_scene(run, Look(), [0])
+    lines = scene.tubes(0)
+    lines = lines.ends[~lines.shaded].reshape(-1, 3)
+    assert len(lines) >= 20 and np.all(bare.tubes(0).shaded)
+    # On the wall: beyond it when moved outwards, within when moved inwards.
+    depth = np.sqrt(wall.square_depth(lines))
+    assert depth.max() < 1e-3 * np.abs(lines).max()
+    middle = getattr(wall, "center", getattr(wall, "point", np.array([500.0] * 3)))
+    normal = getattr(wall, "normal", None)
+    outwards = (
+        0.02 * (lines - middle)
+        if normal is None
+        else 50.0 * np.sign((lines - middle) @ normal + 1e-9)[:, None] * normal
+    )
+    if isinstance(wall, Plane):
+        outwards = np.tile(-50.0 * wall.normal, (len(lines), 1))
+    if isinstance(wall, Cylinder):
+        outwards -= np.outer(outwards @ wall.axis, wall.axis)
+    assert np.all(wall.square_depth(lines + outwards) > 0)
+    (image,) = images(run, [0], Look(), SMALL)
+    assert np.any(image != next(images(analysis.load(two_types), [0], Look(), SMALL)))
+
+
+def test_a_gif(network, tmp_path):
+    path = tmp_path / "film.gif"
+    options = ["--film", "--frames", "1::3", "--fps", "10", *SIZE]
+    assert main(["render", str(network), "--output", str(path), *options]) == 0
+    film = Image.open(path)
+    assert (film.n_frames, film.size, film.info["duration"], film.info["loop"]) == (4, (160, 120), 100, 0)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("ending", ["mp4", "webm"])
+def test_a_film(network, tmp_path, ending):
+    path = tmp_path / f"film.{ending}"
+    options = ["--film", "--frames", ":5", "--turn", "90", "--fps", "5", *SIZE]
+    assert main(["render", str(network), "--output", str(path), *options]) == 0
+    reader = imageio_ffmpeg.read_frames(str(path))
+    information = next(reader)
+    assert information["size"] == (160, 120) and information["fps"] == 5.0
+    frames = [np.frombuffer(frame, np.uint8).reshape(120, 160, 3).astype(int) for frame in reader]
+    assert len(frames) == 5
+    expected = list(images(analysis.load(network), list(range(5)), Look(), View(size=(160, 120), turn=90.0)))
+    motion = np.abs(expected[0].astype(int) - expected[4]).mean()
+    assert motion > 5.0
+    for frame, image in zip(frames, expected):
+        assert np.abs(frame - image).mean() < 0.5 * motion
+
+
+def test_without_ffmpeg(network, tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    assert main(["render", str(network), "--film", "--output", str(tmp_path / "a.mp4")]) == 2
+    assert "pip install 'openmm-cylchain[render]', or write a GIF" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--output", "a.jpg"], "A picture is a file that ends in .png"),
+        (["--film", "--output", "a.png"], "A film is a file that ends in .gif or .mp4 or .webm"),
+        (["--output", "no/where.png"], "is not a directory"),
+        (["--frame", "11"], "frames 0 to 10"),
+        (["--size", "161x120"], "even numbers of pixels"),
+        (["--size", "big"], "--size must be 2 numbers"),
+        (["--view", "0,0,0"], "must be a direction"),
+        (["--view", "0,0"], "--view must be 3 numbers"),
+        (["--projection", "flat"], "projection must be one of"),
+        (["--color", "mood"], "color must be one of type, tension"),
+        (["--average", "0", "--color", "tension"], "average"),
+        (["--diameter", "thick"], "--diameter"),
+        (["--diameter", "-3 nm"], "--diameter must be positive"),
+        (["--turn", "5"], "belong to --film"),
+        (["--film", "--output", "a.gif", "--frames", "20:"], "selects none"),
+        (["--film", "--output", "a.gif", "--frames", "a"], "--frames must be such as"),
+        (["--film", "--output", "a.gif", "--fps", "0"], "frames per second"),
+    ],
+)
+def test_refusals(network, tmp_path, monkeypatch, capsys, options, message):
+    monkeypatch.chdir(tmp_path)
+    given = options if "--output" in options else [*options, "--output", "a.png"]
+    assert main(["render", str(network), *given]) == 2
+    assert message in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_incomplete_runs_are_drawn_if_asked(two_types, tmp_path, capsys):
+    copy = shutil.copytree(two_types, tmp_path / "copy")
+    with open(copy / "energies.csv", "r+b") as file:
+        file.truncate((copy / "energies.csv").stat().st_size - 2)
+    assert main(["render", str(copy), "--output", str(tmp_path / "a.png")]) == 2
+    assert "incomplete" in capsys.readouterr().err
+    assert picture(copy, tmp_path, "--incomplete", *SIZE).shape == (120, 160, 3)
+
+
+def test_a_film_needs_frames(two_types, tmp_path):
+    with pytest.raises(InputError, match="needs a frame"):
+        write_film(analysis.load(two_types), tmp_path / "a.gif", [])

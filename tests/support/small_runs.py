@@ -1,0 +1,61 @@
+"""Configurations of runs that take a second, and their directories."""
+
+from openmm_cylchain.cli import main
+
+TWO_TYPES = """
+title = "two types"
+[solvent]
+temperature = "310 K"
+viscosity = "1.71 mPa*s"
+[[filament]]
+type = "F_ACTIN"
+segments = 6
+count = 3
+[[filament]]
+type = "MICROTUBULE"
+segments = 2
+clamped = [0]
+[simulation]
+time_step = "10 us"
+duration = "3 ms"
+report_interval = "0.1 ms"
+checkpoint_interval = "1 ms"
+seed = 5
+"""
+
+NETWORK = """
+title = "network"
+[solvent]
+temperature = "298.15 K"
+viscosity = "1 mPa*s"
+[box]
+edges = ["0.4 um", "0.4 um", "0.5 um"]
+[[filament]]
+type = "F_ACTIN"
+segment_length = "100 nm"
+segments = 4
+count = 20
+[[linkers]]
+type = "ALPHA_ACTININ"
+count = 60
+bound = 30
+[[linkers]]
+name = "motor"
+stiffness = "0.1 pN/nm"
+rest_length = "30 nm"
+hand = { binding_rate = "1e5 1/s", reach = "60 nm", unbinding_rate = "2000 1/s", speed = "-0.5 um/s" }
+count = 40
+bound = 40
+[simulation]
+time_step = "5 us"
+duration = "1 ms"
+report_interval = "0.1 ms"
+seed = 5
+"""
+
+
+def simulated(folder, text):
+    """The directory of a run of a configuration."""
+    (folder / "input.toml").write_text(text)
+    assert main(["run", str(folder / "input.toml"), "--output", str(folder / "out")]) == 0
+    return folder / "out"
