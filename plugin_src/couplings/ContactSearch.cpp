@@ -1,5 +1,6 @@
 #include "couplings/ContactSearch.h"
 #include "couplings/CandidateLoops.h"
+#include "couplings/Crossings.h"
 #include "mechanics/PeriodicBox.h"
 #include <cstddef>
 #include <cstdlib>

@@ -6,6 +6,7 @@
 #include "TestChains.h"
 #include "couplings/CandidateLoops.h"
 #include "couplings/ContactSearch.h"
+#include "couplings/Crossings.h"
 #include <algorithm>
 #include <cstring>
 #include <map>
