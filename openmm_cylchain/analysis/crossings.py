@@ -57,8 +57,9 @@ def find_crossings(
 ) -> Crossings:
     """Crossings of segments of different chains, or of one but not neighbours, on the way from start to end.
 
-    A pair that crosses and goes back is found twice. One that touches is not found. The number of pairs that are looked
-    at is proportional to the number of segments.
+    A pair that crosses and goes back is found twice. One that touches is not found. In a plane, each end that goes
+    through a segment is one crossing; a joint is an end of one of its segments. The number of pairs that are looked at
+    is proportional to the number of segments.
 
     Parameters
     ----------
@@ -352,10 +353,8 @@ def _passages_of_end(side, place, normals, start, end):
     along = [one[1 - side] for one in (start, end)]
     ends = [place * p - w if side == 0 else w + place * q for p, q, w in (start, end)]
     (a, b), (da, db) = (along[0], ends[0]), (along[1] - along[0], ends[1] - ends[0])
-    c1 = np.cross(a, db) + np.cross(da, b)
-    index, times = _sign_changes(
-        *(_dot(normals, one) for one in (np.cross(a, b), c1, np.cross(da, db))), np.zeros(len(normals))
-    )
+    c0, c1, c2 = np.cross(a, b), np.cross(a, db) + np.cross(da, b), np.cross(da, db)
+    index, times = _sign_changes(_dot(normals, c0), _dot(normals, c1), _dot(normals, c2), np.zeros(len(normals)))
     line, r = a[index] + times[:, None] * da[index], b[index] + times[:, None] * db[index]
     foot = _dot(line, r) / _dot(line, line)
     fractions = np.stack([np.full(len(foot), place), foot], axis=1)
