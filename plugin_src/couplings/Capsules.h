@@ -6,7 +6,7 @@
 
 namespace cylchain {
 
-/** A sphere that comes nearer to the axis of a segment, or to another sphere, than this over the sum of radii is deep. */
+/** A sphere that comes nearer to an axis, or to another sphere, than this over the sum of radii is deep. */
 const double DEEP = 0.7;
 
 /** All points within a radius of the line between two particles, or of one particle: a sphere. */

@@ -606,7 +606,8 @@ static void testPlanarJoints() {
     mt19937_64 generator(12);
     for (int trial = 0; trial < 500; trial++) {
         // A chain with a bend whose joint points down, above a rod along x, in any plane.
-        const double left = uniform(generator, 10, 30), right = uniform(generator, 10, 30), way = uniform(generator, 3, 8);
+        const double left = uniform(generator, 10, 30), right = uniform(generator, 10, 30);
+        const double way = uniform(generator, 3, 8);
         const Vec3d a = randomVector(generator), b = a.cross(randomVector(generator));
         const Vec3d u = a*(1/length(a)), v = b*(1/length(b)), origin = randomVector(generator, 500);
         CapsuleSystem system = {{{0, 1, 5, 0, 0}, {1, 2, 5, 0, 1}, {3, 4, 5}}, {{2, false, 1}}, {}};
@@ -1009,7 +1010,8 @@ static void testRefusals() {
 int main() {
     const string instructionSet = candidateKernels().instructionSet;
     try {
-        for (auto test : {testNearestPoints, testCrossings, testPlanarCrossings, testPlanarJoints, testSpheres, testPairs, testSmallBoxes, testRounding, testLoops,
+        for (auto test : {testNearestPoints, testCrossings, testPlanarCrossings, testPlanarJoints, testSpheres, testPairs,
+                testSmallBoxes, testRounding, testLoops,
                 testSignedGap, testParallel, testJoints, testDivision, testCrossingChains,
                 testNearestImages, testRefusals})
             test();
