@@ -2,7 +2,8 @@
 
 While the ends of two segments move on straight lines, the volume w . (p x q), which the vectors p and q along them span
 with the vector w between their first ends, is a cubic polynomial of time. Where it changes its sign the segments lie in
-one plane, and they cross there if they meet within their lengths. Filaments with contacts that hold do not cross.
+one plane, and they cross there if they meet within their lengths. Where all stays in one plane, the volume is zero, and
+segments cross where an end of one goes through the inside of the other. Filaments with contacts that hold do not cross.
 """
 
 from collections.abc import Iterable
@@ -20,6 +21,9 @@ from ..units.types import BoolArray, BoxVectors, FloatArray, IntArray, Scalar, V
 
 # Of the width of a bracket around the time of a crossing: 2^-52.
 _BISECTIONS = 52
+
+# Segments stay in one plane if no vector between their ends leaves it by more than this, over the longest one.
+_PLANAR = 1e-9
 
 
 @dataclass(frozen=True)
@@ -53,8 +57,9 @@ def find_crossings(
 ) -> Crossings:
     """Crossings of segments of different chains, or of one but not neighbours, on the way from start to end.
 
-    A pair that crosses and goes back is found twice. One that touches is not found. The number of pairs that are looked
-    at is proportional to the number of segments.
+    A pair that crosses and goes back is found twice. One that touches is not found. In a plane, each end that goes
+    through a segment is one crossing; a joint is an end of one of its segments. The number of pairs that are looked at
+    is proportional to the number of segments.
 
     Parameters
     ----------
@@ -198,13 +203,36 @@ class _Segments:
 
     def crossings(self, pairs, start, end):
         geometry = [self._geometry(pairs, positions) for positions in (start, end)]
-        index, times = _sign_changes(*_volume_polynomial(*geometry))
+        volume = _volume_polynomial(*geometry)
+        planar, normals = _in_one_plane(volume, *geometry)
+        index, times = _sign_changes(*volume)
         p, q, w = ((1.0 - times[:, None]) * a[index] + times[:, None] * b[index] for a, b in zip(*geometry))
         fractions = _meeting_place(p, q, w)
+        if len(planar):
+            in_space = ~np.isin(index, planar)
+            found = [(index[in_space], times[in_space], fractions[in_space])]
+            inside = [tuple(vectors[planar] for vectors in one) for one in geometry]
+            for side in (0, 1):
+                for place in (0.0, 1.0):
+                    number, when, where = _passages_of_end(side, place, normals, *inside)
+                    counts = self._is_counted(pairs, planar[number], side, place)
+                    found.append((planar[number[counts]], when[counts], where[counts]))
+            index, times, fractions = (np.concatenate(column) for column in zip(*found))
         met = np.all((fractions >= 0.0) & (fractions <= 1.0), axis=1)
         met = np.flatnonzero(met)[np.argsort(times[met], kind="stable")]
         both = np.stack([pairs.first[index[met]], pairs.second[index[met]]], axis=1)
         return Crossings(self._chain[both], self._number[both], fractions[met], times[met])
+
+    def _is_counted(self, pairs, index, side, place):
+        # A joint goes through with the segment that ends there, unless that one is a neighbour of the other.
+        if place == 1.0:
+            return np.full(len(index), True)
+        own, other = (pairs.first[index], pairs.second[index])[:: 1 - 2 * side]
+        chain, around = self._chain[own], self._around[self._chain[own]]
+        before = np.where(self._number[own] > 0, self._number[own] - 1, around)
+        apart = np.abs(before - self._number[other])
+        same = (chain == self._chain[other]) & np.all(pairs.shift[index] == 0.0, axis=1)
+        return (before < 0) | (same & ((apart <= 1) | (apart == around)))
 
     def _geometry(self, pairs, positions):
         vectors, starts = self.vectors(positions), positions[self._minus]
@@ -300,6 +328,39 @@ def _volume_polynomial(start, end):
         _dot(dw, first) + _dot(w, second),
         _dot(dw, second),
     )
+
+
+def _in_one_plane(volume, start, end):
+    # Numbers of the pairs that stay in one plane on their way, and unit vectors across it.
+    vectors = np.stack([*start, *end], axis=1)
+    squares = np.sum(vectors**2, axis=2)
+    length = np.sqrt(squares.max(axis=1))
+    flat = np.flatnonzero(np.max(np.abs(volume), axis=0) <= 40.0 * _PLANAR * length**3)
+    vectors, length = vectors[flat], length[flat]
+    longest = vectors[np.arange(len(flat)), squares[flat].argmax(axis=1)]
+    across = np.cross(longest[:, None], vectors)
+    areas = np.linalg.norm(across, axis=2)
+    widest = areas.argmax(axis=1)
+    areas = areas[np.arange(len(flat)), widest]
+    with np.errstate(all="ignore"):
+        normals = across[np.arange(len(flat)), widest] / areas[:, None]
+    off = np.abs(np.einsum("ik,ijk->ij", normals, vectors)).max(axis=1, initial=0.0)
+    kept = (areas > _PLANAR * length**2) & (off <= _PLANAR * length)
+    return flat[kept], normals[kept]
+
+
+def _passages_of_end(side, place, normals, start, end):
+    # When an end of the first segment (side 0) or of the second one (side 1) goes through the line of the other, in a
+    # plane: numbers of the pairs, times, and fractions along both.
+    along = [one[1 - side] for one in (start, end)]
+    ends = [place * p - w if side == 0 else w + place * q for p, q, w in (start, end)]
+    (a, b), (da, db) = (along[0], ends[0]), (along[1] - along[0], ends[1] - ends[0])
+    c0, c1, c2 = np.cross(a, b), np.cross(a, db) + np.cross(da, b), np.cross(da, db)
+    index, times = _sign_changes(_dot(normals, c0), _dot(normals, c1), _dot(normals, c2), np.zeros(len(normals)))
+    line, r = a[index] + times[:, None] * da[index], b[index] + times[:, None] * db[index]
+    foot = _dot(line, r) / _dot(line, line)
+    fractions = np.stack([np.full(len(foot), place), foot], axis=1)
+    return index, times, fractions if side == 0 else fractions[:, ::-1]
 
 
 def _sign_changes(c0, c1, c2, c3):

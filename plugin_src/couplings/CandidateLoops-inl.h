@@ -1,6 +1,7 @@
 // Compiled once for each instruction set, which CYLCHAIN_LOOPS names. It does not compile alone.
 
 #include "couplings/CandidateLoops.h"
+#include "couplings/Capsules.h"
 #include <cmath>
 #include <cstddef>
 #include <cstring>
@@ -161,12 +162,16 @@ static int keepNear(const CoarseCapsule* capsules, const float* shifts, float re
         const LaneVector dw = laterW-w, dp = a.laterHalf-a.half, dq = b.laterHalf-b.half;
         const Floats contact = a.radius+b.radius+(reach+margin);
         const Floats before = distance(a.half, b.half, w), after = distance(a.laterHalf, b.laterHalf, laterW);
-        const Floats motion = root(dw.dot(dw))+root(dp.dot(dp))+root(dq.dot(dq));
+        // Spheres pass through others near their axis.
+        const Floats zero = Floats{};
+        const Ints sphere = (a.half.dot(a.half) == zero) | (b.half.dot(b.half) == zero);
+        const Floats deep = sphere ? splat(DEEP)*(a.radius+b.radius) : zero;
+        const Floats motion = root(dw.dot(dw))+root(dp.dot(dp))+root(dq.dot(dq))+2*deep;
         const Ints near = (before <= contact) | (after <= contact) | (before+after <= motion+2*margin);
         const Floats nearest = before < after ? before : after;
         const unsigned sure = bitsOf((Ints) (nearest <= contact-2*margin));
         const Floats clearance = 0.5f*(before+after-motion)-margin;
-        const Floats distance = clearance > Floats{} ? after-margin : Floats{};
+        const Floats distance = clearance > zero ? after-margin : Floats{};
         for (unsigned bits = bitsOf(near); bits != 0; bits &= bits-1) {
             const int lane = __builtin_ctz(bits), pair = start+lane;
             if (pair >= count)

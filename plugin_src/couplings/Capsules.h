@@ -6,6 +6,9 @@
 
 namespace cylchain {
 
+/** A sphere that comes nearer to an axis, or to another sphere, than this over the sum of radii is deep. */
+const double DEEP = 0.7;
+
 /** All points within a radius of the line between two particles, or of one particle: a sphere. */
 struct Capsule {
     int first;
@@ -63,7 +66,10 @@ struct Contact {
     double normal[3];
     /** The distance less the radii. That of a pair that has crossed is negative, see ContactSearch::evaluate(). */
     double gap;
-    /** The share of the stiffness: 1, or 1/2 for each of the two contacts of segments that are nearly parallel. */
+    /**
+     * The share of the stiffness: 1, or 1/2 for each of the two contacts of segments that are nearly parallel, and for
+     * each of the segments at a joint that has crossed.
+     */
     double weight;
     /** Whether the two have crossed. */
     bool crossed;

@@ -1,5 +1,6 @@
 #include "couplings/ContactSearch.h"
 #include "couplings/CandidateLoops.h"
+#include "couplings/Crossings.h"
 #include "mechanics/PeriodicBox.h"
 #include <cstddef>
 #include <cstdlib>
@@ -127,14 +128,22 @@ double largestMotion(const SegmentPair& start, const SegmentPair& end) {
     return sqrt(largestOf(dw.squared(), (dw+dp).squared(), (dw-dq).squared(), (dw+dp-dq).squared()));
 }
 
+/** Whether capsules may pass through each other: from the distance of their axes at the end, and the sum of radii. */
+bool mayPass(const SegmentPair& start, const SegmentPair& end, double distance, double radii) {
+    return distance <= largestMotion(start, end)+(hasSphere(start) ? DEEP*radii : 0);
+}
+
 /** The gap of two capsules, signed if they have crossed. */
 double findGap(const SegmentPair& start, const SegmentPair& end, double radii) {
     const double distance = sqrt(findNearestPoints(end).squared);
-    if (distance <= largestMotion(start, end)) {
-        Crossing crossing;
-        if (findCrossing(start, end, crossing))
-            return end.between(crossing.s, crossing.t).dot(crossing.normal)-radii;
-    }
+    if (!mayPass(start, end, distance, radii))
+        return distance-radii;
+    Passage passage;
+    if (hasSphere(start))
+        return (findPassage(start, end, radii, passage) ? passage.distance : distance)-radii;
+    Crossing crossings[2];
+    if (findCrossings(start, end, crossings) > 0)
+        return end.between(crossings[0].s, crossings[0].t).dot(crossings[0].normal)-radii;
     return distance-radii;
 }
 
@@ -225,6 +234,7 @@ struct ContactSearch::Implementation {
             const double* positions) const;
     bool isOwned(const Contact& contact, const ContactPair& pair, const SegmentPair& start, const SegmentPair& end,
             bool parallel, bool ofA, const double* x, const double* y) const;
+    double shareOf(const Crossing& crossing, const ContactPair& pair) const;
     int evaluate(const ContactPair& pair, const double* x, const double* y, Contact* contacts, double limit) const;
 };
 
@@ -604,7 +614,8 @@ bool ContactSearch::Implementation::addPair(const PlacedCapsule& one, const Plac
                 return false;
             const SegmentPair end = segments(a, b, pair.shift, y);
             const double after = sqrt(findNearestPoints(end).squared);
-            if (after >= limit && before+after > largestMotion(start, end))
+            const double way = largestMotion(start, end)+(hasSphere(start) ? 2*DEEP*limit : 0);
+            if (after >= limit && before+after > way)
                 return false;
         }
     }
@@ -666,8 +677,8 @@ bool ContactSearch::Implementation::isOwned(const Contact& contact, const Contac
             const Vec3d into = along(system.capsules[neighbor], y)*(atEnd ? 1 : -1);
             const double distance = sqrt(fromOther.squared());
             if (fromOther.dot(into) >= 0 && distance-sum > contact.gap+2*least &&
-                    (x == y || distance > largestMotion(withNeighbor(start, neighbor, ofA, atEnd, x),
-                    withNeighbor(end, neighbor, ofA, atEnd, y))))
+                    (x == y || !mayPass(withNeighbor(start, neighbor, ofA, atEnd, x),
+                    withNeighbor(end, neighbor, ofA, atEnd, y), distance, sum)))
                 continue;
         }
         const SegmentPair beside = withNeighbor(end, neighbor, ofA, atEnd, y);
@@ -693,19 +704,49 @@ bool ContactSearch::Implementation::isOwned(const Contact& contact, const Contac
     return true;
 }
 
+/** At a joint, both segments have crossed: the share of the one. */
+double ContactSearch::Implementation::shareOf(const Crossing& crossing, const ContactPair& pair) const {
+    double share = 1;
+    for (bool ofA : {true, false}) {
+        const double fraction = takenToEnd(ofA ? crossing.s : crossing.t);
+        const int own = ofA ? pair.a : pair.b, other = ofA ? pair.b : pair.a;
+        const int neighbor = fraction == 0 ? previous[own] : fraction == 1 ? next[own] : -1;
+        if (neighbor >= 0 && !isExcluded(neighbor, other))
+            share *= 0.5;
+    }
+    return share;
+}
+
 int ContactSearch::Implementation::evaluate(const ContactPair& pair, const double* x, const double* y,
         Contact* contacts, double limit) const {
     const SegmentPair end = segments(pair.a, pair.b, pair.shift, y);
     const double sum = radii(pair.a, pair.b);
     const SegmentPair start = x == y ? end : segments(pair.a, pair.b, pair.shift, x);
     const Places places = findPlaces(end);
-    if (x != y) {
-        Crossing crossing;
-        if (places.distance <= largestMotion(start, end) && findCrossing(start, end, crossing)) {
-            const Vec3d& n = crossing.normal;
-            const double signedDistance = end.between(crossing.s, crossing.t).dot(n);
-            contacts[0] = {crossing.s, crossing.t, {n.x, n.y, n.z}, signedDistance-sum, 1, true};
-            return contacts[0].gap < limit ? 1 : -1;
+    if (x != y && mayPass(start, end, places.distance, sum)) {
+        if (hasSphere(start)) {
+            Passage passage;
+            if (findPassage(start, end, sum, passage)) {
+                const Vec3d& n = passage.normal;
+                contacts[0] = {takenToEnd(passage.s), takenToEnd(passage.t), {n.x, n.y, n.z}, passage.distance-sum, 1,
+                        passage.through};
+                if (contacts[0].gap >= limit)
+                    return -1;
+                return isOwned(contacts[0], pair, start, end, false, true, x, y) &&
+                        isOwned(contacts[0], pair, start, end, false, false, x, y);
+            }
+        }
+        else {
+            Crossing crossings[2];
+            const int count = findCrossings(start, end, crossings);
+            for (int i = 0; i < count; i++) {
+                const Crossing& crossing = crossings[i];
+                const Vec3d& n = crossing.normal;
+                contacts[i] = {crossing.s, crossing.t, {n.x, n.y, n.z},
+                        end.between(crossing.s, crossing.t).dot(n)-sum, shareOf(crossing, pair)/count, true};
+            }
+            if (count > 0)
+                return min(contacts[0].gap, contacts[count-1].gap) < limit ? count : -1;
         }
     }
     contacts[0].gap = places.distance-sum;
@@ -818,6 +859,10 @@ bool ContactSearch::crosses(const ContactPair& pair, const double* x, const doub
     const Implementation& search = *implementation;
     const SegmentPair start = search.segments(pair.a, pair.b, pair.shift, x);
     const SegmentPair end = search.segments(pair.a, pair.b, pair.shift, y);
-    Crossing crossing;
-    return findCrossing(start, end, crossing);
+    if (hasSphere(start)) {
+        Passage passage;
+        return findPassage(start, end, search.radii(pair.a, pair.b), passage) && passage.through;
+    }
+    Crossing crossings[2];
+    return findCrossings(start, end, crossings) > 0;
 }

@@ -68,6 +68,11 @@ public:
      * Two segments touch where they are nearest to each other. If they are nearly parallel, at both ends of their
      * overlap, each with half of the stiffness. If they have crossed between x and y, they touch where they crossed,
      * the normal is that of before, and the gap is the distance along it, less the radii: the signed distance goes on.
+     * Segments that stay in one plane cross where an end goes through the other; if two ends do, they touch at both.
+     * Where that end is a joint, both segments there have half of the stiffness.
+     *
+     * A sphere on a path that comes nearer to the axis of a segment, or to another sphere, than 0.7 of the sum of radii
+     * touches where it is nearest on its way; its normal is that of x, and the gap is signed along it.
      *
      * Around a joint, segments that share it may see one and the same contact. It is counted once:
      * - A contact at a joint is that of the segment that ends there (s = 1), and of none if the distance falls as one
@@ -92,8 +97,8 @@ public:
      */
     void findVector(const ContactPair& pair, double s, double t, const double* positions, double* result) const;
     /**
-     * Get whether the segments of a pair pass through each other on the way from x to y, an odd number of times.
-     * Spheres do not, nor do segments that stay in one plane.
+     * Get whether the capsules of a pair pass through each other on the way from x to y, an odd number of times. Spheres
+     * do if they come nearer to an axis than 0.7 of the sum of radii, and end on the other side of it.
      */
     bool crosses(const ContactPair& pair, const double* x, const double* y) const;
 private:

@@ -218,3 +218,57 @@ def test_bad_input_is_refused():
     ):
         with pytest.raises(InputError, match=message):
             make()
+
+
+# In one plane
+
+
+def _across(r):
+    """Whether segments from r[0] to r[1] and from r[2] to r[3], in a plane, lie across each other."""
+    p, q, w = r[1] - r[0], r[3] - r[2], r[2] - r[0]
+    area = p[0] * q[1] - p[1] * q[0]
+    s, t = (w[0] * q[1] - w[1] * q[0]) / area, (w[0] * p[1] - w[1] * p[0]) / area
+    return (s > 0) & (s < 1) & (t > 0) & (t < 1)
+
+
+def test_passages_in_a_plane_against_where_segments_lie_across_each_other():
+    """Whenever an end goes through a segment, the two lie across each other, or cease to."""
+    rng = np.random.default_rng(4)
+    passages = 0
+    times = np.linspace(0, 1, 4001)
+    for _ in range(200):
+        plane = np.linalg.qr(rng.normal(size=(3, 3)))[0][:2]
+        start = rng.normal(0, 10, (4, 2))
+        end = start + rng.normal(0, 10, (4, 2))
+        found = find_crossings(TWO, start @ plane, end @ plane)
+        states = _across(start[..., None] + (end - start)[..., None] * times)
+        changes = times[1:][states[1:] != states[:-1]]
+        # Two that are nearer to each other than the resolution of the other count are missed by it.
+        if len(found) > 1 and np.diff(found.times).min() < 1e-3:
+            continue
+        assert len(found) == len(changes)
+        np.testing.assert_allclose(found.times, changes, atol=3e-4)
+        assert np.all(np.any((found.fractions == 0) | (found.fractions == 1), axis=1))
+        passages += len(found)
+    assert passages > 60
+
+
+def test_a_joint_that_passes_in_a_plane_counts_once():
+    chains = [np.arange(3), np.arange(3, 5)]
+    start = np.array([[-10, 5, 0], [0, 1, 0], [10, 5, 0], [-30, 0, 0], [30, 0, 0]], float)
+    end = start - np.array([[0, 2, 0]] * 3 + [[0, 0, 0]] * 2)
+    for order in ([0, 1, 2], [2, 1, 0]):
+        crossings = find_crossings([np.array(order), chains[1]], start, end)
+        assert len(crossings) == 1 and crossings.segments.tolist() == [[0, 0]]
+        assert crossings.times == pytest.approx([0.5])
+    # Out of the plane by a nanometre, it passes above, and does not cross.
+    end[1, 2] = start[1, 2] = 1.0
+    assert len(find_crossings(chains, start, end)) == 0
+
+
+def test_segments_that_pass_side_by_side_in_a_plane_are_counted():
+    """Parallel ones, one of which is longer: both ends of the shorter one go through the other."""
+    start = np.array([[-5.0, 1, 0], [5, 1, 0], [-9, 0, 0], [9, 0, 0]])
+    end = start + np.array([[0.0, -3, 0]] * 2 + [[0, 0, 0]] * 2)
+    assert len(find_crossings(TWO, start, end)) == 2
+    assert len(find_crossings(TWO, start, end + [0, 0, 1e-3])) == 2

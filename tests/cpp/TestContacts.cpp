@@ -6,6 +6,7 @@
 #include "TestChains.h"
 #include "couplings/CandidateLoops.h"
 #include "couplings/ContactSearch.h"
+#include "couplings/Crossings.h"
 #include <algorithm>
 #include <cstring>
 #include <map>
@@ -140,6 +141,13 @@ static SegmentPair pairOf(const Vec3d* r) {
     return {r[1]-r[0], r[3]-r[2], r[0]-r[2]};
 }
 
+static bool findCrossing(const SegmentPair& start, const SegmentPair& end, Crossing& crossing) {
+    Crossing found[2];
+    const int count = findCrossings(start, end, found);
+    crossing = found[0];
+    return count > 0;
+}
+
 static void testCrossings() {
     mt19937_64 generator(2);
     int crossed = 0, twice = 0, none = 0, sameSide = 0;
@@ -201,14 +209,81 @@ static void testCrossings() {
     checkClose(0.5, crossing.time, 1, 1e-12, "time");
     check(crossing.normal.z > 0.999, "normal of before");
     check(!findCrossing(apart, apart, crossing), "no motion");
-    check(!findCrossing({{10, 0, 0}, {10, 0, 0}, {0, 0, 1}}, {{10, 0, 0}, {10, 0, 0}, {0, 0, -1}}, crossing),
-            "parallel");
-    check(!findCrossing({{10, 0, 0}, {0, 0, 0}, {-5, 0, 1}}, {{10, 0, 0}, {0, 0, 0}, {-5, 0, -1}}, crossing),
-            "a point and a segment");
+    check(!findCrossing({{10, 0, 0}, {10, 0, 0}, {0, 0, 1}}, {{10, 0, 0}, {10, 0, 0}, {0, 1, -1}}, crossing),
+            "parallel, past each other");
     check(!findCrossing(apart, {{10, 0, 0}, {0, 10, 0}, {-5, 5, 0.001}}, crossing), "it stops before");
     // A segment that turns through the direction of the other, beside it, does not cross it.
     check(!findCrossing({{10, 1, 0}, {10, 0, 0}, {0, 0, 3}}, {{10, -1, 0}, {10, 0, 0}, {0, 0, 3}}, crossing),
             "it turns");
+}
+
+/** Whether two segments in the plane z = 0 meet. */
+static bool meetInPlane(const Vec3d* r) {
+    auto area = [&] (int i, int j, int k) {
+        return (r[j]-r[i]).cross(r[k]-r[i]).z;
+    };
+    return area(0, 1, 2)*area(0, 1, 3) < 0 && area(2, 3, 0)*area(2, 3, 1) < 0;
+}
+
+/** Segments that move in one plane: they have crossed if they lie across each other, or have done so on the way. */
+static void testPlanarCrossings() {
+    mt19937_64 generator(11);
+    int across = 0, passed = 0, none = 0, back = 0;
+    for (int trial = 0; trial < 20000; trial++) {
+        // In the plane z = 0, and the same turned and moved anywhere, with the rounding that this makes.
+        Vec3d start[4], end[4], turnedStart[4], turnedEnd[4];
+        const bool small = trial%3 != 0;
+        for (int i = 0; i < 4; i++) {
+            start[i] = randomVector(generator, 40);
+            end[i] = start[i]+randomVector(generator, small ? 5 : 30);
+            start[i].z = end[i].z = 0;
+        }
+        if (trial%5 == 0) {
+            // Side by side.
+            start[2] = start[0]+randomVector(generator, 3);
+            start[3] = start[1]+randomVector(generator, 3);
+            start[2].z = start[3].z = 0;
+        }
+        if (meetInPlane(start))
+            continue;
+        const Vec3d a = randomVector(generator), b = a.cross(randomVector(generator));
+        const Vec3d u = a*(1/length(a)), v = b*(1/length(b)), origin = randomVector(generator, 1000);
+        for (int i = 0; i < 4; i++) {
+            turnedStart[i] = origin+u*start[i].x+v*start[i].y;
+            turnedEnd[i] = origin+u*end[i].x+v*end[i].y;
+        }
+        Crossing found[2], turned[2];
+        const int count = findCrossings(pairOf(start), pairOf(end), found);
+        check(findCrossings(pairOf(turnedStart), pairOf(turnedEnd), turned) == count, "the same in another plane");
+        bool met = false;
+        const int parts = 3000;
+        for (int i = 1; i < parts && !met; i++) {
+            Vec3d r[4];
+            for (int k = 0; k < 4; k++)
+                r[k] = start[k]+(end[k]-start[k])*((double) i/parts);
+            met = meetInPlane(r);
+        }
+        if (meetInPlane(end))
+            check(count > 0, "they lie across each other, in trial "+to_string(trial));
+        if (!met)
+            check(count == 0 || found[count-1].time-found[0].time < 2.0/parts, "they have never met");
+        across += meetInPlane(end);
+        passed += !meetInPlane(end) && count > 0;
+        back += met && count == 0;
+        none += !met;
+        for (int i = 0; i < count; i++) {
+            check(found[i].s == 0 || found[i].s == 1 || found[i].t == 0 || found[i].t == 1, "an end has crossed");
+            const SegmentPair pair = interpolate(pairOf(start), pairOf(end), found[i].time);
+            checkClose(0, length(pair.between(found[i].s, found[i].t)), 1, 1e-9, "place of crossing");
+            checkClose(1, length(found[i].normal), 1, 1e-12, "unit normal");
+            checkClose(found[i].time, turned[i].time, 1, 1e-6, "time in another plane");
+            checkClose(0, found[i].normal.z, 1, 1e-12, "normal in the plane");
+            const double before = max(0.0, found[i].time-1e-5);
+            check(interpolate(pairOf(start), pairOf(end), before).between(found[i].s, found[i].t).dot(
+                    found[i].normal) > -1e-9, "normal of before");
+        }
+    }
+    check(across > 500 && passed > 300 && none > 5000 && back > 10, "all kinds were tried");
 }
 
 struct TestSystem {
@@ -526,6 +601,103 @@ static vector<Contact> evaluateAll(const ContactSearch& search, const vector<Con
     return contacts;
 }
 
+/** A joint that goes through a rod in their plane, and a rod through a joint: one contact, which pushes back. */
+static void testPlanarJoints() {
+    mt19937_64 generator(12);
+    for (int trial = 0; trial < 500; trial++) {
+        // A chain with a bend whose joint points down, above a rod along x, in any plane.
+        const double left = uniform(generator, 10, 30), right = uniform(generator, 10, 30);
+        const double way = uniform(generator, 3, 8);
+        const Vec3d a = randomVector(generator), b = a.cross(randomVector(generator));
+        const Vec3d u = a*(1/length(a)), v = b*(1/length(b)), origin = randomVector(generator, 500);
+        CapsuleSystem system = {{{0, 1, 5, 0, 0}, {1, 2, 5, 0, 1}, {3, 4, 5}}, {{2, false, 1}}, {}};
+        Array x;
+        for (const Vec3d& place : {Vec3d{-40, left, 0}, Vec3d{0, 2, 0}, Vec3d{40, right, 0}, Vec3d{-60, 0, 0},
+                Vec3d{60, 0, 0}})
+            add(x, origin+u*place.x+v*place.y);
+        Array y = x;
+        for (int particle = 0; particle < 3; particle++)
+            for (int k = 0; k < 3; k++)
+                y[3*particle+k] -= way*(k == 0 ? v.x : k == 1 ? v.y : v.z);
+        ContactSearch search(system);
+        vector<ContactPair> pairs;
+        search.findPairs(x.data(), y.data(), NULL, 0, pairs);
+        double weight = 0;
+        for (const Contact& contact : evaluateAll(search, pairs, x, y)) {
+            const Vec3d normal = {contact.normal[0], contact.normal[1], contact.normal[2]};
+            const bool deepest = contact.gap < -10;
+            if (deepest) {
+                checkClose(2-way-10, contact.gap, 10, 1e-9, "signed gap");
+                checkClose(1, normal.dot(v), 1, 1e-9, "it pushes back");
+                check(contact.crossed, "it has crossed");
+                weight += contact.weight;
+            }
+        }
+        checkClose(1, weight, 1, 1e-12, "a joint counts once");
+        for (const ContactPair& pair : pairs)
+            if (pair.b == 2)
+                check(search.crosses(pair, x.data(), y.data()), "both segments at the joint cross");
+    }
+}
+
+/** A sphere that goes through a rod is pushed back; one that goes around it is not. */
+static void testSpheres() {
+    mt19937_64 generator(13);
+    for (bool rod : {true, false})
+        for (int trial = 0; trial < 2000; trial++) {
+            const bool sphereFirst = trial%2 == 0;
+            const Vec3d a = randomVector(generator), b = a.cross(randomVector(generator));
+            const Vec3d u = a*(1/length(a)), v = b*(1/length(b)), w = u.cross(v), origin = randomVector(generator, 100);
+            const double height = uniform(generator, 11, 25), depth = uniform(generator, -25, 20);
+            const double beside = uniform(generator, -18, 18), along = uniform(generator, -40, 40);
+            Array x, y;
+            CapsuleSystem system;
+            const Vec3d from = origin+w*height+u*(rod ? along : 0), to = origin+w*depth+v*beside+u*(rod ? along : 0);
+            auto addSphere = [&] {
+                system.capsules.push_back({(int) x.size()/3, -1, 8});
+                add(x, from);
+                add(y, to);
+            };
+            auto addOther = [&] {
+                const int first = x.size()/3;
+                system.capsules.push_back({first, rod ? first+1 : -1, 2});
+                for (int end = 0; end < (rod ? 2 : 1); end++)
+                    for (Array* positions : {&x, &y})
+                        add(*positions, rod ? origin+u*(end == 0 ? -50 : 50) : origin);
+            };
+            if (sphereFirst) {
+                addSphere();
+                addOther();
+            }
+            else {
+                addOther();
+                addSphere();
+            }
+            // How near it comes, in small parts of the way.
+            double nearest = 1e9;
+            for (int i = 0; i <= 2000; i++)
+                nearest = min(nearest, hypot(height+(depth-height)*i/2000.0, beside*i/2000.0));
+            if (fabs(nearest-7) < 0.01 || fabs(depth) < 1e-3)
+                continue;
+            const bool deep = nearest < 7, through = deep && depth < 0;
+            ContactSearch search(system);
+            vector<ContactPair> pairs;
+            search.findPairs(x.data(), y.data(), NULL, 0, pairs);
+            check(!deep || pairs.size() == 1, "what goes through is found");
+            if (pairs.empty())
+                continue;
+            check(search.crosses(pairs[0], x.data(), y.data()) == through, "through or not");
+            const vector<Contact> contacts = evaluateAll(search, pairs, x, y);
+            check(contacts.size() == 1, "one contact");
+            const Vec3d normal = Vec3d{contacts[0].normal[0], contacts[0].normal[1], contacts[0].normal[2]}*
+                    (sphereFirst ? 1 : -1);
+            check(contacts[0].crossed == through, "crossed");
+            checkClose((deep ? depth : hypot(depth, beside))-10, contacts[0].gap, 10, 1e-9, "gap");
+            if (deep)
+                checkClose(1, normal.dot(w), 1, 1e-9, "normal of the start");
+        }
+}
+
 /** A rod that moves through another: its gap goes on below what the distance alone can be. */
 static void testSignedGap() {
     mt19937_64 generator(7);
@@ -838,7 +1010,8 @@ static void testRefusals() {
 int main() {
     const string instructionSet = candidateKernels().instructionSet;
     try {
-        for (auto test : {testNearestPoints, testCrossings, testPairs, testSmallBoxes, testRounding, testLoops,
+        for (auto test : {testNearestPoints, testCrossings, testPlanarCrossings, testPlanarJoints, testSpheres, testPairs,
+                testSmallBoxes, testRounding, testLoops,
                 testSignedGap, testParallel, testJoints, testDivision, testCrossingChains,
                 testNearestImages, testRefusals})
             test();
