@@ -51,6 +51,10 @@ public:
     virtual bool needsCompliances() const {
         return false;
     }
+    /** The stiffness of the stiffest coupling that turns, over the friction of its places in a step. */
+    virtual double getTurningStiffness() const {
+        return 0;
+    }
     /** Take note of how forces move the places of the equations: see CoupledEquations::findCompliances(). */
     virtual void setCompliances(const double*) {
     }
