@@ -43,7 +43,7 @@ public:
      *
      * @param active       the packs that take part; others stay where they are
      * @param forTensions  whether tensions of segments must be right, not moves alone
-     * @param stiffness    of the stiffest coupling that turns, over the friction of its places in a step
+     * @param stiffness    see ImplicitCouplings::getDemandingStiffness()
      */
     void solve(const std::vector<PackStep*>& packs, const PackFlags& active,
             const std::vector<CouplingEquation>& equations, double kT, bool forTensions, double stiffness,

@@ -49,8 +49,8 @@ public:
     bool needsCompliances() const override {
         return anyTurns;
     }
-    double getTurningStiffness() const override {
-        return turningStiffness;
+    double getDemandingStiffness() const override {
+        return demandingStiffness;
     }
     void setCompliances(const double* compliances) override;
     bool finishIteration(const double* moves, const double* moved) override;
@@ -92,7 +92,7 @@ private:
     const std::vector<Link>* links = nullptr;
     LinkBoxes boxes;
     const double* begun = nullptr;
-    double kT = 0, stepSize = 0, shareOfMetricForces = 1, turningStiffness = 0;
+    double kT = 0, stepSize = 0, shareOfMetricForces = 1, demandingStiffness = 0;
     bool anyTurns = false;
     int force = 0;
     /** Of all links on the segment that begins with a particle. */

@@ -189,7 +189,7 @@ bool NetworkStep::iterate(const Attempt& attempt, int stage) {
     });
     double stiffness = 0;
     for (const ImplicitCouplings* own : couplings)
-        stiffness = max(stiffness, own->getTurningStiffness());
+        stiffness = max(stiffness, own->getDemandingStiffness());
     const int most = turns ? NEWTON_ITERATIONS_OF_TURNING_LINKS : NEWTON_ITERATIONS;
     for (int iteration = 0; iteration < most; iteration++) {
         equations.clear();
