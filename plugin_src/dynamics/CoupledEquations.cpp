@@ -19,9 +19,9 @@ const double LEAST_ENERGY = 1e-2;
  */
 const double OF_TENSIONS = 2e-4;
 /**
- * The same where couplings that need it are stiffer than this, times their stiffness. What is left of the motion of both
- * places as one makes Newton's method go back and forth otherwise, and bends 2 to 3 % too large in second order. The least energy is that of all packs then, because
- * a single coupling may have it.
+ * The same where couplings that need it are stiffer than this, times their stiffness. What is left of the motion of
+ * both places as one makes Newton's method go back and forth otherwise, and bends 2 to 3 % too large in second order.
+ * The least energy is that of all packs then, because a single coupling may have it.
  */
 const double STIFF = 2e3, OF_STIFF = 10;
 const int LARGEST_NUMBER_OF_ITERATIONS = 1000;
