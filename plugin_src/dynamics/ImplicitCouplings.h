@@ -51,6 +51,13 @@ public:
     virtual bool needsCompliances() const {
         return false;
     }
+    /**
+     * Of couplings that need equations which are solved well, the stiffness of the stiffest, over the friction of its
+     * places in a step. Those are couplings that turn, and in the scheme of second order all that are stiff.
+     */
+    virtual double getDemandingStiffness() const {
+        return 0;
+    }
     /** Take note of how forces move the places of the equations: see CoupledEquations::findCompliances(). */
     virtual void setCompliances(const double*) {
     }

@@ -102,6 +102,12 @@ void LinkEquations::begin(const CoupledStart& start, const Loop& newLoop) {
         describe(start, states[i]);
     });
     anyTurns = any_of(states.begin(), states.end(), [] (const State& state) {return state.turns;});
+    const bool twoStages = start.settings.scheme == Scheme::ImplicitSecondOrder;
+    demandingStiffness = 0;
+    for (const State& state : states)
+        for (int side = 0; side < 2; side++)
+            if ((state.turns || twoStages) && state.places[side].pack >= 0)
+                demandingStiffness = max(demandingStiffness, stepSize*state.link->stiffness/state.friction[side]);
     unfinished.assign(states.size(), 0);
     if (kT > 0)
         drawNoise(start);

@@ -49,6 +49,9 @@ public:
     bool needsCompliances() const override {
         return anyTurns;
     }
+    double getDemandingStiffness() const override {
+        return demandingStiffness;
+    }
     void setCompliances(const double* compliances) override;
     bool finishIteration(const double* moves, const double* moved) override;
     void findFailures(const double* moved, std::vector<bool>& failed) const override;
@@ -89,7 +92,7 @@ private:
     const std::vector<Link>* links = nullptr;
     LinkBoxes boxes;
     const double* begun = nullptr;
-    double kT = 0, stepSize = 0, shareOfMetricForces = 1;
+    double kT = 0, stepSize = 0, shareOfMetricForces = 1, demandingStiffness = 0;
     bool anyTurns = false;
     int force = 0;
     /** Of all links on the segment that begins with a particle. */

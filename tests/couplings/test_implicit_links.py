@@ -1,5 +1,7 @@
 """Links in the equations of implicit steps: forces, relaxation, bits, restarts, periodic boxes, and what goes wrong."""
 
+import re
+
 import numpy as np
 import openmm
 import pytest
@@ -198,7 +200,7 @@ def test_periodic_images_are_the_same(form, scheme):
             end[nodes] -= 0 if moved is None else moved[number]
         ends.append(end)
     # Rounding may take an iteration more or less.
-    assert ends[1] == pytest.approx(ends[0], abs=change_of_last_iteration(FORMS[form]))
+    assert ends[1] == pytest.approx(ends[0], abs=max(1e-4, 0.2 * change_of_last_iteration(FORMS[form])))
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
@@ -285,6 +287,36 @@ def test_links_that_are_stretched_by_micrometers(potential, temperature, scheme)
         pass
     else:
         assert simulation.crosslinks[0].lengths(simulation.context)[0] < 3000
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_stiff_short_links_in_loops_hold_or_say_so(seed, scheme):
+    """Five of 100 pN/nm a filament between random places, also of one segment: some are pulled by nN at first."""
+    generator, count, segments = np.random.default_rng(seed), 6, 4
+    places = [(int(f), int(s), float(u)) for f, s, u in zip(
+        generator.integers(count, size=5 * count), generator.integers(segments, size=5 * count),
+        generator.uniform(size=5 * count))]  # fmt: skip
+    places += [(0, 1, 0.1), (0, 1, 0.8)]
+    network = Network(tuple(zip(places[::2], places[1::2])), count, segments)
+    potential = LinkPotential(100.0, 35.0)
+    nodes = np.zeros((1, count, segments + 1, 3))
+    nodes[..., 0] = 100 * np.arange(segments + 1)
+    nodes[0, ..., 1:] += generator.uniform(0, 60, (count, 1, 2))
+    simulation = Simulation(network, potential, nodes, np.zeros((1, 0, 3)), scheme, 5 * MICROSECOND, seed=seed)
+    start, before = simulation.crosslinks[0].lengths(simulation.context), energy_of(simulation.context)
+    integrator = simulation.integrator
+    try:
+        for step in (1e-3, 1e-2, 0.1, 1.0, 5.0):
+            integrator.setStepSize(step * MICROSECOND)
+            integrator.step(20)
+    except InstabilityError as error:
+        assert re.search("[Cc]rosslink|[Ff]ilament", str(error)), str(error)
+        # The positions are those before the step that could not be taken.
+        assert np.abs(simulation.crosslinks[0].lengths(simulation.context)).max() < 1.1 * np.abs(start).max()
+    else:
+        assert energy_of(simulation.context) < 0.5 * before
+    assert np.isfinite(positions_of(simulation.context)).all()
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
