@@ -67,7 +67,8 @@ struct CandidateKernels {
             const CandidatePairs& pairs);
     /**
      * Keep those of some pairs that come near each other at the start or at the end, or may cross in between or when
-     * they have moved on by the reach, and return how many. Where there is no doubt that they come near, SURE is added to the image.
+     * they have moved on by the reach, and return how many. Where there is no doubt that they come near, SURE is added
+     * to the image.
      *
      * @param shifts  the vectors of images, four numbers each
      * @param reach   how near their surfaces come

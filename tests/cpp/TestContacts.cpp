@@ -920,7 +920,8 @@ static void testRefusals() {
 int main() {
     const string instructionSet = candidateKernels().instructionSet;
     try {
-        for (auto test : {testNearestPoints, testCrossings, testPairs, testSmallBoxes, testRounding, testOutlooks, testSearchingAgain, testLoops,
+        for (auto test : {testNearestPoints, testCrossings, testPairs, testSmallBoxes, testRounding,
+                testOutlooks, testSearchingAgain, testLoops,
                 testSignedGap, testParallel, testJoints, testDivision, testCrossingChains,
                 testNearestImages, testRefusals})
             test();
