@@ -167,7 +167,7 @@ static int keepNear(const CoarseCapsule* capsules, const float* shifts, float re
         const Ints sphere = (a.half.dot(a.half) == zero) | (b.half.dot(b.half) == zero);
         const Floats deep = sphere ? splat(DEEP)*(a.radius+b.radius) : zero;
         const Floats motion = root(dw.dot(dw))+root(dp.dot(dp))+root(dq.dot(dq))+2*deep;
-        const Ints near = (before <= contact) | (after <= contact) | (before+after <= motion+2*margin);
+        const Ints near = (before <= contact) | (after <= contact) | (before+after <= motion+2*(reach+margin));
         const Floats nearest = before < after ? before : after;
         const unsigned sure = bitsOf((Ints) (nearest <= contact-2*margin));
         const Floats clearance = 0.5f*(before+after-motion)-margin;
@@ -186,7 +186,114 @@ static int keepNear(const CoarseCapsule* capsules, const float* shifts, float re
     return kept;
 }
 
-static const CandidateKernels KERNELS = {CYLCHAIN_LOOPS_NAME, findOverlaps, keepNear};
+/** As many pairs as there are doubles in a register. */
+const int DOUBLES = CYLCHAIN_LANES/2;
+typedef double Doubles __attribute__((vector_size(8*DOUBLES)));
+typedef long long Masks __attribute__((vector_size(8*DOUBLES)));
+typedef int Numbers __attribute__((vector_size(4*DOUBLES)));
+
+struct DoubleVector {
+    Doubles x, y, z;
+    CYLCHAIN_INLINE DoubleVector operator+(const DoubleVector& v) const {return {x+v.x, y+v.y, z+v.z};}
+    CYLCHAIN_INLINE DoubleVector operator-(const DoubleVector& v) const {return {x-v.x, y-v.y, z-v.z};}
+    CYLCHAIN_INLINE DoubleVector operator*(Doubles s) const {return {x*s, y*s, z*s};}
+    CYLCHAIN_INLINE Doubles dot(const DoubleVector& v) const {return x*v.x+y*v.y+z*v.z;}
+    CYLCHAIN_INLINE DoubleVector cross(const DoubleVector& v) const {
+        return {y*v.z-z*v.y, z*v.x-x*v.z, x*v.y-y*v.x};
+    }
+};
+
+CYLCHAIN_INLINE Doubles gatherOf(const double* base, Numbers records) {
+    static_assert(sizeof(MovingSegment) == 16*sizeof(double), "A segment is sixteen numbers");
+#if defined(__AVX512F__) && CYLCHAIN_LANES == 16
+    return (Doubles) _mm512_mask_i32gather_pd(_mm512_setzero_pd(), 0xff, (__m256i) (records*16), base, 8);
+#else
+    Doubles result;
+    for (int i = 0; i < DOUBLES; i++)
+        result[i] = base[16*(std::size_t) records[i]];
+    return result;
+#endif
+}
+
+CYLCHAIN_INLINE DoubleVector gatherVectorOf(const double* base, Numbers records) {
+    return {gatherOf(base, records), gatherOf(base+1, records), gatherOf(base+2, records)};
+}
+
+template <class Values> CYLCHAIN_INLINE Values loadOf(const void* values) {
+    Values result;
+    std::memcpy(&result, values, sizeof(result));
+    return result;
+}
+
+CYLCHAIN_INLINE Doubles toUnit(Doubles value) {
+    const Doubles zero = {}, one = zero+1;
+    const Doubles above = value > zero ? value : zero;
+    return above < one ? above : one;
+}
+
+CYLCHAIN_INLINE Doubles smaller(Doubles a, Doubles b) {
+    return a < b ? a : b;
+}
+
+CYLCHAIN_INLINE Doubles greater(Doubles a, Doubles b) {
+    return a > b ? a : b;
+}
+
+static void outlook(const MovingSegment* segments, double parallel, double atEnd, const PairsOfSegments& pairs,
+        int count) {
+    // Rounding may not let it seem that nothing crosses, or that a distance decreases. Segments that stay in one plane
+    // (areInOnePlane() in Crossings.h) may cross there: no volume of theirs is more than this.
+    const double ofVolumes = 2e-7, ofMotion = 1+1e-9, ofSlope = 1e-12, tiny = 1e-30;
+    const double* base = segments[0].first;
+    for (int start = 0; start < count; start += DOUBLES) {
+        const Numbers first = loadOf<Numbers>(pairs.first+start), second = loadOf<Numbers>(pairs.second+start);
+        const DoubleVector shift = {loadOf<Doubles>(pairs.shift[0]+start), loadOf<Doubles>(pairs.shift[1]+start),
+                loadOf<Doubles>(pairs.shift[2]+start)};
+        const DoubleVector w0 = gatherVectorOf(base, first)-gatherVectorOf(base, second)+shift;
+        const DoubleVector p0 = gatherVectorOf(base+3, first), q0 = gatherVectorOf(base+3, second);
+        const DoubleVector w = gatherVectorOf(base+6, first)-gatherVectorOf(base+6, second)+shift;
+        const DoubleVector p = gatherVectorOf(base+9, first), q = gatherVectorOf(base+9, second);
+
+        const Doubles a = p.dot(p)+tiny, b = p.dot(q), e = q.dot(q)+tiny, c = p.dot(w), f = q.dot(w);
+        const Doubles determinant = a*e-b*b;
+        Doubles s = toUnit((b*f-c*e)/greater(determinant, a*e*1e-14));
+        Doubles t = toUnit((b*s+f)/e);
+        s = toUnit((b*t-c)/a);
+        t = toUnit((b*s+f)/e);
+        const DoubleVector r = w+p*s-q*t;
+        const Doubles squared = r.dot(r);
+
+        // The volume is a cubic in time; it does not vanish where all its Bernstein coefficients have one sign.
+        const DoubleVector dw = w-w0, dp = p-p0, dq = q-q0;
+        const DoubleVector n0 = p0.cross(q0), n1 = p0.cross(dq)+dp.cross(q0), n2 = dp.cross(dq);
+        const Doubles c0 = w0.dot(n0), c1 = w0.dot(n1)+dw.dot(n0), c2 = w0.dot(n2)+dw.dot(n1), c3 = dw.dot(n2);
+        const Doubles f1 = c0+c1/3.0, f2 = f1+(c1+c2)/3.0, f3 = c0+c1+c2+c3;
+        const Doubles least = smaller(smaller(c0, f1), smaller(f2, f3));
+        const Doubles most = greater(greater(c0, f1), greater(f2, f3));
+        const Doubles size = a+e+w.dot(w)+p0.dot(p0)+q0.dot(q0)+w0.dot(w0);
+        // In units of volume, squared.
+        const Doubles limit = ofVolumes*ofVolumes*size*size*size;
+        const Masks oneSign = ((least > 0.0) & (least*least > limit)) | ((most < 0.0) & (most*most > limit));
+        const DoubleVector ends[] = {dw, dw+dp, dw-dq, dw+dp-dq};
+        const Doubles motion = greater(greater(ends[0].dot(ends[0]), ends[1].dot(ends[1])),
+                greater(ends[2].dot(ends[2]), ends[3].dot(ends[3])));
+        const Masks mayCross = ~(oneSign | (squared > motion*ofMotion));
+
+        const DoubleVector p1 = gatherVectorOf(base+12, first), q1 = gatherVectorOf(base+12, second);
+        const Doubles along = r.dot(p1), against = r.dot(q1);
+        const Masks firstNearer = (s > 1-atEnd) & (along < 0.0) & (along*along > ofSlope*squared*p1.dot(p1));
+        const Masks secondNearer = (t > 1-atEnd) & (against > 0.0) & (against*against > ofSlope*squared*q1.dot(q1));
+        const Masks flags = (mayCross & MAY_CROSS) | (~(determinant > 1.001*parallel*a*e) & MAY_BE_PARALLEL) |
+                ((s < atEnd) & FIRST_AT_START) | ((t < atEnd) & SECOND_AT_START) | (firstNearer & FIRST_GOES_NEARER) |
+                (secondNearer & SECOND_GOES_NEARER);
+        for (int i = 0; i < DOUBLES; i++) {
+            pairs.distance[start+i] = std::sqrt(squared[i]);
+            pairs.flags[start+i] = flags[i];
+        }
+    }
+}
+
+static const CandidateKernels KERNELS = {CYLCHAIN_LOOPS_NAME, findOverlaps, keepNear, outlook};
 
 } // namespace CYLCHAIN_LOOPS
 } // namespace cylchain

@@ -31,6 +31,29 @@ struct CandidatePairs {
     float *distance, *clearance;
 };
 
+/** A segment at the start and at the end of a step, and the one that follows it in its chain at the end, or zero. */
+struct MovingSegment {
+    double first[3], along[3], laterFirst[3], laterAlong[3], laterNext[3], unused;
+};
+
+/** Pairs of segments, the first ones shifted, and what outlook() finds of them at the end of a step. */
+struct PairsOfSegments {
+    const int *first, *second;
+    const double* shift[3];
+    double* distance;
+    /** Some of the flags below. */
+    int* flags;
+};
+
+/** Two segments may have passed through each other. */
+const int MAY_CROSS = 1;
+/** They are nearly parallel, or nearly so. */
+const int MAY_BE_PARALLEL = 2;
+/** The first or the second of them is nearest to the other one at its start. */
+const int FIRST_AT_START = 4, SECOND_AT_START = 8;
+/** It is so at its end, and what follows it comes nearer. */
+const int FIRST_GOES_NEARER = 16, SECOND_GOES_NEARER = 32;
+
 /** What is added to the image of pairs that are near without doubt. */
 const int SURE = 32;
 
@@ -43,8 +66,9 @@ struct CandidateKernels {
     int (*findOverlaps)(const SweptBoxes& boxes, int capsule, const CapsuleRow* rows, int numRows,
             const CandidatePairs& pairs);
     /**
-     * Keep those of some pairs that come near each other at the start or at the end, or may cross in between, and
-     * return how many. Where there is no doubt that they come near, SURE is added to the image.
+     * Keep those of some pairs that come near each other at the start or at the end, or may cross in between or when
+     * they have moved on by the reach, and return how many. Where there is no doubt that they come near, SURE is added
+     * to the image.
      *
      * @param shifts  the vectors of images, four numbers each
      * @param reach   how near their surfaces come
@@ -52,6 +76,15 @@ struct CandidateKernels {
      */
     int (*keepNear)(const CoarseCapsule* capsules, const float* shifts, float reach, float margin,
             const CandidatePairs& pairs, int count);
+    /**
+     * Find how far apart some pairs of segments are, and whether they may touch.
+     *
+     * @param parallel  the largest sin^2 of the angle of segments that are nearly parallel
+     * @param atEnd     fractions that are at an end
+     * @param count     it is rounded up to a multiple of 8
+     */
+    void (*outlook)(const MovingSegment* segments, double parallel, double atEnd, const PairsOfSegments& pairs,
+            int count);
 };
 
 /** Get the loops for the best instruction set that there is. */

@@ -36,7 +36,7 @@ double component(const Vec3d& vector, int k) {
     return k == 0 ? vector.x : k == 1 ? vector.y : vector.z;
 }
 
-void set(float* values, const Vec3d& vector) {
+template <class Number> void set(Number* values, const Vec3d& vector) {
     values[0] = vector.x;
     values[1] = vector.y;
     values[2] = vector.z;
@@ -102,6 +102,7 @@ struct Part {
     vector<ContactPair> pairs;
     vector<int> first, second, image;
     vector<float> distance, clearance;
+    vector<CapsuleRow> rows;
     CandidatePairs candidates(int from) {
         return {first.data()+from, second.data()+from, image.data()+from, distance.data()+from, clearance.data()+from};
     }
@@ -208,9 +209,14 @@ struct ContactSearch::Implementation {
     vector<CoarseCapsule> sorted;
     SweptBoxes sweptBoxes;
     float margin = 0, imageShifts[4*NUM_IMAGES];
-    double largestHalf[3];
+    /** The largest half width of a box, and by how much a center has left its cell at most, in fractions. */
+    double largestHalf[3], largestExcess[3];
+    /** Where each capsule is in the order of cells, and whether it is searched for again. */
+    vector<int> slots;
+    vector<char> again;
     vector<Part> parts;
     vector<size_t> firstOf;
+    vector<MovingSegment> moving;
 
     Implementation(const CapsuleSystem& system, bool nearestImages);
     bool isExcluded(int a, int b) const;
@@ -220,8 +226,12 @@ struct ContactSearch::Implementation {
     Vec3d along(const Capsule& capsule, const double* positions) const;
     SegmentPair segments(int a, int b, const double* shift, const double* positions) const;
     void setFrame(const double* x, const double* y, const double* box);
-    void describe(int i, const double* x, const double* y, Described& result, PlacedCapsule& place) const;
-    void searchAround(int i, const double* x, const double* y, double slack, Part& part) const;
+    void describe(int i, const double* x, const double* y, Described& result, PlacedCapsule& place,
+            bool keepsImage = false) const;
+    void describeAgain(const vector<int>& capsules, const double* x, const double* y);
+    void putInOrder(int slot, int i);
+    void searchAround(int i, const double* x, const double* y, Part& part) const;
+    void keepPairs(int count, const double* x, const double* y, Part& part) const;
     void checkPositions(const double* x, const double* y) const;
     void setCells();
     void searchCells(int part, const double* x, const double* y);
@@ -236,6 +246,7 @@ struct ContactSearch::Implementation {
             bool parallel, bool ofA, const double* x, const double* y) const;
     double shareOf(const Crossing& crossing, const ContactPair& pair) const;
     int evaluate(const ContactPair& pair, const double* x, const double* y, Contact* contacts, double limit) const;
+    bool isOfNeighbor(const ContactPair& pair, int flags) const;
 };
 
 ContactSearch::Implementation::Implementation(const CapsuleSystem& system, bool nearestImages) :
@@ -279,6 +290,8 @@ ContactSearch::Implementation::Implementation(const CapsuleSystem& system, bool 
     described.resize(capsules.size());
     placed.resize(capsules.size());
     sortedPlaced.resize(capsules.size());
+    slots.resize(capsules.size());
+    again.resize(capsules.size(), 0);
 }
 
 /** Whether two capsules share a particle or are near each other in a chain. */
@@ -354,12 +367,13 @@ void ContactSearch::Implementation::setFrame(const double* x, const double* y, c
 
 /** Find the box, in fractions of the frame, that a capsule sweeps. */
 void ContactSearch::Implementation::describe(int i, const double* x, const double* y, Described& result,
-        PlacedCapsule& place) const {
+        PlacedCapsule& place, bool keepsImage) const {
     const Capsule& capsule = system.capsules[i];
     const Vec3d x0 = position(x, capsule.first)-frame.origin, p = along(capsule, x);
     const Vec3d y0 = position(y, capsule.first)-frame.origin, q = x == y ? p : along(capsule, y);
     const Vec3d ends[] = {frame.toFractions(x0), frame.toFractions(x0+p), frame.toFractions(y0),
             frame.toFractions(y0+q)};
+    const int images[3] = {place.images[0], place.images[1], place.images[2]};
     place = {i, !excluded[i].empty(), capsule, {0, 0, 0}, x0, p};
     double center[3];
     for (int k = 0; k < 3; k++) {
@@ -371,7 +385,7 @@ void ContactSearch::Implementation::describe(int i, const double* x, const doubl
         const double lower = smallestOf(f[0], f[1], f[2], f[3]), upper = largestOf(f[0], f[1], f[2], f[3]);
         center[k] = 0.5*(lower+upper);
         if (frame.periodic)
-            place.images[k] = (int) floor(center[k]);
+            place.images[k] = keepsImage ? images[k] : (int) floor(center[k]);
         result.center[k] = center[k]-place.images[k];
         result.half[k] = 0.5*(upper-lower)+(capsule.radius+0.5*reach)*frame.inverseWidths[k]+SINGLE_ROUNDING;
     }
@@ -403,6 +417,7 @@ void ContactSearch::Implementation::setCells() {
     const int count = described.size();
     double largestLength = 0;
     fill(largestHalf, largestHalf+3, 0.0);
+    fill(largestExcess, largestExcess+3, 0.0);
     for (const Described& capsule : described) {
         for (int k = 0; k < 3; k++)
             largestHalf[k] = max(largestHalf[k], capsule.half[k]);
@@ -457,18 +472,24 @@ void ContactSearch::Implementation::setCells() {
     boxes.resize(6*stride);
     sorted.resize(count);
     for (int k = 0; k < 3; k++) {
-        float *center = &boxes[k*stride], *half = &boxes[(3+k)*stride];
-        sweptBoxes.center[k] = center;
-        sweptBoxes.half[k] = half;
-        for (int i = 0; i < count; i++) {
-            center[i] = described[members[i]].center[k];
-            half[i] = described[members[i]].half[k];
-        }
+        sweptBoxes.center[k] = &boxes[k*stride];
+        sweptBoxes.half[k] = &boxes[(3+k)*stride];
     }
     for (int i = 0; i < count; i++) {
-        sorted[i] = described[members[i]].coarse;
-        sortedPlaced[i] = placed[members[i]];
+        slots[members[i]] = i;
+        putInOrder(i, members[i]);
     }
+}
+
+/** Write a capsule where it is in the order of cells. */
+void ContactSearch::Implementation::putInOrder(int slot, int i) {
+    const size_t stride = described.size()+PADDING;
+    for (int k = 0; k < 3; k++) {
+        boxes[k*stride+slot] = described[i].center[k];
+        boxes[(3+k)*stride+slot] = described[i].half[k];
+    }
+    sorted[slot] = described[i].coarse;
+    sortedPlaced[slot] = placed[i];
 }
 
 /** Find the rows of capsules in half of the neighbors of a cell: each two cells, in each image, meet once. */
@@ -522,15 +543,7 @@ void ContactSearch::Implementation::searchCells(int column, const double* x, con
     part.pairs.clear();
     int count = 0;
     auto look = [&] {
-        count = kernels.keepNear(sorted.data(), imageShifts, reach, margin, part.candidates(0), count);
-        for (int i = 0; i < count; i++) {
-            const int image = part.image[i]%SURE, images[3] = {image/9-1, image/3%3-1, image%3-1};
-            if (addPair(sortedPlaced[part.first[i]], sortedPlaced[part.second[i]], images, part.image[i] >= SURE, x, y,
-                    part)) {
-                part.pairs.back().distance = part.distance[i];
-                part.pairs.back().clearance = part.clearance[i];
-            }
-        }
+        keepPairs(count, x, y, part);
         count = 0;
     };
     CapsuleRow rows[32];
@@ -553,42 +566,81 @@ void ContactSearch::Implementation::searchCells(int column, const double* x, con
     look();
 }
 
-/** Look for pairs with one capsule, in all cells that it may reach now. */
-void ContactSearch::Implementation::searchAround(int i, const double* x, const double* y, double slack,
-        Part& part) const {
-    Described own;
-    PlacedCapsule place;
-    describe(i, x, y, own, place);
-    if (!own.finite)
-        return;
-    int lower[3], upper[3];
-    for (int k = 0; k < 3; k++) {
-        own.half[k] += slack*frame.inverseWidths[k];
-        lower[k] = (int) floor((own.center[k]-own.half[k]-largestHalf[k])*frame.cells[k]);
-        upper[k] = (int) floor((own.center[k]+own.half[k]+largestHalf[k])*frame.cells[k]);
-        if (!frame.periodic) {
-            lower[k] = max(lower[k], 0);
-            upper[k] = min(upper[k], frame.cells[k]-1);
+/** Add those of some pairs of boxes that are near enough. */
+void ContactSearch::Implementation::keepPairs(int count, const double* x, const double* y, Part& part) const {
+    count = candidateKernels().keepNear(sorted.data(), imageShifts, reach, margin, part.candidates(0), count);
+    for (int i = 0; i < count; i++) {
+        const PlacedCapsule &one = sortedPlaced[part.first[i]], &other = sortedPlaced[part.second[i]];
+        const int image = part.image[i]%SURE, images[3] = {image/9-1, image/3%3-1, image%3-1};
+        // Two that are both searched for again find each other twice. Others are not at y.
+        const bool isAgain = again[one.number] != 0;
+        if (isAgain && again[other.number] != 0 && one.number >= other.number)
+            continue;
+        if (addPair(one, other, images, isAgain || part.image[i] >= SURE, x, y, part)) {
+            part.pairs.back().distance = isAgain ? 0 : part.distance[i];
+            part.pairs.back().clearance = isAgain ? 0 : part.clearance[i];
         }
     }
-    int cell[3];
-    for (cell[0] = lower[0]; cell[0] <= upper[0]; cell[0]++)
-        for (cell[1] = lower[1]; cell[1] <= upper[1]; cell[1]++)
-            for (cell[2] = lower[2]; cell[2] <= upper[2]; cell[2]++) {
-                int images[3], number = 0;
-                for (int k = 0; k < 3; k++) {
-                    images[k] = (int) floor((double) cell[k]/frame.cells[k]);
-                    number = number*frame.cells[k]+cell[k]-images[k]*frame.cells[k];
-                }
-                for (int other = cellStart[number]; other < cellStart[number+1]; other++) {
-                    bool overlaps = true;
-                    for (int k = 0; k < 3; k++)
-                        overlaps &= fabs(sweptBoxes.center[k][other]+images[k]-own.center[k]) <=
-                                sweptBoxes.half[k][other]+own.half[k];
-                    if (overlaps && members[other] != i)
-                        addPair(place, sortedPlaced[other], images, false, x, y, part);
-                }
+}
+
+/** Take note of where some capsules are now. They stay in the order of cells where they are. */
+void ContactSearch::Implementation::describeAgain(const vector<int>& capsules, const double* x, const double* y) {
+    for (int i : capsules) {
+        Described& own = described[i];
+        const int cell = own.cell, cells[3] = {cell/(frame.cells[1]*frame.cells[2]),
+                cell/frame.cells[2]%frame.cells[1], cell%frame.cells[2]};
+        describe(i, x, y, own, placed[i], true);
+        if (!own.finite)
+            throw NarrowBoxError("A capsule has moved too far");
+        for (int k = 0; k < 3; k++) {
+            largestHalf[k] = max(largestHalf[k], own.half[k]);
+            const double place = own.center[k]*frame.cells[k]-cells[k];
+            largestExcess[k] = max(largestExcess[k], max(-place, place-1)/frame.cells[k]);
+        }
+        putInOrder(slots[i], i);
+    }
+    for (int k = 0; k < 3; k++)
+        if (frame.periodic && (4*largestHalf[k] > 1 || 4*largestExcess[k] > 1))
+            throw NarrowBoxError("The periodic box is too small for contacts: a capsule moves too far");
+}
+
+/** Look for pairs with one capsule, in all cells that it may reach now. */
+void ContactSearch::Implementation::searchAround(int i, const double* x, const double* y, Part& part) const {
+    const Described& own = described[i];
+    int lower[3], upper[3];
+    for (int k = 0; k < 3; k++) {
+        const double range = own.half[k]+largestHalf[k]+largestExcess[k];
+        lower[k] = (int) floor((own.center[k]-range)*frame.cells[k]);
+        upper[k] = (int) floor((own.center[k]+range)*frame.cells[k]);
+        // What leaves a frame that is not periodic stays in its outermost cells.
+        const int last = frame.cells[k]-1;
+        lower[k] = frame.periodic ? max(lower[k], -frame.cells[k]) : min(max(lower[k], 0), last);
+        upper[k] = frame.periodic ? min(upper[k], frame.cells[k]+last) : min(max(upper[k], 0), last);
+    }
+    part.rows.clear();
+    int most = 0, images[3];
+    auto wrapped = [&] (int cell, int k) {
+        images[k] = cell < 0 ? -1 : cell >= frame.cells[k] ? 1 : 0;
+        return cell-images[k]*frame.cells[k];
+    };
+    for (int cx = lower[0]; cx <= upper[0]; cx++)
+        for (int cy = lower[1]; cy <= upper[1]; cy++) {
+            const int jx = wrapped(cx, 0), column = jx*frame.cells[1]+wrapped(cy, 1);
+            for (int cz = lower[2]; cz <= upper[2];) {
+                // Cells that follow each other in a column are one row.
+                const int from = wrapped(cz, 2);
+                const int to = min(from+upper[2]-cz, frame.cells[2]-1);
+                const int first = cellStart[column*frame.cells[2]+from], last = cellStart[column*frame.cells[2]+to+1];
+                if (first < last)
+                    part.rows.push_back({first, last, imageNumber(images), {(float) images[0], (float) images[1],
+                            (float) images[2]}});
+                most += last-first;
+                cz += to-from+1;
             }
+        }
+    part.makeRoom(most+PADDING);
+    keepPairs(candidateKernels().findOverlaps(sweptBoxes, slots[i], part.rows.data(), part.rows.size(),
+            part.candidates(0)), x, y, part);
 }
 
 /** Add a pair if it is near enough, in double precision where there is doubt; false if it is not. */
@@ -614,7 +666,7 @@ bool ContactSearch::Implementation::addPair(const PlacedCapsule& one, const Plac
                 return false;
             const SegmentPair end = segments(a, b, pair.shift, y);
             const double after = sqrt(findNearestPoints(end).squared);
-            const double way = largestMotion(start, end)+(hasSphere(start) ? 2*DEEP*limit : 0);
+            const double way = largestMotion(start, end)+(hasSphere(start) ? 2*DEEP*limit : 0)+2*reach;
             if (after >= limit && before+after > way)
                 return false;
         }
@@ -820,31 +872,93 @@ void ContactSearch::findPairs(const double* x, const double* y, const double* bo
     search.gather(pairs);
 }
 
-void ContactSearch::findPairsOf(const vector<int>& capsules, const double* x, const double* y, double slack,
-        vector<ContactPair>& pairs, const Loop& run) const {
+void ContactSearch::findPairsOf(const vector<int>& capsules, const double* x, const double* y,
+        vector<ContactPair>& pairs, const Loop& run) {
+    Implementation& search = *implementation;
+    search.describeAgain(capsules, x, y);
+    for (int i : capsules)
+        search.again[i] = 1;
     const int count = capsules.size(), chunks = (count+FEW-1)/FEW;
-    vector<Part> parts(chunks);
+    if ((int) search.parts.size() < chunks)
+        search.parts.resize(chunks);
     runParts(run, chunks, [&] (int chunk) {
+        search.parts[chunk].pairs.clear();
         for (int i = chunk*FEW; i < min(count, (chunk+1)*FEW); i++)
-            implementation->searchAround(capsules[i], x, y, slack, parts[chunk]);
+            search.searchAround(capsules[i], x, y, search.parts[chunk]);
     });
+    for (int i : capsules)
+        search.again[i] = 0;
     pairs.clear();
-    for (const Part& part : parts)
-        pairs.insert(pairs.end(), part.pairs.begin(), part.pairs.end());
-    auto isBefore = [] (const ContactPair& one, const ContactPair& other) {
-        return one.a < other.a || (one.a == other.a && one.b < other.b);
-    };
-    sort(pairs.begin(), pairs.end(), isBefore);
-    // Two capsules of those asked for have found each other twice.
-    auto isSame = [] (const ContactPair& one, const ContactPair& other) {
-        return one.a == other.a && one.b == other.b;
-    };
-    pairs.erase(unique(pairs.begin(), pairs.end(), isSame), pairs.end());
+    for (int chunk = 0; chunk < chunks; chunk++)
+        pairs.insert(pairs.end(), search.parts[chunk].pairs.begin(), search.parts[chunk].pairs.end());
 }
 
 int ContactSearch::evaluate(const ContactPair& pair, const double* x, const double* y, Contact* contacts,
         double limit) const {
     return implementation->evaluate(pair, x, y, contacts, limit);
+}
+
+void ContactSearch::setMotion(const double* x, const double* y, const Loop& run) {
+    const Implementation& search = *implementation;
+    const vector<Capsule>& capsules = search.system.capsules;
+    vector<MovingSegment>& moving = implementation->moving;
+    moving.resize(capsules.size());
+    const int count = capsules.size();
+    runParts(run, (count+CHUNK-1)/CHUNK, [&] (int chunk) {
+        for (int i = chunk*CHUNK; i < min(count, (chunk+1)*CHUNK); i++) {
+            const Capsule& own = capsules[i];
+            const int next = search.next[i];
+            MovingSegment& segment = moving[i];
+            set(segment.first, position(x, own.first));
+            set(segment.along, search.along(own, x));
+            set(segment.laterFirst, position(y, own.first));
+            set(segment.laterAlong, search.along(own, y));
+            set(segment.laterNext, next < 0 ? Vec3d {0, 0, 0} : search.along(capsules[next], y));
+            segment.unused = 0;
+        }
+    });
+}
+
+/** Whether a contact that is not parallel and has not crossed is surely not owned: see isOwned(). */
+bool ContactSearch::Implementation::isOfNeighbor(const ContactPair& pair, int flags) const {
+    // What starts at a joint is the neighbor's that ends there, or nearer than that.
+    auto counts = [&] (int neighbor, int other) {
+        return neighbor >= 0 && !isExcluded(neighbor, other);
+    };
+    return ((flags & FIRST_AT_START) != 0 && counts(previous[pair.a], pair.b)) ||
+            ((flags & FIRST_GOES_NEARER) != 0 && counts(next[pair.a], pair.b)) ||
+            ((flags & SECOND_AT_START) != 0 && counts(previous[pair.b], pair.a)) ||
+            ((flags & SECOND_GOES_NEARER) != 0 && counts(next[pair.b], pair.a));
+}
+
+void ContactSearch::findOutlooks(const ContactPair* const* pairs, int count, PairOutlook* outlooks) const {
+    const int most = 64;
+    int first[most], second[most], flags[most];
+    double x[most], y[most], z[most], distance[most];
+    const CandidateKernels& kernels = candidateKernels();
+    const vector<Capsule>& capsules = implementation->system.capsules;
+    for (int start = 0; start < count; start += most) {
+        const int own = min(most, count-start);
+        for (int i = 0; i < (own+7)/8*8; i++) {
+            const ContactPair& pair = *pairs[start+min(i, own-1)];
+            first[i] = pair.a;
+            second[i] = pair.b;
+            x[i] = pair.shift[0];
+            y[i] = pair.shift[1];
+            z[i] = pair.shift[2];
+        }
+        kernels.outlook(implementation->moving.data(), LARGEST_PARALLEL, AT_END,
+                {first, second, {x, y, z}, distance, flags}, own);
+        for (int i = 0; i < own; i++) {
+            const ContactPair& pair = *pairs[start+i];
+            // How near a sphere comes on its way is not known here.
+            const bool anySphere = capsules[pair.a].second < 0 || capsules[pair.b].second < 0;
+            const bool mayCross = anySphere || (flags[i] & MAY_CROSS) != 0;
+            const bool isKnown = !mayCross && (flags[i] & MAY_BE_PARALLEL) == 0;
+            outlooks[start+i] = {distance[i]-implementation->radii(pair.a, pair.b), mayCross,
+                    isKnown && implementation->isOfNeighbor(pair, flags[i])};
+        }
+    }
 }
 
 void ContactSearch::findVector(const ContactPair& pair, double s, double t, const double* positions,

@@ -17,6 +17,16 @@ public:
     using std::invalid_argument::invalid_argument;
 };
 
+/** A first look at a pair of capsules at y. */
+struct PairOutlook {
+    /** The distance less the radii, not signed. */
+    double gap;
+    /** Whether they may have crossed. */
+    bool mayCross;
+    /** Whether evaluate() finds no contact: it is that of a neighbor. */
+    bool isOfNeighbor;
+};
+
 /**
  * Finds capsules that touch each other, and where.
  *
@@ -39,7 +49,8 @@ public:
     bool isExcluded(int a, int b) const;
     /**
      * Find the pairs of capsules whose surfaces come within reach of each other at x or at y, or that may pass through
-     * each other in between, sorted by a and b. They do not depend on how the loop is run.
+     * each other on the way to y, or to where both have moved on by the reach together, sorted by a and b. They do not
+     * depend on how the loop is run.
      *
      * @param box    the three vectors of a periodic box (nine doubles, in reduced form), or NULL. Its widths must be
      *               more than twice the extent of a capsule in a step with its diameter and the reach, so that two
@@ -51,16 +62,16 @@ public:
     void findPairs(const double* x, const double* y, const double* box, double reach, std::vector<ContactPair>& pairs,
             const Loop& run = Loop());
     /**
-     * Find the same pairs as far as some capsules are in them, after a search with another y. This takes less time
-     * where they are few.
+     * Find the same pairs as far as some capsules are in them, which have another y than in the search before. Others
+     * are taken to be where they were when they were searched for last. A few pairs are farther apart. This takes less
+     * time where capsules are few; NarrowBoxError says so if they extend too far in a periodic box now.
      *
-     * @param capsules  some capsules
-     * @param slack     how far others have moved since that search, at most
-     * @param pairs     receives the pairs, sorted by a and b
+     * @param capsules  some capsules, each of them once
+     * @param pairs     receives the pairs, in an order that does not depend on how the loop is run
      * @param run       runs the parts of the search; one after the other if there is none
      */
-    void findPairsOf(const std::vector<int>& capsules, const double* x, const double* y, double slack,
-            std::vector<ContactPair>& pairs, const Loop& run = Loop()) const;
+    void findPairsOf(const std::vector<int>& capsules, const double* x, const double* y,
+            std::vector<ContactPair>& pairs, const Loop& run = Loop());
     /**
      * Find the contacts of a pair at y: none, one or two. Several threads may do so at the same time. With
      * nearestImages, the box is that of the last search.
@@ -90,6 +101,14 @@ public:
      */
     int evaluate(const ContactPair& pair, const double* x, const double* y, Contact* contacts,
             double limit = std::numeric_limits<double>::infinity()) const;
+    /** Take note of x and y, for findOutlooks(). */
+    void setMotion(const double* x, const double* y, const Loop& run);
+    /**
+     * Take a first look at some pairs, many at once. Several threads may do so at the same time.
+     *
+     * @param outlooks  receives as many
+     */
+    void findOutlooks(const ContactPair* const* pairs, int count, PairOutlook* outlooks) const;
     /**
      * Find the vector from the point at fraction t of the second capsule of a pair to that at s of the first.
      *

@@ -11,7 +11,7 @@ using namespace std;
 namespace {
 
 /** How near pairs come that are looked at in a step, over their diameter: further iterations move them. */
-const double REACH = 1.1;
+const double REACH = 0.5;
 /** The same where a periodic box is too narrow for that. */
 const double LEAST_REACH = 0.2;
 /** The largest overlap that is mirrored, over the same. */
@@ -77,7 +77,6 @@ void ContactEquations::begin(const CoupledStart& start, const Loop& newLoop) {
     pairs.clear();
     states.clear();
     watches.clear();
-    added.clear();
     searched.clear();
 }
 
@@ -116,30 +115,46 @@ void ContactEquations::findPairs(const double* moved) {
     });
     travelled.assign(places.size(), 0.0);
     motion.assign(places.size(), 0.0);
-    for (const ContactPair& pair : pairs)
+    firstPairs.assign(places.size()+1, 0);
+    for (const ContactPair& pair : pairs) {
+        firstPairs[pair.a+1]++;
         addState(pair);
-    numFound = states.size();
+    }
+    for (size_t i = 1; i < firstPairs.size(); i++)
+        firstPairs[i] += firstPairs[i-1];
+    added.assign(places.size(), {});
 }
 
 void ContactEquations::addState(const ContactPair& pair) {
-    states.push_back({pair, {0, 0}, {}, -1, {false, false}, {0, 0}, 0});
-    watches.push_back({pair.a, pair.b, -HUGE_VAL});
+    states.push_back({pair, {0, 0}, {}, {false, false}, {0, 0}});
+    watches.push_back({pair.a, pair.b, -HUGE_VAL, 0, -1, pair.clearance});
+}
+
+/** Whether a pair takes part already. */
+bool ContactEquations::isKnown(const ContactPair& pair) const {
+    const auto first = watches.begin()+firstPairs[pair.a], last = watches.begin()+firstPairs[pair.a+1];
+    const auto found = lower_bound(first, last, pair.b, [] (const Watch& one, int other) {return one.b < other;});
+    const vector<int>& others = added[pair.a];
+    return (found != last && found->b == pair.b) || find(others.begin(), others.end(), pair.b) != others.end();
 }
 
 /** Look for pairs of some capsules again; false if all that are found take part already. */
-bool ContactEquations::findPairsOf(const vector<int>& capsules, const double* moved, double slack) {
-    search->findPairsOf(capsules, begun, moved, slack, pairs, *loop);
+bool ContactEquations::findPairsOf(const vector<int>& capsules, const double* moved) {
+    try {
+        search->findPairsOf(capsules, begun, moved, pairs, *loop);
+    }
+    catch (const NarrowBoxError&) {
+        leavesBox = true;
+        return false;
+    }
     for (int capsule : capsules) {
         takeNoteOf(capsule, moved);
         motion[capsule] = 0;
     }
-    auto isBefore = [] (const Watch& one, const Watch& other) {
-        return one.a < other.a || (one.a == other.a && one.b < other.b);
-    };
     bool any = false;
     for (const ContactPair& pair : pairs)
-        if (!binary_search(watches.begin(), watches.begin()+numFound, Watch {pair.a, pair.b, 0}, isBefore) &&
-                added.insert({{pair.a, pair.b}, (int) states.size()}).second) {
+        if (!isKnown(pair)) {
+            added[pair.a].push_back(pair.b);
             addState(pair);
             mark(states.size()-1);
             any = true;
@@ -147,14 +162,12 @@ bool ContactEquations::findPairsOf(const vector<int>& capsules, const double* mo
     return any;
 }
 
-/** Mark the packs of the pairs for which a function returns true; false if there are none. */
-template <class Function> bool ContactEquations::markPairs(Function function) {
+/** Mark the packs of the pairs that a function finds in each chunk of them; false if there are none. */
+template <class Function> bool ContactEquations::markPairs(Function findIn) {
     const int count = states.size(), chunks = (count+CHUNK-1)/CHUNK;
     (*loop)(chunks, [&] (int chunk) {
         parts[chunk].pairs.clear();
-        for (int i = chunk*CHUNK; i < min(count, (chunk+1)*CHUNK); i++)
-            if (function(i))
-                parts[chunk].pairs.push_back(i);
+        findIn(chunk*CHUNK, min(count, (chunk+1)*CHUNK), parts[chunk]);
     });
     bool any = false;
     for (int chunk = 0; chunk < chunks; chunk++)
@@ -165,10 +178,10 @@ template <class Function> bool ContactEquations::markPairs(Function function) {
     return any;
 }
 
-void ContactEquations::updateContacts(State& state, const double* moved) const {
+void ContactEquations::updateContacts(State& state, int count, const double* moved) const {
     const vector<Capsule>& capsules = search->getSystem().capsules;
     const double radii = capsules[state.pair.a].radius+capsules[state.pair.b].radius;
-    for (int i = 0; i < state.count; i++) {
+    for (int i = 0; i < count; i++) {
         Contact& contact = state.contacts[i];
         double r[3];
         search->findVector(state.pair, contact.s, contact.t, moved, r);
@@ -190,7 +203,40 @@ double ContactEquations::responseOf(int capsule, double fraction) const {
     return place.pack < 0 ? 0 : stepSize/chainPlaces->getLateralFriction(place);
 }
 
-void ContactEquations::evaluate(int number, const double* moved, bool first, Part& part) {
+/** Whether it is looked for where a pair touches: not where that was known a moment ago. */
+bool ContactEquations::isLookedFor(int number) const {
+    const Watch& watch = watches[number];
+    if (!takesPart(watch.a) && !takesPart(watch.b))
+        return false;
+    const vector<Capsule>& capsules = search->getSystem().capsules;
+    const double diameter = capsules[watch.a].radius+capsules[watch.b].radius;
+    const double way = travelled[watch.a]+travelled[watch.b];
+    return watch.count < 0 || (iterations < SEARCHING_ITERATIONS && !(way < watch.searched+SAME_PLACE*diameter));
+}
+
+/** Evaluate some pairs that may touch. */
+void ContactEquations::look(int begin, int end, const double* moved, bool first, Part& part) {
+    part.due.clear();
+    part.numbers.clear();
+    for (int i = begin; i < end; i++)
+        if (!(travelled[watches[i].a]+travelled[watches[i].b] < watches[i].due)) {
+            const bool isDue = isLookedFor(i);
+            part.numbers.push_back(isDue ? i : -1-i);
+            if (isDue)
+                part.due.push_back(&states[i].pair);
+        }
+    part.outlooks.resize(part.due.size());
+    search->findOutlooks(part.due.data(), part.due.size(), part.outlooks.data());
+    const PairOutlook* next = part.outlooks.data();
+    for (int number : part.numbers)
+        if (number >= 0)
+            evaluate(number, moved, first, next++, part);
+        else
+            evaluate(-1-number, moved, first, NULL, part);
+}
+
+/** Add the equations of a pair, with the outlook of one that is looked for. */
+void ContactEquations::evaluate(int number, const double* moved, bool first, const PairOutlook* outlook, Part& part) {
     State& state = states[number];
     Watch& watch = watches[number];
     const ContactPair& pair = state.pair;
@@ -198,29 +244,31 @@ void ContactEquations::evaluate(int number, const double* moved, bool first, Par
         return;
     const double diameter = search->getSystem().capsules[pair.a].radius+search->getSystem().capsules[pair.b].radius;
     const double way = travelled[pair.a]+travelled[pair.b];
-    const bool moves = iterations < SEARCHING_ITERATIONS && !(way < state.searched+SAME_PLACE*diameter);
     double gap = HUGE_VAL;
     // What is farther away is left out, until it may have come near. Overlaps that are mirrored count.
-    const double limit = LARGEST_GAP*diameter+max(state.mirrored[0], state.mirrored[1]);
-    if (first && pair.distance-diameter >= limit)
-        gap = pair.distance-diameter;
-    else if (state.count < 0 || moves) {
+    const double largest = max(state.mirrored[0], state.mirrored[1]), limit = LARGEST_GAP*diameter+largest;
+    if (outlook != NULL) {
         Contact contacts[2];
-        const int count = search->evaluate(pair, begun, moved, contacts, limit);
+        int count;
+        contacts[0].gap = outlook->gap;
+        if (!outlook->mayCross && outlook->gap >= limit)
+            count = -1;
+        else
+            count = outlook->isOfNeighbor ? 0 : search->evaluate(pair, begun, moved, contacts, limit);
         // A contact at a joint may pass from one segment to the next and back: in the end, it must not be lost.
-        if (count == 0 && state.count > 0 && iterations >= PASSING_ITERATIONS)
-            updateContacts(state, moved);
+        if (count == 0 && watch.count > 0 && iterations >= PASSING_ITERATIONS)
+            updateContacts(state, watch.count, moved);
         else {
-            state.count = count;
-            state.searched = way;
-            copy(contacts, contacts+2, state.contacts);
-            gap = contacts[0].gap-max(state.mirrored[0], state.mirrored[1]);
+            watch.count = count;
+            watch.searched = way;
+            copy(contacts, contacts+max(count, 0), state.contacts);
+            gap = contacts[0].gap-largest;
         }
     }
     else
-        updateContacts(state, moved);
+        updateContacts(state, watch.count, moved);
     bool touches = false;
-    for (int i = 0; i < state.count; i++) {
+    for (int i = 0; i < watch.count; i++) {
         const Contact& contact = state.contacts[i];
         // Where contacts are not looked for any more, anyCross() sees whether they have come back.
         if (contact.crossed && iterations < SEARCHING_ITERATIONS)
@@ -262,6 +310,7 @@ void ContactEquations::linearise(int iteration, const double* moved, vector<Coup
     const bool first = searched.empty();
     if (first)
         findPairs(moved);
+    search->setMotion(begun, moved, *loop);
     const int count = states.size(), chunks = (count+CHUNK-1)/CHUNK;
     if ((int) parts.size() < chunks)
         parts.resize(chunks);
@@ -270,9 +319,7 @@ void ContactEquations::linearise(int iteration, const double* moved, vector<Coup
         part.equations.clear();
         part.contacts.clear();
         part.pairs.clear();
-        for (int i = chunk*CHUNK; i < min(count, (chunk+1)*CHUNK); i++)
-            if (!(travelled[watches[i].a]+travelled[watches[i].b] < watches[i].due))
-                evaluate(i, moved, first, part);
+        look(chunk*CHUNK, min(count, (chunk+1)*CHUNK), moved, first, part);
     });
     for (int chunk = 0; chunk < chunks; chunk++) {
         const Part& part = parts[chunk];
@@ -324,9 +371,10 @@ bool ContactEquations::anyComeNear(const double* moved) {
     if (iterations < 2)
         return true;
     const double tolerance = TOLERANCE*sqrt(kT/stiffness)+LEAST_CHANGE*reach;
-    bool any = markPairs([&] (int i) {
-        const Watch& watch = watches[i];
-        return watch.due > 0 && travelled[watch.a]+travelled[watch.b] > watch.due+tolerance;
+    bool any = markPairs([&] (int begin, int end, Part& part) {
+        for (int i = begin; i < end; i++)
+            if (watches[i].due > 0 && travelled[watches[i].a]+travelled[watches[i].b] > watches[i].due+tolerance)
+                part.pairs.push_back(i);
     });
     Motion all;
     for (const Motion& motion : motions) {
@@ -336,7 +384,7 @@ bool ContactEquations::anyComeNear(const double* moved) {
     }
     // Pairs that no search has seen were out of reach: one of the two has moved by more than half of it.
     if (all.largest+all.second > reach)
-        any |= findPairsOf(all.movers, moved, all.largest);
+        any |= findPairsOf(all.movers, moved);
     return any;
 }
 
@@ -371,6 +419,8 @@ bool ContactEquations::finishIteration(const double* moves, const double* moved)
     if (searched.empty())
         return true;
     bool any = anyComeNear(moved);
+    if (leavesBox)
+        return false;
     if (iterations < 2)
         return true;
     for (int pair : crossed)
@@ -402,18 +452,31 @@ void ContactEquations::mark(int pair) {
             unfinished[places[capsule].place.pack] = 1;
 }
 
+/** Find pairs that cross. */
+void ContactEquations::findCrossed(int begin, int end, const double* moved, Part& part) const {
+    part.due.clear();
+    part.numbers.clear();
+    for (int i = begin; i < end; i++)
+        if (!(travelled[watches[i].a]+travelled[watches[i].b] < watches[i].clearance)) {
+            part.numbers.push_back(i);
+            part.due.push_back(&states[i].pair);
+        }
+    part.outlooks.resize(part.due.size());
+    search->findOutlooks(part.due.data(), part.due.size(), part.outlooks.data());
+    for (size_t i = 0; i < part.due.size(); i++)
+        if (part.outlooks[i].mayCross && search->crosses(*part.due[i], begun, moved))
+            part.pairs.push_back(part.numbers[i]);
+}
+
 /** Whether pairs cross elsewhere than where they were last seen to touch: they are looked at again. */
 bool ContactEquations::anyCross(const double* moved) {
-    return markPairs([&] (int i) {
-        const Watch& watch = watches[i];
-        if (travelled[watch.a]+travelled[watch.b] < states[i].pair.clearance)
-            return false;
-        const bool crosses = search->crosses(states[i].pair, begun, moved);
-        if (crosses) {
-            states[i].count = -1;
-            watches[i].due = -HUGE_VAL;
+    search->setMotion(begun, moved, *loop);
+    return markPairs([&] (int begin, int end, Part& part) {
+        findCrossed(begin, end, moved, part);
+        for (int pair : part.pairs) {
+            watches[pair].count = -1;
+            watches[pair].due = -HUGE_VAL;
         }
-        return crosses;
     });
 }
 

@@ -5,7 +5,6 @@
 #include "dynamics/ImplicitCouplings.h"
 #include <algorithm>
 #include <cstddef>
-#include <map>
 #include <utility>
 #include <vector>
 
@@ -53,19 +52,22 @@ private:
         /** The overlaps that are mirrored, and where it touches. */
         double mirrored[2];
         Contact contacts[2];
-        int count;
         /** Whether it touched in the last iteration. */
         bool touched[2];
         /** By how much its gap has changed while one of its packs took no part. */
         double drift[2];
-        /** How far its capsules had travelled when it was looked for where they touch. */
-        double searched;
     };
     /** What tells whether a pair is looked at: many are not. */
     struct Watch {
         int a, b;
         /** How far both capsules must have travelled before they may touch. */
         double due;
+        /** How far they had travelled when it was looked for where they touch. */
+        double searched;
+        /** The number of its contacts; -1 if they are too far apart, or if that is not known. */
+        int count;
+        /** How far they must have travelled before they may cross. */
+        float clearance;
     };
     /** Where a capsule is: its place at fraction 0, and by how much the fraction grows along it. */
     struct CapsulePlace {
@@ -78,6 +80,10 @@ private:
         std::vector<int> contacts;
         /** Pairs that were crossed, or which were looked for. */
         std::vector<int> pairs;
+        /** Those that are looked at in lanes. */
+        std::vector<const ContactPair*> due;
+        std::vector<int> numbers;
+        std::vector<PairOutlook> outlooks;
     };
     /** How far some capsules have moved: the largest two motions, and who may meet others that no search has seen. */
     struct Motion {
@@ -88,7 +94,7 @@ private:
             largest = std::max(largest, motion);
         }
     };
-    template <class Function> bool markPairs(Function function);
+    template <class Function> bool markPairs(Function findIn);
     void mark(int pair);
     bool takesPart(int capsule) const {
         return places[capsule].place.pack >= 0 && (*active)[places[capsule].place.pack];
@@ -98,13 +104,17 @@ private:
     void findPairs(const double* moved);
     void addState(const ContactPair& pair);
     void takeNoteOf(int capsule, const double* moved);
-    bool findPairsOf(const std::vector<int>& capsules, const double* moved, double slack);
+    bool findPairsOf(const std::vector<int>& capsules, const double* moved);
+    bool isKnown(const ContactPair& pair) const;
     double findMirroredOf(const ContactPair& pair, const Contact& contact, double largest) const;
     double responseOf(int capsule, double fraction) const;
-    void evaluate(int pair, const double* moved, bool first, Part& part);
-    void updateContacts(State& state, const double* moved) const;
+    bool isLookedFor(int pair) const;
+    void look(int begin, int end, const double* moved, bool first, Part& part);
+    void evaluate(int pair, const double* moved, bool first, const PairOutlook* outlook, Part& part);
+    void updateContacts(State& state, int count, const double* moved) const;
     bool anyComeNear(const double* moved);
     bool anyCross(const double* moved);
+    void findCrossed(int begin, int end, const double* moved, Part& part) const;
     int findFastest(const double* moved) const;
     PlaceOnChain placeOf(int capsule, double fraction) const;
     ContactSearch* search = nullptr;
@@ -118,9 +128,10 @@ private:
     std::vector<ContactPair> pairs;
     /** Those of the first search in its order, and behind them those that others have found. */
     std::vector<State> states;
+    /** Where those of the first search begin for each first capsule, and the second capsules of others. */
+    std::vector<int> firstPairs;
+    std::vector<std::vector<int> > added;
     std::vector<Watch> watches;
-    std::size_t numFound = 0;
-    std::map<std::pair<int, int>, int> added;
     /** Where the ends of each capsule were when its pairs were looked for. */
     std::vector<double> searched;
     /** Where they were after the last iteration, and how far each capsule has travelled in all since the first. */

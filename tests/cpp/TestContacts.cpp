@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cstring>
 #include <map>
+#include <set>
 #include <thread>
 
 static double uniform(mt19937_64& generator, double lower = 0, double upper = 1) {
@@ -551,6 +552,87 @@ static void testRounding() {
     }
 }
 
+/** What a first look says must be so. */
+static void testOutlooks() {
+    mt19937_64 generator(11);
+    int crossing = 0, touching = 0, ofNeighbors = 0;
+    for (int trial = 0; trial < 6; trial++) {
+        const double box[9] = {700, 0, 0, 100, 700, 0, -50, 80, 700}, *vectors = trial%2 == 0 ? box : NULL;
+        const TestSystem test = makeSystem(generator, 60, 8, 700, 50, 20, trial < 4 ? 6 : 0, vectors);
+        const double *x = test.x.data(), *y = test.y.data();
+        ContactSearch search(test.system);
+        vector<ContactPair> pairs;
+        search.findPairs(x, y, vectors, 10, pairs);
+        vector<const ContactPair*> pointers;
+        for (const ContactPair& pair : pairs)
+            pointers.push_back(&pair);
+        vector<PairOutlook> outlooks(pairs.size());
+        search.setMotion(x, y, [] (int count, const function<void(int)>& iteration) {
+            for (int i = 0; i < count; i++)
+                iteration(i);
+        });
+        search.findOutlooks(pointers.data(), pointers.size(), outlooks.data());
+        for (size_t i = 0; i < pairs.size(); i++) {
+            const Capsule &a = test.system.capsules[pairs[i].a], &b = test.system.capsules[pairs[i].b];
+            const Vec3d shift = {pairs[i].shift[0], pairs[i].shift[1], pairs[i].shift[2]};
+            const double distance = distanceByHand(at(test.y, a.first)+shift, at(test.y, a.end())+shift,
+                    at(test.y, b.first), at(test.y, b.end()));
+            checkClose(distance-a.radius-b.radius, outlooks[i].gap, 1, 1e-6, "gap");
+            const bool crosses = search.crosses(pairs[i], x, y);
+            check(outlooks[i].mayCross || !crosses, "a pair that crosses may do so");
+            Contact contacts[2];
+            const int count = search.evaluate(pairs[i], x, y, contacts);
+            check(!outlooks[i].isOfNeighbor || count == 0, "a neighbor's contact");
+            crossing += crosses;
+            touching += !outlooks[i].mayCross && !outlooks[i].isOfNeighbor && count > 0;
+            ofNeighbors += outlooks[i].isOfNeighbor;
+        }
+    }
+    check(crossing > 10 && touching > 100 && ofNeighbors > 100, "all of them occur");
+}
+
+/** Pairs that a search has not found come to be known when one of their capsules has moved by half of the reach. */
+static void testSearchingAgain() {
+    mt19937_64 generator(12);
+    const double reach = 10;
+    int added = 0;
+    for (int trial = 0; trial < 4; trial++) {
+        const double box[9] = {900, 0, 0, 100, 900, 0, -50, 80, 900}, *vectors = trial%2 == 0 ? box : NULL;
+        const TestSystem test = makeSystem(generator, 60, 8, 900, 50, 20, 5, vectors);
+        ContactSearch search(test.system);
+        vector<ContactPair> pairs, others;
+        search.findPairs(test.x.data(), test.y.data(), vectors, reach, pairs);
+        set<pair<int, int> > known;
+        for (const ContactPair& one : pairs)
+            known.insert({one.a, one.b});
+        // In some chains, all nodes move far, and more than once.
+        vector<double> y = test.y;
+        for (int turn = 0; turn < 3; turn++) {
+            vector<int> moved;
+            for (int i = 0; i < (int) test.system.capsules.size(); i++) {
+                const Capsule& capsule = test.system.capsules[i];
+                if (capsule.chain < 0 || capsule.chain%3 != turn%2)
+                    continue;
+                moved.push_back(i);
+                for (int k = 0; k < 3 && capsule.index == 0; k++)
+                    y[3*capsule.first+k] += 30;
+                for (int k = 0; k < 3; k++)
+                    y[3*capsule.end()+k] += 30;
+            }
+            search.findPairsOf(moved, test.x.data(), y.data(), others);
+            for (const ContactPair& one : others)
+                added += known.insert({one.a, one.b}).second;
+            vector<ContactPair> all;
+            ContactSearch(test.system).findPairs(test.x.data(), y.data(), vectors, reach, all);
+            const set<int> again(moved.begin(), moved.end());
+            for (const ContactPair& one : all)
+                check(known.count({one.a, one.b}) == 1 || (again.count(one.a) == 0 && again.count(one.b) == 0),
+                        "lost pair "+to_string(one.a)+", "+to_string(one.b));
+        }
+    }
+    check(added > 100, "pairs were added");
+}
+
 static void testLoops() {
     mt19937_64 generator(6);
     const double box[9] = {1200, 0, 0, 300, 1200, 0, -100, 200, 1200};
@@ -1011,9 +1093,8 @@ int main() {
     const string instructionSet = candidateKernels().instructionSet;
     try {
         for (auto test : {testNearestPoints, testCrossings, testPlanarCrossings, testPlanarJoints, testSpheres, testPairs,
-                testSmallBoxes, testRounding, testLoops,
-                testSignedGap, testParallel, testJoints, testDivision, testCrossingChains,
-                testNearestImages, testRefusals})
+                testSmallBoxes, testRounding, testOutlooks, testSearchingAgain, testLoops, testSignedGap, testParallel,
+                testJoints, testDivision, testCrossingChains, testNearestImages, testRefusals})
             test();
     }
     catch (const exception& error) {
