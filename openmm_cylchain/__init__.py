@@ -15,8 +15,10 @@ from .couplings.walls import Box, Cylinder, Ellipsoid, Plane, Slab, Sphere, fila
 from .dynamics.recommended_step import fene_steps, recommended_time_step
 from .dynamics.stability import stability_bounds, time_step_bounds
 from .dynamics.time_step import TimeStep, effective_rate
+from .engine_choice import prepare_openmm
 from .errors import (
     ContactWarning,
+    EngineWarning,
     EquilibrationWarning,
     InputError,
     InstabilityError,
@@ -59,6 +61,7 @@ __all__ = [
     "DYNEIN",
     "Ellipsoid",
     "EndCorrections",
+    "EngineWarning",
     "EquilibrationWarning",
     "FILAMIN",
     "F_ACTIN",
@@ -116,3 +119,7 @@ __all__ = [
     "write_lammps_data",
     "write_psf",
 ]
+
+# So that OpenMM can read Systems of it from XML files.
+prepare_openmm()
+del prepare_openmm

@@ -1,15 +1,19 @@
 """Which engines there are, which of them work here, and what they do if nothing is asked for."""
 
 import importlib
+import warnings
 from typing import Any
 
-from .errors import InputError
+import openmm
+
+from .errors import EngineWarning, InputError
 
 ENGINES = ("compiled", "portable")
 """All engines that there are, the fastest first."""
 
 _MODULES = {"compiled": "openmm_cylchain.engines.compiled", "portable": "openmm_cylchain.engines.portable"}
 
+_NOT_INSTALLED = "it is not part of this installation"
 
 _DEFAULT_SCHEMES = {"compiled": "implicit", "portable": "midpoint"}
 
@@ -49,6 +53,8 @@ def load_engine(name: str | None = None) -> Any:
 def choose_engine(name: str | None = None) -> str:
     """The name of an engine that is available: that which is asked for, or else the fastest.
 
+    An EngineWarning says why the compiled engine is left out, where it is installed.
+
     Raises
     ------
     InputError
@@ -58,6 +64,9 @@ def choose_engine(name: str | None = None) -> str:
         raise InputError(f"engine must be one of {', '.join(ENGINES)}, but is {name!r}.")
     reasons = available_engines()
     if name is None:
+        reason = reasons["compiled"]
+        if reason not in (None, _NOT_INSTALLED):
+            warnings.warn(_about_slow_engine(reason), EngineWarning, stacklevel=2)
         return next(each for each in ENGINES if reasons[each] is None)
     reason = reasons[name]
     if reason is not None:
@@ -76,6 +85,41 @@ def available_engines() -> dict[str, str | None]:
     return {"portable": None, "compiled": _why_compiled_is_missing()}
 
 
+def prepare_openmm() -> None:
+    """Load the plugin into OpenMM, where it is installed.
+
+    Without it, OpenMM reads no System of the compiled engine. An EngineWarning says if the plugin was built against
+    another minor version of OpenMM than is installed; any other reason is given where the engine is needed.
+    """
+    available_engines()
+    reason = why_openmm_differs()
+    if reason is not None:
+        warnings.warn(_about_slow_engine(reason), EngineWarning, stacklevel=3)
+
+
+def why_openmm_differs() -> str | None:
+    """What OpenMM the plugin was built against, which one is installed and what to do; None if they are alike."""
+    try:
+        built = importlib.import_module(".plugin_version", __package__).OPENMM_VERSION
+    except ModuleNotFoundError:
+        return None
+    installed = openmm.Platform.getOpenMMVersion()
+    if installed.split(".")[:2] == built.split(".")[:2]:
+        return None
+    minor = ".".join(built.split(".")[:2])
+    return (
+        f"the plugin was built against OpenMM {built}, but OpenMM {installed} is installed: run "
+        f"pip install 'openmm~={minor}.0', or install openmm_cylchain again"
+    )
+
+
+def _about_slow_engine(reason):
+    return (
+        f"The compiled engine does not work: {reason.rstrip('.')}. The portable engine is taken in its place, whose "
+        'steps are a thousand times as short; engine="portable" asks for it without this warning.'
+    )
+
+
 def load_plugin() -> Any:
     """The module of the compiled plugin; None where that engine is missing: then no System has a force of it."""
     if available_engines()["compiled"] is not None:
@@ -87,7 +131,7 @@ def _why_compiled_is_missing():
     try:
         importlib.import_module(_MODULES["compiled"])
     except ModuleNotFoundError as error:
-        return "it is not part of this installation" if error.name == _MODULES["compiled"] else str(error)
+        return _NOT_INSTALLED if error.name == _MODULES["compiled"] else str(error)
     # Whatever keeps a plugin from loading is a reason to report, not to stop.
     except Exception as error:
         return str(error) or type(error).__name__

@@ -74,6 +74,10 @@ class ContactWarning(UserWarning):
     """Beads that are too far apart, or contacts too soft, to keep filaments from passing through each other."""
 
 
+class EngineWarning(UserWarning):
+    """The compiled engine is installed, but does not work: the portable one, much slower, is taken in its place."""
+
+
 class EquilibrationWarning(UserWarning):
     """A trajectory whose start differs from its end by more than chance: averages over it contain the relaxation."""
 

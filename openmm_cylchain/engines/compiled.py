@@ -16,6 +16,7 @@ from ..dynamics.schemes import IMPLICIT_SCHEMES, check_scheme
 from ..dynamics.schemes import SCHEMES as ALL_SCHEMES
 from ..dynamics.step_watch import DividedSteps, ExplicitWork
 from ..dynamics.time_step import as_step
+from ..engine_choice import why_openmm_differs
 from ..errors import InputError, InstabilityError, instability_in_force
 from ..kinetics.binding_force import find_binding_force, make_binding_force
 from ..mechanics.flow import Flow, as_flow
@@ -34,18 +35,15 @@ from .protocol import Engine
 
 def _load_plugin():
     try:
-        from ..plugin_version import OPENMM_VERSION
+        from .. import plugin_version  # noqa: F401
     except ModuleNotFoundError:
         raise ImportError(
             f"the package in {Path(__file__).parents[1]} has no compiled plugin. Install it with pip and a C++ "
             "compiler, without OPENMM_CYLCHAIN_PORTABLE, and run Python outside its source directory."
         ) from None
-    installed = openmm.Platform.getOpenMMVersion()
-    if installed.split(".")[:2] != OPENMM_VERSION.split(".")[:2]:
-        raise ImportError(
-            f"the plugin was built against OpenMM {OPENMM_VERSION}, but OpenMM {installed} is installed. "
-            "Install openmm_cylchain again."
-        )
+    reason = why_openmm_differs()
+    if reason is not None:
+        raise ImportError(f"{reason}.")
     from .. import plugin
 
     libraries = sorted((Path(plugin._plugin.__file__).parent / "lib" / "plugins").glob("libOpenMMCylinderChain*"))

@@ -3,6 +3,7 @@
 import platform
 import sys
 import warnings
+from pathlib import Path
 
 import numpy as np
 import openmm
@@ -66,9 +67,15 @@ def format_information():
         lines.extend(f"  {name:<16} {text}" for name, text in entries.items())
     lines.append(f"OpenMM plugins that failed to load{'' if failures else ': none'}")
     lines.extend(f"  {failure}" for failure in failures)
-    lines.append(f"OpenMM plugin directory\n  {openmm.Platform.getDefaultPluginsDirectory()}")
+    lines.append(f"Directory of OpenMM's own plugins\n  {openmm.Platform.getDefaultPluginsDirectory()}")
+    lines.append(f"Directory of the compiled engine's plugin\n  {_plugin_directory() or 'none'}")
     lines.append(f"Python\n  {sys.executable}")
     return "\n".join(lines)
+
+
+def _plugin_directory():
+    directory = Path(__file__).parents[1] / "lib" / "plugins"
+    return directory if directory.is_dir() else None
 
 
 def _availability(reason):

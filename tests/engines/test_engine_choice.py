@@ -1,12 +1,14 @@
 """Which engines there are, which of them work here, and which is taken if none is named."""
 
+import re
+import subprocess
 import sys
 import types
 
 import openmm
 import pytest
 
-from openmm_cylchain import Filaments, InputError, engine_choice
+from openmm_cylchain import F_ACTIN, EngineWarning, Filaments, InputError, engine_choice
 
 COMPILED = "openmm_cylchain.engines.compiled"
 
@@ -44,3 +46,38 @@ def test_reason_why_a_plugin_does_not_load(error, monkeypatch):
 
     monkeypatch.setattr(engine_choice.importlib, "import_module", fail)
     assert engine_choice.available_engines()["compiled"] == "no such library"
+    with pytest.warns(EngineWarning, match="no such library.*portable engine is taken"):
+        assert engine_choice.choose_engine() == "portable"
+
+
+def test_another_minor_version_of_openmm(tmp_path):
+    # A fresh interpreter, since an engine that has been loaded stays so.
+    program = (
+        "import openmm; openmm.Platform.getOpenMMVersion = staticmethod(lambda: '7.9.1')\n"
+        "import openmm_cylchain as package; package.Filaments(1.0, 300.0)\n"
+        "from openmm_cylchain import engine_choice as choice; print(choice.available_engines()['compiled'])\n"
+    )
+    result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=tmp_path, check=True)
+    sentence = r"built against OpenMM [0-9.]+, but OpenMM 7.9.1 is installed: run pip install 'openmm~=[0-9.]+'"
+    assert re.search(sentence, result.stdout)
+    assert len(re.findall(f"EngineWarning: The compiled engine does not work: .*{sentence}", result.stderr)) == 2
+    assert "portable engine is taken in its place" in result.stderr
+
+
+def test_no_warning_where_all_is_well(tmp_path):
+    program = "import openmm_cylchain; openmm_cylchain.Filaments(1.0, 300.0)"
+    command = [sys.executable, "-W", "error::UserWarning", "-c", program]
+    subprocess.run(command, check=True, cwd=tmp_path)
+
+
+def test_a_system_is_read_where_the_package_is_imported(tmp_path):
+    filaments = Filaments(1.0, 300.0)
+    filaments.add_equilibrium(F_ACTIN, segments=2, seed=1)
+    _, system, _ = filaments.build()
+    (tmp_path / "system.xml").write_text(openmm.XmlSerializer.serialize(system))
+    program = (
+        "import openmm, openmm_cylchain\n"
+        "system = openmm.XmlSerializer.deserialize(open('system.xml').read())\n"
+        "openmm.Context(system, openmm.VerletIntegrator(1.0), openmm.Platform.getPlatformByName('Reference'))\n"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True, cwd=tmp_path)
