@@ -15,7 +15,15 @@ from .couplings.walls import Box, Cylinder, Ellipsoid, Plane, Slab, Sphere, fila
 from .dynamics.recommended_step import fene_steps, recommended_time_step
 from .dynamics.stability import stability_bounds, time_step_bounds
 from .dynamics.time_step import TimeStep, effective_rate
-from .errors import ContactWarning, EquilibrationWarning, InputError, InstabilityError, TimeStepError, TimeStepWarning
+from .errors import (
+    ContactWarning,
+    EquilibrationWarning,
+    InputError,
+    InstabilityError,
+    LinkerWarning,
+    TimeStepError,
+    TimeStepWarning,
+)
 from .filaments.attachments import Attachment
 from .filaments.filament import Filament, Tether
 from .filaments.filament_type import DSDNA, F_ACTIN, MICROTUBULE, FilamentType
@@ -61,6 +69,7 @@ __all__ = [
     "KINESIN_1",
     "LinkerReporter",
     "LinkerTable",
+    "LinkerWarning",
     "Filaments",
     "Flow",
     "InputError",

@@ -74,6 +74,10 @@ class ContactWarning(UserWarning):
     """Beads that are too far apart, or contacts too soft, to keep filaments from passing through each other."""
 
 
+class LinkerWarning(UserWarning):
+    """Linkers that do not do what their numbers suggest, such as hands whose springs keep them from binding."""
+
+
 class EquilibrationWarning(UserWarning):
     """A trajectory whose start differs from its end by more than chance: averages over it contain the relaxation."""
 
