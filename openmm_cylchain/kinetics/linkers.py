@@ -123,8 +123,8 @@ def warn_if_springs_are_short(kind: Crosslinker, temperature: Scalar) -> None:
         warnings.warn(
             f"Linkers {kind.name!r}: a reach of {reach:.4g} nm is far beyond what their spring allows: with the "
             f"stiffness {kind.stiffness:.4g} kJ/(mol nm^2) and no rest length, its thermal extension is {width:.3g} "
-            f"nm, so that hands bind to hardly anything farther than {3.0 * width:.3g} nm away. Give it a rest_length, as "
-            "long as the linker is, or a smaller stiffness; or, if that is what is meant, a reach of about "
+            f"nm, so that hands bind to hardly anything farther than {3.0 * width:.3g} nm away. Give it a rest_length, "
+            "as long as the linker is, or a smaller stiffness; or, if that is what is meant, a reach of about "
             f"{4.0 * width:.3g} nm with a binding_rate smaller in proportion.",
             LinkerWarning,
             stacklevel=3,

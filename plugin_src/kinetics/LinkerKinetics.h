@@ -42,9 +42,9 @@ struct KineticStep {
  * are proposed along all segments around, and accepted by their energy.
  *
  * Each linker has a clock: the integral of its rates over time until its next event. Steps take it down, and only where
- * it runs out is anything drawn. Random numbers belong to the seed, the number of the step and that of the linker. Linkers
- * are independent of each other, except for sites that hold one hand each: what happens to linkers whose hands bind to sites is in the order of
- * time.
+ * it runs out is anything drawn. Random numbers belong to the seed, the number of the step and that of the linker.
+ * Linkers are independent of each other, except for sites that hold one hand each: what happens to linkers whose hands
+ * bind to sites is in the order of time.
  */
 class LinkerKinetics {
 public:
