@@ -78,6 +78,10 @@ class EngineWarning(UserWarning):
     """The compiled engine is installed, but does not work: the portable one, much slower, is taken in its place."""
 
 
+class LinkerWarning(UserWarning):
+    """Linkers that do not do what their numbers suggest, such as hands whose springs keep them from binding."""
+
+
 class EquilibrationWarning(UserWarning):
     """A trajectory whose start differs from its end by more than chance: averages over it contain the relaxation."""
 

@@ -1,14 +1,28 @@
 """Linkers of a type as ``Filaments.add_linkers`` keeps them, and what they do in a Context."""
 
+import math
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
 from openmm import unit
 
-from ..errors import InputError
-from ..units.quantities import LENGTH, NUMBER_DENSITY, VOLUME, in_units_of, non_negative, positive, whole_number
+from ..errors import InputError, LinkerWarning
+from ..units.quantities import (
+    LENGTH,
+    NUMBER_DENSITY,
+    VOLUME,
+    in_units_of,
+    non_negative,
+    positive,
+    thermal_energy,
+    whole_number,
+)
 from ..units.types import FloatArray, Scalar
 from .crosslinker import Crosslinker
+
+LARGEST_REACH_OF_WIDTH = 10.0
+"""How many thermal extensions of a spring without rest length a reach may be before that is warned of."""
 
 
 @dataclass(frozen=True)
@@ -93,6 +107,32 @@ def as_linkers(
         return Linkers(kind, 0, density, room, None, 0, seed)
     number = whole_number(count, 0, f"{label} count")
     return Linkers(kind, number, None, room, None, _as_bound(bound, number, label), seed)
+
+
+def warn_if_springs_are_short(kind: Crosslinker, temperature: Scalar) -> None:
+    """Warn where a spring without rest length lets hands bind only very near to the other end, whatever their reach is.
+
+    Its length in equilibrium has the standard deviation (k_BT/k)^(1/2) along each axis; binding at the distance d from
+    the other end is slower by exp(-k d^2/(2 k_BT)).
+    """
+    if kind.rest_length > 0.0:
+        return
+    width = math.sqrt(thermal_energy(temperature) / kind.stiffness)
+    reach = max(hand.reach for hand in kind.hands if hand.binding_rate > 0.0) if _any_binds(kind) else 0.0
+    if reach > LARGEST_REACH_OF_WIDTH * width:
+        warnings.warn(
+            f"Linkers {kind.name!r}: a reach of {reach:.4g} nm is far beyond what their spring allows: with the "
+            f"stiffness {kind.stiffness:.4g} kJ/(mol nm^2) and no rest length, its thermal extension is {width:.3g} "
+            f"nm, so that hands bind to hardly anything farther than {3.0 * width:.3g} nm away. Give it a rest_length, "
+            "as long as the linker is, or a smaller stiffness; or, if that is what is meant, a reach of about "
+            f"{4.0 * width:.3g} nm with a binding_rate smaller in proportion.",
+            LinkerWarning,
+            stacklevel=3,
+        )
+
+
+def _any_binds(kind):
+    return any(hand.binding_rate > 0.0 for hand in kind.hands)
 
 
 def _as_bound(bound, count, label):

@@ -36,7 +36,7 @@ from ..filaments.segment_place import SegmentPlace
 from ..kinetics.binding_force import find_binding_force, places_of, pulls_of, set_table, table_of
 from ..kinetics.crosslinker import Crosslinker
 from ..kinetics.linker_table import LinkerTable
-from ..kinetics.linkers import LinkerPulls, Linkers, as_linkers
+from ..kinetics.linkers import LinkerPulls, Linkers, as_linkers, warn_if_springs_are_short
 from ..mechanics.flow import Flow, as_flow
 from ..mechanics.redistribution import ChainSet
 from ..mechanics.tension import components_along, filament_tensions
@@ -496,6 +496,11 @@ class Filaments:
         InputError
             For a value that is missing or wrong; with the portable engine, which has no linkers; or if the filaments
             are in a System already.
+
+        Warns
+        -----
+        LinkerWarning
+            For a spring without rest length that is so stiff that hands do not bind anywhere near their reach.
         """
         if not self._engine.has_linkers:
             raise InputError(
@@ -505,6 +510,7 @@ class Filaments:
         if self._nodes is not None:
             raise InputError("These filaments are already in a System: add linkers before.")
         self._linkers.append(as_linkers(kind, count, concentration, volume, anchors, bound, seed))
+        warn_if_springs_are_short(kind, self.temperature)
         return len(self._linkers) - 1
 
     @property

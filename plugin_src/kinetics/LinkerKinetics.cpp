@@ -341,7 +341,7 @@ struct LinkerKinetics::Pending {
 };
 
 /** Draw the next event of a linker that is part of a step; false if the step ends before. */
-bool LinkerKinetics::draw(const Linker& linker, const KineticStep& step, Pending& next) const {
+bool LinkerKinetics::draw(Linker& linker, const KineticStep& step, Pending& next) const {
     const LinkerType& type = system.types[linker.type];
     Event possible[4];
     int numPossible = 0;
@@ -376,9 +376,15 @@ bool LinkerKinetics::draw(const Linker& linker, const KineticStep& step, Pending
     }
     if (total <= 0)
         return false;
-    next.time += next.random.exponential()/total;
-    if (!(next.time < step.stepSize))
+    if (!(linker.clock > 0))
+        linker.clock = next.random.exponential();
+    const double left = total*(step.stepSize-next.time);
+    if (!(linker.clock < left)) {
+        linker.clock -= left;
         return false;
+    }
+    next.time += linker.clock/total;
+    linker.clock = 0;
     double chosen = next.random.uniform()*total;
     int which = 0;
     while (which+1 < numPossible && chosen >= possible[which].rate)
@@ -422,8 +428,6 @@ void LinkerKinetics::takeTogether(LinkerState& state, const KineticStep& step, C
     auto add = [&] (size_t i, double time) {
         Pending next = {time, RandomNumbers(key, step.force, linkers[i].number), static_cast<long long>(i),
                 linkers[i].type, {}, 0};
-        if (i < words.size()/4)
-            next.random.setFirstWords(&words[4*i]);
         if (draw(linkers[i], step, next))
             queue.push(next);
     };
@@ -445,7 +449,7 @@ void LinkerKinetics::takeTogether(LinkerState& state, const KineticStep& step, C
                 sites.insert(siteOf(system.hands[type.hands[side]], linkers[i].hands[side]));
     }
     for (size_t i = 0; i < linkers.size() && anySites; i++)
-        if (needsSites[linkers[i].type])
+        if (needsSites[linkers[i].type] && !passes(linkers[i], step.stepSize))
             add(i, 0);
     for (size_t type = 0; type < system.types.size(); type++)
         if (system.types[type].concentration >= 0)
@@ -476,12 +480,9 @@ void LinkerKinetics::takeTogether(LinkerState& state, const KineticStep& step, C
     }
 }
 
-/**
- * For each type and what its linkers hold, the least random number with which something happens in a step; 0 where
- * that depends on the force of the spring. Most linkers need no further look.
- */
-void LinkerKinetics::findThresholds(const KineticStep& step) {
-    thresholds.assign(4*system.types.size(), 0.0);
+/** The rates of most linkers need no look at where they are: they depend on their type and what they hold. */
+void LinkerKinetics::findKnownRates(const KineticStep& step) {
+    knownRates.assign(4*system.types.size(), -1.0);
     for (size_t number = 0; number < system.types.size(); number++) {
         const LinkerType& type = system.types[number];
         for (int held = 0; held < 4; held++) {
@@ -489,14 +490,15 @@ void LinkerKinetics::findThresholds(const KineticStep& step) {
             if (type.hands[0] < 0 && (held&1) == 0)
                 continue;
             double rate = 0;
-            bool known = !needsSites[number];
+            bool known = true;
             for (int side = 0; side < 2; side++) {
                 if (type.hands[side] < 0)
                     continue;
                 const Hand& hand = system.hands[type.hands[side]];
+                const bool hops = hand.siteSpacing > 0 && hand.speed != 0;
                 if ((held&(1<<side)) != 0) {
-                    rate += unbindingRate(hand, 0, 0);
-                    known = known && (held != 3 || !hand.isLoaded());
+                    rate += unbindingRate(hand, 0, 0)+(hops ? fabs(hand.speed)/hand.siteSpacing : 0);
+                    known = known && (held != 3 || !(hand.isLoaded() || hops));
                 }
                 else if (held != 0)
                     rate += proposalRate(hand);
@@ -504,42 +506,44 @@ void LinkerKinetics::findThresholds(const KineticStep& step) {
                     rate += captureRate(type, side, step);
             }
             if (known)
-                thresholds[4*number+held] = exp(-rate*step.stepSize);
+                knownRates[4*number+held] = rate;
         }
     }
 }
 
-long long LinkerKinetics::advance(LinkerState& state, const KineticStep& step, const Loop& loop) {
+/** Whether it is known that a step passes without an event: then the clock of the linker is taken down. */
+bool LinkerKinetics::passes(Linker& linker, double stepSize) const {
+    const int held = (linker.isHeld(0) ? 1 : 0)+(linker.isHeld(1) ? 2 : 0);
+    const double spent = knownRates[4*linker.type+held]*stepSize;
+    if (spent < 0 || (spent > 0 && !(linker.clock > spent)))
+        return false;
+    linker.clock -= spent;
+    return true;
+}
+
+long long LinkerKinetics::advance(LinkerState& state, const KineticStep& step, const Loop& loop, vector<Link>* links) {
     vector<Linker>& linkers = state.linkers;
     cells.build(contours, step.positions, largestReach, step.boxes.distances, step.boxes.segments);
     const NoiseKey key = {step.seed, 0, state.steps};
     const int count = linkers.size(), chunks = (count+CHUNK-1)/CHUNK;
-    forces.assign(count, step.force);
-    numbers.resize(count);
-    words.resize(4*static_cast<size_t>(count));
     counts.assign(chunks+1, Count());
-    findThresholds(step);
+    pulling.resize(chunks);
+    findKnownRates(step);
     loop(chunks, [&] (int chunk) {
         const int first = chunk*CHUNK, last = min(count, first+CHUNK);
+        pulling[chunk].clear();
         for (int i = first; i < last; i++) {
-            numbers[i] = linkers[i].number;
-            walk(linkers[i], step, counts[chunk]);
-        }
-        drawWords(key, NoiseKind::Linker, 0, &forces[first], &numbers[first], last-first,
-                &words[4*static_cast<size_t>(first)]);
-        for (int i = first; i < last; i++) {
-            if (needsSites[linkers[i].type])
-                continue;
-            const uint32_t* const own = &words[4*static_cast<size_t>(i)];
-            const int held = (linkers[i].isHeld(0) ? 1 : 0)+(linkers[i].isHeld(1) ? 2 : 0);
-            if (RandomNumbers::firstOf(own) < thresholds[4*linkers[i].type+held])
-                continue;
-            Pending next = {0, RandomNumbers(key, step.force, numbers[i]), i, linkers[i].type, {}, 0};
-            next.random.setFirstWords(own);
-            while (next.events <= MOST_EVENTS && draw(linkers[i], step, next))
-                apply(linkers[i], step, next, nullptr, counts[chunk]);
-            if (next.events > MOST_EVENTS)
-                counts[chunk].failed = numbers[i];
+            Linker& linker = linkers[i];
+            walk(linker, step, counts[chunk]);
+            if (!needsSites[linker.type] && !passes(linker, step.stepSize)) {
+                Pending next = {0, RandomNumbers(key, step.force, linker.number), i, linker.type, {}, 0};
+                while (next.events <= MOST_EVENTS && draw(linker, step, next))
+                    apply(linker, step, next, nullptr, counts[chunk]);
+                if (next.events > MOST_EVENTS)
+                    counts[chunk].failed = linker.number;
+            }
+            if (linker.pulls())
+                pulling[chunk].push_back(i);
         }
     });
     takeTogether(state, step, counts[chunks]);
@@ -551,6 +555,14 @@ long long LinkerKinetics::advance(LinkerState& state, const KineticStep& step, c
             return system.types[linker.type].concentration >= 0 && !linker.isHeld(0) && !linker.isHeld(1);
         }), linkers.end());
     state.steps++;
+    if (links != nullptr && (anySites || anyConcentration))
+        describe(state, *links);
+    else if (links != nullptr) {
+        links->clear();
+        for (const vector<int>& own : pulling)
+            for (int i : own)
+                addLink(linkers[i], *links);
+    }
     long long failed = -1;
     for (const Count& one : counts) {
         state.bindings += one.bindings;
@@ -561,19 +573,21 @@ long long LinkerKinetics::advance(LinkerState& state, const KineticStep& step, c
     return failed;
 }
 
+void LinkerKinetics::addLink(const Linker& linker, vector<Link>& links) const {
+    const LinkerType& type = system.types[linker.type];
+    Link link;
+    // A link to a point has that as its second place.
+    link.first = placeOf(linker, 1);
+    link.second = placeOf(linker, 0);
+    link.stiffness = type.stiffness;
+    link.restLength = type.restLength;
+    link.number = linker.number;
+    links.push_back(link);
+}
+
 void LinkerKinetics::describe(const LinkerState& state, vector<Link>& links) const {
     links.clear();
-    for (const Linker& linker : state.linkers) {
-        if (!linker.pulls())
-            continue;
-        const LinkerType& type = system.types[linker.type];
-        Link link;
-        // A link to a point has that as its second place.
-        link.first = placeOf(linker, 1);
-        link.second = placeOf(linker, 0);
-        link.stiffness = type.stiffness;
-        link.restLength = type.restLength;
-        link.number = linker.number;
-        links.push_back(link);
-    }
+    for (const Linker& linker : state.linkers)
+        if (linker.pulls())
+            addLink(linker, links);
 }

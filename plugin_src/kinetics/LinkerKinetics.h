@@ -41,9 +41,10 @@ struct KineticStep {
  * process and its inverse are equally likely in equilibrium, whatever the step is. Binding is drawn by thinning: places
  * are proposed along all segments around, and accepted by their energy.
  *
- * Random numbers belong to the seed, the number of the step and that of the linker. Linkers are independent of each
- * other, except for sites that hold one hand each: what happens to linkers whose hands bind to sites is in the order of
- * time.
+ * Each linker has a clock: the integral of its rates over time until its next event. Steps take it down, and only where
+ * it runs out is anything drawn. Random numbers belong to the seed, the number of the step and that of the linker.
+ * Linkers are independent of each other, except for sites that hold one hand each: what happens to linkers whose hands
+ * bind to sites is in the order of time.
  */
 class LinkerKinetics {
 public:
@@ -58,9 +59,11 @@ public:
     /**
      * Take a step.
      *
+     * @param links  the springs of linkers that join two places then, unless it is NULL
      * @return the number of a linker the rates of which are too large for the step, or -1
      */
-    long long advance(LinkerState& state, const KineticStep& step, const Loop& loop);
+    long long advance(LinkerState& state, const KineticStep& step, const Loop& loop,
+            std::vector<Link>* links = nullptr);
     /** Describe the springs of linkers that join two places. */
     void describe(const LinkerState& state, std::vector<Link>& links) const;
 private:
@@ -87,9 +90,11 @@ private:
     double pull(const Linker& linker, int side, const Spring& spring, const KineticStep& step, double& stiffness) const;
     double speedUnder(const Hand& hand, double pull) const;
     void walk(Linker& linker, const KineticStep& step, Count& count) const;
-    bool draw(const Linker& linker, const KineticStep& step, Pending& next) const;
+    bool draw(Linker& linker, const KineticStep& step, Pending& next) const;
     void apply(Linker& linker, const KineticStep& step, Pending& next, Sites* sites, Count& count) const;
-    void findThresholds(const KineticStep& step);
+    void findKnownRates(const KineticStep& step);
+    void addLink(const Linker& linker, std::vector<Link>& links) const;
+    bool passes(Linker& linker, double stepSize) const;
     void takeTogether(LinkerState& state, const KineticStep& step, Count& count);
     bool proposePlace(const Linker& linker, int side, const KineticStep& step, RandomNumbers& random,
             const Sites* sites, HandPlace& found) const;
@@ -110,12 +115,14 @@ private:
     std::vector<int> spacings;
     /** Of each type of linkers, whether hands need sites, and whether they walk. */
     std::vector<char> needsSites, walks;
-    std::vector<double> thresholds;
+    /** For each type and what its linkers hold, the sum of all rates; -1 where that depends on the spring. */
+    std::vector<double> knownRates;
     double largestReach = 0;
     bool anySites = false, anyConcentration = false;
     SegmentCells cells;
-    std::vector<std::uint32_t> forces, numbers, words;
     std::vector<Count> counts;
+    /** Linkers of each chunk that join two places. */
+    std::vector<std::vector<int> > pulling;
 };
 
 } // namespace cylchain

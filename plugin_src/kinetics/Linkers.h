@@ -81,6 +81,11 @@ struct Linker {
     /** The number of the anchor in the place of its first hand, or -1. */
     int anchor = -1;
     HandPlace hands[2];
+    /**
+     * The integral of its rates over time until its next event, which has an exponential distribution with the mean 1;
+     * if it is not positive, it is drawn when it is needed.
+     */
+    double clock = 0;
     bool isHeld(int side) const {
         return hands[side].isBound() || (side == 0 && anchor >= 0);
     }

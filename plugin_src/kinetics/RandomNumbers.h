@@ -13,17 +13,6 @@ public:
     RandomNumbers(const NoiseKey& key, std::uint32_t force, std::uint32_t number) : key(key), force(force),
             number(number) {
     }
-    /** Give the words of draw 0, which are drawn for many linkers at once. */
-    void setFirstWords(const std::uint32_t* given) {
-        for (int i = 0; i < 4; i++)
-            words[i] = given[i];
-        draw = 1;
-        left = 4;
-    }
-    /** What uniform() returns first, if these are the words of draw 0. */
-    static double firstOf(const std::uint32_t* given) {
-        return numberOf(given[2], given[3]);
-    }
     /** A number between 0 and 1, neither of which it is. */
     double uniform() {
         if (left == 0) {

@@ -10,22 +10,24 @@ void SegmentCells::setGrid(double reach, const double* box) {
     periodic = box != nullptr;
     const size_t count = middles.size()/3;
     fill(toCells, toCells+9, 0.0);
-    if (box != nullptr) {
+    if (periodic) {
         // Rows of the inverse of the box, which is a lower triangle: their sizes are one over the heights of the box.
         const double a = box[0], b = box[4], c = box[8];
         const double inverse[9] = {1/a, -box[3]/(a*b), (box[3]*box[7]-box[6]*b)/(a*b*c), 0, 1/b, -box[7]/(b*c), 0, 0,
                 1/c};
+        double heights[3];
         for (int k = 0; k < 3; k++) {
             const double* row = inverse+3*k;
-            const double height = 1/sqrt(row[0]*row[0]+row[1]*row[1]+row[2]*row[2]);
-            const double most = 1+cbrt(static_cast<double>(count));
-            numCells[k] = static_cast<int>(max(1.0, min(most, floor(height/reach))));
+            heights[k] = 1/sqrt(row[0]*row[0]+row[1]*row[1]+row[2]*row[2]);
             origin[k] = 0;
-            for (int j = 0; j < 3; j++)
-                toCells[3*k+j] = row[j]*numCells[k];
         }
+        setNumbers(heights, reach, count);
+        for (int k = 0; k < 3; k++)
+            for (int j = 0; j < 3; j++)
+                toCells[3*k+j] = inverse[3*k+j]*numCells[k];
         return;
     }
+    double extents[3];
     for (int k = 0; k < 3; k++) {
         double least = HUGE_VAL, largest = -HUGE_VAL;
         for (size_t i = 0; i < count; i++) {
@@ -33,10 +35,23 @@ void SegmentCells::setGrid(double reach, const double* box) {
             largest = max(largest, middles[3*i+k]);
         }
         origin[k] = count == 0 ? 0 : least;
-        const double most = 1+2*cbrt(static_cast<double>(count)), extent = count == 0 ? 0 : largest-least;
-        numCells[k] = static_cast<int>(max(1.0, min(most, floor(extent/reach))));
-        toCells[4*k] = numCells[k]/max(extent, numCells[k]*reach);
+        extents[k] = count == 0 ? 0 : largest-least;
     }
+    setNumbers(extents, reach, count);
+    for (int k = 0; k < 3; k++)
+        toCells[4*k] = numCells[k]/max(extents[k], numCells[k]*reach);
+}
+
+/** As many cells along each axis as the reach allows, but hardly more of them than pieces. */
+void SegmentCells::setNumbers(const double* extents, double reach, size_t count) {
+    double numbers[3];
+    for (int k = 0; k < 3; k++)
+        numbers[k] = max(1.0, floor(extents[k]/reach));
+    while (numbers[0]*numbers[1]*numbers[2] > 1+2.0*count) {
+        double& most = *max_element(numbers, numbers+3);
+        most = max(1.0, floor(0.8*most));
+    }
+    copy(numbers, numbers+3, numCells);
 }
 
 int SegmentCells::findCell(const double* point) const {
@@ -128,14 +143,38 @@ void SegmentCells::build(const Contours& contours, const double* positions, doub
     next.assign(firstOfCell.begin(), firstOfCell.end()-1);
     for (int i = 0; i < count; i++)
         sorted[next[cellOf[i]]++] = i;
-    largestNumber = 0;
-    for (int cell = 0; cell < cells; cell++) {
-        int around[27];
-        const int cellsAround = findCells(cell, around);
-        numAround[cell] = 0;
-        for (int i = 0; i < cellsAround; i++)
-            numAround[cell] += firstOfCell[around[i]+1]-firstOfCell[around[i]];
-        largestNumber = max(largestNumber, numAround[cell]);
+    for (int cell = 0; cell < cells; cell++)
+        numAround[cell] = firstOfCell[cell+1]-firstOfCell[cell];
+    for (int k = 0, stride = 1; k < 3; stride *= numCells[k++])
+        addNeighbours(k, stride);
+    largestNumber = cells == 0 ? 0 : *max_element(numAround.begin(), numAround.end());
+}
+
+/** To the number of each cell, add those of the cells before and behind it along an axis. */
+void SegmentCells::addNeighbours(int axis, int stride) {
+    const int n = numCells[axis], cells = numAround.size();
+    if (n == 1)
+        return;
+    // Cells along the other axes that follow each other in memory are taken side by side.
+    before.resize(stride);
+    first.resize(stride);
+    for (int start = 0; start < cells; start += n*stride) {
+        int* const row = &numAround[start];
+        const int* const end = row+(n-1)*static_cast<ptrdiff_t>(stride);
+        for (int j = 0; j < stride; j++) {
+            first[j] = row[j];
+            // With two cells, that behind is the one before.
+            before[j] = periodic && n > 2 ? end[j] : 0;
+        }
+        for (int i = 0; i < n; i++) {
+            int* const own = row+i*static_cast<ptrdiff_t>(stride);
+            for (int j = 0; j < stride; j++) {
+                const int number = own[j];
+                const int behind = i+1 < n ? own[stride+j] : periodic && n > 2 ? first[j] : 0;
+                own[j] += before[j]+behind;
+                before[j] = number;
+            }
+        }
     }
 }
 

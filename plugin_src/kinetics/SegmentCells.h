@@ -2,6 +2,7 @@
 #define CYLCHAIN_SEGMENT_CELLS_H_
 
 #include "couplings/Contours.h"
+#include <cstddef>
 #include <vector>
 
 namespace cylchain {
@@ -45,6 +46,8 @@ public:
 private:
     void cut(const Contours& contours, double reach);
     void setGrid(double reach, const double* box);
+    void setNumbers(const double* extents, double reach, std::size_t count);
+    void addNeighbours(int axis, int stride);
     int findCells(int cell, int* around) const;
     /** How many cells there are along each axis, and whether they follow each other periodically. */
     int numCells[3] = {1, 1, 1};
@@ -56,7 +59,7 @@ private:
     double reachOfPieces = 0, longest = 0;
     std::vector<double> middles;
     int largestNumber = 0;
-    std::vector<int> cellOf, firstOfCell, sorted, numAround;
+    std::vector<int> cellOf, firstOfCell, sorted, numAround, before, first;
 };
 
 } // namespace cylchain

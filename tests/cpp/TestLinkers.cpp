@@ -148,7 +148,7 @@ static void checkEquilibrium(const Rods& rods, double stiffness, double restLeng
     step.volume = 3e9;
     const Expected expected = expectedOn(rods, system, step.volume);
     LinkerKinetics kinetics(system, rods.chains);
-    LinkerState state = freeLinkers(1500);
+    LinkerState state = freeLinkers(4500);
     // Longer than a hand stays bound.
     const int interval = max(1, (int) (3/stepSize)), blocks = 20, samples = 5;
     for (int i = 0; i < 10*interval; i++)
@@ -308,12 +308,13 @@ static void testRunLengthsAndEnds() {
     Mean runs;
     for (int block = 0; block < 20; block++) {
         LinkerState state = boundLinkers(2000, 0);
+        // Each block has random numbers of its own.
+        state.steps = 1000*block;
         double sum = 0;
         for (int i = 0; i < 400; i++) {
             const int before = countBound(state);
             kinetics.advance(state, stepOf(rods.x, 0.1), SERIAL);
             sum += (before-countBound(state))*50*0.1*(i+1);
-            state.steps += 1000*block;
         }
         runs.add(sum/2000);
         runs.endBlock();

@@ -1,5 +1,6 @@
 """Linkers as users describe them: units, bad input, tables, checkpoints, XML, threads, recommended steps."""
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -7,7 +8,7 @@ import openmm
 import pytest
 from openmm import unit
 
-from openmm_cylchain import F_ACTIN, MICROTUBULE, Crosslinker, Filaments, Hand, InputError
+from openmm_cylchain import F_ACTIN, MICROTUBULE, Crosslinker, Filaments, Hand, InputError, LinkerWarning
 from openmm_cylchain.kinetics.binding_force import find_binding_force
 from support.contexts import new_context, positions_of
 from support.solvent import KT, TEMPERATURE, VISCOSITY
@@ -144,6 +145,36 @@ def test_bad_numbers_of_linkers_are_refused(arguments, message):
     filaments.add_straight(F_ACTIN, 2, (0, 0, 0), (1, 0, 0))
     with pytest.raises(InputError, match=message):
         filaments.add_linkers(SPRING, **arguments)
+
+
+@pytest.mark.parametrize(
+    ("rest_length", "stiffness", "warned"), [(0.0, 110.0, True), (0.0, 90.0, False), (20.0, 110.0, False)]
+)
+def test_springs_much_shorter_than_the_reach_are_warned_of(rest_length, stiffness, warned):
+    """In units of k_BT/reach^2: the thermal extension is a tenth of the reach with 100."""
+    kind = Crosslinker(hands=HAND, stiffness=stiffness * KT / HAND.reach**2, rest_length=rest_length, name="stiff")
+    filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        filaments.add_linkers(kind, count=1)
+    messages = [str(one.message) for one in caught if one.category is LinkerWarning]
+    assert len(messages) == warned
+    assert not warned or ("'stiff'" in messages[0] and "reach of 60 nm" in messages[0] and "5.72 nm" in messages[0])
+    assert all(one.filename == __file__ for one in caught)
+
+
+@pytest.mark.parametrize("spacing", [1e-7, 1e-300])
+def test_sites_that_cannot_be_told_apart_are_refused(spacing):
+    kind = Crosslinker(hands=replace(HAND, site_spacing=spacing), stiffness=0.1)
+    with pytest.raises(openmm.OpenMMException, match="Chain 0 would have more than a thousand million sites of hand 0"):
+        network([(kind, {"count": 1})])
+
+
+def test_more_spacings_of_sites_than_are_known_apart_are_refused():
+    kinds = [Crosslinker(hands=replace(HAND, site_spacing=5.0 + i), stiffness=0.1) for i in range(17)]
+    network([(kind, {"count": 1}) for kind in kinds[:16]])
+    with pytest.raises(openmm.OpenMMException, match="more than 16 different spacings"):
+        network([(kind, {"count": 1}) for kind in kinds])
 
 
 def test_more_than_there_are_sites_is_refused():

@@ -68,7 +68,7 @@ def test_binding_and_motion_are_in_equilibrium_together(step, rest_length, strai
     interval = max(1, round(1.5 / step))
     integrator.step(8 * interval)
     bound, squares = [], []
-    for _ in range(150):
+    for _ in range(300):
         integrator.step(interval)
         bound.append(filaments.linkers_in(context).bound[:, 1].mean())
         lengths = filaments.linker_pulls(context).lengths

@@ -12,9 +12,14 @@
 #include "openmm/internal/OSRngSeed.h"
 #include "openmm/reference/SimTKOpenMMRealType.h"
 #include <algorithm>
+#include <set>
 
 using namespace OpenMM;
 using namespace std;
+
+/** A site is known by a number of 32 bits, and a spacing by one of four. */
+static const double MOST_SITES = 1e9;
+static const size_t MOST_SPACINGS = 16;
 
 static void require(bool condition, const string& message) {
     if (!condition)
@@ -52,6 +57,7 @@ void CylinderChainBindingForceImpl::initialize(ContextImpl& context) {
     for (int chain = 0; chain < contours.getNumChains(); chain++)
         lengths.push_back(contours.getLength(chain));
     system = {};
+    set<double> spacings;
     Vec3 box[3];
     context.getPeriodicBoxVectors(box[0], box[1], box[2]);
     const double room = 0.5*min(min(box[0][0], box[1][1]), box[2][2]);
@@ -60,6 +66,14 @@ void CylinderChainBindingForceImpl::initialize(ContextImpl& context) {
         const cylchain::Hand& hand = system.hands.back();
         require(hand.chains.empty() || hand.chains.back() < contours.getNumChains(),
                 "Hand "+to_string(i)+" binds to a chain that does not exist");
+        for (int chain : hand.chains)
+            require(hand.siteSpacing == 0 || lengths[chain]/hand.siteSpacing < MOST_SITES, "Chain "+
+                    to_string(chain)+" would have more than a thousand million sites of hand "+to_string(i)+
+                    ": sites so near to each other cannot be told apart");
+        if (hand.siteSpacing > 0)
+            spacings.insert(hand.siteSpacing);
+        require(spacings.size() <= MOST_SPACINGS, "Hands have more than "+to_string(MOST_SPACINGS)+
+                " different spacings of sites");
         require(!owner.usesPeriodicBoundaryConditions() || hand.reach < room, "The reach of hand "+to_string(i)+
                 " must be less than half of the periodic box, which is "+to_string(2*room)+" nm wide");
     }
@@ -127,14 +141,15 @@ void CylinderChainBindingForceImpl::updateContextState(ContextImpl& context, boo
     const double stepSize = context.getIntegrator().getStepSize();
     if (!(stepSize > 0))
         return;
-    const size_t before = getLinks().size();
+    const bool pulled = !getLinks().empty();
     const long long failed = linkerKernel.getAs<UpdateCylinderChainLinkersKernel>().execute(context, state,
-            BOLTZ*getTemperature(), stepSize, seed, number);
+            BOLTZ*getTemperature(), stepSize, seed, number, links);
     accept();
+    upToDate = true;
     require(failed == -1, "The hands of linker "+to_string(failed)+" bind, unbind or walk more than a hundred thousand "
             "times within a step: use a smaller step, or look at the rates");
     // An implicit step computes the forces itself.
-    if (!wasExcluded && (before > 0 || !getLinks().empty()))
+    if (!wasExcluded && (pulled || !links.empty()))
         forcesInvalid = true;
 }
 

@@ -27,6 +27,8 @@ void writeLinkerState(SerializationNode& node, const LinkerState& state) {
         linker.setIntProperty("number", columns.numbers[i]).setIntProperty("type", columns.types[i]);
         if (columns.anchors[i] >= 0)
             linker.setIntProperty("anchor", columns.anchors[i]);
+        if (state.linkers[i].clock > 0)
+            linker.setDoubleProperty("clock", state.linkers[i].clock);
         for (int side = 0; side < 2; side++)
             if (columns.chains[2*i+side] >= 0)
                 linker.setIntProperty(CHAIN_PROPERTIES[side], columns.chains[2*i+side])
@@ -48,6 +50,8 @@ LinkerState readLinkerState(const SerializationNode& node) {
     }
     LinkerState state;
     state.linkers = columns.getLinkers();
+    for (size_t i = 0; i < state.linkers.size(); i++)
+        state.linkers[i].clock = node.getChildren()[i].getDoubleProperty("clock", 0);
     state.nextNumber = columns.nextNumber;
     state.steps = node.getLongProperty("steps", 0);
     state.bindings = node.getLongProperty("bindings", 0);
@@ -96,6 +100,7 @@ void writeLinkers(ostream& stream, ContextImpl& context) {
             writeValue(stream, linker.number);
             writeValue(stream, linker.type);
             writeValue(stream, linker.anchor);
+            writeValue(stream, linker.clock);
             for (const HandPlace& hand : linker.hands) {
                 writeValue(stream, hand.chain);
                 writeValue(stream, hand.position);
@@ -104,7 +109,7 @@ void writeLinkers(ostream& stream, ContextImpl& context) {
     }
 }
 
-void readLinkers(istream& stream, ContextImpl& context) {
+void readLinkers(istream& stream, ContextImpl& context, bool withClocks) {
     vector<LinkerState> states;
     vector<uint32_t> seeds;
     const int count = readValue<int>(stream, WITHIN);
@@ -122,6 +127,8 @@ void readLinkers(istream& stream, ContextImpl& context) {
             linker.number = readValue<uint32_t>(stream, WITHIN);
             linker.type = readValue<int>(stream, WITHIN);
             linker.anchor = readValue<int>(stream, WITHIN);
+            if (withClocks)
+                linker.clock = readValue<double>(stream, WITHIN);
             for (HandPlace& hand : linker.hands) {
                 hand.chain = readValue<int>(stream, WITHIN);
                 hand.position = readValue<double>(stream, WITHIN);

@@ -202,10 +202,11 @@ public:
      * @param stepSize    how long the step is
      * @param seed        the seed of the random numbers
      * @param force       the number of the Force among those of the System
+     * @param[out] links  the springs of linkers that join two places then
      * @return the number of a linker the rates of which are too large for the step, or -1
      */
     virtual long long execute(ContextImpl& context, cylchain::LinkerState& state, double kT, double stepSize,
-            std::uint32_t seed, int force) = 0;
+            std::uint32_t seed, int force, std::vector<cylchain::Link>& links) = 0;
     /**
      * Describe the springs of linkers that join two places.
      */

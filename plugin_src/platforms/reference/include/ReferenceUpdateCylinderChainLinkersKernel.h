@@ -17,7 +17,7 @@ public:
     void initialize(const cylchain::LinkerSystem& system, const std::vector<cylchain::Chain>& chains, bool periodic,
             bool nearestParticles);
     long long execute(ContextImpl& context, cylchain::LinkerState& state, double kT, double stepSize,
-            std::uint32_t seed, int force);
+            std::uint32_t seed, int force, std::vector<cylchain::Link>& links);
     void describe(const cylchain::LinkerState& state, std::vector<cylchain::Link>& links);
 private:
     ReferenceParallelLoop loop;

@@ -22,7 +22,7 @@ void ReferenceUpdateCylinderChainLinkersKernel::initialize(const LinkerSystem& s
 }
 
 long long ReferenceUpdateCylinderChainLinkersKernel::execute(ContextImpl& context, LinkerState& state,
-        double kT, double stepSize, uint32_t seed, int force) {
+        double kT, double stepSize, uint32_t seed, int force, vector<Link>& links) {
     ReferencePlatform::PlatformData& data = extractData(context);
     Vec3* const box = data.periodicBoxVectors;
     KineticStep step = {&(*data.positions)[0][0], LinkBoxes(), box[0][0]*box[1][1]*box[2][2], stepSize, seed,
@@ -32,7 +32,7 @@ long long ReferenceUpdateCylinderChainLinkersKernel::execute(ContextImpl& contex
     kinetics->setTemperature(kT);
     return kinetics->advance(state, step, [&] (int count, const function<void(int)>& iteration) {
         loop.run(count, iteration);
-    });
+    }, &links);
 }
 
 void ReferenceUpdateCylinderChainLinkersKernel::describe(const LinkerState& state, vector<Link>& links) {

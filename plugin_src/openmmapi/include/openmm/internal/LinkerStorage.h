@@ -26,8 +26,10 @@ void writeLinkers(std::ostream& stream, ContextImpl& context);
 
 /**
  * Read the linkers of all CylinderChainBindingForces of a Context from a checkpoint.
+ *
+ * @param withClocks  whether it has their clocks, which those of earlier versions do not
  */
-void readLinkers(std::istream& stream, ContextImpl& context);
+void readLinkers(std::istream& stream, ContextImpl& context, bool withClocks);
 
 /**
  * Write the linkers of all CylinderChainBindingForces of a Context to children "Linkers" of a node.
