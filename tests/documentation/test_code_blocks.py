@@ -35,9 +35,8 @@ for y in (0, 60):
     filaments.add_straight(short, 10, [0, y, 0], [1, 0, 0])
 """
 BUILT = FILAMENTS_IN_A_SYSTEM + "topology, system, positions = filaments.build()\n"
-# What a page takes as given, by the page and the beginning of the block before which it runs.
-GIVEN = {
-    ("docs/guide.md", "import mdtraj"): """
+# A short run in a directory.
+RUN = """
 from pathlib import Path
 from openmm_cylchain import cli
 Path("quick.toml").write_text('''
@@ -54,8 +53,12 @@ duration = "2 us"
 report_interval = "100 ns"
 seed = 1
 ''')
-assert cli.main(["run", "quick.toml", "--output", "output_f_actin"]) == 0
-""",
+assert cli.main(["run", "quick.toml", "--output", "DIRECTORY"]) == 0
+"""
+# What a page takes as given, by the page and the beginning of the block before which it runs.
+GIVEN = {
+    ("docs/guide.md", "from openmm_cylchain import analysis"): RUN.replace("DIRECTORY", "output_f_actin"),
+    ("docs/pictures.md", "from openmm_cylchain import analysis"): RUN.replace("DIRECTORY", "motor_network"),
     ("docs/own_system.md", "positions = filaments.add_to"): FILAMENTS_IN_A_SYSTEM
     + """
 topology, system = app.Topology(), openmm.System()
@@ -141,6 +144,8 @@ def commands_of(block):
     text = block.text.replace("\\\n", " ")
     for line in re.split(r"\n|&&", text):
         words = [word for word in shlex.split(line, comments=True) if not re.match(r"[A-Z_]+=", word)]
+        if ">" in words:
+            words = words[: words.index(">")]
         if words:
             yield words
 
