@@ -145,10 +145,10 @@ static void checkEquilibrium(const Rods& rods, double stiffness, double restLeng
     type.restLength = restLength;
     system.types = {type};
     KineticStep step = stepOf(rods.x, stepSize);
-    step.volume = 3e9;
+    step.volume = 1.2e9;
     const Expected expected = expectedOn(rods, system, step.volume);
     LinkerKinetics kinetics(system, rods.chains);
-    LinkerState state = freeLinkers(4500);
+    LinkerState state = freeLinkers(2000);
     // Longer than a hand stays bound.
     const int interval = max(1, (int) (3/stepSize)), blocks = 20, samples = 5;
     for (int i = 0; i < 10*interval; i++)
@@ -164,7 +164,7 @@ static void checkEquilibrium(const Rods& rods, double stiffness, double restLeng
                 one.add(bound == 1);
                 both.add(bound == 2);
                 if (bound == 2) {
-                    const double middle = 0.5*200;
+                    const double middle = 0.5*100;
                     square.add(pow(linker.hands[0].position-middle, 2));
                 }
             }
@@ -182,12 +182,13 @@ static const double ORIGIN[] = {0, 0, 0}, ALONG_X[] = {1, 0, 0};
 
 /** With steps over a factor of a hundred. */
 static void testEquilibriumOnRods() {
+    // All are 100 long, and in few pieces: of what is proposed, most is not taken.
     Rods crossed, parallel;
-    const double a[] = {-100, 0, 0}, b[] = {0, -60, 20}, c[] = {-90, 0, 20}, y[] = {0.6, 0.8, 0};
-    crossed.add(a, ALONG_X, 4, 50);
-    crossed.add(b, y, 2, 100);
-    parallel.add(a, ALONG_X, 2, 100);
-    parallel.add(c, ALONG_X, 5, 40);
+    const double a[] = {-50, 0, 0}, b[] = {0, -30, 20}, c[] = {-45, 0, 20}, y[] = {0.6, 0.8, 0};
+    crossed.add(a, ALONG_X, 2, 50);
+    crossed.add(b, y, 1, 100);
+    parallel.add(a, ALONG_X, 1, 100);
+    parallel.add(c, ALONG_X, 4, 25);
     checkEquilibrium(crossed, 0.02, 0, 120, 0, 0.1);
     checkEquilibrium(crossed, 0.02, 0, 120, 0, 10);
     checkEquilibrium(parallel, 0.05, 30, 70, 0.6, 0.2);
