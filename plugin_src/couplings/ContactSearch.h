@@ -116,8 +116,8 @@ public:
      */
     void findVector(const ContactPair& pair, double s, double t, const double* positions, double* result) const;
     /**
-     * Get whether the capsules of a pair pass through each other on the way from x to y, an odd number of times. Spheres
-     * do if they come nearer to an axis than 0.7 of the sum of radii, and end on the other side of it.
+     * Get whether the capsules of a pair pass through each other on the way from x to y, an odd number of times.
+     * Spheres do if they come nearer to an axis than 0.7 of the sum of radii, and end on the other side of it.
      */
     bool crosses(const ContactPair& pair, const double* x, const double* y) const;
 private:

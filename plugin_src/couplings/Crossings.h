@@ -154,9 +154,9 @@ inline Cubic sideInTime(const Vec3d& alongStart, const Vec3d& rStart, const Vec3
 }
 
 /**
- * Find how segments that stay in a plane with a normal pass through each other: an end of one goes through the inside of
- * the other, an odd number of times. Of such ends, the first two. Segments that lie across each other at the start are
- * free to come apart.
+ * Find how segments that stay in a plane with a normal pass through each other: an end of one goes through the inside
+ * of the other, an odd number of times. Of such ends, the first two. Segments that lie across each other at the start
+ * are free to come apart.
  */
 inline int findPlanarCrossings(const SegmentPair& start, const SegmentPair& end, const Vec3d& normal,
         Crossing* crossings) {

@@ -10,7 +10,7 @@ void SegmentCells::setGrid(double reach, const double* box) {
     periodic = box != nullptr;
     const size_t count = middles.size()/3;
     fill(toCells, toCells+9, 0.0);
-    if (periodic) {
+    if (box != nullptr) {
         // Rows of the inverse of the box, which is a lower triangle: their sizes are one over the heights of the box.
         const double a = box[0], b = box[4], c = box[8];
         const double inverse[9] = {1/a, -box[3]/(a*b), (box[3]*box[7]-box[6]*b)/(a*b*c), 0, 1/b, -box[7]/(b*c), 0, 0,

@@ -1092,8 +1092,8 @@ static void testRefusals() {
 int main() {
     const string instructionSet = candidateKernels().instructionSet;
     try {
-        for (auto test : {testNearestPoints, testCrossings, testPlanarCrossings, testPlanarJoints, testSpheres, testPairs,
-                testSmallBoxes, testRounding, testOutlooks, testSearchingAgain, testLoops, testSignedGap, testParallel,
+        for (auto test : {testNearestPoints, testCrossings, testPlanarCrossings, testPlanarJoints, testSpheres,
+                testPairs, testSmallBoxes, testRounding, testOutlooks, testSearchingAgain, testLoops, testSignedGap, testParallel,
                 testJoints, testDivision, testCrossingChains, testNearestImages, testRefusals})
             test();
     }
