@@ -1093,8 +1093,8 @@ int main() {
     const string instructionSet = candidateKernels().instructionSet;
     try {
         for (auto test : {testNearestPoints, testCrossings, testPlanarCrossings, testPlanarJoints, testSpheres,
-                testPairs, testSmallBoxes, testRounding, testOutlooks, testSearchingAgain, testLoops, testSignedGap, testParallel,
-                testJoints, testDivision, testCrossingChains, testNearestImages, testRefusals})
+                testPairs, testSmallBoxes, testRounding, testOutlooks, testSearchingAgain, testLoops, testSignedGap,
+                testParallel, testJoints, testDivision, testCrossingChains, testNearestImages, testRefusals})
             test();
     }
     catch (const exception& error) {
