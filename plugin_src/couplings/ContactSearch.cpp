@@ -666,7 +666,7 @@ bool ContactSearch::Implementation::addPair(const PlacedCapsule& one, const Plac
                 return false;
             const SegmentPair end = segments(a, b, pair.shift, y);
             const double after = sqrt(findNearestPoints(end).squared);
-            const double way = largestMotion(start, end)+(hasSphere(start) ? 2*DEEP*limit : 0)+2*reach;
+            const double way = largestMotion(start, end)+2*reach+(hasSphere(start) ? 2*DEEP*(limit-reach) : 0);
             if (after >= limit && before+after > way)
                 return false;
         }
