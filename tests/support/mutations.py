@@ -76,8 +76,8 @@ def _mutated_line(lines, number, generator):
     value_of = VALUES[generator.integers(len(VALUES))]
     kind = generator.integers(12)
     if kind > 7 and equals:
-        # What may be meant: another number of the same kind. More filaments than that take long to build.
-        most = 10.0 if key == "count" else 1e6
+        # What may be meant: another number of the same kind. Larger systems than that take long to build.
+        most = 10.0 if key.strip() in ("count", "segments") else 1e6
         return [f"{key} = {re.sub(_NUMBER, lambda match: _scaled(match[0], most, generator), value)}"]
     if kind == 0:
         return []
