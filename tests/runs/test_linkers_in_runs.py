@@ -15,42 +15,18 @@ from openmm_cylchain.output.linker_records import LINKER_RECORD
 from openmm_cylchain.runs.configuration import changed_keys, parse_configuration, read_configuration
 from openmm_cylchain.runs.run import create_filaments
 from openmm_cylchain.runs.run_directory import read_linkers
+from support import small_runs
 from support.checkpoints import resealed
 from support.commands import finish, start, wait_for_size
 from support.repository import EXAMPLES
 
 MOTOR = 'hand = { binding_rate = "1e5 1/s", reach = "60 nm", unbinding_rate = "2000 1/s", speed = "-0.5 um/s", '
 MOTOR += 'stall_force = "4 pN" }'
-NETWORK = """
-title = "network"
-[solvent]
-temperature = "298.15 K"
-viscosity = "1 mPa*s"
-[box]
-edges = ["0.4 um", "0.4 um", "0.5 um"]
-[[filament]]
-type = "F_ACTIN"
-segment_length = "100 nm"
-segments = 4
-count = 20
-[[linkers]]
-type = "ALPHA_ACTININ"
-count = 60
-bound = 30
-[[linkers]]
-name = "motor"
-stiffness = "0.1 pN/nm"
-rest_length = "30 nm"
-MOTOR
-count = 40
-bound = 40
-[simulation]
-time_step = "5 us"
-duration = "4 ms"
-report_interval = "0.1 ms"
-checkpoint_interval = "0.3 ms"
-seed = 5
-""".replace("MOTOR", MOTOR)
+# Longer than that of others, with motors that stall and more checkpoints.
+NETWORK = small_runs.NETWORK.replace(small_runs.MOTOR, MOTOR).replace(
+    'duration = "1 ms"\nreport_interval = "0.1 ms"',
+    'duration = "4 ms"\nreport_interval = "0.1 ms"\ncheckpoint_interval = "0.3 ms"',
+)
 FRAMES = 41
 PN = 0.602214076
 FILES = ("trajectory.dcd", "energies.csv", "linkers.csv", "linkers.npy")

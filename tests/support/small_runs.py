@@ -23,6 +23,7 @@ checkpoint_interval = "1 ms"
 seed = 5
 """
 
+MOTOR = 'hand = { binding_rate = "1e5 1/s", reach = "60 nm", unbinding_rate = "2000 1/s", speed = "-0.5 um/s" }'
 NETWORK = """
 title = "network"
 [solvent]
@@ -43,7 +44,7 @@ bound = 30
 name = "motor"
 stiffness = "0.1 pN/nm"
 rest_length = "30 nm"
-hand = { binding_rate = "1e5 1/s", reach = "60 nm", unbinding_rate = "2000 1/s", speed = "-0.5 um/s" }
+MOTOR
 count = 40
 bound = 40
 [simulation]
@@ -51,7 +52,7 @@ time_step = "5 us"
 duration = "1 ms"
 report_interval = "0.1 ms"
 seed = 5
-"""
+""".replace("MOTOR", MOTOR)
 
 
 def simulated(folder, text):
