@@ -13,6 +13,7 @@ from ..filaments.collection import FilamentCollection
 from ..units.quantities import LENGTH, STIFFNESS, positive, thermal_energy, whole_number
 from ..units.types import Indices, Numbers, Scalar
 from .contacts import SAFE_BARRIER, filament_diameters, is_periodic, outside_particles, particle_diameters
+from .planar_crossings import find_planar_crossing
 
 CAPSULE_BARRIER = 40.0
 """Energy of two capsules whose axes meet in k_B T, with the stiffness that ``default_capsule_stiffness`` gives."""
@@ -86,7 +87,8 @@ def capsule_contact_force(
     Warns
     -----
     ContactWarning
-        If filaments can pass through each other: if ``(k/2) d^2`` is below 25 k_B T for the thinnest.
+        If filaments can pass through each other: if ``(k/2) d^2`` is below 25 k_B T for the thinnest. If planar
+        filaments were added across each other: nothing in their plane takes them apart.
     """
     choose_engine("compiled")
     from .. import plugin
@@ -107,6 +109,7 @@ def capsule_contact_force(
     if periodic:
         _check_box(system, filaments, max([*diameters, *sphere_diameters]))
     _warn_of_barrier(filaments, diameters, stiffness)
+    _warn_of_planar_crossing(filaments, _box_vectors(system) if periodic else None)
     force = plugin.CylinderChainContactForce(stiffness)
     force.setUsesPeriodicBoundaryConditions(periodic)
     for filament, nodes, value in zip(filaments, filaments.node_indices, diameters):
@@ -131,8 +134,12 @@ def as_capsule_contact_force(force: openmm.Force) -> Any | None:
     return plugin.CylinderChainContactForce.cast(force)
 
 
+def _box_vectors(system):
+    return np.array([edge._value for edge in system.getDefaultPeriodicBoxVectors()])
+
+
 def _check_box(system, filaments, diameter):
-    a, b, c = (np.array(edge._value) for edge in system.getDefaultPeriodicBoxVectors())
+    a, b, c = _box_vectors(system)
     volume = abs(np.dot(a, np.cross(b, c)))
     narrowest = min(volume / np.linalg.norm(np.cross(*pair)) for pair in ((b, c), (c, a), (a, b)))
     longest = max(float(one.type.segment_lengths(one.segments, one.closed).max()) for one in filaments)
@@ -151,6 +158,18 @@ def _warn_of_barrier(filaments, diameters, stiffness):
         warnings.warn(
             f"Filament {number} has a contact diameter of {diameters[number]:.3g} nm: others of its kind can pass "
             f"through it for {barrier / kT:.3g} k_B T. Use a larger stiffness.",
+            ContactWarning,
+            stacklevel=3,
+        )
+
+
+def _warn_of_planar_crossing(filaments, box):
+    found = find_planar_crossing(filaments, box)
+    if found is not None:
+        warnings.warn(
+            f"Segment {found.segment} of filament {found.filament} and segment {found.other_segment} of filament "
+            f"{found.other_filament} cross each other in one plane. Planar filaments stay so until an end comes out, "
+            "and what long steps give of them until then is wrong. Place them where they do not cross.",
             ContactWarning,
             stacklevel=3,
         )

@@ -500,3 +500,37 @@ def test_bad_input_of_the_force_is_refused():
     system.addForce(force)
     with pytest.raises(openmm.OpenMMException, match="Illegal particle index: 3"):
         new_context(system, np.zeros((3, 3)))
+
+
+def _planar_pair(first, second, height=0.0, edge=None):
+    filaments = Filaments(VISCOSITY, TEMPERATURE, "compiled")
+    for start, direction, z in ((*first, 0.0), (*second, height)):
+        filaments.add_straight(ACTIN, 3, [*start, z], [*direction, 0], planar=True)
+    box = None if edge is None else edge * np.eye(3)
+    _, system, _ = filaments.build(box_vectors=box)
+    return filaments, system
+
+
+@pytest.mark.parametrize("edge", [None, 1000])
+def test_planar_filaments_across_each_other_are_warned_of(edge):
+    shift = 0 if edge is None else 3000
+    filaments, system = _planar_pair(((0, 0), (1, 0)), ((150 + shift, -120), (0, 1)), edge=edge)
+    with pytest.warns(ContactWarning, match="Segment 1 of filament 0 and segment 1 of filament 1 cross each other in"):
+        capsule_contact_force(filaments, system, 30)
+
+
+def test_planar_filaments_beside_or_above_each_other_are_not_warned_of():
+    for second, height in ((((150, 20), (0, 1)), 0.0), (((150, -120), (0, 1)), 40.0), (((0, 40), (1, 0)), 0.0)):
+        filaments, system = _planar_pair(((0, 0), (1, 0)), second, height)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            capsule_contact_force(filaments, system, 30)
+
+
+def test_neighbors_in_a_planar_filament_do_not_cross():
+    filaments = Filaments(VISCOSITY, TEMPERATURE, "compiled")
+    filaments.add_ring(ACTIN, 12, [0, 0, 0], planar=True)
+    filaments.add_nodes(ACTIN, [[300, 0, 0], [400, 0, 0], [400, 100, 0], [350, -50, 0]], planar=True)
+    _, system, _ = filaments.build()
+    with pytest.warns(ContactWarning, match="Segment 0 of filament 1 and segment 2 of filament 1 cross"):
+        capsule_contact_force(filaments, system, 30)
