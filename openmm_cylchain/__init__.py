@@ -41,6 +41,7 @@ from .output.reporters import CrosslinkReporter, FilamentReporter, LinkerReporte
 from .output.structure_files import write_lammps_data, write_psf
 from .systems.filaments import Filaments
 from .systems.periodic import make_trajectory_whole, make_whole, remove_jumps
+from .systems.run_reporter import RunReporter
 from .systems.step_check import check_time_step
 from .systems.step_check_results import ObservableCheck, StepCheck
 from .version import __version__
@@ -83,6 +84,7 @@ __all__ = [
     "ObservableCheck",
     "Plane",
     "PrecisionWarning",
+    "RunReporter",
     "SegmentFriction",
     "SegmentPlace",
     "Slab",

@@ -1,5 +1,6 @@
 """Analysis of runs, which ``load`` reads, and of trajectories in mdtraj; ``statistics`` has errors of series."""
 
+from ..couplings.crosslink_records import CrosslinkFrame
 from . import statistics
 from .crossings import CrossingCounter, Crossings, find_crossings
 from .networks import contact_map, contraction, filament_distances, mesh_size
@@ -27,6 +28,7 @@ from .trajectories import (
 )
 
 __all__ = [
+    "CrosslinkFrame",
     "CrossingCounter",
     "Crossings",
     "MeanSquareDisplacement",

@@ -1,6 +1,7 @@
-"""A run of ``openmm-cylchain run`` as one object: times, filaments, linkers, energies; for mdtraj and MDAnalysis."""
+"""A run that is in a directory as one object: times, filaments, linkers, energies; for mdtraj and MDAnalysis."""
 
 import csv
+import math
 import warnings
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,6 +12,7 @@ import mdtraj
 import numpy as np
 import numpy.typing as npt
 
+from ..couplings.crosslink_records import CROSSLINK_RECORD, CrosslinkFrame, crosslinks_at
 from ..couplings.walls import Box, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere
 from ..errors import InputError, PrecisionWarning
 from ..mechanics.geometry import segment_vectors
@@ -84,11 +86,11 @@ class Run:
     linker_types : tuple
         Of the kinds of linkers, with ``name``, ``stiffness`` in kJ/(mol nm^2) and ``rest_length`` in nm.
     walls : tuple of Shape
-        Those of ``filament_wall_force``.
+        Those of ``filament_wall_force``, and those that a ``RunReporter`` was given.
     energies : dict of (frames,) arrays
         By the headers of ``energies.csv``.
     complete : bool
-        Whether the run has come to its end.
+        Whether the run has come to its end. True for one of a ``RunReporter``, which does not know.
     """
 
     def __init__(self, files: RunFiles, description: RunDescription, frames: int, energies: dict[str, Any]) -> None:
@@ -108,7 +110,7 @@ class Run:
         self.walls: tuple[Shape, ...] = tuple(
             _SHAPES[own.shape](own.point, own.vector, own.length) for own in description.walls
         )
-        self.complete = frames == description.steps // description.steps_per_frame + 1
+        self.complete = description.steps is None or frames == _frames_of(description)
 
     def __len__(self) -> int:
         """Number of frames."""
@@ -148,6 +150,44 @@ class Run:
         table = _read_table(self._files.linkers)
         count = len(self.linker_types)
         return {name: values[: count * len(self)].reshape(-1, count) for name, values in table.items()}
+
+    @cached_property
+    def _crosslink_records(self):
+        path = self._files.crosslinks
+        return np.load(path, mmap_mode="r") if path.exists() else np.zeros(0, CROSSLINK_RECORD)
+
+    def crosslinks(self, frame: int) -> CrosslinkFrame:
+        """Crosslinks of a frame, of ``Crosslinks`` or ``[[link]]``: none if there are no such.
+
+        Returns
+        -------
+        CrosslinkFrame
+            With ``numbers``, ``places`` (n, 2, 3) in nm, ``tensions`` in kJ/(mol nm) and ``active``, arrays.
+        """
+        frame = self._frame(frame)
+        if not len(self._crosslink_records):
+            return crosslinks_at(self._crosslink_records, 0, np.zeros((0, 3)), None)
+        return crosslinks_at(self._crosslink_records, int(self.steps[frame]), self.positions(frame), self.box)
+
+    @property
+    def spring_names(self) -> list[str]:
+        """Names of all kinds of springs between filaments: of linkers, and "crosslink" if there are such."""
+        names = [own.name for own in self.linker_types]
+        return [*names, "crosslink"] if np.any(self._crosslink_records["number"] >= 0) else names
+
+    def springs(self, frame: int, kind: int) -> tuple[FloatArray, FloatArray]:
+        """Springs of a kind in ``spring_names``: lines (n, 2, 3) between places, and where hands hold (m, 3), in nm.
+
+        Crosslinks that are off are left out.
+        """
+        if kind == len(self.linker_types):
+            found = self.crosslinks(frame)
+            lines = found.places[found.active]
+            return lines, lines.reshape(-1, 3)
+        records = self.linkers[self._frame(frame)]
+        places = np.asarray(records["places"][records["type"] == kind], dtype=float)
+        there = ~np.isnan(places).any(axis=2)
+        return places[there.all(axis=1)], places[there]
 
     @cached_property
     def coordinate_resolution(self) -> float:
@@ -208,9 +248,7 @@ class Run:
             import MDAnalysis
             from MDAnalysis.coordinates.memory import MemoryReader
         except ImportError:
-            raise InputError(
-                "A Universe needs MDAnalysis: install it, as in pip install 'openmm-cylchain[mdanalysis]'."
-            ) from None
+            raise InputError("A Universe needs MDAnalysis: install it by pip install MDAnalysis.") from None
         topology = mdtraj.load_topology(str(self._files.topology))
         atoms, residues = list(topology.atoms), list(topology.residues)
         universe = MDAnalysis.Universe.empty(
@@ -276,12 +314,16 @@ class Run:
         return [total / len(frames) for total in totals]
 
 
+def _frames_of(description):
+    return math.inf if description.steps is None else description.steps // description.steps_per_frame + 1
+
+
 def _filament(own: DescribedFilament) -> RunFilament:
     return RunFilament(own.type, np.array(own.nodes, dtype=int), own.diameter, own.ring, own.clamped)
 
 
 def load(path: str | Path, incomplete: bool = False) -> Run:
-    """Load the directory that ``openmm-cylchain run`` has written.
+    """Load the directory that ``openmm-cylchain run`` or a ``RunReporter`` has written.
 
     Parameters
     ----------
@@ -310,7 +352,7 @@ def load(path: str | Path, incomplete: bool = False) -> Run:
     """
     files = RunFiles(path)
     if not files.path.is_dir():
-        raise InputError(f"{path} is not a directory: give that of `openmm-cylchain run --output`.")
+        raise InputError(f"{path} is not a directory: give that of `openmm-cylchain run --output` or of a RunReporter.")
     if not files.description.exists():
         reason = "its files are those of an older version" if files.trajectory.exists() else "nothing has run into it"
         raise InputError(f"{path} is not the directory of a run: it has no {files.description.name}, {reason}.")
@@ -326,16 +368,16 @@ def load(path: str | Path, incomplete: bool = False) -> Run:
         if not file.exists():
             raise InputError(f"{path} lacks {file.name}: the run has not begun, or its files were moved.")
     frames, energies = _whole_frames(files, description)
-    expected = description.steps // description.steps_per_frame + 1
+    expected = _frames_of(description)
     if frames == 0:
         raise InputError(f"The run in {path} has not a frame that is whole.")
-    if frames < expected and not incomplete:
+    if frames < expected < math.inf and not incomplete:
         raise InputError(
             f"The run in {path} is incomplete: it has {frames} of {expected} frames. Continue it with "
             f"`openmm-cylchain run {files.configuration} --output {path} --resume`, or take what there is with "
             "incomplete=True (--incomplete)."
         )
-    run = Run(files, description, min(frames, expected), energies)
+    run = Run(files, description, int(min(frames, expected)), energies)
     run.warn_of_rounding()
     return run
 
@@ -351,6 +393,9 @@ def _whole_frames(files, description):
         )
     frames = min(len(energies["step"]), len(dcd))
     expected = np.arange(frames) * description.steps_per_frame
+    if description.steps is None and frames:
+        # A RunReporter may come into a Simulation that has gone on for a while.
+        expected += int(energies["step"][0])
     if not np.array_equal(energies["step"][:frames], expected):
         raise InputError(f"{files.energies} does not have a line for each frame of the run.")
     if description.linkers:
@@ -360,7 +405,7 @@ def _whole_frames(files, description):
         recorded = np.load(files.linker_places, mmap_mode="r")["step"]
         held = (table["one hand bound"] + table["both hands bound"])[kinds * (frames - 1) : kinds * frames].sum()
         unfinished = held > 0 and (len(recorded) == 0 or recorded[-1] < expected[frames - 1])
-        if frames <= description.steps // description.steps_per_frame and unfinished:
+        if frames < _frames_of(description) and unfinished:
             frames -= 1
     return frames, energies
 

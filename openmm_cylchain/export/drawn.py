@@ -1,4 +1,4 @@
-"""What exports have in common: paths, the thickness of linkers, and where they are."""
+"""What exports have in common: paths, and the thickness of linkers and crosslinks."""
 
 from pathlib import Path
 
@@ -7,6 +7,7 @@ import numpy as np
 from ..analysis.runs import Run
 from ..errors import InputError
 from ..output.files import check_output_path
+from ..rendering.outlines import wall_lines
 from ..units.types import FloatArray
 
 
@@ -23,9 +24,12 @@ def thickness(run: Run) -> float:
     return min(own.diameter for own in run.filaments)
 
 
-def linker_lines(run: Run, frame: int, kind: int) -> tuple[FloatArray, FloatArray]:
-    """Linkers of a kind in a frame: lines (n, 2, 3) of those that join two places, and places (m, 3) of bound hands."""
-    records = run.linkers[frame]
-    places = np.asarray(records["places"][records["type"] == kind], dtype=float)
-    there = ~np.isnan(places).any(axis=2)
-    return places[there.all(axis=1)], places[there]
+def walls(run: Run) -> list[FloatArray]:
+    """Lines (n, 3) in nm on the walls of a run, as far as filaments are beside them at its ends."""
+    return wall_lines(run, np.concatenate([nodes for frame in (0, -1) for nodes in run.nodes(frame)]))
+
+
+def spring_labels(run: Run) -> list[str]:
+    """Names of kinds of springs, with their number if there are several of one name."""
+    names = run.spring_names
+    return [name if names.count(name) == 1 else f"{name} {kind + 1}" for kind, name in enumerate(names)]

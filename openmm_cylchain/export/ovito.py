@@ -1,4 +1,4 @@
-"""A run as a GSD file for OVITO: nodes and bound hands as particles with radii, segments and linkers as bonds."""
+"""A run as a GSD file for OVITO: nodes and bound hands as particles with radii, segments and springs as bonds."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from ..analysis.runs import Run
 from ..errors import InputError
-from .drawn import check_path, linker_lines, thickness
+from .drawn import check_path, spring_labels, thickness, walls
 
 _ANGSTROM = 10.0  # in a nm
 
@@ -14,10 +14,10 @@ _ANGSTROM = 10.0  # in a nm
 def write_ovito(run: Run, path: str | Path) -> None:
     """Write all frames of a run for OVITO, in angstrom.
 
-    Particles are the nodes of filaments and the hands of linkers that are bound, with the names of their types and
-    radii; bonds are segments and springs of linkers, so that their number changes from frame to frame. ``time_ps`` is
-    an attribute of each frame, beside its step. Without a periodic box, the cell is three times as wide as what it
-    holds.
+    Particles are the nodes of filaments, the hands of linkers that are bound and the ends of crosslinks, with the names
+    of their types and radii; bonds are segments and springs, so that their number changes from frame to frame. Lines on
+    walls are particles and bonds of the type "wall". ``time_ps`` is an attribute of each frame, beside its step.
+    Without a periodic box, the cell is three times as wide as what it holds.
 
     Parameters
     ----------
@@ -35,12 +35,12 @@ def write_ovito(run: Run, path: str | Path) -> None:
     try:
         import gsd.hoomd
     except ImportError:
-        raise InputError(
-            "Files for OVITO need the package gsd: install it, as in pip install 'openmm-cylchain[ovito]'."
-        ) from None
+        raise InputError("Files for OVITO need the package gsd: install it by pip install gsd.") from None
     names = list(dict.fromkeys(own.type.name for own in run.filaments))
-    hands = [f"{own.name} hand" for own in run.linker_types]
-    springs = [own.name for own in run.linker_types]
+    springs = spring_labels(run)
+    hands = [f"{name} hand" for name in springs]
+    wall_points, wall_bonds = _joined(walls(run))
+    walls_there = ["wall"] if len(wall_points) else []
     center, cell = _cell(run)
     segments = np.concatenate([_bonds(own) for own in run.filaments])
     kinds = np.concatenate([np.full(own.segments, names.index(own.type.name)) for own in run.filaments])
@@ -56,8 +56,8 @@ def write_ovito(run: Run, path: str | Path) -> None:
                 positions, bonds = [run.positions(frame)[order]], [position_of[segments]]
                 particle_types, bond_types, widths = [types], [kinds], [diameters]
                 count = len(order)
-                for kind in range(len(run.linker_types)):
-                    lines, places = linker_lines(run, frame, kind)
+                for kind in range(len(springs)):
+                    lines, places = run.springs(frame, kind)
                     # Ends of springs are particles of their own, at the places of hands or anchors.
                     ends = np.concatenate([lines.reshape(-1, 3), places])
                     positions.append(ends)
@@ -66,16 +66,23 @@ def write_ovito(run: Run, path: str | Path) -> None:
                     bond_types.append(np.full(len(lines), len(names) + kind))
                     widths.append(np.full(len(ends), 1.2 * thickness(run)))
                     count += len(ends)
+                if walls_there:
+                    positions.append(wall_points)
+                    bonds.append(count + wall_bonds)
+                    particle_types.append(np.full(len(wall_points), len(names) + len(hands)))
+                    bond_types.append(np.full(len(wall_bonds), len(names) + len(springs)))
+                    widths.append(np.full(len(wall_points), 0.2 * thickness(run)))
+                    count += len(wall_points)
                 snapshot = gsd.hoomd.Frame()
                 snapshot.configuration.step = int(run.steps[frame])
                 snapshot.configuration.box = _ANGSTROM * cell
                 snapshot.particles.N = count
-                snapshot.particles.types = names + hands
+                snapshot.particles.types = names + hands + walls_there
                 snapshot.particles.typeid = np.concatenate(particle_types)
                 snapshot.particles.position = _ANGSTROM * (np.concatenate(positions) - center)
                 snapshot.particles.diameter = _ANGSTROM * np.concatenate(widths)
                 snapshot.bonds.N = sum(len(own) for own in bonds)
-                snapshot.bonds.types = names + springs
+                snapshot.bonds.types = names + springs + walls_there
                 snapshot.bonds.group = np.concatenate(bonds)
                 snapshot.bonds.typeid = np.concatenate(bond_types)
                 snapshot.log["time_ps"] = np.array([run.times[frame]])
@@ -83,6 +90,16 @@ def write_ovito(run: Run, path: str | Path) -> None:
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _joined(lines):
+    # Points of all lines, and pairs of neighbours.
+    bonds, count = [], 0
+    for line in lines:
+        first = count + np.arange(len(line) - 1)
+        bonds.append(np.stack([first, first + 1], axis=1))
+        count += len(line)
+    return np.concatenate([np.zeros((0, 3)), *lines]), np.concatenate([np.zeros((0, 2), dtype=int), *bonds])
 
 
 def _bonds(own):

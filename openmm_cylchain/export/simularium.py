@@ -1,4 +1,4 @@
-"""A run as a Simularium file (JSON): filaments as fibers, linkers as fibers of two points and hands as spheres."""
+"""A run as a Simularium file (JSON): filaments, linkers, crosslinks and walls as fibers, hands as spheres."""
 
 import json
 from pathlib import Path
@@ -8,10 +8,10 @@ import numpy as np
 
 from ..analysis.runs import Run
 from ..output.files import write_atomically
-from ..rendering.colors import filament_colors, linker_color
+from ..rendering.colors import WALL_COLOR, filament_colors, linker_color
 from ..units.text import time_unit
 from ..version import __version__
-from .drawn import check_path, linker_lines, thickness
+from .drawn import check_path, spring_labels, thickness, walls
 
 _SPHERE, _FIBER = 1000.0, 1001.0
 
@@ -21,7 +21,7 @@ def write_simularium(run: Run, path: str | Path) -> None:
 
     The format is version 3 of the trajectory, version 1 of its frames, https://github.com/simularium. Lengths are in
     nm, about the middle of the box; times are in the unit of the last frame. A filament keeps its number from frame to
-    frame, linkers do not. A ring goes on to its first node.
+    frame, linkers do not. A ring goes on to its first node. Lines on walls are fibers of the type "wall".
 
     Parameters
     ----------
@@ -33,7 +33,8 @@ def write_simularium(run: Run, path: str | Path) -> None:
     path = check_path(path, ".simularium")
     name, length = time_unit(float(run.times[-1]) if run.times[-1] > 0 else run.time_step)
     types, mapping = _types(run)
-    center, size = _box(run)
+    outlines = walls(run)
+    center, size = _box(run, outlines)
     content = {
         "trajectoryInfo": {
             "version": 3,
@@ -61,7 +62,7 @@ def write_simularium(run: Run, path: str | Path) -> None:
                 {
                     "frameNumber": frame,
                     "time": float(run.times[frame]) / length,
-                    "data": _agents(run, frame, types, center),
+                    "data": _agents(run, frame, types, center, outlines),
                 }
                 for frame in range(len(run))
             ],
@@ -78,39 +79,44 @@ def _types(run):
     agents: list[tuple[tuple[str, str | int], str, str, str]] = [
         (("filament", name), name, "FIBER", color) for name, color in filament_colors(run).items()
     ]
-    for kind, own in enumerate(run.linker_types):
-        label = own.name if [one.name for one in run.linker_types].count(own.name) == 1 else f"{own.name} {kind + 1}"
+    for kind, label in enumerate(spring_labels(run)):
         agents.append((("linker", kind), label, "FIBER", linker_color(kind)))
         agents.append((("hand", kind), f"{label}#hand", "SPHERE", linker_color(kind)))
+    if run.walls:
+        agents.append((("wall", 0), "wall", "FIBER", WALL_COLOR))
     for number, (key, label, shape, color) in enumerate(agents):
         numbers[key] = number
         mapping[str(number)] = {"name": label, "geometry": {"displayType": shape, "url": "", "color": color}}
     return numbers, mapping
 
 
-def _box(run):
+def _box(run, outlines):
     if run.box is not None:
         return 0.5 * run.box.sum(axis=0), np.abs(run.box).sum(axis=0)
     frames = [run.positions(frame) for frame in np.unique(np.linspace(0, len(run) - 1, 20).astype(int))]
-    lower, upper = np.min(frames, axis=(0, 1)), np.max(frames, axis=(0, 1))
+    points = np.concatenate([*frames, *outlines])
+    lower, upper = points.min(axis=0), points.max(axis=0)
     return 0.5 * (lower + upper), 1.1 * (upper - lower) + thickness(run)
 
 
-def _agents(run, frame, types, center):
+def _agents(run, frame, types, center, outlines):
     data: list[float] = []
     for number, (own, nodes) in enumerate(zip(run.filaments, run.nodes(frame))):
         points = np.concatenate([nodes, nodes[:1]]) if own.ring else nodes
         data += _agent(_FIBER, number, types["filament", own.type.name], 0.5 * own.diameter, points - center)
     number = len(run.filaments)
     radius = 0.5 * thickness(run)
-    for kind in range(len(run.linker_types)):
-        lines, hands = linker_lines(run, frame, kind)
+    for kind in range(len(run.spring_names)):
+        lines, hands = run.springs(frame, kind)
         for line in lines:
             data += _agent(_FIBER, number, types["linker", kind], 0.5 * radius, line - center)
             number += 1
         for hand in hands:
             data += _agent(_SPHERE, number, types["hand", kind], 1.2 * radius, np.zeros((0, 3)), hand - center)
             number += 1
+    for line in outlines:
+        data += _agent(_FIBER, number, types["wall", 0], 0.2 * radius, line - center)
+        number += 1
     return data
 
 

@@ -1,4 +1,4 @@
-"""A run as a script for VMD: the trajectory with thick bonds and colors, linkers, the box and a clock."""
+"""A run as a script for VMD: thick bonds and colors, linkers, crosslinks, the box, walls and a clock."""
 
 from pathlib import Path
 
@@ -6,20 +6,26 @@ import numpy as np
 
 from ..analysis.runs import Run
 from ..output.files import write_atomically
-from ..rendering.colors import filament_colors, linker_color
+from ..rendering.colors import WALL_COLOR, filament_colors, linker_color
 from ..units.text import time_unit
-from .drawn import check_path, linker_lines, thickness
+from .drawn import check_path, thickness, walls
 
 _ANGSTROM = 10.0
 _FIRST_COLOR = 17  # Those before have a meaning of their own in VMD.
 
 _PROCEDURES = """
 proc draw_frame {args} {
-    global molecule times time_unit links link_colors link_radius corner
+    global molecule times time_unit links link_colors link_radius corner walls wall_color
     set frame [molinfo $molecule get frame]
     graphics $molecule delete all
     graphics $molecule color black
     graphics $molecule text $corner "[lindex $times $frame] $time_unit" size 1.2
+    graphics $molecule color $wall_color
+    foreach line $walls {
+        foreach first [lrange $line 0 end-1] second [lrange $line 1 end] {
+            graphics $molecule line $first $second width 2
+        }
+    }
     foreach color $link_colors lines [lindex $links $frame] {
         graphics $molecule color $color
         foreach {first second} $lines {
@@ -39,8 +45,8 @@ def write_vmd(run: Run, path: str | Path) -> None:
     """Write a script that opens a run in VMD: ``vmd -e FILE``.
 
     It loads ``topology.psf`` and ``trajectory.dcd`` from the directory of the run, which must stay where it is. Bonds
-    are as thick as filaments, or as can be seen. Linkers that join two places are drawn for each frame, and the time,
-    which VMD does not read from DCD files.
+    are as thick as filaments, or as can be seen. Linkers that join two places, crosslinks and lines on walls
+    are drawn for each frame, and the time, which VMD does not read from DCD files.
 
     Parameters
     ----------
@@ -75,18 +81,23 @@ def write_vmd(run: Run, path: str | Path) -> None:
             "mol addrep $molecule",
         ]
     first = _FIRST_COLOR + len(filament_colors(run))
-    lines += [_color(first + kind, linker_color(kind)) for kind in range(len(run.linker_types))]
+    lines += [_color(first + kind, linker_color(kind)) for kind in range(len(run.spring_names))]
     if run.box is not None:
         edges = " ".join(f"{_ANGSTROM * edge:.8g}" for edge in np.diag(run.box))
         lines += ["package require pbctools", f"pbc set {{{edges}}} -all -molid $molecule", "pbc box -molid $molecule"]
+    wall_color = first + len(run.spring_names)
+    lines.append(_color(wall_color, WALL_COLOR))
+    outlines = " ".join("{" + " ".join(map(_point, line)) + "}" for line in walls(run))
     times = " ".join(f"{time / length:.6g}" for time in run.times)
-    colors = " ".join(str(first + kind) for kind in range(len(run.linker_types)))
+    colors = " ".join(str(first + kind) for kind in range(len(run.spring_names)))
     corner = _ANGSTROM * run.positions(-1).max(axis=0)
     lines += [
         f"set times {{{times}}}",
         f"set time_unit {name}",
         f"set link_colors {{{colors}}}",
         f"set link_radius {_ANGSTROM * 0.5 * max(0.5 * thickness(run), 0.003 * extent):.6g}",
+        f"set wall_color {wall_color}",
+        f"set walls {{{outlines}}}",
         f"set corner {_point(corner / _ANGSTROM)}",
         "set links {}",
         *(f"lappend links {{{_links(run, frame)}}}" for frame in range(len(run))),
@@ -96,8 +107,8 @@ def write_vmd(run: Run, path: str | Path) -> None:
 
 def _links(run, frame):
     kinds = []
-    for kind in range(len(run.linker_types)):
-        ends, _ = linker_lines(run, frame, kind)
+    for kind in range(len(run.spring_names)):
+        ends, _ = run.springs(frame, kind)
         kinds.append("{" + " ".join(_point(place) for place in ends.reshape(-1, 3)) + "}")
     return " ".join(kinds)
 

@@ -55,12 +55,34 @@ class DescribedLinkers:
 
 @dataclass(frozen=True)
 class DescribedWall:
-    """A wall of a run by its region: see ``Shape.region``; lengths in nm."""
+    """A wall of a run by its region: see ``Shape.region``; lengths in nm.
+
+    ``stiffness`` in kJ/(mol nm^2), and particles with the radii around them in nm, are those of a
+    ``filament_wall_force``; of another wall the shape alone is known, and the stiffness is None.
+    """
 
     shape: str
     point: tuple[float, float, float]
     vector: tuple[float, float, float]
     length: float
+    stiffness: float | None = None
+    particles: tuple[int, ...] = ()
+    radii: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class DescribedContacts:
+    """A ``capsule_contact_force`` of a run: stiffness in kJ/(mol nm^2), diameters in nm.
+
+    ``chains`` are (nodes, diameter, segments of one chain that do not touch, whether it is a ring), ``spheres``
+    (particle, diameter), ``exclusions`` (chain, segment, chain, segment).
+    """
+
+    stiffness: float
+    periodic: bool
+    chains: tuple[tuple[tuple[int, ...], float, int, bool], ...]
+    spheres: tuple[tuple[int, float], ...] = ()
+    exclusions: tuple[tuple[int, int, int, int], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -74,24 +96,28 @@ class RunDescription:
         In K.
     time_step : float
         In ps.
-    steps, steps_per_frame : int
+    steps : int or None
+        Of the whole run; None if nobody has said how long it will be.
+    steps_per_frame : int
     particles : int
     filaments : tuple of DescribedFilament
     box : three vectors of a periodic box in nm, or None
     linkers : tuple of DescribedLinkers
     walls : tuple of DescribedWall
+    contacts : tuple of DescribedContacts
     """
 
     title: str
     temperature: float
     time_step: float
-    steps: int
+    steps: int | None
     steps_per_frame: int
     particles: int
     filaments: tuple[DescribedFilament, ...]
     box: tuple[tuple[float, ...], ...] | None = None
     linkers: tuple[DescribedLinkers, ...] = ()
     walls: tuple[DescribedWall, ...] = ()
+    contacts: tuple[DescribedContacts, ...] = ()
 
     def write(self, path: Path) -> None:
         """Write the description as JSON."""
@@ -107,6 +133,7 @@ class RunDescription:
             ],
             "linkers": [dataclasses.asdict(own) for own in self.linkers],
             "walls": [dataclasses.asdict(own) for own in self.walls],
+            "contacts": [dataclasses.asdict(own) for own in self.contacts],
         }
         write_atomically(path, (json.dumps(content, allow_nan=False) + "\n").encode())
 
@@ -132,15 +159,19 @@ def read_run_description(path: Path) -> RunDescription:
         )
         content["box"] = None if content["box"] is None else tuple(map(tuple, content["box"]))
         content["linkers"] = tuple(DescribedLinkers(**own) for own in content["linkers"])
-        content["walls"] = tuple(
-            DescribedWall(own["shape"], tuple(own["point"]), tuple(own["vector"]), own["length"])
-            for own in content["walls"]
-        )
+        content["walls"] = tuple(DescribedWall(**_as_tuples(own)) for own in content["walls"])
+        content["contacts"] = tuple(DescribedContacts(**_as_tuples(own)) for own in content.get("contacts", ()))
         return RunDescription(**content)
     except (ValueError, KeyError, TypeError, IndexError, AttributeError):
         raise InputError(
             f"{path} does not describe a run, is damaged or of another version of openmm_cylchain."
         ) from None
+
+
+def _as_tuples(entries):
+    if isinstance(entries, dict):
+        return {name: _as_tuples(own) for name, own in entries.items()}
+    return tuple(map(_as_tuples, entries)) if isinstance(entries, list) else entries
 
 
 def _type_of(entries):

@@ -8,6 +8,9 @@ _LINKERS = ("#E69F00", "#D55E00", "#CC79A7", "#F0E442")
 _GREYS = ("#333333", "#8A8A8A", "#5E5E5E", "#B0B0B0")
 
 
+WALL_COLOR = "#9EA3AD"
+
+
 def filament_colors(run: Run) -> dict[str, str]:
     """Colors "#RRGGBB" of the types of filaments of a run, by their names."""
     names = dict.fromkeys(own.type.name for own in run.filaments)
@@ -15,6 +18,6 @@ def filament_colors(run: Run) -> dict[str, str]:
 
 
 def linker_color(kind: int, grey: bool = False) -> str:
-    """The color "#RRGGBB" of a kind of linkers."""
+    """The color "#RRGGBB" of a kind of linkers, or of crosslinks."""
     colors = _GREYS if grey else _LINKERS
     return colors[kind % len(colors)]

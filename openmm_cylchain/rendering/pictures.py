@@ -158,8 +158,7 @@ def _ffmpeg():
         import imageio_ffmpeg
     except ImportError:
         raise InputError(
-            "MP4 and WebM films need imageio-ffmpeg: install it, as in pip install 'openmm-cylchain[render]', or write "
-            "a GIF."
+            "MP4 and WebM films need imageio-ffmpeg: install it by pip install imageio-ffmpeg, or write a GIF."
         ) from None
     return imageio_ffmpeg
 

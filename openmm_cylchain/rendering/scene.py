@@ -1,26 +1,24 @@
 """What a picture of a run shows: filaments, linkers, the periodic box and walls as tubes, with their colors."""
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import matplotlib
 import numpy as np
 
 from ..analysis.order import director
 from ..analysis.runs import Run
-from ..couplings.walls import Box, Cylinder, Ellipsoid, Plane, Sphere
 from ..errors import InputError
 from ..mechanics.geometry import joint_cosines, segment_vectors
 from ..units.quantities import AVOGADRO
 from ..units.types import FloatArray, IntArray
 from .colors import filament_colors, linker_color
+from .outlines import box_edges, wall_lines
 from .tubes import Tubes
 
 COLORINGS = ("type", "tension", "orientation", "bending")
 
 _LINE_COLOR, _LINE_WIDTH = np.array([0.62, 0.64, 0.68]), 0.0011
 _VISIBLE = 0.009  # Of the extent of the scene: what a tube is wide at least.
-_ROUND = 72
 _PICONEWTON = 1e-15 * AVOGADRO * 1e-9
 
 
@@ -37,7 +35,7 @@ class Look:
     whole : bool
         Whether filaments leave a periodic box, or go on at the opposite face.
     linkers : bool
-        Whether linkers are drawn.
+        Whether linkers and crosslinks are drawn.
     average : int
         Over how many frames a tension is averaged.
     """
@@ -107,15 +105,13 @@ class Scene:
         return Tubes.joined(parts)
 
     def _linkers(self, frame):
-        records = self.run.linkers[frame]
         radius = 0.5 * float(np.median(self.diameters))
         parts = []
-        for kind in range(len(self.run.linker_types)):
-            places = np.asarray(records["places"][records["type"] == kind], dtype=float)
+        for kind in range(len(self.run.spring_names)):
+            lines, places = self.run.springs(frame, kind)
             color = _rgb(linker_color(kind, self.scale is not None))
-            there = ~np.isnan(places).any(axis=2)
-            springs, _ = self._wrapped(places[there.all(axis=1)])
-            hands, _ = self._wrapped(np.repeat(places[there][:, None], 2, axis=1))
+            springs, _ = self._wrapped(lines)
+            hands, _ = self._wrapped(np.repeat(places[:, None], 2, axis=1))
             parts.append(Tubes.of_one_kind(springs, 0.55 * radius, color))
             parts.append(Tubes.of_one_kind(hands, 1.35 * radius, color))
         return parts
@@ -168,11 +164,11 @@ def make_scene(run: Run, look: Look, frames: list[int]) -> Scene:
     legend = [(name, color, "filament") for name, color in colors.items()] if look.color == "type" else []
     if look.linkers:
         legend += [
-            (own.name, linker_color(kind, look.color != "type"), "linker") for kind, own in enumerate(run.linker_types)
+            (name, linker_color(kind, look.color != "type"), "linker") for kind, name in enumerate(run.spring_names)
         ]
     axis = director(np.concatenate(_segments(run, frames[0]))) if look.color == "orientation" else None
     scale = _color_scale(run, look, axis, frames)
-    fixed = _lines(_outlines(run, points), _LINE_WIDTH * extent)
+    fixed = _lines(box_edges(run) + wall_lines(run, points), _LINE_WIDTH * extent)
     return Scene(run, look, points, diameters, legend, scale, axis, fixed)
 
 
@@ -187,7 +183,7 @@ def _framed_points(run, look, frames):
         ends += [nodes.min(axis=0), nodes.max(axis=0)]
         if len(frames) == 1:
             ends.extend(nodes)
-    walls = [line for wall in run.walls for line in _outline(wall, np.array(ends))]
+    walls = wall_lines(run, np.array(ends))
     if walls:
         ends.extend(np.concatenate(walls))
     return np.array(ends)
@@ -238,74 +234,3 @@ def _color_scale(run, look, axis, frames):
 def _lines(outlines, radius):
     lines = [np.stack([outline[:-1], outline[1:]], axis=1) for outline in outlines]
     return [Tubes.of_one_kind(np.concatenate(lines), radius, _LINE_COLOR, shaded=False)] if lines else []
-
-
-def _outlines(run, points):
-    outlines: list[Any] = []
-    if run.box is not None:
-        outlines += _box_edges(np.zeros(3), run.box)
-    for wall in run.walls:
-        outlines += _outline(wall, points)
-    return outlines
-
-
-def _box_edges(origin, vectors):
-    edges = []
-    for axis in range(3):
-        others = [vectors[other] for other in range(3) if other != axis]
-        for i in (0, 1):
-            for j in (0, 1):
-                start = origin + i * others[0] + j * others[1]
-                edges.append(np.array([start, start + vectors[axis]]))
-    return edges
-
-
-def _outline(wall, points):
-    # Lines on a wall, as far as there is something beside it.
-    if isinstance(wall, Box):
-        return _box_edges(wall.lower, np.diag(wall.upper - wall.lower))
-    if isinstance(wall, (Sphere, Ellipsoid)):
-        axes = np.full(3, wall.radius) if isinstance(wall, Sphere) else wall.semi_axes
-        outlines = []
-        for normal in range(3):
-            for height in (-0.75, -0.4, 0.0, 0.4, 0.75) if normal == 2 else (0.0,):
-                circle = np.sqrt(1.0 - height**2) * _circle(np.eye(3)[normal]) + height * np.eye(3)[normal]
-                outlines.append(wall.center + axes * circle)
-        for angle in (np.pi / 4, -np.pi / 4):
-            outlines.append(wall.center + axes * _circle(np.array([np.cos(angle), np.sin(angle), 0.0])))
-        return outlines
-    if isinstance(wall, Cylinder):
-        heights = (points - wall.point) @ wall.axis
-        places = np.linspace(heights.min(), heights.max(), 7)
-        circle = wall.radius * _circle(wall.axis)
-        rings = [wall.point + height * wall.axis + circle for height in places]
-        return rings + [np.array([rings[0][i], rings[-1][i]]) for i in range(0, _ROUND, _ROUND // 8)]
-    offsets = (0.0,) if isinstance(wall, Plane) else (-0.5 * wall.thickness, 0.5 * wall.thickness)
-    return [line for offset in offsets for line in _grid(wall.point + offset * wall.normal, wall.normal, points)]
-
-
-def _circle(normal):
-    first, second = _across(normal)
-    angles = np.linspace(0.0, 2.0 * np.pi, _ROUND + 1)[:, None]
-    return np.cos(angles) * first + np.sin(angles) * second
-
-
-def _across(normal):
-    first = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
-    first /= np.linalg.norm(first)
-    return first, np.cross(normal, first)
-
-
-def _grid(point, normal, points):
-    if isinstance(points, list):
-        points = np.array(points)
-    first, second = _across(normal)
-    ranges = []
-    for direction in (first, second):
-        heights = (points - point) @ direction
-        ranges.append((heights.min(), heights.max()))
-    lines = []
-    for (low, high), (start, end), along, aside in ((*ranges, first, second), (*ranges[::-1], second, first)):
-        for place in np.linspace(low, high, 5):
-            lines.append(point + np.array([place * along + start * aside, place * along + end * aside]))
-    return lines

@@ -1,7 +1,6 @@
 """The run: filaments from a configuration, simulated into a directory, resumable after any interruption."""
 
 import contextlib
-import io
 import signal
 import threading
 import time
@@ -10,21 +9,23 @@ import numpy as np
 import openmm
 from openmm import app, unit
 
+from ..couplings.crosslink_records import CrosslinkFile
+from ..couplings.crosslinks import Crosslinks
 from ..dynamics.precision import PRECISIONS
 from ..engines.description import describe_lengths, filament_label
 from ..errors import InputError, InstabilityError
 from ..mechanics.broken_segment import find_broken_segment
-from ..output.files import write_atomically
 from ..output.linker_records import LinkerFile, measure_linkers
 from ..output.progress import RunProgress
-from ..output.structure_files import write_lammps_data, write_psf
+from ..output.run_tables import ENERGY_COLUMNS, LINKER_TABLE_COLUMNS, ReportTable, TrajectoryFile
+from ..systems.described_runs import energy_cells, total_energies, write_topology
 from ..systems.step_check import check_time_step
 from ..units.quantities import thermal_energy
 from ..units.text import format_time
 from .description import describe
 from .initial_state import build_system, place_filaments
 from .relaxation import relaxed_positions
-from .run_directory import ENERGY_COLUMNS, LINKER_TABLE_COLUMNS, Checkpoint, ReportTable, RunDirectory, TrajectoryFile
+from .run_directory import Checkpoint, RunDirectory
 
 _SECONDS_BETWEEN_CHECKS = 0.2
 
@@ -74,9 +75,10 @@ def run(configuration, output, resume=False):
             if resume:
                 print("No checkpoint yet: starting from the beginning.")
             positions = relaxed_positions(configuration, built)
-            _write_topology(directory, simulation, positions)
+            write_topology(directory, simulation.topology, simulation.system, positions)
             describe(configuration, filaments, simulation.system).write(directory.description)
             simulation.context.setPositions(positions)
+            _write_crosslinks(directory, simulation)
         else:
             _restore(simulation.context, checkpoint, filaments.engine)
             print(f"Resuming at step {checkpoint.step}, {format_time(checkpoint.step * settings.time_step)}.")
@@ -217,15 +219,12 @@ def _platform(settings, engine):
     return platform, properties
 
 
-def _write_topology(directory, simulation, positions):
-    topology, system = simulation.topology, simulation.system
-    mmcif, psf, data = io.StringIO(), io.StringIO(), io.StringIO()
-    app.PDBxFile.writeFile(topology, positions, mmcif, keepIds=True)
-    write_psf(topology, psf, system)
-    write_lammps_data(topology, positions, data, system)
-    paths = (directory.topology, directory.topology_psf, directory.topology_data)
-    for path, text in zip(paths, (mmcif, psf, data)):
-        write_atomically(path, text.getvalue().encode())
+def _write_crosslinks(directory, simulation):
+    # Those of a configuration stay as they are.
+    if Crosslinks.from_system(simulation.system):
+        with contextlib.closing(CrosslinkFile(directory.crosslinks, simulation.system)) as file:
+            file.write(simulation.context, 0)
+            file.synchronise()
 
 
 def _restore(context, checkpoint, engine):
@@ -254,19 +253,17 @@ class _Recorder:
         self._directory = directory
         self._checkpoint = checkpoint
         self._step = 0 if checkpoint is None else checkpoint.step
-        self._segments = sum(filament.segments for filament in filaments)
-        self._joints = sum(filament.segments - (not filament.closed) for filament in filaments)
 
     def run_to_end(self):
-        settings = self._settings
+        settings, begun = self._settings, self._checkpoint
         self._trajectory = TrajectoryFile(
             self._directory.trajectory,
             self._simulation.topology,
             settings.time_step,
             settings.steps_per_report,
-            self._checkpoint,
+            begun and begun.trajectory_size,
+            begun.trajectory_header if begun else b"",
         )
-        begun = self._checkpoint
         self._energies = ReportTable(self._directory.energies, ENERGY_COLUMNS, begun and begun.energies_size)
         files = [self._trajectory, self._energies]
         if self._filaments.linkers:
@@ -315,19 +312,14 @@ class _Recorder:
         context = self._simulation.context
         state = context.getState(positions=True)
         positions = state.getPositions(asNumpy=True).value_in_unit(unit.nanometer)
-        stretching, bending = self._energies_of(positions)
+        stretching, bending = total_energies(self._filaments, positions)
         self._check_finite(positions, stretching, bending)
         self._trajectory.write(positions)
         self._energies.write(
             self._step,
             (
                 self._step * self._settings.time_step,
-                stretching,
-                bending,
-                stretching + bending,
-                stretching / self._segments / self._kT,
-                bending / self._joints / self._kT if self._joints else np.nan,
-                self._mean_end_to_end_distance(positions),
+                *energy_cells(self._filaments, positions, stretching, bending, self._kT),
             ),
         )
         if self._filaments.linkers:
@@ -335,19 +327,6 @@ class _Recorder:
             for number, row in enumerate(rows):
                 self._linkers.write(self._step, (self._step * self._settings.time_step, number, *row))
             self._places.write(records)
-
-    def _energies_of(self, positions):
-        stretching = bending = 0.0
-        for filament, nodes in zip(self._filaments, self._filaments.node_indices):
-            with np.errstate(all="ignore"):
-                energies = filament.energies(positions[nodes])
-            stretching += energies[0]
-            bending += energies[1]
-        return stretching, bending
-
-    def _mean_end_to_end_distance(self, positions):
-        ends = np.array([(nodes[0], nodes[-1]) for nodes in self._filaments.node_indices])
-        return np.mean(np.linalg.norm(positions[ends[:, 1]] - positions[ends[:, 0]], axis=1))
 
     def _check_finite(self, positions, stretching, bending):
         if np.isfinite(stretching) and np.isfinite(bending) and np.all(np.isfinite(positions)):

@@ -6,21 +6,19 @@ one step once they are safely on disk, so whatever is written behind that point 
 
 import hashlib
 import json
-import os
 from dataclasses import dataclass
 
 import numpy as np
-from openmm import app
 
 from ..errors import InputError
 from ..output.files import write_atomically
 from ..output.run_files import RunFiles, try_lock
+from ..output.run_tables import ENERGY_COLUMNS, LINKER_TABLE_COLUMNS
 from ..version import __version__
 from .configuration import changed_keys, read_configuration
 from .start_files import COPIES
 
 _MAGIC = "openmm-cylchain checkpoint 2"
-_DCD_HEADER_SIZE = 92
 
 
 @dataclass(frozen=True)
@@ -108,7 +106,7 @@ class RunDirectory(RunFiles):
             write_atomically(self.path / COPIES / path.name, path.read_bytes())
 
     def _check_vacant(self, configuration, resume):
-        results = (self.trajectory, self.checkpoint, self.energies, self.linkers, self.linker_places)
+        results = (self.trajectory, self.checkpoint, self.energies, self.linkers, self.linker_places, self.crosslinks)
         for path in (*results, self.topology, self.summary, self.figure):
             if path.exists():
                 advice = "but no configuration.toml to resume it with:" if resume else "continue it with --resume, or"
@@ -198,121 +196,6 @@ class RunDirectory(RunFiles):
 def digest_of_checkpoint(header, state):
     """SHA-256 of all that a checkpoint says: of its header, a dict, and of OpenMM's checkpoint, in bytes."""
     return hashlib.sha256(json.dumps(header, sort_keys=True).encode() + b"\n" + state).hexdigest()
-
-
-def _open_at(path, size):
-    # Open for appending at a length that the file had at a checkpoint, and forget what was written since.
-    if not path.exists() or path.stat().st_size < size:
-        raise InputError(
-            f"{path} is missing or shorter than at the checkpoint: the run cannot be resumed. Start it again in "
-            "another directory."
-        )
-    file = open(path, "r+b")
-    file.truncate(size)
-    return file
-
-
-class TrajectoryFile:
-    """A DCD file that is written frame by frame and can be continued.
-
-    Parameters
-    ----------
-    path : Path
-    topology : openmm.app.Topology
-    time_step : float
-        In ps.
-    steps_per_frame : int
-    checkpoint : Checkpoint, optional
-        Where to continue; a new file if not given.
-    """
-
-    def __init__(self, path, topology, time_step, steps_per_frame, checkpoint=None):
-        if checkpoint is None:
-            self._file = open(path, "w+b")
-        else:
-            self._file = _open_at(path, checkpoint.trajectory_size)
-            # The number of frames stands in the header, which may be ahead of the checkpoint.
-            self._file.write(checkpoint.trajectory_header)
-        self._dcd = app.DCDFile(self._file, topology, time_step, 0, steps_per_frame, append=checkpoint is not None)
-
-    def write(self, positions):
-        """Append a frame of (particles, 3) positions in nm."""
-        self._dcd.writeModel(positions)
-
-    def synchronise(self):
-        """Bring everything to disk and return the size and the header of the file."""
-        self._file.flush()
-        os.fsync(self._file.fileno())
-        self._file.seek(0)
-        header = self._file.read(_DCD_HEADER_SIZE)
-        return self._file.seek(0, os.SEEK_END), header
-
-    def close(self):
-        """Close the file."""
-        self._file.close()
-
-
-ENERGY_COLUMNS = (
-    "step",
-    "time (ps)",
-    "stretching energy (kJ/mol)",
-    "bending energy (kJ/mol)",
-    "potential energy (kJ/mol)",
-    "stretching energy per segment (kT)",
-    "bending energy per joint (kT)",
-    "mean end-to-end distance (nm)",
-)
-
-
-LINKER_TABLE_COLUMNS = (
-    "step",
-    "time (ps)",
-    "linkers",
-    "unbound",
-    "one hand bound",
-    "both hands bound",
-    "mean tension (kJ/mol/nm)",
-    "maximum tension (kJ/mol/nm)",
-    "bindings of all linkers",
-    "unbindings of all linkers",
-)
-"""A line per report and [[linkers]] table, which are counted from 0."""
-
-
-class ReportTable:
-    """A table of comma-separated values that can be continued.
-
-    Parameters
-    ----------
-    path : Path
-    columns : sequence of str
-    size : int, optional
-        Of the file, where to continue; a new file if not given.
-    """
-
-    def __init__(self, path, columns, size=None):
-        if size is None:
-            self._file = open(path, "w+b")
-            self._file.write((",".join(columns) + "\n").encode())
-        else:
-            self._file = _open_at(path, size)
-            self._file.seek(0, os.SEEK_END)
-
-    def write(self, step, values):
-        """Append a line: the step and a number for each further column (NaN where it has no meaning)."""
-        cells = (str(value) if isinstance(value, int) else repr(float(value)) for value in values)
-        self._file.write(",".join([str(step), *cells]).encode() + b"\n")
-        self._file.flush()
-
-    def synchronise(self):
-        """Bring everything to disk and return the size of the file."""
-        self._file.flush()
-        os.fsync(self._file.fileno())
-        return self._file.tell()
-
-    def close(self):
-        """Close the file."""
-        self._file.close()
 
 
 def read_energies(path):

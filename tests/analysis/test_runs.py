@@ -21,6 +21,7 @@ from openmm_cylchain import (
     filament_wall_force,
 )
 from openmm_cylchain.output.run_description import (
+    DescribedContacts,
     DescribedFilament,
     DescribedLinkers,
     DescribedWall,
@@ -240,10 +241,11 @@ def test_walls_are_described():
     _, system, _ = filaments.build()
     for shape in (Sphere([1, 2, 3], 5e4), Box([-1e4] * 3, [2e4] * 3), Cylinder([0, 0, 1], [0, 0, 2], 3e4)):
         system.addForce(filament_wall_force(filaments, system, shape, 1.0))
+    held = {"stiffness": 1.0, "particles": tuple(range(24)), "radii": (0.0,) * 24}
     assert describe(configuration, filaments, system).walls == (
-        DescribedWall("sphere", (1.0, 2.0, 3.0), (0.0, 0.0, 0.0), 5e4),
-        DescribedWall("box", (-1e4,) * 3, (2e4,) * 3, 0.0),
-        DescribedWall("cylinder", (0.0, 0.0, 1.0), (0.0, 0.0, 1.0), 3e4),
+        DescribedWall("sphere", (1.0, 2.0, 3.0), (0.0, 0.0, 0.0), 5e4, **held),
+        DescribedWall("box", (-1e4,) * 3, (2e4,) * 3, 0.0, **held),
+        DescribedWall("cylinder", (0.0, 0.0, 1.0), (0.0, 0.0, 1.0), 3e4, **held),
     )
 
 
@@ -263,7 +265,12 @@ def test_description_is_kept_as_it_is(tmp_path):
         ),
         box=((1.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 3.0)),
         linkers=(DescribedLinkers("motor", 0.1, 30.0),),
-        walls=(DescribedWall("sphere", (1.0, 2.0, 3.0), (0.0, 0.0, 0.0), 50.0),),
+        walls=(DescribedWall("sphere", (1.0, 2.0, 3.0), (0.0, 0.0, 0.0), 50.0, 0.3, (0, 2), (1.0, 1.5)),),
+        contacts=(
+            DescribedContacts(
+                0.1, True, (((0, 1, 2), 8.0, 2, True), ((7, 8), 25.0, 1, False)), ((12, 3.0),), ((0, 1, 1, 0),)
+            ),
+        ),
     )
     description.write(tmp_path / "description.json")
     assert read_run_description(tmp_path / "description.json") == description

@@ -195,7 +195,7 @@ def test_a_film(network, tmp_path, ending):
 def test_without_ffmpeg(network, tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     assert main(["render", str(network), "--film", "--output", str(tmp_path / "a.mp4")]) == 2
-    assert "pip install 'openmm-cylchain[render]', or write a GIF" in capsys.readouterr().err
+    assert "pip install imageio-ffmpeg, or write a GIF" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

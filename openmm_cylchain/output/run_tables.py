@@ -1,0 +1,168 @@
+"""The files of a run that grow while it goes on, and can be continued: its trajectory and its tables."""
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from openmm import app
+
+from ..errors import InputError
+from ..units.types import FloatArray
+from .dcd_frames import DCDFrames
+
+_DCD_HEADER_SIZE = 92
+
+
+def _open_at(path, size):
+    # Open for appending at a length that the file had at a checkpoint, and forget what was written since.
+    if not path.exists() or path.stat().st_size < size:
+        raise InputError(
+            f"{path} is missing or shorter than at the checkpoint: the run cannot be resumed. Start it again in "
+            "another directory."
+        )
+    file = open(path, "r+b")
+    file.truncate(size)
+    return file
+
+
+def size_of_lines(path: Path, step: int) -> tuple[int, int]:
+    """The size of a ReportTable up to a step, and the number of its whole lines until then, but for the header."""
+    with open(path, "rb") as file:
+        size, count = len(file.readline()), 0
+        for line in file:
+            if not line.endswith(b"\n") or int(line.partition(b",")[0]) > step:
+                break
+            size, count = size + len(line), count + 1
+    return size, count
+
+
+def start_of_trajectory(path: Path, frames: int) -> tuple[int, bytes]:
+    """The size and the header of a trajectory with its first frames alone.
+
+    Raises
+    ------
+    InputError
+        If it has fewer.
+    """
+    there = DCDFrames(path)
+    if len(there) < frames:
+        raise InputError(f"{path} has {len(there)} frames, but there are energies of {frames}: it is damaged.")
+    with open(path, "rb") as file:
+        header = bytearray(file.read(_DCD_HEADER_SIZE))
+    first, interval = (int.from_bytes(header[place : place + 4], "little") for place in (12, 16))
+    for place, value in ((8, frames), (20, first + max(frames - 1, 0) * interval)):
+        header[place : place + 4] = value.to_bytes(4, "little")
+    return there.size_of(frames), bytes(header)
+
+
+class TrajectoryFile:
+    """A DCD file that is written frame by frame and can be continued.
+
+    Parameters
+    ----------
+    path : Path
+    topology : openmm.app.Topology
+    time_step : float
+        In ps.
+    steps_per_frame : int
+    size : int, optional
+        Of the file, where to continue; a new file if not given.
+    header : bytes
+        Of the file at that size.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        topology: app.Topology,
+        time_step: float,
+        steps_per_frame: int,
+        size: int | None = None,
+        header: bytes = b"",
+    ) -> None:
+        if size is None:
+            self._file = open(path, "w+b")
+        else:
+            self._file = _open_at(path, size)
+            # The number of frames stands in the header, which may be ahead of the checkpoint.
+            self._file.write(header)
+        self._dcd = app.DCDFile(self._file, topology, time_step, 0, steps_per_frame, append=size is not None)
+
+    def write(self, positions: FloatArray) -> None:
+        """Append a frame of (particles, 3) positions in nm."""
+        self._dcd.writeModel(positions)
+
+    def synchronise(self) -> tuple[int, bytes]:
+        """Bring everything to disk and return the size and the header of the file."""
+        self._file.flush()
+        os.fsync(self._file.fileno())
+        self._file.seek(0)
+        header = self._file.read(_DCD_HEADER_SIZE)
+        return self._file.seek(0, os.SEEK_END), header
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+
+ENERGY_COLUMNS = (
+    "step",
+    "time (ps)",
+    "stretching energy (kJ/mol)",
+    "bending energy (kJ/mol)",
+    "potential energy (kJ/mol)",
+    "stretching energy per segment (kT)",
+    "bending energy per joint (kT)",
+    "mean end-to-end distance (nm)",
+)
+
+
+LINKER_TABLE_COLUMNS = (
+    "step",
+    "time (ps)",
+    "linkers",
+    "unbound",
+    "one hand bound",
+    "both hands bound",
+    "mean tension (kJ/mol/nm)",
+    "maximum tension (kJ/mol/nm)",
+    "bindings of all linkers",
+    "unbindings of all linkers",
+)
+"""A line per report and [[linkers]] table, which are counted from 0."""
+
+
+class ReportTable:
+    """A table of comma-separated values that can be continued.
+
+    Parameters
+    ----------
+    path : Path
+    columns : sequence of str
+    size : int, optional
+        Of the file, where to continue; a new file if not given.
+    """
+
+    def __init__(self, path: Path, columns: Sequence[str], size: int | None = None) -> None:
+        if size is None:
+            self._file = open(path, "w+b")
+            self._file.write((",".join(columns) + "\n").encode())
+        else:
+            self._file = _open_at(path, size)
+            self._file.seek(0, os.SEEK_END)
+
+    def write(self, step: int, values: Sequence[float]) -> None:
+        """Append a line: the step and a number for each further column (NaN where it has no meaning)."""
+        cells = (str(value) if isinstance(value, int) else repr(float(value)) for value in values)
+        self._file.write(",".join([str(step), *cells]).encode() + b"\n")
+        self._file.flush()
+
+    def synchronise(self) -> int:
+        """Bring everything to disk and return the size of the file."""
+        self._file.flush()
+        os.fsync(self._file.fileno())
+        return self._file.tell()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()

@@ -1,0 +1,175 @@
+"""What runs simulate and what they write of it, for ``analysis.load``: from their filaments and their System."""
+
+import dataclasses
+import io
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import openmm
+from openmm import app
+
+from ..couplings.capsule_contacts import as_capsule_contact_force
+from ..couplings.walls import Shape, as_filament_wall_force
+from ..output.files import write_atomically
+from ..output.run_description import (
+    DescribedContacts,
+    DescribedFilament,
+    DescribedLinkers,
+    DescribedWall,
+    RunDescription,
+)
+from ..output.run_files import RunFiles
+from ..output.structure_files import write_lammps_data, write_psf
+from ..units.types import FloatArray
+
+
+def describe_system(
+    filaments: Any,
+    system: openmm.System,
+    title: str,
+    time_step: float,
+    steps: int | None,
+    steps_per_frame: int,
+    box: FloatArray | None,
+    shapes: Sequence[Shape] = (),
+) -> RunDescription:
+    """What a run of a System simulates: filaments, linkers, walls and contacts.
+
+    Parameters
+    ----------
+    filaments : Filaments
+    system : openmm.System
+        With the filaments; walls of ``filament_wall_force`` and contacts are found in it.
+    title : str
+    time_step : float
+        In ps.
+    steps : int or None
+    steps_per_frame : int
+    box : (3, 3) array in nm, or None
+    shapes : sequence of Shape
+        Walls beside those in the System.
+
+    Returns
+    -------
+    RunDescription
+    """
+    walls = [wall for wall in map(_wall, system.getForces()) if wall is not None]
+    contacts = [own for own in map(_contacts, system.getForces()) if own is not None]
+    return RunDescription(
+        title=title,
+        temperature=filaments.temperature,
+        time_step=time_step,
+        steps=steps,
+        steps_per_frame=steps_per_frame,
+        particles=system.getNumParticles(),
+        filaments=tuple(
+            DescribedFilament(own.type, tuple(int(node) for node in nodes), own.closed, tuple(own.clamped))
+            for own, nodes in zip(filaments, filaments.node_indices)
+        ),
+        box=None if box is None else tuple(tuple(float(edge) for edge in vector) for vector in box),
+        linkers=tuple(
+            DescribedLinkers(own.kind.name, own.kind.stiffness, own.kind.rest_length) for own in filaments.linkers
+        ),
+        walls=(*walls, *(DescribedWall(*_region(shape.region)) for shape in shapes)),
+        contacts=tuple(contacts),
+    )
+
+
+def _region(region):
+    # Quantities in OpenMM's units: the vector is a direction of some shapes and a length of others.
+    shape, point, vector, length = (getattr(value, "_value", value) for value in region)
+    return shape, tuple(map(float, point)), tuple(map(float, vector)), float(length)
+
+
+def _wall(force):
+    force = as_filament_wall_force(force)
+    if force is None:
+        return None
+    held = range(force.getNumParticles())
+    return dataclasses.replace(
+        DescribedWall(*_region(force.getRegion())),
+        stiffness=force.getStiffness()._value,
+        particles=tuple(force.getParticle(index) for index in held),
+        radii=tuple(force.getParticleRadius(index)._value for index in held),
+    )
+
+
+def _contacts(force):
+    force = as_capsule_contact_force(force)
+    if force is None:
+        return None
+    return DescribedContacts(
+        stiffness=force.getStiffness()._value,
+        periodic=force.usesPeriodicBoundaryConditions(),
+        chains=tuple(
+            (
+                tuple(force.getChainParticles(chain)),
+                force.getChainDiameter(chain)._value,
+                force.getChainExcludedNeighbors(chain),
+                force.isChainClosed(chain),
+            )
+            for chain in range(force.getNumChains())
+        ),
+        spheres=tuple(
+            (force.getSphereParticle(sphere), force.getSphereDiameter(sphere)._value)
+            for sphere in range(force.getNumSpheres())
+        ),
+        exclusions=tuple(tuple(force.getExclusion(index)) for index in range(force.getNumExclusions())),
+    )
+
+
+def write_topology(files: RunFiles, topology: app.Topology, system: openmm.System, positions: Any) -> None:
+    """Write what programs need to know of a trajectory: files for mdtraj, VMD and OVITO.
+
+    Parameters
+    ----------
+    files : RunFiles
+    topology : openmm.app.Topology
+    system : openmm.System
+    positions : (particles, 3) lengths
+    """
+    mmcif, psf, data = io.StringIO(), io.StringIO(), io.StringIO()
+    app.PDBxFile.writeFile(topology, positions, mmcif, keepIds=True)
+    write_psf(topology, psf, system)
+    write_lammps_data(topology, positions, data, system)
+    for path, text in zip((files.topology, files.topology_psf, files.topology_data), (mmcif, psf, data)):
+        write_atomically(path, text.getvalue().encode())
+
+
+def total_energies(filaments: Any, positions: FloatArray) -> tuple[float, float]:
+    """Stretching and bending energy of all filaments in kJ/mol, for positions in nm."""
+    stretching = bending = 0.0
+    for filament, nodes in zip(filaments, filaments.node_indices):
+        with np.errstate(all="ignore"):
+            energies = filament.energies(positions[nodes])
+        stretching += energies[0]
+        bending += energies[1]
+    return stretching, bending
+
+
+def energy_cells(
+    filaments: Any, positions: FloatArray, stretching: float, bending: float, kT: float
+) -> tuple[float, ...]:
+    """What a line of ENERGY_COLUMNS says behind its step and time.
+
+    Parameters
+    ----------
+    filaments : Filaments
+    positions : (particles, 3) array
+        In nm.
+    stretching, bending : float
+        Of ``total_energies``.
+    kT : float
+    """
+    segments = sum(filament.segments for filament in filaments)
+    joints = sum(filament.segments - (not filament.closed) for filament in filaments)
+    ends = np.array([(nodes[0], nodes[-1]) for nodes in filaments.node_indices])
+    return (
+        stretching,
+        bending,
+        stretching + bending,
+        stretching / segments / kT if kT else np.nan,
+        bending / joints / kT if joints and kT else np.nan,
+        float(np.mean(np.linalg.norm(positions[ends[:, 1]] - positions[ends[:, 0]], axis=1))),
+    )

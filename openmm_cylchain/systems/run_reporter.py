@@ -1,0 +1,182 @@
+"""A reporter that writes what ``openmm-cylchain run`` writes, so that scripts are loaded, drawn and exported alike."""
+
+import contextlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import openmm
+from openmm import app
+
+from ..couplings.crosslink_records import CrosslinkFile
+from ..couplings.crosslinks import Crosslinks
+from ..couplings.walls import Shape
+from ..errors import InputError
+from ..output.linker_records import LinkerFile, measure_linkers
+from ..output.run_files import RunFiles
+from ..output.run_tables import (
+    ENERGY_COLUMNS,
+    LINKER_TABLE_COLUMNS,
+    ReportTable,
+    TrajectoryFile,
+    size_of_lines,
+    start_of_trajectory,
+)
+from ..units.quantities import thermal_energy, whole_number
+from .described_runs import describe_system, energy_cells, total_energies, write_topology
+from .filaments import Filaments
+
+
+class RunReporter:
+    """Writes a directory as ``openmm-cylchain run`` does, for ``simulation.reporters`` of OpenMM's app layer.
+
+    ``analysis.load``, ``openmm-cylchain render`` and ``openmm-cylchain export`` take the directory. In it are the
+    trajectory with its topology, energies, a description of filaments, periodic box, walls of ``filament_wall_force``
+    and contacts, and where linkers and crosslinks are, which may come and go. The configuration in which the
+    Simulation starts is the first frame.
+
+    Parameters
+    ----------
+    directory : str or Path
+        Made if it does not exist.
+    reportInterval : int
+        In steps.
+    filaments : Filaments
+        In the System that is simulated.
+    title : str
+    walls : sequence of Shape
+        Those to be drawn beside walls of ``filament_wall_force``: of ``wall_force``, whose formula alone is in the
+        System.
+    append : bool
+        Go on with a directory that this reporter has written; frames behind the present step are forgotten, so that
+        a run can go on from a checkpoint. The description stays what it was.
+
+    Raises
+    ------
+    InputError
+        If the directory holds a run already (without ``append``), or none (with it), or another one.
+
+    Examples
+    --------
+    >>> simulation.reporters.append(RunReporter("my_run", 100, filaments))  # doctest: +SKIP
+    >>> simulation.step(10000)  # doctest: +SKIP
+    >>> run = analysis.load("my_run")  # doctest: +SKIP
+    """
+
+    def __init__(
+        self,
+        directory: str | Path,
+        reportInterval: int,  # noqa: N803 - OpenMM's name
+        filaments: Filaments,
+        title: str = "",
+        walls: Sequence[Shape] = (),
+        append: bool = False,
+    ) -> None:
+        self._closed = True
+        self._interval = whole_number(reportInterval, 1, "reportInterval")
+        if not isinstance(filaments, Filaments):
+            raise InputError(f"filaments must be a Filaments object, but is {type(filaments).__name__}.")
+        for shape in walls:
+            if not isinstance(shape, Shape):
+                raise InputError(f"walls must be Shapes such as Sphere, but one is {shape!r}.")
+        if not isinstance(directory, (str, Path)):
+            raise InputError(f"directory must be a path, but is {directory!r}.")
+        self._filaments, self._title, self._walls = filaments, str(title), tuple(walls)
+        self._kT = thermal_energy(filaments.temperature)
+        self._append = bool(append)
+        self._files = RunFiles(directory)
+        self._open: list[Any] = []
+        self._last = -1
+        if self._files.path.exists() and not self._files.path.is_dir():
+            raise InputError(f"{directory} is a file: give the name of a directory.")
+        there = self._files.trajectory.exists() or self._files.configuration.exists()
+        if there and not append:
+            raise InputError(
+                f"{directory} holds a run already: choose another directory, or go on with it by append=True."
+            )
+        if append and (not there or self._files.configuration.exists()):
+            raise InputError(f"{directory} holds no run of a RunReporter: it cannot be gone on with.")
+        self._closed = False
+
+    def describeNextReport(self, simulation: app.Simulation) -> dict[str, Any]:  # noqa: N802 - OpenMM's name
+        """When the next report is due, and that it needs positions; as OpenMM asks for it."""
+        if self._closed:
+            raise InputError(f"The RunReporter of {self._files.path} is closed: make another one with append=True.")
+        if not self._open:
+            self._begin(simulation)
+        steps = self._interval - simulation.currentStep % self._interval
+        return {"steps": steps, "periodic": False, "include": ["positions"]}
+
+    def _begin(self, simulation):
+        filaments, system, files = self._filaments, simulation.system, self._files
+        last = max(int(nodes.max()) for nodes in filaments.node_indices)
+        if last >= system.getNumParticles():
+            raise InputError("filaments must be those in the System that is simulated, but it has fewer particles.")
+        time_step = simulation.integrator.getStepSize()._value
+        state = simulation.context.getState(positions=True)
+        files.path.mkdir(parents=True, exist_ok=True)
+        frames, step = None, simulation.currentStep
+        if self._append:
+            frames = size_of_lines(files.energies, step)[1]
+        else:
+            periodic = system.usesPeriodicBoundaryConditions()
+            box = state.getPeriodicBoxVectors(asNumpy=True)._value if periodic else None
+            description = describe_system(
+                filaments, system, self._title, time_step, None, self._interval, box, self._walls
+            )
+            description.write(files.description)
+            write_topology(files, simulation.topology, system, state.getPositions(asNumpy=True))
+
+        def table(path, columns):
+            return ReportTable(path, columns, size_of_lines(path, step)[0] if self._append else None)
+
+        with contextlib.ExitStack() as stack:
+
+            def opened(file):
+                stack.callback(file.close)
+                self._open.append(file)
+                return file
+
+            begun = start_of_trajectory(files.trajectory, frames) if frames is not None else (None, b"")
+            self._trajectory = opened(
+                TrajectoryFile(files.trajectory, simulation.topology, time_step, self._interval, *begun)
+            )
+            self._energies = opened(table(files.energies, ENERGY_COLUMNS))
+            if filaments.linkers:
+                self._linkers = opened(table(files.linkers, LINKER_TABLE_COLUMNS))
+                count = None
+                if self._append:
+                    count = int(np.searchsorted(np.load(files.linker_places, mmap_mode="r")["step"], step, "right"))
+                self._places = opened(LinkerFile(files.linker_places, count))
+            self._crosslinks = None
+            if Crosslinks.from_system(system):
+                self._crosslinks = opened(CrosslinkFile(files.crosslinks, system, self._append, step))
+            stack.pop_all()
+        if not self._append and step % self._interval == 0:
+            self.report(simulation, state)
+
+    def report(self, simulation: app.Simulation, state: openmm.State) -> None:
+        """Write a frame; OpenMM calls it."""
+        step, time = simulation.currentStep, state.getTime()._value
+        positions = state.getPositions(asNumpy=True)._value
+        cells = energy_cells(self._filaments, positions, *total_energies(self._filaments, positions), self._kT)
+        # The energies come last: load takes a frame for whole that has a line there.
+        self._trajectory.write(positions)
+        if self._crosslinks is not None:
+            self._crosslinks.write(simulation.context, step)
+        if self._filaments.linkers:
+            rows, records = measure_linkers(self._filaments, simulation.context, step)
+            for number, row in enumerate(rows):
+                self._linkers.write(step, (time, number, *row))
+            self._places.write(records)
+        self._energies.write(step, (time, *cells))
+
+    def close(self) -> None:
+        """Close the files; what was written can be loaded before, too."""
+        for file in getattr(self, "_open", []):
+            file.close()
+        self._open, self._closed = [], True
+
+    def __del__(self) -> None:
+        self.close()
