@@ -14,6 +14,7 @@ import openmm
 
 from ..errors import InputError
 from ..mechanics.geometry import to_nearest_images
+from ..units.quantities import whole_number
 from ..units.types import BoolArray, FloatArray, IntArray
 from .link_places import PLACE_COLUMNS, LinkPlaces
 
@@ -71,8 +72,9 @@ class CrosslinkTable:
     active: BoolArray = _empty((), bool)
 
     def __post_init__(self) -> None:
-        for name in _COLUMNS:
-            self._set(name, np.array(getattr(self, name), dtype=np.int64 if name in _WHOLE else np.float64))
+        for name in (*_COLUMNS, *(name for name in _FURTHER if name != "active")):
+            self._set(name, self._column(name))
+        object.__setattr__(self, "next_number", whole_number(self.next_number, 0, "next_number"))
         places = LinkPlaces(*(getattr(self, name) for name in PLACE_COLUMNS))
         for name in PLACE_COLUMNS:
             self._set(name, getattr(places, name))
@@ -81,6 +83,19 @@ class CrosslinkTable:
         active = np.array(self.active, dtype=bool)
         self._set("active", active if len(active) else np.ones(len(self.numbers), dtype=bool))
         self._check()
+
+    def _column(self, name):
+        try:
+            column = np.array(getattr(self, name), dtype=np.float64)
+        except (ValueError, TypeError):
+            raise InputError(f"{name} of a table of crosslinks must be an array of numbers.") from None
+        if name != "maximum_extension" and not np.all(np.isfinite(column)):
+            raise InputError(f"{name} of a table of crosslinks must be finite, but contains NaN or infinity.")
+        if name not in _WHOLE:
+            return column
+        if np.any(column != np.round(column)):
+            raise InputError(f"{name} of a table of crosslinks must be whole numbers.")
+        return np.array(getattr(self, name), dtype=np.int64)
 
     def _set(self, name, column):
         column.setflags(write=False)

@@ -39,6 +39,9 @@ from .chain_type import ChainType, check_bending_is_given_once, check_type_name
 from .equilibrium import draw_chain
 from .joint_calibration import calibrated_stiffness
 
+_SMALLEST, _LARGEST = 1e-30, 1e30
+"""Of what a filament type is given: fourth powers and products of two are finite."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class FilamentType(ChainType):
@@ -159,7 +162,11 @@ class FilamentType(ChainType):
         ):
             value = getattr(self, attribute)
             if value is not None:
-                self._set(attribute, positive(value, dimension, f"{attribute} of filament type {self.name!r}"))
+                value = positive(value, dimension, f"{attribute} of filament type {self.name!r}")
+                self._check_magnitude(attribute, value)
+                self._set(attribute, value)
+        if self.mass_per_length is None:
+            self._fail("mass_per_length must be given; 3500 Da/nm if it is left out.")
         self._resolve_bending()
         self._resolve_stretching()
         self._resolve_extension()
@@ -187,8 +194,16 @@ class FilamentType(ChainType):
         if self.persistence_length is not None:
             length = positive(self.persistence_length, LENGTH, f"persistence_length {name}")
             rigidity = length * thermal_energy(self.temperature)
+        self._check_magnitude("bending_rigidity", rigidity)
         self._set("bending_rigidity", rigidity)
         self._set("persistence_length", None)
+
+    def _check_magnitude(self, attribute, value):
+        # Powers of what is beyond are not finite.
+        if not (value == 0.0 or _SMALLEST <= value <= _LARGEST):
+            self._fail(
+                f"{attribute} must be between {_SMALLEST:g} and {_LARGEST:g} in OpenMM's units, but is {value:g}."
+            )
 
     def _resolve_stretching(self):
         if (self.stretching_stiffness is None) == (self.stretching_modulus is None):

@@ -13,10 +13,20 @@ from .placement import check_shape, clamped_nodes, in_one_plane, joint_stiffness
 MINIMUM_RING = 4
 """Segments that a ring has at least."""
 
+_MOST_SEGMENTS = 10**8
+
+
+def number_of_segments(segments: int, label: str) -> int:
+    """The number of segments of a filament as an int; InputError if it is none, or more than a computer can hold."""
+    number = whole_number(segments, 1, f"{label}: segments")
+    if number > _MOST_SEGMENTS:
+        raise InputError(f"{label}: segments must be at most {_MOST_SEGMENTS:.0e}, but is {number:.3g}.")
+    return number
+
 
 def straight(filament_type: ChainType, segments: int, start: Vector, direction: Vector, label: str) -> FloatArray:
     """Positions (segments + 1, 3) in nm of a straight filament with segments of rest length: without forces."""
-    segments = whole_number(segments, 1, f"{label}: segments")
+    segments = number_of_segments(segments, label)
     start = vector(start, LENGTH, f"{label}: start")
     lengths = filament_type.straight_lengths(segments)
     # Equal ones without an error that adds up along the filament.
@@ -39,7 +49,7 @@ def given(positions: Vectors, label: str) -> FloatArray:
 
 def ring(filament_type: ChainType, segments: int, center: Vector, normal: Vector, label: str) -> FloatArray:
     """Positions (segments, 3) in nm of a regular polygon with segments of rest length."""
-    segments = whole_number(segments, 1, f"{label}: segments")
+    segments = number_of_segments(segments, label)
     center = vector(center, LENGTH, f"{label}: center")
     return regular_polygon(segments, filament_type.segment_length, center, unit_vector(normal, label, "normal"))
 
@@ -56,7 +66,7 @@ def drawn(
     label: str,
 ) -> FloatArray:
     """Positions (segments + 1, 3) in nm from the exact equilibrium of the free discrete chain."""
-    segments = whole_number(segments, 1, f"{label}: segments")
+    segments = number_of_segments(segments, label)
     start = vector(start, LENGTH, f"{label}: start")
     planar = _flag(planar, f"{label}: planar")
     if direction is not None:

@@ -120,12 +120,18 @@ def _cut_unfinished_line(path, header):
         file.truncate(end)
 
 
+def _check_filaments(filaments):
+    if not hasattr(filaments, "node_indices"):
+        raise InputError(f"filaments must be a Filaments object, but is {type(filaments).__name__}.")
+
+
 class FilamentsReporter(_TableReporter):
     """What reporters of things whose number does not change have in common: arrays (reports, things)."""
 
     def __init__(
         self, file: TextFile | None, reportInterval: int, filaments: FilamentCollection, append: bool = False
     ) -> None:  # noqa: N803 - OpenMM's name
+        _check_filaments(filaments)
         self._filaments = filaments
         self._nodes = filaments.node_indices
         super().__init__(file, reportInterval, append)
@@ -224,6 +230,7 @@ class TensionReporter(FilamentsReporter):
         joints: bool = False,
         mean: bool = False,
     ) -> None:
+        _check_filaments(filaments)
         self._joints = bool(joints)
         self._mean = bool(mean)
         self._include = () if mean else ("positions", "forces")
@@ -295,6 +302,7 @@ class TetherReporter(FilamentsReporter):
     def __init__(
         self, file: TextFile | None, reportInterval: int, filaments: FilamentCollection, append: bool = False
     ) -> None:  # noqa: N803 - OpenMM's name
+        _check_filaments(filaments)
         if not filaments.tethers:
             raise InputError("There are no tethers to report: call add_tether first.")
         super().__init__(file, reportInterval, filaments, append)
@@ -342,6 +350,8 @@ class CrosslinkReporter(_TableReporter):
     def __init__(
         self, file: TextFile | None, reportInterval: int, crosslinks: MeasuredCrosslinks, append: bool = False
     ) -> None:  # noqa: N803 - OpenMM's name
+        if not hasattr(crosslinks, "measure"):
+            raise InputError(f"crosslinks must be a Crosslinks object, but is {type(crosslinks).__name__}.")
         self._crosslinks = crosslinks
         self._numbers: list[IntArray] = []
         super().__init__(file, reportInterval, append)
@@ -423,6 +433,7 @@ class LinkerReporter(FilamentsReporter):
         append: bool = False,
         places: str | Path | None = None,
     ) -> None:
+        _check_filaments(filaments)
         if not filaments.linkers:
             raise InputError("There are no linkers to report: call add_linkers first.")
         if places is not None and not isinstance(places, (str, Path)):

@@ -15,6 +15,7 @@ def add_command(commands):
     what.add_argument("--film", action="store_true", help="a film of all frames, or of those of --frames")
     parser.add_argument("--frames", metavar="A:B:C", help="of a film: from A to before B, every C-th, as in Python")
     parser.add_argument("--fps", type=float, metavar="N", help="frames per second of a film, 20 if not given")
+    parser.add_argument("--colors", type=int, metavar="N", help="of a GIF, 255 if not given: fewer make a smaller file")
     parser.add_argument("--turn", type=float, default=0.0, metavar="DEGREES", help="turn the camera during a film")
     parser.add_argument(
         "--color",
@@ -36,8 +37,9 @@ def add_command(commands):
 
 
 def _render(options):
-    if not options.film and (options.frames is not None or options.fps is not None or options.turn):
-        raise InputError("--frames, --fps and --turn belong to --film: give that, too.")
+    of_films = (options.frames, options.fps, options.colors)
+    if not options.film and (options.turn or any(own is not None for own in of_films)):
+        raise InputError("--frames, --fps, --colors and --turn belong to --film: give that, too.")
 
     from ..analysis.runs import load
     from ..output.progress import ProgressMessages
@@ -52,7 +54,9 @@ def _render(options):
         progress = ProgressMessages()
         try:
             frames_per_second = 20.0 if options.fps is None else options.fps
-            write_film(run, options.output, _frames(options.frames, len(run)), frames_per_second, look, view, progress)
+            frames = _frames(options.frames, len(run))
+            colors = 255 if options.colors is None else options.colors
+            write_film(run, options.output, frames, frames_per_second, look, view, progress, colors)
         finally:
             progress.finish()
     else:

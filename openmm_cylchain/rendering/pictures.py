@@ -11,6 +11,7 @@ from PIL import Image
 from ..analysis.runs import Run
 from ..errors import InputError
 from ..output.files import check_output_path, write_atomically
+from ..units.quantities import whole_number
 from ..units.types import FloatArray
 from .annotations import annotated
 from .camera import camera_on
@@ -96,6 +97,7 @@ def write_film(
     look: Look | None = None,
     view: View | None = None,
     say: Callable[[str], None] = lambda message: None,
+    colors: int = 255,
 ) -> None:
     """Draw frames into a film: GIF, or MP4 and WebM, which need imageio-ffmpeg.
 
@@ -112,6 +114,8 @@ def write_film(
     view : View, optional
     say : callable (str), optional
         Told how far it is.
+    colors : int
+        Of a GIF, 2 to 255: fewer make a smaller file.
 
     Raises
     ------
@@ -123,17 +127,22 @@ def write_film(
     path = Path(path)
     if not 0.0 < frames_per_second <= 100.0:
         raise InputError(f"A film has more than 0 and up to 100 frames per second, but not {frames_per_second!r}.")
+    if whole_number(colors, 2, "colors") > 255:
+        raise InputError(f"A GIF has up to 255 colors, but not {colors}.")
     frames = list(range(len(run))) if frames is None else [int(frame) for frame in frames]
     if not frames:
         raise InputError("A film needs a frame at least.")
     for frame in frames:
         run.positions(frame)
     frames = [frame % len(run) for frame in frames]
-    writer = _write_gif if path.suffix == ".gif" else _write_video
     drawn = images(run, frames, look or Look(), view or View())
     temporary = path.with_name(f".{path.stem}.new{path.suffix}")
     try:
-        writer(_told(drawn, len(frames), say), temporary, frames_per_second)
+        pictures = _told(drawn, len(frames), say)
+        if path.suffix == ".gif":
+            _write_gif(pictures, temporary, frames_per_second, int(colors))
+        else:
+            _write_video(pictures, temporary, frames_per_second)
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
@@ -163,10 +172,10 @@ def _ffmpeg():
     return imageio_ffmpeg
 
 
-def _write_gif(drawn, path, frames_per_second):
+def _write_gif(drawn, path, frames_per_second, colors):
     # One palette for all frames, or colors would flicker.
     pictures = [Image.fromarray(image) for image in drawn]
-    palette = pictures[len(pictures) // 2].quantize(255, Image.Quantize.MEDIANCUT)
+    palette = pictures[len(pictures) // 2].quantize(colors, Image.Quantize.MEDIANCUT)
     indexed = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
     indexed[0].save(
         path, format="gif", save_all=True, append_images=indexed[1:], duration=1000.0 / frames_per_second, loop=0

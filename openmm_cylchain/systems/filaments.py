@@ -59,6 +59,7 @@ from .insertion import (
     add_to_topology,
     check_force_groups,
     check_target,
+    set_box_vectors,
 )
 
 
@@ -584,11 +585,15 @@ class Filaments:
         topology : openmm.app.Topology
         system : openmm.System
         positions : (particles, 3) Quantity in nm
+
+        Raises
+        ------
+        InputError
+            For box vectors that are not three, not finite or not in the reduced form that OpenMM needs.
         """
         topology, system = app.Topology(), openmm.System()
         if box_vectors is not None:
-            vectors = [openmm.Vec3(*vector(edge, LENGTH, "box_vectors")) for edge in box_vectors]
-            system.setDefaultPeriodicBoxVectors(*vectors)
+            vectors = set_box_vectors(system, box_vectors)
             topology.setPeriodicBoxVectors(vectors * unit.nanometer)
         positions = self.add_to(
             topology, system, np.zeros((0, 3)) * unit.nanometer, stretching_force_group, bending_force_group

@@ -1,6 +1,7 @@
 """Insertion of filaments into a Topology and a System that may hold other things already."""
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 import openmm
@@ -8,8 +9,8 @@ from openmm import app
 
 from ..errors import InputError
 from ..filaments.filament import NODE_NAME, Filament
-from ..units.quantities import LENGTH, in_units_of, whole_number
-from ..units.types import FloatArray, IntArray, Vectors
+from ..units.quantities import LENGTH, in_units_of, vector, whole_number
+from ..units.types import BoxVectors, FloatArray, IntArray, Vectors
 
 
 def check_target(topology: app.Topology, system: openmm.System, positions: Vectors) -> FloatArray:
@@ -84,3 +85,22 @@ def _exclude_from_custom_nonbonded(force, existing, missing):
         force.addParticle([0.0] * force.getNumPerParticleParameters())
     if missing and force.getNumInteractionGroups() == 0:
         force.addInteractionGroup(range(existing), range(existing))
+
+
+def set_box_vectors(system: openmm.System, box_vectors: BoxVectors) -> list[openmm.Vec3]:
+    """Give a System periodic box vectors, and return them in nm; InputError if they are none."""
+    try:
+        edges: list[Any] = list(box_vectors)
+    except TypeError:
+        edges = []
+    if len(edges) != 3 or isinstance(box_vectors, str):
+        raise InputError(f"box_vectors must be three vectors of three lengths, but is {box_vectors!r}.")
+    vectors = [openmm.Vec3(*(float(x) for x in vector(edge, LENGTH, "box_vectors"))) for edge in edges]
+    try:
+        system.setDefaultPeriodicBoxVectors(*vectors)
+    except openmm.OpenMMException:
+        raise InputError(
+            "box_vectors must be in the reduced form of OpenMM: the first along x, the second in the plane of x and y, "
+            f"diagonal elements above zero, others at most half of these; but are {[tuple(own) for own in vectors]}."
+        ) from None
+    return vectors
