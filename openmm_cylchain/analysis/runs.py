@@ -152,6 +152,16 @@ class Run:
         return {name: values[: count * len(self)].reshape(-1, count) for name, values in table.items()}
 
     @cached_property
+    def pulling(self) -> dict[str, FloatArray]:
+        """Points, forces and extensions of tethers that move: (frames, tethers) arrays by the headers of
+        ``pulling.csv``, empty without such."""
+        if not self._files.pulling.exists():
+            return {}
+        table = _read_table(self._files.pulling)
+        count = int(np.sum(table["step"] == table["step"][0]))
+        return {name: values[: count * len(self)].reshape(-1, count) for name, values in table.items()}
+
+    @cached_property
     def _crosslink_records(self):
         path = self._files.crosslinks
         return np.load(path, mmap_mode="r") if path.exists() else np.zeros(0, CROSSLINK_RECORD)
@@ -407,6 +417,10 @@ def _whole_frames(files, description):
         unfinished = held > 0 and (len(recorded) == 0 or recorded[-1] < expected[frames - 1])
         if frames < _frames_of(description) and unfinished:
             frames -= 1
+    if files.pulling.exists():
+        steps = _read_table(files.pulling)["step"]
+        first = np.sum(steps == steps[0]) if len(steps) else 1
+        frames = min(frames, len(steps) // int(first))
     return frames, energies
 
 

@@ -23,6 +23,7 @@ class RunFiles:
         self.energies = self.path / "energies.csv"
         self.linkers = self.path / "linkers.csv"
         self.linker_places = self.path / "linkers.npy"
+        self.pulling = self.path / "pulling.csv"
         self.crosslinks = self.path / "crosslinks.npy"
         self.checkpoint = self.path / "checkpoint.chk"
         self.summary = self.path / "summary.json"

@@ -132,6 +132,20 @@ LINKER_TABLE_COLUMNS = (
 """A line per report and [[linkers]] table, which are counted from 0."""
 
 
+PULLING_TABLE_COLUMNS = (
+    "step",
+    "time (ps)",
+    "tether",
+    "filament",
+    "point x (nm)",
+    "point y (nm)",
+    "point z (nm)",
+    "force along the velocity (kJ/mol/nm)",
+    "extension along the velocity (nm)",
+)
+"""A line per report and moving tether; the extension is that of the end-to-end vector that points to the tether."""
+
+
 class ReportTable:
     """A table of comma-separated values that can be continued.
 

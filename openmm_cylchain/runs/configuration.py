@@ -236,6 +236,7 @@ def _disturbed(configuration):
     for tether in configuration.tethers:
         for number in tether.filaments:
             tethered[number] = tethered.get(number, 0) + 1
+    moving = {number for tether in configuration.tethers if tether.velocity for number in tether.filaments}
     pulled = {number for pull in configuration.pulls for number in pull.filaments}
     linked = {place["filament"] for link in configuration.links for place in link.between or ()}
     groups, first = [], 0
@@ -248,7 +249,8 @@ def _disturbed(configuration):
             "contacts": configuration.contacts is not None,
             "walls": bool(configuration.walls),
             "forces": bool(pulled & numbers),
-            "tethers": any(tethered.get(number, 0) + bool(group.clamped) > 1 for number in numbers),
+            "tethers": bool(moving & numbers)
+            or any(tethered.get(number, 0) + bool(group.clamped) > 1 for number in numbers),
             "flow": configuration.flow is not None and not configuration.flow.is_at_rest,
             "propulsion": group.propulsion != 0.0,
         }

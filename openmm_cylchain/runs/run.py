@@ -17,13 +17,20 @@ from ..errors import InputError, InstabilityError
 from ..mechanics.broken_segment import find_broken_segment
 from ..output.linker_records import LinkerFile, measure_linkers
 from ..output.progress import RunProgress
-from ..output.run_tables import ENERGY_COLUMNS, LINKER_TABLE_COLUMNS, ReportTable, TrajectoryFile
+from ..output.run_tables import (
+    ENERGY_COLUMNS,
+    LINKER_TABLE_COLUMNS,
+    PULLING_TABLE_COLUMNS,
+    ReportTable,
+    TrajectoryFile,
+)
 from ..systems.described_runs import energy_cells, total_energies, write_topology
 from ..systems.step_check import check_time_step
 from ..units.quantities import thermal_energy
 from ..units.text import format_time
 from .description import describe
 from .initial_state import build_system, place_filaments
+from .moving_tethers import MovingTethers
 from .relaxation import relaxed_positions
 from .run_directory import Checkpoint, RunDirectory
 
@@ -253,6 +260,7 @@ class _Recorder:
         self._directory = directory
         self._checkpoint = checkpoint
         self._step = 0 if checkpoint is None else checkpoint.step
+        self._moving = MovingTethers(configuration, filaments)
 
     def run_to_end(self):
         settings, begun = self._settings, self._checkpoint
@@ -270,6 +278,9 @@ class _Recorder:
             self._linkers = ReportTable(self._directory.linkers, LINKER_TABLE_COLUMNS, begun and begun.linkers_size)
             self._places = LinkerFile(self._directory.linker_places, begun and begun.linker_records)
             files += [self._linkers, self._places]
+        if self._moving:
+            self._pulling = ReportTable(self._directory.pulling, PULLING_TABLE_COLUMNS, begun and begun.pulling_size)
+            files.append(self._pulling)
         with contextlib.ExitStack() as stack, _Signals() as signals:
             for file in files:
                 stack.enter_context(contextlib.closing(file))
@@ -282,13 +293,18 @@ class _Recorder:
                 self._progress.finish(self._step)
 
     def _advance(self, signals):
-        settings = self._settings
+        settings, moving = self._settings, self._moving
         chunk = 1
+        moving.move(self._simulation.context, self._step)
         while self._step < settings.steps:
-            to_report = settings.steps_per_report - self._step % settings.steps_per_report
-            chunk = self._timed_steps(min(chunk, to_report))
+            limits = [settings.steps_per_report - self._step % settings.steps_per_report]
+            if moving:
+                limits.append(moving.interval - self._step % moving.interval)
+            chunk = self._timed_steps(min(chunk, *limits))
             if self._step % settings.steps_per_report == 0:
                 self._report()
+            if moving and self._step % moving.interval == 0:
+                moving.move(self._simulation.context, self._step)
             interrupted = signals.received is not None
             if interrupted or self._step % settings.steps_per_checkpoint == 0 or self._step == settings.steps:
                 self._write_checkpoint()
@@ -327,6 +343,8 @@ class _Recorder:
             for number, row in enumerate(rows):
                 self._linkers.write(self._step, (self._step * self._settings.time_step, number, *row))
             self._places.write(records)
+        for row in self._moving.rows(self._step, positions):
+            self._pulling.write(self._step, row)
 
     def _check_finite(self, positions, stretching, bending):
         if np.isfinite(stretching) and np.isfinite(bending) and np.all(np.isfinite(positions)):
@@ -356,6 +374,7 @@ class _Recorder:
                 energies_size=self._energies.synchronise(),
                 linkers_size=self._linkers.synchronise() if self._filaments.linkers else 0,
                 linker_records=self._places.synchronise() if self._filaments.linkers else 0,
+                pulling_size=self._pulling.synchronise() if self._moving else 0,
                 state=self._simulation.context.createCheckpoint(),
             )
         )

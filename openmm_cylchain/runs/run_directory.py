@@ -18,7 +18,7 @@ from ..version import __version__
 from .configuration import changed_keys, read_configuration
 from .start_files import COPIES
 
-_MAGIC = "openmm-cylchain checkpoint 2"
+_MAGIC = "openmm-cylchain checkpoint 3"
 
 
 @dataclass(frozen=True)
@@ -33,6 +33,7 @@ class Checkpoint:
     state: bytes
     linkers_size: int = 0
     linker_records: int = 0
+    pulling_size: int = 0
 
 
 class RunDirectory(RunFiles):
@@ -106,7 +107,15 @@ class RunDirectory(RunFiles):
             write_atomically(self.path / COPIES / path.name, path.read_bytes())
 
     def _check_vacant(self, configuration, resume):
-        results = (self.trajectory, self.checkpoint, self.energies, self.linkers, self.linker_places, self.crosslinks)
+        results = (
+            self.trajectory,
+            self.checkpoint,
+            self.energies,
+            self.linkers,
+            self.linker_places,
+            self.crosslinks,
+            self.pulling,
+        )
         for path in (*results, self.topology, self.summary, self.figure):
             if path.exists():
                 advice = "but no configuration.toml to resume it with:" if resume else "continue it with --resume, or"
@@ -141,6 +150,7 @@ class RunDirectory(RunFiles):
             "energies_size": checkpoint.energies_size,
             "linkers_size": checkpoint.linkers_size,
             "linker_records": checkpoint.linker_records,
+            "pulling_size": checkpoint.pulling_size,
             "state_size": len(checkpoint.state),
         }
         header["digest"] = digest_of_checkpoint(header, checkpoint.state)
@@ -169,6 +179,7 @@ class RunDirectory(RunFiles):
                 energies_size=header["energies_size"],
                 linkers_size=header["linkers_size"],
                 linker_records=header["linker_records"],
+                pulling_size=header["pulling_size"],
                 state=state,
             )
         except InputError:

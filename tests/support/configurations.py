@@ -55,6 +55,12 @@ rest_length = "20 nm"
 table = 1
 node = 0
 stiffness = "0.001 pN/nm"
+[[tether]]
+filament = 1
+node = -1
+stiffness = "0.001 pN/nm"
+velocity = ["1 um/s", "0 um/s", "0 um/s"]
+start_time = "1 ms"
 [[pull]]
 filament = [1, 2]
 tension = "0.1 pN"

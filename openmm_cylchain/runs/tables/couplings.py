@@ -79,8 +79,16 @@ TETHER = TableKind(
         Key("node", Whole(-(10**9), 10**9, "0"), REQUIRED, "Its number in the filament; -1 is the last one."),
         Key("point", point(), None, "Where the node is held; where it begins if not given."),
         Key("stiffness", Quantity(units.STIFFNESS), REQUIRED, "Of the spring."),
+        Key(
+            "velocity",
+            Triple(Quantity(units.VELOCITY, "any"), '["1 um/s", "0 um/s", "0 um/s"]'),
+            None,
+            "At which the point moves; `pulling.csv` has its force at every report.",
+        ),
+        Key("start_time", Quantity(units.TIME, "zero"), 0.0, "Until which it stays where it begins."),
     ),
-    "A spring from a node of a filament to a point, such as an optical trap, see `Filaments.add_tether`.",
+    "A spring from a node of a filament to a point, such as an optical trap, see `Filaments.add_tether`. The point may "
+    "move at a constant velocity.",
     repeated=True,
 )
 
@@ -155,12 +163,14 @@ class Wall:
 
 @dataclass(frozen=True)
 class TetherGroup:
-    """A [[tether]] table: a node of each of some filaments; the point in nm, or None."""
+    """A [[tether]] table: a node of each of some filaments; the point in nm, or None; velocity in nm/ps, or None."""
 
     filaments: tuple
     node: int
     point: tuple | None
     stiffness: float
+    velocity: tuple | None
+    start_time: float
 
 
 @dataclass(frozen=True)
@@ -212,7 +222,12 @@ def read_tether(entries, groups):
     """The TetherGroup of a [[tether]] table."""
     numbers = _filaments(entries, groups)
     _check_node(entries, numbers, groups)
-    return TetherGroup(numbers, entries["node"], entries["point"], entries["stiffness"])
+    if "velocity" in entries and not any(entries["velocity"]):
+        raise entries.at("velocity").error("is zero: leave it out for a point that stays.")
+    if "start_time" in entries:
+        entries.require("velocity")
+    names = ("node", "point", "stiffness", "velocity", "start_time")
+    return TetherGroup(numbers, *(entries[name] for name in names))
 
 
 def read_pull(entries, groups):
