@@ -130,7 +130,7 @@ Instability NetworkStep::step(const double* positions, const double* forces, con
     result.divided = count(divided.begin(), divided.end(), true);
     if (!divide({positions, forces, box, settings, divided, loop}, 1, displacements, failed)) {
         result.chain = find(failed.begin(), failed.end(), true)-failed.begin();
-        result.coupling = findCulprit();
+        result.coupling = culprit;
     }
     result.iterations = iterations;
     return result;
@@ -268,10 +268,15 @@ bool NetworkStep::divide(const Attempt& whole, int division, double* displacemen
                         function(k);
     };
     for (int i = 0; i < 2; i++, half.settings.step++) {
-        const bool taken = attempt(half, part.data(), failed) ||
-                (division < LARGEST_DIVISION && divide(half, division+1, part.data(), failed));
-        if (!taken)
-            return false;
+        if (!attempt(half, part.data(), failed)) {
+            if (division == LARGEST_DIVISION) {
+                // Now, because couplings know positions that last as long as this.
+                culprit = findCulprit();
+                return false;
+            }
+            if (!divide(half, division+1, part.data(), failed))
+                return false;
+        }
         forTaken([&] (int k) {
             start[k] += part[k];
             total[k] += part[k];

@@ -75,6 +75,8 @@ private:
     LaneFlags unfinished, flags;
     /** The packs that take part in an iteration: the others have converged, and nothing holds them otherwise. */
     PackFlags active;
+    /** The coupling by which a step that cannot be divided any more has gone wrong. */
+    BrokenCoupling culprit;
     int iterations = 0, substitutions = 0;
 };
 
