@@ -85,18 +85,12 @@ void LinkEquations::begin(const CoupledStart& start, const Loop& newLoop) {
     begun = start.positions;
     kT = start.settings.kT;
     stepSize = start.settings.stepSize;
-    states.clear();
-    for (const Link& link : *links) {
-        State state;
-        state.link = &link;
-        const bool first = start.places.find(link.first, state.places[0]);
-        const bool second = start.places.find(link.second, state.places[1]);
-        if ((!first && !second) || link.stiffness == 0)
-            continue;
-        if (!start.takes(state.places[0]) || !start.takes(state.places[1]))
-            continue;
-        states.push_back(state);
-    }
+    states.resize(links->size());
+    runInChunks(*loop, states.size(), CHUNK, [&] (int i) {
+        place(start, (*links)[i], states[i]);
+    });
+    states.erase(remove_if(states.begin(), states.end(), [] (const State& state) {return state.link == NULL;}),
+            states.end());
     addStiffness(start.places);
     runInChunks(*loop, states.size(), CHUNK, [&] (int i) {
         describe(start, states[i]);
@@ -113,13 +107,23 @@ void LinkEquations::begin(const CoupledStart& start, const Loop& newLoop) {
         drawNoise(start);
 }
 
+/** Find the places of a link; it has none if it does not take part. */
+void LinkEquations::place(const CoupledStart& start, const Link& link, State& state) const {
+    const bool first = start.places.find(link.first, state.places[0]);
+    const bool second = start.places.find(link.second, state.places[1]);
+    const bool moves = (first || second) && link.stiffness != 0;
+    state.link = moves && start.takes(state.places[0]) && start.takes(state.places[1]) ? &link : NULL;
+    for (int side = 0; side < 2; side++)
+        state.particles[side] = state.places[side].pack >= 0 ? start.places.getParticle(state.places[side]) : -1;
+}
+
 /** What holds each segment: links at the same place relax together. */
 void LinkEquations::addStiffness(const ChainPlaces& places) {
     auto forPlaces = [&] (auto function) {
         for (const State& state : states)
-            for (const PlaceOnChain& place : state.places)
-                if (place.pack >= 0)
-                    function(places.getParticle(place), state.link->stiffness);
+            for (int particle : state.particles)
+                if (particle >= 0)
+                    function(particle, state.link->stiffness);
     };
     stiffness.resize(places.getNumParticles());
     forPlaces([&] (int particle, double) {stiffness[particle] = 0;});
@@ -145,7 +149,7 @@ void LinkEquations::describe(const CoupledStart& start, State& state) const {
         if (place.pack < 0)
             continue;
         state.friction[side] = start.places.getFriction(place);
-        const double total = stiffness[start.places.getParticle(place)];
+        const double total = stiffness[state.particles[side]];
         rate += total/state.friction[side];
         state.alone &= total == link.stiffness;
     }
@@ -165,22 +169,25 @@ void LinkEquations::drawNoise(const CoupledStart& start) {
     chains.assign(count, force);
     parts.resize(count);
     normals.resize(4*count);
-    for (size_t i = 0; i < count; i++)
-        parts[i] = states[i].link->number;
-    drawNormals(key, NoiseKind::Link, chains.data(), parts.data(), count, normals.data());
-    for (size_t i = 0; i < count; i++) {
-        State& state = states[i];
-        const Link& link = *state.link;
-        if (hasRange(link.model)) {
-            const double range = link.maximumExtension, stiffness = link.stiffness*range*range/kT;
-            double drawn;
-            drawFeneCoordinates(key, &chains[i], &parts[i], &stiffness, 1, &drawn);
-            state.random[0] = drawn*range;
+    (*loop)((count+CHUNK-1)/CHUNK, [&] (int chunk) {
+        const size_t begin = (size_t) chunk*CHUNK, end = min(count, begin+CHUNK);
+        for (size_t i = begin; i < end; i++)
+            parts[i] = states[i].link->number;
+        drawNormals(key, NoiseKind::Link, &chains[begin], &parts[begin], end-begin, &normals[4*begin]);
+        for (size_t i = begin; i < end; i++) {
+            State& state = states[i];
+            const Link& link = *state.link;
+            if (hasRange(link.model)) {
+                const double range = link.maximumExtension, stiffness = link.stiffness*range*range/kT;
+                double drawn;
+                drawFeneCoordinates(key, &chains[i], &parts[i], &stiffness, 1, &drawn);
+                state.random[0] = drawn*range;
+            }
+            else
+                for (int k = 0; k < (state.turns ? 1 : 3); k++)
+                    state.random[k] = normals[4*i+k]*sqrt(kT/link.stiffness);
         }
-        else
-            for (int k = 0; k < (state.turns ? 1 : 3); k++)
-                state.random[k] = normals[4*i+k]*sqrt(kT/link.stiffness);
-    }
+    });
 }
 
 void LinkEquations::beginStage(int stage, int numStages, const double* moved) {
@@ -292,8 +299,30 @@ void LinkEquations::setCompliances(const double* compliances) {
             for (int k = 0; k < 6; k++)
                 state.compliance[k] += own[k]+outer[k];
         }
+        const double size = max(sqrt(dot(t, t)), LEAST);
+        for (int k = 0; k < 3; k++)
+            state.first[k] = t[k]/size;
+        multiply(state.compliance, state.first, state.firstResponse);
         state.compliant = true;
     }
+}
+
+/**
+ * Find how a force along a link that shares its places with others moves them apart. The compliance is small along these
+ * others and large across, so that its product with the direction changes much as soon as that turns by little. But
+ * links that share places turn together: what counts is where they are against each other, which the first iteration
+ * knows. So its response turns with the link. Taken with a direction that turns alone, it would not let the iteration
+ * end.
+ */
+void LinkEquations::turnResponse(const State& state, double* response) {
+    const double *m = state.direction, *t = state.first, *w = state.firstResponse;
+    const double size = sqrt(dot(m, m)), perSize = 1/max(size, LEAST);
+    double axis[3];
+    for (int k = 0; k < 3; k++)
+        axis[k] = (t[(k+1)%3]*m[(k+2)%3]-t[(k+2)%3]*m[(k+1)%3])*perSize;
+    const double cosine = dot(t, m)*perSize, along = dot(axis, w)/max(1+cosine, LEAST);
+    for (int k = 0; k < 3; k++)
+        response[k] = size*(cosine*w[k]+axis[(k+1)%3]*w[(k+2)%3]-axis[(k+2)%3]*w[(k+1)%3]+along*axis[k]);
 }
 
 /**
@@ -306,7 +335,10 @@ double LinkEquations::describeMetric(const State& state, const double* r, double
         return 1;
     const double* const m = state.direction;
     double response[3];
-    multiply(state.compliance, m, response);
+    if (state.alone)
+        multiply(state.compliance, m, response);
+    else
+        turnResponse(state, response);
     const double along = dot(m, response);
     const double least = LEAST_LENGTH*(state.link->restLength+state.link->maximumExtension);
     const double before = max(state.length, least), after = max(state.distance, least);
@@ -315,6 +347,8 @@ double LinkEquations::describeMetric(const State& state, const double* r, double
     const double size = kT*state.link->stiffness*state.theta*0.5*(1/before+1/after)/(1+resistance*along);
     for (int k = 0; k < 3; k++)
         force[k] = -size*(response[k]-along*m[k]);
+    if (!state.alone)
+        return 1;
     const double ofDistance = dot(r, response)/max(state.distance, LEAST);
     return along > 0 ? min(LARGEST_RATIO, max(1/LARGEST_RATIO, ofDistance/along)) : 1;
 }

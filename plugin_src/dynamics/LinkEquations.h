@@ -62,6 +62,8 @@ private:
     struct State {
         const Link* link;
         PlaceOnChain places[2];
+        /** Where their segments begin, or -1. */
+        int particles[2];
         /** Whether it has a direction: one coordinate instead of three. */
         bool turns;
         /** The image of the first place against the second. */
@@ -73,15 +75,20 @@ private:
         double direction[3], distance, tension, response, slope, multiplier;
         /** The least friction of its places, and how they move apart by a force between them, without this link. */
         double friction[2], compliance[6];
+        /** The direction of the first iteration as a unit vector, and how a unit force along it moves them apart. */
+        double first[3], firstResponse[3];
+        /** Whether compliances are known, and whether no other link is on its segments. */
         bool compliant, alone;
         /** The squared change of the last iteration, times the response. */
         double change;
     };
+    void place(const CoupledStart& start, const Link& link, State& state) const;
     void addStiffness(const ChainPlaces& places);
     void describe(const CoupledStart& start, State& state) const;
     void drawNoise(const CoupledStart& start);
     bool isUnfinished(State& state, const double* move, const double* moved) const;
     bool hasFailed(std::size_t number, const double* moved) const;
+    static void turnResponse(const State& state, double* response);
     double describeMetric(const State& state, const double* r, double* force) const;
     void vectorOf(const State& state, const double* positions, double* r) const;
     std::vector<State> states;
