@@ -1,5 +1,6 @@
 #include "dynamics/CoupledEquations.h"
 #include <algorithm>
+#include <atomic>
 #include <cstddef>
 #include <numeric>
 
@@ -27,6 +28,8 @@ const double STIFF = 2e3, OF_STIFF = 10;
 const int LARGEST_NUMBER_OF_ITERATIONS = 1000;
 /** Equations that a thread looks at together. */
 const int CHUNK = 256;
+/** What a term far from the processor's caches shows is asked for this many terms ahead. */
+const int AHEAD = 16;
 
 /** Add the product of a symmetric matrix and a vector, times a factor. */
 inline void addProduct(const double* k, const double* v, double factor, double* result) {
@@ -37,10 +40,25 @@ inline void addProduct(const double* k, const double* v, double factor, double* 
 
 } // namespace
 
-void CoupledEquations::gatherTerms(const vector<CouplingEquation>& equations, const PackFlags& active,
+/** Whether the terms of the last iteration had the same places but for their fractions. */
+bool CoupledEquations::hasSamePlaces(const vector<CouplingEquation>& equations, const PackFlags& active,
             const Loop& loop) {
-    // Sort the places by packs and nodes, by counting.
+    if (2*equations.size() != sortedPlaces.size() || active != activeOfTerms)
+        return false;
+    atomic<bool> same(true);
+    runInChunks(loop, sortedPlaces.size(), CHUNK, [&] (int number) {
+        if (!same.load(memory_order_relaxed))
+            return;
+        const PlaceOnChain& place = equations[number/2].places[number%2];
+        const SortedPlace& sorted = sortedPlaces[number];
+        if (place.pack != sorted.pack || (place.pack >= 0 && (place.node != sorted.node || place.lane != sorted.lane)))
+            same.store(false, memory_order_relaxed);
+    });
+    return same;
+}
 
+/** Sort the places by packs and nodes, by counting. */
+void CoupledEquations::sortPlaces(const vector<CouplingEquation>& equations, const PackFlags& active) {
     const int numPacks = active.size();
     firstOfPack.assign(numPacks+1, 0);
     auto forPlaces = [&] (auto function) {
@@ -67,15 +85,28 @@ void CoupledEquations::gatherTerms(const vector<CouplingEquation>& equations, co
     terms.resize(count);
     partners.resize(count);
     coupled.assign(numPacks, 0);
-    sums.assign(numPacks, 0.0);
-    for (vector<double>* values : {&change, &residual, &response, &force, &direction, &nextDirection, &found})
+    for (vector<double>* values : {&change, &residual, &response, &force, &direction, &image, &found})
         values->resize(3*count);
+    exchanged.resize(count);
     termOf.assign(2*equations.size(), -1);
     forPlaces([&] (const PlaceOnChain& place, size_t i, int side) {
         termOf[2*i+side] = firstOfNode[firstOfPack[place.pack]+place.node]++;
         if (termOf[2*i+1-side] >= 0)
             coupled[place.pack] = coupled[equations[i].places[1-side].pack] = 1;
     });
+    activeOfTerms = active;
+    sortedPlaces.resize(termOf.size());
+    for (size_t number = 0; number < sortedPlaces.size(); number++) {
+        const PlaceOnChain& place = equations[number/2].places[number%2];
+        sortedPlaces[number] = {place.pack, place.node, place.lane};
+    }
+}
+
+void CoupledEquations::gatherTerms(const vector<CouplingEquation>& equations, const PackFlags& active,
+            const Loop& loop) {
+    if (!hasSamePlaces(equations, active, loop))
+        sortPlaces(equations, active);
+    sums.assign(active.size(), 0.0);
     runInChunks(loop, termOf.size(), CHUNK, [&] (int number) {
         if (termOf[number] < 0)
             return;
@@ -110,6 +141,7 @@ void CoupledEquations::solve(const vector<PackStep*>& packs, const PackFlags& ac
         const int first = firstTerms[pack], last = firstTerms[pack+1];
         for (vector<double>* values : {&residual, &force, &direction, &found})
             fill(values->begin()+3*first, values->begin()+3*last, 0.0);
+        fill(exchanged.begin()+first, exchanged.begin()+last, Exchanged());
         if (active[pack])
             packs[pack]->eliminate(terms.data()+first, last-first, change.data()+3*first);
     });
@@ -122,7 +154,13 @@ void CoupledEquations::solve(const vector<PackStep*>& packs, const PackFlags& ac
     // Of the matrix, X joins places of different terms: its product with a vector is that of K with the partner's.
     auto respond = [&] (int pack, int first, int last) {
         packs[pack]->respond(residual.data()+3*first, response.data()+3*first);
-        sums[pack] = inner_product(residual.begin()+3*first, residual.begin()+3*last, response.begin()+3*first, 0.0);
+        double sum = 0;
+        for (int i = first; i < last; i++)
+            for (int k = 0; k < 3; k++) {
+                sum += residual[3*i+k]*response[3*i+k];
+                exchanged[i].response[k] = response[3*i+k];
+            }
+        sums[pack] = sum;
     };
     forCoupled([&] (int pack, int first, int last) {
         for (int i = first; i < last; i++)
@@ -138,34 +176,34 @@ void CoupledEquations::solve(const vector<PackStep*>& packs, const PackFlags& ac
         forCoupled([&] (int pack, int first, int last) {
             double sum = 0;
             for (int i = first; i < last; i++) {
-                double image[3];
+                if (i+AHEAD < last && partners[i+AHEAD] >= 0)
+                    __builtin_prefetch(&exchanged[partners[i+AHEAD]]);
                 for (int k = 0; k < 3; k++) {
                     force[3*i+k] = residual[3*i+k]+ratio*force[3*i+k];
-                    nextDirection[3*i+k] = response[3*i+k]+ratio*direction[3*i+k];
-                    image[k] = force[3*i+k];
+                    direction[3*i+k] = response[3*i+k]+ratio*direction[3*i+k];
+                    image[3*i+k] = force[3*i+k];
                 }
                 if (partners[i] >= 0) {
+                    const Exchanged& partner = exchanged[partners[i]];
                     double ofPartner[3];
                     for (int k = 0; k < 3; k++)
-                        ofPartner[k] = response[3*partners[i]+k]+ratio*direction[3*partners[i]+k];
-                    addProduct(terms[i].stiffness, ofPartner, -1, image);
+                        ofPartner[k] = partner.response[k]+ratio*partner.direction[k];
+                    addProduct(terms[i].stiffness, ofPartner, -1, &image[3*i]);
                 }
                 for (int k = 0; k < 3; k++)
-                    sum += nextDirection[3*i+k]*image[k];
+                    sum += direction[3*i+k]*image[3*i+k];
             }
             sums[pack] = sum;
         });
         const double length = energy/total();
-        direction.swap(nextDirection);
         forCoupled([&] (int pack, int first, int last) {
-            for (int i = 3*first; i < 3*last; i++) {
-                found[i] += length*force[i];
-                change[i] += length*direction[i];
-                residual[i] -= length*force[i];
-            }
             for (int i = first; i < last; i++)
-                if (partners[i] >= 0)
-                    addProduct(terms[i].stiffness, &direction[3*partners[i]], length, &residual[3*i]);
+                for (int k = 0; k < 3; k++) {
+                    found[3*i+k] += length*force[3*i+k];
+                    change[3*i+k] += length*direction[3*i+k];
+                    residual[3*i+k] -= length*image[3*i+k];
+                    exchanged[i].direction[k] = direction[3*i+k];
+                }
             respond(pack, first, last);
         });
         iterations++;

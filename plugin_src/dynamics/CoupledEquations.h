@@ -65,6 +65,8 @@ public:
         return iterations;
     }
 private:
+    bool hasSamePlaces(const std::vector<CouplingEquation>& equations, const PackFlags& active, const Loop& loop);
+    void sortPlaces(const std::vector<CouplingEquation>& equations, const PackFlags& active);
     void gatherTerms(const std::vector<CouplingEquation>& equations, const PackFlags& active,
             const Loop& loop);
     double total() const;
@@ -74,12 +76,23 @@ private:
     std::vector<int> partners;
     /** For each equation and side, the number of its term, or -1. */
     std::vector<int> termOf;
+    /** For each equation and side, the place by which it has been sorted, and the packs that took part then. */
+    struct SortedPlace {
+        int pack, node, lane;
+    };
+    std::vector<SortedPlace> sortedPlaces;
+    PackFlags activeOfTerms;
     /** Where the terms of each pack begin. Packs that no coupling joins to another place take no part in iterations. */
     std::vector<int> firstTerms;
     PackFlags coupled;
     std::vector<double> sums;
     /** Three numbers for each term: solution, residual, its response, direction and its image, and the forces found. */
-    std::vector<double> change, residual, response, force, direction, nextDirection, found;
+    std::vector<double> change, residual, response, force, direction, image, found;
+    /** What each term shows its partner, in one place: its response, and its last direction. */
+    struct Exchanged {
+        double response[3], direction[3];
+    };
+    std::vector<Exchanged> exchanged;
     std::vector<double> moves, compliancesOfTerms;
     std::vector<int> firstOfPack, firstOfNode;
     int iterations = 0;

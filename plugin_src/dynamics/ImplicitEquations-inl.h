@@ -42,6 +42,8 @@ public:
                 *after = Row {};
             current = ahead;
             factors = factorsAhead;
+            if (s+3 < n)
+                fetchAhead(&segments[s+2]);
             if (!CLOSED || s < pack.segments)
                 addSegment(y, s, current, *here, *after);
             else {

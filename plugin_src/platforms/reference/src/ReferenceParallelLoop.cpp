@@ -19,39 +19,47 @@ namespace {
 const int LARGEST_NUMBER_OF_LOOKS = 100;
 
 /**
- * Loops that follow each other, and threads that wait for them.  Iterations are taken one by one, so that nobody waits
+ * Loops that follow each other, and threads that wait for them.  Each thread begins with the same part of each loop, so
+ * that what it works on stays in its cache.  Iterations are taken one by one, also those of others, so that nobody waits
  * for a thread that comes late: it finds none left.
  */
 class SuccessiveLoops {
 public:
+    explicit SuccessiveLoops(int threads) : parts(threads) {
+    }
     void run(int count, const function<void(int)>& newIteration) {
         if (count == 0)
             return;
         iteration = &newIteration;
         size = count;
         finished = 0;
-        left = count;
+        const int numParts = parts.size();
+        for (int part = 0; part < numParts; part++)
+            parts[part].end = (long long) count*(part+1)/numParts;
+        // From here on, others may take iterations.
+        for (int part = 0; part < numParts; part++)
+            parts[part].left = parts[part].end-(long long) count*part/numParts;
         if (sleeping > 0) {
             lock_guard<mutex> lock(access);
             wakeUp.notify_all();
         }
-        work();
+        work(0);
         while (finished < size)
             this_thread::yield();
     }
     /**
      * Take part in all loops until they have ended.
      */
-    void help() {
+    void help(int thread) {
         for (int looks = 0; !ended; looks++) {
-            if (work())
+            if (work(thread))
                 looks = 0;
             if (looks < LARGEST_NUMBER_OF_LOOKS)
                 this_thread::yield();
             else {
                 unique_lock<mutex> lock(access);
                 sleeping++;
-                wakeUp.wait(lock, [&] () {return left > 0 || ended;});
+                wakeUp.wait(lock, [&] () {return ended || anyLeft();});
                 sleeping--;
                 looks = 0;
             }
@@ -64,21 +72,37 @@ public:
     }
 private:
     /**
-     * Take iterations as long as there are any.  Who has taken one knows that its loop goes on until it is finished.
+     * A part of a loop, in memory that no other part shares.
      */
-    bool work() {
+    struct alignas(64) Part {
+        atomic<int> left{0};
+        int end = 0;
+    };
+    bool anyLeft() const {
+        return any_of(parts.begin(), parts.end(), [] (const Part& part) {return part.left > 0;});
+    }
+    /**
+     * Take iterations as long as there are any, those of the own part first.  Who has taken one knows that its loop goes
+     * on until it is finished.
+     */
+    bool work(int thread) {
+        const int numParts = parts.size();
         bool any = false;
-        for (int own = left; own > 0; own = left)
-            if (left.compare_exchange_weak(own, own-1)) {
-                (*iteration)(size-own);
-                finished++;
-                any = true;
-            }
+        for (int i = 0; i < numParts; i++) {
+            Part& part = parts[(thread+i)%numParts];
+            for (int own = part.left; own > 0; own = part.left)
+                if (part.left.compare_exchange_weak(own, own-1)) {
+                    (*iteration)(part.end-own);
+                    finished++;
+                    any = true;
+                }
+        }
         return any;
     }
+    vector<Part> parts;
     const function<void(int)>* iteration = NULL;
     int size = 0;
-    atomic<int> left{0}, finished{0}, sleeping{0};
+    atomic<int> finished{0}, sleeping{0};
     atomic<bool> ended{false};
     mutex access;
     condition_variable wakeUp;
@@ -120,11 +144,11 @@ void ReferenceParallelLoop::runMany(const function<void(const Loop&)>& function)
         function([&] (int count, const std::function<void(int)>& iteration) {run(count, iteration);});
         return;
     }
-    SuccessiveLoops loops;
+    SuccessiveLoops loops(threads->getNumThreads());
     const int helpers = threads->getNumThreads()-1;
     threads->execute([&] (ThreadPool&, int index) {
         if (index < helpers)
-            loops.help();
+            loops.help(index+1);
     });
     try {
         function([&] (int count, const std::function<void(int)>& iteration) {loops.run(count, iteration);});
