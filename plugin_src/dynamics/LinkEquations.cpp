@@ -308,11 +308,11 @@ void LinkEquations::setCompliances(const double* compliances) {
 }
 
 /**
- * Find how a force along a link that shares its places with others moves them apart. The compliance is small along these
- * others and large across, so that its product with the direction changes much as soon as that turns by little. But
- * links that share places turn together: what counts is where they are against each other, which the first iteration
- * knows. So its response turns with the link. Taken with a direction that turns alone, it would not let the iteration
- * end.
+ * Find how a force along a link that shares its places with others moves them apart. The compliance is small along
+ * these others and large across, so that its product with the direction changes much as soon as that turns by little.
+ * But links that share places turn together: what counts is where they are against each other, which the first
+ * iteration knows. So its response turns with the link. Taken with a direction that turns alone, it would not let the
+ * iteration end.
  */
 void LinkEquations::turnResponse(const State& state, double* response) {
     const double *m = state.direction, *t = state.first, *w = state.firstResponse;

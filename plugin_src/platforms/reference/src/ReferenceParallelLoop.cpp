@@ -20,8 +20,8 @@ const int LARGEST_NUMBER_OF_LOOKS = 100;
 
 /**
  * Loops that follow each other, and threads that wait for them.  Each thread begins with the same part of each loop, so
- * that what it works on stays in its cache.  Iterations are taken one by one, also those of others, so that nobody waits
- * for a thread that comes late: it finds none left.
+ * that what it works on stays in its cache.  Iterations are taken one by one, also those of others, so that nobody
+ * waits for a thread that comes late: it finds none left.
  */
 class SuccessiveLoops {
 public:
@@ -82,8 +82,8 @@ private:
         return any_of(parts.begin(), parts.end(), [] (const Part& part) {return part.left > 0;});
     }
     /**
-     * Take iterations as long as there are any, those of the own part first.  Who has taken one knows that its loop goes
-     * on until it is finished.
+     * Take iterations as long as there are any, those of the own part first.  Who has taken one knows that its loop
+     * goes on until it is finished.
      */
     bool work(int thread) {
         const int numParts = parts.size();
