@@ -121,7 +121,8 @@ def _cut_unfinished_line(path, header):
 
 
 def _check_filaments(filaments):
-    if not hasattr(filaments, "node_indices"):
+    # Of the class: the property itself refuses filaments that are not in a System yet, which is another mistake.
+    if not hasattr(type(filaments), "node_indices"):
         raise InputError(f"filaments must be a Filaments object, but is {type(filaments).__name__}.")
 
 
