@@ -7,7 +7,6 @@ private and may change.
 from . import analysis, theory
 from .bead_spring.bead_spring_type import DSDNA_BASE_PAIRS, BeadSpringType
 from .couplings.capsule_contacts import capsule_contact_force
-from .couplings.contact_frames import find_contacts
 from .couplings.contacts import add_exclusions, contact_force, crossing_barrier, excluded_pairs, share_exclusions
 from .couplings.crosslink_tables import CrosslinkTable
 from .couplings.crosslinks import Crosslinks
@@ -17,6 +16,7 @@ from .dynamics.recommended_step import fene_steps, recommended_time_step
 from .dynamics.stability import stability_bounds, time_step_bounds
 from .dynamics.time_step import TimeStep, effective_rate
 from .engine_choice import prepare_openmm
+from .engines.gpu_platforms import enable_platform
 from .errors import (
     ContactWarning,
     EngineWarning,
@@ -101,7 +101,6 @@ __all__ = [
     "add_exclusions",
     "analysis",
     "capsule_contact_force",
-    "find_contacts",
     "change_constant_force",
     "check_time_step",
     "constant_force",
@@ -109,6 +108,7 @@ __all__ = [
     "contact_force",
     "crossing_barrier",
     "effective_rate",
+    "enable_platform",
     "excluded_pairs",
     "fene_steps",
     "filament_wall_force",

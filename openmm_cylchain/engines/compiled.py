@@ -1,5 +1,5 @@
 """The compiled engine: a CylinderChainForce and a CylinderChainIntegrator from the plugin, on the Reference and CPU
-platforms.
+platforms. Those for GPUs are in gpu_platforms.py.
 
 Importing this module loads the plugin into OpenMM. An ImportError says why that cannot be done.
 """
@@ -46,7 +46,9 @@ def _load_plugin():
         raise ImportError(f"{reason}.")
     from .. import plugin
 
-    libraries = sorted((Path(plugin._plugin.__file__).parent / "lib" / "plugins").glob("libOpenMMCylinderChain*"))
+    libraries = sorted(
+        (Path(plugin._plugin.__file__).parent / "lib" / "plugins").glob("libOpenMMCylinderChainReference*")
+    )
     if not libraries:
         raise ImportError("the installation lacks the plugin's libraries for OpenMM. Install openmm_cylchain again.")
     try:

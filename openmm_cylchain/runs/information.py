@@ -10,7 +10,9 @@ import openmm
 import scipy
 
 from ..engine_choice import available_engines
+from ..engines.gpu_platforms import GPU_PLATFORMS
 from ..version import __version__
+from .platform_trial import try_platform
 
 
 def versions():
@@ -60,6 +62,7 @@ def format_information():
         ("Versions", versions()),
         ("Engines", {name: _availability(reason) for name, reason in available_engines().items()}),
         ("OpenMM platforms", {name: _availability(reason) for name, reason in platforms().items()}),
+        ("Filaments of the compiled engine on GPUs", {name: try_platform(name) for name in GPU_PLATFORMS}),
     ]
     lines = []
     for title, entries in sections:

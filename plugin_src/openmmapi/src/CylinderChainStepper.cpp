@@ -40,6 +40,7 @@ CylinderChainStepper::CylinderChainStepper(ContextImpl& context, const CylinderC
         kernel(createKernel(context, force, others)),
         explicitWork(getKernel().getLoop()), periodic(context.getSystem().usesPeriodicBoundaryConditions()),
         recorded(false) {
+    getKernel().refuseScheme(static_cast<Scheme>(integrator.getScheme()));
     if (isImplicit(static_cast<Scheme>(integrator.getScheme())))
         couplings.refuseNarrowBox(chains);
     explicitWork.initialize(findMobileParticles(chains, others));

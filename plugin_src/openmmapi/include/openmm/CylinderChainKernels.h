@@ -235,6 +235,11 @@ public:
     virtual void initialize(const System& system, const CylinderChainDescription& chains, const OtherParticles& others,
             CalcCylinderChainForceKernel& forceKernel) = 0;
     /**
+     * Throw an exception if this platform cannot take steps of a scheme.
+     */
+    virtual void refuseScheme(cylchain::Scheme) {
+    }
+    /**
      * Get the loop over particles that this platform has for its host.
      */
     virtual ParallelLoop& getLoop() = 0;

@@ -1,0 +1,56 @@
+# Plugins for the platforms of OpenMM that share its Common kernels: GPU_PLUGINS are those that can be built. They need
+# OpenMM's library of the platform, with its headers, and the headers of what it runs on. What they lack is said in
+# platforms.txt, which is installed, and never stops the build.
+
+get_filename_component(OPENMM_LIBRARIES "${OPENMM_LIBRARY}" DIRECTORY)
+set(COMMON_KERNELS layout constants vectors noise potentials workspace stages tensionBand equations metricForces
+    implicitStep explicitStep chainForces chainKernels particles)
+list(TRANSFORM COMMON_KERNELS PREPEND "${CMAKE_CURRENT_SOURCE_DIR}/platforms/common/kernels/")
+list(TRANSFORM COMMON_KERNELS APPEND ".cc")
+set(KERNEL_SOURCES "${CMAKE_CURRENT_BINARY_DIR}/CommonCylinderChainKernelSources.cpp")
+set(EMBED_KERNELS "${CMAKE_CURRENT_SOURCE_DIR}/platforms/common/EmbedKernels.cmake")
+string(REPLACE ";" "$<SEMICOLON>" COMMON_KERNEL_LIST "${COMMON_KERNELS}")
+add_custom_command(
+    OUTPUT "${KERNEL_SOURCES}"
+    COMMAND "${CMAKE_COMMAND}" "-DOUTPUT=${KERNEL_SOURCES}" "-DKERNELS=${COMMON_KERNEL_LIST}" -P "${EMBED_KERNELS}"
+    DEPENDS ${COMMON_KERNELS} "${EMBED_KERNELS}"
+    VERBATIM)
+set(GPU_PLUGINS "")
+set(PLATFORMS_TEXT "")
+
+# A plugin for a platform, from the Common sources and those of its own folder.
+function(add_gpu_plugin name folder library)
+    file(GLOB sources CONFIGURE_DEPENDS platforms/common/src/*.cpp platforms/${folder}/src/*.cpp)
+    add_library(OpenMMCylinderChain${name} SHARED ${sources} "${KERNEL_SOURCES}")
+    target_include_directories(OpenMMCylinderChain${name} PRIVATE platforms/common/include platforms/${folder}/include)
+    target_include_directories(OpenMMCylinderChain${name} SYSTEM PRIVATE ${ARGN})
+    target_link_libraries(OpenMMCylinderChain${name} PRIVATE OpenMMCylinderChain CylinderChainMechanics "${library}")
+    target_compile_options(OpenMMCylinderChain${name} PRIVATE -Wall -Wextra -Werror=switch)
+    # Each platform has classes of the same names, and so do these plugins.
+    set_target_properties(OpenMMCylinderChain${name} PROPERTIES
+        CXX_VISIBILITY_PRESET hidden
+        INSTALL_RPATH "${ORIGIN}/..;${ORIGIN}/../../../${OPENMM_RPATH};${ORIGIN}/../../../${OPENMM_RPATH}/plugins${OTHER_RPATH}")
+    set(GPU_PLUGINS ${GPU_PLUGINS} OpenMMCylinderChain${name} PARENT_SCOPE)
+endfunction()
+
+function(report_platform name sentence)
+    message(STATUS "Plugin for ${name}: ${sentence}")
+    set(PLATFORMS_TEXT "${PLATFORMS_TEXT}${name}: ${sentence}\n" PARENT_SCOPE)
+endfunction()
+
+find_library(OPENMM_OPENCL OpenMMOpenCL HINTS "${OPENMM_LIBRARIES}/plugins" NO_DEFAULT_PATH)
+find_path(OPENCL_HEADERS CL/cl.h)
+find_path(OPENMM_COMMON_HEADERS openmm/common/ComputeContext.h HINTS "${OPENMM_INCLUDE}")
+if(NOT OPENMM_OPENCL)
+    report_platform(OpenCL "not built, because OpenMM has no library for it")
+elseif(NOT OPENMM_COMMON_HEADERS)
+    report_platform(OpenCL "not built, because OpenMM has no headers for it")
+elseif(NOT OPENCL_HEADERS)
+    report_platform(OpenCL "not built, because CL/cl.h is missing; Debian and Ubuntu have it in opencl-c-headers")
+else()
+    add_gpu_plugin(OpenCL opencl "${OPENMM_OPENCL}" "${OPENCL_HEADERS}")
+    target_compile_definitions(OpenMMCylinderChainOpenCL PRIVATE CL_TARGET_OPENCL_VERSION=300)
+    report_platform(OpenCL "built")
+endif()
+file(CONFIGURE OUTPUT platforms.txt @ONLY CONTENT "${PLATFORMS_TEXT}")
+install(FILES "${CMAKE_CURRENT_BINARY_DIR}/platforms.txt" DESTINATION ${PACKAGE}/lib)

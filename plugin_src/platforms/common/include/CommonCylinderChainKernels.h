@@ -1,0 +1,25 @@
+#ifndef OPENMM_COMMONCYLINDERCHAINKERNELS_H_
+#define OPENMM_COMMONCYLINDERCHAINKERNELS_H_
+
+#include "openmm/KernelImpl.h"
+#include "openmm/Platform.h"
+#include "openmm/common/ComputeContext.h"
+#include <string>
+#include <vector>
+
+namespace OpenMM {
+
+/**
+ * Get the names of the kernels that platforms for GPUs know.  Some of them are refused when a Context is created, with
+ * what to do instead; OpenMM would say of a kernel that it does not know only that there is one.
+ */
+std::vector<std::string> getCommonKernelNames();
+
+/**
+ * Create one of these kernels.
+ */
+KernelImpl* createCommonKernel(const std::string& name, const Platform& platform, ComputeContext& cc);
+
+} // namespace OpenMM
+
+#endif /*OPENMM_COMMONCYLINDERCHAINKERNELS_H_*/

@@ -1,0 +1,112 @@
+#ifndef OPENMM_COMMONCYLINDERCHAINS_H_
+#define OPENMM_COMMONCYLINDERCHAINS_H_
+
+#include "dynamics/ChainEngine.h"
+#include "openmm/Vec3.h"
+#include "openmm/common/ComputeArray.h"
+#include "openmm/common/ComputeContext.h"
+#include "openmm/internal/CylinderChainDescription.h"
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace OpenMM {
+
+/**
+ * The chains of a Context in the memory of its device, and the programs that compute them there.
+ *
+ * Chains that use the same models and have similar lengths make a batch: one kernel computes them, with a work-item for
+ * each.  The nodes of all chains follow on each other; their positions and forces are doubles, and gather() brings them
+ * from where OpenMM keeps its particles.
+ */
+class CommonCylinderChains {
+public:
+    CommonCylinderChains(ComputeContext& cc, const CylinderChainDescription& description);
+    ~CommonCylinderChains();
+    /**
+     * Take over the parameters of the chains, which have changed.
+     */
+    void update();
+    /**
+     * Bring the positions of nodes, and the forces on them unless they are to be zero, into the order of chains.
+     */
+    void gather(bool withForces);
+    /**
+     * Find the forces and energies of chains at the positions that were gathered, and add the forces to those of the
+     * platform.
+     *
+     * @param[out] energy   the energies of all chains, unless that is NULL
+     */
+    void addForces(bool includeForces, cylchain::ChainEnergy* energy);
+    /**
+     * Advance the nodes from the positions that were gathered, or reached before, without moving particles.
+     *
+     * @param findsForces   whether to find the forces of chains at the start of each step, and to have none besides
+     * @param[out] divided  the number of steps of a chain that were divided
+     * @return the number of steps that all chains could take
+     */
+    int advance(const cylchain::StepSettings& settings, int count, bool findsForces, long long& divided);
+    /**
+     * Get the first chain that could take the least number of steps in the last call of advance().
+     */
+    int getFirstUnstable() const;
+    /**
+     * Move particles to where nodes have been advanced.
+     */
+    void moveNodes(double stepSize);
+    /**
+     * Copy the displacements of the last step of each chain to those of all particles.
+     */
+    void getDisplacements(std::vector<Vec3>& displacements);
+    /**
+     * Get where each particle is in the arrays of the platform, see ComputeContext::getAtomIndex().
+     */
+    ComputeArray& getSlots();
+    /**
+     * Get the flow and the periodic box of a step, as kernels need them, and what is true of the step.
+     */
+    ComputeArray& getFlow() {
+        return flow;
+    }
+    ComputeArray& getBox() {
+        return box;
+    }
+    int describeStep(const cylchain::StepSettings& settings);
+    /**
+     * Get what went wrong in a step, which kernels add to.
+     */
+    ComputeArray& getSummary() {
+        return summary;
+    }
+    std::vector<std::uint64_t> readSummary();
+    /**
+     * Compile kernels that have no chains.
+     */
+    ComputeProgram compile(const std::string& source);
+private:
+    class ReorderListener;
+    struct Batch;
+    struct Arrays;
+    std::unique_ptr<Batch> makeBatch(const std::vector<int>& members);
+    ComputeProgram programFor(const cylchain::Chain& chain);
+    void makeBatches();
+    void uploadTethers();
+    void updateBox();
+    void updateShifts();
+    ComputeContext& cc;
+    const CylinderChainDescription& description;
+    std::map<std::string, ComputeProgram> programs;
+    std::vector<std::unique_ptr<Batch> > batches;
+    std::unique_ptr<Arrays> arrays;
+    std::vector<int> particleOfNode, firstNodes, stepsTaken;
+    std::vector<double> flowNumbers, boxNumbers, shiftNumbers;
+    bool slotsAreValid, gatherHasArguments = false, scatterHasArguments = false, moveHasArguments = false;
+    ComputeArray slots, particles, positions, forces, displacements, shifts, energies, flow, box, taken, summary;
+    ComputeKernel gatherKernel, scatterKernel, moveKernel;
+};
+
+} // namespace OpenMM
+
+#endif /*OPENMM_COMMONCYLINDERCHAINS_H_*/

@@ -1,0 +1,246 @@
+"""Filaments on OpenMM's platforms for GPUs follow the trajectory of the Reference platform, noise and all."""
+
+import os
+
+import numpy as np
+import openmm
+import pytest
+from openmm import app, unit
+
+import openmm_cylchain
+from openmm_cylchain import (
+    Crosslinker,
+    Crosslinks,
+    Filaments,
+    Hand,
+    InstabilityError,
+    Sphere,
+    capsule_contact_force,
+    filament_wall_force,
+    stokes_friction,
+)
+from openmm_cylchain.engines.gpu_platforms import GPU_PLATFORMS, why_not_on
+from support.contexts import energy_of, forces_of, new_context, positions_of
+from support.platform_variants import ACTIN, SHEAR, VARIANTS, filaments_of_variant, step_of_variant
+from support.platforms import PLATFORMS
+from support.solvent import TEMPERATURE, VISCOSITY
+
+NAMES = [name for name in GPU_PLATFORMS if name in PLATFORMS and why_not_on(name) is None]
+# nm, for nodes that are less than 2000 nm from the origin. OpenMM adds forces on GPUs in units of 2^-32 kJ/(mol nm),
+# and computes them in single precision in mixed; 0.3 kJ/(mol nm) take filaments 1000 nm far here.
+TOLERANCES = {"double": 1e-5, "mixed": 1e-4, "single": 0.05}
+
+pytestmark = pytest.mark.skipif(
+    not NAMES,
+    reason="; ".join(f"{name}: {why_not_on(name) or 'there is no device'}" for name in GPU_PLATFORMS),
+)
+
+
+@pytest.fixture(params=NAMES, scope="module")
+def gpu(request):
+    """A platform for GPUs. Where later tests name none, the processor is still what they get."""
+    os.environ["OPENMM_DEFAULT_PLATFORM"] = "CPU"
+    openmm_cylchain.enable_platform(request.param)
+    return request.param
+
+
+def _context(variant, scheme, platform, precision=None, flow=None):
+    filaments, system, positions, arguments = filaments_of_variant(variant, flow)
+    integrator = filaments.create_integrator(
+        system, step_of_variant(variant, scheme), scheme, random_seed=4, precision="double", checks=False, **arguments
+    )
+    return new_context(system, positions, integrator, platform, {"Precision": precision} if precision else {})
+
+
+def _compare(gpu, variant, scheme, precision, steps=20, flow=None):
+    expected, found = (
+        _context(variant, scheme, platform, own, flow) for platform, own in (("Reference", None), (gpu, precision))
+    )
+    start = positions_of(expected)
+    forces = forces_of(expected)
+    assert forces_of(found) == pytest.approx(forces, abs=2e-4 * np.abs(forces).max())
+    assert energy_of(found) == pytest.approx(energy_of(expected), rel=1e-3, abs=1e-3)
+    for context in (expected, found):
+        context.getIntegrator().step(steps)
+    end = positions_of(expected)
+    assert np.abs(end - start).max() > 100 * TOLERANCES[precision]
+    assert np.abs(positions_of(found) - end).max() < TOLERANCES[precision]
+
+
+@pytest.mark.parametrize("precision", TOLERANCES)
+def test_trajectories_with_noise_agree(gpu, precision):
+    """100 steps of open filaments among beads, in each precision."""
+    _compare(gpu, "open", "implicit", precision, steps=100)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", ["implicit", "implicit-second-order", "euler", "midpoint"])
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_all_variants_agree(gpu, variant, scheme):
+    _compare(gpu, variant, scheme, "double")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("variant", ["open", "fixed", "ring", "planar", "beads"])
+def test_filaments_in_a_flow_agree(gpu, variant):
+    for scheme in ("implicit", "midpoint"):
+        _compare(gpu, variant, scheme, "double", flow=SHEAR)
+
+
+BOX = 1500.0
+
+
+def _crossing_context(platform, precision=None, tether=True):
+    """Equal filaments among beads, with a cutoff force, that are dragged across a periodic box but for one."""
+    topology, system = app.Topology(), openmm.System()
+    chain = topology.addChain()
+    beads = np.random.default_rng(3).uniform(0, BOX, size=(40, 3))
+    for _ in beads:
+        topology.addAtom("B", None, topology.addResidue("BEA", chain))
+        system.addParticle(1e5)
+    system.setDefaultPeriodicBoxVectors(*(BOX * np.eye(3)))
+    topology.setPeriodicBoxVectors(BOX * np.eye(3) * unit.nanometer)
+    filaments = Filaments(VISCOSITY, TEMPERATURE, "compiled")
+    for number in range(6):
+        filaments.add_equilibrium(ACTIN, 10, seed=number, start=[100.0, 240.0 * number, 50.0])
+    if tether:
+        filaments.add_tether(5, 0, [100.0 + BOX, 1200.0, 50.0 - 2 * BOX], 0.5)
+    positions = filaments.add_to(topology, system, beads * unit.nanometer)
+    repulsion = openmm.CustomNonbondedForce("20*(1-r/60)^2")
+    repulsion.setNonbondedMethod(openmm.CustomNonbondedForce.CutoffPeriodic)
+    repulsion.setCutoffDistance(60.0)
+    for _ in range(system.getNumParticles()):
+        repulsion.addParticle([])
+    system.addForce(repulsion)
+    drift = openmm.CustomExternalForce("-6*(x+0.7*y-0.5*z)")
+    for particle in range(system.getNumParticles()):
+        drift.addParticle(particle, [])
+    system.addForce(drift)
+    friction = stokes_friction(60, VISCOSITY)
+    integrator = filaments.create_integrator(
+        system, 2e5, "implicit", particle_friction=friction, random_seed=4, precision="double", checks=False
+    )
+    return new_context(system, positions, integrator, platform, {"Precision": precision} if precision else {})
+
+
+def test_filaments_cross_a_periodic_box_while_particles_are_reordered(gpu):
+    """For longer than OpenMM waits to reorder particles; the tether's point is some boxes away from its node."""
+    expected, found = _crossing_context("Reference"), _crossing_context(gpu, "double")
+    start = positions_of(expected)
+    for context in (expected, found):
+        context.getIntegrator().step(600)
+    end = positions_of(expected)
+    assert np.median(np.abs(end - start).max(axis=1)) > BOX
+    assert np.abs(positions_of(found) - end).max() < 1e-2
+
+
+def test_failure_leaves_positions_before_the_step(gpu):
+    context = _context("open", "implicit", gpu, "double")
+    integrator = context.getIntegrator()
+    integrator.step(3)
+    system = context.getSystem()
+    before, steps = positions_of(context), context.getStepCount()
+    push = next(force for force in system.getForces() if isinstance(force, openmm.CustomExternalForce))
+    push.setEnergyFunction("1e12*x^2")
+    context.reinitialize(preserveState=True)
+    with pytest.raises(InstabilityError, match="force on it, or its position, is not finite") as caught:
+        integrator.step(1)
+    assert caught.value.step is not None and "Filament 0" in str(caught.value)
+    assert positions_of(context) == pytest.approx(before, abs=1e-9) and context.getStepCount() == steps
+
+
+def test_checkpoint_continues_the_same_trajectory(gpu):
+    first, second = (_context("open", "implicit", gpu, "mixed") for _ in range(2))
+    first.getIntegrator().step(5)
+    checkpoint = first.createCheckpoint()
+    first.getIntegrator().step(7)
+    second.loadCheckpoint(checkpoint)
+    second.getIntegrator().step(7)
+    assert np.array_equal(positions_of(first), positions_of(second))
+
+
+def test_steps_taken_together_are_those_taken_one_by_one(gpu):
+    ends = []
+    for counts in ([40], [1] * 40):
+        filaments = Filaments(VISCOSITY, TEMPERATURE, "compiled")
+        filaments.add_equilibrium(ACTIN, 12, seed=1)
+        _, system, positions = filaments.build()
+        integrator = filaments.create_integrator(system, 2e6, "implicit", random_seed=2)
+        context = new_context(system, positions, integrator, gpu, {"Precision": "single"})
+        for count in counts:
+            integrator.step(count)
+        ends.append(positions_of(context))
+        assert context.getStepCount() == 40 and context.getTime()._value == pytest.approx(40 * 2e6)
+    assert np.array_equal(*ends)
+
+
+def test_moved_tethers_hold_filaments_elsewhere(gpu):
+    """Parameters are updated in one of two Contexts, which follows the Reference platform as before."""
+    contexts, ends = [], []
+    for platform, precision in (("Reference", None), (gpu, "double"), (gpu, "double")):
+        filaments, system, positions, arguments = filaments_of_variant("tethered")
+        integrator = filaments.create_integrator(
+            system, 2e6, "implicit", random_seed=4, precision="double", checks=False, **arguments
+        )
+        properties = {"Precision": precision} if precision else {}
+        context = new_context(system, positions, integrator, platform, properties)
+        contexts.append(context)
+        integrator.step(5)
+        if len(contexts) < 3:
+            filaments.move_tether(context, 0, [300.0, 100.0, -50.0], 4e-3)
+        integrator.step(5)
+        ends.append(positions_of(context))
+    assert np.abs(ends[1] - ends[0]).max() < TOLERANCES["double"]
+    assert np.abs(ends[2] - ends[0]).max() > 10
+
+
+def _add_links(filaments, system):
+    links = Crosslinks(0.1, 30.0)
+    links.add(None, filaments.segment_place(0, arc_length=100.0), filaments.segment_place(1, arc_length=100.0))
+    links.add_to(system)
+
+
+REFUSED = {
+    r"contacts of capsules \(CylinderChainContactForce\)": lambda filaments, system: system.addForce(
+        capsule_contact_force(filaments, system, 8.0)
+    ),
+    r"links \(CylinderChainLinkForce\)": _add_links,
+    r"walls for filaments \(CylinderChainWallForce\)": lambda filaments, system: system.addForce(
+        filament_wall_force(filaments, system, Sphere((0, 0, 0), 5000.0), 0.1)
+    ),
+}
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_forces_that_are_not_computed_there_are_refused_with_the_context(gpu, what):
+    filaments, system, positions, arguments = filaments_of_variant("open")
+    REFUSED[what](filaments, system)
+    integrator = filaments.create_integrator(system, 1e3, "implicit", checks=False, **arguments)
+    with pytest.raises(openmm.OpenMMException, match=f"{gpu} platform does not compute {what}.*on the CPU platform"):
+        new_context(system, positions, integrator, gpu)
+
+
+def test_linkers_are_refused_with_the_context(gpu):
+    filaments = Filaments(VISCOSITY, TEMPERATURE, "compiled")
+    for number in range(2):
+        filaments.add_equilibrium(ACTIN, 10, seed=number, start=[0.0, 30.0 * number, 0.0])
+    hand = Hand(binding_rate=3e-8, reach=60.0, unbinding_rate=2e-9)
+    filaments.add_linkers(Crosslinker(hands=hand, stiffness=0.06), count=5, volume=1e8)
+    _, system, positions = filaments.build()
+    integrator = filaments.create_integrator(system, 1e3, "implicit", checks=False)
+    with pytest.raises(openmm.OpenMMException, match=f"{gpu} platform does not compute .*on the CPU platform"):
+        new_context(system, positions, integrator, gpu)
+
+
+def test_modes_are_refused_with_the_context(gpu):
+    filaments, system, positions, arguments = filaments_of_variant("beads")
+    integrator = filaments.create_integrator(system, 0.05, "modes", checks=False, **arguments)
+    with pytest.raises(openmm.OpenMMException, match=f"On the {gpu} platform, filaments are not moved by their modes"):
+        new_context(system, positions, integrator, gpu)
+
+
+def test_tensions_are_refused_before_the_step(gpu):
+    context = _context("open", "implicit", gpu, "double")
+    context.getIntegrator().setRecordsTensions(True)
+    with pytest.raises(openmm.OpenMMException, match=f"On the {gpu} platform, tensions.*Use the CPU platform"):
+        context.getIntegrator().step(1)
