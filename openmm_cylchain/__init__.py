@@ -7,6 +7,7 @@ private and may change.
 from . import analysis, theory
 from .bead_spring.bead_spring_type import DSDNA_BASE_PAIRS, BeadSpringType
 from .couplings.capsule_contacts import capsule_contact_force
+from .couplings.contact_frames import find_contacts
 from .couplings.contacts import add_exclusions, contact_force, crossing_barrier, excluded_pairs, share_exclusions
 from .couplings.crosslink_tables import CrosslinkTable
 from .couplings.crosslinks import Crosslinks
@@ -101,6 +102,7 @@ __all__ = [
     "add_exclusions",
     "analysis",
     "capsule_contact_force",
+    "find_contacts",
     "change_constant_force",
     "check_time_step",
     "constant_force",

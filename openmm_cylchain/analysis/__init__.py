@@ -1,9 +1,11 @@
 """Analysis of runs, which ``load`` reads, and of trajectories in mdtraj; ``statistics`` has errors of series."""
 
+from ..couplings.contact_frames import ContactFrame
 from ..couplings.crosslink_records import CrosslinkFrame
 from . import statistics
 from .crossings import CrossingCounter, Crossings, find_crossings
-from .networks import contact_map, contraction, filament_distances, mesh_size
+from .moduli import RelaxationModulus, relaxation_modulus
+from .networks import contact_map, contraction, filament_distances, find_bundles, mesh_size
 from .order import director, order_parameter, order_tensor
 from .runs import Run, RunFilament, load
 from .stress import Stress, stress
@@ -28,10 +30,12 @@ from .trajectories import (
 )
 
 __all__ = [
+    "ContactFrame",
     "CrosslinkFrame",
     "CrossingCounter",
     "Crossings",
     "MeanSquareDisplacement",
+    "RelaxationModulus",
     "Run",
     "RunFilament",
     "Stress",
@@ -46,6 +50,7 @@ __all__ = [
     "end_to_end_vectors",
     "filament_distances",
     "filament_nodes",
+    "find_bundles",
     "find_crossings",
     "joint_cosines",
     "load",
@@ -56,6 +61,7 @@ __all__ = [
     "order_tensor",
     "persistence_length",
     "radii_of_gyration",
+    "relaxation_modulus",
     "ring_filaments",
     "segment_lengths",
     "statistics",

@@ -1,15 +1,16 @@
-"""Networks of filaments: distances and contacts of filaments, mesh size, and contraction against time."""
+"""Networks of filaments: distances, contacts and bundles of filaments, mesh size, contraction against time."""
 
 import math
 
 import numpy as np
+from scipy import sparse
 
 from ..errors import InputError
 from ..mechanics.geometry import segment_vectors
-from ..units.quantities import LENGTH, VOLUME, non_negative, positive
-from ..units.types import BoolArray, FloatArray, Scalar
+from ..units.quantities import ANGLE, LENGTH, non_negative, positive
+from ..units.types import BoolArray, FloatArray, IntArray, Scalar
 from .crossings import pairs_of_points, segment_distances
-from .runs import Run
+from .runs import Run, volume_of
 
 
 def filament_distances(run: Run, frame: int, cutoff: Scalar) -> FloatArray:
@@ -34,23 +35,31 @@ def filament_distances(run: Run, frame: int, cutoff: Scalar) -> FloatArray:
         For a cutoff that with the longest segment exceeds the width of the periodic box.
     """
     cutoff = positive(cutoff, LENGTH, "cutoff")
-    nodes = run.nodes(frame)
-    starts = np.concatenate([own if filament.ring else own[:-1] for filament, own in zip(run.filaments, nodes)])
-    vectors = np.concatenate([segment_vectors(own, filament.ring) for filament, own in zip(run.filaments, nodes)])
-    owners = np.repeat(np.arange(len(run.filaments)), [own.segments for own in run.filaments])
-    middles = starts + 0.5 * vectors
-    # Two segments within the cutoff have middles within that and half of their lengths.
-    reach = cutoff + float(np.linalg.norm(vectors, axis=1).max())
-    pairs = pairs_of_points(middles, reach, run.box)
-    pairs = pairs.where(owners[pairs.first] != owners[pairs.second])
-    first, second = pairs.first, pairs.second
-    distances = segment_distances(vectors[first], vectors[second], starts[second] + pairs.shift - starts[first])
+    near = _NearSegments(run, frame, cutoff)
+    owners, first, second, distances = near.owners, near.first, near.second, near.distances
     result = np.full((len(run.filaments),) * 2, np.inf)
-    near = distances <= cutoff
-    np.minimum.at(result, (owners[first[near]], owners[second[near]]), distances[near])
+    np.minimum.at(result, (owners[first], owners[second]), distances)
     result = np.minimum(result, result.T)
     np.fill_diagonal(result, 0.0)
     return result
+
+
+class _NearSegments:
+    # All segments, and the pairs of those of two filaments within a cutoff.
+
+    def __init__(self, run, frame, cutoff):
+        nodes = run.nodes(frame)
+        starts = np.concatenate([own if filament.ring else own[:-1] for filament, own in zip(run.filaments, nodes)])
+        self.vectors = np.concatenate([segment_vectors(own, each.ring) for each, own in zip(run.filaments, nodes)])
+        self.owners = np.repeat(np.arange(len(run.filaments)), [own.segments for own in run.filaments])
+        # Two segments within the cutoff have middles within that and half of their lengths.
+        reach = cutoff + float(np.linalg.norm(self.vectors, axis=1).max())
+        pairs = pairs_of_points(starts + 0.5 * self.vectors, reach, run.box)
+        pairs = pairs.where(self.owners[pairs.first] != self.owners[pairs.second])
+        between = starts[pairs.second] + pairs.shift - starts[pairs.first]
+        distances = segment_distances(self.vectors[pairs.first], self.vectors[pairs.second], between)
+        near = distances <= cutoff
+        self.first, self.second, self.distances = pairs.first[near], pairs.second[near], distances[near]
 
 
 def contact_map(run: Run, frame: int, gap: Scalar = 0.0) -> BoolArray:
@@ -73,6 +82,57 @@ def contact_map(run: Run, frame: int, gap: Scalar = 0.0) -> BoolArray:
     return near
 
 
+def find_bundles(run: Run, frame: int, gap: Scalar, angle: Scalar, overlap: Scalar) -> list[IntArray]:
+    """Bundles of filaments: those that run side by side, and what runs beside these.
+
+    Two filaments are in one bundle if each has segments of at least the length ``overlap`` in all that come within a
+    gap of the other's surface and are aligned with it there to within an angle, whichever way they point.
+
+    Parameters
+    ----------
+    run : Run
+    frame : int
+    gap : length
+        Between surfaces, beside the diameters: that of a crosslinker with what it fluctuates.
+    angle : angle
+        Largest one of two segments side by side, up to 90 degrees; a number is in radians.
+    overlap : length
+        Along the contour, such as a fifth of a filament; 0 for any.
+
+    Returns
+    -------
+    list of int arrays
+        Numbers of the filaments of each bundle, from the bundle with the most to that with the fewest, two at least.
+
+    Raises
+    ------
+    InputError
+        For a gap that with diameter and longest segment exceeds the width of the periodic box; bad lengths or angle.
+    """
+    gap, overlap = non_negative(gap, LENGTH, "gap"), non_negative(overlap, LENGTH, "overlap")
+    angle = positive(angle, ANGLE, "angle")
+    if angle > 0.5 * math.pi:
+        raise InputError(f"angle must be at most 90 degrees, but is {math.degrees(angle):g} degrees.")
+    radii = 0.5 * np.array([own.diameter for own in run.filaments])
+    near = _NearSegments(run, frame, 2.0 * float(radii.max()) + gap)
+    first, second = near.first, near.second
+    lengths = np.linalg.norm(near.vectors, axis=1)
+    cosines = np.abs(np.einsum("ni,ni->n", near.vectors[first], near.vectors[second]))
+    aligned = cosines >= (math.cos(angle) - 1e-12) * lengths[first] * lengths[second]
+    close = near.distances <= radii[near.owners[first]] + radii[near.owners[second]] + gap
+    first, second = first[aligned & close], second[aligned & close]
+    # How much of each filament (row) runs beside each other one (column); a segment counts once for a filament.
+    beside = np.unique(
+        np.concatenate([[first, near.owners[second]], [second, near.owners[first]]], axis=1).astype(int), axis=1
+    )
+    count = len(run.filaments)
+    shared = sparse.coo_array((lengths[beside[0]], (near.owners[beside[0]], beside[1])), (count, count)).tocsr()
+    joined = shared.minimum(shared.T) >= overlap if overlap > 0.0 else shared > 0.0
+    number, label = sparse.csgraph.connected_components(joined, directed=False)
+    bundles = [np.flatnonzero(label == each) for each in range(number)]
+    return sorted((own for own in bundles if len(own) > 1), key=lambda own: -len(own))
+
+
 def mesh_size(run: Run, volume: Scalar | None = None) -> float:
     """The mesh size ``xi = (3/rho)^(1/2)`` in nm, with the contour length rho of filaments per volume, at rest.
 
@@ -91,12 +151,7 @@ def mesh_size(run: Run, volume: Scalar | None = None) -> float:
     InputError
         Without a periodic box and a volume.
     """
-    if volume is None:
-        if run.box is None:
-            raise InputError("There is no periodic box: give the volume in which the filaments are.")
-        room = float(np.linalg.det(run.box))
-    else:
-        room = positive(volume, VOLUME, "volume")
+    room = volume_of(run, volume)
     length = sum(float(own.type.segment_lengths(own.segments, own.ring).sum()) for own in run.filaments)
     return math.sqrt(3.0 * room / length)
 

@@ -12,6 +12,7 @@ import mdtraj
 import numpy as np
 import numpy.typing as npt
 
+from ..couplings.contact_frames import ContactFrame, DescribedContactFinder, joined_contacts
 from ..couplings.crosslink_records import CROSSLINK_RECORD, CrosslinkFrame, crosslinks_at
 from ..couplings.walls import Box, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere
 from ..errors import InputError, PrecisionWarning
@@ -20,8 +21,8 @@ from ..output.dcd_frames import DCDFrames
 from ..output.linker_records import LINKER_RECORD
 from ..output.run_description import DescribedFilament, DescribedLinkers, RunDescription, read_run_description
 from ..output.run_files import RunFiles
-from ..units.quantities import thermal_energy, whole_number
-from ..units.types import FloatArray, Indices, IntArray
+from ..units.quantities import VOLUME, positive, thermal_energy, whole_number
+from ..units.types import FloatArray, Indices, IntArray, Scalar
 
 _COARSE = 0.2
 _SHAPES = {
@@ -179,6 +180,30 @@ class Run:
             return crosslinks_at(self._crosslink_records, 0, np.zeros((0, 3)), None)
         return crosslinks_at(self._crosslink_records, int(self.steps[frame]), self.positions(frame), self.box)
 
+    @cached_property
+    def _contact_finders(self):
+        own = self._description
+        filaments = {filament.nodes: number for number, filament in enumerate(own.filaments)}
+        return [DescribedContactFinder(contacts, filaments, own.particles, self.box) for contacts in own.contacts]
+
+    def contacts(self, frame: int) -> ContactFrame:
+        """Contacts of a frame, of all ``capsule_contact_force`` or ``[contacts]``: none if there is no such.
+
+        They are found anew, at positions in single precision.
+
+        Returns
+        -------
+        ContactFrame
+            With ``filaments``, ``segments``, ``fractions``, ``gaps``, ``forces``, ``directions``, ``distances``.
+
+        Raises
+        ------
+        InputError
+            If the compiled engine is missing.
+        """
+        positions = self.positions(frame)
+        return joined_contacts([finder.find(positions) for finder in self._contact_finders])
+
     @property
     def spring_names(self) -> list[str]:
         """Names of all kinds of springs between filaments: of linkers, and "crosslink" if there are such."""
@@ -322,6 +347,15 @@ class Run:
                 lengths = np.linalg.norm(segment_vectors(nodes, own.ring), axis=1)
                 total += own.type.stretching_derivatives(lengths, own.ring)
         return [total / len(frames) for total in totals]
+
+
+def volume_of(run: Run, volume: Scalar | None) -> float:
+    """A volume in nm^3; that of the periodic box of a run if None, InputError if it has none."""
+    if volume is not None:
+        return positive(volume, VOLUME, "volume")
+    if run.box is None:
+        raise InputError("There is no periodic box: give the volume that is meant.")
+    return float(np.linalg.det(run.box))
 
 
 def _frames_of(description):

@@ -1,15 +1,14 @@
-"""The stress of a network: the virial of chains and of linkers, and the ideal part of nodes."""
+"""The stress of a network: the virial of chains, linkers, crosslinks and contacts, and the ideal part of nodes."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import InputError
 from ..filaments.placement import joint_stiffnesses
 from ..mechanics.geometry import segment_vectors
-from ..units.quantities import VOLUME, positive, thermal_energy
+from ..units.quantities import thermal_energy
 from ..units.types import FloatArray, Scalar
-from .runs import Run
+from .runs import Run, volume_of
 
 
 @dataclass(frozen=True)
@@ -20,26 +19,33 @@ class Stress:
     ----------
     chains : of stretching and bending
     linkers : of springs with both hands bound
+    crosslinks : of those that are on and join filaments or particles
+    contacts : of segments that touch each other or spheres
     ideal : -n k_BT/V on the diagonal, of n nodes that move freely
     """
 
     chains: FloatArray
     linkers: FloatArray
+    crosslinks: FloatArray
+    contacts: FloatArray
     ideal: FloatArray
 
     @property
     def total(self) -> FloatArray:
         """The sum of the parts."""
-        return self.chains + self.linkers + self.ideal
+        return self.chains + self.linkers + self.crosslinks + self.contacts + self.ideal
 
 
 def stress(run: Run, frame: int, volume: Scalar | None = None) -> Stress:
-    """The stress of a frame: ``sigma = (1/V) (sum of r x f over segments and springs - n k_BT)``.
+    """The stress of a frame: ``sigma = (1/V) (sum of r x f over segments, springs and contacts - n k_BT)``.
 
-    r is the vector of a segment or a spring and f the force with which it pulls at its first end; that of a segment
-    holds stretching and bending, so that ``V sigma`` is the derivative of the energy by an affine strain. It is that of
-    the configuration at one time: its average over frames is the stress. Contacts, walls, tethers, anchors of linkers
-    and friction in a flow are not in it.
+    r is the vector of a segment, of a spring or between the axes at a contact, and f the force with which it pulls at
+    its first end; that of a segment holds stretching and bending, so that ``V sigma`` is the derivative of the energy
+    by an affine strain. It is that of the configuration at one time: its average over frames is the stress.
+
+    What acts from outside is not in it: walls, tethers, anchors, crosslinks to fixed points, friction in a flow. In
+    equilibrium within walls, the stress is what the walls hold: its trace is -3 times their mean pressure. Nor are
+    other forces of a System, and particles that are not nodes have no ideal part.
 
     Parameters
     ----------
@@ -55,32 +61,42 @@ def stress(run: Run, frame: int, volume: Scalar | None = None) -> Stress:
     Raises
     ------
     InputError
-        Without a periodic box and a volume.
+        Without a periodic box and a volume; with contacts, if the compiled engine is missing.
 
     Warns
     -----
     PrecisionWarning
         If positions are far from the origin, see ``load``.
     """
-    if volume is not None:
-        room = positive(volume, VOLUME, "volume")
-    elif run.box is not None:
-        room = float(np.linalg.det(run.box))
-    else:
-        raise InputError("There is no periodic box: give the volume of which the stress is wanted.")
+    room = volume_of(run, volume)
     run.warn_of_rounding()
     chains, free = np.zeros((3, 3)), 0
     for own, nodes in zip(run.filaments, run.nodes(frame)):
         chains += _virial_of_chain(own, nodes)
         free += len(nodes) - len(own.clamped)
-    records = run.linkers[frame]
-    records = records[(records["filaments"] >= 0).all(axis=1)]
-    springs = np.asarray(records["places"][:, 1] - records["places"][:, 0], dtype=float)
-    lengths = np.linalg.norm(springs, axis=1)
-    pulls = np.divide(records["tension"], lengths, out=np.zeros(len(lengths)), where=lengths > 0.0)
-    linkers = np.einsum("ni,nj,n->ij", springs, springs, pulls)
+    linkers = run.linkers[frame]
+    linkers = linkers[(linkers["filaments"] >= 0).all(axis=1)]
+    crosslinks = run.crosslinks(frame)
+    joining = crosslinks.active & ~crosslinks.at_points
+    contacts = run.contacts(frame)
     ideal = -free * thermal_energy(run.temperature) * np.eye(3)
-    return Stress(chains / room, linkers / room, ideal / room)
+    return Stress(
+        chains=chains / room,
+        linkers=_virial_of_springs(linkers["places"], linkers["tension"]) / room,
+        crosslinks=_virial_of_springs(crosslinks.places[joining], crosslinks.tensions[joining]) / room,
+        contacts=_virial(contacts.directions, -contacts.forces * contacts.distances) / room,
+        ideal=ideal / room,
+    )
+
+
+def _virial(vectors, weights):
+    return np.einsum("ni,nj,n->ij", vectors, vectors, weights)
+
+
+def _virial_of_springs(places, tensions):
+    vectors = np.asarray(places[:, 1] - places[:, 0], dtype=float)
+    lengths = np.linalg.norm(vectors, axis=1)
+    return _virial(vectors, np.divide(tensions, lengths, out=np.zeros(len(lengths)), where=lengths > 0.0))
 
 
 def _virial_of_chain(own, nodes):

@@ -108,12 +108,15 @@ class CrosslinkFrame:
         dV/dd in kJ/(mol nm), positive where they pull; zero for those that are off.
     active : (n,) bool array
         Which are on.
+    at_points : (n,) bool array
+        Which hold to a fixed point, the second place.
     """
 
     numbers: IntArray
     places: FloatArray
     tensions: FloatArray
     active: BoolArray
+    at_points: BoolArray
 
     def __len__(self) -> int:
         return len(self.numbers)
@@ -149,4 +152,4 @@ def crosslinks_at(
             first = table.places.positions(positions, 0, nearest)
             places[rows] = np.stack([first, first + vectors], axis=1)
             tensions[rows] = slopes_of(model, table, lengths)
-    return CrosslinkFrame(present["number"], places, tensions, present["active"])
+    return CrosslinkFrame(present["number"], places, tensions, present["active"], present["pairs"][:, 1] < 0)

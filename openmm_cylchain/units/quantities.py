@@ -13,6 +13,7 @@ AVOGADRO = 6.02214076e23
 BOLTZMANN = unit.MOLAR_GAS_CONSTANT_R.value_in_unit(unit.kilojoule_per_mole / unit.kelvin)
 
 LENGTH = unit.nanometer
+ANGLE = unit.radian
 VOLUME = unit.nanometer**3
 NUMBER_DENSITY = unit.nanometer**-3
 TIME = unit.picosecond

@@ -209,7 +209,8 @@ static bool takeNumbers(PyObject* object, std::vector<T>& values) {
         const std::vector<int>& active, const std::vector<int>& types, const std::vector<int>& anchors,
         const std::vector<int>& chains};
 %apply std::vector<double>& tensions {std::vector<double>& fractions, std::vector<double>& points,
-        std::vector<double>& parameters, std::vector<double>& places};
+        std::vector<double>& parameters, std::vector<double>& places, std::vector<double>& gaps,
+        std::vector<double>& forces};
 %apply const std::vector<double>& fractions {const std::vector<double>& points,
         const std::vector<double>& parameters, const std::vector<double>& places};
 
@@ -308,6 +309,10 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %pythonappend OpenMM::CylinderChainLinkForce::getLinkParameters(int, int&, double&, double&, double&) const %{
     units = (_LENGTH, _STIFFNESS, _LENGTH)
     val = [val[0], *(unit.Quantity(v, u) for v, u in zip(val[1:], units))]
+%}
+%pythonappend OpenMM::CylinderChainContactForce::getContacts(Context&, std::vector<int>&, std::vector<double>&,
+        std::vector<double>&, std::vector<double>&, std::vector<Vec3>&) %{
+    val = [val[0], val[1], unit.Quantity(val[2], _LENGTH), unit.Quantity(val[3], _FORCE), val[4]]
 %}
 %pythonappend OpenMM::CylinderChainContactForce::getStiffness() const %{
     val = unit.Quantity(val, _STIFFNESS)

@@ -5,6 +5,7 @@ import warnings
 
 import numpy as np
 import pytest
+from openmm import unit
 
 from openmm_cylchain import F_ACTIN, EquilibrationWarning, InputError, analysis
 from openmm_cylchain.analysis.runs import RunFilament
@@ -130,3 +131,54 @@ def test_runs_that_are_too_short():
     for series in (np.zeros(7), np.zeros((20, 2))):
         with pytest.raises(InputError, match="8 frames at least"):
             mean_in_equilibrium(series)
+
+
+# Two that run side by side, turned round; one across them; one beside an end; two far away, 10 degrees apart.
+SIDE_BY_SIDE = [
+    [[0, 0, 0], [100, 0, 0], [200, 0, 0], [300, 0, 0]],
+    [[300, 12, 0], [200, 12, 0], [100, 12, 0], [0, 12, 0]],
+    [[50, -100, 10], [50, 0, 10], [50, 100, 10]],
+    [[290, 0, 12], [390, 0, 12], [490, 0, 12]],
+    [[0, 0, 500], [200, 0, 500]],
+    [[0, 10, 500], [200 * math.cos(math.radians(10)), 10 + 200 * math.sin(math.radians(10)), 500]],
+]
+
+
+@pytest.mark.parametrize("gap", [8.0, 8.0 * unit.nanometer])
+def test_bundles(gap):
+    run = PlacedRun([SIDE_BY_SIDE])
+
+    def bundles(angle, overlap, gap=gap):
+        return [own.tolist() for own in analysis.find_bundles(run, 0, gap, angle, overlap)]
+
+    assert bundles(math.radians(5.0), 150.0) == [[0, 1]]
+    assert bundles(5.0 * unit.degree, 150.0 * unit.nanometer) == [[0, 1]]
+    # The fourth has one segment beside the end of the first.
+    assert bundles(math.radians(5.0), 100.0) == [[0, 1, 3]]
+    assert bundles(math.radians(5.0), 101.0) == [[0, 1]]
+    assert bundles(math.radians(11.0), 100.0) == [[0, 1, 3], [4, 5]]
+    assert bundles(math.radians(90.0), 0.0) == [[0, 1, 2, 3], [4, 5]]
+    assert bundles(math.radians(11.0), 0.0, gap=4.1) == [[4, 5]]
+    assert bundles(math.radians(11.0), 0.0, gap=3.9) == []
+
+
+def test_bundles_through_faces_of_a_box():
+    run = PlacedRun([[[[0, 2, 5], [30, 2, 5]], [[200, 399 - 1200, 5], [230, 399 - 1200, 5]]]], [200, 400, 300])
+    assert [own.tolist() for own in analysis.find_bundles(run, 0, 0.0, 0.1, 30.0)] == [[0, 1]]
+    with pytest.raises(InputError, match="box is 200 nm wide"):
+        analysis.find_bundles(run, 0, 190.0, 0.1, 30.0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((-1.0, 0.1, 10.0), "gap"),
+        ((1.0, 0.0, 10.0), "angle"),
+        ((1.0, 1.6, 10.0), "angle must be at most 90 degrees, but is 91.6"),
+        ((1.0, 0.1, math.nan), "overlap"),
+        ((1.0 * unit.second, 0.1, 1.0), "gap"),
+    ],
+)
+def test_bad_bundles_are_refused(arguments, message):
+    with pytest.raises(InputError, match=message):
+        analysis.find_bundles(PlacedRun([SIDE_BY_SIDE]), 0, *arguments)

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from openmm_cylchain import DSDNA_BASE_PAIRS, F_ACTIN, MICROTUBULE, InputError, analysis
+from openmm_cylchain.analysis import CrosslinkFrame
 from openmm_cylchain.analysis.runs import RunFilament
+from openmm_cylchain.couplings.contact_frames import joined_contacts
 from openmm_cylchain.filaments.placement import joint_stiffnesses
 from openmm_cylchain.output.linker_records import LINKER_RECORD
 from openmm_cylchain.units.quantities import thermal_energy
@@ -19,7 +21,7 @@ class PlacedRun:
 
     temperature = TEMPERATURE
 
-    def __init__(self, chains, springs=(), box=None):
+    def __init__(self, chains, springs=(), box=None, crosslinks=((), (), ())):
         self.box = None if box is None else np.diag(np.array(box, dtype=float))
         self._nodes = [np.array(nodes, dtype=float) for _, nodes, *_ in chains]
         self.filaments = [
@@ -32,9 +34,19 @@ class PlacedRun:
             lengths = np.linalg.norm(np.diff(records["places"], axis=1)[:, 0], axis=1)
             records["tension"] = STIFFNESS * (lengths - REST_LENGTH)
         self.linkers = [records]
+        self._springs, self._on, self._at_points = crosslinks
 
     def nodes(self, frame):
         return self._nodes
+
+    def crosslinks(self, frame):
+        places = np.reshape(np.array(self._springs, dtype=float), (-1, 2, 3))
+        tensions = STIFFNESS * np.linalg.norm(places[:, 1] - places[:, 0], axis=1)
+        on, fixed = np.array(self._on, dtype=bool), np.array(self._at_points, dtype=bool)
+        return CrosslinkFrame(np.arange(len(places)), places, np.where(on, tensions, 0.0), on, fixed)
+
+    def contacts(self, frame):
+        return joined_contacts([])
 
     def warn_of_rounding(self):
         pass
@@ -62,6 +74,15 @@ def test_a_network_of_springs_in_a_box():
     forces = STIFFNESS * np.array([7 * (100 - REST_LENGTH), 200 - REST_LENGTH, 0.0])
     np.testing.assert_allclose(found.linkers, np.diag(forces / [200 * 400, 100 * 400, 1]), atol=1e-15)
     np.testing.assert_allclose(found.chains, 0.0, atol=1e-15)
+
+
+def test_crosslinks_that_join_filaments_count():
+    """Of rest length zero; one that is off and one at a fixed point do not."""
+    springs = [[[0, 0, 0], [10, 0, 0]], [[0, 0, 0], [0, 20, 0]], [[0, 0, 0], [0, 0, 30]]]
+    straight = (F_ACTIN, np.outer([0.0, 360.0], [0, 0, 1.0]), False, ())
+    links = (springs, [True, False, True], [False, False, True])
+    found = analysis.stress(PlacedRun([straight], crosslinks=links), 0, 50.0)
+    np.testing.assert_allclose(found.crosslinks, np.diag([STIFFNESS * 100.0 / 50.0, 0.0, 0.0]))
 
 
 @pytest.mark.parametrize("ring", [False, True])

@@ -136,6 +136,12 @@ void CylinderChainContactForce::updateParametersInContext(Context& context) {
             getContextImpl(context));
 }
 
+void CylinderChainContactForce::getContacts(Context& context, vector<int>& ends, vector<double>& fractions,
+        vector<double>& gaps, vector<double>& forces, vector<Vec3>& directions) {
+    dynamic_cast<CylinderChainContactForceImpl&>(getImplInContext(context)).getContacts(getContextImpl(context), ends,
+            fractions, gaps, forces, directions);
+}
+
 void CylinderChainContactForce::setUsesPeriodicBoundaryConditions(bool periodic) {
     usePeriodic = periodic;
 }

@@ -82,3 +82,39 @@ void CylinderChainContactForceImpl::updateParametersInContext(ContextImpl& conte
     kernel.getAs<CalcCylinderChainContactForceKernel>().copyParametersToContext(context, stiffness);
     context.systemChanged();
 }
+
+void CylinderChainContactForceImpl::getContacts(ContextImpl& context, vector<int>& ends, vector<double>& fractions,
+        vector<double>& gaps, vector<double>& forces, vector<Vec3>& directions) const {
+    vector<Vec3> positions;
+    context.getPositions(positions);
+    Vec3 box[3];
+    context.getPeriodicBoxVectors(box[0], box[1], box[2]);
+    // The kernel's own search must not forget what it has found.
+
+    ContactSearch around(search->getSystem());
+    vector<ContactPair> pairs;
+    const double* x = &positions[0][0];
+    try {
+        around.findPairs(x, x, periodic ? &box[0][0] : NULL, 0, pairs);
+    }
+    catch (const invalid_argument& error) {
+        throw OpenMMException(string("CylinderChainContactForce: ")+error.what());
+    }
+    const vector<Capsule>& capsules = search->getSystem().capsules;
+    const int firstSphere = capsules.size()-owner.getNumSpheres();
+    for (const ContactPair& pair : pairs) {
+        Contact found[2];
+        const int count = around.evaluate(pair, x, x, found, 0);
+        for (int i = 0; i < count; i++) {
+            for (int side : {pair.a, pair.b})
+                if (side < firstSphere)
+                    ends.insert(ends.end(), {capsules[side].chain, capsules[side].index});
+                else
+                    ends.insert(ends.end(), {-1, side-firstSphere});
+            fractions.insert(fractions.end(), {found[i].s, found[i].t});
+            gaps.push_back(found[i].gap);
+            forces.push_back(-found[i].weight*stiffness*found[i].gap);
+            directions.push_back(Vec3(found[i].normal[0], found[i].normal[1], found[i].normal[2]));
+        }
+    }
+}

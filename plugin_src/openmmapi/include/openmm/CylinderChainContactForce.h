@@ -158,6 +158,20 @@ public:
      */
     void updateParametersInContext(Context& context);
     /**
+     * Get the contacts at the present positions of a Context: every place where two segments, or a segment and a
+     * sphere, overlap.
+     *
+     * @param context          a Context with this force
+     * @param[out] ends        four numbers for each contact: the chain and the segment of the first side, and those of
+     *                         the second.  A sphere has -1 for a chain, and its index for a segment.
+     * @param[out] fractions   two for each contact: where along its segment each side touches.  Zero for a sphere.
+     * @param[out] gaps        the distances of the axes less half the sum of the diameters: negative, measured in nm
+     * @param[out] forces      the forces with which the two repel each other, measured in kJ/mol/nm
+     * @param[out] directions  unit vectors from the second side to the first
+     */
+    void getContacts(Context& context, std::vector<int>& ends, std::vector<double>& fractions,
+            std::vector<double>& gaps, std::vector<double>& forces, std::vector<Vec3>& directions);
+    /**
      * Set whether the distances of segments and spheres are those of their nearest periodic images.  The positions of a
      * chain's particles are taken as they are, even in a periodic box.
      */

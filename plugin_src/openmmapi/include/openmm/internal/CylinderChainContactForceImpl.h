@@ -29,6 +29,11 @@ public:
     std::vector<std::string> getKernelNames();
     void updateParametersInContext(ContextImpl& context);
     /**
+     * Find the contacts at the present positions: see CylinderChainContactForce::getContacts().
+     */
+    void getContacts(ContextImpl& context, std::vector<int>& ends, std::vector<double>& fractions,
+            std::vector<double>& gaps, std::vector<double>& forces, std::vector<Vec3>& directions) const;
+    /**
      * Get what finds contacts in the Context: the segments of all chains, in their order, then the spheres.
      */
     cylchain::ContactSearch& getSearch() {
