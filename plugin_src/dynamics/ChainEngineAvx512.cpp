@@ -1,6 +1,7 @@
 #ifdef CYLCHAIN_X86_64
 #define CYLCHAIN_LOOPS avx512
 #define CYLCHAIN_LANES 8
+#define CYLCHAIN_SMALL_PACKS avx2Kernels
 #include "dynamics/ChainLoops-inl.h"
 
 const cylchain::ChainKernels& cylchain::avx512Kernels() {

@@ -69,12 +69,32 @@ Instability stepOfModesOfPack(const ModePack<Scalar>& modes, const double* posit
 
 #include "dynamics/ExplicitLoops-inl.h"
 
+/**
+ * Whether all but implicit steps of open chains is left to CYLCHAIN_SMALL_PACKS for packs of W chains, with the same
+ * results to the bit. Few packs have less chains than lanes, but their loops take as long to compile.
+ */
+template <int W> constexpr bool isSmall() {
+#ifdef CYLCHAIN_SMALL_PACKS
+    return W > 1 && W < CYLCHAIN_LANES;
+#else
+    return false;
+#endif
+}
+
+#ifndef CYLCHAIN_SMALL_PACKS
+#define CYLCHAIN_SMALL_PACKS baselineKernels
+#endif
+
 template <int W> Instability stepPackAs(const Pack& pack, const double* positions, const double* forces,
             const double* box, const StepSettings& settings, double* displacements) {
-    if (isImplicit(settings.scheme))
-        return pack.closed ? stepPackImplicitly<W, true>(pack, positions, forces, box, settings, displacements) :
-                stepPackImplicitly<W, false>(pack, positions, forces, box, settings, displacements);
-    return stepPack<W>(pack, positions, forces, box, settings, displacements);
+    if (isImplicit(settings.scheme) && !pack.closed)
+        return stepPackImplicitly<W, false>(pack, positions, forces, box, settings, displacements);
+    if constexpr (isSmall<W>())
+        return CYLCHAIN_SMALL_PACKS().step(pack, positions, forces, box, settings, displacements);
+    else if (isImplicit(settings.scheme))
+        return stepPackImplicitly<W, true>(pack, positions, forces, box, settings, displacements);
+    else
+        return stepPack<W>(pack, positions, forces, box, settings, displacements);
 }
 
 /** Call a function with as many lanes as a pack has. Those that the instruction set has not are not compiled. */
@@ -88,7 +108,10 @@ template <int W = CYLCHAIN_LANES, class Function> auto withLanesOf(const Pack& p
 ChainEnergy addForcesOfPack(const Pack& pack, const double* positions, double* forces, const double* box,
             bool includeEnergy) {
     return withLanesOf(pack, [&] (auto lanes) {
-        return addForcesTo<lanes>(pack, positions, forces, box, includeEnergy);
+        if constexpr (isSmall<lanes>())
+            return CYLCHAIN_SMALL_PACKS().addForces(pack, positions, forces, box, includeEnergy);
+        else
+            return addForcesTo<lanes>(pack, positions, forces, box, includeEnergy);
     });
 }
 
@@ -101,14 +124,20 @@ Instability stepOfPack(const Pack& pack, const double* positions, const double* 
 
 PackStep* createStepOfPack(const Pack& pack) {
     return withLanesOf(pack, [&] (auto lanes) {
-        return newPackStep<lanes>(pack);
+        if constexpr (isSmall<lanes>())
+            return CYLCHAIN_SMALL_PACKS().createStep(pack);
+        else
+            return newPackStep<lanes>(pack);
     });
 }
 
 Instability stepOfModesOfPack(const ModePack<Scalar>& modes, const double* positions, const double* forces,
             const double* box, const StepSettings& settings, double* displacements) {
     return withLanesOf(modes.pack, [&] (auto lanes) {
-        return stepPackOfModes<lanes>(modes, positions, forces, box, settings, displacements);
+        if constexpr (isSmall<lanes>())
+            return CYLCHAIN_SMALL_PACKS().stepOfModes(modes, positions, forces, box, settings, displacements);
+        else
+            return stepPackOfModes<lanes>(modes, positions, forces, box, settings, displacements);
     });
 }
 

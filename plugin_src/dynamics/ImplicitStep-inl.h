@@ -51,7 +51,7 @@ public:
      *                quarter of a turn would do
      * @return the number of iterations
      */
-    int take(const Vec* forces, Vec* y, bool* failed) {
+    __attribute__((noinline)) int take(const Vec* forces, Vec* y, bool* failed) {
         begin(forces, y);
         for (int i = 0; i < W; i++)
             failed[i] = false;

@@ -165,13 +165,13 @@ static bool takeNumber(PyObject* object, int& value) {
 
 template <class T>
 static bool takeNumbers(PyObject* object, std::vector<T>& values) {
-    PyObject* sequence = PySequence_Fast(object, "numbers must be in a sequence");
+    PyObject* sequence = PySequence_Tuple(object);
     if (sequence == NULL)
         return false;
-    values.resize(PySequence_Fast_GET_SIZE(sequence));
+    values.resize(PyTuple_Size(sequence));
     bool taken = true;
     for (size_t i = 0; i < values.size() && taken; i++)
-        taken = takeNumber(PySequence_Fast_GET_ITEM(sequence, i), values[i]);
+        taken = takeNumber(PyTuple_GetItem(sequence, i), values[i]);
     Py_DECREF(sequence);
     return taken;
 }

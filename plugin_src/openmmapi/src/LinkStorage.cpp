@@ -87,7 +87,7 @@ LinkTable readTable(const SerializationNode& node) {
     return stored.getTable();
 }
 
-static vector<CylinderChainLinkForceImpl*> findForces(ContextImpl& context) {
+static vector<CylinderChainLinkForceImpl*> findLinkForces(ContextImpl& context) {
     vector<CylinderChainLinkForceImpl*> forces;
     for (ForceImpl* impl : context.getForceImpls()) {
         CylinderChainLinkForceImpl* force = dynamic_cast<CylinderChainLinkForceImpl*>(impl);
@@ -102,7 +102,7 @@ static void giveTables(const vector<LinkTable>& tables, ContextImpl& context) {
 
     if (tables.empty())
         return;
-    const vector<CylinderChainLinkForceImpl*> forces = findForces(context);
+    const vector<CylinderChainLinkForceImpl*> forces = findLinkForces(context);
     if (tables.size() != forces.size())
         throw OpenMMException("CylinderChainIntegrator: The State or checkpoint has the links of "+
                 to_string(tables.size())+" CylinderChainLinkForces, but the System has "+to_string(forces.size()));
@@ -110,7 +110,7 @@ static void giveTables(const vector<LinkTable>& tables, ContextImpl& context) {
         forces[i]->setTable(tables[i]);
 }
 
-static const char* const WITHIN = "the links of a CylinderChainLinkForce";
+static const char* const WITHIN_LINKS = "the links of a CylinderChainLinkForce";
 
 template <class T> static void writeValues(ostream& stream, const vector<T>& values) {
     stream.write(reinterpret_cast<const char*>(values.data()), values.size()*sizeof(T));
@@ -120,12 +120,12 @@ template <class T> static vector<T> readValues(istream& stream, size_t count) {
     // One by one, so that a checkpoint which is cut off cannot ask for more memory than it has.
     vector<T> values;
     for (size_t i = 0; i < count; i++)
-        values.push_back(readValue<T>(stream, WITHIN)); // NOLINT(performance-inefficient-vector-operation)
+        values.push_back(readValue<T>(stream, WITHIN_LINKS)); // NOLINT(performance-inefficient-vector-operation)
     return values;
 }
 
 void writeLinks(ostream& stream, ContextImpl& context) {
-    const vector<CylinderChainLinkForceImpl*> forces = findForces(context);
+    const vector<CylinderChainLinkForceImpl*> forces = findLinkForces(context);
     writeValue(stream, (int) forces.size());
     for (CylinderChainLinkForceImpl* force : forces) {
         const StoredTable stored(force->getTable());
@@ -143,11 +143,11 @@ void writeLinks(ostream& stream, ContextImpl& context) {
 
 void readLinks(istream& stream, ContextImpl& context) {
     vector<LinkTable> tables;
-    const int numTables = readValue<int>(stream, WITHIN);
+    const int numTables = readValue<int>(stream, WITHIN_LINKS);
     for (int i = 0; i < numTables; i++) {
         StoredTable stored;
-        stored.nextNumber = readValue<int>(stream, WITHIN);
-        const size_t count = max(0, readValue<int>(stream, WITHIN));
+        stored.nextNumber = readValue<int>(stream, WITHIN_LINKS);
+        const size_t count = max(0, readValue<int>(stream, WITHIN_LINKS));
         stored.numbers = readValues<int>(stream, count);
         stored.active = readValues<int>(stream, count);
         stored.columns.ends = readValues<int>(stream, 4*count);
@@ -161,7 +161,7 @@ void readLinks(istream& stream, ContextImpl& context) {
 }
 
 void writeLinks(SerializationNode& node, ContextImpl& context) {
-    for (CylinderChainLinkForceImpl* force : findForces(context))
+    for (CylinderChainLinkForceImpl* force : findLinkForces(context))
         writeTable(node.createChildNode("Links"), force->getTable());
 }
 

@@ -11,7 +11,7 @@ using namespace std;
 
 namespace OpenMM {
 
-static void refuse(const string& message) {
+static void refuseLinkers(const string& message) {
     throw OpenMMException("CylinderChainBindingForce: "+message);
 }
 
@@ -27,22 +27,22 @@ LinkerColumns::LinkerColumns(const LinkerState& state) : nextNumber(state.nextNu
     }
 }
 
-static void checkColumn(const char* name, size_t size, size_t expected) {
+static void checkLinkerColumn(const char* name, size_t size, size_t expected) {
     if (size != expected)
-        refuse(string("There must be ")+to_string(expected)+" "+name+", but there are "+to_string(size));
+        refuseLinkers(string("There must be ")+to_string(expected)+" "+name+", but there are "+to_string(size));
 }
 
 vector<Linker> LinkerColumns::getLinkers() const {
     const size_t count = numbers.size();
-    checkColumn("types", types.size(), count);
-    checkColumn("anchors", anchors.size(), count);
-    checkColumn("chains", chains.size(), 2*count);
-    checkColumn("places", places.size(), 2*count);
+    checkLinkerColumn("types", types.size(), count);
+    checkLinkerColumn("anchors", anchors.size(), count);
+    checkLinkerColumn("chains", chains.size(), 2*count);
+    checkLinkerColumn("places", places.size(), 2*count);
     vector<Linker> linkers;
     linkers.reserve(count);
     for (size_t i = 0; i < count; i++) {
         if (numbers[i] < 0 || (i > 0 && numbers[i] <= numbers[i-1]))
-            refuse("The numbers of linkers must ascend from 0 on");
+            refuseLinkers("The numbers of linkers must ascend from 0 on");
         Linker linker;
         linker.number = numbers[i];
         linker.type = types[i];
@@ -55,7 +55,7 @@ vector<Linker> LinkerColumns::getLinkers() const {
         linkers.push_back(linker);
     }
     if (nextNumber < 0 || (count > 0 && nextNumber <= numbers.back()))
-        refuse("The next number must be above those of all linkers");
+        refuseLinkers("The next number must be above those of all linkers");
     return linkers;
 }
 
@@ -65,43 +65,43 @@ void checkLinkers(const vector<Linker>& linkers, const LinkerSystem& system, con
     for (const Linker& linker : linkers) {
         const string name = "Linker "+to_string(linker.number);
         if (linker.type < 0 || linker.type >= (int) system.types.size())
-            refuse(name+" has an illegal type: "+to_string(linker.type));
+            refuseLinkers(name+" has an illegal type: "+to_string(linker.type));
         const LinkerType& type = system.types[linker.type];
         if (linker.anchor < -1 || linker.anchor >= (int) system.anchors.size())
-            refuse(name+" has an illegal anchor: "+to_string(linker.anchor));
+            refuseLinkers(name+" has an illegal anchor: "+to_string(linker.anchor));
         if ((linker.anchor == -1) != (type.hands[0] >= 0))
-            refuse(name+(linker.anchor == -1 ? " has no anchor, but those of its type have one" :
+            refuseLinkers(name+(linker.anchor == -1 ? " has no anchor, but those of its type have one" :
                     " has an anchor, but those of its type have two hands"));
         if (type.concentration >= 0 && !linker.isHeld(0) && !linker.isHeld(1))
-            refuse(name+" is not bound, but those of its type are only counted while they are bound: their "
+            refuseLinkers(name+" is not bound, but those of its type are only counted while they are bound: their "
                     "concentration is given");
         if (!isfinite(linker.clock))
-            refuse(name+" has an illegal clock: "+to_string(linker.clock));
+            refuseLinkers(name+" has an illegal clock: "+to_string(linker.clock));
         for (int side = 0; side < 2; side++) {
             const HandPlace& place = linker.hands[side];
             if (!place.isBound()) {
                 if (place.chain < -1)
-                    refuse(name+" is bound to an illegal chain: "+to_string(place.chain));
+                    refuseLinkers(name+" is bound to an illegal chain: "+to_string(place.chain));
                 continue;
             }
             if (type.hands[side] < 0)
-                refuse(name+" has an anchor in the place of its first hand, but is bound with it");
+                refuseLinkers(name+" has an anchor in the place of its first hand, but is bound with it");
             const Hand& hand = system.hands[type.hands[side]];
             if (!binary_search(hand.chains.begin(), hand.chains.end(), place.chain))
-                refuse(name+" is bound to chain "+to_string(place.chain)+", to which its hand does not bind");
+                refuseLinkers(name+" is bound to chain "+to_string(place.chain)+", to which its hand does not bind");
             if (!(place.position >= 0))
-                refuse(name+" is bound at an illegal position along chain "+to_string(place.chain));
+                refuseLinkers(name+" is bound at an illegal position along chain "+to_string(place.chain));
             if (lengths.empty())
                 continue;
             const double length = lengths[place.chain];
             if (!(place.position <= length*(1+1e-9)))
-                refuse(name+" is bound "+to_string(place.position)+" nm along chain "+to_string(place.chain)+
+                refuseLinkers(name+" is bound "+to_string(place.position)+" nm along chain "+to_string(place.chain)+
                         ", which is only "+to_string(length)+" nm long");
             if (hand.siteSpacing > 0) {
                 const long long site = (long long) floor(place.position/hand.siteSpacing);
                 if (site >= floor(length/hand.siteSpacing+1e-9) ||
                         !sites.insert(make_tuple(place.chain, hand.siteSpacing, site)).second)
-                    refuse(name+" is bound to site "+to_string(site)+" of chain "+to_string(place.chain)+
+                    refuseLinkers(name+" is bound to site "+to_string(site)+" of chain "+to_string(place.chain)+
                             ", which does not exist or is taken");
             }
         }

@@ -59,7 +59,7 @@ LinkerState readLinkerState(const SerializationNode& node) {
     return state;
 }
 
-static vector<CylinderChainBindingForceImpl*> findForces(ContextImpl& context) {
+static vector<CylinderChainBindingForceImpl*> findBindingForces(ContextImpl& context) {
     vector<CylinderChainBindingForceImpl*> forces;
     for (ForceImpl* impl : context.getForceImpls()) {
         CylinderChainBindingForceImpl* force = dynamic_cast<CylinderChainBindingForceImpl*>(impl);
@@ -74,7 +74,7 @@ static void giveStates(const vector<LinkerState>& states, const vector<uint32_t>
 
     if (states.empty())
         return;
-    const vector<CylinderChainBindingForceImpl*> forces = findForces(context);
+    const vector<CylinderChainBindingForceImpl*> forces = findBindingForces(context);
     if (states.size() != forces.size())
         throw OpenMMException("CylinderChainIntegrator: The State or checkpoint has the linkers of "+
                 to_string(states.size())+" CylinderChainBindingForces, but the System has "+
@@ -86,10 +86,10 @@ static void giveStates(const vector<LinkerState>& states, const vector<uint32_t>
     }
 }
 
-static const char* const WITHIN = "the linkers of a CylinderChainBindingForce";
+static const char* const WITHIN_LINKERS = "the linkers of a CylinderChainBindingForce";
 
 void writeLinkers(ostream& stream, ContextImpl& context) {
-    const vector<CylinderChainBindingForceImpl*> forces = findForces(context);
+    const vector<CylinderChainBindingForceImpl*> forces = findBindingForces(context);
     writeValue(stream, (int) forces.size());
     for (CylinderChainBindingForceImpl* force : forces) {
         const LinkerState& state = force->getState();
@@ -112,26 +112,26 @@ void writeLinkers(ostream& stream, ContextImpl& context) {
 void readLinkers(istream& stream, ContextImpl& context, bool withClocks) {
     vector<LinkerState> states;
     vector<uint32_t> seeds;
-    const int count = readValue<int>(stream, WITHIN);
+    const int count = readValue<int>(stream, WITHIN_LINKERS);
     for (int i = 0; i < count; i++) {
         LinkerState state;
-        seeds.push_back(readValue<uint64_t>(stream, WITHIN));
-        state.nextNumber = readValue<uint64_t>(stream, WITHIN);
-        state.steps = readValue<uint64_t>(stream, WITHIN);
-        state.bindings = readValue<uint64_t>(stream, WITHIN);
-        state.unbindings = readValue<uint64_t>(stream, WITHIN);
-        const uint64_t linkers = readValue<uint64_t>(stream, WITHIN);
+        seeds.push_back(readValue<uint64_t>(stream, WITHIN_LINKERS));
+        state.nextNumber = readValue<uint64_t>(stream, WITHIN_LINKERS);
+        state.steps = readValue<uint64_t>(stream, WITHIN_LINKERS);
+        state.bindings = readValue<uint64_t>(stream, WITHIN_LINKERS);
+        state.unbindings = readValue<uint64_t>(stream, WITHIN_LINKERS);
+        const uint64_t linkers = readValue<uint64_t>(stream, WITHIN_LINKERS);
         for (uint64_t j = 0; j < linkers; j++) {
             // One by one, so that a checkpoint which is cut off cannot ask for more memory than it has.
             Linker linker;
-            linker.number = readValue<uint32_t>(stream, WITHIN);
-            linker.type = readValue<int>(stream, WITHIN);
-            linker.anchor = readValue<int>(stream, WITHIN);
+            linker.number = readValue<uint32_t>(stream, WITHIN_LINKERS);
+            linker.type = readValue<int>(stream, WITHIN_LINKERS);
+            linker.anchor = readValue<int>(stream, WITHIN_LINKERS);
             if (withClocks)
-                linker.clock = readValue<double>(stream, WITHIN);
+                linker.clock = readValue<double>(stream, WITHIN_LINKERS);
             for (HandPlace& hand : linker.hands) {
-                hand.chain = readValue<int>(stream, WITHIN);
-                hand.position = readValue<double>(stream, WITHIN);
+                hand.chain = readValue<int>(stream, WITHIN_LINKERS);
+                hand.position = readValue<double>(stream, WITHIN_LINKERS);
             }
             state.linkers.push_back(linker);
         }
@@ -141,7 +141,7 @@ void readLinkers(istream& stream, ContextImpl& context, bool withClocks) {
 }
 
 void writeLinkers(SerializationNode& node, ContextImpl& context) {
-    for (CylinderChainBindingForceImpl* force : findForces(context))
+    for (CylinderChainBindingForceImpl* force : findBindingForces(context))
         writeLinkerState(node.createChildNode("Linkers"), force->getState());
 }
 

@@ -1,6 +1,6 @@
 #include "ReferenceCalcCylinderChainContactForceKernel.h"
+#include "ReferenceContextData.h"
 #include "openmm/OpenMMException.h"
-#include "openmm/reference/ReferencePlatform.h"
 #include <algorithm>
 #include <stdexcept>
 
@@ -13,10 +13,6 @@ static const double SKIN = 0.75;
 
 /** Pairs that are looked at by one thread at a time. */
 static const int CHUNK = 512;
-
-static ReferencePlatform::PlatformData& extractData(ContextImpl& context) {
-    return *reinterpret_cast<ReferencePlatform::PlatformData*>(context.getPlatformData());
-}
 
 /** A contact of a pair. */
 struct ReferenceCalcCylinderChainContactForceKernel::Touching {

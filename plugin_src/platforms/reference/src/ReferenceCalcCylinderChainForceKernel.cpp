@@ -1,13 +1,9 @@
 #include "ReferenceCalcCylinderChainForceKernel.h"
-#include "openmm/reference/ReferencePlatform.h"
+#include "ReferenceContextData.h"
 
 using namespace OpenMM;
 using namespace cylchain;
 using namespace std;
-
-static ReferencePlatform::PlatformData& extractData(ContextImpl& context) {
-    return *reinterpret_cast<ReferencePlatform::PlatformData*>(context.getPlatformData());
-}
 
 ReferenceCalcCylinderChainForceKernel::ReferenceCalcCylinderChainForceKernel(string name, const Platform& platform,
         ContextImpl& context) : CalcCylinderChainForceKernel(name, platform), loop(context), chains(NULL) {

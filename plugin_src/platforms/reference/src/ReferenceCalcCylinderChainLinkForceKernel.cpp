@@ -1,5 +1,5 @@
 #include "ReferenceCalcCylinderChainLinkForceKernel.h"
-#include "openmm/reference/ReferencePlatform.h"
+#include "ReferenceContextData.h"
 #include <algorithm>
 
 using namespace OpenMM;
@@ -9,11 +9,7 @@ using namespace std;
 /**
  * Links are given to threads in blocks of this size.
  */
-static const int BLOCK_SIZE = 1024;
-
-static ReferencePlatform::PlatformData& extractData(ContextImpl& context) {
-    return *reinterpret_cast<ReferencePlatform::PlatformData*>(context.getPlatformData());
-}
+static const int LINKS_OF_BLOCK = 1024;
 
 ReferenceCalcCylinderChainLinkForceKernel::ReferenceCalcCylinderChainLinkForceKernel(string name,
         const Platform& platform, ContextImpl& context) : CalcCylinderChainLinkForceKernel(name, platform),
@@ -35,9 +31,9 @@ double ReferenceCalcCylinderChainLinkForceKernel::execute(ContextImpl& context, 
     boxes.segments = nearestParticles ? box : NULL;
     const int count = links.size();
     pulls.resize(count);
-    loop.run((count+BLOCK_SIZE-1)/BLOCK_SIZE, [&] (int block) {
-        const int end = min(count, (block+1)*BLOCK_SIZE);
-        for (int i = block*BLOCK_SIZE; i < end; i++)
+    loop.run((count+LINKS_OF_BLOCK-1)/LINKS_OF_BLOCK, [&] (int block) {
+        const int end = min(count, (block+1)*LINKS_OF_BLOCK);
+        for (int i = block*LINKS_OF_BLOCK; i < end; i++)
             pulls[i] = computePull(links[i], positions, boxes);
     });
 

@@ -1,14 +1,10 @@
 #include "ReferenceCalcCylinderChainWallForceKernel.h"
+#include "ReferenceContextData.h"
 #include "openmm/internal/ContextImpl.h"
-#include "openmm/reference/ReferencePlatform.h"
 
 using namespace OpenMM;
 using namespace cylchain;
 using namespace std;
-
-static ReferencePlatform::PlatformData& extractData(ContextImpl& context) {
-    return *reinterpret_cast<ReferencePlatform::PlatformData*>(context.getPlatformData());
-}
 
 ReferenceCalcCylinderChainWallForceKernel::ReferenceCalcCylinderChainWallForceKernel(string name,
         const Platform& platform) : CalcCylinderChainWallForceKernel(name, platform) {

@@ -1,6 +1,6 @@
 #include "ReferenceIntegrateCylinderChainStepKernel.h"
+#include "ReferenceContextData.h"
 #include "lanes/Noise.h"
-#include "openmm/reference/ReferencePlatform.h"
 #include "openmm/reference/ReferenceVirtualSites.h"
 #include <algorithm>
 #include <cmath>
@@ -13,11 +13,7 @@ using namespace std;
 /**
  * Particles outside chains are given to threads in blocks of this size.
  */
-static const int BLOCK_SIZE = 64;
-
-static ReferencePlatform::PlatformData& extractData(ContextImpl& context) {
-    return *reinterpret_cast<ReferencePlatform::PlatformData*>(context.getPlatformData());
-}
+static const int PARTICLES_OF_BLOCK = 64;
 
 static bool isFinite(const Vec3& v) {
     return isfinite(v[0]) && isfinite(v[1]) && isfinite(v[2]);
@@ -105,7 +101,7 @@ int ReferenceIntegrateCylinderChainStepKernel::displaceOthers(ContextImpl& conte
         double friction) {
     const vector<int>& mobile = others->getMobile();
     const vector<Vec3>& forces = *extractData(context).forces;
-    const int numBlocks = (mobile.size()+BLOCK_SIZE-1)/BLOCK_SIZE;
+    const int numBlocks = (mobile.size()+PARTICLES_OF_BLOCK-1)/PARTICLES_OF_BLOCK;
     loop.run(numBlocks, [&] (int block) {
         displaceBlock(block, *extractData(context).positions, forces, settings, friction);
     });
@@ -125,11 +121,11 @@ static Vec3 velocityOf(const BackgroundFlow& flow, const Vec3& x) {
 void ReferenceIntegrateCylinderChainStepKernel::displaceBlock(int block, const vector<Vec3>& positions,
         const vector<Vec3>& forces, const StepSettings& settings, double friction) {
     const vector<int>& mobile = others->getMobile();
-    const int start = block*BLOCK_SIZE;
-    const int end = min((int) mobile.size(), start+BLOCK_SIZE);
-    const uint32_t noChains[BLOCK_SIZE] = {};
-    uint32_t particles[BLOCK_SIZE];
-    double gaussian[4*BLOCK_SIZE];
+    const int start = block*PARTICLES_OF_BLOCK;
+    const int end = min((int) mobile.size(), start+PARTICLES_OF_BLOCK);
+    const uint32_t noChains[PARTICLES_OF_BLOCK] = {};
+    uint32_t particles[PARTICLES_OF_BLOCK];
+    double gaussian[4*PARTICLES_OF_BLOCK];
     copy(mobile.begin()+start, mobile.begin()+end, particles);
     drawNormals({(uint32_t) settings.seed, (uint32_t) settings.level, settings.step}, NoiseKind::Particle, noChains,
             particles, end-start, gaussian);

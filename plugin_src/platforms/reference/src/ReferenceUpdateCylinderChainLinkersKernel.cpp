@@ -1,13 +1,9 @@
 #include "ReferenceUpdateCylinderChainLinkersKernel.h"
-#include "openmm/reference/ReferencePlatform.h"
+#include "ReferenceContextData.h"
 
 using namespace OpenMM;
 using namespace cylchain;
 using namespace std;
-
-static ReferencePlatform::PlatformData& extractData(ContextImpl& context) {
-    return *reinterpret_cast<ReferencePlatform::PlatformData*>(context.getPlatformData());
-}
 
 ReferenceUpdateCylinderChainLinkersKernel::ReferenceUpdateCylinderChainLinkersKernel(string name,
         const Platform& platform, ContextImpl& context) : UpdateCylinderChainLinkersKernel(name, platform),
