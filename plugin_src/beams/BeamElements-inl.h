@@ -1,0 +1,73 @@
+// Included into the namespace of an instruction set. It does not compile alone.
+
+/**
+ * What a step keeps of elements, and velocities and forces at the points of their curves.
+ */
+
+/** What a step begins with. */
+template <int W> struct BeamStart {
+    Vector<typename Lanes<W>::Type> *control, *chord;
+};
+
+/** A coordinate that is a strain: its start and noise, and what the last iteration had for its tension. */
+template <class Real> struct BeamStrain {
+    Real start, random, stiffness, tension, multiplier, before;
+};
+
+/** What a step keeps of an element and of its first node. */
+template <class Real> struct BeamElementState {
+    BeamStrain<Real> ofNode, ofMiddle;
+    Vector<Real> sum, difference, randomSum, randomDifference, middle;
+    Vector<Real> direction, newMiddle;
+    /** The response of the strain in the middle to the four vectors. */
+    Vector<Real> weights[4];
+    /** What the forces of the two strains lack of those along the mean directions, for a tension of one. */
+    BeamGradient<Real> lacking;
+    Vector<Real> nodeLacking;
+};
+
+/** Two vectors that are orthogonal to a unit vector and to each other, as Duff et al. 2017. */
+template <class Real> CYLCHAIN_INLINE void orthogonal(const Vector<Real>& m, Vector<Real>& first,
+            Vector<Real>& second) {
+    Real sign;
+    Vector<Real> copy = m;
+    for (int i = 0; i < LANE_COUNT<Real>; i++)
+        lane(sign, i) = std::copysign(1.0, lane(copy.z, i));
+    const Real a = -1/(sign+m.z), b = m.x*m.y*a;
+    first = {1+sign*m.x*m.x*a, sign*b, -sign*m.x};
+    second = {b, sign+m.y*m.y*a, -m.y};
+}
+
+/** The direction of the curve at a Gauss point. */
+template <class Real> CYLCHAIN_INLINE Vector<Real> directionAt(int g, const Vector<Real>& control1,
+            const Vector<Real>& chord, const Vector<Real>& control2) {
+    const Vector<Real> slope = control1*splat<Real>(WEIGHTS.slope[g][1])+chord*splat<Real>(WEIGHTS.slope[g][2])+
+            control2*splat<Real>(WEIGHTS.slope[g][3]);
+    return slope*(1/root(slope.dot(slope)));
+}
+
+/** Let a force at a Gauss point act on the nodes. */
+template <class Real> CYLCHAIN_INLINE void addAt(int g, const Vector<Real>& force, SixVector<Real>& first,
+            SixVector<Real>& second) {
+    first.position = first.position+force*splat<Real>(WEIGHTS.value[g][0]);
+    first.control = first.control+force*splat<Real>(WEIGHTS.value[g][1]);
+    second.position = second.position+force*splat<Real>(WEIGHTS.value[g][2]);
+    second.control = second.control+force*splat<Real>(WEIGHTS.value[g][3]);
+}
+
+/** How far a Gauss point moves with the nodes. */
+template <class Real> CYLCHAIN_INLINE Vector<Real> velocityAt(int g, const SixVector<Real>& first,
+            const SixVector<Real>& second) {
+    return first.position*splat<Real>(WEIGHTS.value[g][0])+first.control*splat<Real>(WEIGHTS.value[g][1])+
+            second.position*splat<Real>(WEIGHTS.value[g][2])+second.control*splat<Real>(WEIGHTS.value[g][3]);
+}
+
+/** Let a force on the vectors of an element act on its nodes. */
+template <class Real> CYLCHAIN_INLINE void addForcesOf(const BeamGradient<Real>& force, Real perLength,
+            SixVector<Real>& first, SixVector<Real>& second) {
+    const Vector<Real> chord = force.middle*(perLength*Scalar(1.5)), control = force.middle*(perLength*Scalar(0.75));
+    first.position = first.position-chord;
+    first.control = first.control+force.first*(3*perLength)-control;
+    second.position = second.position+chord;
+    second.control = second.control+force.last*(3*perLength)-control;
+}

@@ -1,0 +1,259 @@
+// Included into the namespace of an instruction set. It does not compile alone.
+
+/**
+ * Linear equations with one block of six rows for each node of a chain, and their solution from the first node to the
+ * last one. The six are the position and the control vector of a node.
+ */
+
+template <class Real> struct SixVector {
+    Vector<Real> position, control;
+};
+
+/** A 6x6 matrix; of a symmetric one, what is below the diagonal and on it. */
+template <class Real> struct SixMatrix {
+    Real a[6][6];
+};
+
+/**
+ * What four vectors of an element have in the equations: symmetric blocks of them, and products for so many
+ * coordinates.
+ */
+template <class Real, int COORDINATES> struct BeamMatrix {
+    /** The pairs 00, 01, 02, 03, 11, 12, 13, 22, 23 and 33. */
+    Symmetric<Real> block[10];
+    /** Plus each of these times itself, for the four vectors. */
+    Vector<Real> outer[COORDINATES][4];
+};
+
+template <int W> class BeamEquations {
+public:
+    typedef typename Lanes<W>::Type Real;
+    typedef Vector<Real> Vec;
+    struct Row {
+        SixMatrix<Real> diagonal, upper;
+    };
+    struct Eliminated {
+        SixMatrix<Real> inverse, factor;
+        Real right[6];
+    };
+    /** @param mobile  one or zero for each particle and lane */
+    BeamEquations(const std::vector<double>& mobile, int nodes, Eliminated* memory) : mobile(mobile), n(nodes),
+            rows(memory) {
+    }
+    /** Add an element to the equations of its nodes; it is the first to do so for the second one. */
+    template <int COORDINATES> static CYLCHAIN_INLINE void addElement(const BeamMatrix<Real, COORDINATES>& m, Row& here,
+            Row& after) {
+        addLower(m, 0, here.diagonal);
+        after.diagonal = SixMatrix<Real> {};
+        addLower(m, 2, after.diagonal);
+#pragma GCC unroll 6
+        for (int k = 0; k < 2; k++)
+#pragma GCC unroll 6
+            for (int l = 0; l < 2; l++)
+                setBlock(m, k, 2+l, here.upper, k, l);
+    }
+    /** Add a symmetric matrix to the control vector of a node. */
+    static CYLCHAIN_INLINE void addToControl(const Symmetric<Real>& m, Row& row) {
+        addSymmetric(m, row.diagonal, 1);
+    }
+    /** Eliminate a node, which the next one follows unless it is the last. */
+    CYLCHAIN_INLINE void eliminate(int node, Row& here, Row& after, bool last) {
+        Eliminated& own = rows[node];
+        invert(node, here.diagonal);
+        own.inverse = here.diagonal;
+        if (last)
+            return;
+#pragma GCC unroll 6
+        for (int i = 0; i < 6; i++)
+#pragma GCC unroll 6
+            for (int j = 0; j < 6; j++) {
+                Real value = own.inverse.a[i][0]*here.upper.a[0][j];
+#pragma GCC unroll 6
+                for (int k = 1; k < 6; k++)
+                    value = value+element(own.inverse, i, k)*here.upper.a[k][j];
+                own.factor.a[i][j] = value;
+            }
+#pragma GCC unroll 6
+        for (int i = 0; i < 6; i++)
+#pragma GCC unroll 6
+            for (int j = 0; j <= i; j++) {
+                Real value = after.diagonal.a[i][j];
+#pragma GCC unroll 6
+                for (int k = 0; k < 6; k++)
+                    value = value-here.upper.a[k][i]*own.factor.a[k][j];
+                after.diagonal.a[i][j] = value;
+            }
+    }
+    /** Set the right side of all nodes. */
+    void setRight(const SixVector<Real>* right) {
+        for (int node = 0; node < n; node++)
+            store(right[node], rows[node].right);
+    }
+    /** Solve the equations with the right side that they have. */
+    void substitute(SixVector<Real>* result) {
+        for (int node = 0; node < n-1; node++) {
+            const Eliminated& own = rows[node];
+#pragma GCC unroll 6
+            for (int j = 0; j < 6; j++) {
+                Real value = rows[node+1].right[j];
+#pragma GCC unroll 6
+                for (int i = 0; i < 6; i++)
+                    value = value-own.factor.a[i][j]*own.right[i];
+                rows[node+1].right[j] = value;
+            }
+        }
+        Real next[6] = {};
+        for (int node = n-1; node >= 0; node--) {
+            const Eliminated& own = rows[node];
+            Real x[6];
+#pragma GCC unroll 6
+            for (int i = 0; i < 6; i++) {
+                Real value = element(own.inverse, i, 0)*own.right[0];
+#pragma GCC unroll 6
+                for (int j = 1; j < 6; j++)
+                    value = value+element(own.inverse, i, j)*own.right[j];
+                if (node < n-1)
+#pragma GCC unroll 6
+                    for (int j = 0; j < 6; j++)
+                        value = value-own.factor.a[i][j]*next[j];
+                x[i] = value;
+            }
+#pragma GCC unroll 6
+            for (int i = 0; i < 6; i++)
+                next[i] = x[i];
+            result[node] = {{x[0], x[1], x[2]}, {x[3], x[4], x[5]}};
+        }
+    }
+    /**
+     * Find the blocks of the inverse of the matrix, from the last node to the first, and use them: those of a node
+     * and, unless it is the last one, that of the node and the next and that of the next.
+     */
+    template <class Function> void findInverse(Function use) const {
+        SixMatrix<Real> next = rows[n-1].inverse, both = {};
+        use(n-1, next, both, next);
+        for (int node = n-2; node >= 0; node--) {
+            const Eliminated& own = rows[node];
+            SixMatrix<Real> here;
+#pragma GCC unroll 6
+            for (int i = 0; i < 6; i++)
+#pragma GCC unroll 6
+                for (int j = 0; j < 6; j++) {
+                    Real value = Real{};
+#pragma GCC unroll 6
+                    for (int k = 0; k < 6; k++)
+                        value = value-own.factor.a[i][k]*element(next, k, j);
+                    both.a[i][j] = value;
+                }
+#pragma GCC unroll 6
+            for (int i = 0; i < 6; i++)
+#pragma GCC unroll 6
+                for (int j = 0; j <= i; j++) {
+                    Real value = own.inverse.a[i][j];
+#pragma GCC unroll 6
+                    for (int k = 0; k < 6; k++)
+                        value = value-both.a[i][k]*own.factor.a[j][k];
+                    here.a[i][j] = value;
+                }
+            use(node, here, both, next);
+            next = here;
+        }
+    }
+    static CYLCHAIN_INLINE Real element(const SixMatrix<Real>& symmetric, int i, int j) {
+        return i >= j ? symmetric.a[i][j] : symmetric.a[j][i];
+    }
+    static CYLCHAIN_INLINE void store(const SixVector<Real>& v, Real* values) {
+        values[0] = v.position.x;
+        values[1] = v.position.y;
+        values[2] = v.position.z;
+        values[3] = v.control.x;
+        values[4] = v.control.y;
+        values[5] = v.control.z;
+    }
+private:
+    /** The number of a pair of vectors, of which the second one is not before the first. */
+    static constexpr int indexOf(int k, int l) {
+        return k*(7-k)/2+l;
+    }
+    const std::vector<double>& mobile;
+    const int n;
+    Eliminated* const rows;
+
+    /** The inverse. Fixed particles have none of it: they neither move nor pass anything on. */
+    CYLCHAIN_INLINE void invert(int node, SixMatrix<Real>& m) const {
+        const Real moves[] = {loaded<Real>(mobile, 2*node), loaded<Real>(mobile, 2*node+1)};
+#pragma GCC unroll 6
+        for (int pivot = 0; pivot < 6; pivot++) {
+            const Real mobileOne = moves[pivot/3];
+            const Real inverse = mobileOne/(m.a[pivot][pivot]*mobileOne+(1-mobileOne));
+            Real column[6];
+#pragma GCC unroll 6
+            for (int i = 0; i < 6; i++)
+                column[i] = element(m, i, pivot);
+#pragma GCC unroll 6
+            for (int i = 0; i < 6; i++)
+#pragma GCC unroll 6
+                for (int j = 0; j <= i; j++)
+                    if (i != pivot && j != pivot)
+                        m.a[i][j] = m.a[i][j]-column[i]*column[j]*inverse;
+#pragma GCC unroll 6
+            for (int i = 0; i < 6; i++) {
+                Real& one = i >= pivot ? m.a[i][pivot] : m.a[pivot][i];
+                one = i == pivot ? -inverse : column[i]*inverse;
+            }
+        }
+#pragma GCC unroll 6
+        for (int i = 0; i < 6; i++)
+#pragma GCC unroll 6
+            for (int j = 0; j <= i; j++)
+                m.a[i][j] = -m.a[i][j];
+    }
+    static CYLCHAIN_INLINE void addSymmetric(const Symmetric<Real>& s, SixMatrix<Real>& m, int k) {
+        const int o = 3*k;
+        m.a[o][o] = m.a[o][o]+s.xx;
+        m.a[o+1][o] = m.a[o+1][o]+s.yx;
+        m.a[o+1][o+1] = m.a[o+1][o+1]+s.yy;
+        m.a[o+2][o] = m.a[o+2][o]+s.zx;
+        m.a[o+2][o+1] = m.a[o+2][o+1]+s.zy;
+        m.a[o+2][o+2] = m.a[o+2][o+2]+s.zz;
+    }
+    /** Add the blocks of the vectors k and k+1 to the lower half of a matrix. */
+    template <int COORDINATES> static CYLCHAIN_INLINE void addLower(const BeamMatrix<Real, COORDINATES>& m, int k,
+            SixMatrix<Real>& result) {
+#pragma GCC unroll 6
+        for (int l = 0; l < 2; l++) {
+            Symmetric<Real> own = m.block[indexOf(k+l, k+l)];
+#pragma GCC unroll 6
+            for (int i = 0; i < COORDINATES; i++)
+                own.addOuter(m.outer[i][k+l], m.outer[i][k+l]);
+            addSymmetric(own, result, l);
+        }
+        SixMatrix<Real> below;
+        setBlock(m, k+1, k, below, 1, 0);
+#pragma GCC unroll 6
+        for (int i = 3; i < 6; i++)
+#pragma GCC unroll 6
+            for (int j = 0; j < 3; j++)
+                result.a[i][j] = result.a[i][j]+below.a[i][j];
+    }
+    /** Set a block of a matrix to that of two vectors of an element. */
+    template <int COORDINATES> static CYLCHAIN_INLINE void setBlock(const BeamMatrix<Real, COORDINATES>& matrix,
+            int first, int second, SixMatrix<Real>& m, int k, int l) {
+        Real (*const a)[6] = m.a;
+        const int o = 3*k, p = 3*l;
+        const Symmetric<Real> s = matrix.block[indexOf(std::min(first, second),
+                std::max(first, second))];
+        Matrix<Real> sum = Matrix<Real>::of(s);
+#pragma GCC unroll 6
+        for (int i = 0; i < COORDINATES; i++)
+            sum = sum+Matrix<Real>::outer(matrix.outer[i][first], matrix.outer[i][second]);
+        a[o][p] = sum.x.x;
+        a[o][p+1] = sum.x.y;
+        a[o][p+2] = sum.x.z;
+        a[o+1][p] = sum.y.x;
+        a[o+1][p+1] = sum.y.y;
+        a[o+1][p+2] = sum.y.z;
+        a[o+2][p] = sum.z.x;
+        a[o+2][p+1] = sum.z.y;
+        a[o+2][p+2] = sum.z.z;
+    }
+};

@@ -1,0 +1,10 @@
+#ifdef CYLCHAIN_X86_64
+#define CYLCHAIN_LOOPS avx2
+#define CYLCHAIN_LANES 4
+#include "beams/BeamLoops-inl.h"
+
+const cylchain::BeamKernels& cylchain::avx2BeamKernels() {
+    static const BeamKernels kernels = {CYLCHAIN_LANES, avx2::addForcesOfBeams, avx2::stepOfBeams};
+    return kernels;
+}
+#endif

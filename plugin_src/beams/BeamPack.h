@@ -1,0 +1,53 @@
+#ifndef CYLCHAIN_BEAM_PACK_H_
+#define CYLCHAIN_BEAM_PACK_H_
+
+#include "dynamics/ChainEngine.h"
+#include <vector>
+
+namespace cylchain {
+
+/**
+ * Chains of beam elements side by side: the numbers of all chains for one node lie next to each other, one in each
+ * lane. Chains that are shorter than the longest one are filled up with elements that have neither energy nor friction,
+ * with nodes that are fixed.
+ */
+struct BeamPack {
+    /** The properties of the elements of a lane. */
+    enum Property {Length, Stretching, Bending, Shortening, Parallel, Perpendicular, NumProperties};
+    int lanes, nodes;
+    bool planar;
+    /** The number of each lane's chain, that by which its noise is known, and that of its nodes. */
+    std::vector<int> chain, noiseChain, nodesOfLane;
+    /** Particle of each position and control point, [2*node, 2*node+1][lane]; -1 for one that only fills up. */
+    std::vector<int> particles;
+    /** The same particles, each of them once, chain by chain. */
+    std::vector<int> particlesOfChains;
+    /** Properties, [property][lane]. */
+    std::vector<double> properties;
+    /** One for each element that is there, [element][lane]; zero for others. */
+    std::vector<double> present;
+    /** One for each particle that moves, [particle][lane]; zero for others. */
+    std::vector<double> mobile;
+    /** One for each lane whose chain has no particle that is fixed; zero for others. */
+    std::vector<double> free;
+};
+
+/** The loops over a pack, compiled for one instruction set. */
+struct BeamKernels {
+    /** The largest number of lanes that fits a register. */
+    int lanes;
+    ChainEnergy (*addForces)(const BeamPack& pack, const double* positions, double* forces, const double* box,
+            bool includeEnergy);
+    Instability (*step)(const BeamPack& pack, const double* positions, const double* forces, const double* box,
+            const StepSettings& settings, double* displacements);
+};
+
+const BeamKernels& baselineBeamKernels();
+#ifdef CYLCHAIN_X86_64
+const BeamKernels& avx2BeamKernels();
+const BeamKernels& avx512BeamKernels();
+#endif
+
+} // namespace cylchain
+
+#endif /*CYLCHAIN_BEAM_PACK_H_*/
