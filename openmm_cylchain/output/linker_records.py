@@ -44,7 +44,7 @@ class LinkedFilaments(Protocol):
 
     def linker_places(self, context: openmm.Context) -> Any: ...
 
-    def linker_events(self, context: openmm.Context) -> tuple[int, int]: ...
+    def linker_events(self, context: openmm.Context, linker_type: int | None = None) -> tuple[int, int]: ...
 
 
 def measure_linkers(
@@ -56,12 +56,11 @@ def measure_linkers(
     kinds = [own.kind for own in filaments.linkers]
     stiffness, rest = np.array([(kind.stiffness, kind.rest_length) for kind in kinds])[table.types].T
     tensions = stiffness * (lengths - rest)
-    events = filaments.linker_events(context)
     rows = []
     for number in range(len(kinds)):
         pulling = tensions[(table.types == number) & ~np.isnan(tensions)]
         mean, largest = (pulling.mean(), pulling.max()) if len(pulling) else (np.nan, np.nan)
-        rows.append((*table.counts(number), float(mean), float(largest), *events))
+        rows.append((*table.counts(number), float(mean), float(largest), *filaments.linker_events(context, number)))
     bound = table.bound.any(axis=1)
     records = np.zeros(int(bound.sum()), dtype=LINKER_RECORD)
     records["step"] = step

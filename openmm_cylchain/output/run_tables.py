@@ -126,8 +126,8 @@ LINKER_TABLE_COLUMNS = (
     "both hands bound",
     "mean tension (kJ/mol/nm)",
     "maximum tension (kJ/mol/nm)",
-    "bindings of all linkers",
-    "unbindings of all linkers",
+    "bindings",
+    "unbindings",
 )
 """A line per report and [[linkers]] table, which are counted from 0."""
 

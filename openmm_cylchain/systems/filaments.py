@@ -550,10 +550,28 @@ class Filaments:
         """
         return places_of(*self._seen_linkers(context)) * unit.nanometer
 
-    def linker_events(self, context: openmm.Context) -> tuple[int, int]:
-        """How often hands have bound and unbound in a Context since the start, with all that its checkpoint knew."""
-        bindings, unbindings = self._binding_force(context).getNumEventsInContext(context)
-        return int(bindings), int(unbindings)
+    def linker_events(self, context: openmm.Context, linker_type: int | None = None) -> tuple[int, int]:
+        """How often hands have bound and unbound in a Context since the start, with all that its checkpoint knew.
+
+        Parameters
+        ----------
+        context : openmm.Context
+        linker_type : int, optional
+            What ``add_linkers`` returned; linkers of all types if not given.
+
+        Raises
+        ------
+        InputError
+            If there are no linkers, or none of this type.
+        """
+        force = self._binding_force(context)
+        if linker_type is not None:
+            whole_number(linker_type, 0, "linker_type")
+            if linker_type >= len(self._linkers):
+                raise InputError(f"There is no type {linker_type} of linkers: there are {len(self._linkers)}.")
+        types = range(len(self._linkers)) if linker_type is None else [linker_type]
+        bindings, unbindings = zip(*(force.getNumEventsInContext(context, number) for number in types))
+        return sum(bindings), sum(unbindings)
 
     def _seen_linkers(self, context):
         force, state = self._binding_force(context), context.getState(positions=True)

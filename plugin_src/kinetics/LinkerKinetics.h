@@ -7,6 +7,7 @@
 #include "kinetics/RandomNumbers.h"
 #include "kinetics/SegmentCells.h"
 #include "mechanics/Loop.h"
+#include <cstddef>
 #include <cstdint>
 #include <unordered_set>
 #include <vector>
@@ -42,9 +43,10 @@ struct KineticStep {
  * are proposed along all segments around, and accepted by their energy.
  *
  * Each linker has a clock: the integral of its rates over time until its next event. Steps take it down, and only where
- * it runs out is anything drawn. Random numbers belong to the seed, the number of the step and that of the linker.
- * Linkers are independent of each other, except for sites that hold one hand each: what happens to linkers whose hands
- * bind to sites is in the order of time.
+ * it runs out is anything drawn. Most rates follow from the type of a linker, from what it holds, and from how many
+ * pieces of chains are around the piece that it holds: a step looks at two numbers of a linker, and nothing else. Random
+ * numbers belong to the seed, the number of the step and that of the linker. Linkers are independent of each other,
+ * except for sites that hold one hand each: what happens to linkers whose hands bind to sites is in the order of time.
  */
 class LinkerKinetics {
 public:
@@ -76,8 +78,21 @@ private:
     struct Event;
     struct Pending;
     struct Count {
-        std::uint64_t bindings = 0, unbindings = 0;
+        /** Of each type. */
+        std::vector<LinkerEvents> events;
         long long failed = -1;
+    };
+    /** What is known of linkers of a type that hold the same: where their rates come from. */
+    struct Kind {
+        /** The sum of rates other than of binding around; -1 where it depends on the spring. */
+        double rate = 0;
+        /** Of binding, for each piece around. */
+        double perPiece = 0;
+        bool atAnchor = false, sameChain = false, walks = false, needsSites = false, pulls = false;
+    };
+    /** What a step needs to know of a linker: its kind, and the number of its piece or anchor. */
+    struct Watch {
+        int kind = 0, where = -1;
     };
     bool usesSites(const LinkerType& type) const;
     Place placeOf(const Linker& linker, int side) const;
@@ -90,12 +105,19 @@ private:
     double pull(const Linker& linker, int side, const Spring& spring, const KineticStep& step, double& stiffness) const;
     double speedUnder(const Hand& hand, double pull) const;
     void walk(Linker& linker, const KineticStep& step, Count& count) const;
-    bool draw(Linker& linker, const KineticStep& step, Pending& next) const;
+    bool draw(LinkerState& state, const KineticStep& step, Pending& next) const;
     void apply(Linker& linker, const KineticStep& step, Pending& next, Sites* sites, Count& count) const;
-    void findKnownRates(const KineticStep& step);
+    void findKinds(const KineticStep& step);
+    void findMarks(const KineticStep& step);
+    void know(LinkerState& state);
+    Watch watch(const Linker& linker) const;
     void addLink(const Linker& linker, std::vector<Link>& links) const;
-    bool passes(Linker& linker, double stepSize) const;
+    int countAround(const Watch& watch, const KineticStep& step) const;
+    bool passes(double& clock, const Watch& watch, const KineticStep& step) const;
+    void advanceChunk(LinkerState& state, const KineticStep& step, int chunk);
+    void removeUnbound(LinkerState& state);
     void takeTogether(LinkerState& state, const KineticStep& step, Count& count);
+    SegmentCells::Around lookAround(const Linker& linker, int side, const double* place) const;
     bool proposePlace(const Linker& linker, int side, const KineticStep& step, RandomNumbers& random,
             const Sites* sites, HandPlace& found) const;
     bool captureAnywhere(const Linker& linker, int side, RandomNumbers& random, const Sites* sites,
@@ -113,16 +135,22 @@ private:
     std::vector<std::vector<double> > sums;
     /** For each hand, the number of its spacing among different ones, or -1 if it needs no sites. */
     std::vector<int> spacings;
-    /** Of each type of linkers, whether hands need sites, and whether they walk. */
-    std::vector<char> needsSites, walks;
-    /** For each type and what its linkers hold, the sum of all rates; -1 where that depends on the spring. */
-    std::vector<double> knownRates;
+    /** For each type and what its linkers hold. */
+    std::vector<Kind> kinds;
     double largestReach = 0;
-    bool anySites = false, anyConcentration = false;
+    bool anySites = false, anyConcentration = false, anyAnchors = false, anyBinding = false;
     SegmentCells cells;
+    /** Of anchors, while the grid of cells is what it was. */
+    std::vector<std::uint32_t> marks;
+    std::uint64_t gridOfMarks = 0;
+    /** Of the state that was advanced last. */
+    const LinkerState* known = nullptr;
+    std::vector<Watch> watches;
+    Sites taken;
+    const std::uint64_t ownNumber;
     std::vector<Count> counts;
-    /** Linkers of each chunk that join two places. */
-    std::vector<std::vector<int> > pulling;
+    /** Linkers of each chunk that join two places, and those with sites whose clocks may run out. */
+    std::vector<std::vector<int> > pulling, competing;
 };
 
 } // namespace cylchain

@@ -81,11 +81,6 @@ struct Linker {
     /** The number of the anchor in the place of its first hand, or -1. */
     int anchor = -1;
     HandPlace hands[2];
-    /**
-     * The integral of its rates over time until its next event, which has an exponential distribution with the mean 1;
-     * if it is not positive, it is drawn when it is needed.
-     */
-    double clock = 0;
     bool isHeld(int side) const {
         return hands[side].isBound() || (side == 0 && anchor >= 0);
     }
@@ -95,15 +90,41 @@ struct Linker {
     }
 };
 
+/** How often hands have bound, and unbound for whatever reason. */
+struct LinkerEvents {
+    std::uint64_t bindings = 0, unbindings = 0;
+};
+
+/** The number of the LinkerKinetics that has derived arrays of a state; those of a copy are not known. */
+struct KnownTo {
+    std::uint64_t number = 0;
+    KnownTo() = default;
+    KnownTo(const KnownTo&) {
+    }
+    KnownTo& operator=(const KnownTo&) {
+        number = 0;
+        return *this;
+    }
+};
+
 /** All that changes while linkers bind and unbind. */
 struct LinkerState {
-    /** In the order of their numbers. */
+    /** In the order of their numbers. What is changed between steps is changed in a copy. */
     std::vector<Linker> linkers;
+    /**
+     * Of each linker, the integral of its rates over time until its next event, which has an exponential distribution
+     * with the mean 1; if it is not positive, or not there, it is drawn when it is needed.
+     */
+    std::vector<double> clocks;
     std::uint32_t nextNumber = 0;
     /** How many steps have been taken. */
     std::uint64_t steps = 0;
-    /** How often hands have bound and unbound. */
-    std::uint64_t bindings = 0, unbindings = 0;
+    /** Of each type of linkers; none before the first step. */
+    std::vector<LinkerEvents> events;
+    KnownTo knownTo;
+    double getClock(std::size_t linker) const {
+        return linker < clocks.size() ? clocks[linker] : 0;
+    }
 };
 
 /** Kinds of linkers, what they are anchored at, and the temperature. */

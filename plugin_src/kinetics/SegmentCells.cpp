@@ -1,188 +1,274 @@
 #include "kinetics/SegmentCells.h"
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 
 using namespace cylchain;
 using namespace std;
 
-void SegmentCells::setGrid(double reach, const double* box) {
-    periodic = box != nullptr;
-    const size_t count = middles.size()/3;
-    fill(toCells, toCells+9, 0.0);
-    if (box != nullptr) {
+/** Coordinates of cells are between these. */
+static const double LARGEST_COORDINATE = 1e9;
+/** Cells grow in steps of this, so that they mostly stay what they are while segments stretch. */
+static const double GROWTH = 1.02;
+
+void SegmentCells::setGrid(double size, const double* box) {
+    double changed[9] = {};
+    int numbers[3] = {0, 0, 0};
+    if (box == nullptr)
+        changed[0] = changed[4] = changed[8] = 1/size;
+    else {
         // Rows of the inverse of the box, which is a lower triangle: their sizes are one over the heights of the box.
         const double a = box[0], b = box[4], c = box[8];
         const double inverse[9] = {1/a, -box[3]/(a*b), (box[3]*box[7]-box[6]*b)/(a*b*c), 0, 1/b, -box[7]/(b*c), 0, 0,
                 1/c};
-        double heights[3];
         for (int k = 0; k < 3; k++) {
             const double* row = inverse+3*k;
-            heights[k] = 1/sqrt(row[0]*row[0]+row[1]*row[1]+row[2]*row[2]);
-            origin[k] = 0;
-        }
-        setNumbers(heights, reach, count);
-        for (int k = 0; k < 3; k++)
+            const double height = 1/sqrt(row[0]*row[0]+row[1]*row[1]+row[2]*row[2]);
+            numbers[k] = static_cast<int>(min(LARGEST_COORDINATE, max(1.0, floor(height/size))));
             for (int j = 0; j < 3; j++)
-                toCells[3*k+j] = inverse[3*k+j]*numCells[k];
-        return;
-    }
-    double extents[3];
-    for (int k = 0; k < 3; k++) {
-        double least = HUGE_VAL, largest = -HUGE_VAL;
-        for (size_t i = 0; i < count; i++) {
-            least = min(least, middles[3*i+k]);
-            largest = max(largest, middles[3*i+k]);
+                changed[3*k+j] = row[j]*numbers[k];
         }
-        origin[k] = count == 0 ? 0 : least;
-        extents[k] = count == 0 ? 0 : largest-least;
     }
-    setNumbers(extents, reach, count);
-    for (int k = 0; k < 3; k++)
-        toCells[4*k] = numCells[k]/max(extents[k], numCells[k]*reach);
-}
-
-/** As many cells along each axis as the reach allows, but hardly more of them than pieces. */
-void SegmentCells::setNumbers(const double* extents, double reach, size_t count) {
-    double numbers[3];
-    for (int k = 0; k < 3; k++)
-        numbers[k] = max(1.0, floor(extents[k]/reach));
-    while (numbers[0]*numbers[1]*numbers[2] > 1+2.0*count) {
-        double& most = *max_element(numbers, numbers+3);
-        most = max(1.0, floor(0.8*most));
-    }
+    if (!equal(changed, changed+9, toCells) || !equal(numbers, numbers+3, numCells))
+        gridNumber++;
+    copy(changed, changed+9, toCells);
     copy(numbers, numbers+3, numCells);
 }
 
-int SegmentCells::findCell(const double* point) const {
-    int cell = 0;
-    for (int k = 2; k >= 0; k--) {
+void SegmentCells::findCoordinates(const double* point, int* coordinates) const {
+    for (int k = 0; k < 3; k++) {
         double coordinate = 0;
         for (int j = 0; j < 3; j++)
-            coordinate += toCells[3*k+j]*(point[j]-origin[j]);
-        if (periodic)
-            coordinate -= numCells[k]*floor(coordinate/numCells[k]);
-        // What is beyond the grid is near the cells at its edge alone.
-        const double number = min(numCells[k]-1.0, max(0.0, coordinate));
-        cell = cell*numCells[k]+static_cast<int>(number);
+            coordinate += toCells[3*k+j]*point[j];
+        const int n = numCells[k];
+        if (n > 0)
+            coordinate -= n*floor(coordinate/n);
+        coordinate = floor(coordinate);
+        // Written so that NaN is somewhere, too.
+        coordinate = min(n > 0 ? n-1.0 : LARGEST_COORDINATE, max(n > 0 ? 0.0 : -LARGEST_COORDINATE, coordinate));
+        coordinates[k] = static_cast<int>(coordinate);
     }
-    return cell;
 }
 
-int SegmentCells::findCells(int cell, int* around) const {
-    int along[3][3], counts[3];
-    for (int k = 0, rest = cell; k < 3; k++) {
-        const int n = numCells[k], own = rest%n;
-        rest /= n;
-        counts[k] = 0;
-        for (int shift = -1; shift <= 1; shift++) {
-            const int other = periodic ? (own+shift+n)%n : own+shift;
-            const bool known = find(along[k], along[k]+counts[k], other) != along[k]+counts[k];
-            if (other >= 0 && other < n && !known)
-                along[k][counts[k]++] = other;
-        }
+/** The coordinates beside one, and itself, along an axis: each once. */
+int SegmentCells::findNeighbours(int coordinate, int axis, int* found) const {
+    const int n = numCells[axis];
+    if (n == 0 || n > 2) {
+        for (int shift = -1; shift <= 1; shift++)
+            found[shift+1] = n == 0 ? coordinate+shift : (coordinate+shift+n)%n;
+        return 3;
     }
-    int count = 0;
-    for (int z = 0; z < counts[2]; z++)
-        for (int y = 0; y < counts[1]; y++)
-            for (int x = 0; x < counts[0]; x++)
-                around[count++] = (along[2][z]*numCells[1]+along[1][y])*numCells[0]+along[0][x];
-    return count;
+    for (int i = 0; i < n; i++)
+        found[i] = i;
+    return n;
+}
+
+/** Cells that follow each other along the first axis have marks that do so. */
+uint32_t SegmentCells::markOf(const int* coordinates) const {
+    return (static_cast<uint32_t>(coordinates[0])+static_cast<uint32_t>(coordinates[1])*0x9e3779b1u+
+            static_cast<uint32_t>(coordinates[2])*0x85ebca77u)&lastMark;
+}
+
+size_t SegmentCells::slotOf(const int* coordinates) const {
+    const uint32_t mixed = static_cast<uint32_t>(coordinates[0])*0x9e3779b1u^
+            static_cast<uint32_t>(coordinates[1])*0x85ebca77u^static_cast<uint32_t>(coordinates[2])*0xc2b2ae3du;
+    return mixed*0x9e3779b1u>>slotShift;
+}
+
+int SegmentCells::findCell(const int* coordinates) const {
+    for (size_t slot = slotOf(coordinates); slots[slot] >= 0; slot = slot+1 < slots.size() ? slot+1 : 0)
+        if (equal(coordinates, coordinates+3, cells[slots[slot]].coordinates))
+            return slots[slot];
+    return -1;
+}
+
+int SegmentCells::addCell(const int* coordinates, int chain) {
+    size_t slot = slotOf(coordinates);
+    for (; slots[slot] >= 0; slot = slot+1 < slots.size() ? slot+1 : 0)
+        if (equal(coordinates, coordinates+3, cells[slots[slot]].coordinates))
+            return slots[slot];
+    slots[slot] = static_cast<int>(cells.size());
+    cells.push_back({{coordinates[0], coordinates[1], coordinates[2]}, 0, 0, chain, chain, 0, 0});
+    mark(held, markOf(coordinates));
+    return slots[slot];
+}
+
+SegmentCells::Around SegmentCells::gather(const int* coordinates) const {
+    Around around;
+    int x[3], y[3], z[3];
+    const int numX = findNeighbours(coordinates[0], 0, x), numY = findNeighbours(coordinates[1], 1, y);
+    const int numZ = findNeighbours(coordinates[2], 2, z);
+    const bool inRow = numX == 3 && x[1] == x[0]+1 && x[2] == x[1]+1;
+    for (int k = 0; k < numZ; k++)
+        for (int j = 0; j < numY; j++) {
+            const int start[3] = {x[0], y[j], z[k]};
+            const uint32_t mark = markOf(start);
+            // Most rows hold nothing. There is a word more behind the last one, which is the first again.
+            if (inRow) {
+                const uint32_t bit = mark&63;
+                uint64_t word = held[mark>>6]>>bit;
+                if (bit > 61)
+                    word |= held[(mark>>6)+1]<<(64-bit);
+                if ((word&7) == 0)
+                    continue;
+            }
+            for (int i = 0; i < numX; i++) {
+                const int other[3] = {x[i], y[j], z[k]};
+                const int cell = findCell(other);
+                if (cell >= 0) {
+                    around.cells[around.numCells++] = cell;
+                    around.numPieces += cells[cell].count;
+                }
+            }
+        }
+    return around;
+}
+
+SegmentCells::Around SegmentCells::lookAround(const double* point) const {
+    int coordinates[3];
+    findCoordinates(point, coordinates);
+    return gather(coordinates);
+}
+
+uint32_t SegmentCells::findMark(const double* point) const {
+    int coordinates[3];
+    findCoordinates(point, coordinates);
+    return markOf(coordinates);
 }
 
 void SegmentCells::cut(const Contours& contours, double reach) {
     reachOfPieces = reach;
     pieces.clear();
+    firstOfSegment.clear();
     longest = 0;
     for (int segment = 0; segment < contours.getNumSegments(); segment++) {
         const double length = contours.getSegmentLength(segment);
         const int parts = static_cast<int>(max(1.0, ceil(length/reach)));
+        firstOfSegment.push_back(static_cast<int>(pieces.size()));
         for (int part = 0; part < parts; part++)
             pieces.push_back({segment, part*length/parts, length/parts});
         longest = max(longest, length/parts);
     }
+    firstOfSegment.push_back(static_cast<int>(pieces.size()));
+    cellOf.resize(pieces.size());
+    sorted.resize(pieces.size());
+    vectors.resize(3*static_cast<size_t>(contours.getNumSegments()));
+    int slotBits = 4;
+    while (slotBits < 30 && (static_cast<size_t>(1)<<slotBits) < 2*pieces.size()+2)
+        slotBits++;
+    slotShift = 32-slotBits;
+    slots.resize(static_cast<size_t>(1)<<slotBits);
+    lastMark = (static_cast<uint32_t>(1)<<min(31, slotBits+5))-1;
+    held.resize((lastMark>>6)+2);
+    near.resize(held.size());
+    gridNumber++;
+}
+
+int SegmentCells::findPiece(const Contours& contours, int segment, double along) const {
+    const int first = firstOfSegment[segment], parts = firstOfSegment[segment+1]-first;
+    const int part = static_cast<int>(along*parts/contours.getSegmentLength(segment));
+    return first+min(parts-1, max(0, part));
+}
+
+void SegmentCells::clear() {
+    fill(slots.begin(), slots.end(), -1);
+    fill(held.begin(), held.end(), 0);
+    cells.clear();
 }
 
 void SegmentCells::build(const Contours& contours, const double* positions, double reach, const double* box,
-            const double* segmentBox) {
+            const double* segmentBox, bool forPoints) {
     if (reach != reachOfPieces)
         cut(contours, reach);
-    const int count = pieces.size();
-    middles.resize(3*static_cast<size_t>(count));
-    double largest = 0;
-    for (int i = 0; i < count; i++) {
-        const SegmentPiece& piece = pieces[i];
-        const double* first = positions+3*contours.getFirst(piece.segment);
-        const double* second = positions+3*contours.getSecond(piece.segment);
-        const double length = contours.getSegmentLength(piece.segment);
-        const double middle = (piece.start+0.5*piece.length)/length, part = piece.length/length;
-        double vector[3];
+    const int segments = contours.getNumSegments();
+    double stretched = 0;
+    for (int segment = 0; segment < segments; segment++) {
+        const double* first = positions+3*contours.getFirst(segment);
+        const double* second = positions+3*contours.getSecond(segment);
+        double* const vector = &vectors[3*segment];
         for (int k = 0; k < 3; k++)
             vector[k] = second[k]-first[k];
         if (segmentBox != nullptr)
             takeToNearestImage(vector, segmentBox);
-        for (int k = 0; k < 3; k++)
-            middles[3*i+k] = first[k]+middle*vector[k];
-        largest = max(largest, part*part*(vector[0]*vector[0]+vector[1]*vector[1]+vector[2]*vector[2]));
+        const double parts = firstOfSegment[segment+1]-firstOfSegment[segment];
+        const double square = (vector[0]*vector[0]+vector[1]*vector[1]+vector[2]*vector[2])/(parts*parts);
+        stretched = max(stretched, square);
     }
-    setGrid(reach+0.5*sqrt(largest), box);
-
-    // By counting.
-
-    const int cells = numCells[0]*numCells[1]*numCells[2];
-    cellOf.resize(count);
-    firstOfCell.assign(cells+1, 0);
-    for (int i = 0; i < count; i++) {
-        cellOf[i] = findCell(&middles[3*i]);
-        firstOfCell[cellOf[i]+1]++;
-    }
-    for (int cell = 0; cell < cells; cell++)
-        firstOfCell[cell+1] += firstOfCell[cell];
-    sorted.resize(count);
-    vector<int>& next = numAround;
-    next.assign(firstOfCell.begin(), firstOfCell.end()-1);
-    for (int i = 0; i < count; i++)
-        sorted[next[cellOf[i]]++] = i;
-    for (int cell = 0; cell < cells; cell++)
-        numAround[cell] = firstOfCell[cell+1]-firstOfCell[cell];
-    for (int k = 0, stride = 1; k < 3; stride *= numCells[k++])
-        addNeighbours(k, stride);
-    largestNumber = cells == 0 ? 0 : *max_element(numAround.begin(), numAround.end());
-}
-
-/** To the number of each cell, add those of the cells before and behind it along an axis. */
-void SegmentCells::addNeighbours(int axis, int stride) {
-    const int n = numCells[axis], cells = numAround.size();
-    if (n == 1)
-        return;
-    // Cells along the other axes that follow each other in memory are taken side by side.
-    before.resize(stride);
-    first.resize(stride);
-    for (int start = 0; start < cells; start += n*stride) {
-        int* const row = &numAround[start];
-        const int* const end = row+(n-1)*static_cast<ptrdiff_t>(stride);
-        for (int j = 0; j < stride; j++) {
-            first[j] = row[j];
-            // With two cells, that behind is the one before.
-            before[j] = periodic && n > 2 ? end[j] : 0;
-        }
-        for (int i = 0; i < n; i++) {
-            int* const own = row+i*static_cast<ptrdiff_t>(stride);
-            for (int j = 0; j < stride; j++) {
-                const int number = own[j];
-                const int behind = i+1 < n ? own[stride+j] : periodic && n > 2 ? first[j] : 0;
-                own[j] += before[j]+behind;
-                before[j] = number;
+    // From any place of a piece to the middle of another one.
+    double size = reach+GROWTH*longest;
+    while (size < reach+sqrt(stretched) && size < LARGEST_COORDINATE)
+        size *= GROWTH;
+    setGrid(size, box);
+    clear();
+    int last[3] = {0, 0, 0}, cell = -1;
+    for (int segment = 0; segment < segments; segment++) {
+        const double* first = positions+3*contours.getFirst(segment);
+        const double* vector = &vectors[3*segment];
+        const int begin = firstOfSegment[segment], end = firstOfSegment[segment+1], chain = contours.getChain(segment);
+        for (int i = begin; i < end; i++) {
+            const double fraction = (i-begin+0.5)/(end-begin);
+            double middle[3];
+            for (int k = 0; k < 3; k++)
+                middle[k] = first[k]+fraction*vector[k];
+            int coordinates[3];
+            findCoordinates(middle, coordinates);
+            if (cell < 0 || !equal(coordinates, coordinates+3, last)) {
+                cell = addCell(coordinates, chain);
+                copy(coordinates, coordinates+3, last);
             }
+            cellOf[i] = cell;
+            cells[cell].count++;
+            cells[cell].lastChain = chain;
         }
+    }
+    held.back() = held.front();
+    countAll();
+    if (forPoints)
+        markAround();
+}
+
+/** Sort pieces into cells, and count those around each cell. */
+void SegmentCells::countAll() {
+    int next = 0;
+    for (Cell& cell : cells) {
+        cell.first = next;
+        next += cell.count;
+        cell.count = 0;
+    }
+    for (size_t i = 0; i < pieces.size(); i++) {
+        Cell& cell = cells[cellOf[i]];
+        sorted[cell.first+cell.count++] = static_cast<int>(i);
+    }
+    for (Cell& cell : cells) {
+        const Around around = gather(cell.coordinates);
+        bool several = false;
+        for (int i = 0; i < around.numCells; i++) {
+            const Cell& other = cells[around.cells[i]];
+            several = several || other.firstChain != cell.firstChain || other.lastChain != cell.firstChain;
+        }
+        cell.around = around.numPieces;
+        cell.aroundIfSeveral = several ? around.numPieces : 0;
     }
 }
 
-const SegmentPiece& SegmentCells::getAround(int cell, int number) const {
-    int around[27];
-    const int cells = findCells(cell, around);
+/** Mark all cells that have one which holds something around them. */
+void SegmentCells::markAround() {
+    fill(near.begin(), near.end(), 0);
+    for (const Cell& cell : cells) {
+        int x[3], y[3], z[3];
+        const int numX = findNeighbours(cell.coordinates[0], 0, x), numY = findNeighbours(cell.coordinates[1], 1, y);
+        const int numZ = findNeighbours(cell.coordinates[2], 2, z);
+        for (int k = 0; k < numZ; k++)
+            for (int j = 0; j < numY; j++)
+                for (int i = 0; i < numX; i++) {
+                    const int other[3] = {x[i], y[j], z[k]};
+                    mark(near, markOf(other));
+                }
+    }
+}
+
+const SegmentPiece& SegmentCells::getAround(const Around& around, int number) const {
     int i = 0;
-    for (; number >= firstOfCell[around[i]+1]-firstOfCell[around[i]] && i+1 < cells; i++)
-        number -= firstOfCell[around[i]+1]-firstOfCell[around[i]];
-    return pieces[sorted[firstOfCell[around[i]]+number]];
+    for (; i+1 < around.numCells && number >= cells[around.cells[i]].count; i++)
+        number -= cells[around.cells[i]].count;
+    return pieces[sorted[cells[around.cells[i]].first+number]];
 }

@@ -3,6 +3,7 @@
 
 #include "couplings/Contours.h"
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 namespace cylchain {
@@ -14,52 +15,99 @@ struct SegmentPiece {
 };
 
 /**
- * A grid of cells that hold pieces of segments by their middles, so that one of those near a point can be drawn.
+ * Pieces of segments in cells by their middles, so that one of those near a piece or a point can be drawn.
+ *
+ * Only cells that hold something are kept, in a table by their coordinates: what this costs does not depend on how much
+ * room there is between chains. What is found follows from the positions alone, not from earlier ones.
  */
 class SegmentCells {
 public:
+    /** The cells around a place that hold something, and the number of pieces in them. */
+    struct Around {
+        int cells[27];
+        int numCells = 0, numPieces = 0;
+    };
     /**
      * Cut segments into pieces that are no longer than the reach, and sort these into cells.
      *
-     * @param reach       pieces that come this near to a point are among those around it
+     * @param reach       pieces that come this near to a point, or to any place of a piece, are among those around it
      * @param box         the periodic box if distances are those of nearest images, or NULL
      * @param segmentBox  the box in which the second end of a segment is that nearest to the first, or NULL
+     * @param forPoints   whether isNear() is going to be asked
      */
     void build(const Contours& contours, const double* positions, double reach, const double* box,
-            const double* segmentBox);
-    /** The cell of a point. */
-    int findCell(const double* point) const;
-    /** The number of pieces in a cell and the cells around it. */
-    int countAround(int cell) const {
-        return numAround[cell];
+            const double* segmentBox, bool forPoints);
+    /** The number of the piece at a length along a segment. */
+    int findPiece(const Contours& contours, int segment, double along) const;
+    const SegmentPiece& getPiece(int piece) const {
+        return pieces[piece];
     }
-    /** The largest number of pieces around any cell. */
-    int getLargestNumber() const {
-        return largestNumber;
+    /** The number of pieces around a piece, itself among them. */
+    int countAround(int piece) const {
+        return cells[cellOf[piece]].around;
+    }
+    /** The same, but zero if all of them belong to its own chain. */
+    int countOthersAround(int piece) const {
+        return cells[cellOf[piece]].aroundIfSeveral;
     }
     /** The longest piece. */
     double getLongest() const {
         return longest;
     }
-    /** The piece of a number among those around a cell. */
-    const SegmentPiece& getAround(int cell, int number) const;
+    Around lookAround(int piece) const {
+        return gather(cells[cellOf[piece]].coordinates);
+    }
+    Around lookAround(const double* point) const;
+    /** The piece of a number among those around a place. */
+    const SegmentPiece& getAround(const Around& around, int number) const;
+    /** A number of the cell of a point, for isNear(), until getGridNumber() is another one. */
+    std::uint32_t findMark(const double* point) const;
+    /** Whether there may be pieces around a point: if not, there are none. */
+    bool isNear(std::uint32_t mark) const {
+        return (near[mark>>6]>>(mark&63)&1) != 0;
+    }
+    std::uint64_t getGridNumber() const {
+        return gridNumber;
+    }
 private:
+    struct Cell {
+        int coordinates[3];
+        /** The pieces in it, as they are sorted; the chains of the first and the last. */
+        int first, count, firstChain, lastChain;
+        int around, aroundIfSeveral;
+    };
     void cut(const Contours& contours, double reach);
-    void setGrid(double reach, const double* box);
-    void setNumbers(const double* extents, double reach, std::size_t count);
-    void addNeighbours(int axis, int stride);
-    int findCells(int cell, int* around) const;
-    /** How many cells there are along each axis, and whether they follow each other periodically. */
-    int numCells[3] = {1, 1, 1};
-    bool periodic = false;
-    /** Where the grid begins, and the vectors that take a point to its coordinates in cells. */
-    double origin[3] = {}, toCells[9] = {};
+    void setGrid(double size, const double* box);
+    void findCoordinates(const double* point, int* coordinates) const;
+    int findNeighbours(int coordinate, int axis, int* found) const;
+    std::uint32_t markOf(const int* coordinates) const;
+    std::size_t slotOf(const int* coordinates) const;
+    int findCell(const int* coordinates) const;
+    int addCell(const int* coordinates, int chain);
+    void clear();
+    void mark(std::vector<std::uint64_t>& bits, std::uint32_t number) const {
+        bits[number>>6] |= static_cast<std::uint64_t>(1)<<(number&63);
+    }
+    Around gather(const int* coordinates) const;
+    void countAll();
+    void markAround();
+    /** The vectors that take a point to its coordinates in cells, and how many there are along axes of a box, or 0. */
+    double toCells[9] = {};
+    int numCells[3] = {0, 0, 0};
+    std::uint64_t gridNumber = 0;
     /** Pieces stay the same as long as the reach does. */
     std::vector<SegmentPiece> pieces;
+    std::vector<int> firstOfSegment;
     double reachOfPieces = 0, longest = 0;
-    std::vector<double> middles;
-    int largestNumber = 0;
-    std::vector<int> cellOf, firstOfCell, sorted, numAround, before, first;
+    std::vector<double> vectors;
+    std::vector<int> cellOf, sorted;
+    std::vector<Cell> cells;
+    /** Where cells are by their coordinates: -1 where none is. */
+    std::vector<int> slots;
+    /** A bit for each cell, and for each one beside a cell; others may have the same. */
+    std::vector<std::uint64_t> held, near;
+    std::uint32_t lastMark = 0;
+    int slotShift = 0;
 };
 
 } // namespace cylchain

@@ -7,6 +7,7 @@
 #include "kinetics/LinkerKinetics.h"
 #include <algorithm>
 #include <map>
+#include <set>
 
 const double KT = 4.0;
 
@@ -400,7 +401,7 @@ static void testThreadsAndImages() {
             kinetics.advance(states[copy], own, copy == 1 ? BACKWARDS : SERIAL);
         }
     }
-    check(states[0].bindings > 1000 && states[0].unbindings > 500, "nothing happens");
+    check(states[0].events[0].bindings > 1000 && states[0].events[0].unbindings > 500, "nothing happens");
     for (size_t i = 0; i < states[0].linkers.size(); i++)
         for (int side = 0; side < 2; side++) {
             const HandPlace& place = states[0].linkers[i].hands[side];
@@ -439,20 +440,35 @@ static void testSegmentsAround() {
     for (const double* ofCells : {(const double*) NULL, box})
         for (double reach : {5.0, 40.0, 90.0}) {
             SegmentCells cells;
-            cells.build(contours, rods.x.data(), reach, ofCells, NULL);
+            cells.build(contours, rods.x.data(), reach, ofCells, NULL, true);
             for (int i = 0; i < 200; i++) {
                 Array point = normal(3);
                 for (double& value : point)
                     value *= 250;
-                const int cell = cells.findCell(point.data());
+                // Half of them are on pieces, which are looked around themselves.
+                const int onPiece = i%2 == 0 ? -1 : cells.findPiece(contours, i%240, 25*(i%13)/13.0);
+                if (onPiece >= 0)
+                    for (int k = 0; k < 3; k++) {
+                        const double fraction = i%13/13.0;
+                        point[k] = (1-fraction)*rods.x[3*contours.getFirst(i%240)+k]+
+                                fraction*rods.x[3*contours.getSecond(i%240)+k];
+                    }
+                const SegmentCells::Around found = onPiece < 0 ? cells.lookAround(point.data()) :
+                        cells.lookAround(onPiece);
+                check(onPiece < 0 || cells.countAround(onPiece) == found.numPieces, "their number");
+                check(found.numPieces == 0 || cells.isNear(cells.findMark(point.data())), "what is near");
                 // By their middles.
                 map<pair<int, double>, SegmentPiece> around;
-                for (int number = 0; number < cells.countAround(cell); number++) {
-                    const SegmentPiece& piece = cells.getAround(cell, number);
+                set<int> chainsAround;
+                for (int number = 0; number < found.numPieces; number++) {
+                    const SegmentPiece& piece = cells.getAround(found, number);
                     check(around.insert({{piece.segment, piece.start}, piece}).second, "a piece is there twice");
                     check(piece.length <= min(25.0, reach)*(1+1e-12) && piece.length <= cells.getLongest(),
                             "its length");
+                    chainsAround.insert(contours.getChain(piece.segment));
                 }
+                check(onPiece < 0 || cells.countOthersAround(onPiece) ==
+                        (chainsAround.size() > 1 ? found.numPieces : 0), "those of other chains");
                 for (int s = 0; s < contours.getNumSegments(); s++)
                     for (double fraction = 0; fraction < 1.01; fraction += 0.125) {
                         double vector[3], square = 0;
@@ -464,12 +480,12 @@ static void testSegmentsAround() {
                         for (double component : vector)
                             square += component*component;
                         const double along = 25*fraction;
-                        const bool found = any_of(around.begin(), around.end(), [&] (const auto& entry) {
+                        const bool known = any_of(around.begin(), around.end(), [&] (const auto& entry) {
                             const SegmentPiece& piece = entry.second;
                             return piece.segment == s && along > piece.start-1e-9 &&
                                     along < piece.start+piece.length+1e-9;
                         });
-                        check(square > reach*reach || found, "a place in reach is not found");
+                        check(square > reach*reach || known, "a place in reach is not found");
                     }
             }
         }

@@ -69,8 +69,9 @@ def test_table_and_places(simulated, tmp_path):
         np.testing.assert_allclose(
             filaments.linker_places(simulation.context)._value[:, 0], places[:, 0], atol=1e-6, equal_nan=True
         )
-        bindings, unbindings = filaments.linker_events(simulation.context)
-        assert bindings - unbindings == table.bound.sum() - 30
+        events = [filaments.linker_events(simulation.context, number) for number in range(2)]
+        assert filaments.linker_events(simulation.context) == tuple(np.sum(events, axis=0))
+        assert np.subtract(*np.sum(events, axis=0)) == table.bound.sum() - 30
         for number, rest in enumerate((30.0, 0.0)):
             of_type = table.types == number
             held = table.held[of_type]
@@ -80,8 +81,7 @@ def test_table_and_places(simulated, tmp_path):
                 *(int((held == n).sum()) for n in range(3)),
                 tensions.mean(),
                 tensions.max(),
-                bindings,
-                unbindings,
+                *events[number],
             ]
             found = [reporter[column][report, number] for column in COLUMNS]
             np.testing.assert_allclose(found, expected, rtol=1e-6)

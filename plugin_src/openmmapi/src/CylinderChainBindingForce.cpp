@@ -251,6 +251,7 @@ void CylinderChainBindingForce::setLinkers(const vector<int>& numbers, const vec
     const vector<Linker> linkers = columnsOf(numbers, types, anchors, chains, places, nextNumber).getLinkers();
     checkLinkers(linkers, {hands, this->types, this->anchors, 0.0}, {});
     state.linkers = linkers;
+    state.clocks.clear();
     state.nextNumber = nextNumber;
 }
 
@@ -266,15 +267,18 @@ void CylinderChainBindingForce::setLinkersInContext(Context& context, const vect
     CylinderChainBindingForceImpl& impl = dynamic_cast<CylinderChainBindingForceImpl&>(getImplInContext(context));
     LinkerState replaced = impl.getKnownState();
     replaced.linkers = columnsOf(numbers, types, anchors, chains, places, nextNumber).getLinkers();
+    replaced.clocks.clear();
     replaced.nextNumber = nextNumber;
     impl.setState(replaced);
 }
 
-void CylinderChainBindingForce::getNumEventsInContext(Context& context, long long& bindings,
+void CylinderChainBindingForce::getNumEventsInContext(Context& context, int type, long long& bindings,
         long long& unbindings) const {
+    ASSERT_VALID_INDEX(type, types);
     CylinderChainBindingForceImpl& impl = dynamic_cast<CylinderChainBindingForceImpl&>(getImplInContext(context));
-    bindings = impl.getState().bindings;
-    unbindings = impl.getState().unbindings;
+    const vector<LinkerEvents>& events = impl.getState().events;
+    bindings = type < (int) events.size() ? events[type].bindings : 0;
+    unbindings = type < (int) events.size() ? events[type].unbindings : 0;
 }
 
 ForceImpl* CylinderChainBindingForce::createImpl() const {

@@ -12,6 +12,7 @@
 #include "openmm/internal/OSRngSeed.h"
 #include "openmm/reference/SimTKOpenMMRealType.h"
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 using namespace OpenMM;
@@ -169,6 +170,9 @@ const cylchain::LinkerState& CylinderChainBindingForceImpl::getState() {
 
 void CylinderChainBindingForceImpl::setState(const cylchain::LinkerState& replaced) {
     checkLinkers(replaced.linkers, system, lengths);
+    require(replaced.clocks.size() <= replaced.linkers.size() && all_of(replaced.clocks.begin(),
+            replaced.clocks.end(), [] (double clock) {return isfinite(clock);}), "A linker has an illegal clock");
+    require(replaced.events.size() <= system.types.size(), "There are events of a type of linkers that does not exist");
     state = replaced;
     accept();
 }

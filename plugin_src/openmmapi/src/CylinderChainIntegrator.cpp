@@ -280,7 +280,7 @@ uint64_t CylinderChainIntegrator::findNextStep() const {
 }
 
 void CylinderChainIntegrator::createCheckpoint(ostream& stream) const {
-    const int version = 6;
+    const int version = 7;
     stream.write((const char*) &version, sizeof(version));
     stream.write((const char*) &noiseLevel, sizeof(noiseLevel));
     stream.write((const char*) &noiseSeed, sizeof(noiseSeed));
@@ -301,13 +301,13 @@ void CylinderChainIntegrator::loadCheckpoint(istream& stream) {
     stream.read((char*) &steps, sizeof(steps));
     Vec3 flow[5];
     stream.read((char*) flow, sizeof(flow));
-    if (!stream || version < 3 || version > 6 || level < 0 || level > getLargestPathLevel())
+    if (!stream || version < 3 || version > 7 || level < 0 || level > getLargestPathLevel())
         throw OpenMMException("loadCheckpoint: Checkpoint was not created with this version of "
                 "CylinderChainIntegrator");
     if (version > 3)
         readLinks(stream, *context);
     if (version > 4)
-        readLinkers(stream, *context, version > 5);
+        readLinkers(stream, *context, version > 5, version > 6);
     setFlow(flow[0], flow[1], flow[2], flow[3], flow[4]);
     noiseLevel = level;
     noiseSeed = seed;
@@ -316,7 +316,7 @@ void CylinderChainIntegrator::loadCheckpoint(istream& stream) {
 }
 
 void CylinderChainIntegrator::serializeParameters(SerializationNode& node) const {
-    node.setIntProperty("version", 6);
+    node.setIntProperty("version", 7);
     node.setIntProperty("pathLevel", noiseLevel);
     node.setLongProperty("stepsTaken", findNextStep());
     const Vec3 flow[] = {flowVelocity, flowGradient[0], flowGradient[1], flowGradient[2], flowOrigin};
@@ -331,7 +331,7 @@ void CylinderChainIntegrator::serializeParameters(SerializationNode& node) const
 
 void CylinderChainIntegrator::deserializeParameters(const SerializationNode& node) {
     const int version = node.getIntProperty("version");
-    if (version < 1 || version > 6)
+    if (version < 1 || version > 7)
         throw OpenMMException("Unsupported version number");
 
     // The same time on the path, or the next step after it.

@@ -75,8 +75,6 @@ void checkLinkers(const vector<Linker>& linkers, const LinkerSystem& system, con
         if (type.concentration >= 0 && !linker.isHeld(0) && !linker.isHeld(1))
             refuseLinkers(name+" is not bound, but those of its type are only counted while they are bound: their "
                     "concentration is given");
-        if (!isfinite(linker.clock))
-            refuseLinkers(name+" has an illegal clock: "+to_string(linker.clock));
         for (int side = 0; side < 2; side++) {
             const HandPlace& place = linker.hands[side];
             if (!place.isBound()) {

@@ -17,18 +17,22 @@ namespace OpenMM {
 
 static const char* const CHAIN_PROPERTIES[] = {"chain1", "chain2"};
 static const char* const PLACE_PROPERTIES[] = {"place1", "place2"};
+/** The name of a node with events of a type of linkers. */
+static const char* const EVENTS = "Events";
 
 void writeLinkerState(SerializationNode& node, const LinkerState& state) {
     const LinkerColumns columns(state);
-    node.setIntProperty("nextNumber", columns.nextNumber).setLongProperty("steps", state.steps)
-            .setLongProperty("bindings", state.bindings).setLongProperty("unbindings", state.unbindings);
+    node.setIntProperty("nextNumber", columns.nextNumber).setLongProperty("steps", state.steps);
+    for (const LinkerEvents& events : state.events)
+        node.createChildNode(EVENTS).setLongProperty("bindings", events.bindings)
+                .setLongProperty("unbindings", events.unbindings);
     for (size_t i = 0; i < columns.numbers.size(); i++) {
         SerializationNode& linker = node.createChildNode("Linker");
         linker.setIntProperty("number", columns.numbers[i]).setIntProperty("type", columns.types[i]);
         if (columns.anchors[i] >= 0)
             linker.setIntProperty("anchor", columns.anchors[i]);
-        if (state.linkers[i].clock > 0)
-            linker.setDoubleProperty("clock", state.linkers[i].clock);
+        if (state.getClock(i) > 0)
+            linker.setDoubleProperty("clock", state.getClock(i));
         for (int side = 0; side < 2; side++)
             if (columns.chains[2*i+side] >= 0)
                 linker.setIntProperty(CHAIN_PROPERTIES[side], columns.chains[2*i+side])
@@ -38,8 +42,15 @@ void writeLinkerState(SerializationNode& node, const LinkerState& state) {
 
 LinkerState readLinkerState(const SerializationNode& node) {
     LinkerColumns columns;
+    LinkerState state;
     columns.nextNumber = node.getIntProperty("nextNumber");
     for (const SerializationNode& linker : node.getChildren()) {
+        if (linker.getName() == EVENTS) {
+            state.events.push_back({(uint64_t) linker.getLongProperty("bindings"),
+                    (uint64_t) linker.getLongProperty("unbindings")});
+            continue;
+        }
+        state.clocks.push_back(linker.getDoubleProperty("clock", 0));
         columns.numbers.push_back(linker.getIntProperty("number"));
         columns.types.push_back(linker.getIntProperty("type"));
         columns.anchors.push_back(linker.getIntProperty("anchor", -1));
@@ -48,14 +59,9 @@ LinkerState readLinkerState(const SerializationNode& node) {
             columns.places.push_back(linker.getDoubleProperty(PLACE_PROPERTIES[side], 0));
         }
     }
-    LinkerState state;
     state.linkers = columns.getLinkers();
-    for (size_t i = 0; i < state.linkers.size(); i++)
-        state.linkers[i].clock = node.getChildren()[i].getDoubleProperty("clock", 0);
     state.nextNumber = columns.nextNumber;
     state.steps = node.getLongProperty("steps", 0);
-    state.bindings = node.getLongProperty("bindings", 0);
-    state.unbindings = node.getLongProperty("unbindings", 0);
     return state;
 }
 
@@ -93,14 +99,20 @@ void writeLinkers(ostream& stream, ContextImpl& context) {
     writeValue(stream, (int) forces.size());
     for (CylinderChainBindingForceImpl* force : forces) {
         const LinkerState& state = force->getState();
-        for (uint64_t value : {(uint64_t) force->getSeed(), (uint64_t) state.nextNumber, state.steps, state.bindings,
-                state.unbindings, (uint64_t) state.linkers.size()})
+        for (uint64_t value : {(uint64_t) force->getSeed(), (uint64_t) state.nextNumber, state.steps,
+                (uint64_t) state.events.size()})
             writeValue(stream, value);
-        for (const Linker& linker : state.linkers) {
+        for (const LinkerEvents& events : state.events) {
+            writeValue(stream, events.bindings);
+            writeValue(stream, events.unbindings);
+        }
+        writeValue(stream, (uint64_t) state.linkers.size());
+        for (size_t i = 0; i < state.linkers.size(); i++) {
+            const Linker& linker = state.linkers[i];
             writeValue(stream, linker.number);
             writeValue(stream, linker.type);
             writeValue(stream, linker.anchor);
-            writeValue(stream, linker.clock);
+            writeValue(stream, state.getClock(i));
             for (const HandPlace& hand : linker.hands) {
                 writeValue(stream, hand.chain);
                 writeValue(stream, hand.position);
@@ -109,7 +121,7 @@ void writeLinkers(ostream& stream, ContextImpl& context) {
     }
 }
 
-void readLinkers(istream& stream, ContextImpl& context, bool withClocks) {
+void readLinkers(istream& stream, ContextImpl& context, bool withClocks, bool withTypes) {
     vector<LinkerState> states;
     vector<uint32_t> seeds;
     const int count = readValue<int>(stream, WITHIN_LINKERS);
@@ -118,8 +130,15 @@ void readLinkers(istream& stream, ContextImpl& context, bool withClocks) {
         seeds.push_back(readValue<uint64_t>(stream, WITHIN_LINKERS));
         state.nextNumber = readValue<uint64_t>(stream, WITHIN_LINKERS);
         state.steps = readValue<uint64_t>(stream, WITHIN_LINKERS);
-        state.bindings = readValue<uint64_t>(stream, WITHIN_LINKERS);
-        state.unbindings = readValue<uint64_t>(stream, WITHIN_LINKERS);
+        // Earlier versions have not counted events of each type: counts begin anew.
+        const uint64_t types = withTypes ? readValue<uint64_t>(stream, WITHIN_LINKERS) : 1;
+        for (uint64_t j = 0; j < types; j++) {
+            LinkerEvents events;
+            events.bindings = readValue<uint64_t>(stream, WITHIN_LINKERS);
+            events.unbindings = readValue<uint64_t>(stream, WITHIN_LINKERS);
+            if (withTypes)
+                state.events.push_back(events);
+        }
         const uint64_t linkers = readValue<uint64_t>(stream, WITHIN_LINKERS);
         for (uint64_t j = 0; j < linkers; j++) {
             // One by one, so that a checkpoint which is cut off cannot ask for more memory than it has.
@@ -128,7 +147,7 @@ void readLinkers(istream& stream, ContextImpl& context, bool withClocks) {
             linker.type = readValue<int>(stream, WITHIN_LINKERS);
             linker.anchor = readValue<int>(stream, WITHIN_LINKERS);
             if (withClocks)
-                linker.clock = readValue<double>(stream, WITHIN_LINKERS);
+                state.clocks.push_back(readValue<double>(stream, WITHIN_LINKERS));
             for (HandPlace& hand : linker.hands) {
                 hand.chain = readValue<int>(stream, WITHIN_LINKERS);
                 hand.position = readValue<double>(stream, WITHIN_LINKERS);

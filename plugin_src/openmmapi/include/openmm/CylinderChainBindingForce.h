@@ -273,13 +273,14 @@ public:
             const std::vector<int>& anchors, const std::vector<int>& chains, const std::vector<double>& places,
             int nextNumber) const;
     /**
-     * Get how often hands of a Context have bound and unbound.
+     * Get how often hands of linkers of a type have bound and unbound in a Context.
      *
      * @param context          the Context
+     * @param type             the index of the type
      * @param[out] bindings    how often a hand has bound
-     * @param[out] unbindings  how often a hand has unbound
+     * @param[out] unbindings  how often a hand has unbound, for whatever reason
      */
-    void getNumEventsInContext(Context& context, long long& bindings, long long& unbindings) const;
+    void getNumEventsInContext(Context& context, int type, long long& bindings, long long& unbindings) const;
     /**
      * Get whether distances are those of nearest periodic images.
      */

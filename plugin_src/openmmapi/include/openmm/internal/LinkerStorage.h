@@ -28,8 +28,9 @@ void writeLinkers(std::ostream& stream, ContextImpl& context);
  * Read the linkers of all CylinderChainBindingForces of a Context from a checkpoint.
  *
  * @param withClocks  whether it has their clocks, which those of earlier versions do not
+ * @param withTypes   whether it has events of each type of linkers, which those of earlier versions do not
  */
-void readLinkers(std::istream& stream, ContextImpl& context, bool withClocks);
+void readLinkers(std::istream& stream, ContextImpl& context, bool withClocks, bool withTypes);
 
 /**
  * Write the linkers of all CylinderChainBindingForces of a Context to children "Linkers" of a node.

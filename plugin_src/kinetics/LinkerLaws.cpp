@@ -1,0 +1,281 @@
+#include "kinetics/LinkerKinetics.h"
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+using namespace cylchain;
+using namespace std;
+
+namespace {
+
+/** Exponents of rates are at most this. */
+const double LARGEST_EXPONENT = 500;
+
+double boundedExp(double x) {
+    return exp(min(x, LARGEST_EXPONENT));
+}
+
+double dot(const double* a, const double* b) {
+    return a[0]*b[0]+a[1]*b[1]+a[2]*b[2];
+}
+
+} // namespace
+
+bool LinkerKinetics::usesSites(const LinkerType& type) const {
+    return (type.hands[0] >= 0 && spacings[type.hands[0]] >= 0) || spacings[type.hands[1]] >= 0;
+}
+
+Place LinkerKinetics::placeOf(const Linker& linker, int side) const {
+    if (linker.hands[side].isBound())
+        return contours.findPlace(linker.hands[side].chain, linker.hands[side].position);
+    return system.anchors[linker.anchor];
+}
+
+double LinkerKinetics::energyOf(const LinkerType& type, double distance) const {
+    const double extension = distance-type.restLength;
+    return 0.5*type.stiffness*extension*extension;
+}
+
+LinkerKinetics::Spring LinkerKinetics::measure(const Linker& linker, const KineticStep& step) const {
+    const LinkerType& type = system.types[linker.type];
+    Spring spring;
+    double first[3];
+    locate(placeOf(linker, 0), step.positions, step.boxes.segments, first);
+    locate(placeOf(linker, 1), step.positions, step.boxes.segments, spring.vector);
+    for (int k = 0; k < 3; k++)
+        spring.vector[k] -= first[k];
+    if (step.boxes.distances != nullptr)
+        takeToNearestImage(spring.vector, step.boxes.distances);
+    spring.distance = sqrt(dot(spring.vector, spring.vector));
+    spring.energy = energyOf(type, spring.distance);
+    spring.force = type.stiffness*(spring.distance-type.restLength);
+    return spring;
+}
+
+/** An energy over k_B T. */
+double LinkerKinetics::reduced(double energy) const {
+    return energy > 0 ? energy/system.kT : 0;
+}
+
+double LinkerKinetics::unbindingRate(const Hand& hand, double energy, double force) const {
+    double rate = hand.unbindingRate;
+    if (hand.unbindingForce > 0)
+        rate *= boundedExp(force/hand.unbindingForce);
+    else if (hand.strainShare > 0)
+        rate *= boundedExp(hand.strainShare*reduced(energy));
+    if (hand.catchRate > 0)
+        rate += hand.catchRate*(hand.catchForce > 0 ? exp(-force/hand.catchForce) : 1);
+    return rate;
+}
+
+/** The rate at which a hand of an unbound linker binds anywhere. */
+double LinkerKinetics::captureRate(const LinkerType& type, int side, const KineticStep& step) const {
+    const Hand& hand = system.hands[type.hands[side]];
+    const double length = sums[type.hands[side]].empty() ? 0 : sums[type.hands[side]].back();
+    const double volume = type.volume > 0 ? type.volume : step.volume;
+    const double ofHands = 4*M_PI/3*pow(system.hands[type.hands[0]].reach*system.hands[type.hands[1]].reach, 1.5);
+    return hand.bindingRate*length*(type.concentration >= 0 ? ofHands*type.concentration : ofHands/volume);
+}
+
+/**
+ * How hard a bound hand is pulled along its chain, towards the plus end.
+ *
+ * @param[out] stiffness  how much less that becomes for each length by which it walks
+ */
+double LinkerKinetics::pull(const Linker& linker, int side, const Spring& spring, const KineticStep& step,
+        double& stiffness) const {
+    const LinkerType& type = system.types[linker.type];
+    const HandPlace& place = linker.hands[side];
+    const int segment = contours.findSegment(place.chain, place.position);
+    double tangent[3];
+    for (int k = 0; k < 3; k++)
+        tangent[k] = step.positions[3*contours.getSecond(segment)+k]-step.positions[3*contours.getFirst(segment)+k];
+    if (step.boxes.segments != nullptr)
+        takeToNearestImage(tangent, step.boxes.segments);
+    // How far it gets for each length of the segment at rest.
+    for (double& component : tangent)
+        component /= contours.getSegmentLength(segment);
+    const double square = dot(tangent, tangent);
+    stiffness = type.stiffness*square;
+    if (!(spring.distance > 0))
+        return 0;
+    const double along = dot(spring.vector, tangent)/spring.distance;
+    const double across = max(0.0, spring.force/spring.distance)*(square-along*along);
+    stiffness = type.stiffness*along*along+across;
+    // The force does its work along the contour of segments as long as they are.
+    const double pull = spring.force*along/sqrt(max(square, 1e-12));
+    return side == 0 ? pull : -pull;
+}
+
+/** The speed under a pull in the direction of walking, which is that of the unloaded speed if positive. */
+double LinkerKinetics::speedUnder(const Hand& hand, double pull) const {
+    const double size = fabs(hand.speed);
+    const double ratio = hand.stallForce > 0 ? 1+pull/hand.stallForce : 1;
+    return size*min(2.0, max(hand.walksBackward ? -1.0 : 0.0, ratio));
+}
+
+/** Hands that are bound walk, those which bind to sites excepted. */
+void LinkerKinetics::walk(Linker& linker, const KineticStep& step, Count& count) const {
+    const LinkerType& type = system.types[linker.type];
+    double moves[2] = {0, 0};
+    int walking = 0;
+    for (int side = 0; side < 2; side++)
+        if (linker.hands[side].isBound()) {
+            const Hand& hand = system.hands[type.hands[side]];
+            walking += hand.speed != 0 && hand.siteSpacing == 0;
+        }
+    if (walking == 0)
+        return;
+    const bool pulls = linker.pulls();
+    const Spring spring = pulls ? measure(linker, step) : Spring();
+    for (int side = 0; side < 2; side++) {
+        if (!linker.hands[side].isBound())
+            continue;
+        const Hand& hand = system.hands[type.hands[side]];
+        if (hand.speed == 0 || hand.siteSpacing > 0)
+            continue;
+        const double direction = hand.speed > 0 ? 1 : -1;
+        double stiffness = 0;
+        const double along = pulls ? direction*pull(linker, side, spring, step, stiffness) : 0;
+        double move = speedUnder(hand, along)*step.stepSize;
+        // However long the step is, it ends where the spring stops it.
+        if (pulls && hand.stallForce > 0 && stiffness > 0) {
+            const double toStall = (along+hand.stallForce)/(stiffness*walking);
+            move = move > 0 ? min(move, max(0.0, toStall)) : max(move, min(0.0, toStall));
+        }
+        moves[side] = direction*move;
+    }
+    for (int side = 0; side < 2; side++) {
+        if (moves[side] == 0)
+            continue;
+        HandPlace& place = linker.hands[side];
+        const double length = contours.getLength(place.chain);
+        place.position += moves[side];
+        if (contours.isClosed(place.chain)) {
+            place.position -= length*floor(place.position/length);
+            continue;
+        }
+        if (place.position >= 0 && place.position <= length)
+            continue;
+        if (system.hands[type.hands[side]].holdsAtEnds)
+            place.position = min(length, max(0.0, place.position));
+        else
+            unbind(linker, side, nullptr, count);
+    }
+}
+
+uint64_t LinkerKinetics::siteOf(const Hand& hand, const HandPlace& place) const {
+    const uint64_t spacing = spacings[&hand-system.hands.data()];
+    return (static_cast<uint64_t>(place.chain)<<36)^(spacing<<32)^
+            static_cast<uint64_t>(place.position/hand.siteSpacing);
+}
+
+/** How many sites a chain has. */
+double LinkerKinetics::countSites(const Hand& hand, int chain) const {
+    // A length that is a whole number of spacings has as many sites, however it was rounded.
+    return floor(contours.getLength(chain)/hand.siteSpacing+1e-9);
+}
+
+/** Take a place to the middle of the site where it is; false if it is on none, at the plus end of a chain. */
+bool LinkerKinetics::toSite(const Hand& hand, HandPlace& place) const {
+    const double site = floor(place.position/hand.siteSpacing);
+    place.position = (site+0.5)*hand.siteSpacing;
+    return site >= 0 && site < countSites(hand, place.chain);
+}
+
+void LinkerKinetics::bind(Linker& linker, int side, const HandPlace& place, Sites* sites, Count& count) const {
+    const Hand& hand = system.hands[system.types[linker.type].hands[side]];
+    linker.hands[side] = place;
+    if (hand.siteSpacing > 0 && sites != nullptr)
+        sites->insert(siteOf(hand, place));
+    count.events[linker.type].bindings++;
+}
+
+void LinkerKinetics::unbind(Linker& linker, int side, Sites* sites, Count& count) const {
+    const Hand& hand = system.hands[system.types[linker.type].hands[side]];
+    if (hand.siteSpacing > 0 && sites != nullptr)
+        sites->erase(siteOf(hand, linker.hands[side]));
+    linker.hands[side] = HandPlace();
+    count.events[linker.type].unbindings++;
+}
+
+/** The rate of proposals for each piece around. */
+double LinkerKinetics::proposalRate(const Hand& hand) const {
+    return hand.bindingRate*cells.getLongest();
+}
+
+/** Look around what the other side of a linker holds, which is at a place. */
+SegmentCells::Around LinkerKinetics::lookAround(const Linker& linker, int side, const double* place) const {
+    const HandPlace& hand = linker.hands[side];
+    if (!hand.isBound())
+        return cells.lookAround(place);
+    const int segment = contours.findSegment(hand.chain, hand.position);
+    return cells.lookAround(cells.findPiece(contours, segment, hand.position-contours.getStart(segment)));
+}
+
+/** Propose a place where a hand could bind; true if it binds there. */
+bool LinkerKinetics::proposePlace(const Linker& linker, int side, const KineticStep& step, RandomNumbers& random,
+        const Sites* sites, HandPlace& found) const {
+    const LinkerType& type = system.types[linker.type];
+    const int number = type.hands[side];
+    const Hand& hand = system.hands[number];
+    const double which = random.uniform(), where = random.uniform(), accepted = random.uniform();
+    double from[3];
+    locate(placeOf(linker, 1-side), step.positions, step.boxes.segments, from);
+    const SegmentCells::Around around = lookAround(linker, 1-side, from);
+    if (around.numPieces == 0)
+        return false;
+    const int chosen = min(around.numPieces-1, static_cast<int>(which*around.numPieces));
+    const SegmentPiece& piece = cells.getAround(around, chosen);
+    const double along = where*cells.getLongest();
+    found.chain = contours.getChain(piece.segment);
+    found.position = contours.getStart(piece.segment)+piece.start+along;
+    if (along > piece.length || binds[number][found.chain] == 0 ||
+            (!type.sameChain && linker.hands[1-side].chain == found.chain))
+        return false;
+    if (hand.siteSpacing > 0 && (!toSite(hand, found) || sites->count(siteOf(hand, found)) > 0))
+        return false;
+    double vector[3];
+    locate(contours.findPlace(found.chain, found.position), step.positions, step.boxes.segments, vector);
+    for (int k = 0; k < 3; k++)
+        vector[k] -= from[k];
+    if (step.boxes.distances != nullptr)
+        takeToNearestImage(vector, step.boxes.distances);
+    const double distance = sqrt(dot(vector, vector));
+    return distance <= hand.reach &&
+            accepted < exp(-(1-hand.strainShare)*reduced(energyOf(type, distance)));
+}
+
+/** Find a place anywhere on its chains for a hand of an unbound linker; false if that is taken. */
+bool LinkerKinetics::captureAnywhere(const Linker& linker, int side, RandomNumbers& random, const Sites* sites,
+        HandPlace& found) const {
+    const int number = system.types[linker.type].hands[side];
+    const Hand& hand = system.hands[number];
+    const vector<double>& sum = sums[number];
+    const double along = random.uniform()*sum.back();
+    const size_t index = min<size_t>(sum.size()-1, upper_bound(sum.begin(), sum.end(), along)-sum.begin());
+    found.chain = hand.chains[index];
+    found.position = min(contours.getLength(found.chain), along-(index == 0 ? 0 : sum[index-1]));
+    return hand.siteSpacing == 0 || (toSite(hand, found) && sites->count(siteOf(hand, found)) == 0);
+}
+
+/** A hand on a site walks to the next one, if that is not taken. */
+void LinkerKinetics::hop(Linker& linker, int side, int direction, Sites* sites, Count& count) const {
+    const Hand& hand = system.hands[system.types[linker.type].hands[side]];
+    HandPlace next = linker.hands[side];
+    const double number = countSites(hand, next.chain);
+    double site = floor(next.position/hand.siteSpacing)+direction;
+    if (contours.isClosed(next.chain))
+        site -= number*floor(site/number);
+    if (site < 0 || site >= number) {
+        if (!hand.holdsAtEnds)
+            unbind(linker, side, sites, count);
+        return;
+    }
+    next.position = (site+0.5)*hand.siteSpacing;
+    if (sites->count(siteOf(hand, next)) > 0)
+        return;
+    sites->erase(siteOf(hand, linker.hands[side]));
+    sites->insert(siteOf(hand, next));
+    linker.hands[side] = next;
+}
