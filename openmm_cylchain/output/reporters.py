@@ -388,7 +388,8 @@ class LinkerReporter(FilamentsReporter):
 
     Columns: ``unbound``, ``one_hand_bound`` and ``both_hands_bound`` count linkers, with an anchor for a hand;
     ``mean_tension`` and ``maximum_tension`` are those of linkers that join two places, in kJ/(mol nm), positive where
-    they pull, NaN if there are none; ``bindings`` and ``unbindings`` are events of hands since the start. ``reporter["both_hands_bound"]`` is an array (reports, types).
+    they pull, NaN if there are none; ``bindings`` and ``unbindings`` are events of the hands of this type since the
+    start. ``reporter["both_hands_bound"]`` is an array (reports, types).
 
     Where each linker with a hand that is bound is goes to a file of its own, ``places``, that ``numpy.load`` reads as
     one array of records: ``step``, ``number``, ``type``, ``anchor``, ``filaments`` and ``arc_lengths`` (as in

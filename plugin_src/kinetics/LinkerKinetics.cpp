@@ -244,6 +244,7 @@ void LinkerKinetics::findKinds(const KineticStep& step) {
             if ((held&(1<<side)) != 0) {
                 kind.rate += unbindingRate(hand, 0, 0)+(hops ? fabs(hand.speed)/hand.siteSpacing : 0);
                 kind.walks = kind.walks || (hand.speed != 0 && !hops);
+                kind.velocity = hops ? 0 : hand.speed;
                 known = known && (held != 3 || !(hand.isLoaded() || hops));
             }
             else if (held != 0)
@@ -251,6 +252,7 @@ void LinkerKinetics::findKinds(const KineticStep& step) {
             else if (type.concentration < 0)
                 kind.rate += captureRate(type, side, step);
         }
+        kind.rests = known && !kind.atAnchor && !kind.walks && !kind.pulls;
         if (!known)
             kind.rate = -1;
     }
@@ -258,13 +260,15 @@ void LinkerKinetics::findKinds(const KineticStep& step) {
 
 LinkerKinetics::Watch LinkerKinetics::watch(const Linker& linker) const {
     const int held = (linker.isHeld(0) ? 1 : 0)+(linker.isHeld(1) ? 2 : 0);
-    Watch watch = {4*linker.type+held, -1};
+    // That of nothing around.
+    Watch watch = {4*linker.type+held, 2*cells.getNumPieces()};
     if (held == 0 || held == 3 || !anyBinding)
         return watch;
     const HandPlace& hand = linker.hands[held-1];
     if (hand.isBound()) {
         const int segment = contours.findSegment(hand.chain, hand.position);
-        watch.where = cells.findPiece(contours, segment, hand.position-contours.getStart(segment));
+        const int piece = cells.findPiece(contours, segment, hand.position-contours.getStart(segment));
+        watch.where = system.types[linker.type].sameChain ? piece : cells.getNumPieces()+piece;
     }
     else
         watch.where = linker.anchor;
@@ -306,9 +310,8 @@ void LinkerKinetics::findMarks(const KineticStep& step) {
 
 /** How many pieces are around a linker to which it could bind. */
 int LinkerKinetics::countAround(const Watch& watch, const KineticStep& step) const {
-    const Kind& kind = kinds[watch.kind];
-    if (!kind.atAnchor)
-        return kind.sameChain ? cells.countAround(watch.where) : cells.countOthersAround(watch.where);
+    if (!kinds[watch.kind].atAnchor)
+        return cells.getNumbersAround()[watch.where];
     if (!cells.isNear(marks[watch.where]))
         return 0;
     double place[3];
@@ -316,17 +319,46 @@ int LinkerKinetics::countAround(const Watch& watch, const KineticStep& step) con
     return cells.lookAround(place).numPieces;
 }
 
-/** Whether it is known that a step passes without an event: then the clock of the linker is taken down. */
-bool LinkerKinetics::passes(double& clock, const Watch& watch, const KineticStep& step) const {
+/** The sum of the rates of a linker; -1 if that depends on its spring. */
+double LinkerKinetics::findRate(const Watch& watch, const KineticStep& step) const {
     const Kind& kind = kinds[watch.kind];
-    if (kind.rate < 0)
-        return false;
-    const double rate = kind.rate+(kind.perPiece > 0 ? kind.perPiece*countAround(watch, step) : 0);
-    const double spent = rate*step.stepSize;
-    if (spent > 0 && !(clock > spent))
+    if (kind.rate < 0 || !(kind.perPiece > 0))
+        return kind.rate;
+    return kind.rate+kind.perPiece*countAround(watch, step);
+}
+
+/** Whether it is known that a step passes without an event: then the clock of the linker is taken down. */
+bool LinkerKinetics::passes(double& clock, double rate, double stepSize) const {
+    const double spent = rate*stepSize;
+    if (!(spent >= 0) || (spent > 0 && !(clock > spent)))
         return false;
     clock -= spent;
     return true;
+}
+
+/** The piece that a linker holds. */
+int LinkerKinetics::pieceOf(const Watch& watch) const {
+    return watch.where < cells.getNumPieces() ? watch.where : watch.where-cells.getNumPieces();
+}
+
+/** Hands of a linker walk that do not bind to sites. */
+void LinkerKinetics::walkAll(Linker& linker, const KineticStep& step, Watch& own, Count& count) const {
+    const Kind& kind = kinds[own.kind];
+    if (kind.pulls)
+        walk(linker, step, count);
+    else {
+        const int side = own.kind%4-1;
+        HandPlace& place = linker.hands[side];
+        place.position += kind.velocity*step.stepSize;
+        // Mostly it stays on its piece.
+        if (anyBinding) {
+            const SegmentPiece& piece = cells.getPiece(pieceOf(own));
+            if (place.position >= piece.alongChain && place.position < piece.alongChain+piece.length)
+                return;
+        }
+        stayOnChain(linker, side, count);
+    }
+    own = watch(linker);
 }
 
 void LinkerKinetics::advanceChunk(LinkerState& state, const KineticStep& step, int chunk) {
@@ -337,13 +369,17 @@ void LinkerKinetics::advanceChunk(LinkerState& state, const KineticStep& step, i
     count.failed = -1;
     pulling[chunk].clear();
     competing[chunk].clear();
+    const int* const around = cells.getNumbersAround();
     for (int i = first; i < last; i++) {
         Watch& own = watches[i];
-        if (kinds[own.kind].walks) {
-            walk(state.linkers[i], step, count);
-            own = watch(state.linkers[i]);
-        }
-        if (!passes(state.clocks[i], own, step)) {
+        // Of most linkers, nothing else is looked at.
+        const Kind& kind = kinds[own.kind];
+        if (kind.rests && passes(state.clocks[i], kind.rate+kind.perPiece*around[own.where], step.stepSize))
+            continue;
+        if (kind.walks)
+            walkAll(state.linkers[i], step, own, count);
+        const double rate = findRate(own, step);
+        if (kind.rests || !passes(state.clocks[i], rate, step.stepSize)) {
             Linker& linker = state.linkers[i];
             if (kinds[own.kind].needsSites)
                 competing[chunk].push_back(i);

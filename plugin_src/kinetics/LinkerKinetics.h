@@ -44,9 +44,10 @@ struct KineticStep {
  *
  * Each linker has a clock: the integral of its rates over time until its next event. Steps take it down, and only where
  * it runs out is anything drawn. Most rates follow from the type of a linker, from what it holds, and from how many
- * pieces of chains are around the piece that it holds: a step looks at two numbers of a linker, and nothing else. Random
- * numbers belong to the seed, the number of the step and that of the linker. Linkers are independent of each other,
- * except for sites that hold one hand each: what happens to linkers whose hands bind to sites is in the order of time.
+ * pieces of chains are around the piece that it holds: a step looks at two numbers of a linker, and nothing else.
+ * Random numbers belong to the seed, the number of the step and that of the linker. Linkers are independent of each
+ * other, except for sites that hold one hand each: what happens to linkers whose hands bind to sites is in the order
+ * of time.
  */
 class LinkerKinetics {
 public:
@@ -88,9 +89,13 @@ private:
         double rate = 0;
         /** Of binding, for each piece around. */
         double perPiece = 0;
+        /** Of a hand that walks without a load, towards the plus end, if the linker holds nothing else. */
+        double velocity = 0;
         bool atAnchor = false, sameChain = false, walks = false, needsSites = false, pulls = false;
+        /** Whether a step has nothing to do for it as long as its clock does not run out. */
+        bool rests = false;
     };
-    /** What a step needs to know of a linker: its kind, and the number of its piece or anchor. */
+    /** What a step needs to know of a linker: its kind, and its anchor, or where the number around its piece is. */
     struct Watch {
         int kind = 0, where = -1;
     };
@@ -107,17 +112,21 @@ private:
     void walk(Linker& linker, const KineticStep& step, Count& count) const;
     bool draw(LinkerState& state, const KineticStep& step, Pending& next) const;
     void apply(Linker& linker, const KineticStep& step, Pending& next, Sites* sites, Count& count) const;
+    void stayOnChain(Linker& linker, int side, Count& count) const;
+    void walkAll(Linker& linker, const KineticStep& step, Watch& watch, Count& count) const;
     void findKinds(const KineticStep& step);
     void findMarks(const KineticStep& step);
     void know(LinkerState& state);
     Watch watch(const Linker& linker) const;
+    int pieceOf(const Watch& watch) const;
     void addLink(const Linker& linker, std::vector<Link>& links) const;
     int countAround(const Watch& watch, const KineticStep& step) const;
-    bool passes(double& clock, const Watch& watch, const KineticStep& step) const;
+    double findRate(const Watch& watch, const KineticStep& step) const;
+    bool passes(double& clock, double rate, double stepSize) const;
     void advanceChunk(LinkerState& state, const KineticStep& step, int chunk);
     void removeUnbound(LinkerState& state);
     void takeTogether(LinkerState& state, const KineticStep& step, Count& count);
-    SegmentCells::Around lookAround(const Linker& linker, int side, const double* place) const;
+    SegmentCells::Around lookAround(const Linker& linker, int side, const KineticStep& step) const;
     bool proposePlace(const Linker& linker, int side, const KineticStep& step, RandomNumbers& random,
             const Sites* sites, HandPlace& found) const;
     bool captureAnywhere(const Linker& linker, int side, RandomNumbers& random, const Sites* sites,

@@ -145,23 +145,27 @@ void LinkerKinetics::walk(Linker& linker, const KineticStep& step, Count& count)
         }
         moves[side] = direction*move;
     }
-    for (int side = 0; side < 2; side++) {
-        if (moves[side] == 0)
-            continue;
-        HandPlace& place = linker.hands[side];
-        const double length = contours.getLength(place.chain);
-        place.position += moves[side];
-        if (contours.isClosed(place.chain)) {
-            place.position -= length*floor(place.position/length);
-            continue;
+    for (int side = 0; side < 2; side++)
+        if (moves[side] != 0) {
+            linker.hands[side].position += moves[side];
+            stayOnChain(linker, side, count);
         }
-        if (place.position >= 0 && place.position <= length)
-            continue;
-        if (system.hands[type.hands[side]].holdsAtEnds)
-            place.position = min(length, max(0.0, place.position));
-        else
-            unbind(linker, side, nullptr, count);
+}
+
+/** A hand that has walked beyond an end stays there, or lets go. */
+void LinkerKinetics::stayOnChain(Linker& linker, int side, Count& count) const {
+    HandPlace& place = linker.hands[side];
+    const double length = contours.getLength(place.chain);
+    if (contours.isClosed(place.chain)) {
+        place.position -= length*floor(place.position/length);
+        return;
     }
+    if (place.position >= 0 && place.position <= length)
+        return;
+    if (system.hands[system.types[linker.type].hands[side]].holdsAtEnds)
+        place.position = min(length, max(0.0, place.position));
+    else
+        unbind(linker, side, nullptr, count);
 }
 
 uint64_t LinkerKinetics::siteOf(const Hand& hand, const HandPlace& place) const {
@@ -204,11 +208,14 @@ double LinkerKinetics::proposalRate(const Hand& hand) const {
     return hand.bindingRate*cells.getLongest();
 }
 
-/** Look around what the other side of a linker holds, which is at a place. */
-SegmentCells::Around LinkerKinetics::lookAround(const Linker& linker, int side, const double* place) const {
+/** Look around what a side of a linker holds. */
+SegmentCells::Around LinkerKinetics::lookAround(const Linker& linker, int side, const KineticStep& step) const {
     const HandPlace& hand = linker.hands[side];
-    if (!hand.isBound())
+    if (!hand.isBound()) {
+        double place[3];
+        locate(placeOf(linker, side), step.positions, step.boxes.segments, place);
         return cells.lookAround(place);
+    }
     const int segment = contours.findSegment(hand.chain, hand.position);
     return cells.lookAround(cells.findPiece(contours, segment, hand.position-contours.getStart(segment)));
 }
@@ -220,9 +227,7 @@ bool LinkerKinetics::proposePlace(const Linker& linker, int side, const KineticS
     const int number = type.hands[side];
     const Hand& hand = system.hands[number];
     const double which = random.uniform(), where = random.uniform(), accepted = random.uniform();
-    double from[3];
-    locate(placeOf(linker, 1-side), step.positions, step.boxes.segments, from);
-    const SegmentCells::Around around = lookAround(linker, 1-side, from);
+    const SegmentCells::Around around = lookAround(linker, 1-side, step);
     if (around.numPieces == 0)
         return false;
     const int chosen = min(around.numPieces-1, static_cast<int>(which*around.numPieces));
@@ -235,7 +240,8 @@ bool LinkerKinetics::proposePlace(const Linker& linker, int side, const KineticS
         return false;
     if (hand.siteSpacing > 0 && (!toSite(hand, found) || sites->count(siteOf(hand, found)) > 0))
         return false;
-    double vector[3];
+    double from[3], vector[3];
+    locate(placeOf(linker, 1-side), step.positions, step.boxes.segments, from);
     locate(contours.findPlace(found.chain, found.position), step.positions, step.boxes.segments, vector);
     for (int k = 0; k < 3; k++)
         vector[k] -= from[k];

@@ -35,17 +35,21 @@ void SegmentCells::setGrid(double size, const double* box) {
 }
 
 void SegmentCells::findCoordinates(const double* point, int* coordinates) const {
+    // Written so that NaN is somewhere, too.
+    if (numCells[0] == 0) {
+        for (int k = 0; k < 3; k++)
+            coordinates[k] = static_cast<int>(min(LARGEST_COORDINATE, max(-LARGEST_COORDINATE,
+                    floor(toCells[4*k]*point[k]))));
+        return;
+    }
     for (int k = 0; k < 3; k++) {
+        // Rows have nothing before their own axis.
         double coordinate = 0;
-        for (int j = 0; j < 3; j++)
+        for (int j = k; j < 3; j++)
             coordinate += toCells[3*k+j]*point[j];
         const int n = numCells[k];
-        if (n > 0)
-            coordinate -= n*floor(coordinate/n);
-        coordinate = floor(coordinate);
-        // Written so that NaN is somewhere, too.
-        coordinate = min(n > 0 ? n-1.0 : LARGEST_COORDINATE, max(n > 0 ? 0.0 : -LARGEST_COORDINATE, coordinate));
-        coordinates[k] = static_cast<int>(coordinate);
+        coordinate = floor(coordinate-n*floor(coordinate/n));
+        coordinates[k] = static_cast<int>(min(n-1.0, max(0.0, coordinate)));
     }
 }
 
@@ -87,32 +91,36 @@ int SegmentCells::addCell(const int* coordinates, int chain) {
         if (equal(coordinates, coordinates+3, cells[slots[slot]].coordinates))
             return slots[slot];
     slots[slot] = static_cast<int>(cells.size());
-    cells.push_back({{coordinates[0], coordinates[1], coordinates[2]}, 0, 0, chain, chain, 0, 0});
+    cells.push_back({{coordinates[0], coordinates[1], coordinates[2]}, 0, 0, chain, chain, 0, false});
     mark(held, markOf(coordinates));
     return slots[slot];
 }
 
+/** Which of a cell and the two that follow it along the first axis may hold something: three bits. */
+unsigned SegmentCells::readRow(const int* coordinates) const {
+    const uint32_t number = markOf(coordinates), bit = number&63;
+    uint64_t word = held[number>>6]>>bit;
+    // There is a word more behind the last one, which is the first again.
+    if (bit > 61)
+        word |= held[(number>>6)+1]<<(64-bit);
+    return word&7;
+}
+
 SegmentCells::Around SegmentCells::gather(const int* coordinates) const {
     Around around;
-    int x[3], y[3], z[3];
+    int x[3] = {}, y[3] = {}, z[3] = {};
     const int numX = findNeighbours(coordinates[0], 0, x), numY = findNeighbours(coordinates[1], 1, y);
     const int numZ = findNeighbours(coordinates[2], 2, z);
     const bool inRow = numX == 3 && x[1] == x[0]+1 && x[2] == x[1]+1;
     for (int k = 0; k < numZ; k++)
         for (int j = 0; j < numY; j++) {
-            const int start[3] = {x[0], y[j], z[k]};
-            const uint32_t mark = markOf(start);
-            // Most rows hold nothing. There is a word more behind the last one, which is the first again.
-            if (inRow) {
-                const uint32_t bit = mark&63;
-                uint64_t word = held[mark>>6]>>bit;
-                if (bit > 61)
-                    word |= held[(mark>>6)+1]<<(64-bit);
-                if ((word&7) == 0)
-                    continue;
-            }
+            int other[3] = {x[0], y[j], z[k]};
+            // Most rows hold nothing.
+            const unsigned row = inRow ? readRow(other) : 7;
             for (int i = 0; i < numX; i++) {
-                const int other[3] = {x[i], y[j], z[k]};
+                if ((row>>i&1) == 0)
+                    continue;
+                other[0] = x[i];
                 const int cell = findCell(other);
                 if (cell >= 0) {
                     around.cells[around.numCells++] = cell;
@@ -145,12 +153,14 @@ void SegmentCells::cut(const Contours& contours, double reach) {
         const int parts = static_cast<int>(max(1.0, ceil(length/reach)));
         firstOfSegment.push_back(static_cast<int>(pieces.size()));
         for (int part = 0; part < parts; part++)
-            pieces.push_back({segment, part*length/parts, length/parts});
+            pieces.push_back({segment, part*length/parts, length/parts,
+                    contours.getStart(segment)+part*length/parts});
         longest = max(longest, length/parts);
     }
     firstOfSegment.push_back(static_cast<int>(pieces.size()));
     cellOf.resize(pieces.size());
     sorted.resize(pieces.size());
+    numAround.assign(2*pieces.size()+1, 0);
     vectors.resize(3*static_cast<size_t>(contours.getNumSegments()));
     int slotBits = 4;
     while (slotBits < 30 && (static_cast<size_t>(1)<<slotBits) < 2*pieces.size()+2)
@@ -238,15 +248,61 @@ void SegmentCells::countAll() {
         Cell& cell = cells[cellOf[i]];
         sorted[cell.first+cell.count++] = static_cast<int>(i);
     }
+    const bool small = find_if(numCells, numCells+3, [] (int n) {return n == 1 || n == 2;}) != numCells+3;
     for (Cell& cell : cells) {
-        const Around around = gather(cell.coordinates);
-        bool several = false;
-        for (int i = 0; i < around.numCells; i++) {
-            const Cell& other = cells[around.cells[i]];
-            several = several || other.firstChain != cell.firstChain || other.lastChain != cell.firstChain;
+        cell.around = small ? 0 : cell.count;
+        cell.several = cell.lastChain != cell.firstChain;
+    }
+    for (size_t i = 0; i < cells.size(); i++) {
+        if (!small) {
+            lookAhead(static_cast<int>(i));
+            continue;
         }
-        cell.around = around.numPieces;
-        cell.aroundIfSeveral = several ? around.numPieces : 0;
+        const Around around = gather(cells[i].coordinates);
+        cells[i].around = around.numPieces;
+        for (int j = 0; j < around.numCells; j++)
+            cells[i].several = cells[i].several || cells[around.cells[j]].firstChain != cells[i].firstChain ||
+                    cells[around.cells[j]].lastChain != cells[i].firstChain;
+    }
+    for (size_t i = 0; i < pieces.size(); i++) {
+        const Cell& cell = cells[cellOf[i]];
+        numAround[i] = cell.around;
+        numAround[pieces.size()+i] = cell.several ? cell.around : 0;
+    }
+}
+
+/** Count what two cells beside each other have for each other. */
+void SegmentCells::meet(int cell, int other) {
+    Cell &a = cells[cell], &b = cells[other];
+    a.around += b.count;
+    b.around += a.count;
+    const bool one = a.firstChain == b.firstChain && a.lastChain == b.lastChain && a.firstChain == a.lastChain;
+    a.several = a.several || !one;
+    b.several = b.several || !one;
+}
+
+/** Count for a cell and those of the half of its neighbours that come after it. */
+void SegmentCells::lookAhead(int cell) {
+    const int coordinates[3] = {cells[cell].coordinates[0], cells[cell].coordinates[1], cells[cell].coordinates[2]};
+    int x[3] = {}, y[3] = {}, z[3] = {};
+    findNeighbours(coordinates[0], 0, x);
+    findNeighbours(coordinates[1], 1, y);
+    findNeighbours(coordinates[2], 2, z);
+    const bool inRow = x[1] == x[0]+1 && x[2] == x[1]+1;
+    static const int ROWS[5][2] = {{1, 1}, {2, 1}, {0, 2}, {1, 2}, {2, 2}};
+    for (const int* row : ROWS) {
+        int other[3] = {x[0], y[row[0]], z[row[1]]};
+        unsigned found = inRow ? readRow(other) : 7;
+        // Of its own row, what is behind it.
+        if (row == ROWS[0])
+            found &= 4;
+        for (int i = 0; found != 0; i++, found >>= 1)
+            if ((found&1) != 0) {
+                other[0] = x[i];
+                const int known = findCell(other);
+                if (known >= 0)
+                    meet(cell, known);
+            }
     }
 }
 
@@ -254,7 +310,7 @@ void SegmentCells::countAll() {
 void SegmentCells::markAround() {
     fill(near.begin(), near.end(), 0);
     for (const Cell& cell : cells) {
-        int x[3], y[3], z[3];
+        int x[3] = {}, y[3] = {}, z[3] = {};
         const int numX = findNeighbours(cell.coordinates[0], 0, x), numY = findNeighbours(cell.coordinates[1], 1, y);
         const int numZ = findNeighbours(cell.coordinates[2], 2, z);
         for (int k = 0; k < numZ; k++)

@@ -8,10 +8,10 @@
 
 namespace cylchain {
 
-/** A part of a segment: where it begins along the segment at rest, and its length. */
+/** A part of a segment: where it begins along the segment at rest, and along its chain, and its length. */
 struct SegmentPiece {
     int segment;
-    double start, length;
+    double start, length, alongChain;
 };
 
 /**
@@ -42,13 +42,20 @@ public:
     const SegmentPiece& getPiece(int piece) const {
         return pieces[piece];
     }
+    int getNumPieces() const {
+        return static_cast<int>(pieces.size());
+    }
     /** The number of pieces around a piece, itself among them. */
     int countAround(int piece) const {
-        return cells[cellOf[piece]].around;
+        return numAround[piece];
     }
     /** The same, but zero if all of them belong to its own chain. */
     int countOthersAround(int piece) const {
-        return cells[cellOf[piece]].aroundIfSeveral;
+        return numAround[pieces.size()+piece];
+    }
+    /** The numbers around all pieces, then those of other chains, then a zero. */
+    const int* getNumbersAround() const {
+        return numAround.data();
     }
     /** The longest piece. */
     double getLongest() const {
@@ -74,7 +81,9 @@ private:
         int coordinates[3];
         /** The pieces in it, as they are sorted; the chains of the first and the last. */
         int first, count, firstChain, lastChain;
-        int around, aroundIfSeveral;
+        /** How many are around it, and whether all that are belong to its first chain. */
+        int around;
+        bool several;
     };
     void cut(const Contours& contours, double reach);
     void setGrid(double size, const double* box);
@@ -83,12 +92,15 @@ private:
     std::uint32_t markOf(const int* coordinates) const;
     std::size_t slotOf(const int* coordinates) const;
     int findCell(const int* coordinates) const;
+    unsigned readRow(const int* coordinates) const;
     int addCell(const int* coordinates, int chain);
     void clear();
     void mark(std::vector<std::uint64_t>& bits, std::uint32_t number) const {
         bits[number>>6] |= static_cast<std::uint64_t>(1)<<(number&63);
     }
     Around gather(const int* coordinates) const;
+    void lookAhead(int cell);
+    void meet(int cell, int other);
     void countAll();
     void markAround();
     /** The vectors that take a point to its coordinates in cells, and how many there are along axes of a box, or 0. */
@@ -101,6 +113,7 @@ private:
     double reachOfPieces = 0, longest = 0;
     std::vector<double> vectors;
     std::vector<int> cellOf, sorted;
+    std::vector<int> numAround = std::vector<int>(1, 0);
     std::vector<Cell> cells;
     /** Where cells are by their coordinates: -1 where none is. */
     std::vector<int> slots;

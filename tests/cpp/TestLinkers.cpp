@@ -421,6 +421,46 @@ static void testThreadsAndImages() {
     checkClose(both(states[0]), both(states[2]), 4*sqrt(2*both(states[0])), 1, "images");
 }
 
+/** What a linker does depends neither on which others there are nor on where it is stored. */
+static void testOrderOfStorage() {
+    Rods rods;
+    const double a[] = {-100, 0, 0}, b[] = {-90, 0, 20};
+    rods.add(a, ALONG_X, 4, 50);
+    rods.add(b, ALONG_X, 5, 40);
+    LinkerSystem system;
+    system.kT = KT;
+    system.hands = {handOf(0.3, 60, 1, {0, 1}), handOf(0.6, 60, 0.5, {0, 1})};
+    system.hands[1].speed = 0.5;
+    LinkerType type;
+    type.hands[0] = 0;
+    type.hands[1] = 1;
+    type.stiffness = 0.05;
+    system.types = {type};
+    LinkerState all = freeLinkers(900), some, reversed = all;
+    for (size_t i = 0; i < all.linkers.size(); i += 3)
+        some.linkers.push_back(all.linkers[i]);
+    reverse(reversed.linkers.begin(), reversed.linkers.end());
+    KineticStep step = stepOf(rods.x, 0.2);
+    step.volume = 1e8;
+    LinkerKinetics kinetics(system, rods.chains);
+    // All by one, so that what it keeps of a state belongs to another one each time.
+    for (int i = 0; i < 60; i++)
+        for (LinkerState* state : {&all, &some, &reversed})
+            kinetics.advance(*state, step, SERIAL);
+    check(all.events[0].unbindings > 300, "nothing happens");
+    const auto same = [] (const Linker& one, const Linker& other) {
+        bool same = one.number == other.number;
+        for (int side = 0; side < 2; side++)
+            same = same && one.hands[side].chain == other.hands[side].chain &&
+                    one.hands[side].position == other.hands[side].position;
+        return same;
+    };
+    for (size_t i = 0; i < all.linkers.size(); i++) {
+        check(same(all.linkers[i], reversed.linkers[all.linkers.size()-1-i]), "the order of storage");
+        check(i%3 != 0 || same(all.linkers[i], some.linkers[i/3]), "which others there are");
+    }
+}
+
 static void testSegmentsAround() {
     NormalNumbers normal(3);
     const double box[] = {300, 0, 0, 70, 280, 0, -60, 40, 310};
@@ -500,6 +540,7 @@ int main() {
         testRunLengthsAndEnds();
         testSites();
         testThreadsAndImages();
+        testOrderOfStorage();
         testEquilibriumOnRods();
     }
     catch (const exception& e) {

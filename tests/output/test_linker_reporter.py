@@ -77,6 +77,7 @@ def test_table_and_places(simulated, tmp_path):
             held = table.held[of_type]
             tensions = 0.1 * (lengths[of_type & (table.held == 2)] - rest)
             assert len(tensions) > 0
+            assert np.subtract(*events[number]) == table.bound[of_type].sum() - (30, 0)[number]
             expected = [
                 *(int((held == n).sum()) for n in range(3)),
                 tensions.mean(),
