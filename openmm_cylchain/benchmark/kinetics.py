@@ -240,7 +240,8 @@ def ratio_of_means(values, others):
     value = one.value / other.value
     if one.error is None or other.error is None:
         return Estimate(value, None)
-    return Estimate(value, float(abs(value) * np.hypot(one.error / one.value, other.error / other.value)))
+    # The first mean may be zero: where no linker has bound with both hands.
+    return Estimate(value, float(np.hypot(one.error, value * other.error) / abs(other.value)))
 
 
 def course_rows(name, courses, crossings=None):

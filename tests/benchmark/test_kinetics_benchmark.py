@@ -135,6 +135,16 @@ def test_ratios_to_the_reference():
     assert rows["shortening_over_reference_bundle_2000_us"].value == pytest.approx(1.0)
 
 
+def test_ratios_of_means_have_errors_where_a_mean_is_zero():
+    ratio = kinetics.ratio_of_means([2.0, 4.0], [5.0, 7.0])
+    assert ratio.value == pytest.approx(0.5)
+    assert ratio.error == pytest.approx(0.5 * np.hypot(1 / 3, 1 / 6))
+    around_zero = kinetics.ratio_of_means([-1.0, 1.0], [5.0, 7.0])
+    assert around_zero.value == 0.0
+    assert around_zero.error == pytest.approx(1 / 6)
+    assert kinetics.ratio_of_means([0.0, 0.0], [5.0, 7.0]).value == 0.0
+
+
 def test_speeds():
     times = {"bundle_1000_us": np.array([2e-3, 2e-3]), "bundle_5000_us": np.array([4e-2, 4e-2])}
     rows = {row.name: row.value for row in kinetics.speed_rows("bundle", (1000.0, 5000.0), times)}
