@@ -3,6 +3,7 @@
 import copy
 import os
 import pickle
+import re
 import subprocess
 import sys
 
@@ -524,7 +525,7 @@ def test_states_of_earlier_versions_are_read():
     state = context.getState(integratorParameters=True)
     xml = openmm.XmlSerializer.serialize(state)
     begin, end = xml.index("<Links"), xml.rindex("</Links>") + len("</Links>")
-    old = (xml[:begin] + xml[end:]).replace('stepsTaken="0" version="6"', 'stepsTaken="0" version="3"')
+    old = re.sub('stepsTaken="0" version="[0-9]+"', 'stepsTaken="0" version="3"', xml[:begin] + xml[end:])
     assert 'stepsTaken="0" version="3"' in old
     links = forces[0].getLinksInContext(context)
     context.setState(openmm.XmlSerializer.deserialize(old))
