@@ -70,8 +70,9 @@ Instability stepOfModesOfPack(const ModePack<Scalar>& modes, const double* posit
 #include "dynamics/ExplicitLoops-inl.h"
 
 /**
- * Whether all but implicit steps of open chains is left to CYLCHAIN_SMALL_PACKS for packs of W chains, with the same
- * results to the bit. Few packs have less chains than lanes, but their loops take as long to compile.
+ * Whether packs of W chains are left to CYLCHAIN_SMALL_PACKS, with the same results to the bit: its registers have as
+ * many lanes. Few packs have less chains than lanes, but their loops take as long to compile. A chain alone is not: its
+ * results would be rounded in another way, and it would be slower.
  */
 template <int W> constexpr bool isSmall() {
 #ifdef CYLCHAIN_SMALL_PACKS
@@ -87,12 +88,11 @@ template <int W> constexpr bool isSmall() {
 
 template <int W> Instability stepPackAs(const Pack& pack, const double* positions, const double* forces,
             const double* box, const StepSettings& settings, double* displacements) {
-    if (isImplicit(settings.scheme) && !pack.closed)
-        return stepPackImplicitly<W, false>(pack, positions, forces, box, settings, displacements);
     if constexpr (isSmall<W>())
         return CYLCHAIN_SMALL_PACKS().step(pack, positions, forces, box, settings, displacements);
     else if (isImplicit(settings.scheme))
-        return stepPackImplicitly<W, true>(pack, positions, forces, box, settings, displacements);
+        return pack.closed ? stepPackImplicitly<W, true>(pack, positions, forces, box, settings, displacements) :
+                stepPackImplicitly<W, false>(pack, positions, forces, box, settings, displacements);
     else
         return stepPack<W>(pack, positions, forces, box, settings, displacements);
 }
