@@ -388,7 +388,7 @@ def filament_wall_force(
 
     The energy is ``(k/2) d^2`` for the depth d to which a node, or a sphere around it, gets beyond the wall: that of
     ``wall_force`` at a radius of zero. Schemes "implicit" and "implicit-second-order" take the wall at the end of the
-    step and mirror what would diffuse into it, so that its stiffness does not limit their steps. In other schemes, and
+    step and bring back what would get into it, so that its stiffness does not limit their steps. In other schemes, and
     in other Integrators, it is explicit.
 
     Parameters

@@ -7,11 +7,16 @@ using namespace std;
 
 ChainPlaces::ChainPlaces(const vector<Chain>& chains, int particles) : chains(chains), chainOfParticle(particles, -1),
         nodeOfParticle(particles, -1), packOfChain(chains.size(), -1), laneOfChain(chains.size(), -1) {
-    for (size_t chain = 0; chain < chains.size(); chain++)
+    for (size_t chain = 0; chain < chains.size(); chain++) {
         for (size_t node = 0; node < chains[chain].nodes.size(); node++) {
             chainOfParticle[chains[chain].nodes[node]] = chain;
             nodeOfParticle[chains[chain].nodes[node]] = node;
         }
+        double length = 0;
+        for (const Segment& segment : chains[chain].segments)
+            length += segment.restLength;
+        lengths.push_back(length);
+    }
 }
 
 void ChainPlaces::setParticles(const vector<CoupledParticle>& newParticles) {

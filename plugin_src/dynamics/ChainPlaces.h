@@ -60,6 +60,10 @@ public:
     const std::vector<Chain>& getChains() const {
         return chains;
     }
+    /** The length of a chain whose segments have their rest lengths. */
+    double getLength(int chain) const {
+        return lengths[chain];
+    }
     /** The number of chains and particles. */
     int getNumChains() const {
         return chains.size()+particles.size();
@@ -69,6 +73,7 @@ public:
 private:
     const std::vector<Chain>& chains;
     std::vector<CoupledParticle> particles;
+    std::vector<double> lengths;
     std::vector<int> chainOfParticle, nodeOfParticle, packOfChain, laneOfChain;
 };
 

@@ -14,8 +14,8 @@ namespace {
 const double REACH = 0.5;
 /** The same where a periodic box is too narrow for that. */
 const double LEAST_REACH = 0.2;
-/** The largest overlap that is mirrored, over the same. */
-const double LARGEST_MIRRORED = 1;
+/** The largest predicted overlap, and the largest gap that two come back to, over the same. */
+const double LARGEST_RETURN = 1;
 /** Where pairs with a larger gap are nearest is not looked for, over the same. */
 const double LARGEST_GAP = 0.3;
 /** Capsules that have travelled less touch where they did, over the same. */
@@ -52,8 +52,8 @@ void ContactEquations::begin(const CoupledStart& start, const Loop& newLoop) {
     active = &start.active;
     kT = start.settings.kT;
     stepSize = start.settings.stepSize;
-    mirrorDepth = findDepthOfMirror(kT, stiffness);
-    chainPlaces = &start.places;
+    wallDepth = findDepthOfWall(kT, stiffness);
+    responses.begin(start.places, stepSize);
     const vector<Capsule>& capsules = search->getSystem().capsules;
     places.resize(capsules.size());
     double diameter = 0;
@@ -126,7 +126,7 @@ void ContactEquations::findPairs(const double* moved) {
 }
 
 void ContactEquations::addState(const ContactPair& pair) {
-    states.push_back({pair, {0, 0}, {}, {false, false}, {0, 0}});
+    states.push_back({pair, {}, {}, {false, false}, {0, 0}});
     watches.push_back({pair.a, pair.b, -HUGE_VAL, 0, -1, pair.clearance});
 }
 
@@ -191,16 +191,20 @@ void ContactEquations::updateContacts(State& state, int count, const double* mov
 }
 
 /** Find b for a contact with a predicted gap. */
-double ContactEquations::findMirroredOf(const ContactPair& pair, const Contact& contact, double largest) const {
-    const double overlap = min(-contact.gap, largest), a = stiffness*(responseOf(pair.a, contact.s)+
-            responseOf(pair.b, contact.t));
-    return cylchain::findMirrored(overlap, a, mirrorDepth);
+RestGap ContactEquations::findRestGap(const ContactPair& pair, const Contact& contact, double largest) const {
+    const double a = stiffness*(responseOf(pair.a, contact.s)+responseOf(pair.b, contact.t));
+    const vector<Capsule>& capsules = search->getSystem().capsules;
+    double r[3];
+    search->findVector(pair, contact.s, contact.t, begun, r);
+    const double* n = contact.normal;
+    const double before = r[0]*n[0]+r[1]*n[1]+r[2]*n[2]-capsules[pair.a].radius-capsules[pair.b].radius;
+    return RestGap(max(contact.gap, -largest), min(before, largest), a, wallDepth);
 }
 
 /** How far a unit force across a capsule moves a place on it in the step. */
 double ContactEquations::responseOf(int capsule, double fraction) const {
     const PlaceOnChain place = placeOf(capsule, fraction);
-    return place.pack < 0 ? 0 : stepSize/chainPlaces->getLateralFriction(place);
+    return place.pack < 0 ? 0 : responses.find(place);
 }
 
 /** Whether it is looked for where a pair touches: not where that was known a moment ago. */
@@ -245,8 +249,9 @@ void ContactEquations::evaluate(int number, const double* moved, bool first, con
     const double diameter = search->getSystem().capsules[pair.a].radius+search->getSystem().capsules[pair.b].radius;
     const double way = travelled[pair.a]+travelled[pair.b];
     double gap = HUGE_VAL;
-    // What is farther away is left out, until it may have come near. Overlaps that are mirrored count.
-    const double largest = max(state.mirrored[0], state.mirrored[1]), limit = LARGEST_GAP*diameter+largest;
+    // What is farther away is left out, until it may have come near. Gaps that two come back to count.
+    const double largest = max({0.0, state.restGaps[0].get(), state.restGaps[1].get()});
+    const double limit = LARGEST_GAP*diameter+largest;
     if (outlook != NULL) {
         Contact contacts[2];
         int count;
@@ -274,8 +279,10 @@ void ContactEquations::evaluate(int number, const double* moved, bool first, con
         if (contact.crossed && iterations < SEARCHING_ITERATIONS)
             part.pairs.push_back(number);
         if (first)
-            state.mirrored[i] = findMirroredOf(pair, contact, LARGEST_MIRRORED*diameter);
-        const double overlap = state.mirrored[i]-contact.gap;
+            state.restGaps[i] = findRestGap(pair, contact, LARGEST_RETURN*diameter);
+        else if (state.touched[i])
+            state.restGaps[i].correct(contact.gap);
+        const double overlap = state.restGaps[i].get()-contact.gap;
         gap = min(gap, -overlap);
         // Contacts that open and close in turn would keep the iteration from ending.
         const bool holds = iterations >= HOLDING_ITERATIONS && state.touched[i];

@@ -3,6 +3,8 @@
 
 #include "couplings/ContactSearch.h"
 #include "dynamics/ImplicitCouplings.h"
+#include "dynamics/PlaceResponses.h"
+#include "dynamics/RestGap.h"
 #include <algorithm>
 #include <cstddef>
 #include <utility>
@@ -18,9 +20,9 @@ namespace cylchain {
  *
  *     k_c (b-g(y)) n   where g(y) < b,
  *
- * with b as for walls, see findMirrored(): a predicted overlap is mirrored, as a wall would throw a diffusing particle
- * back; with b = 0, contacts would act too early by 0.58 of what diffusion moves them by in a step. Small steps resolve
- * a contact. Segments that have crossed in the end fail.
+ * with b of a RestGap: where an overlap is predicted, two segments come back to the gap with which
+ * the step began. With b = 0, contacts would act too early by 0.58 of what diffusion moves them by in a step. Small
+ * steps resolve a contact. Segments that have crossed in the end fail.
  *
  * Where two capsules touch may jump: from a segment to its neighbour, or between the ends of nearly parallel ones. So
  * it is looked for in the first iterations alone; after that, each pair keeps the fractions where it touches.
@@ -49,9 +51,9 @@ private:
     /** A pair of capsules. */
     struct State {
         ContactPair pair;
-        /** The overlaps that are mirrored, and where it touches. */
-        double mirrored[2];
+        /** Where it touches. */
         Contact contacts[2];
+        RestGap restGaps[2];
         /** Whether it touched in the last iteration. */
         bool touched[2];
         /** By how much its gap has changed while one of its packs took no part. */
@@ -106,7 +108,7 @@ private:
     void takeNoteOf(int capsule, const double* moved);
     bool findPairsOf(const std::vector<int>& capsules, const double* moved);
     bool isKnown(const ContactPair& pair) const;
-    double findMirroredOf(const ContactPair& pair, const Contact& contact, double largest) const;
+    RestGap findRestGap(const ContactPair& pair, const Contact& contact, double largest) const;
     double responseOf(int capsule, double fraction) const;
     bool isLookedFor(int pair) const;
     void look(int begin, int end, const double* moved, bool first, Part& part);
@@ -122,8 +124,8 @@ private:
     const Loop* loop = nullptr;
     const PackFlags* active = nullptr;
     const double *begun = nullptr, *box = nullptr;
-    const ChainPlaces* chainPlaces = nullptr;
-    double kT = 0, stepSize = 0, mirrorDepth = 0, reach = 0, reaches[2] = {};
+    PlaceResponses responses;
+    double kT = 0, stepSize = 0, wallDepth = 0, reach = 0, reaches[2] = {};
     std::vector<CapsulePlace> places;
     std::vector<ContactPair> pairs;
     /** Those of the first search in its order, and behind them those that others have found. */

@@ -1,4 +1,5 @@
 #include "dynamics/WallEquations.h"
+#include "dynamics/PlaceResponses.h"
 #include "dynamics/SymmetricMatrices.h"
 #include <algorithm>
 #include <cmath>
@@ -15,37 +16,18 @@ const double DIAGONAL = 1-M_SQRT1_2;
 const double TOLERANCE = 0.3;
 /** The same in nm, where nothing moves thermally. */
 const double LEAST_TOLERANCE = 1e-7;
-/** The number of iterations after which what is beyond a face for the first time is mirrored. */
-const int MIRRORING_ITERATIONS = 3;
-/** How stiff a wall or contact is that mirrors at a depth of its own. */
-const double LEAST_STIFF = 1;
-/** How far beyond a wall particles are now and then, over the depth at which they are mirrored. */
-const double LARGEST_DEPTH = 3;
-/** The number of iterations that know of no walls. */
+/** The number of iterations that know of no walls: what they lead to is predicted. */
 const int FREE_ITERATIONS = 2;
 /** The number of iterations that look where faces are. */
 const int SEARCHING_ITERATIONS = 10;
-/** By how much a tangent plane may be wrong, over what is mirrored. */
+/** By how much a tangent plane may be wrong, over the gap below which there is a force. */
 const double LARGEST_DEVIATION = 0.1;
-/** The most that is mirrored at a curved face, over the way to the middle. */
-const double LARGEST_MIRRORED = 0.5;
+/** The largest way beyond a curved face or back from it, over the way to the middle. */
+const double LARGEST_RETURN = 0.5;
 /** Particles that a thread looks at together. */
 const int CHUNK = 256;
 
 } // namespace
-
-double cylchain::findMirrored(double overlap, double a, double depth) {
-    if (a < LEAST_STIFF) {
-        // Within 2 % in the surface excess for a from 0.1 on.
-        const double scaled = 0.6*sqrt(a);
-        return max(0.0, overlap)*scaled/(1+scaled);
-    }
-    return -depth+max(0.0, overlap-depth)*(1+2/a);
-}
-
-double cylchain::findDepthOfMirror(double kT, double stiffness) {
-    return sqrt(0.5*M_PI*kT/stiffness);
-}
 
 /** Add how a force on a round face turns with it: its share of 1-g g, or of the plane across the axis of a cylinder. */
 static void addTurning(const Wall& wall, const double* g, double size, double* stiffness) {
@@ -66,18 +48,23 @@ void WallEquations::begin(const CoupledStart& start, const Loop& newLoop) {
     loop = &newLoop;
     begun = start.positions;
     stepSize = start.settings.stepSize;
-    mirrorDepth = findDepthOfMirror(start.settings.kT, system->stiffness);
+    wallDepth = findDepthOfWall(start.settings.kT, system->stiffness);
     tolerance = max(LEAST_TOLERANCE, TOLERANCE*sqrt(start.settings.kT/system->stiffness));
     const size_t count = system->particles.size();
     places.resize(count);
-    frictions.resize(count);
+    responses.resize(count);
+    together.assign(count, 0);
+    PlaceResponses found;
+    found.begin(start.places, stepSize);
     parts.resize((count+CHUNK-1)/CHUNK);
     (*loop)(parts.size(), [&] (int part) {
         for (size_t i = (size_t) part*CHUNK; i < min(count, (size_t) (part+1)*CHUNK); i++) {
             Place place;
             place.first = system->particles[i].particle;
-            if (start.places.find(place, places[i]) && start.taken[places[i].chain])
-                frictions[i] = start.places.getLateralFriction(places[i]);
+            if (start.places.find(place, places[i]) && start.taken[places[i].chain]) {
+                responses[i] = found.find(places[i]);
+                together[i] = found.moveTogether(places[i].chain);
+            }
             else
                 places[i] = PlaceOnChain();
         }
@@ -113,10 +100,10 @@ void WallEquations::linearise(int iteration, const double* moved, vector<Couplin
                 const bool round = shape == WallShape::Sphere || shape == WallShape::Cylinder;
                 // The distance from the middle. Where it is short, there would be more stiffness than steps can have.
                 const double distance = depth-particle.radius+system->wall.length;
-                state.curvature = round ? 1/max(distance, LARGEST_MIRRORED*system->wall.length) : 0;
+                state.curvature = round ? 1/max(distance, LARGEST_RETURN*system->wall.length) : 0;
             }
             state.equation = -1;
-            const double beyond = findDepthAt(state, moved)+state.mirrored;
+            const double beyond = findDepthAt(state, moved)+state.restGap.get();
             if (!(beyond > 0))
                 continue;
             state.equation = equations.size()-first;
@@ -132,21 +119,36 @@ void WallEquations::linearise(int iteration, const double* moved, vector<Couplin
         }
 }
 
-double WallEquations::findMirroredOf(int particle, int face, double depth) const {
+RestGap WallEquations::findRestGap(int particle, int face, double depth) const {
     const WallParticle& own = system->particles[particle];
     double gradient[3];
     const double before = findDepth(system->wall, face, begun+3*own.particle, own.radius, gradient);
-    const double largest = (isFlat(system->wall) ? 1 : LARGEST_MIRRORED)*(getRoom(system->wall)-own.radius);
-    // What begins farther beyond the wall than thermal motion gets to comes back without being thrown.
-    const double further = depth-max(0.0, before-LARGEST_DEPTH*mirrorDepth);
-    return findMirrored(min(largest, further), implicit*stepSize*system->stiffness/frictions[particle], mirrorDepth);
+    const double largest = isFlat(system->wall) ? HUGE_VAL : LARGEST_RETURN*(getRoom(system->wall)-own.radius);
+    return RestGap(max(-largest, -depth), min(largest, -before), implicit*system->stiffness*responses[particle],
+            wallDepth);
+}
+
+/** Get whether a neighbour in the chain, with which a particle moves together, is deeper beyond a face. */
+bool WallEquations::isBesideDeeper(int particle, int face, double depth, const double* moved) const {
+    if (!together[particle])
+        return false;
+    for (int other : {particle-1, particle+1}) {
+        if (other < 0 || other >= (int) places.size() || places[other].pack < 0 ||
+                places[other].chain != places[particle].chain)
+            continue;
+        const WallParticle& own = system->particles[other];
+        double gradient[3];
+        if (findDepth(system->wall, face, moved+3*own.particle, own.radius, gradient) > depth)
+            return true;
+    }
+    return false;
 }
 
 bool WallEquations::finishPart(int number, const double* moves, const double* moved) {
     Part& part = parts[number];
     bool unfinished = false;
     for (State& state : part.states) {
-        const double beyond = findDepthAt(state, moved)+state.mirrored;
+        const double depth = findDepthAt(state, moved), b = state.restGap.get(), beyond = depth+b;
         if (state.equation < 0)
             state.unfinished = beyond > tolerance;
         else {
@@ -159,7 +161,9 @@ bool WallEquations::finishPart(int number, const double* moves, const double* mo
         const WallParticle& own = system->particles[state.particle];
         double gradient[3];
         const double real = findDepth(system->wall, state.face, moved+3*own.particle, own.radius, gradient);
-        state.unfinished |= !(real+state.mirrored-max(0.0, beyond) <= max(tolerance, LARGEST_DEVIATION*state.mirrored));
+        state.unfinished |= !(real+b-max(0.0, beyond) <= max(tolerance, LARGEST_DEVIATION*b));
+        if (state.unfinished)
+            state.restGap.correct(-depth);
         unfinished |= state.unfinished;
     }
     const int count = places.size();
@@ -170,18 +174,19 @@ bool WallEquations::finishPart(int number, const double* moves, const double* mo
         for (int face = 0; face < numFaces; face++) {
             if ((reached[i]>>face)&1)
                 continue;
-            State state = {i, face, 0, {}, 0, -1, 0, 0, true};
+            State state;
+            state.particle = i;
+            state.face = face;
             const double depth = findDepth(system->wall, face, moved+3*own.particle, own.radius, state.gradient);
-            // Where two faces meet, what one has mirrored may be beyond the other. Later iterations are no predictions:
-            // others have pushed the particle.
-            const bool predicts = iterations < MIRRORING_ITERATIONS;
+            // What is beyond a face later on has been pushed there or was beside what was deeper: no prediction.
+            const bool predicts = iterations < FREE_ITERATIONS;
             if (!(depth > (predicts ? 0 : tolerance)))
                 continue;
-            state.mirrored = findMirroredOf(i, face, predicts ? depth : 0);
-            if (!(depth+state.mirrored > (predicts ? 0 : tolerance)))
+            state.restGap = findRestGap(i, face, predicts ? depth : 0);
+            if (!(depth+state.restGap.get() > (predicts ? 0 : tolerance)))
                 continue;
             unfinished = true;
-            if (iterations < FREE_ITERATIONS-1)
+            if (iterations < FREE_ITERATIONS-1 || (predicts && isBesideDeeper(i, face, depth, moved)))
                 continue;
             reached[i] |= 1<<face;
             const double* y = moved+3*own.particle;

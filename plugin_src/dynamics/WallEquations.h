@@ -3,6 +3,7 @@
 
 #include "couplings/Walls.h"
 #include "dynamics/ImplicitCouplings.h"
+#include "dynamics/RestGap.h"
 #include <vector>
 
 namespace cylchain {
@@ -11,12 +12,14 @@ namespace cylchain {
  * Walls in an implicit step.
  *
  * The first two iterations of a stage know of none: one alone does not know how segments turn. Where they lead, y*, a
- * particle may be beyond a face by b = d(y*)-max(0, d(x)) more than where it began, x, with the depth d. The force is
+ * particle may be beyond a face, with the depth d(y*) > 0. The force is
  *
- *     -k (m+d(y)) grad d   where d(y) > -m
+ *     -k (b+d(y)) grad d   where d(y) > -b
  *
- * with m = findMirrored(b, ...). A stiff wall mirrors what diffuses into it, as it would throw a diffusing particle
- * back; with m = 0, particles would heap up at it. The pressure on a flat wall is that of the density before it.
+ * with b of a RestGap: what diffuses into a stiff wall comes back to where it began; with b = 0, particles would
+ * heap up at it. The pressure on a flat wall is that of the density before it. Where a stretch of a chain is beyond a
+ * face, its deepest nodes come back, and take along what is beside them: if each came back, filaments that walls press
+ * on would be 10 % too straight.
  *
  * Depths are taken from the iterate, and from the tangent plane to an iterate after some iterations. Each force is
  * along the gradient of one depth, so that faces of slabs and boxes, which are flat, are exact.
@@ -41,16 +44,15 @@ private:
         /** Its number in the wall. */
         int particle;
         int face;
-        /** What is mirrored: m. */
-        double mirrored;
+        RestGap restGap;
         /** The depth is offset+gradient.y. */
-        double gradient[3], offset;
+        double gradient[3] = {}, offset = 0;
         /** The number of its equation in the last iteration, or -1. */
-        int equation;
+        int equation = -1;
         /** The force that the last iteration has found, times grad d, and the second derivative of d across grad d. */
-        double force, curvature;
+        double force = 0, curvature = 0;
         /** Whether another iteration is needed for it. */
-        bool unfinished;
+        bool unfinished = true;
     };
     struct Part {
         std::vector<State> states;
@@ -58,38 +60,23 @@ private:
     };
     double findDepthAt(const State& state, const double* positions) const;
     bool finishPart(int part, const double* moves, const double* moved);
-    double findMirroredOf(int particle, int face, double depth) const;
+    bool isBesideDeeper(int particle, int face, double depth, const double* moved) const;
+    RestGap findRestGap(int particle, int face, double depth) const;
     const WallSystem* system = nullptr;
     const Loop* loop = nullptr;
     const double* begun = nullptr;
-    double stepSize = 0, tolerance = 0, mirrorDepth = 0, implicit = 1;
+    double stepSize = 0, tolerance = 0, wallDepth = 0, implicit = 1;
     int numFaces = 0, iterations = 0;
-    /** For each particle of the wall: where it is, its friction, and a bit for each face that it has a state of. */
+    /**
+     * For each particle of the wall: where it is, how a force moves it, whether it moves together with its neighbours,
+     * and a bit for each face that it has a state of.
+     */
     std::vector<PlaceOnChain> places;
-    std::vector<double> frictions;
+    std::vector<double> responses;
+    std::vector<char> together;
     std::vector<unsigned char> reached;
     std::vector<Part> parts;
 };
-
-/**
- * Find b for an overlap that is predicted, of a wall or a contact with the stiffness k where the friction is zeta.
- *
- * A step that does not resolve the potential, a = h k/zeta >= 1, mirrors: not at the surface, but at the depth
- * d = (pi k_B T/2k)^(1/2) behind it. So much room a soft wall has beyond its surface in equilibrium, the integral of
- * exp(-k x^2/2 k_B T). Then what diffuses is as dense in front of a flat wall as in equilibrium, up to the surface
- * itself. What is linear responds to the force k (b-g) with g = g*+a (b-g), which gets to g = -g*-2d with
- *
- *     b = -d+(1+2/a) max(0, -g*-d).
- *
- * A step that resolves it has b = -beta g* with a share beta from 0 on, so that the surface excess is that of
- * equilibrium, (pi k_B T/2k)^(1/2).
- *
- * @param overlap  -g*
- * @param depth    of findDepthOfMirror()
- */
-double findMirrored(double overlap, double a, double depth);
-/** Find the depth at which steps mirror that do not resolve a stiffness. */
-double findDepthOfMirror(double kT, double stiffness);
 
 } // namespace cylchain
 

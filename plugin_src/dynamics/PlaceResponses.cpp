@@ -1,0 +1,56 @@
+#include "dynamics/PlaceResponses.h"
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+using namespace cylchain;
+using namespace std;
+
+/** How many of its lengths a beam is bent by an end. */
+static const double LENGTHS_OF_END = 4;
+
+void PlaceResponses::begin(const ChainPlaces& newPlaces, double newStepSize) {
+    places = &newPlaces;
+    stepSize = newStepSize;
+    const vector<Chain>& chains = places->getChains();
+    beams.assign(chains.size(), {0, 0, 0, 0});
+    for (size_t i = 0; i < chains.size(); i++) {
+        const Chain& chain = chains[i];
+        const Segment& segment = chain.segments[0];
+        const double friction = segment.perpendicular/segment.restLength;
+        const double rigidity = chain.joints.empty() ? 0 : chain.joints[0]*segment.restLength;
+        if (!(friction > 0 && rigidity > 0))
+            continue;
+        Beam& beam = beams[i];
+        beam.length = places->getLength(i);
+        beam.wave = M_SQRT2*pow(rigidity*stepSize/friction, 0.25);
+        beam.bending = 0.5*stepSize/(friction*beam.wave);
+        beam.whole = stepSize/(friction*beam.length);
+    }
+}
+
+double PlaceResponses::find(const PlaceOnChain& place) const {
+    const double alone = stepSize/places->getLateralFriction(place);
+    if (place.chain >= (int) beams.size() || !(beams[place.chain].wave > 0))
+        return alone;
+    const Beam& beam = beams[place.chain];
+    const Chain& chain = places->getChains()[place.chain];
+    // A ring turns, too, but about axes in its plane alone: 3/2 on the average over directions.
+    double bending = beam.bending, whole = 1.5*beam.whole;
+    if (!chain.closed) {
+        const double at = (place.node+place.fraction)*beam.length/chain.segments.size();
+        const double x = min(at, beam.length-at)/beam.wave, off = at/beam.length-0.5;
+        if (x < LENGTHS_OF_END)
+            bending *= 1+exp(-2*x)*(1+2*cos(x)*(cos(x)-sin(x)));
+        whole = beam.whole*(1+12*off*off);
+    }
+    return min(alone, cbrt(bending*bending*bending+whole*whole*whole));
+}
+
+bool PlaceResponses::moveTogether(int chain) const {
+    if (chain >= (int) beams.size())
+        return false;
+    const Beam& beam = beams[chain];
+    const double segment = beam.length/places->getChains()[chain].segments.size();
+    return segment < min(beam.wave, 0.25*beam.length);
+}
