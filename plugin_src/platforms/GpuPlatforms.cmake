@@ -29,6 +29,7 @@ function(add_gpu_plugin name folder library)
     # Each platform has classes of the same names, and so do these plugins.
     set_target_properties(OpenMMCylinderChain${name} PROPERTIES
         CXX_VISIBILITY_PRESET hidden
+        UNITY_BUILD "${CYLCHAIN_UNITY}" UNITY_BUILD_BATCH_SIZE 0
         INSTALL_RPATH "${ORIGIN}/..;${ORIGIN}/../../../${OPENMM_RPATH};${ORIGIN}/../../../${OPENMM_RPATH}/plugins${OTHER_RPATH}")
     set(GPU_PLUGINS ${GPU_PLUGINS} OpenMMCylinderChain${name} PARENT_SCOPE)
 endfunction()
