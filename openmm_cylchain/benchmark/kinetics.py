@@ -5,6 +5,7 @@ as many crosslinkers, on one thread (see ``kinetic_systems``). From the same rel
 hand bound, bundles take steps of each length over the same time, with several seeds; and a tenth of the longest step. A
 bundle is not in equilibrium: energies, numbers of linkers and lengths are compared at the same times. Then the bundles
 as they are, linked, are timed in turn. The same without contacts shows what linkers cost, and what they change.
+In turn with them, ``many_linkers`` are timed beside the mechanics of their filaments, and their memory is measured.
 """
 
 import time
@@ -14,7 +15,9 @@ import numpy as np
 
 from ..engine_choice import choose_engine
 from .kinetic_systems import MICROSECOND, BundleSystem, create_bundle, relaxed_positions
+from .many_linkers import NetworkSystem, bytes_per_linker, linked_networks, linker_cases, linker_rows
 from .measurement import Case, Estimate, describe_machine, median, scaled, time_interleaved
+from .memory import MeasurementError
 from .report import Report, Row, row
 
 REFERENCE_FACTOR = 10.0
@@ -44,6 +47,8 @@ class KineticsEffort:
     repetitions : int
     seconds : float
         Of timing in each repetition.
+    network : NetworkSystem
+        Of many linkers.
     """
 
     systems: tuple
@@ -55,11 +60,12 @@ class KineticsEffort:
     crossing_steps: int
     repetitions: int
     seconds: float
+    network: NetworkSystem = NetworkSystem()
 
 
 _SYSTEMS = (BundleSystem(), BundleSystem(name="bundle_without_contacts", contacts=False))
 FULL = KineticsEffort(_SYSTEMS, (1000.0, 2000.0), 200, 1e6, 20, 4, 50, 7, 2.0)
-QUICK = KineticsEffort(_SYSTEMS, (2000.0,), 50, 2e5, 4, 2, 10, 3, 1.0)
+QUICK = KineticsEffort(_SYSTEMS, (2000.0,), 50, 2e5, 4, 2, 10, 3, 1.0, NetworkSystem(steps=100))
 
 
 @dataclass(frozen=True)
@@ -152,6 +158,9 @@ def benchmark_kinetics(effort=FULL, say=lambda message: None):
                 cases.append(_case(name, bundle))
             details += course_rows(name, own, crossings[system.name].get(step))
         tables.append(f"{system.name}\n\n" + format_courses(courses[system.name], crossings[system.name]))
+    say(f"{effort.network.linkers} linkers on {effort.network.segments * effort.network.filaments} segments")
+    networks, joined = linked_networks(effort.network)
+    cases += linker_cases(networks)
     times = time_interleaved(cases, effort.repetitions, effort.seconds, say, clock=time.process_time)
     settings = {
         "steps_us": effort.steps,
@@ -161,6 +170,8 @@ def benchmark_kinetics(effort=FULL, say=lambda message: None):
         "segments": sum(len(nodes) - 1 for nodes in bundle.nodes),
         "motors": bundle.system.motors,
         "crosslinkers": bundle.system.crosslinkers,
+        "many_linkers": effort.network.linkers,
+        "segments_of_many_linkers": effort.network.filaments * effort.network.segments,
         "threads": 1,
         "clock": "processor",
     }
@@ -172,7 +183,13 @@ def benchmark_kinetics(effort=FULL, say=lambda message: None):
     for system in effort.systems:
         rows += speed_rows(system.name, effort.steps, times)
         rows += ratio_rows(system.name, effort.steps, courses[system.name])
-    return Report(title, machine, settings, rows, {}, details, "\n\n".join(tables))
+    rows += linker_rows(times, joined)
+    missing = {}
+    try:
+        rows.append(Row("bytes_per_linker", bytes_per_linker(effort.network), None, "B"))
+    except MeasurementError as error:
+        missing["bytes_per_linker"] = str(error)
+    return Report(title, machine, settings, rows, missing, details, "\n\n".join(tables))
 
 
 def case_name(system, step):

@@ -54,12 +54,23 @@ def measure_growth(kind, chains, segments):
     MeasurementError
         If the process fails, or memory cannot be measured on this operating system.
     """
-    command = [sys.executable, "-m", __name__, kind, str(chains), str(segments)]
+    return Growth(**measure_in_process(__name__, kind, str(chains), str(segments)))
+
+
+def measure_in_process(module, *arguments):
+    """Run a module of this package in a fresh process, and read the JSON in the last line of what it writes.
+
+    Raises
+    ------
+    MeasurementError
+        If the process fails.
+    """
+    command = [sys.executable, "-m", module, *arguments]
     finished = subprocess.run(command, cwd=_HERE, capture_output=True, text=True)
     if finished.returncode != 0:
         lines = finished.stderr.strip().splitlines()
         raise MeasurementError(lines[-1] if lines else f"its process ended with code {finished.returncode}")
-    return Growth(**json.loads(finished.stdout.splitlines()[-1]))
+    return json.loads(finished.stdout.splitlines()[-1])
 
 
 def grow(kind, chains, segments):

@@ -9,11 +9,12 @@ from openmm import unit
 from scipy.integrate import quad
 
 from openmm_cylchain import cli
-from openmm_cylchain.benchmark import kinetic_systems, kinetics, measurement
+from openmm_cylchain.benchmark import kinetic_systems, kinetics, many_linkers, measurement
 from openmm_cylchain.benchmark.kinetic_systems import BundleSystem, create_bundle, relaxed_positions
 from openmm_cylchain.benchmark.kinetics import Course
 
 SMALL = BundleSystem(filaments=8, motors=20, crosslinkers=15, length=2500.0)
+FEW = many_linkers.NetworkSystem(filaments=12, segments=8, linkers=300, edge=300.0, steps=40)
 THERMAL_ENERGY = 8.31446261815324e-3 * 298.15
 
 
@@ -159,7 +160,9 @@ def test_benchmark_of_kinetics(monkeypatch, tmp_path, capsys):
         return measurement.time_interleaved(cases, repetitions, 1e-3)
 
     bare = replace(SMALL, name="bare", contacts=False)
-    monkeypatch.setattr(kinetics, "QUICK", kinetics.KineticsEffort((SMALL, bare), (1000.0,), 2, 2e4, 2, 2, 3, 2, 1e-3))
+    monkeypatch.setattr(
+        kinetics, "QUICK", kinetics.KineticsEffort((SMALL, bare), (1000.0,), 2, 2e4, 2, 2, 3, 2, 1e-3, FEW)
+    )
     monkeypatch.setattr(kinetics, "time_interleaved", quickly)
     path = tmp_path / "result.json"
     assert cli.main(["benchmark", "kinetics", "--quick", "--json", str(path)]) == 0
@@ -170,8 +173,42 @@ def test_benchmark_of_kinetics(monkeypatch, tmp_path, capsys):
     assert rows["simulated_seconds_per_second_bundle"]["value"] > 0
     assert rows["bending_energy_over_reference_bundle_1000_us"]["error"] > 0
     assert rows["crossings_bundle_1000_us"]["value"] == 0
+    assert rows["time_per_step_many_linkers_alone"]["value"] > 0
+    assert np.isfinite(rows["bytes_per_linker"]["value"])
     assert "crossings_bundle_100_us" not in rows
     assert rows["simulated_seconds_per_second_bare"]["value"] > 0
     assert "crossings_bare_1000_us" not in rows
     output = capsys.readouterr().out
     assert "Shortening" in output and "energies in k_BT" in output
+
+
+def test_springs_of_many_linkers_are_those_of_their_network():
+    networks, joined = many_linkers.linked_networks(FEW)
+    with_linkers, with_springs = networks["with_linkers"], networks["with_springs"]
+    table = with_linkers.filaments.linkers_in(with_linkers.context)
+    assert joined == table.counts()[2] > 20
+    assert table.counts()[0] == 0
+    energies = []
+    for network in (with_linkers, with_springs):
+        forces = network.context.getState(energy=True, forces=True)
+        energies.append(forces.getPotentialEnergy()._value)
+    assert energies[0] == pytest.approx(energies[1], rel=1e-9)
+    positions = with_linkers.positions()
+    for case, network in zip(many_linkers.linker_cases(networks), networks.values()):
+        case.advance(2)
+        case.advance(0)
+        np.testing.assert_array_equal(network.positions(), positions)
+        assert case.name.startswith("many_linkers_")
+    alone = networks["alone"].context.getState(energy=True).getPotentialEnergy()._value
+    assert energies[0] - alone > 0.1 * joined * THERMAL_ENERGY
+
+
+def test_rows_of_many_linkers():
+    times = {"with_linkers": [6e-3, 5e-3, 7e-3], "with_springs": [4e-3, 4e-3, 4e-3], "alone": [1e-3, 1e-3, 1e-3]}
+    times = {f"many_linkers_{name}": values for name, values in times.items()}
+    rows = {row.name: row for row in many_linkers.linker_rows(times, 7)}
+    assert rows["time_per_step_many_linkers_with_linkers"].value == pytest.approx(6.0)
+    assert rows["time_per_step_kinetics_of_many_linkers"].value == pytest.approx(2.0)
+    assert rows["kinetics_over_mechanics_of_many_linkers"].value == pytest.approx(0.5)
+    assert rows["kinetics_over_mechanics_of_many_linkers"].error > 0.1
+    assert rows["linkers_with_both_hands_bound_of_many_linkers"].value == 7.0
