@@ -17,6 +17,7 @@ from .errors import InputError, InstabilityError, TimeStepWarning
 from .export import command as export
 from .rendering import command as rendering
 from .runs.beginnings import START_NAMES
+from .scans import command as scans
 from .version import __version__
 
 _FAILED, _WRONG_INPUT, _WRONG_STEP, _KEYBOARD_INTERRUPT = 1, 2, 3, 130
@@ -101,6 +102,7 @@ def _parser():
     timestep.add_argument("--json", metavar="FILE", help="write the results of the check to FILE as well")
     timestep.set_defaults(command=_time_step)
 
+    scans.add_command(commands)
     rendering.add_command(commands)
     export.add_command(commands)
     _add_benchmarks(commands.add_parser("benchmark", help="measure speed and memory on this machine"))
@@ -116,6 +118,7 @@ def _add_beginnings(commands):
     new.add_argument("file", metavar="FILE", nargs="?", help="KIND.toml if not given; never overwritten")
     new.set_defaults(command=_new)
     schema = commands.add_parser("schema", help="print the JSON schema of configurations, for editors")
+    schema.add_argument("--scan", action="store_true", help="that of scans instead")
     schema.set_defaults(command=_schema)
 
 
@@ -174,8 +177,10 @@ def _add_reproductions(parser):
 
 def _run(options):
     from .runs.configuration import read_configuration
-    from .runs.run import RunInterrupted, run
+    from .runs.run import RunInterrupted
     from .runs.run_directory import RunDirectory
+    from .runs.summarised_run import run_with_summary
+    from .runs.summary import format_summary
 
     configuration = read_configuration(options.configuration)
     if options.dry_run:
@@ -186,20 +191,11 @@ def _run(options):
     if options.output is None:
         raise InputError("Say where the files of the run go: --output DIR, or give --dry-run.")
     try:
-        run(configuration, options.output, options.resume)
+        groups, linkers = run_with_summary(configuration, options.output, options.resume)
     except RunInterrupted as interruption:
         _say("interrupted", interruption)
         raise SystemExit(128 + interruption.signal_number) from None
-
-    from .runs.summary import format_summary, load_trajectory, summarise, summarise_linkers, write_summary
-    from .runs.summary_figure import write_figure
-
     directory = RunDirectory(options.output)
-    trajectory = load_trajectory(configuration, directory)
-    groups = summarise(configuration, trajectory)
-    linkers = summarise_linkers(configuration, directory)
-    write_summary(configuration, directory, groups, linkers)
-    write_figure(configuration, directory, trajectory)
     print()
     print(format_summary(configuration, groups, linkers))
     print(f"\nWritten to {directory.path}: {directory.summary.name}, {directory.figure.name}")
@@ -213,9 +209,10 @@ def _new(options):
 
 
 def _schema(options):
-    from .runs.schema import format_schema
+    from .runs.schema import configuration_schema, format_schema
+    from .scans.schema import scan_schema
 
-    print(format_schema())
+    print(format_schema(scan_schema() if options.scan else configuration_schema()))
 
 
 _BOUND_LABELS = {

@@ -29,6 +29,7 @@ FLOORS = (
     ("export",),
     ("benchmark",),
     ("reproduce",),
+    ("scans",),
     ("cli",),
 )
 FLOOR = {name: floor for floor, names in enumerate(FLOORS) for name in names}

@@ -121,7 +121,27 @@ def parse_configuration(text, folder="."):
     except (ValueError, RecursionError) as error:
         # Numbers of thousands of digits, and lists within lists.
         raise InputError(f"not valid TOML: {error}.") from None
-    lines = lines_of(text_of_lines, entries)
+    return configuration_of(entries, text, folder, lines_of(text_of_lines, entries))
+
+
+def configuration_of(entries, text, folder, lines):
+    """Check the tables of a configuration.
+
+    Parameters
+    ----------
+    entries : dict
+        What tomllib made of its text.
+    text : str
+        What a run keeps.
+    folder : str or Path
+        From which files are named.
+    lines : dict
+        Where entries stand, see ``lines_of``.
+
+    Raises
+    ------
+    ConfigurationError
+    """
     try:
         return _configuration(entries, text, Path(folder), lines)
     except UnknownKeyError as error:

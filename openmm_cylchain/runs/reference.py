@@ -28,13 +28,14 @@ def reference_page():
     """The page as Markdown."""
     parts = [_INTRODUCTION]
     for kind in TABLES:
-        parts += _section(kind, "##", kind.header)
+        parts += section(kind, "##", kind.header)
         if kind.name == "filament":
             parts.append(_FILES)
     return "\n".join(parts)
 
 
-def _section(kind, level, title):
+def section(kind, level, title):
+    """Lines of a table of keys below a heading."""
     needed = " (required)" if kind.required else ""
     yield f"{level} `{title}`{needed}\n\n{kind.text}\n\n| key | value | meaning |\n|---|---|---|"
     inner = []
@@ -43,7 +44,7 @@ def _section(kind, level, title):
         inner += _tables_in(key)
     yield ""
     for name, table in inner:
-        yield from _section(table, "###", f"{name} of {title}")
+        yield from section(table, "###", f"{name} of {title}")
 
 
 def _value(key):

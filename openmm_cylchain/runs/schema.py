@@ -5,7 +5,7 @@ import json
 from .configuration import TABLES
 from .keys import Text
 
-_DIALECT = "https://json-schema.org/draft/2020-12/schema"
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def configuration_schema():
@@ -21,7 +21,7 @@ def configuration_schema():
             content = {"type": "array", "items": content, **({"minItems": 1} if kind.required else {})}
         properties[kind.name] = content
     return {
-        "$schema": _DIALECT,
+        "$schema": DIALECT,
         "title": "A run of openmm-cylchain",
         "type": "object",
         "properties": properties,
@@ -30,6 +30,6 @@ def configuration_schema():
     }
 
 
-def format_schema():
-    """The schema as text."""
-    return json.dumps(configuration_schema(), indent=2, ensure_ascii=False)
+def format_schema(schema):
+    """A schema as text."""
+    return json.dumps(schema, indent=2, ensure_ascii=False)

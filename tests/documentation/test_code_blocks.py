@@ -11,7 +11,9 @@ import openmm
 import pytest
 
 from openmm_cylchain import cli
+from openmm_cylchain.runs.beginnings import write_start
 from openmm_cylchain.runs.configuration import read_configuration
+from openmm_cylchain.scans import read_scan
 from support.pages import PAGES, blocks_of, name_of
 from support.repository import ROOT
 
@@ -55,10 +57,24 @@ seed = 1
 ''')
 assert cli.main(["run", "quick.toml", "--output", "DIRECTORY"]) == 0
 """
+# A scan of one run.
+SCAN = (
+    RUN.partition("assert")[0].replace("quick.toml", "dna.toml")
+    + """
+Path("scan.toml").write_text('''
+[scan]
+base = "dna.toml"
+gather = ["persistence length", "mean square end-to-end distance"]
+[vary]
+solvent.temperature = ["310 K"]
+''')
+"""
+)
 # What a page takes as given, by the page and the beginning of the block before which it runs.
 GIVEN = {
     ("docs/guide.md", "from openmm_cylchain import analysis"): RUN.replace("DIRECTORY", "output_f_actin"),
     ("docs/pictures.md", "from openmm_cylchain import analysis"): RUN.replace("DIRECTORY", "motor_network"),
+    ("docs/scans.md", "from concurrent.futures"): SCAN,
     ("docs/own_system.md", "positions = filaments.add_to"): FILAMENTS_IN_A_SYSTEM
     + """
 topology, system = app.Topology(), openmm.System()
@@ -136,7 +152,11 @@ def test_toml_is_a_configuration(tmp_path):
     for block in blocks:
         path = tmp_path / "block.toml"
         path.write_text(block.text)
-        read_configuration(path)
+        if "[scan]" in block.text:
+            write_start("dna", tmp_path / "dna.toml")
+            assert len(read_scan(path).runs) > 1
+        else:
+            read_configuration(path)
 
 
 def commands_of(block):

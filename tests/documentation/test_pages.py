@@ -6,7 +6,7 @@ import re
 import pytest
 
 import openmm_cylchain
-from openmm_cylchain import Crosslinker, analysis, theory
+from openmm_cylchain import Crosslinker, analysis, scans, theory
 from openmm_cylchain.analysis import statistics
 from openmm_cylchain.kinetics import presets
 from support.pages import PAGES, headings_of, name_of
@@ -51,7 +51,7 @@ def entries(stem):
 def test_every_public_name_is_in_the_reference():
     """Once, and nothing else is."""
     modules = {"analysis", "theory"}
-    named = [name for stem in REFERENCE if stem not in modules for name in entries(stem)]
+    named = [name for stem in REFERENCE if stem not in {*modules, "scans"} for name in entries(stem)]
     assert ".. automodule:: openmm_cylchain.kinetics.presets" in REFERENCE["linkers"]
     named += [name for name, thing in vars(presets).items() if isinstance(thing, Crosslinker)]
     # What a method returns, which nobody makes.
@@ -75,3 +75,7 @@ def test_every_example_is_in_the_gallery_with_its_picture():
     for path in EXAMPLES.glob("*.py"):
         assert f"](../examples/{path.name})" in text, path.name
         assert f"](gallery/{path.stem}.png)" in text, path.name
+
+
+def test_scans_are_in_the_reference():
+    assert sorted(entries("scans")) == sorted(scans.__all__)

@@ -34,12 +34,14 @@ def mistakes(text):
 
 def test_it_is_a_schema():
     jsonschema.Draft202012Validator.check_schema(configuration_schema())
-    assert format_schema().startswith('{\n  "$schema": "https://json-schema.org/draft/2020-12/schema"')
+    assert format_schema(configuration_schema()).startswith(
+        '{\n  "$schema": "https://json-schema.org/draft/2020-12/schema"'
+    )
 
 
 def test_command_prints_it(capsys):
     assert main(["schema"]) == 0
-    assert capsys.readouterr().out == format_schema() + "\n"
+    assert capsys.readouterr().out == format_schema(configuration_schema()) + "\n"
 
 
 @pytest.mark.parametrize("text", FILES, ids=lambda text: text.splitlines()[0][:30])

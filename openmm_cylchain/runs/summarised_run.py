@@ -1,0 +1,24 @@
+"""A run with its summary and figure: what the command ``run`` does, and each run of a scan."""
+
+from .run import run
+from .run_directory import RunDirectory
+from .summary import load_trajectory, summarise, summarise_linkers, write_summary
+from .summary_figure import write_figure
+
+
+def run_with_summary(configuration, output, resume=False):
+    """Run a configuration to its end, and write its summary and figure; see ``run`` for arguments and errors.
+
+    Returns
+    -------
+    groups, linkers : list of GroupSummary, list of LinkerSummary
+    """
+    run(configuration, output, resume)
+    directory = RunDirectory(output)
+    trajectory = load_trajectory(configuration, directory)
+    groups = summarise(configuration, trajectory)
+    linkers = summarise_linkers(configuration, directory)
+    # The summary comes last: a run that has one is complete.
+    write_figure(configuration, directory, trajectory)
+    write_summary(configuration, directory, groups, linkers)
+    return groups, linkers
