@@ -87,6 +87,10 @@ def test_concentrations_take_units():
     [
         ({"binding_rate": -1.0}, "binding_rate cannot be negative"),
         ({"binding_rate": np.nan}, "binding_rate must be finite"),
+        ({"binding_rate": np.inf}, "binding_rate must be finite"),
+        ({"unbinding_rate": -1.0}, "unbinding_rate cannot be negative"),
+        ({"unbinding_rate": np.nan}, "unbinding_rate must be finite"),
+        ({"catch_rate": -1.0, "catch_force": 1.0}, "catch_rate cannot be negative"),
         ({"unbinding_rate": np.inf}, "unbinding_rate must be finite"),
         ({"unbinding_rate": 1.0 * unit.second}, "unit"),
         ({"reach": 0.0}, "reach must be positive"),

@@ -139,3 +139,49 @@ def test_motors_with_two_hands_slide_antiparallel_filaments():
     integrator.step(10000)
     # Hands walk to the plus end of either filament, so each is pushed towards its minus end.
     assert offset() - start == pytest.approx(2 * 400.0 * 0.5, rel=0.02)
+
+
+def test_catch_bonds_live_longest_under_the_load_of_their_closed_form():
+    """Of hands under springs of fixed lengths, on a segment that does not move: 1/(k e^(F/F_u) + k_c e^(-F/F_c))."""
+    slip, catch, number, stiffness = 2.0 / SECOND, 60.0 / SECOND, 4000, 0.05 * PICONEWTON
+    slip_force, catch_force = 4.0 * PICONEWTON, 1.5 * PICONEWTON
+    hand = Hand(
+        binding_rate=0.0,
+        reach=500.0,
+        unbinding_rate=slip,
+        unbinding_force=slip_force,
+        catch_rate=catch,
+        catch_force=catch_force,
+    )
+    # The rate is least where k/F_u e^(F/F_u) = k_c/F_c e^(-F/F_c).
+    best = np.log(catch * slip_force / (slip * catch_force)) / (1.0 / slip_force + 1.0 / catch_force)
+    loads = best * np.array([0.0, 0.5, 1.0, 2.0])
+    filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
+    nodes = np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 0.0], [200.0, 0.0, 0.0]])
+    filaments.add_nodes(F_ACTIN.with_segment_length(100.0), nodes, clamped=range(2))
+    kind = Crosslinker(hands=hand, stiffness=stiffness, rest_length=20.0)
+    types = [
+        filaments.add_linkers(kind, anchors=[[50.0, 20.0 + load / stiffness, 0.0]] * number, bound=number)
+        for load in loads
+    ]
+    _, system, positions = filaments.build()
+    rates = slip * np.exp(loads / slip_force) + catch * np.exp(-loads / catch_force)
+    context = new_context(
+        system, positions, filaments.create_integrator(system, 0.1 / rates.max(), random_seed=7, checks=False)
+    )
+    table = filaments.linkers_in(context)
+    filaments.set_linkers(context, replace(table, arc_lengths=np.where(table.bound, 50.0, 0.0)))
+    times, steps = [], 0
+    for rate in np.sort(rates)[::-1]:
+        target = round(1.0 / rate * rates.max() / 0.1)
+        context.getIntegrator().step(target - steps)
+        steps = target
+        times.append(steps * context.getIntegrator().getStepSize()._value)
+        # Those of this rate have lived for one lifetime.
+        type_ = types[int(np.flatnonzero(rates == rate)[0])]
+        left = filaments.linkers_in(context).counts(type_)[2]
+        expected = np.exp(-rate * times[-1])
+        assert left / number == pytest.approx(expected, abs=4.0 * np.sqrt(expected * (1.0 - expected) / number))
+    survivors = [filaments.linkers_in(context).counts(type_)[2] for type_ in types]
+    assert np.argmax(survivors) == 2
+    assert np.argmin(rates) == 2

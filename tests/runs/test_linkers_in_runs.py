@@ -124,6 +124,11 @@ def test_anchors(anchors, expected):
             ["number 2: The reach of a hand, 0.09 nm, must be at least a thousandth of a segment"],
         ),
         ('reach = "60 nm", ', "", ["number 2: hand lacks the key 'reach': add a line such as reach ="]),
+        ('"1e5 1/s"', '"-1e5 1/s"', ["number 2: hand binding_rate must be zero or positive"]),
+        ('"2000 1/s"', '"nan 1/s"', ["number 2: hand unbinding_rate must be finite"]),
+        ('"1e5 1/s"', '"inf 1/s"', ["number 2: hand binding_rate must be finite"]),
+        ('"4 pN"', '"0 pN"', ["number 2: hand stall_force must be positive"]),
+        ("stall_force =", 'site_spacing = "0 nm", stall_force =', ["number 2: hand site_spacing must be positive"]),
         ('"1e5 1/s"', '"200"', ["hand binding_rate needs a unit", '"10 1/s"']),
         ('"-0.5 um/s"', '"-0.5 um"', ["hand speed has the unit", '"0.5 um/s"']),
         ('"0.1 pN/nm"', '"-0.1 pN/nm"', ["[[linkers]] number 2: stiffness must be positive"]),
@@ -171,6 +176,20 @@ def test_mistakes_are_named(old, new, fragments):
         parse_configuration(NETWORK.replace(old, new, 1))
     for fragment in fragments:
         assert fragment in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("spacing", "message"),
+    [
+        ("30 nm", r"Linkers 'motor': 40 are to begin bound, but there are only \d+ sites"),
+        ("1e-7 nm", 'number 2: hand site_spacing is "1e-7 nm", which is too small to be simulated'),
+    ],
+)
+def test_sites_that_runs_cannot_have_are_refused(spacing, message, tmp_path, capsys):
+    text = NETWORK.replace("stall_force =", f'site_spacing = "{spacing}", stall_force =', 1)
+    (tmp_path / "input.toml").write_text(text.replace("count = 20", "count = 1", 1))
+    assert main(["run", str(tmp_path / "input.toml"), "--output", str(tmp_path / "out")]) != 0
+    assert re.search(message, capsys.readouterr().err)
 
 
 def test_kinesin_binds_to_microtubules_alone():
