@@ -186,3 +186,26 @@ def test_refusals(two_types, tmp_path, monkeypatch, capsys, options, message):
     assert main(["export", str(two_types), *options]) == 2
     assert message in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.slow
+def test_ovito_itself_reads_bonds_times_and_radii(two_types, tmp_path):
+    """Its Python module, without a display."""
+    ovito_io = pytest.importorskip("ovito.io")
+    pipeline = ovito_io.import_file(str(exported(two_types, tmp_path, "ovito")))
+    run = analysis.load(two_types)
+    assert pipeline.source.num_frames == len(run.times) == 31
+    for frame in (0, 30):
+        data = pipeline.compute(frame)
+        assert data.attributes["time_ps"] == pytest.approx(run.times[frame])
+        nodes = np.concatenate(list(run.nodes(frame)))
+        bonds = np.array(data.particles.bonds["Topology"])
+        counts = [len(own) for own in run.nodes(frame)]
+        first = np.cumsum([0, *counts[:-1]])
+        expected = [(start + i, start + i + 1) for start, count in zip(first, counts) for i in range(count - 1)]
+        assert sorted(map(tuple, np.sort(bonds, axis=1))) == expected
+        positions, lengths = np.array(data.particles["Position"]), np.linalg.norm
+        for a, b in expected:
+            assert lengths(positions[a] - positions[b]) == pytest.approx(lengths(nodes[a] - nodes[b]) * 10.0, abs=0.01)
+        diameters = [own.diameter for own in run.filaments for _ in range(len(own.nodes))]
+        assert np.array(data.particles["Radius"]) == pytest.approx(5.0 * np.array(diameters), rel=1e-6)
