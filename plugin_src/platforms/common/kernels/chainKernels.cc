@@ -75,8 +75,9 @@ inline DEVICE void findAddedForces(const Step* step, GLOBAL double* RESTRICT for
         GLOBAL double* RESTRICT energies) {
     findForces(step, forces, energies);
     for (int k = 0; k < 3*step->own; k++) {
-        const double added = (mm_long) (forces[k]*0x100000000)*(1/(double) 0x100000000);
-        forces[k] = fabs(added) < LARGEST_FORCE ? added : NAN;
+        // NaN fails.
+        forces[k] = fabs(forces[k]) < LARGEST_FORCE ?
+                (mm_long) (forces[k]*0x100000000)*(1/(double) 0x100000000) : NAN;
     }
 }
 

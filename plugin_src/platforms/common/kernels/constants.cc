@@ -31,3 +31,8 @@ enum {NOISE_SEGMENT, NOISE_LENGTH, NOISE_BEND, NOISE_TETHER, NOISE_PARTICLE, NOI
 
 /** The fixed-point numbers in which platforms add forces reach as far as 2^31. */
 #define LARGEST_FORCE 2147483000.0
+
+/** CUDA's compiler of kernels has no such macro. */
+#ifndef NAN
+#define NAN nan("")
+#endif

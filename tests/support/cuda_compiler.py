@@ -1,0 +1,116 @@
+"""Kernels for CUDA, compiled without a device as OpenMM would: by NVRTC to PTX, and by ptxas to what a GPU runs.
+
+Both are in packages of NVIDIA on the package index, and what OpenMM puts before each kernel is in its library for CUDA.
+"""
+
+import ctypes
+import re
+import subprocess
+from importlib.util import find_spec
+from pathlib import Path
+
+import openmm
+
+from support.repository import ROOT
+
+_KERNELS = ROOT / "plugin_src" / "platforms" / "common" / "kernels"
+_HOST = ROOT / "plugin_src" / "platforms" / "common" / "src" / "CommonCylinderChains.cpp"
+_SITE_PACKAGES = Path(openmm.__file__).parents[1]
+_OPENMM_LIBRARY = _SITE_PACKAGES / "OpenMM.libs" / "lib" / "plugins" / "libOpenMMCUDA.so"
+
+
+def _in_package(package, pattern):
+    spec = find_spec("nvidia")
+    folders = spec.submodule_search_locations if spec is not None else []
+    found = [path for folder in folders for path in sorted((Path(folder) / package).glob(pattern))]
+    return found[0] if found else None
+
+
+_NVRTC = _in_package("cuda_nvrtc", "lib/libnvrtc.so.*")
+_PTXAS = _in_package("cuda_nvcc", "bin/ptxas")
+
+MISSING = [
+    name
+    for name, path in (
+        ("OpenMM-CUDA-12", _OPENMM_LIBRARY if _OPENMM_LIBRARY.exists() else None),
+        ("nvidia-cuda-nvrtc-cu12", _NVRTC),
+        ("nvidia-cuda-nvcc-cu12", _PTXAS),
+    )
+    if path is None
+]
+"""The packages that are not installed."""
+
+
+def _text_of_openmm(marker):
+    """The source text in OpenMM's library that contains a marker."""
+    texts = [text for text in _OPENMM_LIBRARY.read_bytes().split(b"\0") if marker in text]
+    assert len(texts) == 1, f"{len(texts)} texts in {_OPENMM_LIBRARY.name} have {marker!r}"
+    return texts[0].decode()
+
+
+def source_of(defines=(), precision="double", program="programFor", *more):
+    """A program as the host puts it together, with more kernels, behind what OpenMM puts before it."""
+    host = re.search(rf"::{program}\(.*?\n}}\n", _HOST.read_text(), re.DOTALL).group()
+    parts = "".join((_KERNELS / f"{name}.cc").read_text() for name in [*re.findall(r"Sources::(\w+)", host), *more])
+    real, mixed = ("double", "double") if precision == "double" else ("float", "float")
+    if precision == "mixed":
+        mixed = "double"
+    types = "".join(
+        f"typedef {kind}{count} {name}{count};\n"
+        + (f"#define make_{name}{count} make_{kind}{count}\n" if count else "")
+        for name, kind in (("real", real), ("mixed", mixed))
+        for count in ("", "2", "3", "4")
+    )
+    switch = {"double": "#define USE_DOUBLE_PRECISION 1\n", "mixed": "#define USE_MIXED_PRECISION 1\n", "single": ""}
+    return (
+        switch[precision]
+        + types
+        + _text_of_openmm(b"#define KERNEL extern")
+        + "".join(f"#define {name} 1\n" for name in defines)
+        + _text_of_openmm(b"inline __device__ double3 make_double3(double a)")
+        + parts
+    )
+
+
+def compile_to_ptx(source, architecture):
+    """The PTX of a source; AssertionError with what NVRTC says if it does not compile."""
+    nvrtc = ctypes.CDLL(str(_NVRTC))
+    program = ctypes.c_void_p()
+    assert nvrtc.nvrtcCreateProgram(ctypes.byref(program), source.encode(), b"kernels.cu", 0, None, None) == 0
+    # The options of OpenMM's CudaContext.
+    options = [f"--gpu-architecture={architecture}", "--use_fast_math", "-std=c++11"]
+    texts = (ctypes.c_char_p * len(options))(*(option.encode() for option in options))
+    result = nvrtc.nvrtcCompileProgram(program, len(options), texts)
+    size = ctypes.c_size_t()
+    nvrtc.nvrtcGetProgramLogSize(program, ctypes.byref(size))
+    log = ctypes.create_string_buffer(size.value)
+    nvrtc.nvrtcGetProgramLog(program, log)
+    assert result == 0, log.value.decode()[:4000]
+    nvrtc.nvrtcGetPTXSize(program, ctypes.byref(size))
+    ptx = ctypes.create_string_buffer(size.value)
+    nvrtc.nvrtcGetPTX(program, ptx)
+    return ptx.value.decode()
+
+
+def resources_of(ptx, architecture, folder):
+    """Registers, bytes of stack and bytes of spilled registers of each kernel."""
+    file = folder / "kernels.ptx"
+    file.write_text(ptx)
+    result = subprocess.run(
+        [_PTXAS, "--verbose", f"--gpu-name={architecture}", "--output-file", folder / "kernels.cubin", file],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    found = {}
+    pattern = (
+        r"Compiling entry function '(\w+)'.*?(\d+) bytes stack frame, (\d+) bytes spill stores, (\d+) bytes spill loads"
+        r".*?Used (\d+) registers"
+    )
+    for name, stack, stores, loads, registers in re.findall(pattern, result.stderr, re.DOTALL):
+        found[name] = {
+            "registers": int(registers),
+            "stack": int(stack),
+            "spills": int(stores) + int(loads),
+        }
+    return found
