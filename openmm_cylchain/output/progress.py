@@ -38,8 +38,8 @@ class StatusLine:
         self._stream.flush()
 
     def end(self) -> None:
-        """Leave the line that was written last."""
-        if self.in_place:
+        """Leave the line that was written last, if there is one."""
+        if self.in_place and self._width:
             self._stream.write("\n")
             self._stream.flush()
 

@@ -1,21 +1,33 @@
 """Filaments that are drawn on top of each other come apart before a run begins."""
 
+import time
+
 from openmm import Context, OpenMMException, Platform
 
 from ..errors import InputError, InstabilityError
+from ..output.progress import ProgressMessages
 from .initial_state import build_system
 
 # Lengths of steps in those of the run, first in the cold.
 _COLD, _WARM = (1e-3, 1e-2, 0.1, 0.5), (0.1, 0.5, 1.0)
 _STEPS = 20
 _COLD_TEMPERATURE = 1.0
+_ALL_STEPS = _STEPS * (len(_COLD) + len(_WARM))
+_SECONDS_BETWEEN_MESSAGES = 2.0
 
 
-def relaxed_positions(configuration, built):
+def relaxed_positions(configuration, built, say=None):
     """Positions in which a run begins: those of a BuiltSystem, or where contacts have pushed what overlapped.
 
     That takes 140 steps without linkers: in the cold, in steps that grow, and then at the temperature of the solvent.
     The result depends on the configuration alone.
+
+    Parameters
+    ----------
+    configuration : Configuration
+    built : BuiltSystem
+    say : callable (str), optional
+        Told how far it is where it takes longer than two seconds; lines of standard error if not given.
 
     Raises
     ------
@@ -24,6 +36,16 @@ def relaxed_positions(configuration, built):
     """
     if configuration.contacts is None or not configuration.contacts.relax:
         return built.positions
+    if say is not None:
+        return _come_apart(configuration, built.positions, _Progress(say))
+    messages = ProgressMessages()
+    try:
+        return _come_apart(configuration, built.positions, _Progress(messages))
+    finally:
+        messages.finish()
+
+
+def _come_apart(configuration, positions, progress):
     settings, temperature = configuration.simulation, configuration.solvent.temperature
     alone = build_system(configuration, settings.engine, settings.seed, linkers=False)
     integrator = alone.filaments.create_integrator(
@@ -36,16 +58,35 @@ def relaxed_positions(configuration, built):
         **alone.arguments(),
     )
     context = Context(alone.system, integrator, Platform.getPlatformByName("Reference"))
-    context.setPositions(built.positions)
+    context.setPositions(positions)
     try:
         for bath, lengths in ((_COLD_TEMPERATURE, _COLD), (temperature, _WARM)):
             integrator.setTemperature(bath)
             for length in lengths:
                 integrator.setStepSize(length * settings.time_step)
-                integrator.step(_STEPS)
+                for _ in range(_STEPS):
+                    integrator.step(1)
+                    progress.step_is_done()
     except (InstabilityError, OpenMMException) as error:
         raise InputError(
             f"[contacts] filaments that overlap at first have not come apart: {error} Begin with fewer filaments, "
             "with a smaller diameter or time_step, or set relax = false."
         ) from None
     return context.getState(positions=True).getPositions(asNumpy=True)
+
+
+class _Progress:
+    # Silent if it is soon done. Lines become rarer, since some starts take minutes.
+
+    def __init__(self, say):
+        self._say = say
+        self._done = 0
+        self._start = time.monotonic()
+        self._next = _SECONDS_BETWEEN_MESSAGES
+
+    def step_is_done(self):
+        self._done += 1
+        elapsed = time.monotonic() - self._start
+        if elapsed >= self._next:
+            self._next = elapsed + max(_SECONDS_BETWEEN_MESSAGES, 0.5 * elapsed)
+            self._say(f"filaments that overlap come apart before the first step: {self._done} of {_ALL_STEPS} steps")

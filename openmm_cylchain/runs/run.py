@@ -171,7 +171,7 @@ def check_step(configuration, seconds=20.0, say=lambda message: None):
     """
     settings = configuration.simulation
     built = build_system(configuration, settings.engine, settings.seed)
-    positions = relaxed_positions(configuration, built)
+    positions = relaxed_positions(configuration, built, say)
     platform, properties = _platform(settings, built.filaments.engine)
     # An interruption that Python raises within a step may end as an error of OpenMM.
     with _Signals() as signals:

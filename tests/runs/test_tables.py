@@ -1,6 +1,7 @@
 """Tables of configurations beyond filaments and linkers: what is built is what Python builds, and what is refused."""
 
 import re
+import subprocess
 import sys
 
 import mdtraj
@@ -287,6 +288,56 @@ def test_filaments_with_contacts_come_apart_before_the_run():
     np.testing.assert_array_equal(relaxed._value, relaxed_positions(configuration, one)._value)
     kept = parse(CONTACTS + "relax = false\n", filament=text)
     assert relaxed_positions(kept, one) is before
+
+
+OVERLAPPING = """
+[solvent]
+temperature = "298 K"
+viscosity = "1e-05 mPa*s"
+[box]
+edges = ["1 um", "1 um", "1 um"]
+[[filament]]
+type = "F_ACTIN"
+segment_length = "100 nm"
+segments = 10
+count = 60
+[contacts]
+diameter = "15 nm"
+[simulation]
+time_step = "10 us"
+duration = "100 ms"
+report_interval = "2 ms"
+seed = 1
+platform = "CPU"
+checks = false
+"""
+
+
+@pytest.mark.slow
+def test_a_start_that_takes_long_says_how_far_it_is(tmp_path):
+    # Half a minute in a solvent of a hundred-thousandth of the viscosity of water: all steps are divided.
+    (tmp_path / "run.toml").write_text(OVERLAPPING)
+    command = [sys.executable, "-m", "openmm_cylchain.cli", "run", "run.toml", "--output", "out"]
+    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
+        lines = [process.stderr.readline() for _ in range(2)]
+        process.kill()
+    said = [
+        re.search(r"([0-9.]+) s  filaments that overlap come apart .*: (\d+) of 140 steps$", line) for line in lines
+    ]
+    assert all(said), lines
+    first, second = [(float(found[1]), int(found[2])) for found in said]
+    assert first[0] < second[0] and 0 < first[1] < second[1] < 140
+
+
+def test_messages_of_a_start(monkeypatch, capsys):
+    monkeypatch.setattr("openmm_cylchain.runs.relaxation._SECONDS_BETWEEN_MESSAGES", 0.0)
+    configuration = parse(CONTACTS, filament=FILAMENT + 'count = 2\ninside = { shape = "sphere", radius = "400 nm" }\n')
+    one, messages = build_system(configuration, None, 3), []
+    relaxed_positions(configuration, one, messages.append)
+    assert messages and all("filaments that overlap come apart" in message for message in messages)
+    assert capsys.readouterr() == ("", "")
+    relaxed_positions(configuration, one)
+    assert " of 140 steps\n" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("suffix", ["npy", "npz", "cif", "dcd"])
