@@ -2,6 +2,7 @@
 #include "couplings/CandidateLoops.h"
 #include "couplings/Crossings.h"
 #include "mechanics/PeriodicBox.h"
+#include "mechanics/Prefetch.h"
 #include <cstddef>
 #include <cstdlib>
 #include <map>
@@ -21,6 +22,8 @@ const double AT_END = 1e-9;
 const double LEAST_DIFFERENCE = 1e-10;
 /** Capsules that are described together, those that are searched around together, and pairs looked at together. */
 const int CHUNK = 512, FEW = 8, BATCH = 512;
+/** Capsules that are far away in memory are asked for this many ahead. */
+const int AHEAD = 8;
 /** What rounding adds to distances in single precision, over the lengths that they are made of. */
 const double SINGLE_ROUNDING = 1e-6;
 /** The error of a distance where segments are nearly parallel, over their lengths, in single precision. */
@@ -198,6 +201,7 @@ struct ContactSearch::Implementation {
     vector<int> next, previous;
     /** Explicit exclusions of each capsule, sorted. */
     vector<vector<int> > excluded;
+    bool anyExclusions;
 
     // The last search.
     Frame frame;
@@ -216,7 +220,9 @@ struct ContactSearch::Implementation {
     vector<char> again;
     vector<Part> parts;
     vector<size_t> firstOf;
+    /** What setMotion() has taken note of. */
     vector<MovingSegment> moving;
+    const double *motionBegins = NULL, *motionEnds = NULL;
 
     Implementation(const CapsuleSystem& system, bool nearestImages);
     bool isExcluded(int a, int b) const;
@@ -225,6 +231,7 @@ struct ContactSearch::Implementation {
     }
     Vec3d along(const Capsule& capsule, const double* positions) const;
     SegmentPair segments(int a, int b, const double* shift, const double* positions) const;
+    SegmentPair movingSegments(const ContactPair& pair, bool atEnd) const;
     void setFrame(const double* x, const double* y, const double* box);
     void describe(int i, const double* x, const double* y, Described& result, PlacedCapsule& place,
             bool keepsImage = false) const;
@@ -245,7 +252,8 @@ struct ContactSearch::Implementation {
     bool isOwned(const Contact& contact, const ContactPair& pair, const SegmentPair& start, const SegmentPair& end,
             bool parallel, bool ofA, const double* x, const double* y) const;
     double shareOf(const Crossing& crossing, const ContactPair& pair) const;
-    int evaluate(const ContactPair& pair, const double* x, const double* y, Contact* contacts, double limit) const;
+    int evaluate(const ContactPair& pair, const SegmentPair& start, const SegmentPair& end, const double* x,
+            const double* y, Contact* contacts, double limit) const;
     bool isOfNeighbor(const ContactPair& pair, int flags) const;
 };
 
@@ -278,6 +286,7 @@ ContactSearch::Implementation::Implementation(const CapsuleSystem& system, bool 
             }
         }
     excluded.resize(capsules.size());
+    anyExclusions = !system.exclusions.empty();
     for (const pair<int, int>& exclusion : system.exclusions) {
         for (int i : {exclusion.first, exclusion.second})
             if (i < 0 || i >= (int) capsules.size())
@@ -310,7 +319,7 @@ bool ContactSearch::Implementation::areNeighbors(const Capsule& first, const Cap
 
 bool ContactSearch::Implementation::isExcluded(int a, int b) const {
     return a == b || areNeighbors(system.capsules[a], system.capsules[b]) ||
-            (!excluded[a].empty() && binary_search(excluded[a].begin(), excluded[a].end(), b));
+            (anyExclusions && binary_search(excluded[a].begin(), excluded[a].end(), b));
 }
 
 Vec3d ContactSearch::Implementation::along(const Capsule& capsule, const double* positions) const {
@@ -329,6 +338,17 @@ SegmentPair ContactSearch::Implementation::segments(int a, int b, const double* 
     const Capsule &first = system.capsules[a], &second = system.capsules[b];
     const Vec3d w = position(positions, first.first)-position(positions, second.first);
     return {along(first, positions), along(second, positions), {w.x+shift[0], w.y+shift[1], w.z+shift[2]}};
+}
+
+/** The same from what setMotion() has taken note of. */
+SegmentPair ContactSearch::Implementation::movingSegments(const ContactPair& pair, bool atEnd) const {
+    const MovingSegment &a = moving[pair.a], &b = moving[pair.b];
+    auto vector = [] (const double* v) {
+        return Vec3d {v[0], v[1], v[2]};
+    };
+    const Vec3d w = vector(atEnd ? a.laterFirst : a.first)-vector(atEnd ? b.laterFirst : b.first);
+    return {vector(atEnd ? a.laterAlong : a.along), vector(atEnd ? b.laterAlong : b.along),
+            {w.x+pair.shift[0], w.y+pair.shift[1], w.z+pair.shift[2]}};
 }
 
 void ContactSearch::Implementation::setFrame(const double* x, const double* y, const double* box) {
@@ -374,7 +394,7 @@ void ContactSearch::Implementation::describe(int i, const double* x, const doubl
     const Vec3d ends[] = {frame.toFractions(x0), frame.toFractions(x0+p), frame.toFractions(y0),
             frame.toFractions(y0+q)};
     const int images[3] = {place.images[0], place.images[1], place.images[2]};
-    place = {i, !excluded[i].empty(), capsule, {0, 0, 0}, x0, p};
+    place = {i, anyExclusions && !excluded[i].empty(), capsule, {0, 0, 0}, x0, p};
     double center[3];
     for (int k = 0; k < 3; k++) {
         const double f[] = {component(ends[0], k), component(ends[1], k), component(ends[2], k), component(ends[3], k)};
@@ -476,6 +496,10 @@ void ContactSearch::Implementation::setCells() {
         sweptBoxes.half[k] = &boxes[(3+k)*stride];
     }
     for (int i = 0; i < count; i++) {
+        if (i+AHEAD < count) {
+            prefetch(&described[members[i+AHEAD]]);
+            prefetch(&placed[members[i+AHEAD]]);
+        }
         slots[members[i]] = i;
         putInOrder(i, members[i]);
     }
@@ -570,6 +594,8 @@ void ContactSearch::Implementation::searchCells(int column, const double* x, con
 void ContactSearch::Implementation::keepPairs(int count, const double* x, const double* y, Part& part) const {
     count = candidateKernels().keepNear(sorted.data(), imageShifts, reach, margin, part.candidates(0), count);
     for (int i = 0; i < count; i++) {
+        if (i+AHEAD < count)
+            prefetch(&sortedPlaced[part.second[i+AHEAD]]);
         const PlacedCapsule &one = sortedPlaced[part.first[i]], &other = sortedPlaced[part.second[i]];
         const int image = part.image[i]%SURE, images[3] = {image/9-1, image/3%3-1, image%3-1};
         // Two that are both searched for again find each other twice. Others are not at y.
@@ -769,11 +795,9 @@ double ContactSearch::Implementation::shareOf(const Crossing& crossing, const Co
     return share;
 }
 
-int ContactSearch::Implementation::evaluate(const ContactPair& pair, const double* x, const double* y,
-        Contact* contacts, double limit) const {
-    const SegmentPair end = segments(pair.a, pair.b, pair.shift, y);
+int ContactSearch::Implementation::evaluate(const ContactPair& pair, const SegmentPair& start, const SegmentPair& end,
+        const double* x, const double* y, Contact* contacts, double limit) const {
     const double sum = radii(pair.a, pair.b);
-    const SegmentPair start = x == y ? end : segments(pair.a, pair.b, pair.shift, x);
     const Places places = findPlaces(end);
     if (x != y && mayPass(start, end, places.distance, sum)) {
         if (hasSphere(start)) {
@@ -895,12 +919,22 @@ void ContactSearch::findPairsOf(const vector<int>& capsules, const double* x, co
 
 int ContactSearch::evaluate(const ContactPair& pair, const double* x, const double* y, Contact* contacts,
         double limit) const {
-    return implementation->evaluate(pair, x, y, contacts, limit);
+    const SegmentPair end = implementation->segments(pair.a, pair.b, pair.shift, y);
+    const SegmentPair start = x == y ? end : implementation->segments(pair.a, pair.b, pair.shift, x);
+    return implementation->evaluate(pair, start, end, x, y, contacts, limit);
+}
+
+int ContactSearch::evaluate(const ContactPair& pair, Contact* contacts, double limit) const {
+    const Implementation& search = *implementation;
+    return search.evaluate(pair, search.movingSegments(pair, false), search.movingSegments(pair, true),
+            search.motionBegins, search.motionEnds, contacts, limit);
 }
 
 void ContactSearch::setMotion(const double* x, const double* y, const Loop& run) {
     const Implementation& search = *implementation;
     const vector<Capsule>& capsules = search.system.capsules;
+    implementation->motionBegins = x;
+    implementation->motionEnds = y;
     vector<MovingSegment>& moving = implementation->moving;
     moving.resize(capsules.size());
     const int count = capsules.size();
@@ -961,9 +995,15 @@ void ContactSearch::findOutlooks(const ContactPair* const* pairs, int count, Pai
     }
 }
 
-void ContactSearch::findVector(const ContactPair& pair, double s, double t, const double* positions,
-        double* result) const {
-    const Vec3d r = implementation->segments(pair.a, pair.b, pair.shift, positions).between(s, t);
+void ContactSearch::prefetchMotion(int a, int b) const {
+    for (int capsule : {a, b}) {
+        prefetch(&implementation->moving[capsule]);
+        prefetch(&implementation->system.capsules[capsule]);
+    }
+}
+
+void ContactSearch::findVector(const ContactPair& pair, double s, double t, bool atEnd, double* result) const {
+    const Vec3d r = implementation->movingSegments(pair, atEnd).between(s, t);
     result[0] = r.x;
     result[1] = r.y;
     result[2] = r.z;

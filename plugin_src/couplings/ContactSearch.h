@@ -101,20 +101,26 @@ public:
      */
     int evaluate(const ContactPair& pair, const double* x, const double* y, Contact* contacts,
             double limit = std::numeric_limits<double>::infinity()) const;
-    /** Take note of x and y, for findOutlooks(). */
+    /** Take note of x and y, for the functions below. */
     void setMotion(const double* x, const double* y, const Loop& run);
+    /** Ask for what is known of two capsules, which is needed soon. */
+    void prefetchMotion(int a, int b) const;
     /**
      * Take a first look at some pairs, many at once. Several threads may do so at the same time.
      *
      * @param outlooks  receives as many
      */
     void findOutlooks(const ContactPair* const* pairs, int count, PairOutlook* outlooks) const;
+    /** Find the contacts of a pair at y, as the other function of this name does. */
+    int evaluate(const ContactPair& pair, Contact* contacts,
+            double limit = std::numeric_limits<double>::infinity()) const;
     /**
      * Find the vector from the point at fraction t of the second capsule of a pair to that at s of the first.
      *
+     * @param atEnd   at y, or else at x
      * @param result  three numbers
      */
-    void findVector(const ContactPair& pair, double s, double t, const double* positions, double* result) const;
+    void findVector(const ContactPair& pair, double s, double t, bool atEnd, double* result) const;
     /**
      * Get whether the capsules of a pair pass through each other on the way from x to y, an odd number of times.
      * Spheres do if they come nearer to an axis than 0.7 of the sum of radii, and end on the other side of it.

@@ -10,6 +10,7 @@
 #include "dynamics/PackStep.h"
 #include "lanes/Noise.h"
 #include "mechanics/PeriodicBox.h"
+#include "mechanics/Prefetch.h"
 #include <algorithm>
 #include <cmath>
 #include <cstdint>

@@ -1,6 +1,7 @@
 #include "dynamics/ContactEquations.h"
 #include "dynamics/SymmetricMatrices.h"
 #include "dynamics/WallEquations.h"
+#include "mechanics/Prefetch.h"
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -56,6 +57,7 @@ void ContactEquations::begin(const CoupledStart& start, const Loop& newLoop) {
     responses.begin(start.places, stepSize);
     const vector<Capsule>& capsules = search->getSystem().capsules;
     places.resize(capsules.size());
+    packs.resize(capsules.size());
     double diameter = 0;
     for (const Capsule& capsule : capsules)
         diameter = max(diameter, 2*capsule.radius);
@@ -70,6 +72,7 @@ void ContactEquations::begin(const CoupledStart& start, const Loop& newLoop) {
             places[i].direction = capsule.second < 0 ? 0 : found.fraction == 0 ? 1 : -1;
         else
             found = PlaceOnChain();
+        packs[i] = found.pack;
     });
     reaches[0] = REACH*diameter;
     reaches[1] = LEAST_REACH*diameter;
@@ -126,7 +129,7 @@ void ContactEquations::findPairs(const double* moved) {
 }
 
 void ContactEquations::addState(const ContactPair& pair) {
-    states.push_back({pair, {}, {}, {false, false}, {0, 0}});
+    states.push_back({pair, {}});
     watches.push_back({pair.a, pair.b, -HUGE_VAL, 0, -1, pair.clearance});
 }
 
@@ -178,13 +181,13 @@ template <class Function> bool ContactEquations::markPairs(Function findIn) {
     return any;
 }
 
-void ContactEquations::updateContacts(State& state, int count, const double* moved) const {
+void ContactEquations::updateContacts(State& state, int count) const {
     const vector<Capsule>& capsules = search->getSystem().capsules;
     const double radii = capsules[state.pair.a].radius+capsules[state.pair.b].radius;
     for (int i = 0; i < count; i++) {
-        Contact& contact = state.contacts[i];
+        Contact& contact = state.sides[i].contact;
         double r[3];
-        search->findVector(state.pair, contact.s, contact.t, moved, r);
+        search->findVector(state.pair, contact.s, contact.t, true, r);
         const double* n = contact.normal;
         contact.gap = r[0]*n[0]+r[1]*n[1]+r[2]*n[2]-radii;
     }
@@ -195,7 +198,7 @@ RestGap ContactEquations::findRestGap(const ContactPair& pair, const Contact& co
     const double a = stiffness*(responseOf(pair.a, contact.s)+responseOf(pair.b, contact.t));
     const vector<Capsule>& capsules = search->getSystem().capsules;
     double r[3];
-    search->findVector(pair, contact.s, contact.t, begun, r);
+    search->findVector(pair, contact.s, contact.t, false, r);
     const double* n = contact.normal;
     const double before = r[0]*n[0]+r[1]*n[1]+r[2]*n[2]-capsules[pair.a].radius-capsules[pair.b].radius;
     return RestGap(max(contact.gap, -largest), min(before, largest), a, wallDepth);
@@ -212,19 +215,20 @@ bool ContactEquations::isLookedFor(int number) const {
     const Watch& watch = watches[number];
     if (!takesPart(watch.a) && !takesPart(watch.b))
         return false;
-    const vector<Capsule>& capsules = search->getSystem().capsules;
-    const double diameter = capsules[watch.a].radius+capsules[watch.b].radius;
     const double way = travelled[watch.a]+travelled[watch.b];
-    return watch.count < 0 || (iterations < SEARCHING_ITERATIONS && !(way < watch.searched+SAME_PLACE*diameter));
+    return watch.count < 0 || (iterations < SEARCHING_ITERATIONS && !(way < watch.samePlace));
 }
 
 /** Evaluate some pairs that may touch. */
-void ContactEquations::look(int begin, int end, const double* moved, bool first, Part& part) {
+void ContactEquations::look(int begin, int end, bool first, Part& part) {
     part.due.clear();
     part.numbers.clear();
     for (int i = begin; i < end; i++)
         if (!(travelled[watches[i].a]+travelled[watches[i].b] < watches[i].due)) {
             const bool isDue = isLookedFor(i);
+            prefetch(&states[i].pair);
+            prefetch(&states[i].sides[0]);
+            search->prefetchMotion(watches[i].a, watches[i].b);
             part.numbers.push_back(isDue ? i : -1-i);
             if (isDue)
                 part.due.push_back(&states[i].pair);
@@ -234,13 +238,13 @@ void ContactEquations::look(int begin, int end, const double* moved, bool first,
     const PairOutlook* next = part.outlooks.data();
     for (int number : part.numbers)
         if (number >= 0)
-            evaluate(number, moved, first, next++, part);
+            evaluate(number, first, next++, part);
         else
-            evaluate(-1-number, moved, first, NULL, part);
+            evaluate(-1-number, first, NULL, part);
 }
 
 /** Add the equations of a pair, with the outlook of one that is looked for. */
-void ContactEquations::evaluate(int number, const double* moved, bool first, const PairOutlook* outlook, Part& part) {
+void ContactEquations::evaluate(int number, bool first, const PairOutlook* outlook, Part& part) {
     State& state = states[number];
     Watch& watch = watches[number];
     const ContactPair& pair = state.pair;
@@ -250,7 +254,7 @@ void ContactEquations::evaluate(int number, const double* moved, bool first, con
     const double way = travelled[pair.a]+travelled[pair.b];
     double gap = HUGE_VAL;
     // What is farther away is left out, until it may have come near. Gaps that two come back to count.
-    const double largest = max({0.0, state.restGaps[0].get(), state.restGaps[1].get()});
+    const double largest = max({0.0, state.sides[0].restGap.get(), state.sides[1].restGap.get()});
     const double limit = LARGEST_GAP*diameter+largest;
     if (outlook != NULL) {
         Contact contacts[2];
@@ -259,37 +263,39 @@ void ContactEquations::evaluate(int number, const double* moved, bool first, con
         if (!outlook->mayCross && outlook->gap >= limit)
             count = -1;
         else
-            count = outlook->isOfNeighbor ? 0 : search->evaluate(pair, begun, moved, contacts, limit);
+            count = outlook->isOfNeighbor ? 0 : search->evaluate(pair, contacts, limit);
         // A contact at a joint may pass from one segment to the next and back: in the end, it must not be lost.
         if (count == 0 && watch.count > 0 && iterations >= PASSING_ITERATIONS)
-            updateContacts(state, watch.count, moved);
+            updateContacts(state, watch.count);
         else {
             watch.count = count;
-            watch.searched = way;
-            copy(contacts, contacts+max(count, 0), state.contacts);
+            watch.samePlace = way+SAME_PLACE*diameter;
+            for (int i = 0; i < count; i++)
+                state.sides[i].contact = contacts[i];
             gap = contacts[0].gap-largest;
         }
     }
     else
-        updateContacts(state, watch.count, moved);
+        updateContacts(state, watch.count);
     bool touches = false;
     for (int i = 0; i < watch.count; i++) {
-        const Contact& contact = state.contacts[i];
+        Side& side = state.sides[i];
+        const Contact& contact = side.contact;
         // Where contacts are not looked for any more, anyCross() sees whether they have come back.
         if (contact.crossed && iterations < SEARCHING_ITERATIONS)
             part.pairs.push_back(number);
         if (first)
-            state.restGaps[i] = findRestGap(pair, contact, LARGEST_RETURN*diameter);
-        else if (state.touched[i])
-            state.restGaps[i].correct(contact.gap);
-        const double overlap = state.restGaps[i].get()-contact.gap;
+            side.restGap = findRestGap(pair, contact, LARGEST_RETURN*diameter);
+        else if (side.touched)
+            side.restGap.correct(contact.gap);
+        const double overlap = side.restGap.get()-contact.gap;
         gap = min(gap, -overlap);
         // Contacts that open and close in turn would keep the iteration from ending.
-        const bool holds = iterations >= HOLDING_ITERATIONS && state.touched[i];
-        if (!state.touched[i])
-            state.drift[i] = -overlap;
-        state.touched[i] = overlap > 0 || holds;
-        if (!state.touched[i])
+        const bool holds = iterations >= HOLDING_ITERATIONS && side.touched;
+        if (!side.touched)
+            side.drift = -overlap;
+        side.touched = overlap > 0 || holds;
+        if (!side.touched)
             continue;
         touches = true;
         CouplingEquation equation;
@@ -326,7 +332,7 @@ void ContactEquations::linearise(int iteration, const double* moved, vector<Coup
         part.equations.clear();
         part.contacts.clear();
         part.pairs.clear();
-        look(chunk*CHUNK, min(count, (chunk+1)*CHUNK), moved, first, part);
+        look(chunk*CHUNK, min(count, (chunk+1)*CHUNK), first, part);
     });
     for (int chunk = 0; chunk < chunks; chunk++) {
         const Part& part = parts[chunk];
@@ -407,9 +413,9 @@ bool ContactEquations::isUnfinished(int number, const double* move) {
     const double tolerance = TOLERANCE*(iterations < PATIENT_ITERATIONS ? 1 : LATE);
     if (!(bound*bound < tolerance*tolerance*kT+least))
         return true;
-    State& state = states[contact/2];
-    double& drift = state.drift[contact%2];
-    const double* n = state.contacts[contact%2].normal;
+    Side& side = states[contact/2].sides[contact%2];
+    double& drift = side.drift;
+    const double* n = side.contact.normal;
     drift += n[0]*move[0]+n[1]*move[1]+n[2]*move[2];
     const int a = equation.places[0].pack, b = equation.places[1].pack;
     if (a < 0 || b < 0 || (*active)[a] == (*active)[b])

@@ -48,24 +48,28 @@ public:
     bool findCulprit(const double* moved, const CouplingEquation* equations, BrokenCoupling& culprit) const override;
     void findNeighbours(std::vector<std::pair<int, int> >& neighbours) const override;
 private:
+    /** One of the two contacts that a pair may have. */
+    struct Side {
+        /** Where it touches. */
+        Contact contact;
+        RestGap restGap;
+        /** By how much its gap has changed while one of its packs took no part. */
+        double drift;
+        /** Whether it touched in the last iteration. */
+        bool touched;
+    };
     /** A pair of capsules. */
     struct State {
         ContactPair pair;
-        /** Where it touches. */
-        Contact contacts[2];
-        RestGap restGaps[2];
-        /** Whether it touched in the last iteration. */
-        bool touched[2];
-        /** By how much its gap has changed while one of its packs took no part. */
-        double drift[2];
+        Side sides[2];
     };
     /** What tells whether a pair is looked at: many are not. */
     struct Watch {
         int a, b;
         /** How far both capsules must have travelled before they may touch. */
         double due;
-        /** How far they had travelled when it was looked for where they touch. */
-        double searched;
+        /** They touch where they did, as long as they have not travelled this far. */
+        double samePlace;
         /** The number of its contacts; -1 if they are too far apart, or if that is not known. */
         int count;
         /** How far they must have travelled before they may cross. */
@@ -99,7 +103,7 @@ private:
     template <class Function> bool markPairs(Function findIn);
     void mark(int pair);
     bool takesPart(int capsule) const {
-        return places[capsule].place.pack >= 0 && (*active)[places[capsule].place.pack];
+        return packs[capsule] >= 0 && (*active)[packs[capsule]];
     }
     bool isUnfinished(int equation, const double* move);
     void follow(int first, int last, const double* moved, Motion& result);
@@ -111,9 +115,9 @@ private:
     RestGap findRestGap(const ContactPair& pair, const Contact& contact, double largest) const;
     double responseOf(int capsule, double fraction) const;
     bool isLookedFor(int pair) const;
-    void look(int begin, int end, const double* moved, bool first, Part& part);
-    void evaluate(int pair, const double* moved, bool first, const PairOutlook* outlook, Part& part);
-    void updateContacts(State& state, int count, const double* moved) const;
+    void look(int begin, int end, bool first, Part& part);
+    void evaluate(int pair, bool first, const PairOutlook* outlook, Part& part);
+    void updateContacts(State& state, int count) const;
     bool anyComeNear(const double* moved);
     bool anyCross(const double* moved);
     void findCrossed(int begin, int end, const double* moved, Part& part) const;
@@ -127,6 +131,8 @@ private:
     PlaceResponses responses;
     double kT = 0, stepSize = 0, wallDepth = 0, reach = 0, reaches[2] = {};
     std::vector<CapsulePlace> places;
+    /** The packs of these places. */
+    std::vector<int> packs;
     std::vector<ContactPair> pairs;
     /** Those of the first search in its order, and behind them those that others have found. */
     std::vector<State> states;

@@ -43,7 +43,7 @@ public:
             current = ahead;
             factors = factorsAhead;
             if (s+3 < n)
-                fetchAhead(&segments[s+2]);
+                prefetch(&segments[s+2]);
             if (!CLOSED || s < pack.segments)
                 addSegment(y, s, current, *here, *after);
             else {

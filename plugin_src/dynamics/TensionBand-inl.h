@@ -56,13 +56,6 @@ template <class Real> struct TensionEquation {
 /** What a substitution finds: nodes and tensions, what to add to them, or nodes alone. */
 enum class Goal {Find, Add, Nodes};
 
-/** Ask for a record that is needed soon: where a step has many chains, it is far from the processor. */
-template <class Record> CYLCHAIN_INLINE void fetchAhead(const Record* record) {
-    const char* const bytes = reinterpret_cast<const char*>(record);
-    for (std::size_t i = 0; i < sizeof(Record); i += 64)
-        __builtin_prefetch(bytes+i, 1);
-}
-
 #include "dynamics/TensionResponses-inl.h"
 
 template <int W, bool CLOSED> class TensionBand {
@@ -214,7 +207,7 @@ private:
         for (int node = CLOSED ? 2 : 0; node < n; node++) {
             EliminatedPair<Real, CLOSED>& own = nodes[node];
             if (node+2 < n)
-                fetchAhead(&nodes[node+2]);
+                prefetch(&nodes[node+2]);
             const Vec right = added(node, here);
             own.solution = own.inverse*right-own.give*start;
             own.tension = own.reciprocal*start+own.give.dot(right);
@@ -239,7 +232,7 @@ private:
     template <int FOLLOWING> CYLCHAIN_INLINE void eliminatePair(int node, const Row& row, Row& next, Row& second) {
         EliminatedPair<Real, CLOSED>& result = nodes[node];
         if (node+1 < n)
-            fetchAhead(&nodes[node+1]);
+            prefetch(&nodes[node+1]);
         Sym inverse = inverseOfMobile(row.diagonal, loaded<Real>(pack.mobile, node));
         const Vec raised = inverse*link.first;
         const Real reciprocal = 1/(link.resistance+link.first.dot(raised));

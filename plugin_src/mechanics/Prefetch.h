@@ -1,0 +1,27 @@
+#ifndef CYLCHAIN_PREFETCH_H_
+#define CYLCHAIN_PREFETCH_H_
+
+#include <cstddef>
+
+namespace cylchain {
+
+/** The bytes that a processor fetches from memory together. */
+const std::size_t CACHE_LINE = 64;
+
+/**
+ * Ask for a record that is needed soon. Where a step has many chains, memory is far from the processor, and what is
+ * found in an order of its own, such as the other capsule of a pair, comes late. It is fetched to the second cache: the
+ * first has room for few requests, and when they are used up everything waits.
+ */
+template <class Record> inline __attribute__((always_inline)) void prefetch(const Record* record) {
+    const char* const bytes = reinterpret_cast<const char*>(record);
+    for (std::size_t i = 0; i < sizeof(Record); i += CACHE_LINE)
+        __builtin_prefetch(bytes+i, 0, 2);
+    // A record that does not begin with a line ends in one more.
+    if (alignof(Record) < CACHE_LINE && sizeof(Record) > 8)
+        __builtin_prefetch(bytes+sizeof(Record)-1, 0, 2);
+}
+
+} // namespace cylchain
+
+#endif /*CYLCHAIN_PREFETCH_H_*/
