@@ -1,0 +1,90 @@
+"""A network with motors and crosslinkers that is killed at random moments, again and again, ends with the same files.
+
+``OPENMM_CYLCHAIN_TEST_KILLS=100`` before the command of pytest kills it so often.
+"""
+
+import json
+import multiprocessing
+import os
+import signal
+import time
+
+import numpy as np
+import pytest
+
+from openmm_cylchain.runs.configuration import parse_configuration
+from openmm_cylchain.runs.run import run
+from support import small_runs
+
+# Many checkpoints, so that kills fall into writing them, too.
+NETWORK = small_runs.NETWORK.replace(
+    'duration = "1 ms"\nreport_interval = "0.1 ms"',
+    'duration = "8 ms"\nreport_interval = "50 us"\ncheckpoint_interval = "50 us"',
+)
+STEPS = 1600
+FILES = ("trajectory.dcd", "energies.csv", "linkers.csv", "linkers.npy", "description.json", "topology.cif")
+KILLS = int(os.environ.get("OPENMM_CYLCHAIN_TEST_KILLS", "3"))
+
+
+def contents(directory, name):
+    # The header of a DCD file has the date of its beginning, behind the number of frames.
+    content = (directory / name).read_bytes()
+    return content[:92] + content[276:] if name == "trajectory.dcd" else content
+
+
+def step_of_checkpoint(directory):
+    path = directory / "checkpoint.chk"
+    return json.loads(path.read_bytes().partition(b"\n")[0])["step"] if path.exists() else None
+
+
+@pytest.fixture
+def processes(tmp_path, monkeypatch):
+    """Begin with all that a run imports, so that many can be killed in a minute."""
+    monkeypatch.chdir(tmp_path)  # What is installed is imported, not what is in the folder of the tests.
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["openmm_cylchain.runs.run"])
+    return context
+
+
+def started(processes, configuration, output):
+    process = processes.Process(target=run, args=(configuration, output, True))
+    process.start()
+    return process
+
+
+@pytest.mark.slow
+def test_network_that_is_killed_at_random_moments(tmp_path, processes):
+    """Counted are kills between the first checkpoint and the last step; others come on top."""
+    configuration = parse_configuration(NETWORK)
+    reference = tmp_path / "reference"
+    started(processes, configuration, tmp_path / "first").join()  # It starts the server, which takes long.
+    begun = time.monotonic()
+    whole = started(processes, configuration, reference)
+    whole.join()
+    assert whole.exitcode == 0
+    longest = time.monotonic() - begun
+    generator = np.random.default_rng(17)
+    counted, early, late, runs = [], 0, 0, 0
+    while len(counted) < KILLS:
+        output = tmp_path / f"run{runs}"
+        runs += 1
+        code = None
+        while code != 0:
+            process = started(processes, configuration, output)
+            process.join(generator.uniform(0.0, 1.0) * longest if len(counted) < KILLS else None)
+            process.kill()
+            process.join()
+            code = process.exitcode
+            assert code in (0, -signal.SIGKILL)
+            if code != 0:
+                step = step_of_checkpoint(output)
+                early += step is None
+                late += step == STEPS
+                counted += [step] if step not in (None, STEPS) else []
+        for name in FILES:
+            assert contents(output, name) == contents(reference, name) != b"", (name, counted)
+    print(
+        f"{len(counted)} kills at {len(set(counted))} steps of {runs} runs of {longest:.2f} s, {early} before and {late} "
+        "behind them"
+    )
+    assert len(set(counted)) > 0.5 * KILLS and runs <= KILLS
