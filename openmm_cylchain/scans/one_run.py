@@ -13,6 +13,8 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+import openmm
+
 from ..errors import InputError, InstabilityError
 
 _FAILED, _WRONG_INPUT = 1, 2
@@ -87,7 +89,7 @@ def _process(task):
     with open(directory / LOG, "ab") as log:
         # In the directory of the run: what is there cannot take the place of this package.
         process = subprocess.Popen(
-            [sys.executable, "-m", __name__],
+            [sys.executable, "-c", f"import sys; from {__name__} import main; sys.exit(main())"],
             cwd=directory,
             env=environment,
             stdin=subprocess.PIPE,
@@ -131,6 +133,7 @@ def main():
         deadline = time.monotonic() + 2.0 * _SECONDS_TO_END
         while RunFiles(order["directory"]).is_being_written and time.monotonic() < deadline:
             time.sleep(0.1)
+        print(_platform_in_words(configuration.simulation), flush=True)
         run_with_summary(configuration, order["directory"], resume=True)
     except InputError as error:
         print(f"error: {error}", flush=True)
@@ -144,6 +147,13 @@ def main():
     return 0
 
 
+def _platform_in_words(settings):
+    if settings.platform != "CPU":
+        return f"On the platform {settings.platform}."
+    threads = settings.threads or int(openmm.Platform.getPlatform("CPU").getPropertyDefaultValue("Threads"))
+    return f"On the platform CPU with {threads} thread{'s' * (threads > 1)}."
+
+
 def _end_with_the_starter():
     # Not through sys.stdin, which would be locked when the process ends.
     while os.read(0, 4096):
@@ -151,7 +161,3 @@ def _end_with_the_starter():
     os.kill(os.getpid(), signal.SIGTERM)
     time.sleep(_SECONDS_TO_END)
     os._exit(128 + signal.SIGTERM)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

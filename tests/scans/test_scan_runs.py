@@ -17,6 +17,7 @@ import pytest
 from openmm_cylchain import InputError
 from openmm_cylchain.cli import main
 from openmm_cylchain.scans import read_scan, scan
+from openmm_cylchain.scans.one_run import LOG, Task, perform
 
 RUN = """
 [solvent]
@@ -188,10 +189,34 @@ def test_failures_are_named_and_the_others_gathered(tmp_path, capsys):
     assert "failed" in statuses
 
 
+@pytest.mark.parametrize(("setting", "threads"), [("", "2 threads"), ("threads = 1", "1 thread")])
+def test_threads_of_a_run_elsewhere(tmp_path, monkeypatch, setting, threads):
+    """Those of the environment of a worker, if the file does not say how many."""
+    monkeypatch.setenv("OPENMM_CPU_THREADS", "2")
+    text = RUN.replace("DURATION", "0.1 ms") + f'platform = "CPU"\nseed = 1\n{setting}\n'
+    outcome = perform(Task(text, str(tmp_path), str(tmp_path / "out"), attempts=1))
+    assert outcome.status == "done"
+    assert (tmp_path / "out" / LOG).read_text().startswith(f"On the platform CPU with {threads}.\n")
+
+
+def assert_threads(path, threads):
+    logs = [own.read_text() for own in path.glob(f"runs/*/{LOG}")]
+    assert len(logs) == 2 and all(log.startswith(f"On the platform CPU with {threads}.\n") for log in logs)
+
+
+def short_on_the_cpu(folder):
+    folder.mkdir()
+    path = files_of(folder)
+    with open(folder / "run.toml", "a") as file:
+        file.write('platform = "CPU"\n')
+    return path
+
+
 @pytest.mark.slow
-def test_dask_with_two_workers(tmp_path, unbroken):
+def test_dask_with_two_workers(tmp_path, unbroken, monkeypatch):
     distributed = pytest.importorskip("distributed")
     path = files_of(tmp_path, "20 ms")
+    monkeypatch.setenv("OPENMM_CPU_THREADS", "3")
     with (
         distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
         distributed.Client(cluster) as client,
@@ -199,7 +224,10 @@ def test_dask_with_two_workers(tmp_path, unbroken):
         assert len(client.scheduler_info()["workers"]) == 2
         result = scan(path, tmp_path / "out", client.get_executor(pure=False), say=lambda line: None)
         assert main(["scan", str(path), "--output", str(tmp_path / "out"), *dask(cluster)]) == 0
+        short = short_on_the_cpu(tmp_path / "cpu")
+        on_cpu = scan(short, tmp_path / "cpu" / "out", client.get_executor(pure=False), say=lambda line: None)
     assert result.is_complete
+    assert_threads(on_cpu.path, "3 threads")
     assert_same_runs(result.path, unbroken)
 
 
