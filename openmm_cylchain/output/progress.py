@@ -51,14 +51,21 @@ class ProgressMessages:
     ----------
     stream : file
         Standard error if not given.
+    seconds_between_lines : float
+        Messages that come sooner after a line than that are left out, but not on a terminal.
     """
 
-    def __init__(self, stream: TextIO | None = None) -> None:
+    def __init__(self, stream: TextIO | None = None, seconds_between_lines: float = 0.0) -> None:
         self._line = StatusLine(sys.stderr if stream is None else stream)
+        self._between = seconds_between_lines
         self._start = time.monotonic()
+        self._next = self._start + seconds_between_lines
 
     def __call__(self, message: str) -> None:
-        self._line.write(f"{time.monotonic() - self._start:6.1f} s  {message}")
+        now = time.monotonic()
+        if self._line.in_place or now >= self._next:
+            self._next = now + self._between
+            self._line.write(f"{now - self._start:6.1f} s  {message}")
 
     def finish(self) -> None:
         """Leave the line that was overwritten."""

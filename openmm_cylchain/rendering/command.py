@@ -4,6 +4,8 @@ import math
 
 from ..errors import InputError
 
+_SECONDS_BETWEEN_LINES = 10.0
+
 
 def add_command(commands):
     """Add ``render`` to the subcommands of an argparse parser."""
@@ -51,7 +53,7 @@ def _render(options):
     view = View(_size(options.size), options.projection, direction, options.turn)
     run = load(options.run, options.incomplete)
     if options.film:
-        progress = ProgressMessages()
+        progress = ProgressMessages(seconds_between_lines=_SECONDS_BETWEEN_LINES)
         try:
             frames_per_second = 20.0 if options.fps is None else options.fps
             frames = _frames(options.frames, len(run))

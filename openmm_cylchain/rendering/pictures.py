@@ -15,7 +15,7 @@ from ..units.quantities import whole_number
 from ..units.types import FloatArray
 from .annotations import annotated
 from .camera import camera_on
-from .scene import Look, make_scene
+from .scene import Look, legend_of, make_scene
 from .shading import shaded_image
 
 PICTURES, FILMS = (".png",), (".gif", ".mp4", ".webm")
@@ -140,7 +140,8 @@ def write_film(
     try:
         pictures = _told(drawn, len(frames), say)
         if path.suffix == ".gif":
-            _write_gif(pictures, temporary, frames_per_second, int(colors))
+            legend = [color for _, color, _ in legend_of(run, look or Look())]
+            _write_gif(pictures, temporary, frames_per_second, int(colors), legend)
         else:
             _write_video(pictures, temporary, frames_per_second)
         temporary.replace(path)
@@ -172,14 +173,23 @@ def _ffmpeg():
     return imageio_ffmpeg
 
 
-def _write_gif(drawn, path, frames_per_second, colors):
+def _write_gif(drawn, path, frames_per_second, colors, legend):
     # One palette for all frames, or colors would flicker.
     pictures = [Image.fromarray(image) for image in drawn]
-    palette = pictures[len(pictures) // 2].quantize(colors, Image.Quantize.MEDIANCUT)
+    palette = _palette(pictures[len(pictures) // 2], colors, legend)
     indexed = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
     indexed[0].save(
         path, format="gif", save_all=True, append_images=indexed[1:], duration=1000.0 / frames_per_second, loop=0
     )
+
+
+def _palette(picture, colors, legend):
+    # Colors of the legend cover few pixels: a median with their neighbours would make two types look alike.
+    exact = [channel for color in legend[: colors // 2] for channel in bytes.fromhex(color[1:])]
+    left = colors - len(exact) // 3
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([*exact, *picture.quantize(left, Image.Quantize.MEDIANCUT).getpalette()[: 3 * left]])
+    return palette
 
 
 def _write_video(drawn, path, frames_per_second):

@@ -160,16 +160,21 @@ def make_scene(run: Run, look: Look, frames: list[int]) -> Scene:
         diameters = own if look.diameter == 0.0 else np.full(len(own), look.diameter)
     # Tubes stand out from the points by half their width.
     points = np.concatenate([points + 0.5 * diameters.max(), points - 0.5 * diameters.max()])
+    axis = director(np.concatenate(_segments(run, frames[0]))) if look.color == "orientation" else None
+    scale = _color_scale(run, look, axis, frames)
+    fixed = _lines(box_edges(run) + wall_lines(run, points), _LINE_WIDTH * extent)
+    return Scene(run, look, points, diameters, legend_of(run, look), scale, axis, fixed)
+
+
+def legend_of(run: Run, look: Look) -> list[tuple[str, str, str]]:
+    """Labels, colors "#RRGGBB" and kinds of what the legend of a picture has; see ``Scene``."""
     colors = filament_colors(run)
     legend = [(name, color, "filament") for name, color in colors.items()] if look.color == "type" else []
     if look.linkers:
         legend += [
             (name, linker_color(kind, look.color != "type"), "linker") for kind, name in enumerate(run.spring_names)
         ]
-    axis = director(np.concatenate(_segments(run, frames[0]))) if look.color == "orientation" else None
-    scale = _color_scale(run, look, axis, frames)
-    fixed = _lines(box_edges(run) + wall_lines(run, points), _LINE_WIDTH * extent)
-    return Scene(run, look, points, diameters, legend, scale, axis, fixed)
+    return legend
 
 
 def _framed_points(run, look, frames):

@@ -24,7 +24,7 @@ from ..errors import EquilibrationWarning, InputError
 from ..filaments.equilibrium import SegmentLengthDistribution
 from ..output.files import write_atomically
 from ..units.quantities import AVOGADRO, thermal_energy
-from ..units.text import format_time
+from ..units.text import format_time, format_with_error
 from ..version import __version__
 from .configuration import linker_labels
 from .run_directory import read_linkers
@@ -465,7 +465,7 @@ def _linker_table(linkers):
     rows = [("linkers", "unbound", "one hand", "both hands", "mean tension (pN)", "largest (pN)")]
     for own in linkers:
         states = [
-            f"{getattr(own, state):.4g} ± {getattr(own, f'{state}_error'):.1g}"
+            format_with_error(getattr(own, state), getattr(own, f"{state}_error"))
             for state in ("unbound", "one_hand_bound", "both_hands_bound")
         ]
         tensions = ["-" if force is None else f"{force:.3g}" for force in (own.mean_tension, own.largest_tension)]

@@ -227,11 +227,11 @@ def _draw_energies(axis, groups, temperature, energies):
     curves = [("stretching", "segment", np.average(stretching, weights=segments), _STRETCHING_COLOUR)]
     if np.any(joints * bending):
         curves.append(("bending", "joint", np.average(bending, weights=joints), _BENDING_COLOUR))
-    free = "exact" if all(map(is_in_equilibrium, kinds)) else "free chains"
+    free = "exact in equilibrium" if all(map(is_in_equilibrium, kinds)) else "free chains"
     for label, per, exact, colour in curves:
         values = energies[f"{label} energy per {per} (kT)"]
         axis.plot(time, values, color=colour, linewidth=1.0, alpha=0.8, label=f"{label}, per {per}")
-        axis.axhline(exact, color=colour, linewidth=1.8, linestyle="--", label=f"{free} in equilibrium: {exact:.4g}")
+        axis.axhline(exact, color=colour, linewidth=1.8, linestyle="--", label=f"{free}: {exact:.4g}")
     axis.set_xlim(time[0], time[-1])
     bottom, top = axis.get_ylim()
     axis.set_ylim(min(0.0, bottom), top + 0.28 * (top - min(0.0, bottom)))

@@ -1,6 +1,7 @@
 """Physical quantities as text: reading "1.71 mPa*s" into OpenMM's units, and writing times for people."""
 
 import functools
+import math
 import re
 
 from openmm import unit
@@ -136,6 +137,14 @@ def _convert(number, unit, target, name):
 
 
 _TIME_UNITS = (("s", 1e12), ("ms", 1e9), ("us", 1e6), ("ns", 1e3), ("ps", 1.0))
+
+
+def format_with_error(value: float, error: float) -> str:
+    """A value and its standard error, which has two significant digits: "0.0392 ± 0.0041"."""
+    if not (math.isfinite(value) and math.isfinite(error) and error > 0.0):
+        return f"{value:.4g} ± {error:.2g}"
+    decimals = max(0, 1 - math.floor(math.log10(error)))
+    return f"{value:.{decimals}f} ± {error:.{decimals}f}"
 
 
 def time_unit(time: float) -> tuple[str, float]:

@@ -18,7 +18,7 @@ from openmm_cylchain.units.quantities import (
     VISCOSITY,
     VOLUME,
 )
-from openmm_cylchain.units.text import format_time, parse_quantity
+from openmm_cylchain.units.text import format_time, format_with_error, parse_quantity
 
 
 @pytest.mark.parametrize(
@@ -86,6 +86,13 @@ def test_bad_quantities_are_refused(text, message):
         parse_quantity(text, LENGTH, "width")
     assert message in str(caught.value)
     assert '"360 nm"' in str(caught.value) or "finite" in message
+
+
+def test_errors_have_two_digits():
+    pairs = ((81.38, 11.7), (0.03922, 0.0412), (1882, 3.6), (5, 0.0), (4.308, 0.951), (1234.5, 320))
+    said = ["81 ± 12", "0.039 ± 0.041", "1882.0 ± 3.6", "5 ± 0", "4.31 ± 0.95", "1234 ± 320"]
+    assert [format_with_error(*pair) for pair in pairs] == said
+    assert format_with_error(3.0, float("nan")) == "3 ± nan"
 
 
 def test_times_are_written_with_a_unit_that_suits_them():
