@@ -12,6 +12,7 @@ from .couplings.contacts import add_exclusions, contact_force, crossing_barrier,
 from .couplings.crosslink_tables import CrosslinkTable
 from .couplings.crosslinks import Crosslinks
 from .couplings.pulling import ConstantVelocityPulling, change_constant_force, constant_force, constant_tension
+from .couplings.wall_points import random_points_on
 from .couplings.walls import Box, Cylinder, Ellipsoid, Plane, Slab, Sphere, filament_wall_force, wall_force
 from .dynamics.recommended_step import fene_steps, recommended_time_step
 from .dynamics.stability import stability_bounds, time_step_bounds
@@ -116,6 +117,7 @@ __all__ = [
     "filament_wall_force",
     "make_trajectory_whole",
     "make_whole",
+    "random_points_on",
     "recommended_time_step",
     "remove_jumps",
     "share_exclusions",

@@ -157,7 +157,8 @@ def _configuration(raw, text, folder, lines):
     box = tables["box"][0]["edges"] if tables["box"] else None
     (settings,) = tables["simulation"]
     groups = _filaments(tables, solvent, box, folder)
-    linkers = tuple(read_linkers(own, groups, box, read_seed(settings)) for own in tables["linkers"])
+    walls = tuple(map(read_wall, tables["wall"]))
+    linkers = tuple(read_linkers(own, groups, box, read_seed(settings), walls) for own in tables["linkers"])
     configuration = Configuration(
         title,
         solvent,
@@ -169,7 +170,7 @@ def _configuration(raw, text, folder, lines):
         *([read_flow(own) for own in tables["flow"]] or (None,)),
         tuple(read_particles(own, solvent, box) for own in tables["particles"]),
         *([read_contacts(own, groups) for own in tables["contacts"]] or (None,)),
-        tuple(map(read_wall, tables["wall"])),
+        walls,
         tuple(read_tether(own, groups) for own in tables["tether"]),
         tuple(read_pull(own, groups) for own in tables["pull"]),
         tuple(read_link(own, groups) for own in tables["link"]),

@@ -4,7 +4,7 @@ python -m openmm_cylchain.runs.reference > docs/configuration.md
 """
 
 from .configuration import TABLES
-from .keys import REQUIRED, Choice, Inline, Pair
+from .keys import REQUIRED, Choice
 from .table import TableKind
 
 _INTRODUCTION = """# The file of a run
@@ -71,8 +71,9 @@ def _written(value):
 
 
 def _tables_in(key):
-    if isinstance(key.kind, (Inline, Pair)) and isinstance(key.kind.table, TableKind):
-        yield key.name, key.kind.table
+    table = getattr(key.kind, "table", None)
+    if isinstance(table, TableKind):
+        yield key.name, table
 
 
 if __name__ == "__main__":

@@ -111,6 +111,20 @@ def test_anchors(anchors, expected):
     assert (linkers.count, linkers.bound) == (2, 1)
 
 
+def test_anchors_on_walls():
+    """At random on what the box holds of the wall: those of random_points_on."""
+    wall = '\n[[wall]]\nshape = "plane"\npoint = ["0 nm", "0 nm", "-4 nm"]\nstiffness = "1 pN/nm"\n'
+    region = 'count = 300, wall = 1, lower = ["0 nm", "0 nm", "-9 nm"], upper = ["1 um", "2 um", "9 nm"]'
+    text = NETWORK.replace("count = 40\nbound = 40", f"anchors = {{ {region} }}\nbound = 1") + wall
+    anchors = np.array(parse_configuration(text).linkers[1].anchors)
+    assert anchors.shape == (300, 3)
+    np.testing.assert_array_equal(anchors[:, 2], -4.0)
+    assert anchors[:, :2].min() > 0.0 and 900.0 < anchors[:, 0].max() < 1000.0 < anchors[:, 1].max() < 2000.0
+    np.testing.assert_array_equal(parse_configuration(text).linkers[1].anchors, anchors)
+    with pytest.raises(InputError, match="wall is 2, but there are 1"):
+        parse_configuration(text.replace("wall = 1", "wall = 2"))
+
+
 @pytest.mark.parametrize(
     ("old", "new", "fragments"),
     [

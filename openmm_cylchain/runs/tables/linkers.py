@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...couplings.wall_points import random_points_on
 from ...errors import InputError
 from ...kinetics.crosslinker import Crosslinker
 from ...kinetics.hand import AT_ENDS, Hand
@@ -53,6 +54,10 @@ class _Anchors:
     example = '[["0 nm", "0 nm", "0 nm"], ["100 nm", "0 nm", "0 nm"]]'
     text = "a list of points or of numbers of nodes, or a table"
 
+    @property
+    def table(self):
+        return _ANCHOR_REGION
+
     def read(self, value, place):
         if isinstance(value, dict):
             return _ANCHOR_REGION.read(value, place)
@@ -94,10 +99,11 @@ _ANCHOR_REGION = TableKind(
     "anchors",
     (
         Key("count", Whole(1, 10**7, "1000"), REQUIRED, "How many."),
-        Key("lower", point(), REQUIRED, "Corner of a box in which they are at random; it may be flat."),
-        Key("upper", point(), REQUIRED, "The opposite corner."),
+        Key("wall", Whole(1, 1000, "1"), None, "On which [[wall]] they are, by its number from 1 on."),
+        Key("lower", point(), None, "Corner of a box that they are in. For a wall, else that of the periodic box."),
+        Key("upper", point(), None, "The opposite corner."),
     ),
-    "Anchors at random places.",
+    "Anchors at random places, in a box or on a wall.",
 )
 LINKERS = TableKind(
     "linkers",
@@ -132,9 +138,9 @@ class LinkerGroup:
     bound: int
 
 
-def read_linkers(entries, groups, box, seed):
+def read_linkers(entries, groups, box, seed, walls=()):
     """The LinkerGroup of a [[linkers]] table, for FilamentGroups; the seed is that of anchors at random places."""
-    anchors = _anchor_points(entries, sum(own.count * own.nodes for own in groups), seed)
+    anchors = _anchor_points(entries, sum(own.count * own.nodes for own in groups), seed, box, walls)
     names = ("count", "concentration", "volume")
     group = LinkerGroup(_kind(entries), *(entries[name] for name in names), anchors, entries["bound"])
     with entries.naming():
@@ -212,18 +218,31 @@ def _hand(entries, changed):
             raise InputError(f"{entries.label}: {str(error).removeprefix('Hand: ')}") from None
 
 
-def _anchor_points(entries, nodes, seed):
+def _anchor_points(entries, nodes, seed, box, walls):
     anchors = entries["anchors"]
     if anchors is None:
         return None
     if isinstance(anchors, Entries):
-        lower, upper = np.array(anchors["lower"]), np.array(anchors["upper"])
-        if np.any(lower > upper):
-            raise anchors.at("upper").error("must not be below lower.")
-        generator = np.random.default_rng([seed, *entries.place.path[1:]])
-        return tuple(map(tuple, generator.uniform(lower, upper, (anchors["count"], 3)).tolist()))
+        return tuple(map(tuple, _random_anchors(anchors, [seed, *entries.place.path[1:]], box, walls).tolist()))
     if isinstance(anchors[0], int) and not 0 <= min(anchors) <= max(anchors) < nodes:
         raise entries.at("anchors").error(
             f"must be numbers of nodes between 0 and {nodes - 1}, but are {list(anchors)}."
         )
     return anchors
+
+
+def _random_anchors(entries, seed, box, walls):
+    """In a box, or on what it holds of a wall."""
+    wall, lower, upper = (entries[name] for name in ("wall", "lower", "upper"))
+    if box is not None and wall is not None:
+        lower, upper = (0.0, 0.0, 0.0) if lower is None else lower, box if upper is None else upper
+    if wall is None:
+        entries.require("lower", "upper")
+    elif wall > len(walls):
+        raise entries.at("wall").error(f"is {wall}, but there are {len(walls)} [[wall]] tables.")
+    if lower is not None and upper is not None and np.any(np.array(lower) > np.array(upper)):
+        raise entries.at("upper").error("must not be below lower.")
+    if wall is None:
+        return np.random.default_rng(seed).uniform(lower, upper, (entries["count"], 3))
+    with entries.naming():
+        return random_points_on(walls[wall - 1].shape, entries["count"], seed, lower, upper)

@@ -1,0 +1,132 @@
+"""Points at random on walls: motors of a gliding assay, or tethers, are anchored there."""
+
+import math
+
+import numpy as np
+
+from ..errors import InputError
+from ..units.quantities import LENGTH, vector, whole_number
+from ..units.types import FloatArray, Vector
+from .walls import Box, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere
+
+_MOST_DRAWS = 10**7
+"""Points that may be drawn for one on a part of the wall."""
+
+_BATCH = 4096
+_ROUNDING = 1e-9
+"""How far beyond the region a point on the wall may be, over the size of numbers."""
+
+
+def random_points_on(
+    wall: Shape, count: int, seed: int = 0, lower: Vector | None = None, upper: Vector | None = None
+) -> FloatArray:
+    """Points at random on a wall, with the same chance for each area: an array (count, 3) in nm.
+
+    Parameters
+    ----------
+    wall : Plane, Slab, Sphere, Cylinder, Box or Ellipsoid
+    count : int
+    seed : int
+    lower, upper : (3,) length, optional
+        Opposite corners of a box along the axes of space: points are on what it holds of the wall. Planes, slabs and
+        cylinders, which have no end, need both.
+
+    Raises
+    ------
+    InputError
+        For a value that is missing or wrong, or a box that holds nothing of the wall, or less than 10^-7 of what is
+        near it.
+    """
+    if not isinstance(wall, Shape):
+        raise InputError(f"wall must be a shape, such as Plane(point, normal), but is {wall!r}.")
+    count = whole_number(count, 1, "count")
+    if isinstance(wall, (Plane, Slab, Cylinder)) and (lower is None or upper is None):
+        raise InputError(
+            f"A {type(wall).__name__} has no end: give lower and upper, the corners of the box to stay in."
+        )
+    low = np.full(3, -np.inf) if lower is None else vector(lower, LENGTH, "lower")
+    high = np.full(3, np.inf) if upper is None else vector(upper, LENGTH, "upper")
+    if np.any(low > high):
+        raise InputError(f"lower must not be above upper, but they are {low.tolist()} and {high.tolist()} nm.")
+    generator = np.random.default_rng(seed)
+    draw = _SAMPLERS[type(wall)]
+    slack = _ROUNDING * max(np.abs(corner[np.isfinite(corner)]).max(initial=0.0) for corner in (low, high))
+    found, drawn = np.zeros((0, 3)), 0
+    while len(found) < count:
+        points = draw(wall, _BATCH, generator, low, high)
+        drawn += _BATCH
+        inside = np.all((points >= low - slack) & (points <= high + slack), axis=1)
+        found = np.vstack([found, points[inside]])
+        if drawn > _MOST_DRAWS * max(1, len(found)):
+            raise InputError(
+                f"The box from {low.tolist()} to {high.tolist()} nm holds nothing of the wall, or too little of it: "
+                "take a larger one that the wall goes through."
+            )
+    return np.clip(found[:count], low, high)
+
+
+def _tangents(normal):
+    """Two unit vectors across a unit vector and each other."""
+    first = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
+    first /= np.linalg.norm(first)
+    return first, np.cross(normal, first)
+
+
+def _corners(low, high):
+    return np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+
+
+def _on_plane(plane, count, generator, low, high):
+    across = np.array(_tangents(plane.normal))
+    extent = (_corners(low, high) - plane.point) @ across.T
+    return plane.point + generator.uniform(extent.min(axis=0), extent.max(axis=0), (count, 2)) @ across
+
+
+def _on_slab(slab, count, generator, low, high):
+    sides = generator.choice([-0.5, 0.5], count) * slab.thickness
+    return _on_plane(slab, count, generator, low, high) + sides[:, None] * slab.normal
+
+
+def _on_cylinder(cylinder, count, generator, low, high):
+    heights = (_corners(low, high) - cylinder.point) @ cylinder.axis
+    first, second = _tangents(cylinder.axis)
+    angle = generator.uniform(0.0, 2.0 * math.pi, (count, 1))
+    height = generator.uniform(heights.min(), heights.max(), (count, 1))
+    return cylinder.point + height * cylinder.axis + cylinder.radius * (np.cos(angle) * first + np.sin(angle) * second)
+
+
+def _directions(count, generator):
+    normals = generator.normal(size=(count, 3))
+    return normals / np.linalg.norm(normals, axis=1)[:, None]
+
+
+def _on_sphere(sphere, count, generator, low, high):
+    return sphere.center + sphere.radius * _directions(count, generator)
+
+
+def _on_ellipsoid(ellipsoid, count, generator, low, high):
+    # Of the unit sphere, an area grows with |n/a| a b c for its direction n and the semi-axes.
+    directions = _directions(count, generator)
+    growth = np.linalg.norm(directions / ellipsoid.semi_axes, axis=1) * ellipsoid.semi_axes.min()
+    kept = generator.uniform(size=count) < growth
+    return ellipsoid.center + directions[kept] * ellipsoid.semi_axes
+
+
+def _on_box(box, count, generator, low, high):
+    edges = box.upper - box.lower
+    areas = np.prod(edges) / edges
+    axes = generator.choice(3, count, p=areas / areas.sum())
+    points = generator.uniform(box.lower, box.upper, (count, 3))
+    ends = np.where(generator.integers(2, size=count) == 0, box.lower[axes], box.upper[axes])
+    points[np.arange(count), axes] = ends
+    return points
+
+
+_SAMPLERS = {
+    Plane: _on_plane,
+    Slab: _on_slab,
+    Sphere: _on_sphere,
+    Cylinder: _on_cylinder,
+    Box: _on_box,
+    Ellipsoid: _on_ellipsoid,
+}
