@@ -12,15 +12,19 @@ namespace cylchain {
  * Node i has a position P and a control point Q. Element i is the cubic curve r(x), x from 0 to 1, with the Bezier
  * points P_i, Q_i, 2 P_(i+1)-Q_(i+1) and P_(i+1), so that r' = dr/ds = 3 (Q-P)/h at a node, s being the arc length at
  * rest. With the vectors t_i, u and t_(i+1) of r' at the ends and in the middle of an element, the angles alpha from
- * t_i to u and beta from u to t_(i+1), as vectors along the axes of these rotations, and their sum s and difference d,
+ * t_i to u and beta from u to t_(i+1), as vectors along the axes of these rotations, their sum s = alpha+beta and
+ *
+ *     d = (beta-alpha) (1+|v|^2/40+|v|^4/560+|beta-alpha|^2/84),    v = t_(i+1)-t_i,
+ *
  * the energy of an element is
  *
  *     (EI/2h) (s^2+(4/3) d^2) + (K h/2) (e_i^2/6 + 2 e^2/3 + e_(i+1)^2/6).
  *
- * The first part is (EI/2) int theta'^2 ds, exactly, for an angle theta that is quadratic along the element. The
- * second part is (K/2) int (|r'|-1)^2 ds by Simpson's rule, which does not lock: e_i = |t_i|-1 at the nodes and, in the
- * middle, e = |u|-1-|w|^2/40+|v|^4/480 with w = t_i-2u+t_(i+1) and v = t_(i+1)-t_i. What is taken away there is the
- * error that Simpson's rule makes in the chord of an element with such an angle.
+ * The first part is (EI/2) int theta'^2 ds of an angle theta that is quadratic along the element, as long as it bends
+ * little; the factor in d makes it, to its orders, that of the curve in a plane that has the least energy with these
+ * ends, without a force along its chord. The second part is (K/2) int (|r'|-1)^2 ds by Simpson's rule, which does not
+ * lock: e_i = |t_i|-1 at the nodes and, in the middle, e = |u|-1-|w|^2/40+|v|^4/480 with w = t_i-2u+t_(i+1). What is
+ * taken away there is the error that Simpson's rule makes in the chord of an element with such an angle.
  *
  * Friction is distributed along the curve, along and across it, and so is its noise.
  */

@@ -118,9 +118,13 @@ private:
             other += d*d;
             wide += normals[components+k]*normals[components+k];
         }
-        const double half = std::sin(0.5*std::sqrt(square)), turnSquare = 4*half*half, scale = 1+turnSquare/40;
+        const double half = std::sin(0.5*std::sqrt(square)), turnSquare = 4*half*half;
+        const double least = 1+turnSquare*(SCALE_OF_TURN+turnSquare*SCALE_OF_SQUARE);
+        const double scale = scaleOf(std::sqrt(other), least);
         both /= scale;
         other /= scale*scale;
+        // How a difference grows with the one that is not scaled, along and across it.
+        const double along = scale+2*SCALE_OF_DIFFERENCE*other;
         const double angles[] = {std::sqrt(std::max(0.0, 0.25*(square+other)-0.5*both)),
                 std::sqrt(0.25*(square+other)+0.5*both)};
         if (std::max(angles[0], angles[1]) > M_PI)
@@ -130,11 +134,20 @@ private:
         const double derivative = std::sqrt(slope*slope-0.4*(1+(4-turnSquare)/40-turnSquare*turnSquare/480));
         const double length = 5*(slope-derivative);
         if (pack.planar)
-            return length/(derivative*scale)*std::exp(-0.5*PLANAR_WIDTH*ofDifference*ofDifference*wide);
-        double result = length*length/(derivative*scale*scale);
+            return length/(derivative*along)*std::exp(-0.5*PLANAR_WIDTH*ofDifference*ofDifference*wide);
+        double result = length*length/(derivative*along*scale);
         for (double angle : angles)
             result *= angle < 1e-4 ? 1 : std::sin(angle)/angle;
         return result;
+    }
+    /** The scale of a difference of bends d: x in x = least+c (d/x)^2, by Newton's method. */
+    static double scaleOf(double difference, double least) {
+        double scale = least;
+        for (int i = 0; i < 8; i++) {
+            const double one = difference/scale, wrong = (least+SCALE_OF_DIFFERENCE*one*one-scale)*scale;
+            scale += wrong/(scale+2*SCALE_OF_DIFFERENCE*one*one);
+        }
+        return scale;
     }
     /** Of a coordinate in equilibrium; none if it has no stiffness. */
     Real deviation(Real stiffness) const {

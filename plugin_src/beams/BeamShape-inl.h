@@ -27,6 +27,9 @@ template <class Real> struct AngleFactor {
     }
 };
 
+/** What makes up for the bends that an element does not have, see BeamChain.h. */
+const Scalar SCALE_OF_TURN = 1.0/40, SCALE_OF_SQUARE = 1.0/560, SCALE_OF_DIFFERENCE = 1.0/84;
+
 /** The vectors of an element: r' at its ends and in its middle. */
 template <class Real> struct BeamVectors {
     Vector<Real> first, middle, last;
@@ -78,9 +81,10 @@ template <class Real> struct BeamShape {
     }
     /** The forces on the vectors that do the work of moments, those of the sum and of the difference. */
     CYLCHAIN_INLINE BeamGradient<Real> forcesOf(const Vec& ofSum, const Vec& ofDifference) const {
-        const Vec scaled = ofDifference*scale;
+        const Real work = ofDifference.dot(unscaled);
+        const Vec scaled = ofDifference*scale+unscaled*(work*(2*SCALE_OF_DIFFERENCE));
         const Vec moment1 = ofSum-scaled, moment2 = ofSum+scaled;
-        const Vec apart = turn*(ofDifference.dot(unscaled)*Scalar(1.0/20));
+        const Vec apart = turn*(work*(2*SCALE_OF_TURN+turnSquare*(4*SCALE_OF_SQUARE)));
         const Real along1 = factor1.slope*moment1.dot(normal1), along2 = factor2.slope*moment2.dot(normal2);
         const Vec force1 = crossProduct(middle, moment1)*factor1.value+middle*along1;
         const Vec force2 = crossProduct(moment2, middle)*factor2.value+middle*along2;
@@ -102,8 +106,8 @@ private:
         const Vec bend1 = normal1*factor1.value, bend2 = normal2*factor2.value;
         sum = bend1+bend2;
         turnSquare = turn.dot(turn);
-        scale = 1+turnSquare*Scalar(1.0/40);
         unscaled = bend2-bend1;
+        scale = 1+turnSquare*(SCALE_OF_TURN+turnSquare*SCALE_OF_SQUARE)+unscaled.dot(unscaled)*SCALE_OF_DIFFERENCE;
         difference = unscaled*scale;
         middleStrain = lengthOfMiddle-1-second.dot(second)*Scalar(1.0/40)+turnSquare*turnSquare*Scalar(1.0/480);
     }

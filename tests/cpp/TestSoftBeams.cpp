@@ -29,7 +29,7 @@ static Averages integrated(int elements, double rigidity, bool planar) {
                 const double bends = alpha*alpha+beta*beta, both = 2*alpha*beta*c;
                 const double cosine = cos(alpha)*cos(beta)-sin(alpha)*sin(beta)*c;
                 const double t = 2+2*cosine, v = 2-2*cosine, direction = cos(alpha)+cos(beta);
-                const double energy = rigidity/2*(bends+both+4.0/3*(bends-both)*pow(1+v/40, 2));
+                const double energy = rigidity/2*(bends+both+4.0/3*(bends-both)*pow(1+v/40+v*v/560+(bends-both)/84, 2));
                 // The length u of the middle vector has no strain: u-1-|t1+t2-2u|^2/40+|t2-t1|^4/480 = 0.
                 const double slope = 1+0.1*direction, root = sqrt(slope*slope-0.4*(1+t/40-v*v/480));
                 const double u = 5*(slope-root);
