@@ -19,7 +19,7 @@ import numpy as np
 
 from ..errors import EquilibrationWarning, InputError
 from ..filaments.filament import NODE_NAME
-from ..units.quantities import DIMENSIONLESS, LENGTH, TIME, in_units_of, positive, whole_number
+from ..units.quantities import DIMENSIONLESS, LENGTH, TIME, in_units_of, positive, shown, whole_number
 from ..units.types import BoolArray, FloatArray, Indices, IntArray, Scalar
 from .statistics import FEWEST_FRAMES_OF_DRIFT, SIGNIFICANT_DRIFT, drift, mean_with_error
 
@@ -329,7 +329,9 @@ def bending_mode_amplitudes(
     segments = directions.shape[1]
     numbers = np.atleast_1d(in_units_of(modes, DIMENSIONLESS, "modes"))
     if np.any(numbers != np.floor(numbers)) or np.any(numbers < 1) or np.any(numbers >= segments):
-        raise InputError(f"modes must be whole numbers from 1 to {segments - 1} for {segments} segments: {modes!r}.")
+        raise InputError(
+            f"modes must be whole numbers from 1 to {segments - 1} for {segments} segments, but are {shown(modes)}."
+        )
     if contour_length is None:
         contour_length = contour_lengths(trajectory, filament).mean()
     length = positive(contour_length, LENGTH, "contour_length")

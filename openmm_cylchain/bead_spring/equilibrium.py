@@ -7,7 +7,7 @@ Chains are open, with their short end bonds, and have any number of bonds N; the
 import numpy as np
 
 from ..errors import InputError
-from ..units.quantities import TEMPERATURE, positive, whole_number
+from ..units.quantities import TEMPERATURE, positive, shown, whole_number
 from ..units.types import FloatArray, Indices, Scalar
 from .bead_spring_type import BeadSpringType
 from .modes import mode_shapes
@@ -16,7 +16,7 @@ from .transfer_operator import TransferOperator, transfer_operator
 
 def _operator(bead_type, bonds, temperature, planar):
     if not isinstance(bead_type, BeadSpringType):
-        raise InputError(f"This is for a BeadSpringType, such as DSDNA_BASE_PAIRS, but not for {bead_type!r}.")
+        raise InputError(f"This is for a BeadSpringType, such as DSDNA_BASE_PAIRS, but not for {shown(bead_type)}.")
     bonds = whole_number(bonds, 1, "bonds")
     reduced = bead_type.reduced_temperature(positive(temperature, TEMPERATURE, "temperature"))
     return transfer_operator(bead_type.nu, reduced, bonds, 2 if planar else 3)
@@ -86,7 +86,7 @@ def bead_spring_mean_square_distances_from_center(
     count = operator.bonds + 1
     chosen = np.arange(count) if beads is None else np.atleast_1d(np.asarray(beads))
     if np.any((chosen < 0) | (chosen >= count)):
-        raise InputError(f"beads must be from 0 to {count - 1}, but are {beads!r}.")
+        raise InputError(f"beads must be from 0 to {count - 1}, but are {shown(beads)}.")
     bond = np.arange(1, count)[:, None]
     weights = (bond <= chosen).astype(float) - (count - bond) / count
     return bead_type.natural_length**2 * _mean_squares(operator, weights)

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.fft import dct, idct
 
 from ..errors import InputError
-from ..units.quantities import LENGTH, TIME, in_units_of, positive, thermal_energy, whole_number
+from ..units.quantities import LENGTH, TIME, in_units_of, positive, shown, thermal_energy, whole_number
 from ..units.types import FloatArray, Indices, Scalar, Vectors
 from .bead_spring_type import BeadSpringType
 
@@ -40,7 +40,7 @@ def mode_shapes(bonds: int, modes: int | Indices) -> FloatArray:
     """phi_np of eq. (26): (beads, modes), for modes p from 0 to N."""
     numbers = np.atleast_1d(np.asarray(modes))
     if np.any((numbers < 0) | (numbers > bonds)):
-        raise InputError(f"modes must be from 0 to the number of bonds, {bonds}, but are {modes!r}.")
+        raise InputError(f"modes must be from 0 to the number of bonds, {bonds}, but are {shown(modes)}.")
     shapes = np.cos(np.pi / (bonds + 1) * np.outer(np.arange(bonds + 1) + 0.5, numbers))
     return np.where(numbers == 0, np.sqrt(0.5), 1.0) * np.sqrt(2.0 / (bonds + 1)) * shapes
 

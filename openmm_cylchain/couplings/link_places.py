@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..filaments.attachments import SAME_PLACE
 from ..filaments.segment_place import SegmentPlace
 from ..mechanics.geometry import to_nearest_images
-from ..units.quantities import LENGTH, vector, whole_number
+from ..units.quantities import LENGTH, shown, vector, whole_number
 from ..units.types import BoolArray, FloatArray, IntArray
 
 NOWHERE = -1
@@ -190,7 +190,7 @@ def as_places(pairs: Any) -> LinkPlaces:
         return LinkPlaces(particles)
     rows = _as_rows(pairs)
     if rows is None:
-        raise InputError(f"pairs must have the shape (n, 2), but are {pairs!r}.")
+        raise InputError(f"pairs must have the shape (n, 2), but are {shown(pairs)}.")
     columns: dict[str, Any] = {name: [] for name in PLACE_COLUMNS}
     for first, second in rows:
         ends = [_as_place(first), _as_place(second)]

@@ -10,7 +10,7 @@ from ..errors import InputError
 from ..filaments.collection import FilamentCollection
 from ..output.files import TextFile
 from ..output.reporters import FilamentsReporter
-from ..units.quantities import FORCE, LENGTH, TIME, VELOCITY, in_units_of, unit_vector, whole_number
+from ..units.quantities import FORCE, LENGTH, TIME, VELOCITY, in_units_of, shown, unit_vector, whole_number
 from ..units.types import FloatArray, Indices, Numbers, Scalar, Vector, Vectors
 
 CONSTANT_FORCE_NAME = "ConstantForce"
@@ -81,7 +81,7 @@ def is_constant_force(force: openmm.Force) -> bool:
 
 def _refuse_unless_constant(force):
     if not is_constant_force(force):
-        raise InputError(f"force must be one that constant_force or constant_tension has made, but is {force!r}.")
+        raise InputError(f"force must be one that constant_force or constant_tension has made, but is {shown(force)}.")
 
 
 def _as_forces(forces, count):

@@ -16,7 +16,7 @@ import openmm
 from ..engine_choice import available_engines, choose_engine
 from ..errors import InputError
 from ..filaments.collection import FilamentCollection
-from ..units.quantities import LENGTH, STIFFNESS, in_units_of, positive, unit_vector, vector
+from ..units.quantities import LENGTH, STIFFNESS, in_units_of, positive, shown, unit_vector, vector
 from ..units.types import FloatArray, FloatOrArray, Indices, Numbers, Scalar, Vector
 from .contacts import outside_particles
 
@@ -364,7 +364,7 @@ def wall_force(shape: Shape, stiffness: Scalar, particles: Indices) -> openmm.Cu
         For a shape that is none, or a stiffness that is not positive.
     """
     if not isinstance(shape, Shape):
-        raise InputError(f"shape must be a Shape such as Sphere, but is {shape!r}.")
+        raise InputError(f"shape must be a Shape such as Sphere, but is {shown(shape)}.")
     stiffness = positive(stiffness, STIFFNESS, "stiffness")
     square_depth, *definitions = shape.expression.split(";", 1)
     expression = ";".join([f"{_number(0.5 * stiffness)}*({square_depth})", *definitions])
@@ -422,7 +422,7 @@ def filament_wall_force(
     from .. import plugin
 
     if not isinstance(shape, Shape):
-        raise InputError(f"shape must be a Shape such as Sphere, but is {shape!r}.")
+        raise InputError(f"shape must be a Shape such as Sphere, but is {shown(shape)}.")
     stiffness = positive(stiffness, STIFFNESS, "stiffness")
     radii = _radii(radius, len(filaments), "radius", shape)
     spheres = outside_particles(filaments, system, particles)

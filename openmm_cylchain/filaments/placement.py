@@ -9,6 +9,7 @@ from ..units.types import FloatArray, Indices
 from .chain_type import ChainType
 
 _PLANE_TOLERANCE = 1e-9  # Of a segment's length: rounding of positions that were computed.
+_FARTHEST = 1e12
 
 
 def named_nodes(nodes: int | Indices, count: int, label: str) -> tuple[int, ...]:
@@ -66,6 +67,11 @@ def planar_direction(direction: FloatArray, label: str) -> FloatArray:
 
 def check_shape(filament_type: ChainType, positions: FloatArray, label: str, closed: bool = False) -> None:
     """Raise InputError for node positions (n, 3) in nm in which a force is not defined."""
+    if np.max(np.abs(positions)) > _FARTHEST:
+        raise InputError(
+            f"{label}: its nodes are up to {np.max(np.abs(positions)):.3g} nm from the origin. Beyond {_FARTHEST:g} nm "
+            "numbers are too coarse for its forces: move it closer."
+        )
     vectors = segment_vectors(positions, closed)
     lengths = np.linalg.norm(vectors, axis=1)
     if np.any(lengths == 0.0):

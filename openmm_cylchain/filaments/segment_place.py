@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from ..errors import InputError
-from ..units.quantities import whole_number
+from ..units.quantities import shown, whole_number
 
 
 @dataclass(frozen=True)
@@ -40,5 +40,5 @@ class SegmentPlace:
         except (TypeError, ValueError):
             fraction = math.nan
         if not 0.0 <= fraction <= 1.0:
-            raise InputError(f"SegmentPlace: fraction must be a number between 0 and 1, but is {self.fraction!r}.")
+            raise InputError(f"SegmentPlace: fraction must be a number between 0 and 1, but is {shown(self.fraction)}.")
         object.__setattr__(self, "fraction", fraction)

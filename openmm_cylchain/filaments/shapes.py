@@ -4,7 +4,16 @@ import numpy as np
 
 from ..errors import InputError
 from ..mechanics.geometry import regular_polygon
-from ..units.quantities import FORCE, LENGTH, finite_number, in_units_of, unit_vector, vector, whole_number
+from ..units.quantities import (
+    FORCE,
+    LENGTH,
+    finite_number,
+    in_units_of,
+    shown,
+    unit_vector,
+    vector,
+    whole_number,
+)
 from ..units.types import FloatArray, Indices, Scalar, Vector, Vectors
 from .chain_type import ChainType
 from .filament import Filament
@@ -112,5 +121,5 @@ def new_filament(
 
 def _flag(value, name):
     if not isinstance(value, (bool, np.bool_)):
-        raise InputError(f"{name} must be True or False, but is {value!r}.")
+        raise InputError(f"{name} must be True or False, but is {shown(value)}.")
     return bool(value)

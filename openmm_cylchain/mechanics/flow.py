@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..errors import InputError
-from ..units.quantities import LENGTH, RATE, VELOCITY, finite_number, in_units_of, unit_vector, vector
+from ..units.quantities import LENGTH, RATE, VELOCITY, finite_number, in_units_of, shown, unit_vector, vector
 from ..units.types import FloatArray, Scalar, Vector, Vectors
 
 _REST = (0.0, 0.0, 0.0)
@@ -140,7 +140,7 @@ def as_flow(flow: Flow | None) -> Flow:
     if flow is None:
         return Flow()
     if not isinstance(flow, Flow):
-        raise InputError(f"flow must be a Flow, such as Flow.shear(rate), but is {flow!r}.")
+        raise InputError(f"flow must be a Flow, such as Flow.shear(rate), but is {shown(flow)}.")
     return flow
 
 

@@ -13,6 +13,7 @@ from ..couplings.crosslink_records import CrosslinkFile
 from ..couplings.crosslinks import Crosslinks
 from ..dynamics.precision import PRECISIONS
 from ..engines.description import describe_lengths, filament_label
+from ..engines.gpu_platforms import GPU_PLATFORMS, enable_platform
 from ..errors import InputError, InstabilityError
 from ..mechanics.broken_segment import find_broken_segment
 from ..output.linker_records import LinkerFile, measure_linkers
@@ -199,11 +200,18 @@ def check_step(configuration, seconds=20.0, say=lambda message: None):
 
 
 def _of_filaments(settings, engine):
-    # The precision if it is that of filaments. Others are of the platform, and so is any with the portable engine.
-    return settings.precision if engine == "compiled" and settings.precision in PRECISIONS else None
+    # The precision if it is that of filaments. Others are of the platform, and so is any with the portable engine, and
+    # on GPUs, where filaments are in double precision.
+    own = engine == "compiled" and settings.platform not in GPU_PLATFORMS
+    return settings.precision if own and settings.precision in PRECISIONS else None
 
 
 def _platform(settings, engine):
+    if engine == "compiled" and settings.platform in GPU_PLATFORMS:
+        try:
+            enable_platform(settings.platform)
+        except InputError as error:
+            raise InputError(f'[simulation] platform: {error} "Reference" always can.') from None
     names = [openmm.Platform.getPlatform(index).getName() for index in range(openmm.Platform.getNumPlatforms())]
     if settings.platform not in names:
         raise InputError(

@@ -49,6 +49,7 @@ from ..units.quantities import (
     in_units_of,
     non_negative,
     positive,
+    shown,
     vector,
     whole_number,
 )
@@ -1050,7 +1051,7 @@ class Filaments:
         if not isinstance(filament_type, ChainType):
             raise InputError(
                 f"Filament {len(self)}: filament_type must be a FilamentType, such as F_ACTIN, or a BeadSpringType, "
-                f"but is {filament_type!r}."
+                f"but is {shown(filament_type)}."
             )
         return f"Filament {len(self)} ({filament_type.name})"
 

@@ -9,7 +9,7 @@ from openmm import app
 
 from ..errors import InputError
 from ..filaments.filament import NODE_NAME, Filament
-from ..units.quantities import LENGTH, in_units_of, vector, whole_number
+from ..units.quantities import LENGTH, in_units_of, shown, vector, whole_number
 from ..units.types import BoxVectors, FloatArray, IntArray, Vectors
 
 
@@ -94,7 +94,7 @@ def set_box_vectors(system: openmm.System, box_vectors: BoxVectors) -> list[open
     except TypeError:
         edges = []
     if len(edges) != 3 or isinstance(box_vectors, str):
-        raise InputError(f"box_vectors must be three vectors of three lengths, but is {box_vectors!r}.")
+        raise InputError(f"box_vectors must be three vectors of three lengths, but is {shown(box_vectors)}.")
     vectors = [openmm.Vec3(*(float(x) for x in vector(edge, LENGTH, "box_vectors"))) for edge in edges]
     try:
         system.setDefaultPeriodicBoxVectors(*vectors)

@@ -6,7 +6,7 @@ from openmm import unit
 
 from ..errors import InputError
 from ..filaments.chain_type import ChainType
-from ..units.quantities import DIMENSIONLESS, TEMPERATURE, in_units_of, positive, thermal_energy
+from ..units.quantities import DIMENSIONLESS, TEMPERATURE, in_units_of, positive, shown, thermal_energy
 from ..units.types import FloatOrArray, Numbers, Scalar
 
 
@@ -36,5 +36,5 @@ def each_whole_number(value: npt.ArrayLike, minimum: int, name: str) -> FloatOrA
     """Whole numbers; raise InputError if one is none or below the minimum."""
     number = in_units_of(value, DIMENSIONLESS, name)
     if np.any(number != np.floor(number)) or np.any(np.asarray(number) < minimum):
-        raise InputError(f"{name} must be whole numbers of at least {minimum}, but is {value!r}.")
+        raise InputError(f"{name} must be whole numbers of at least {minimum}, but is {shown(value)}.")
     return number

@@ -1,6 +1,7 @@
 """Conversion of user input, with or without units, to plain numbers in OpenMM's units."""
 
 import math
+import reprlib
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,10 @@ MASS = unit.dalton
 MASS_PER_LENGTH = unit.dalton / unit.nanometer
 DIMENSIONLESS = unit.dimensionless
 
+_SHOWN_NUMBERS = 16
+_short = reprlib.Repr()
+_short.maxstring = _short.maxother = 160
+
 
 def in_units_of(value: Numbers, target: unit.Unit, name: str) -> FloatOrArray:
     """Return ``value`` as a float or float array in the unit ``target``.
@@ -54,11 +59,19 @@ def in_units_of(value: Numbers, target: unit.Unit, name: str) -> FloatOrArray:
     except ValueError:
         array = np.asarray(None)
     if array.dtype.kind not in "iuf" and array.size and value is not None:
-        raise InputError(f"{name} must be a number or an array of numbers, but is {value!r}.")
+        raise InputError(f"{name} must be a number or an array of numbers, but is {shown(value)}.")
     array = array.astype(float)
     if not np.all(np.isfinite(array)):
         raise InputError(f"{name} must be finite, but contains NaN or infinity.")
     return float(array) if array.ndim == 0 else array
+
+
+def shown(value: Any) -> str:
+    """What to say of a value in a message: itself on one line, if it is short; of an array its shape."""
+    shape, size = getattr(value, "shape", None), getattr(value, "size", 0)
+    if isinstance(shape, tuple) and isinstance(size, int) and size > _SHOWN_NUMBERS:
+        return f"an array of the shape {shape}"
+    return " ".join(_short.repr(value).split())
 
 
 def _converted(quantity, target, name):
@@ -99,7 +112,7 @@ def whole_number(value: Any, minimum: int, name: str) -> int:
     """Return ``value`` as an int; raise InputError unless it is a whole number of at least ``minimum``."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
         if not (isinstance(value, float) and math.isfinite(value) and value == int(value)):
-            raise InputError(f"{name} must be a whole number, but is {value!r}.")
+            raise InputError(f"{name} must be a whole number, but is {shown(value)}.")
     if value < minimum:
         raise InputError(f"{name} must be at least {minimum}, but is {value}.")
     return int(value)

@@ -4,6 +4,7 @@ import fcntl
 import re
 import shutil
 
+import MDAnalysis
 import mdtraj
 import numpy as np
 import pytest
@@ -117,6 +118,29 @@ def test_mdanalysis_has_times_bonds_and_radii(network):
     np.testing.assert_allclose(universe.atoms.positions, 10.0 * run.positions(4), rtol=1e-6)
     np.testing.assert_allclose(universe.dimensions, [4000.0, 4000.0, 5000.0, 90.0, 90.0, 90.0])
     np.testing.assert_allclose(universe.bonds.bonds(), 1000.0, atol=60.0)
+
+
+def test_radii_of_mdanalysis_are_those_of_each_filament(two_types):
+    run = analysis.load(two_types)
+    atoms = run.mdanalysis().atoms
+    assert len(atoms) == sum(len(own.nodes) for own in run.filaments)
+    for own in run.filaments:
+        np.testing.assert_allclose(atoms.radii[own.nodes], 5.0 * own.diameter)
+
+
+@pytest.mark.parametrize(("name", "kind"), [("topology.psf", "PSF"), ("topology.data", "DATA")])
+def test_mdanalysis_reads_the_files_as_they_are(two_types, network, name, kind):
+    for directory in (two_types, network):
+        run = analysis.load(directory)
+        universe = MDAnalysis.Universe(str(directory / name), str(directory / "trajectory.dcd"), topology_format=kind)
+        expected = [(node, node + 1) for own in run.filaments for node in own.nodes[:-1]]
+        assert sorted(map(tuple, np.sort(universe.bonds.indices, axis=1))) == expected
+        # The header of a DCD file has the time between frames in single precision.
+        np.testing.assert_allclose([frame.time for frame in universe.trajectory], run.times, rtol=1e-7)
+        universe.trajectory[-1]
+        np.testing.assert_allclose(universe.atoms.positions, 10.0 * run.positions(-1), rtol=1e-6)
+        if run.box is not None:
+            np.testing.assert_allclose(universe.dimensions[:3], 10.0 * np.diag(run.box))
 
 
 def test_linkers_of_frames(network):

@@ -9,6 +9,7 @@ from openmm_cylchain import DSDNA, DSDNA_BASE_PAIRS, F_ACTIN, MICROTUBULE, EndCo
 from openmm_cylchain.dynamics.recommended_step import recommended_time_step
 from openmm_cylchain.engine_choice import default_scheme
 from openmm_cylchain.runs.configuration import changed_keys, parse_configuration, read_configuration
+from openmm_cylchain.runs.run import create_simulation
 from support.repository import EXAMPLES
 
 SOLVENT = '[solvent]\ntemperature = "310 K"\nviscosity = "1.71 mPa*s"\n'
@@ -228,6 +229,15 @@ def test_file_is_named_in_messages(tmp_path):
         read_configuration(path)
     path.write_bytes((SOLVENT + FILAMENT + SIMULATION).replace("\n", "\r\n").encode())
     assert read_configuration(path) == parse()
+
+
+def test_platforms_for_gpus_say_why_not():
+    with pytest.raises(
+        InputError, match=r"\[simulation\] platform: Filaments cannot be computed on the platform HIP here"
+    ):
+        create_simulation(parse(simulation=SIMULATION + 'platform = "HIP"\n'))
+    with pytest.raises(InputError, match="platform must be one of those that OpenMM has loaded, .*'Vulkan'"):
+        create_simulation(parse(simulation=SIMULATION + 'platform = "Vulkan"\n'))
 
 
 def test_changes_are_named():

@@ -15,6 +15,7 @@ from openmm import app
 
 from openmm_cylchain import F_ACTIN, InputError
 from openmm_cylchain.cli import main
+from openmm_cylchain.engines.gpu_platforms import why_not_on
 from openmm_cylchain.runs.configuration import parse_configuration, read_configuration
 from openmm_cylchain.runs.run import create_filaments, run
 from openmm_cylchain.runs.run_directory import RunDirectory, read_energies
@@ -556,6 +557,22 @@ def test_version(capsys):
         main(["--version"])
     assert caught.value.code == 0
     assert capsys.readouterr().out.startswith("openmm-cylchain ")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(why_not_on("OpenCL") is not None, reason=f"OpenCL: {why_not_on('OpenCL')}")
+def test_a_file_turns_on_the_platform_that_it_names(tmp_path, unbroken):
+    """In a process of its own, because that lasts until it ends."""
+    config = configured(
+        tmp_path, SHORT.replace("[simulation]", '[simulation]\nplatform = "OpenCL"\nprecision = "double"')
+    )
+    code, _, errors = finish(start(config, tmp_path / "out"))
+    assert code == 0, errors
+    runs = [
+        mdtraj.load_dcd(str(path / "trajectory.dcd"), top=str(path / "topology.cif")).xyz
+        for path in (tmp_path / "out", unbroken)
+    ]
+    np.testing.assert_allclose(runs[0], runs[1], rtol=1e-5, atol=1e-3)
 
 
 def test_freely_jointed_and_single_segments_have_a_summary(tmp_path):

@@ -38,6 +38,28 @@ def test_numbers_of_segments_that_no_computer_holds(filaments):
             filaments.add_ring(F_ACTIN, segments, (0, 0, 0))
 
 
+def test_arguments_are_shown_on_one_short_line(filaments):
+    with pytest.raises(InputError, match=re.escape("must be a whole number, but is an array of the shape (1000,).")):
+        filaments.add_straight(F_ACTIN, np.zeros(1000), (0, 0, 0), (1, 0, 0))
+    for wrong in (["x"] * 1000, "x" * 1000, {"a": np.eye(9)}, object()):
+        with pytest.raises(InputError) as caught:
+            filaments.add_straight(F_ACTIN, wrong, (0, 0, 0), (1, 0, 0))
+        assert len(str(caught.value)) < 250 and "\n" not in str(caught.value)
+    with pytest.raises(InputError, match=r"but is \[1, 2\]\."):
+        filaments.add_straight(F_ACTIN, [1, 2], (0, 0, 0), (1, 0, 0))
+
+
+@pytest.mark.parametrize("planar", [False, True])
+def test_positions_beyond_all_measure(filaments, planar):
+    nodes = np.array([[0.0, 0, 0], [360, 0, 0], [720, 0, 0]])
+    for far in (1e18, 1e200):
+        with pytest.raises(InputError, match=r"up to 1e\+(18|200) nm from the origin. Beyond 1e\+12 nm"):
+            filaments.add_nodes(F_ACTIN, nodes + [0, 0, far], planar=planar)
+    for wrong in (-np.inf, np.nan):
+        with pytest.raises(InputError, match="positions must be finite"):
+            filaments.add_nodes(F_ACTIN, nodes + [0, 0, wrong], planar=planar)
+
+
 @pytest.mark.parametrize("box", [5, "box", [1, 2], np.eye(3)[:2], [5.0, 5.0, 5.0], np.nan * np.eye(3)])
 def test_boxes_that_are_none(filaments, box):
     filaments.add_straight(F_ACTIN, 2, (0, 0, 0), (1, 0, 0))
