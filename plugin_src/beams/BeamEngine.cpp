@@ -12,8 +12,6 @@
 using namespace cylchain;
 using namespace std;
 
-/** The longest element over the persistence length: an element bends by up to a turn, and not by more. */
-static const double LONGEST_ELEMENT = 2;
 /** Chains share a pack if at most a fifth of a lane is filled up. */
 static const double LARGEST_FILLING = 0.2;
 

@@ -15,6 +15,8 @@ namespace cylchain {
  */
 class BeamEngine {
 public:
+    /** The longest element that a step takes, over its persistence length. */
+    static constexpr double LONGEST_ELEMENT = 1;
     /**
      * @param chains      the chains; no particle may belong to two of them
      * @param firstNoise  the number by which the noise of the first chain is known, and those that follow
@@ -33,7 +35,7 @@ public:
     /**
      * Compute the displacements of a pack in a step of scheme "implicit", the only one there is for beams, without
      * flow. The forces are those from outside the chains. A chain whose equations are not solved takes the step in
-     * parts. Elements that are longer than two persistence lengths are refused.
+     * parts. Elements that are longer than a persistence length are refused.
      *
      * @return the first instability found, with the number of the chain, or chain = -1 if there is none
      */

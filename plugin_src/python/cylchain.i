@@ -232,7 +232,8 @@ static bool takeNumbers(PyObject* object, std::vector<T>& values) {
         double& extensionalFriction, double& length, double& stiffness, double& stretching, double& bending,
         double& propulsion, double& work, double& bindingRate, double& reach, double& unbindingRate,
         double& strainShare, double& unbindingForce, double& catchRate, double& catchForce, double& speed,
-        double& stallForce, double& volume, double& concentration};
+        double& stallForce, double& volume, double& concentration, double& elementLength, double& stretchingModulus,
+        double& bendingRigidity, double& shortening};
 %apply bool& OUTPUT {bool& walksBackward, bool& holdsAtEnds, bool& sameChain};
 %apply long long& OUTPUT {long long& bindings, long long& unbindings};
 
@@ -294,6 +295,12 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %pythonappend OpenMM::CylinderChainForce::getTetherParameters(int, int&, int&, Vec3&, double&) const %{
     val[2] = unit.Quantity(val[2], _LENGTH)
     val[3] = unit.Quantity(val[3], _STIFFNESS)
+%}
+%pythonappend OpenMM::CylinderChainForce::getBeamChainParameters(int, double&, double&, double&, double&, double&,
+        double&) const %{
+    friction = _FRICTION/_LENGTH
+    units = (_LENGTH, _FORCE, _ENERGY*_LENGTH, unit.dimensionless, friction, friction)
+    val = [unit.Quantity(v, u) for v, u in zip(val, units)]
 %}
 %pythonappend OpenMM::CylinderChainForce::computeEnergies(Context&, double&, double&) const %{
     val = [unit.Quantity(v, _ENERGY) for v in val]
@@ -414,6 +421,7 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %ignore OpenMM::CylinderChainForce::SegmentInfo;
 %ignore OpenMM::CylinderChainForce::ChainInfo;
 %ignore OpenMM::CylinderChainForce::TetherInfo;
+%ignore OpenMM::CylinderChainForce::BeamInfo;
 %ignore OpenMM::CylinderChainContactForce::ChainInfo;
 %ignore OpenMM::CylinderChainContactForce::SphereInfo;
 %ignore OpenMM::CylinderChainContactForce::ExclusionInfo;

@@ -467,7 +467,7 @@ static void testFailures() {
     wrong.bendingRigidity = 0.4;
     const BeamEngine soft({wrong});
     check(isRefused([&] {soft.step(0, x.data(), f.data(), NULL, settings, moves.data());}),
-            "elements longer than two persistence lengths");
+            "elements longer than a persistence length");
     settings.scheme = Scheme::Midpoint;
     check(isRefused([&] {engine.step(0, x.data(), f.data(), NULL, settings, moves.data());}), "an explicit scheme");
     settings.scheme = Scheme::Implicit;

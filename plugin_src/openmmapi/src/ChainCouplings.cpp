@@ -63,6 +63,12 @@ ChainCouplings::ChainCouplings(ContextImpl& context, const CylinderChainDescript
     }
 }
 
+void ChainCouplings::refuseAll(const string& what) const {
+    if (!links.empty() || !linkers.empty() || !walls.empty() || !contacts.empty())
+        throw OpenMMException("CylinderChainIntegrator: A System with "+what+" cannot have links, contacts, walls or "
+                "linkers of this plugin as yet: take segments, or remove them");
+}
+
 void ChainCouplings::refuseNarrowBox(const CylinderChainDescription& chains) const {
     double longest = 0;
     for (const Chain& chain : chains.getChains())

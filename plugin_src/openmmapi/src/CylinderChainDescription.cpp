@@ -62,6 +62,15 @@ static void copyTethers(const CylinderChainForce& force, vector<cylchain::Chain>
     }
 }
 
+static cylchain::BeamChain describeBeam(const CylinderChainForce& force, int index) {
+    cylchain::BeamChain beam;
+    beam.particles = force.getBeamChainParticles(index);
+    force.getBeamChainParameters(index, beam.elementLength, beam.stretchingModulus, beam.bendingRigidity,
+            beam.shortening, beam.parallelFriction, beam.perpendicularFriction);
+    beam.planar = force.isBeamChainPlanar(index);
+    return beam;
+}
+
 CylinderChainDescription::CylinderChainDescription(const System& system, const CylinderChainForce& force) :
         forceGroup(force.getForceGroup()), periodic(force.usesPeriodicBoundaryConditions()) {
     for (int i = 0; i < force.getNumChains(); i++) {
@@ -71,12 +80,18 @@ CylinderChainDescription::CylinderChainDescription(const System& system, const C
         copyParameters(force, i, chain);
         chains.push_back(chain);
     }
+    for (int i = 0; i < force.getNumBeamChains(); i++) {
+        cylchain::BeamChain beam = describeBeam(force, i);
+        for (int particle : beam.particles)
+            beam.fixed.push_back(system.getParticleMass(particle) == 0.0);
+        beams.push_back(beam);
+    }
     copyTethers(force, chains);
     lookForModes();
 }
 
 void CylinderChainDescription::update(const CylinderChainForce& force) {
-    if (force.getNumChains() != (int) chains.size())
+    if (force.getNumChains() != (int) chains.size() || force.getNumBeamChains() != (int) beams.size())
         throw OpenMMException("updateParametersInContext: The number of chains has changed");
     for (int i = 0; i < force.getNumChains(); i++) {
         const cylchain::Chain present = describeTopology(force, i);
@@ -85,6 +100,13 @@ void CylinderChainDescription::update(const CylinderChainForce& force) {
         if (present.bending != chains[i].bending || present.stretching != chains[i].stretching)
             throw OpenMMException("updateParametersInContext: The models of a chain have changed");
         copyParameters(force, i, chains[i]);
+    }
+    for (int i = 0; i < force.getNumBeamChains(); i++) {
+        cylchain::BeamChain beam = describeBeam(force, i);
+        if (beam.particles != beams[i].particles)
+            throw OpenMMException("updateParametersInContext: The particles of a chain have changed");
+        beam.fixed = beams[i].fixed;
+        beams[i] = beam;
     }
     copyTethers(force, chains);
     lookForModes();

@@ -26,6 +26,16 @@ static void checkStiffness(double stiffness) {
         throw OpenMMException("CylinderChainForce: The stiffness of a joint cannot be negative and must be finite");
 }
 
+static void refuseParticles(const vector<int>& particles) {
+    set<int> distinct;
+    for (int particle : particles) {
+        if (particle < 0)
+            throw OpenMMException("CylinderChainForce: Illegal particle index: "+to_string(particle));
+        if (!distinct.insert(particle).second)
+            throw OpenMMException("CylinderChainForce: Particle "+to_string(particle)+" appears twice in a chain");
+    }
+}
+
 static string twoTethers(int chain, int node) {
     return "CylinderChainForce: Node "+to_string(node)+" of chain "+to_string(chain)+" cannot have two tethers";
 }
@@ -49,13 +59,7 @@ int CylinderChainForce::addChain(const vector<int>& particles, BendingModel bend
         throw OpenMMException("CylinderChainForce: A chain must have at least two particles");
     if (closed && particles.size() < 4)
         throw OpenMMException("CylinderChainForce: A closed chain must have at least four particles");
-    set<int> distinct;
-    for (int particle : particles) {
-        if (particle < 0)
-            throw OpenMMException("CylinderChainForce: Illegal particle index: "+to_string(particle));
-        if (!distinct.insert(particle).second)
-            throw OpenMMException("CylinderChainForce: Particle "+to_string(particle)+" appears twice in a chain");
-    }
+    refuseParticles(particles);
     if (!cylchain::isEntry<cylchain::BendingModel>(bendingModel))
         throw OpenMMException("CylinderChainForce: Illegal bending model: "+to_string((int) bendingModel));
     if (!cylchain::isEntry<cylchain::StretchingModel>(stretchingModel))
@@ -82,6 +86,66 @@ int CylinderChainForce::addChain(const vector<int>& particles, BendingModel bend
         throw;
     }
     return index;
+}
+
+int CylinderChainForce::addBeamChain(const vector<int>& particles, double elementLength, double stretchingModulus,
+        double bendingRigidity, double shortening, double parallelFriction, double perpendicularFriction,
+        bool planar) {
+    if (particles.size() < 4 || particles.size()%2 != 0)
+        throw OpenMMException("CylinderChainForce: A chain of beam elements must have two particles for each of at "
+                "least two nodes");
+    refuseParticles(particles);
+    beams.push_back({particles, 0, 0, 0, 0, 0, 0, planar});
+    const int index = beams.size()-1;
+    try {
+        setBeamChainParameters(index, elementLength, stretchingModulus, bendingRigidity, shortening, parallelFriction,
+                perpendicularFriction);
+    }
+    catch (...) {
+        beams.pop_back();
+        throw;
+    }
+    return index;
+}
+
+const vector<int>& CylinderChainForce::getBeamChainParticles(int chain) const {
+    ASSERT_VALID_INDEX(chain, beams);
+    return beams[chain].particles;
+}
+
+bool CylinderChainForce::isBeamChainPlanar(int chain) const {
+    ASSERT_VALID_INDEX(chain, beams);
+    return beams[chain].planar;
+}
+
+void CylinderChainForce::getBeamChainParameters(int chain, double& elementLength, double& stretchingModulus,
+        double& bendingRigidity, double& shortening, double& parallelFriction, double& perpendicularFriction) const {
+    ASSERT_VALID_INDEX(chain, beams);
+    const BeamInfo& beam = beams[chain];
+    elementLength = beam.elementLength;
+    stretchingModulus = beam.stretchingModulus;
+    bendingRigidity = beam.bendingRigidity;
+    shortening = beam.shortening;
+    parallelFriction = beam.parallelFriction;
+    perpendicularFriction = beam.perpendicularFriction;
+}
+
+void CylinderChainForce::setBeamChainParameters(int chain, double elementLength, double stretchingModulus,
+        double bendingRigidity, double shortening, double parallelFriction, double perpendicularFriction) {
+    ASSERT_VALID_INDEX(chain, beams);
+    checkPositive(elementLength, "The length of an element");
+    checkPositive(stretchingModulus, "The stretching modulus of a chain of beam elements");
+    checkPositive(bendingRigidity, "The bending rigidity of a chain of beam elements");
+    checkNotNegative(shortening, "The shortening of an element");
+    checkPositive(parallelFriction, "The friction along beam elements");
+    checkPositive(perpendicularFriction, "The friction across beam elements");
+    BeamInfo& beam = beams[chain];
+    beam.elementLength = elementLength;
+    beam.stretchingModulus = stretchingModulus;
+    beam.bendingRigidity = bendingRigidity;
+    beam.shortening = shortening;
+    beam.parallelFriction = parallelFriction;
+    beam.perpendicularFriction = perpendicularFriction;
 }
 
 const CylinderChainForce::ChainInfo& CylinderChainForce::getChain(int chain) const {

@@ -87,9 +87,11 @@ void CylinderChainIntegrator::checkSystem(const System& system, const CylinderCh
     }
     const CylinderChainForce& force = chains.getOwner();
     vector<bool> isNode(system.getNumParticles(), false);
-    for (int chain = 0; chain < force.getNumChains(); chain++) {
+    const int numChains = force.getNumChains();
+    for (int chain = 0; chain < numChains+force.getNumBeamChains(); chain++) {
         bool mobile = false;
-        for (int particle : force.getChainParticles(chain)) {
+        for (int particle : chain < numChains ? force.getChainParticles(chain) :
+                force.getBeamChainParticles(chain-numChains)) {
             if (system.isVirtualSite(particle))
                 throw OpenMMException("Particle "+to_string(particle)+" is a node of chain "+to_string(chain)+
                         " and cannot be a virtual site");

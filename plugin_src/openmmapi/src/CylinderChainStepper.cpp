@@ -1,4 +1,5 @@
 #include "openmm/internal/CylinderChainStepper.h"
+#include "beams/BeamEngine.h"
 #include "couplings/Links.h"
 #include "mechanics/BrokenSegment.h"
 #include "mechanics/PeriodicBox.h"
@@ -30,6 +31,10 @@ static vector<int> findMobileParticles(const CylinderChainDescription& chains, c
         for (size_t node = 0; node < chain.nodes.size(); node++)
             if (!chain.fixed[node])
                 mobile.push_back(chain.nodes[node]);
+    for (const BeamChain& beam : chains.getBeams())
+        for (size_t i = 0; i < beam.particles.size(); i++)
+            if (!beam.fixed[i])
+                mobile.push_back(beam.particles[i]);
     sort(mobile.begin(), mobile.end());
     return mobile;
 }
@@ -43,6 +48,8 @@ CylinderChainStepper::CylinderChainStepper(ContextImpl& context, const CylinderC
     getKernel().refuseScheme(static_cast<Scheme>(integrator.getScheme()));
     if (isImplicit(static_cast<Scheme>(integrator.getScheme())))
         couplings.refuseNarrowBox(chains);
+    if (!chains.getBeams().empty())
+        couplings.refuseAll("chains of beam elements");
     explicitWork.initialize(findMobileParticles(chains, others));
 }
 
@@ -98,18 +105,60 @@ StepSettings CylinderChainStepper::describeStep(uint64_t seed, int level, uint64
     if (settings.scheme == Scheme::Modes)
         chains.requireModes();
     settings.kT = BOLTZ*integrator.getTemperature();
+    refuseBeams(settings.scheme, settings.kT);
     settings.stepSize = integrator.getStepSize();
     settings.seed = seed;
     settings.level = level;
     settings.step = step;
     settings.flow = describeFlow();
     settings.precision = static_cast<Precision>(integrator.getPrecision());
+    if (settings.flow.present && !chains.getBeams().empty())
+        throw OpenMMException("CylinderChainIntegrator: Chains of beam elements are for a solvent at rest: take "
+                "segments, or no flow");
     return settings;
+}
+
+void CylinderChainStepper::refuseBeams(Scheme scheme, double kT) const {
+    if (!chains.getBeams().empty() && scheme != Scheme::Implicit)
+        throw OpenMMException("CylinderChainIntegrator: Chains of beam elements are for scheme Implicit alone, with "
+                "their force group among the integration force groups");
+    for (size_t i = 0; i < chains.getBeams().size(); i++) {
+        const double lengths = kT*chains.getBeams()[i].elementLength/chains.getBeams()[i].bendingRigidity;
+        if (lengths > BeamEngine::LONGEST_ELEMENT) {
+            stringstream message;
+            message << "CylinderChainIntegrator: The elements of beam chain " << i << " are " << lengths <<
+                    " persistence lengths long, and must not be longer than " << BeamEngine::LONGEST_ELEMENT <<
+                    ": divide it into more elements";
+            throw OpenMMException(message.str());
+        }
+    }
+}
+
+void CylinderChainStepper::refuseTornBeams() const {
+    const vector<Vec3> positions = getPositions();
+    double box[9];
+    getBox(box);
+    const double half = 0.5*min({box[0], box[4], box[8]});
+    for (size_t chain = 0; chain < chains.getBeams().size(); chain++) {
+        const BeamChain& beam = chains.getBeams()[chain];
+        for (size_t i = 1; i < beam.particles.size(); i++) {
+            const Vec3 between = positions[beam.particles[i]]-positions[beam.particles[i-1]];
+            if (norm(between) <= max(half, 2*beam.elementLength))
+                continue;
+            double nearest[] = {between[0], between[1], between[2]};
+            takeToNearestImage(nearest, box);
+            if (norm(Vec3(nearest[0], nearest[1], nearest[2])) < 0.999*norm(between))
+                throw OpenMMException("Beam chain "+to_string(chain)+" is torn between its particles "+
+                        to_string(i-1)+" and "+to_string(i)+": positions were wrapped into the periodic box particle "
+                        "by particle. Make chains whole before setting them");
+        }
+    }
 }
 
 void CylinderChainStepper::refuseTornChains() const {
     if (!periodic || chains.usesPeriodicBoundaryConditions())
         return;
+    refuseTornBeams();
     const vector<Vec3> positions = getPositions();
     double box[9];
     getBox(box);
@@ -196,6 +245,10 @@ void CylinderChainStepper::step(uint64_t seed, int level, uint64_t step, bool fo
             getKernel().displaceCoupledChains(context, settings, coupled);
     if (found.chain != -1 && found.coupling.kind != BrokenCoupling::None && areForcesFinite())
         reportCoupling(found.coupling, coupled, settings);
+    if (found.chain >= (int) chains.getChains().size() && coupled.empty())
+        throw OpenMMException("Beam chain "+to_string(found.chain-chains.getChains().size())+" has blown up in step "+
+                to_string(settings.step+1)+": its equations cannot be solved. Positions are those before this step. "
+                "Use a smaller time step, or look for excessive forces");
     if (found.chain >= (int) chains.getChains().size())
         reportParticle(coupled.particles[found.chain-chains.getChains().size()].particle, settings);
     if (found.chain != -1)

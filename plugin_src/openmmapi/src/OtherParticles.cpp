@@ -10,6 +10,9 @@ OtherParticles::OtherParticles(const System& system, const CylinderChainIntegrat
     for (const cylchain::Chain& chain : chains.getChains())
         for (int node : chain.nodes)
             isNode[node] = true;
+    for (const cylchain::BeamChain& beam : chains.getBeams())
+        for (int particle : beam.particles)
+            isNode[particle] = true;
     masses.resize(numParticles);
     for (int i = 0; i < numParticles; i++) {
         masses[i] = system.getParticleMass(i);

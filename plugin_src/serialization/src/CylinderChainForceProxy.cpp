@@ -10,9 +10,34 @@ using namespace std;
 CylinderChainForceProxy::CylinderChainForceProxy() : SerializationProxy("CylinderChainForce") {
 }
 
+static void serializeBeams(const CylinderChainForce& force, SerializationNode& node) {
+    for (int i = 0; i < force.getNumBeamChains(); i++) {
+        double length, modulus, rigidity, shortening, parallel, perpendicular;
+        force.getBeamChainParameters(i, length, modulus, rigidity, shortening, parallel, perpendicular);
+        SerializationNode& beam = node.createChildNode("Beam");
+        beam.setDoubleProperty("elementLength", length).setDoubleProperty("stretchingModulus", modulus)
+                .setDoubleProperty("bendingRigidity", rigidity).setDoubleProperty("shortening", shortening)
+                .setDoubleProperty("parallel", parallel).setDoubleProperty("perpendicular", perpendicular)
+                .setBoolProperty("planar", force.isBeamChainPlanar(i));
+        SerializationNode& particles = beam.createChildNode("Particles");
+        for (int particle : force.getBeamChainParticles(i))
+            particles.createChildNode("Particle").setIntProperty("index", particle);
+    }
+}
+
+static void addBeam(CylinderChainForce& force, const SerializationNode& node) {
+    vector<int> particles;
+    for (auto& particle : node.getChildNode("Particles").getChildren())
+        particles.push_back(particle.getIntProperty("index"));
+    force.addBeamChain(particles, node.getDoubleProperty("elementLength"),
+            node.getDoubleProperty("stretchingModulus"), node.getDoubleProperty("bendingRigidity"),
+            node.getDoubleProperty("shortening"), node.getDoubleProperty("parallel"),
+            node.getDoubleProperty("perpendicular"), node.getBoolProperty("planar"));
+}
+
 void CylinderChainForceProxy::serialize(const void* object, SerializationNode& node) const {
-    node.setIntProperty("version", 4);
     const CylinderChainForce& force = *reinterpret_cast<const CylinderChainForce*>(object);
+    node.setIntProperty("version", force.getNumBeamChains() > 0 ? 5 : 4);
     node.setIntProperty("forceGroup", force.getForceGroup());
     node.setStringProperty("name", force.getName());
     node.setBoolProperty("usesPeriodic", force.usesPeriodicBoundaryConditions());
@@ -48,6 +73,10 @@ void CylinderChainForceProxy::serialize(const void* object, SerializationNode& n
             joints.createChildNode("Joint").setDoubleProperty("stiffness", stiffness);
         }
     }
+    // Versions before 5 have none, and are what is written of a Force without any.
+
+    if (force.getNumBeamChains() > 0)
+        serializeBeams(force, node.createChildNode("Beams"));
     SerializationNode& tethers = node.createChildNode("Tethers");
     for (int i = 0; i < force.getNumTethers(); i++) {
         int chain, tethered;
@@ -108,7 +137,7 @@ static void addChain(CylinderChainForce& force, const SerializationNode& node, i
 
 void* CylinderChainForceProxy::deserialize(const SerializationNode& node) const {
     const int version = node.getIntProperty("version");
-    if (version < 1 || version > 4)
+    if (version < 1 || version > 5)
         throw OpenMMException("Unsupported version number");
     unique_ptr<CylinderChainForce> force(new CylinderChainForce());
     force->setForceGroup(node.getIntProperty("forceGroup"));
@@ -121,5 +150,8 @@ void* CylinderChainForceProxy::deserialize(const SerializationNode& node) const 
             force->addTether(tether.getIntProperty("chain"), tether.getIntProperty("node"),
                     Vec3(tether.getDoubleProperty("x"), tether.getDoubleProperty("y"), tether.getDoubleProperty("z")),
                     tether.getDoubleProperty("stiffness"));
+    if (version > 4)
+        for (auto& beam : node.getChildNode("Beams").getChildren())
+            addBeam(*force, beam);
     return force.release();
 }

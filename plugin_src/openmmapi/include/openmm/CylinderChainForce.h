@@ -221,6 +221,49 @@ public:
      */
     void setJointParameters(int chain, int joint, double stiffness);
     /**
+     * Add a chain of beam elements, which bend inside; beams/BeamChain.h says what they are.  Only scheme "implicit"
+     * moves them, on the Reference and CPU platforms, in a solvent at rest, and in a System that has neither links,
+     * contacts, walls nor linkers of this plugin.  Any other Force may act on their particles.
+     *
+     * @param particles             two for each node, its position and its control point, for at least two nodes, and
+     *                              none of them twice
+     * @param elementLength         the length h of each element, measured in nm
+     * @param stretchingModulus     EA, measured in kJ/mol/nm
+     * @param bendingRigidity       EI, measured in kJ nm/mol
+     * @param shortening            the part by which a chord is shorter, because bends inside of an element fluctuate
+     * @param parallelFriction      the friction per length against motion along the curve, measured in kJ ps/mol/nm^3
+     * @param perpendicularFriction the friction per length against motion across it
+     * @param planar                whether particles keep their z
+     * @return the index of the chain among those of beam elements
+     */
+    int addBeamChain(const std::vector<int>& particles, double elementLength, double stretchingModulus,
+            double bendingRigidity, double shortening, double parallelFriction, double perpendicularFriction,
+            bool planar = false);
+    /**
+     * Get the number of chains of beam elements.
+     */
+    int getNumBeamChains() const {
+        return beams.size();
+    }
+    /**
+     * Get the particles of a chain of beam elements.
+     */
+    const std::vector<int>& getBeamChainParticles(int chain) const;
+    /**
+     * Get the parameters of a chain of beam elements, see addBeamChain().
+     */
+    void getBeamChainParameters(int chain, double& elementLength, double& stretchingModulus, double& bendingRigidity,
+            double& shortening, double& parallelFriction, double& perpendicularFriction) const;
+    /**
+     * Set the parameters of a chain of beam elements, see addBeamChain().
+     */
+    void setBeamChainParameters(int chain, double elementLength, double stretchingModulus, double bendingRigidity,
+            double shortening, double parallelFriction, double perpendicularFriction);
+    /**
+     * Get whether the particles of a chain of beam elements keep their z.
+     */
+    bool isBeamChainPlanar(int chain) const;
+    /**
      * Get the number of tethers.
      */
     int getNumTethers() const {
@@ -289,11 +332,13 @@ private:
     class ChainInfo;
     class SegmentInfo;
     class TetherInfo;
+    class BeamInfo;
     const ChainInfo& getChain(int chain) const;
     ChainInfo& getChain(int chain);
     void checkTether(int chain, int node, const Vec3& point, double stiffness) const;
     std::vector<ChainInfo> chains;
     std::vector<TetherInfo> tethers;
+    std::vector<BeamInfo> beams;
     std::set<std::pair<int, int> > tetheredNodes;
     bool usePeriodic;
 };
@@ -330,6 +375,17 @@ public:
     std::vector<double> joints;
     bool closed, planar;
     double nodeFriction;
+};
+
+/**
+ * This is an internal class used to record information about a chain of beam elements.
+ * @private
+ */
+class CylinderChainForce::BeamInfo {
+public:
+    std::vector<int> particles;
+    double elementLength, stretchingModulus, bendingRigidity, shortening, parallelFriction, perpendicularFriction;
+    bool planar;
 };
 
 } // namespace OpenMM

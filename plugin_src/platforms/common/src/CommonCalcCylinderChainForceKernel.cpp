@@ -1,6 +1,7 @@
 #include "CommonCalcCylinderChainForceKernel.h"
 #include "openmm/common/ComputeForceInfo.h"
 #include "openmm/common/ContextSelector.h"
+#include "openmm/OpenMMException.h"
 
 using namespace OpenMM;
 using namespace cylchain;
@@ -32,6 +33,9 @@ CommonCalcCylinderChainForceKernel::CommonCalcCylinderChainForceKernel(string na
 }
 
 void CommonCalcCylinderChainForceKernel::initialize(const System&, const CylinderChainDescription& chains) {
+    if (!chains.getBeams().empty())
+        throw OpenMMException("CylinderChainForce: Chains of beam elements are for the platforms Reference and CPU "
+                "alone");
     description = &chains;
     cc.addForce(new ForceInfo(chains));
 }

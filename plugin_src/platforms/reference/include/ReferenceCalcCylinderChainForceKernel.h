@@ -2,6 +2,7 @@
 #define OPENMM_REFERENCECALCCYLINDERCHAINFORCEKERNEL_H_
 
 #include "ReferenceParallelLoop.h"
+#include "beams/BeamEngine.h"
 #include "dynamics/ChainEngine.h"
 #include "openmm/CylinderChainKernels.h"
 #include <memory>
@@ -27,6 +28,12 @@ public:
         return *engine;
     }
     /**
+     * Get the engine of chains of beam elements.
+     */
+    const cylchain::BeamEngine& getBeamEngine() const {
+        return *beamEngine;
+    }
+    /**
      * Get a number that increases whenever the engine is another one.
      */
     int getEngineVersion() const {
@@ -44,10 +51,12 @@ public:
      */
     const double* getBox(ContextImpl& context) const;
 private:
+    void createEngines();
     cylchain::ChainEnergy addForces(ContextImpl& context, std::vector<Vec3>& forces, bool includeEnergy);
     ReferenceParallelLoop loop;
     const CylinderChainDescription* chains;
     std::unique_ptr<cylchain::ChainEngine> engine;
+    std::unique_ptr<cylchain::BeamEngine> beamEngine;
     int version = 0;
 };
 

@@ -36,7 +36,8 @@ public:
         return mixedChains;
     }
 private:
-    int advancePack(ContextImpl& context, int pack, cylchain::StepSettings settings, int count, long long& divided);
+    template <class Engine> int advancePack(ContextImpl& context, const Engine& engine, int pack,
+            cylchain::StepSettings settings, int count, long long& divided);
     void displaceBlock(int block, const std::vector<Vec3>& positions, const std::vector<Vec3>& forces,
             const cylchain::StepSettings& settings, double friction);
     void findNewPosition(ContextImpl& context, int particle, double stepSize);

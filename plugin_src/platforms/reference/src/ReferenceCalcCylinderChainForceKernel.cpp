@@ -11,7 +11,12 @@ ReferenceCalcCylinderChainForceKernel::ReferenceCalcCylinderChainForceKernel(str
 
 void ReferenceCalcCylinderChainForceKernel::initialize(const System&, const CylinderChainDescription& chains) {
     this->chains = &chains;
-    engine.reset(new ChainEngine(chains.getChains()));
+    createEngines();
+}
+
+void ReferenceCalcCylinderChainForceKernel::createEngines() {
+    engine.reset(new ChainEngine(chains->getChains()));
+    beamEngine.reset(new BeamEngine(chains->getBeams(), chains->getChains().size()));
 }
 
 const double* ReferenceCalcCylinderChainForceKernel::getBox(ContextImpl& context) const {
@@ -22,9 +27,11 @@ ChainEnergy ReferenceCalcCylinderChainForceKernel::addForces(ContextImpl& contex
         bool includeEnergy) {
     const double* positions = &(*extractData(context).positions)[0][0];
     const double* box = getBox(context);
-    vector<ChainEnergy> energies(engine->getNumPacks());
+    const int numPacks = engine->getNumPacks();
+    vector<ChainEnergy> energies(numPacks+beamEngine->getNumPacks());
     loop.run(energies.size(), [&] (int pack) {
-        energies[pack] = engine->addForces(pack, positions, &forces[0][0], box, includeEnergy);
+        energies[pack] = pack < numPacks ? engine->addForces(pack, positions, &forces[0][0], box, includeEnergy) :
+                beamEngine->addForces(pack-numPacks, positions, &forces[0][0], box, includeEnergy);
     });
 
     // The sum does not depend on the order in which threads have finished.
@@ -54,6 +61,6 @@ void ReferenceCalcCylinderChainForceKernel::computeEnergies(ContextImpl& context
 }
 
 void ReferenceCalcCylinderChainForceKernel::copyParametersToContext(ContextImpl&) {
-    engine.reset(new ChainEngine(chains->getChains()));
+    createEngines();
     version++;
 }

@@ -47,10 +47,18 @@ Instability ReferenceIntegrateCylinderChainStepKernel::displaceChains(ContextImp
     const double* forces = &(*data.forces)[0][0];
     const double* box = chainKernel->getBox(context);
     const vector<int> packs = engine.getPacksOfStep(settings);
-    vector<Instability> instabilities(packs.size());
-    loop.run(packs.size(), [&] (int i) {
-        instabilities[i] = engine.step(packs[i], positions, forces, box, settings, &displacements[0][0]);
-        for (int particle : engine.getParticles(packs[i]))
+    const BeamEngine& beams = chainKernel->getBeamEngine();
+    const int numPacks = packs.size(), numChains = chainKernel->getChains().size();
+    vector<Instability> instabilities(numPacks+beams.getNumPacks());
+    loop.run(instabilities.size(), [&] (int i) {
+        const bool ofBeams = i >= numPacks;
+        const int pack = ofBeams ? i-numPacks : packs[i];
+        instabilities[i] = ofBeams ? beams.step(pack, positions, forces, box, settings, &displacements[0][0]) :
+                engine.step(pack, positions, forces, box, settings, &displacements[0][0]);
+        // Beams count as further chains.
+        if (ofBeams && instabilities[i].chain != -1)
+            instabilities[i].chain += numChains;
+        for (int particle : ofBeams ? beams.getParticles(pack) : engine.getParticles(pack))
             findNewPosition(context, particle, settings.stepSize);
     });
 
@@ -163,20 +171,23 @@ void ReferenceIntegrateCylinderChainStepKernel::exchangePositions(ContextImpl& c
 
 int ReferenceIntegrateCylinderChainStepKernel::advanceChains(ContextImpl& context, const StepSettings& settings,
         int count, long long& divided) {
-    const vector<int> packs = chainKernel->getEngine().getPacksOfStep(settings);
-    vector<int> taken(packs.size());
-    vector<long long> dividedInPack(packs.size());
-    loop.run(packs.size(), [&] (int i) {
-        taken[i] = advancePack(context, packs[i], settings, count, dividedInPack[i]);
+    const ChainEngine& engine = chainKernel->getEngine();
+    const BeamEngine& beams = chainKernel->getBeamEngine();
+    const vector<int> packs = engine.getPacksOfStep(settings);
+    const int numPacks = packs.size();
+    vector<int> taken(numPacks+beams.getNumPacks());
+    vector<long long> dividedInPack(taken.size());
+    loop.run(taken.size(), [&] (int i) {
+        taken[i] = i < numPacks ? advancePack(context, engine, packs[i], settings, count, dividedInPack[i]) :
+                advancePack(context, beams, i-numPacks, settings, count, dividedInPack[i]);
     });
     divided = accumulate(dividedInPack.begin(), dividedInPack.end(), 0LL);
     return *min_element(taken.begin(), taken.end());
 }
 
-int ReferenceIntegrateCylinderChainStepKernel::advancePack(ContextImpl& context, int pack, StepSettings settings,
-        int count, long long& divided) {
+template <class Engine> int ReferenceIntegrateCylinderChainStepKernel::advancePack(ContextImpl& context,
+        const Engine& engine, int pack, StepSettings settings, int count, long long& divided) {
     ReferencePlatform::PlatformData& data = extractData(context);
-    const ChainEngine& engine = chainKernel->getEngine();
     const double* box = chainKernel->getBox(context);
     double* forces = &(*data.forces)[0][0];
     const ParticleRange particles = engine.getParticles(pack);

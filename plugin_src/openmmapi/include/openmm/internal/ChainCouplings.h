@@ -33,6 +33,10 @@ public:
      */
     void refuseNarrowBox(const CylinderChainDescription& chains) const;
     /**
+     * Throw an exception if there is any coupling, because what there is in the Context cannot have one.
+     */
+    void refuseAll(const std::string& what) const;
+    /**
      * While an object of this class exists, the Forces that implicit steps take contribute nothing.
      */
     class Exclusion {

@@ -1,6 +1,7 @@
 #ifndef OPENMM_CYLINDERCHAINDESCRIPTION_H_
 #define OPENMM_CYLINDERCHAINDESCRIPTION_H_
 
+#include "beams/BeamChain.h"
 #include "mechanics/Chain.h"
 #include "openmm/CylinderChainForce.h"
 #include "openmm/System.h"
@@ -24,6 +25,12 @@ public:
         return chains;
     }
     /**
+     * Get the chains of beam elements.
+     */
+    const std::vector<cylchain::BeamChain>& getBeams() const {
+        return beams;
+    }
+    /**
      * Throw an exception if a chain has no modes, see Scheme::Modes.
      */
     void requireModes() const;
@@ -42,6 +49,7 @@ public:
 private:
     void lookForModes();
     std::vector<cylchain::Chain> chains;
+    std::vector<cylchain::BeamChain> beams;
     // The first chain that has no modes, and why, or nothing.
 
     std::string withoutModes;

@@ -87,6 +87,8 @@ private:
     cylchain::StepSettings describeStep(std::uint64_t seed, int level, std::uint64_t step);
     void recordForces(cylchain::StepSettings& settings, bool records);
     void takeNoteOfForces(const cylchain::StepSettings& settings, bool followsOn);
+    void refuseBeams(cylchain::Scheme scheme, double kT) const;
+    void refuseTornBeams() const;
     bool areForcesFinite();
     void reportInstability(int chain, const cylchain::StepSettings& settings);
     void reportCoupling(const cylchain::BrokenCoupling& coupling, const cylchain::CoupledForces& coupled,
