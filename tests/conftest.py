@@ -6,7 +6,7 @@ import sys
 import openmm
 import pytest
 
-from support.platforms import ENGINES, PLATFORMS
+from support.platforms import COMPILED_PLATFORMS, ENGINES, NOT_TESTED, PLATFORMS
 
 
 def pytest_configure():
@@ -18,8 +18,10 @@ def pytest_configure():
 
 
 def pytest_report_header():
-    """Name the platforms under test."""
-    return f"OpenMM platforms: {', '.join(PLATFORMS)}"
+    """Name the platforms under test, and why filaments are not on the others."""
+    untested = [f"not on {name}: {reason}" for name, reason in NOT_TESTED.items()]
+    filaments = "; ".join([", ".join(map(str, COMPILED_PLATFORMS)), *untested])
+    return [f"OpenMM platforms: {', '.join(PLATFORMS)}", f"Filaments of the compiled engine: {filaments}"]
 
 
 @pytest.fixture(params=PLATFORMS, scope="session")

@@ -19,24 +19,18 @@ from openmm_cylchain import (
     filament_wall_force,
     stokes_friction,
 )
-from openmm_cylchain.engines.gpu_platforms import GPU_PLATFORMS, why_not_on
 from support.contexts import energy_of, forces_of, new_context, positions_of
 from support.platform_variants import ACTIN, SHEAR, VARIANTS, filaments_of_variant, step_of_variant
-from support.platforms import PLATFORMS
+from support.platforms import GPU_CASES, GPU_NAMES, NOT_TESTED
 from support.solvent import TEMPERATURE, VISCOSITY
 
-NAMES = [name for name in GPU_PLATFORMS if name in PLATFORMS and why_not_on(name) is None]
-# nm, for nodes that are less than 2000 nm from the origin. OpenMM adds forces on GPUs in units of 2^-32 kJ/(mol nm),
-# and computes them in single precision in mixed; 0.3 kJ/(mol nm) take filaments 1000 nm far here.
-TOLERANCES = {"double": 1e-5, "mixed": 1e-4, "single": 0.05}
+# Of paths, in nm. Pushes of 0.3 kJ/(mol nm) take filaments 1000 nm far here.
+TOLERANCES = {case.precision: case.path_tolerance for case in GPU_CASES}
 
-pytestmark = pytest.mark.skipif(
-    not NAMES,
-    reason="; ".join(f"{name}: {why_not_on(name) or 'there is no device'}" for name in GPU_PLATFORMS),
-)
+pytestmark = pytest.mark.skipif(not GPU_NAMES, reason=str(NOT_TESTED))
 
 
-@pytest.fixture(params=NAMES, scope="module")
+@pytest.fixture(params=GPU_NAMES, scope="module")
 def gpu(request):
     """A platform for GPUs. Where later tests name none, the processor is still what they get."""
     os.environ["OPENMM_DEFAULT_PLATFORM"] = "CPU"

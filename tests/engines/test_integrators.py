@@ -14,7 +14,7 @@ from openmm_cylchain import DSDNA, F_ACTIN, Filaments, InputError, InstabilityEr
 from support.contexts import energy_of, new_context, new_simulation, positions_of
 from support.dense_mechanics import bent_chain, dense_resistance
 from support.filaments_and_beads import STEP, actin_filaments, bead_system, filaments_and_beads, integrator_of_both
-from support.platforms import ENGINE_PLATFORMS, ENGINE_SCHEMES
+from support.platforms import ENGINE_PLATFORMS, ENGINE_SCHEMES, EVERYWHERE
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 
 
@@ -107,7 +107,7 @@ def test_two_contexts_at_once_equal_each_alone(engine):
         assert np.array_equal(positions_of(context), expected)
 
 
-@pytest.mark.parametrize(("engine", "platform"), ENGINE_PLATFORMS)
+@pytest.mark.parametrize(("engine", "platform"), EVERYWHERE)
 def test_two_contexts_in_two_threads_equal_each_alone(engine, platform):
     from concurrent.futures import ThreadPoolExecutor
 
@@ -129,7 +129,7 @@ def test_two_contexts_in_two_threads_equal_each_alone(engine, platform):
         assert np.array_equal(positions_of(context), positions_alone)
 
 
-@pytest.mark.parametrize(("engine", "platform"), ENGINE_PLATFORMS)
+@pytest.mark.parametrize(("engine", "platform"), EVERYWHERE)
 def test_checkpoint_restart_is_bit_identical(engine, platform):
     filaments, system, positions = filaments_and_beads(engine)
     integrator = integrator_of_both(filaments, system, random_seed=5)
@@ -171,7 +171,7 @@ def test_saved_state_continues_with_the_integrators_own_seed(engine):
         assert np.all(np.any(ends[one][mobile] != ends[two][mobile], axis=1))
 
 
-@pytest.mark.parametrize(("engine", "platform"), ENGINE_PLATFORMS)
+@pytest.mark.parametrize(("engine", "platform"), EVERYWHERE)
 def test_system_survives_xml(engine, platform):
     filaments, system, positions = filaments_and_beads(engine)
     integrator = integrator_of_both(filaments, system, random_seed=5)
@@ -206,10 +206,10 @@ def test_step_size_and_temperature_can_change(engine):
     assert integrator.computeSystemTemperature() == 0 * unit.kelvin
 
 
-@pytest.mark.parametrize(("engine", "platform"), ENGINE_PLATFORMS)
+@pytest.mark.parametrize(("engine", "platform"), EVERYWHERE)
 def test_reported_forces_and_energy_are_the_physical_ones(engine, platform):
     filaments, system, positions = filaments_and_beads(engine)
-    plain = openmm.Context(system, openmm.VerletIntegrator(1.0), openmm.Platform.getPlatform(platform))
+    plain = new_context(system, positions, platform=platform)
     integrator = integrator_of_both(filaments, system, random_seed=1)
     context = new_context(system, positions, integrator, platform)
     integrator.step(7)
@@ -280,7 +280,7 @@ def test_free_particles_diffuse_with_their_own_friction(engine):
         assert abs(squares.mean() - expected) < 4 * squares.std(ddof=1) / np.sqrt(len(squares))
 
 
-@pytest.mark.parametrize(("engine", "platform"), ENGINE_PLATFORMS)
+@pytest.mark.parametrize(("engine", "platform"), EVERYWHERE)
 def test_blow_up_names_filament_segment_and_step_and_keeps_positions_finite(engine, platform):
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine=engine)
     filaments.add_equilibrium(F_ACTIN, 6, seed=1)
@@ -296,7 +296,7 @@ def test_blow_up_names_filament_segment_and_step_and_keeps_positions_finite(engi
     assert np.isfinite(energy_of(context))
 
 
-@pytest.mark.parametrize(("engine", "platform"), ENGINE_PLATFORMS)
+@pytest.mark.parametrize(("engine", "platform"), EVERYWHERE)
 def test_steps_at_once_equal_steps_one_by_one(engine, platform):
     """With nothing but chains in the System, the compiled engine takes many steps at once."""
     filaments = actin_filaments(engine, (5, 3, 8, 8, 1))
@@ -338,7 +338,7 @@ def test_blow_up_within_steps_at_once_leaves_all_chains_at_the_step_before(engin
     assert np.array_equal(positions_of(context), positions_of(other_context))
 
 
-@pytest.mark.parametrize(("engine", "platform"), ENGINE_PLATFORMS)
+@pytest.mark.parametrize(("engine", "platform"), EVERYWHERE)
 @pytest.mark.parametrize("box", [None, 1800.0])
 def test_lengths_that_leave_the_range_of_fene_are_a_blow_up(engine, platform, box):
     """A segment can be as short or long as its FENE potential allows, or else has no energy."""

@@ -15,7 +15,7 @@ from support.contexts import new_context, positions_of
 from support.dense_mechanics import bent_chain, dense_resistance
 from support.equilibrium_cases import CASES, time_step
 from support.noise_covariance import assert_covariance, moves_of_a_step
-from support.platforms import ENGINE_PLATFORMS, ENGINES
+from support.platforms import ENGINE_PLATFORMS, ENGINES, EVERYWHERE
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 
 SIGMAS = 4.0
@@ -175,7 +175,7 @@ def test_direction_of_a_draw():
 # Dynamics
 
 
-@pytest.mark.parametrize(("engine", "platform"), ENGINE_PLATFORMS)
+@pytest.mark.parametrize(("engine", "platform"), EVERYWHERE)
 def test_nodes_keep_their_height_to_the_bit(engine, platform):
     """Whatever pulls along z, and beside a filament that moves in space."""
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine=engine)

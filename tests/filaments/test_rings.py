@@ -18,7 +18,7 @@ from support.dense_mechanics import bent_chain, dense_resistance
 from support.equilibrium_cases import Case as EquilibriumCase
 from support.equilibrium_cases import soft_chain, time_step
 from support.noise_covariance import assert_covariance, moves_of_a_step
-from support.platforms import ENGINE_PLATFORMS, ENGINES
+from support.platforms import ENGINES, EVERYWHERE
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 
 FRICTION = F_ACTIN.segment_friction(VISCOSITY, TEMPERATURE)
@@ -458,7 +458,7 @@ def test_equilibrium_of_longer_freely_jointed_rings_is_exact(engine):
     _check_freely_jointed_rings(engine, 9, 1500, 2000)
 
 
-@pytest.mark.parametrize(("engine", "platform"), ENGINE_PLATFORMS)
+@pytest.mark.parametrize(("engine", "platform"), EVERYWHERE)
 def test_rings_run_on_every_platform(engine, platform):
     """A few steps with noise: the same on all platforms, to their precision."""
     ends = []

@@ -3,11 +3,19 @@
 import openmm
 from openmm import app
 
+from .platforms import CompiledPlatform
+
 
 def new_context(system, positions, integrator=None, platform="Reference", properties=None):
-    """A Context with positions. A platform may be given by its name; an integrator is for those who take steps."""
+    """A Context with positions. An integrator is for those who take steps.
+
+    A platform may be given by its name, or with its precision as a ``CompiledPlatform``.
+    """
     if integrator is None:
         integrator = openmm.VerletIntegrator(0.001)
+    if isinstance(platform, CompiledPlatform):
+        platform.enable()
+        platform, properties = platform.name, {**platform.properties, **(properties or {})}
     if isinstance(platform, str):
         platform = openmm.Platform.getPlatform(platform)
     context = openmm.Context(system, integrator, platform, properties or {})

@@ -1,8 +1,14 @@
-"""The platforms, engines and schemes that are tested here."""
+"""The platforms, precisions, engines and schemes that are tested here, and how well platforms agree."""
+
+import os
+from dataclasses import dataclass
 
 import openmm
+import pytest
 
+import openmm_cylchain
 from openmm_cylchain.dynamics.schemes import EXPLICIT_SCHEMES
+from openmm_cylchain.engines.gpu_platforms import GPU_PLATFORMS, why_not_on
 
 _WANTED = ("Reference", "CPU", "OpenCL")
 
@@ -23,6 +29,76 @@ PLATFORMS = [name for name in _WANTED if _usable(name)]
 ENGINES = ("portable", "compiled")
 ENGINE_SCHEMES = [(engine, scheme) for engine in ENGINES for scheme in EXPLICIT_SCHEMES] + [("compiled", "implicit")]
 
-# The compiled engine has no kernels for GPU platforms yet.
+
+@dataclass(frozen=True)
+class CompiledPlatform:
+    """A platform on which the compiled engine is tested, for ``new_context``.
+
+    Attributes
+    ----------
+    name : str
+    precision : {"single", "mixed", "double"} or None
+        None where there is no choice.
+    tolerance : float
+        By which share of the largest one forces, energies and displacements may differ from those of the Reference
+        platform.
+    rounding : float
+        In nm, by which stored positions are rounded that are less than 2048 nm from the origin.
+    path_tolerance : float
+        In nm, by which such positions may differ after up to 100 steps with noise.
+    """
+
+    name: str
+    precision: str | None
+    tolerance: float
+    rounding: float
+    path_tolerance: float
+
+    def __str__(self):
+        return self.name if self.precision is None else f"{self.name}-{self.precision}"
+
+    @property
+    def properties(self):
+        """Of a Context."""
+        return {} if self.precision is None else {"Precision": self.precision}
+
+    def enable(self):
+        """Load the plugin of a platform for GPUs. Where later tests name none, the processor is still what they get."""
+        if self.name in GPU_PLATFORMS:
+            os.environ["OPENMM_DEFAULT_PLATFORM"] = "CPU"
+            openmm_cylchain.enable_platform(self.name)
+
+
+# OpenMM adds forces on GPUs in units of 2^-32 kJ/(mol nm), and computes its own in single precision but in "double".
+TOLERANCES = {"double": (1e-9, 0.0, 1e-5), "mixed": (1e-6, 0.0, 1e-4), "single": (1e-3, 2**-13, 0.05)}
+"""Of platforms for GPUs, as in ``CompiledPlatform``."""
+
+GPU_NAMES = [name for name in GPU_PLATFORMS if why_not_on(name) is None and _usable(name)]
+"""The platforms for GPUs on which filaments are tested here."""
+
+NOT_TESTED = {name: why_not_on(name) or "there is no device" for name in GPU_PLATFORMS if name not in GPU_NAMES}
+"""Why they are not on the others."""
+
+CPU_CASES = [CompiledPlatform(name, None, 1e-9, 0.0, 1e-9) for name in PLATFORMS if name in ("Reference", "CPU")]
+GPU_CASES = [
+    CompiledPlatform(name, precision, *TOLERANCES[precision]) for name in GPU_NAMES for precision in TOLERANCES
+]
+COMPILED_PLATFORMS = CPU_CASES + GPU_CASES
+
+
+def _marks(case):
+    # PoCL compiles kernels for many seconds, for each precision.
+    return [pytest.mark.slow] if case.precision in ("single", "double") else []
+
+
+ON_COMPILED_PLATFORMS = pytest.mark.parametrize(
+    "platform", [pytest.param(case, marks=_marks(case), id=str(case)) for case in COMPILED_PLATFORMS]
+)
+"""Runs a test of the compiled engine on all platforms; in all precisions where slow tests run."""
+
 ENGINE_PLATFORMS = [("portable", platform) for platform in PLATFORMS]
-ENGINE_PLATFORMS += [("compiled", platform) for platform in PLATFORMS if platform in ("Reference", "CPU")]
+ENGINE_PLATFORMS += [("compiled", case.name) for case in CPU_CASES]
+
+EVERYWHERE = [*ENGINE_PLATFORMS]
+EVERYWHERE += [pytest.param("compiled", case, marks=pytest.mark.slow, id=f"compiled-{case}") for case in GPU_CASES]
+"""Engines and platforms; with those for GPUs where slow tests run."""

@@ -10,7 +10,7 @@ from openmm_cylchain import F_ACTIN, Filaments, InputError, InstabilityError
 from openmm_cylchain.systems.periodic import make_trajectory_whole, make_whole, remove_jumps
 from support.contexts import new_context, positions_of
 from support.periodic_systems import BEADS, CUBIC, TRICLINIC, crossing_filaments, particles_of
-from support.platforms import ENGINE_PLATFORMS, ENGINE_SCHEMES
+from support.platforms import ENGINE_SCHEMES, EVERYWHERE
 from support.solvent import VISCOSITY
 
 
@@ -37,7 +37,7 @@ def crossing_context(engine, platform, vectors):
 
 
 @pytest.mark.parametrize("vectors", [CUBIC, TRICLINIC], ids=["cubic", "triclinic"])
-@pytest.mark.parametrize(("engine", "platform"), ENGINE_PLATFORMS)
+@pytest.mark.parametrize(("engine", "platform"), EVERYWHERE)
 def test_wrapping_shifts_whole_filaments_and_restarts_do_not_jump(engine, platform, vectors):
     filaments, _, integrator, context = crossing_context(engine, platform, vectors)
     start = positions_of(context)
