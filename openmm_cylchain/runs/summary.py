@@ -30,8 +30,11 @@ from .configuration import linker_labels
 from .run_directory import read_linkers
 from .silence import silenced_c_library
 
+_STRETCHING = "stretching energy per segment"
 _WORMLIKE = "the same, theory of the wormlike chain (25)"
 _EXTENSION = "extension along the tension, second half of the run"
+_ROUNDING_OF_STRETCHING, _ROUNDING_OF_ALL = 0.01, 1.0
+"""Beyond which share of its thermal energy, that of stretching, or nothing at all, is compared with theory."""
 _ENOUGH_FILAMENTS = 8
 _AGREEMENT_SIGMA = 3.0
 _AGREEMENT_FRACTION = 0.05
@@ -201,19 +204,21 @@ def _summarise_linkers(name, table):
 
 def _summarise_group(configuration, group, members, label, trajectory):
     observables, short = [], []
-    comparable = is_in_equilibrium(group)
+    rounding = _rounding_share(configuration, group, trajectory)
+    comparable = is_in_equilibrium(group) and rounding <= _ROUNDING_OF_ALL
     temperature = configuration.solvent.temperature
     for name, unit, series, exact in _series(group, temperature, trajectory, members):
         value, error = _mean_with_error(series)
         slow = len(members) < _ENOUGH_FILAMENTS and statistical_inefficiency(series) > len(series) / 10
         if slow and name != _WORMLIKE:
             short.append(name)
-        observables.append(_compared(name, unit, value, error, exact, comparable))
+        rounded = name == _STRETCHING and rounding > _ROUNDING_OF_STRETCHING
+        observables.append(_compared(name, unit, value, error, exact, comparable and not rounded))
     if has_exact_extension(group):
         series = extensions(group, trajectory, members)
         value, error = _mean_with_error(series)
         exact = float(theory.chain_extension(group.type, group.segments, group.tension[0], temperature))
-        observables.append(_compared(_EXTENSION, "nm", value, error, exact, True))
+        observables.append(_compared(_EXTENSION, "nm", value, error, exact, rounding <= _ROUNDING_OF_ALL))
     observables += _persistence_length(group, temperature, trajectory, members, comparable)
     return GroupSummary(
         label=label,
@@ -221,9 +226,9 @@ def _summarise_group(configuration, group, members, label, trajectory):
         filaments=group.count,
         segments=group.segments,
         start=group.start,
-        in_equilibrium=comparable,
+        in_equilibrium=is_in_equilibrium(group),
         observables=tuple(observables),
-        notes=tuple(_notes(configuration, group, members, trajectory, short)),
+        notes=tuple(_notes(configuration, group, members, trajectory, short, rounding)),
     )
 
 
@@ -251,7 +256,7 @@ def _series(group, temperature, trajectory, members):
     lengths = np.stack(segment_lengths(trajectory, members), axis=1)
     distribution = SegmentLengthDistribution(kind, temperature)
     yield (
-        "stretching energy per segment",
+        _STRETCHING,
         "kT",
         kind.stretching_energy(lengths).mean(axis=2) / kT,
         theory.stretching_energy_mean(kind, temperature) / kT,
@@ -278,7 +283,7 @@ def _series_of_beads(kind, bonds, temperature, trajectory, members):
     lengths = np.linalg.norm(vectors, axis=3)
     free = kind, bonds, temperature
     energies = kind.stretching_energies(lengths).mean(axis=2) / kT
-    yield "stretching energy per segment", "kT", energies, theory.bead_spring_stretching_energies(*free).mean() / kT
+    yield _STRETCHING, "kT", energies, theory.bead_spring_stretching_energies(*free).mean() / kT
     yield "segment length", "nm", lengths.mean(axis=2), theory.bead_spring_mean_lengths(*free).mean()
     if bonds > 1:
         energies = kind.bending_energies(vectors).mean(axis=2) / kT
@@ -348,13 +353,14 @@ def _compared(name, unit, value, error, exact, comparable):
     return Observable(name, unit, value, error, exact, deviation, relative, verdict)
 
 
-def _notes(configuration, group, members, trajectory, short):
+def _notes(configuration, group, members, trajectory, short, rounding):
     if group.start == "straight":
         yield (
             "Started straight, not in equilibrium: the averages contain the relaxation, so they are not compared "
             "with equilibrium."
         )
     bends = group.segments > 1 and not group.closed and trajectory.n_frames >= FEWEST_FRAMES_OF_DRIFT
+    bends = bends and rounding <= _ROUNDING_OF_ALL
     drift = bending_drift(trajectory, members) if bends else 0.0
     if abs(drift) > SIGNIFICANT_DRIFT:
         yield (
@@ -386,11 +392,11 @@ def _notes(configuration, group, members, trajectory, short):
         )
     if configuration.simulation.scheme == "euler":
         yield 'Scheme "euler" has the drift of free segments: chain averages are biased at any time step.'
-    rounding = _rounding_share(configuration, group, trajectory)
-    if rounding > 0.01:
+    if rounding > _ROUNDING_OF_STRETCHING:
+        what = "nothing is" if rounding > _ROUNDING_OF_ALL else "it is not"
         yield (
-            f"The single precision of the trajectory adds about {100 * rounding:.0f} % to the stretching energy here; "
-            "energies.csv is not affected."
+            f"The single precision of the trajectory adds about {100 * rounding:.2g} % to the stretching energy this "
+            f"far from the origin, so {what} compared. energies.csv is not affected. Begin nearer to the origin."
         )
 
 

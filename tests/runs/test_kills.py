@@ -78,13 +78,15 @@ def test_network_that_is_killed_at_random_moments(tmp_path, processes):
             process.join()
             code = process.exitcode
             assert code in (0, -signal.SIGKILL)
-            if code != 0:
+            if code == 0:
+                longest *= 0.9  # So that about as many kills come too late as too early, however busy the machine is.
+            else:
                 step = step_of_checkpoint(output)
                 if step not in (before, STEPS):
                     counted.append(step)
                 else:
                     others += 1
-                    longest *= 1.1  # The machine may have become slower.
+                    longest *= 1.1
         for name in FILES:
             assert contents(output, name) == contents(reference, name) != b"", (name, counted)
     print(f"{len(counted)} kills of {runs} runs of {longest:.2f} s, and {others} before a checkpoint or behind the end")

@@ -575,6 +575,25 @@ def test_a_file_turns_on_the_platform_that_it_names(tmp_path, unbroken):
     np.testing.assert_allclose(runs[0], runs[1], rtol=1e-5, atol=1e-3)
 
 
+@pytest.mark.parametrize(("distance", "compared"), [("1 m", 0), ("1 mm", 5), ("1 um", 6)])
+def test_what_a_trajectory_is_too_coarse_for_is_not_compared(tmp_path, distance, compared):
+    text = SHORT[: SHORT.index("[[filament]]", 100)] + SHORT[SHORT.index("[simulation]") :]
+    text = text.replace("count = 3", f'position = ["0 nm", "{distance}", "0 nm"]')
+    configuration = read_configuration(configured(tmp_path, text))
+    run(configuration, tmp_path / "out")
+    (group,) = summarise(configuration, load_trajectory(configuration, RunDirectory(tmp_path / "out")))
+    verdicts = {own.name: own.verdict for own in group.observables if own.verdict != "reference"}
+    assert sum(verdict != "not comparable" for verdict in verdicts.values()) == compared
+    assert (verdicts["stretching energy per segment"] == "not comparable") == (compared < 6)
+    said = [note for note in group.notes if "single precision" in note]
+    assert len(said) == (compared < 6)
+    if said:
+        assert ("nothing is compared" if compared == 0 else "it is not compared") in said[0]
+        assert not any("Not in equilibrium" in note for note in group.notes) or compared > 0
+    energies = read_energies(tmp_path / "out" / "energies.csv")
+    assert np.all(energies["stretching energy per segment (kT)"] < 4.0)
+
+
 def test_freely_jointed_and_single_segments_have_a_summary(tmp_path):
     text = SHORT.replace("segments = 6", 'segments = 3\nbending_rigidity = "0 pN*nm^2"').replace(
         "segments = 4", "segments = 1"
