@@ -155,7 +155,11 @@ def _add_benchmarks(parser):
         "kinetics", help="motors and crosslinkers: a contractile bundle at several steps, most of an hour"
     )
     kinetics.set_defaults(command=_benchmark_kinetics)
-    for benchmark in (engines, scaling, time_step, bead_spring, base_pairs, networks, kinetics):
+    platforms = benchmarks.add_parser(
+        "platforms", help="filaments, alone and among particles, on each platform and in each precision, many minutes"
+    )
+    platforms.set_defaults(command=_benchmark_platforms)
+    for benchmark in (engines, scaling, time_step, bead_spring, base_pairs, networks, kinetics, platforms):
         benchmark.add_argument("--quick", action="store_true", help="a rough measurement within a minute")
         benchmark.add_argument("--json", metavar="FILE", help="write machine, settings and results to FILE as well")
 
@@ -380,6 +384,12 @@ def _benchmark_kinetics(options):
     from .benchmark.kinetics import FULL, QUICK, benchmark_kinetics
 
     _benchmark(options, lambda say: benchmark_kinetics(QUICK if options.quick else FULL, say=say))
+
+
+def _benchmark_platforms(options):
+    from .benchmark.platforms import FULL, QUICK, benchmark_platforms
+
+    _benchmark(options, lambda say: benchmark_platforms(QUICK if options.quick else FULL, say))
 
 
 def _benchmark(options, measure):
