@@ -191,16 +191,55 @@ def test_moved_tethers_hold_filaments_elsewhere(gpu):
 def _add_links(filaments, system):
     links = Crosslinks(0.1, 30.0)
     links.add(None, filaments.segment_place(0, arc_length=100.0), filaments.segment_place(1, arc_length=100.0))
+    links.add(None, filaments.segment_place(1, arc_length=300.0), filaments.segment_place(2, arc_length=250.0))
     links.add_to(system)
+
+
+def _add_walls(filaments, system):
+    system.addForce(filament_wall_force(filaments, system, Sphere((0, 400, 0), 350.0), 0.1))
+
+
+COUPLINGS = {"links": _add_links, "walls": _add_walls}
+
+
+def _coupled_context(what, scheme, platform, properties=None):
+    filaments, system, positions, arguments = filaments_of_variant("open")
+    COUPLINGS[what](filaments, system)
+    step = step_of_variant("open", scheme)
+    integrator = filaments.create_integrator(
+        system, step, scheme, random_seed=4, precision="double", checks=False, **arguments
+    )
+    return new_context(system, positions, integrator, platform, properties)
+
+
+@pytest.mark.parametrize("what", COUPLINGS)
+def test_explicit_steps_with_links_and_walls_agree(gpu, what):
+    expected, bare = _coupled_context(what, "midpoint", "Reference"), _context("open", "midpoint", "Reference")
+    found = _coupled_context(what, "midpoint", gpu, {"Precision": "double"})
+    forces = forces_of(expected)
+    added = np.abs(forces - forces_of(bare)).max()
+    assert added > 1.0
+    assert np.abs(forces_of(found) - forces).max() < 1e-6 * added
+    assert energy_of(found) == pytest.approx(energy_of(expected), rel=1e-6)
+    for context in (expected, found, bare):
+        context.getIntegrator().step(50)
+    end = positions_of(expected)
+    assert np.abs(end - positions_of(bare)).max() > 1e-3
+    assert np.abs(positions_of(found) - end).max() < TOLERANCES["double"]
+
+
+@pytest.mark.parametrize("what", COUPLINGS)
+def test_implicit_steps_with_links_and_walls_are_refused(gpu, what):
+    context = _coupled_context(what, "implicit", gpu, {"Precision": "double"})
+    before = positions_of(context)
+    with pytest.raises(openmm.OpenMMException, match=f"On the {gpu} platform, filaments with links or walls take expl"):
+        context.getIntegrator().step(1)
+    assert np.array_equal(positions_of(context), before)
 
 
 REFUSED = {
     r"contacts of capsules \(CylinderChainContactForce\)": lambda filaments, system: system.addForce(
         capsule_contact_force(filaments, system, 8.0)
-    ),
-    r"links \(CylinderChainLinkForce\)": _add_links,
-    r"walls for filaments \(CylinderChainWallForce\)": lambda filaments, system: system.addForce(
-        filament_wall_force(filaments, system, Sphere((0, 0, 0), 5000.0), 0.1)
     ),
 }
 

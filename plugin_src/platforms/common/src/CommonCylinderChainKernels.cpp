@@ -1,5 +1,6 @@
 #include "CommonCylinderChainKernels.h"
 #include "CommonCalcCylinderChainForceKernel.h"
+#include "CommonCouplingKernels.h"
 #include "CommonIntegrateCylinderChainStepKernel.h"
 #include "openmm/OpenMMException.h"
 
@@ -17,13 +18,13 @@ KernelImpl* OpenMM::createCommonKernel(const string& name, const Platform& platf
         return new CommonCalcCylinderChainForceKernel(name, platform, cc);
     if (name == IntegrateCylinderChainStepKernel::Name())
         return new CommonIntegrateCylinderChainStepKernel(name, platform, cc);
+    if (name == CalcCylinderChainLinkForceKernel::Name())
+        return new CommonCalcCylinderChainLinkForceKernel(name, platform, cc);
+    if (name == CalcCylinderChainWallForceKernel::Name())
+        return new CommonCalcCylinderChainWallForceKernel(name, platform, cc);
     string force;
     if (name == CalcCylinderChainContactForceKernel::Name())
         force = "contacts of capsules (CylinderChainContactForce)";
-    else if (name == CalcCylinderChainLinkForceKernel::Name())
-        force = "links (CylinderChainLinkForce)";
-    else if (name == CalcCylinderChainWallForceKernel::Name())
-        force = "walls for filaments (CylinderChainWallForce)";
     else if (name == UpdateCylinderChainLinkersKernel::Name())
         force = "linkers that bind and unbind (CylinderChainBindingForce)";
     else
