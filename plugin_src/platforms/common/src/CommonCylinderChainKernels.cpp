@@ -22,13 +22,10 @@ KernelImpl* OpenMM::createCommonKernel(const string& name, const Platform& platf
         return new CommonCalcCylinderChainLinkForceKernel(name, platform, cc);
     if (name == CalcCylinderChainWallForceKernel::Name())
         return new CommonCalcCylinderChainWallForceKernel(name, platform, cc);
-    string force;
     if (name == CalcCylinderChainContactForceKernel::Name())
-        force = "contacts of capsules (CylinderChainContactForce)";
-    else if (name == UpdateCylinderChainLinkersKernel::Name())
-        force = "linkers that bind and unbind (CylinderChainBindingForce)";
-    else
+        return new CommonCalcCylinderChainContactForceKernel(name, platform, cc);
+    if (name != UpdateCylinderChainLinkersKernel::Name())
         throw OpenMMException("Tried to create kernel with illegal kernel name '"+name+"'");
-    throw OpenMMException("The "+platform.getName()+" platform does not compute "+force+
-            " of the compiled engine. Create the Context on the CPU platform");
+    throw OpenMMException("The "+platform.getName()+" platform does not compute linkers that bind and unbind "
+            "(CylinderChainBindingForce) of the compiled engine. Create the Context on the CPU platform");
 }
