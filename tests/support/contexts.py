@@ -3,7 +3,7 @@
 import openmm
 from openmm import app
 
-from .platforms import CompiledPlatform
+from .compiled_platform import CompiledPlatform
 
 
 def new_context(system, positions, integrator=None, platform="Reference", properties=None):

@@ -1,14 +1,12 @@
 """The platforms, precisions, engines and schemes that are tested here, and how well platforms agree."""
 
-import os
-from dataclasses import dataclass
-
 import openmm
 import pytest
 
-import openmm_cylchain
 from openmm_cylchain.dynamics.schemes import EXPLICIT_SCHEMES
 from openmm_cylchain.engines.gpu_platforms import GPU_PLATFORMS, why_not_on
+
+from .compiled_platform import CompiledPlatform
 
 _WANTED = ("Reference", "CPU", "OpenCL")
 
@@ -28,45 +26,6 @@ PLATFORMS = [name for name in _WANTED if _usable(name)]
 
 ENGINES = ("portable", "compiled")
 ENGINE_SCHEMES = [(engine, scheme) for engine in ENGINES for scheme in EXPLICIT_SCHEMES] + [("compiled", "implicit")]
-
-
-@dataclass(frozen=True)
-class CompiledPlatform:
-    """A platform on which the compiled engine is tested, for ``new_context``.
-
-    Attributes
-    ----------
-    name : str
-    precision : {"single", "mixed", "double"} or None
-        None where there is no choice.
-    tolerance : float
-        By which share of the largest one forces, energies and displacements may differ from those of the Reference
-        platform.
-    rounding : float
-        In nm, by which stored positions are rounded that are less than 2048 nm from the origin.
-    path_tolerance : float
-        In nm, by which such positions may differ after up to 100 steps with noise.
-    """
-
-    name: str
-    precision: str | None
-    tolerance: float
-    rounding: float
-    path_tolerance: float
-
-    def __str__(self):
-        return self.name if self.precision is None else f"{self.name}-{self.precision}"
-
-    @property
-    def properties(self):
-        """Of a Context."""
-        return {} if self.precision is None else {"Precision": self.precision}
-
-    def enable(self):
-        """Load the plugin of a platform for GPUs. Where later tests name none, the processor is still what they get."""
-        if self.name in GPU_PLATFORMS:
-            os.environ["OPENMM_DEFAULT_PLATFORM"] = "CPU"
-            openmm_cylchain.enable_platform(self.name)
 
 
 # OpenMM adds forces on GPUs in units of 2^-32 kJ/(mol nm), and computes its own in single precision but in "double".
