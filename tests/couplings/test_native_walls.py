@@ -25,12 +25,12 @@ from openmm_cylchain.couplings.walls import as_filament_wall_force
 from openmm_cylchain.dynamics.explicit_forces import ExplicitForces
 from openmm_cylchain.engines.compiled import plugin
 from support.contexts import energy_of, forces_of, new_context, positions_of
+from support.platforms import ON_COMPILED_PLATFORMS
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 from support.wall_shapes import SHAPES
 
 ACTIN = F_ACTIN.with_segment_length(100)
 STIFFNESS = 7.0
-HOSTS = ["Reference", "CPU"]
 SMALLER = [
     (Plane([1, 2, 3], [0, 0, 2]), Plane([1, 2, 3.4], [0, 0, 1])),
     (Slab([1, 2, 3], [0, 1, 1], 3), Slab([1, 2, 3], [0, 1, 1], 2.2)),
@@ -69,7 +69,7 @@ def _points(count, seed=3):
 # Energies and forces
 
 
-@pytest.mark.parametrize("platform", HOSTS)
+@ON_COMPILED_PLATFORMS
 @pytest.mark.parametrize("shape", SHAPES, ids=_name)
 def test_energy_and_forces_are_those_of_wall_force(shape, platform):
     filaments, system, _ = _filaments()
@@ -80,16 +80,16 @@ def test_energy_and_forces_are_those_of_wall_force(shape, platform):
     points[:2] = [[0.1, 0.2, 0.3], [0.1, 0, 0]]
     context = new_context(_alone(system, force), points, platform=platform)
     energies = 0.5 * STIFFNESS * shape.square_depth(points)
-    assert energy_of(context) == pytest.approx(energies.sum(), rel=1e-6)
+    assert energy_of(context) == pytest.approx(energies.sum(), rel=max(1e-12, platform.tolerance))
     assert energies.sum() > 100
     forces = forces_of(context)
     other = new_context(_alone(system, wall_force(shape, STIFFNESS, range(count))), points)
-    np.testing.assert_allclose(forces, forces_of(other), atol=1e-4 if platform == "CPU" else 1e-10)
+    np.testing.assert_allclose(forces, forces_of(other), atol=platform.tolerance * np.abs(forces).max())
     width = 1e-5
     for axis in range(3):
         step = width * np.eye(3)[axis]
         slope = (shape.square_depth(points + step) - shape.square_depth(points - step)) / (2 * width)
-        np.testing.assert_allclose(forces[:, axis], -0.5 * STIFFNESS * slope, atol=1e-3)
+        np.testing.assert_allclose(forces[:, axis], -0.5 * STIFFNESS * slope, atol=max(1e-3, 40 * platform.tolerance))
 
 
 @pytest.mark.parametrize("shape, smaller", SMALLER, ids=[_name(one) for one in SMALLER])
@@ -139,11 +139,12 @@ def test_copies_pickles_and_xml(shape):
     assert as_filament_wall_force(openmm.HarmonicBondForce()) is None
 
 
-def test_a_wall_moves_in_one_of_two_contexts():
+@ON_COMPILED_PLATFORMS
+def test_a_wall_moves_in_one_of_two_contexts(platform):
     filaments, system, _ = _filaments(1, 1)
     host = _alone(system, filament_wall_force(filaments, system, Plane([0, 0, 0], [0, 0, 1]), 2.0))
     force = as_filament_wall_force(host.getForce(0))
-    contexts = [new_context(host, [[0, 0, 1], [5, 0, -1]]) for _ in range(2)]
+    contexts = [new_context(host, [[0, 0, 1], [5, 0, -1]], platform=platform) for _ in range(2)]
     assert [energy_of(context) for context in contexts] == [1.0, 1.0]
     force.setRegion("plane", openmm.Vec3(0, 0, 3) * unit.nanometer, openmm.Vec3(0, 0, 2), 0)
     force.setStiffness(4 * unit.kilojoule_per_mole / unit.nanometer**2)

@@ -128,6 +128,41 @@ def test_filaments_cross_a_periodic_box_while_particles_are_reordered(gpu):
     assert np.abs(positions_of(found) - end).max() < 1e-2
 
 
+def _far_context(platform, precision=None):
+    """Filaments some boxes away from each other, with links, a wall and contacts that are not periodic."""
+    filaments = Filaments(VISCOSITY, TEMPERATURE, "compiled")
+    for number, where in enumerate(([0, 0, 0], [0, 3 * BOX, 200], [0, 300, -2 * BOX], [10, 312, -2 * BOX])):
+        filaments.add_equilibrium(ACTIN, 10, seed=number, start=np.add([100.0, 240.0, 50.0], where))
+    _, system, positions = filaments.build()
+    links = Crosslinks(1e-4, 30.0)
+    links.add(None, filaments.segment_place(0, arc_length=100.0), filaments.segment_place(1, arc_length=100.0))
+    links.add_to(system)
+    system.addForce(filament_wall_force(filaments, system, Sphere((0, 0, -2 * BOX), 350.0), 1e-4))
+    system.addForce(capsule_contact_force(filaments, system, 25.0, 0.5, periodic=False))
+    system.setDefaultPeriodicBoxVectors(*(BOX * np.eye(3)))
+    repulsion = openmm.CustomNonbondedForce("20*(1-r/5)^2")
+    repulsion.setNonbondedMethod(openmm.CustomNonbondedForce.CutoffPeriodic)
+    repulsion.setCutoffDistance(5.0)
+    for _ in range(system.getNumParticles()):
+        repulsion.addParticle([])
+    system.addForce(repulsion)
+    integrator = filaments.create_integrator(
+        system, step_of_variant("open", "midpoint"), "midpoint", random_seed=4, precision="double", checks=False
+    )
+    return new_context(system, positions, integrator, platform, {"Precision": precision} if precision else {})
+
+
+def test_couplings_reach_across_periodic_boxes(gpu):
+    """OpenMM wraps filaments into the box after some hundred steps; what couples them must not see it."""
+    expected, found = _far_context("Reference"), _far_context(gpu, "double")
+    for context in (expected, found):
+        context.getIntegrator().step(300)
+    forces = forces_of(expected)
+    assert np.abs(forces).max() > 1 and np.abs(forces_of(found) - forces).max() < 1e-5 * np.abs(forces).max()
+    assert energy_of(found) == pytest.approx(energy_of(expected), rel=1e-6)
+    assert np.abs(positions_of(found) - positions_of(expected)).max() < TOLERANCES["double"]
+
+
 def test_failure_leaves_positions_before_the_step(gpu):
     context = _context("open", "implicit", gpu, "double")
     integrator = context.getIntegrator()

@@ -1,6 +1,7 @@
 #ifndef OPENMM_COMMONCOUPLINGKERNELS_H_
 #define OPENMM_COMMONCOUPLINGKERNELS_H_
 
+#include "CoupledParticles.h"
 #include "HostForces.h"
 #include "couplings/ContactSearch.h"
 #include "couplings/Links.h"
@@ -11,7 +12,7 @@ namespace OpenMM {
 
 /**
  * This kernel is invoked by CylinderChainLinkForce to calculate the forces acting on the system and the energy of the
- * system.  The processor computes them.
+ * system.
  */
 class CommonCalcCylinderChainLinkForceKernel : public CalcCylinderChainLinkForceKernel {
 public:
@@ -20,13 +21,19 @@ public:
     double execute(ContextImpl& context, const std::vector<cylchain::Link>& links, bool includeForces,
             bool includeEnergy, int& outOfRange);
 private:
-    HostForces host;
-    bool periodic, nearestParticles;
+    void upload(const std::vector<cylchain::Link>& present);
+    ComputeContext& cc;
+    CoupledParticles coupled;
+    int flags;
+    bool anyRange;
+    std::vector<cylchain::Link> links;
+    ComputeArray ends, numbers, energies, outOfRange, summary;
+    ComputeKernel kernel;
 };
 
 /**
  * This kernel is invoked by CylinderChainWallForce to calculate the forces acting on the system and the energy of the
- * system.  The processor computes them.
+ * system.
  */
 class CommonCalcCylinderChainWallForceKernel : public CalcCylinderChainWallForceKernel {
 public:
@@ -35,8 +42,13 @@ public:
     double execute(ContextImpl& context, bool includeForces, bool includeEnergy);
     void copyParametersToContext(ContextImpl& context, const cylchain::WallSystem& walls);
 private:
-    HostForces host;
+    void upload();
+    ComputeContext& cc;
+    CoupledParticles coupled;
     cylchain::WallSystem walls;
+    bool upToDate;
+    ComputeArray particles, radii, numbers, energies;
+    ComputeKernel kernel;
 };
 
 /**

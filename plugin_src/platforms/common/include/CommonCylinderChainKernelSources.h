@@ -22,6 +22,7 @@ struct CommonCylinderChainKernelSources {
     static const char* const chainForces;
     static const char* const chainKernels;
     static const char* const particles;
+    static const char* const couplings;
 };
 
 } // namespace OpenMM

@@ -84,7 +84,7 @@ public:
     /**
      * Compile kernels that have no chains.
      */
-    ComputeProgram compile(const std::string& source);
+    static ComputeProgram compile(ComputeContext& cc, const std::string& source);
 private:
     class ReorderListener;
     struct Batch;

@@ -52,3 +52,18 @@ enum {STRETCHING_ENERGY, BENDING_ENERGY, TETHER_ENERGY, NUM_ENERGIES};
 
 /** What went wrong in a step, and what was divided. */
 enum {NUM_UNSTABLE_CHAINS, NUM_DIVIDED_STEPS, NUM_UNSTABLE_PARTICLES, NUM_SUMMARY_NUMBERS};
+
+/** Where a particle that couplings act on is in the arrays of OpenMM, and by how many vectors of the box it is wrapped. */
+enum {PARTICLE_SLOT = 0, PARTICLE_CELLS = 1, NUM_PARTICLE_NUMBERS = 4};
+
+/** A link: the particles of its two places, or -1, and its numbers. */
+enum {NUM_LINK_ENDS = 4};
+enum {LINK_FRACTION = 0, LINK_POINT = 2, LINK_STIFFNESS = 8, LINK_REST_LENGTH, LINK_INVERSE_EXTENSION,
+        NUM_LINK_NUMBERS};
+
+/** What is true of links: where nearest images are taken in a periodic box. */
+enum {LINKS_ARE_PERIODIC = 1, PLACES_ARE_PERIODIC = 2};
+
+/** The shapes of walls, in the order of CYLCHAIN_WALL_SHAPES, and the numbers of a wall. */
+enum {WALL_PLANE, WALL_SLAB, WALL_SPHERE, WALL_CYLINDER, WALL_BOX, WALL_ELLIPSOID};
+enum {WALL_POINT = 0, WALL_VECTOR = 3, WALL_LENGTH = 6, WALL_STIFFNESS, NUM_WALL_NUMBERS};

@@ -91,7 +91,7 @@ CommonCylinderChains::CommonCylinderChains(ComputeContext& cc, const CylinderCha
     makeArray(cc, summary, vector<uint64_t>(layout::NUM_SUMMARY_NUMBERS), "summaryOfStep");
     cc.addReorderListener(new ReorderListener(slotsAreValid));
     makeBatches();
-    const ComputeProgram program = compile(CommonCylinderChainKernelSources::particles);
+    const ComputeProgram program = compile(cc, CommonCylinderChainKernelSources::particles);
     gatherKernel = program->createKernel("gatherNodes");
     scatterKernel = program->createKernel("scatterForces");
     moveKernel = program->createKernel("moveNodes");
@@ -100,7 +100,7 @@ CommonCylinderChains::CommonCylinderChains(ComputeContext& cc, const CylinderCha
 CommonCylinderChains::~CommonCylinderChains() {
 }
 
-ComputeProgram CommonCylinderChains::compile(const string& source) {
+ComputeProgram CommonCylinderChains::compile(ComputeContext& cc, const string& source) {
     typedef CommonCylinderChainKernelSources Sources;
     return cc.compileProgram(string(Sources::layout)+Sources::constants+Sources::vectors+Sources::noise+source);
 }

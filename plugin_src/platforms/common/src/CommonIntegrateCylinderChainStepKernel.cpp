@@ -55,7 +55,8 @@ void CommonIntegrateCylinderChainStepKernel::makeArrays() {
     mobilities.initialize<double>(cc, mobile.size(), "mobilities");
     displacementsOfOthers.initialize<double>(cc, 3*mobile.size(), "displacementsOfOthers");
     unstable.initialize<int>(cc, mobile.size(), "unstableParticles");
-    const ComputeProgram program = chainKernel->getChains().compile(CommonCylinderChainKernelSources::particles);
+    const ComputeProgram program = CommonCylinderChains::compile(cc,
+            CommonCylinderChainKernelSources::particles);
     displaceKernel = program->createKernel("displaceOthers");
     moveKernel = program->createKernel("moveOthers");
 }
