@@ -163,12 +163,13 @@ def test_places_on_segments_are_virtual_sites(platform):
         force.addLink(0, 1, 0.3, 2, -1, 0.0, HARMONIC, 0.4, 30.0, 0.0)
         return force
 
-    def results_of(force):
+    def results_of(force, platform=platform):
         context = new_context(system(force), np.vstack([positions, np.zeros((2, 3))]), platform=platform)
         context.computeVirtualSites()
         return [energy_of(context), *forces_of(context)[:8].ravel()]
 
-    expected = results_of(stock())
+    # On GPUs, OpenMM has rest lengths of bonds in single precision.
+    expected = results_of(stock(), "Reference")
     bounds = {"rel": max(1e-12, platform.tolerance), "abs": max(1e-9, 30 * platform.tolerance)}
     assert results_of(linked()) == pytest.approx(expected, **bounds)
     assert results_of(direct()) == pytest.approx(expected, **bounds)
@@ -182,7 +183,7 @@ def test_places_on_segments_are_virtual_sites(platform):
         new_context(system(force), np.zeros((10, 3)))
     # Sites that are not between their parents stay sites.
     weights[0] = (1.5, -0.5)
-    assert results_of(linked()) == pytest.approx(results_of(stock()), **bounds)
+    assert results_of(linked()) == pytest.approx(results_of(stock(), "Reference"), **bounds)
 
 
 @ON_COMPILED_PLATFORMS
