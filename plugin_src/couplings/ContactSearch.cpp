@@ -864,6 +864,10 @@ bool ContactSearch::isExcluded(int a, int b) const {
     return implementation->isExcluded(a, b);
 }
 
+int ContactSearch::getNeighbor(int capsule, bool atEnd) const {
+    return (atEnd ? implementation->next : implementation->previous).at(capsule);
+}
+
 static void runParts(const Loop& run, int parts, const function<void(int)>& part) {
     if (run)
         run(parts, part);

@@ -47,6 +47,8 @@ public:
     void setRadius(int capsule, double radius);
     /** Get whether two capsules never touch each other. */
     bool isExcluded(int a, int b) const;
+    /** Get the capsule of the same chain that begins where one ends, or ends where it begins, or -1. */
+    int getNeighbor(int capsule, bool atEnd) const;
     /**
      * Find the pairs of capsules whose surfaces come within reach of each other at x or at y, or that may pass through
      * each other on the way to y, or to where both have moved on by the reach together, sorted by a and b. They do not

@@ -4,7 +4,7 @@
 
 get_filename_component(OPENMM_LIBRARIES "${OPENMM_LIBRARY}" DIRECTORY)
 set(COMMON_KERNELS layout constants vectors noise potentials workspace stages tensionBand equations metricForces
-    implicitStep explicitStep chainForces chainKernels particles couplings)
+    implicitStep explicitStep chainForces chainKernels particles couplings contacts)
 list(TRANSFORM COMMON_KERNELS PREPEND "${CMAKE_CURRENT_SOURCE_DIR}/platforms/common/kernels/")
 list(TRANSFORM COMMON_KERNELS APPEND ".cc")
 set(KERNEL_SOURCES "${CMAKE_CURRENT_BINARY_DIR}/CommonCylinderChainKernelSources.cpp")

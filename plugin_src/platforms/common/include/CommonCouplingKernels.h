@@ -2,8 +2,6 @@
 #define OPENMM_COMMONCOUPLINGKERNELS_H_
 
 #include "CoupledParticles.h"
-#include "HostForces.h"
-#include "couplings/ContactSearch.h"
 #include "couplings/Links.h"
 #include "couplings/Walls.h"
 #include "openmm/CylinderChainKernels.h"
@@ -49,24 +47,6 @@ private:
     bool upToDate;
     ComputeArray particles, radii, numbers, energies;
     ComputeKernel kernel;
-};
-
-/**
- * This kernel is invoked by CylinderChainContactForce to calculate the forces acting on the system and the energy of
- * the system.  The processor computes them, and searches for pairs each time.
- */
-class CommonCalcCylinderChainContactForceKernel : public CalcCylinderChainContactForceKernel {
-public:
-    CommonCalcCylinderChainContactForceKernel(std::string name, const Platform& platform, ComputeContext& cc);
-    void initialize(const System& system, cylchain::ContactSearch& search, double stiffness, bool periodic);
-    double execute(ContextImpl& context, bool includeForces, bool includeEnergy);
-    void copyParametersToContext(ContextImpl& context, double stiffness);
-private:
-    HostForces host;
-    cylchain::ContactSearch* search;
-    double stiffness;
-    bool periodic;
-    std::vector<cylchain::ContactPair> pairs;
 };
 
 } // namespace OpenMM

@@ -23,6 +23,7 @@ struct CommonCylinderChainKernelSources {
     static const char* const chainKernels;
     static const char* const particles;
     static const char* const couplings;
+    static const char* const contacts;
 };
 
 } // namespace OpenMM

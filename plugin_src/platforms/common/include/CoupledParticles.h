@@ -39,6 +39,9 @@ public:
      * Find the positions of the particles now.
      */
     void gather();
+    ComputeArray& getPositions() {
+        return positions;
+    }
     /**
      * Copy the positions that were gathered to where those of all particles are.
      */
@@ -88,6 +91,11 @@ template <class T> void uploadTo(ComputeContext& cc, ComputeArray& array, std::v
     values.resize(array.getSize());
     array.upload(values);
 }
+
+/**
+ * Get the sum of the first values of an array of doubles.
+ */
+double sumOfValues(ComputeArray& array, int count);
 
 } // namespace OpenMM
 

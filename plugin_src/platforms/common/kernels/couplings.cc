@@ -30,7 +30,7 @@ inline DEVICE Vector positionOfParticle(GLOBAL const double* RESTRICT positions,
     return make_double3(positions[3*particle], positions[3*particle+1], positions[3*particle+2]);
 }
 
-/** Add a force on a particle. Sums do not depend on their order; a particle with a force too large for them is marked. */
+/** Add a force on a particle. Sums do not depend on their order. Where a force is too large for them, it is marked. */
 inline DEVICE void addToParticle(int particle, Vector force, int paddedNumAtoms,
         GLOBAL mm_ulong* RESTRICT forceBuffers, GLOBAL const int* RESTRICT images, GLOBAL int* RESTRICT marks) {
     // NaN fails.
@@ -85,8 +85,9 @@ KERNEL void computeLinks(int count, int flags, int includesForces, int paddedNum
         GLOBAL const int* end = ends+i*NUM_LINK_ENDS;
         GLOBAL const double* own = numbers+(size_t) i*NUM_LINK_NUMBERS;
         const int arePeriodic = flags&PLACES_ARE_PERIODIC;
-        Vector between = locatePlace(end[2], end[3], own[LINK_FRACTION+1], own+LINK_POINT+3, positions, box, arePeriodic)
-                -locatePlace(end[0], end[1], own[LINK_FRACTION], own+LINK_POINT, positions, box, arePeriodic);
+        Vector between = locatePlace(end[2], end[3], own[LINK_FRACTION+1], own+LINK_POINT+3, positions, box,
+                arePeriodic)-locatePlace(end[0], end[1], own[LINK_FRACTION], own+LINK_POINT, positions, box,
+                arePeriodic);
         if (flags&LINKS_ARE_PERIODIC)
             between = nearestImage(between, box);
         const double length = sqrt(product(between, between)), extension = length-own[LINK_REST_LENGTH];

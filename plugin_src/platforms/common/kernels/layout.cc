@@ -53,7 +53,7 @@ enum {STRETCHING_ENERGY, BENDING_ENERGY, TETHER_ENERGY, NUM_ENERGIES};
 /** What went wrong in a step, and what was divided. */
 enum {NUM_UNSTABLE_CHAINS, NUM_DIVIDED_STEPS, NUM_UNSTABLE_PARTICLES, NUM_SUMMARY_NUMBERS};
 
-/** Where a particle that couplings act on is in the arrays of OpenMM, and by how many vectors of the box it is wrapped. */
+/** Where a particle of couplings is in the arrays of OpenMM, and by how many vectors of the box it is wrapped. */
 enum {PARTICLE_SLOT = 0, PARTICLE_CELLS = 1, NUM_PARTICLE_NUMBERS = 4};
 
 /** A link: the particles of its two places, or -1, and its numbers. */
@@ -67,3 +67,10 @@ enum {LINKS_ARE_PERIODIC = 1, PLACES_ARE_PERIODIC = 2};
 /** The shapes of walls, in the order of CYLCHAIN_WALL_SHAPES, and the numbers of a wall. */
 enum {WALL_PLANE, WALL_SLAB, WALL_SPHERE, WALL_CYLINDER, WALL_BOX, WALL_ELLIPSOID};
 enum {WALL_POINT = 0, WALL_VECTOR = 3, WALL_LENGTH = 6, WALL_STIFFNESS, NUM_WALL_NUMBERS};
+
+/**
+ * A pair of capsules: the particles of the first and of the second, of either the ones before and behind it in its
+ * chain (-1 where that neighbor cannot have the contact), and its side; and its numbers.
+ */
+enum {CONTACT_SIDE = 8, NUM_CONTACT_ENDS};
+enum {CONTACT_SHIFT = 0, CONTACT_RADII = 3, NUM_CONTACT_NUMBERS};

@@ -1,12 +1,7 @@
 #include "CommonCouplingKernels.h"
 #include "ChainTables.h"
-#include "openmm/OpenMMException.h"
 #include "openmm/common/ContextSelector.h"
-#include "openmm/internal/ContextImpl.h"
 #include <algorithm>
-#include <functional>
-#include <numeric>
-#include <stdexcept>
 
 using namespace OpenMM;
 using namespace cylchain;
@@ -17,12 +12,6 @@ using namespace std;
 static_assert((int) WallShape::Plane == layout::WALL_PLANE && (int) WallShape::Slab == layout::WALL_SLAB &&
         (int) WallShape::Sphere == layout::WALL_SPHERE && (int) WallShape::Cylinder == layout::WALL_CYLINDER &&
         (int) WallShape::Box == layout::WALL_BOX && (int) WallShape::Ellipsoid == layout::WALL_ELLIPSOID, "");
-
-static double sumOf(ComputeArray& energies, int count) {
-    vector<double> found(energies.getSize());
-    energies.download(found);
-    return accumulate(found.begin(), found.begin()+count, 0.0);
-}
 
 CommonCalcCylinderChainLinkForceKernel::CommonCalcCylinderChainLinkForceKernel(string name, const Platform& platform,
         ComputeContext& cc) : CalcCylinderChainLinkForceKernel(name, platform), cc(cc), coupled(cc), flags(0),
@@ -105,7 +94,7 @@ double CommonCalcCylinderChainLinkForceKernel::execute(ContextImpl&, const vecto
             firstOutOfRange = find(found.begin(), found.end(), 1)-found.begin();
         }
     }
-    return includeEnergy ? sumOf(energies, links.size()) : 0;
+    return includeEnergy ? sumOfValues(energies, links.size()) : 0;
 }
 
 CommonCalcCylinderChainWallForceKernel::CommonCalcCylinderChainWallForceKernel(string name, const Platform& platform,
@@ -159,66 +148,10 @@ double CommonCalcCylinderChainWallForceKernel::execute(ContextImpl&, bool includ
     kernel->execute(walls.particles.size());
     if (includeForces)
         coupled.finishForces();
-    return includeEnergy ? sumOf(energies, walls.particles.size()) : 0;
+    return includeEnergy ? sumOfValues(energies, walls.particles.size()) : 0;
 }
 
 void CommonCalcCylinderChainWallForceKernel::copyParametersToContext(ContextImpl&, const WallSystem& walls) {
     this->walls = walls;
     upToDate = false;
-}
-
-CommonCalcCylinderChainContactForceKernel::CommonCalcCylinderChainContactForceKernel(string name,
-        const Platform& platform, ComputeContext& cc) : CalcCylinderChainContactForceKernel(name, platform), host(cc),
-        search(NULL), stiffness(0), periodic(false) {
-}
-
-void CommonCalcCylinderChainContactForceKernel::initialize(const System&, ContactSearch& search, double stiffness,
-        bool periodic) {
-    this->search = &search;
-    this->stiffness = stiffness;
-    this->periodic = periodic;
-}
-
-double CommonCalcCylinderChainContactForceKernel::execute(ContextImpl& context, bool includeForces, bool) {
-    const vector<Capsule>& capsules = search->getSystem().capsules;
-    if (capsules.empty())
-        return 0;
-    vector<Vec3>& positions = host.begin(context);
-    vector<Vec3>& forces = host.getForces();
-    Vec3 box[3];
-    context.getPeriodicBoxVectors(box[0], box[1], box[2]);
-    const double* x = &positions[0][0];
-    try {
-        search->findPairs(x, x, periodic ? &box[0][0] : NULL, 0, pairs, [] (int count,
-                const function<void(int)>& iteration) {
-            for (int i = 0; i < count; i++)
-                iteration(i);
-        });
-    }
-    catch (const invalid_argument& error) {
-        throw OpenMMException(string("CylinderChainContactForce: ")+error.what());
-    }
-    double energy = 0;
-    for (const ContactPair& pair : pairs) {
-        Contact contacts[2];
-        const int count = search->evaluate(pair, x, x, contacts, 0);
-        for (int i = 0; i < count; i++) {
-            const Contact& contact = contacts[i];
-            const double k = contact.weight*stiffness;
-            energy += 0.5*k*contact.gap*contact.gap;
-            const Vec3 force = Vec3(contact.normal[0], contact.normal[1], contact.normal[2])*(-k*contact.gap);
-            const Capsule &a = capsules[pair.a], &b = capsules[pair.b];
-            forces[a.first] += force*(1-contact.s);
-            forces[a.end()] += force*contact.s;
-            forces[b.first] -= force*(1-contact.t);
-            forces[b.end()] -= force*contact.t;
-        }
-    }
-    if (includeForces)
-        host.add();
-    return energy;
-}
-
-void CommonCalcCylinderChainContactForceKernel::copyParametersToContext(ContextImpl&, double stiffness) {
-    this->stiffness = stiffness;
 }

@@ -1,4 +1,5 @@
 #include "CommonCylinderChainKernels.h"
+#include "CommonCalcCylinderChainContactForceKernel.h"
 #include "CommonCalcCylinderChainForceKernel.h"
 #include "CommonCouplingKernels.h"
 #include "CommonIntegrateCylinderChainStepKernel.h"

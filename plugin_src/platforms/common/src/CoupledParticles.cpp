@@ -3,9 +3,16 @@
 #include "CommonCylinderChainKernelSources.h"
 #include "CommonCylinderChains.h"
 #include <algorithm>
+#include <numeric>
 
 using namespace OpenMM;
 using namespace std;
+
+double OpenMM::sumOfValues(ComputeArray& array, int count) {
+    vector<double> found(array.getSize());
+    array.download(found);
+    return accumulate(found.begin(), found.begin()+count, 0.0);
+}
 
 CoupledParticles::CoupledParticles(ComputeContext& cc) : cc(cc), boxNumbers(9) {
 }
@@ -28,7 +35,8 @@ int CoupledParticles::numberOf(int particle) const {
 
 ComputeKernel CoupledParticles::createKernel(const string& name) {
     if (!program)
-        program = CommonCylinderChains::compile(cc, CommonCylinderChainKernelSources::couplings);
+        program = CommonCylinderChains::compile(cc, string(CommonCylinderChainKernelSources::couplings)+
+                CommonCylinderChainKernelSources::contacts);
     return program->createKernel(name);
 }
 
