@@ -18,19 +18,21 @@ add_custom_command(
 set(GPU_PLUGINS "")
 set(PLATFORMS_TEXT "")
 
-# A plugin for a platform, from the Common sources and those of its own folder.
+# A plugin for a platform, from the Common sources and those of its own folder. What the processor does for it, such as
+# the binding of linkers, is in the plugin for Reference.
 function(add_gpu_plugin name folder library)
     file(GLOB sources CONFIGURE_DEPENDS platforms/common/src/*.cpp platforms/${folder}/src/*.cpp)
     add_library(OpenMMCylinderChain${name} SHARED ${sources} "${KERNEL_SOURCES}")
     target_include_directories(OpenMMCylinderChain${name} PRIVATE platforms/common/include platforms/${folder}/include)
     target_include_directories(OpenMMCylinderChain${name} SYSTEM PRIVATE ${ARGN})
-    target_link_libraries(OpenMMCylinderChain${name} PRIVATE OpenMMCylinderChain CylinderChainMechanics "${library}")
+    target_link_libraries(OpenMMCylinderChain${name} PRIVATE OpenMMCylinderChain OpenMMCylinderChainReference
+        CylinderChainMechanics "${library}")
     target_compile_options(OpenMMCylinderChain${name} PRIVATE -Wall -Wextra -Werror=switch)
     # Each platform has classes of the same names, and so do these plugins.
     set_target_properties(OpenMMCylinderChain${name} PROPERTIES
         CXX_VISIBILITY_PRESET hidden
         UNITY_BUILD "${CYLCHAIN_UNITY}" UNITY_BUILD_BATCH_SIZE 0
-        INSTALL_RPATH "${ORIGIN}/..;${ORIGIN}/../../../${OPENMM_RPATH};${ORIGIN}/../../../${OPENMM_RPATH}/plugins${OTHER_RPATH}")
+        INSTALL_RPATH "${ORIGIN};${ORIGIN}/..;${ORIGIN}/../../../${OPENMM_RPATH};${ORIGIN}/../../../${OPENMM_RPATH}/plugins${OTHER_RPATH}")
     set(GPU_PLUGINS ${GPU_PLUGINS} OpenMMCylinderChain${name} PARENT_SCOPE)
 endfunction()
 

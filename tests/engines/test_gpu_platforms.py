@@ -279,16 +279,65 @@ def test_implicit_steps_with_couplings_are_refused(gpu, what):
     assert np.array_equal(positions_of(context), before)
 
 
-def test_linkers_are_refused_with_the_context(gpu):
+def _linked_context(platform, precision=None, scheme="midpoint"):
+    """Filaments in a periodic box with crosslinkers, motors and anchored ones, whose hands come and go fast."""
     filaments = Filaments(VISCOSITY, TEMPERATURE, "compiled")
-    for number in range(2):
-        filaments.add_equilibrium(ACTIN, 10, seed=number, start=[0.0, 30.0 * number, 0.0])
-    hand = Hand(binding_rate=3e-8, reach=60.0, unbinding_rate=2e-9)
-    filaments.add_linkers(Crosslinker(hands=hand, stiffness=0.06), count=5, volume=1e8)
-    _, system, positions = filaments.build()
-    integrator = filaments.create_integrator(system, 1e3, "implicit", checks=False)
-    with pytest.raises(openmm.OpenMMException, match=f"{gpu} platform does not compute .*on the CPU platform"):
-        new_context(system, positions, integrator, gpu)
+    generator = np.random.default_rng(1)
+    for number in range(12):
+        filaments.add_equilibrium(ACTIN, 8, seed=number, start=generator.uniform(0.0, 400.0, 3))
+    hand = Hand(binding_rate=3e-4, reach=80.0, unbinding_rate=1e-5, unbinding_force=5.0)
+    motor = Hand(binding_rate=3e-4, reach=80.0, unbinding_rate=1e-5, speed=1e-3, stall_force=10.0)
+    filaments.add_linkers(Crosslinker(hands=hand, stiffness=0.06, rest_length=50.0), count=60)
+    filaments.add_linkers(Crosslinker(hands=motor, stiffness=0.06, rest_length=50.0), count=40)
+    filaments.add_linkers(
+        Crosslinker(hands=hand, stiffness=0.06, rest_length=50.0), anchors=generator.uniform(0.0, 400.0, (20, 3))
+    )
+    _, system, positions = filaments.build(box_vectors=400.0 * np.eye(3))
+    step = step_of_variant("open", "midpoint")
+    integrator = filaments.create_integrator(system, step, scheme, random_seed=4, precision="double", checks=False)
+    properties = {"Precision": precision} if precision else {}
+    return filaments, new_context(system, positions, integrator, platform, properties)
+
+
+def test_linkers_bind_walk_and_pull_at_explicit_steps(gpu):
+    """Hands are where they are on the Reference platform, after many have bound and unbound; so are filaments."""
+    tables, ends, energies = [], [], []
+    for platform, precision in (("Reference", None), (gpu, "double")):
+        filaments, context = _linked_context(platform, precision)
+        start = filaments.linkers_in(context)
+        context.getIntegrator().step(100)
+        tables.append(filaments.linkers_in(context))
+        ends.append(positions_of(context))
+        energies.append(energy_of(context))
+    assert tables[0].counts()[2] > 20 and start.counts()[2] == 0
+    assert np.array_equal(tables[1].filaments, tables[0].filaments)
+    assert tables[1].arc_lengths == pytest.approx(tables[0].arc_lengths, abs=1e-3)
+    assert np.abs(ends[1] - ends[0]).max() < TOLERANCES["double"]
+    assert energies[1] == pytest.approx(energies[0], rel=1e-6)
+
+
+def test_linkers_continue_from_checkpoints(gpu):
+    filaments, context = _linked_context(gpu, "mixed")
+    integrator = context.getIntegrator()
+    integrator.step(40)
+    checkpoint = context.createCheckpoint()
+    ends = []
+    for _ in range(2):
+        integrator.step(40)
+        ends.append((positions_of(context), filaments.linkers_in(context)))
+        context.loadCheckpoint(checkpoint)
+    assert ends[0][1].counts()[2] > 20
+    assert np.array_equal(ends[0][0], ends[1][0])
+    assert np.array_equal(ends[0][1].filaments, ends[1][1].filaments)
+
+
+def test_implicit_steps_with_linkers_are_refused(gpu):
+    """Before the first step, though no linker is bound then."""
+    _, context = _linked_context(gpu, "double", "implicit")
+    before = positions_of(context)
+    with pytest.raises(openmm.OpenMMException, match=f"On the {gpu} platform, filaments with linkers take explicit"):
+        context.getIntegrator().step(1)
+    assert np.array_equal(positions_of(context), before) and context.getStepCount() == 0
 
 
 def test_modes_are_refused_with_the_context(gpu):

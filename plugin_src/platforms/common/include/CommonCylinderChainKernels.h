@@ -10,8 +10,7 @@
 namespace OpenMM {
 
 /**
- * Get the names of the kernels that platforms for GPUs know.  Some of them are refused when a Context is created, with
- * what to do instead; OpenMM would say of a kernel that it does not know only that there is one.
+ * Get the names of the kernels that platforms for GPUs know.
  */
 std::vector<std::string> getCommonKernelNames();
 

@@ -3,6 +3,7 @@
 #include "CommonCalcCylinderChainForceKernel.h"
 #include "CommonCouplingKernels.h"
 #include "CommonIntegrateCylinderChainStepKernel.h"
+#include "CommonUpdateCylinderChainLinkersKernel.h"
 #include "openmm/OpenMMException.h"
 
 using namespace OpenMM;
@@ -25,8 +26,7 @@ KernelImpl* OpenMM::createCommonKernel(const string& name, const Platform& platf
         return new CommonCalcCylinderChainWallForceKernel(name, platform, cc);
     if (name == CalcCylinderChainContactForceKernel::Name())
         return new CommonCalcCylinderChainContactForceKernel(name, platform, cc);
-    if (name != UpdateCylinderChainLinkersKernel::Name())
-        throw OpenMMException("Tried to create kernel with illegal kernel name '"+name+"'");
-    throw OpenMMException("The "+platform.getName()+" platform does not compute linkers that bind and unbind "
-            "(CylinderChainBindingForce) of the compiled engine. Create the Context on the CPU platform");
+    if (name == UpdateCylinderChainLinkersKernel::Name())
+        return new CommonUpdateCylinderChainLinkersKernel(name, platform, cc);
+    throw OpenMMException("Tried to create kernel with illegal kernel name '"+name+"'");
 }

@@ -1,0 +1,64 @@
+#include "CommonUpdateCylinderChainLinkersKernel.h"
+#include "dynamics/ChainEngine.h"
+#include "openmm/CylinderChainIntegrator.h"
+#include "openmm/OpenMMException.h"
+#include "openmm/common/ContextSelector.h"
+#include "openmm/internal/ContextImpl.h"
+#include <functional>
+
+using namespace OpenMM;
+using namespace cylchain;
+using namespace std;
+
+CommonUpdateCylinderChainLinkersKernel::CommonUpdateCylinderChainLinkersKernel(string name, const Platform& platform,
+        ComputeContext& cc) : UpdateCylinderChainLinkersKernel(name, platform), cc(cc), coupled(cc), periodic(false),
+        nearestParticles(false) {
+}
+
+void CommonUpdateCylinderChainLinkersKernel::initialize(const LinkerSystem& system, const vector<Chain>& chains,
+        bool periodic, bool nearestParticles) {
+    kinetics.reset(new LinkerKinetics(system, chains));
+    this->periodic = periodic;
+    this->nearestParticles = nearestParticles;
+    for (const Chain& chain : chains)
+        particles.insert(particles.end(), chain.nodes.begin(), chain.nodes.end());
+    for (const Place& anchor : system.anchors)
+        if (!anchor.isPoint())
+            particles.push_back(anchor.first);
+}
+
+void CommonUpdateCylinderChainLinkersKernel::refuseImplicitSteps(ContextImpl& context) {
+    // Where no linker joins filaments yet, a step would know nothing of them.
+
+    const CylinderChainIntegrator* integrator = dynamic_cast<const CylinderChainIntegrator*>(
+            &context.getIntegrator());
+    if (integrator != NULL && isImplicit(static_cast<Scheme>(integrator->getScheme())))
+        throw OpenMMException("On the "+getPlatform().getName()+" platform, filaments with linkers take explicit "
+                "steps. Use scheme \"euler\" or \"midpoint\", or the CPU platform");
+}
+
+long long CommonUpdateCylinderChainLinkersKernel::execute(ContextImpl& context, LinkerState& state, double kT,
+        double stepSize, uint32_t seed, int force, vector<Link>& links) {
+    refuseImplicitSteps(context);
+    ContextSelector selector(cc);
+    if (positions.empty()) {
+        positions.resize(cc.getNumAtoms());
+        coupled.setParticles(particles);
+    }
+    coupled.gather();
+    coupled.downloadPositions(positions);
+    const double* box = coupled.getBoxNumbers().data();
+    KineticStep step = {&positions[0][0], LinkBoxes(), box[0]*box[4]*box[8], stepSize, seed,
+            static_cast<uint32_t>(force)};
+    step.boxes.distances = periodic ? box : NULL;
+    step.boxes.segments = nearestParticles ? box : NULL;
+    kinetics->setTemperature(kT);
+    return kinetics->advance(state, step, [] (int count, const function<void(int)>& iteration) {
+        for (int i = 0; i < count; i++)
+            iteration(i);
+    }, &links);
+}
+
+void CommonUpdateCylinderChainLinkersKernel::describe(const LinkerState& state, vector<Link>& links) {
+    kinetics->describe(state, links);
+}
