@@ -93,7 +93,7 @@ def compile_to_ptx(source, architecture):
 
 
 def resources_of(ptx, architecture, folder):
-    """Registers, bytes of stack and bytes of spilled registers of each kernel."""
+    """Registers, bytes of stack and bytes of spilled registers of each kernel, with the functions that it calls."""
     file = folder / "kernels.ptx"
     file.write_text(ptx)
     result = subprocess.run(
@@ -103,14 +103,13 @@ def resources_of(ptx, architecture, folder):
         check=True,
     )
     found = {}
-    pattern = (
-        r"Compiling entry function '(\w+)'.*?(\d+) bytes stack frame, (\d+) bytes spill stores, (\d+) bytes spill loads"
-        r".*?Used (\d+) registers"
-    )
-    for name, stack, stores, loads, registers in re.findall(pattern, result.stderr, re.DOTALL):
+    for text in result.stderr.split("Compiling entry function")[1:]:
+        name = re.match(r" '(\w+)'", text).group(1)
+        stack = re.search(r"(\d+) bytes stack frame", text).group(1)
+        spills = re.findall(r"(\d+) bytes spill stores, (\d+) bytes spill loads", text)
         found[name] = {
-            "registers": int(registers),
+            "registers": int(re.search(r"Used (\d+) registers", text).group(1)),
             "stack": int(stack),
-            "spills": int(stores) + int(loads),
+            "spills": sum(int(stores) + int(loads) for stores, loads in spills),
         }
     return found

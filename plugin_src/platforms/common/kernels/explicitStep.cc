@@ -167,7 +167,7 @@ DEVICE void addRandomForces(const Step* step, bool isEuler) {
 }
 
 /** Take a step; MOVED is how far nodes move. Returns whether no segment has changed too much. */
-DEVICE bool takeExplicitStep(Step* step, GLOBAL const double* forces, bool isEuler) {
+CALLED DEVICE bool takeExplicitStep(Step* step, GLOBAL const double* forces, bool isEuler) {
     Vector x = positionOf(step, 0);
     for (int node = 0; node < step->nodes; node++) {
         storeVector(step, NODE, node, x);

@@ -203,7 +203,7 @@ DEVICE bool takePart(Step* step, GLOBAL const double* forces, bool divided) {
  *
  * @return the number of times that the step was divided, or -1 if it cannot be taken
  */
-DEVICE int takeStep(Step* step, GLOBAL const double* forces) {
+CALLED DEVICE int takeStep(Step* step, GLOBAL const double* forces) {
     const NoiseKey key = step->key;
     const double h = step->h;
     int division = 0;
