@@ -321,6 +321,19 @@ def test_explicit_steps_with_couplings_agree(gpu, what):
     assert np.abs(positions_of(found) - end).max() < TOLERANCES["double"]
 
 
+def test_a_link_out_of_its_range_is_named_before_the_step(gpu):
+    filaments, system, positions, arguments = filaments_of_variant("open")
+    links = Crosslinks(0.1, 30.0, "fene", 40.0)
+    links.add(None, filaments.segment_place(0, segment=1), filaments.segment_place(1, segment=1))
+    links.add_to(system)
+    integrator = filaments.create_integrator(system, 1.0, "midpoint", random_seed=4, checks=False, **arguments)
+    context = new_context(system, positions, integrator, gpu, {"Precision": "mixed"})
+    before = positions_of(context)
+    with pytest.raises(InstabilityError, match="its length of [0-9.]+ nm is outside 30"):
+        integrator.step(1)
+    assert np.array_equal(positions_of(context), before) and context.getStepCount() == 0
+
+
 @pytest.mark.parametrize("what", COUPLINGS)
 def test_implicit_steps_with_couplings_are_refused(gpu, what):
     context = _coupled_context(what, "implicit", gpu, {"Precision": "double"})
