@@ -47,11 +47,12 @@ def _trajectory(engine, platform, scheme, steps=100):
     for name in ("fx", "fy", "fz"):
         external.addPerParticleParameter(name)
     generator = np.random.default_rng(7)
+    # OpenMM keeps parameters of these forces in single precision on GPUs.
     for particle in range(system.getNumParticles()):
-        external.addParticle(particle, generator.normal(size=3))
+        external.addParticle(particle, generator.normal(size=3).astype(np.float32).astype(float))
     system.addForce(external)
     bond = openmm.HarmonicBondForce()
-    bond.addBond(2, int(filaments.node_indices[0][20]), 100.0, 0.01)
+    bond.addBond(2, int(filaments.node_indices[0][20]), 100.0, 2.0**-7)
     system.addForce(bond)
     friction = stokes_friction(50, VISCOSITY)
     integrator = filaments.create_integrator(
