@@ -13,7 +13,7 @@ PROJECTIONS = ("perspective", "orthographic")
 _DISTANCES = {"perspective": 3.5, "orthographic": 3000.0}
 _MARGIN = 0.06
 # Of the smallest extent over the middle one: what is flatter is seen from above.
-_FLAT = 0.2
+_FLAT = 0.35
 
 
 @dataclass(frozen=True)

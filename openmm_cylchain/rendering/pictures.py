@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..output.files import check_output_path, write_atomically
 from ..units.quantities import whole_number
 from ..units.types import FloatArray
-from .annotations import annotated
+from .annotations import annotated, clock_text, margins
 from .camera import camera_on
 from .scene import Look, legend_of, make_scene
 from .shading import shaded_image
@@ -53,13 +53,25 @@ class View:
 def images(run: Run, frames: list[int], look: Look, view: View) -> Iterator[FloatArray]:
     """Pictures (height, width, 3) of frames, as whole numbers from 0 to 255, all with one framing."""
     scene = make_scene(run, look, frames)
+    width, height = view.size
     direction = None if view.direction is None else np.array(view.direction)
+    turns = np.linspace(0.0, view.turn, len(frames)) if view.turn else np.zeros(1)
+
+    def cameras(free):
+        size = (width - free.left - free.right, height)
+        return [camera_on(scene.points, size, view.projection, direction, turn) for turn in turns]
+
+    free = margins(scene, cameras, view.size)
+    own = cameras(free)
+    # A picture of the start has the clock of the run.
+    times = run.times[frames] if np.any(run.times[frames] > 0.0) else run.times
     for number, frame in enumerate(frames):
-        turn = view.turn * number / max(len(frames) - 1, 1)
-        camera = camera_on(scene.points, view.size, view.projection, direction, turn)
+        camera = own[number % len(own)]
         # What is thinner than a pixel would be broken lines.
-        image = shaded_image(camera, scene.tubes(frame).at_least(0.4 / camera.scale), _BACKGROUND)
-        yield annotated(image, camera, scene, float(run.times[frame]), float(run.times[frames[-1]]))
+        shaded = shaded_image(camera, scene.tubes(frame).at_least(0.4 / camera.scale), _BACKGROUND)
+        image = np.tile(_BACKGROUND, (height, width, 1))
+        image[:, free.left : width - free.right] = shaded
+        yield annotated(image, camera, scene, clock_text(float(run.times[frame]), times))
 
 
 def write_picture(run: Run, frame: int, path: str | Path, look: Look | None = None, view: View | None = None) -> None:

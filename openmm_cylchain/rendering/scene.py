@@ -182,16 +182,8 @@ def _framed_points(run, look, frames):
         corners = np.array(np.meshgrid(*[[0.0, 1.0]] * 3)).reshape(3, 8).T
         return corners @ run.box
     sampled = {frames[round(place)] for place in np.linspace(0, len(frames) - 1, min(len(frames), 20))}
-    ends = []
-    for frame in sampled:
-        nodes = np.concatenate(run.nodes(frame))
-        ends += [nodes.min(axis=0), nodes.max(axis=0)]
-        if len(frames) == 1:
-            ends.extend(nodes)
-    walls = wall_lines(run, np.array(ends))
-    if walls:
-        ends.extend(np.concatenate(walls))
-    return np.array(ends)
+    nodes = np.concatenate([own for frame in sampled for own in run.nodes(frame)])
+    return np.concatenate([nodes, *wall_lines(run, nodes)])
 
 
 def _rgb(color):

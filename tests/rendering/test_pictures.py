@@ -11,7 +11,7 @@ from PIL import Image
 from openmm_cylchain import InputError, Plane, Slab, Sphere, analysis
 from openmm_cylchain.cli import main
 from openmm_cylchain.couplings.walls import Box, Cylinder, Ellipsoid
-from openmm_cylchain.rendering.annotations import scale_bar_length
+from openmm_cylchain.rendering.annotations import Margins, clock_text, margins, scale_bar_length
 from openmm_cylchain.rendering.camera import camera_on
 from openmm_cylchain.rendering.colors import filament_colors, linker_color
 from openmm_cylchain.rendering.pictures import View, images, write_film
@@ -83,6 +83,59 @@ def test_the_scale_bar_is_as_long_as_it_says(network):
     )
     assert np.all(np.diff(bar) == 1)
     assert len(bar) == pytest.approx(scale_bar_length(camera) * camera.scale, abs=2.0)
+
+
+@pytest.mark.parametrize(
+    ("time", "times", "text"),
+    [
+        (0.0, [0.0], "0"),
+        (0.0, [0.0, 2e9, 100e9], "0 ms"),
+        (2e9, [0.0, 2e9, 100e9], "2 ms"),
+        (4e12, [4e12], "4.00 s"),
+        (20e3, [0.0, 20e3, 40e3, 20e6], "0.02 µs"),
+        (20e6, [0.0, 20e3, 40e3, 20e6], "20.00 µs"),
+    ],
+)
+def test_the_clock(time, times, text):
+    assert clock_text(time, np.array(times)) == text
+
+
+def test_nothing_is_written_over_a_box(network):
+    run, size = analysis.load(network), (320, 240)
+    scene = make_scene(run, Look(), [0])
+
+    def cameras(free):
+        return [camera_on(scene.points, (size[0] - free.left - free.right, size[1]), view=np.array([0.0, 0.0, -1.0]))]
+
+    free = margins(scene, cameras, size)
+    (image,) = images(run, [0], Look(), View(size=size, direction=(0.0, 0.0, -1.0)))
+    dark = np.all(image[:100, :160] < 60, axis=2).any(axis=0)  # Text; lines of the box are lighter.
+    assert 0 < np.flatnonzero(dark).max() < free.left
+    # From there on there is something: the box.
+    lit = np.flatnonzero(np.any(image[110:180] < 200, axis=(0, 2)))
+    assert free.left <= lit.min() and lit.max() < size[0]
+    (bare,) = cameras(Margins(0, 0))
+    seen = bare.seen(scene.points)
+    assert (bare.distance * bare.scale * seen[:, 0] / -seen[:, 2]).min() + 160 < np.flatnonzero(dark).max()
+
+
+def test_wide_scenes_make_room_for_the_scale_of_colors(two_types, tmp_path):
+    plain = picture(two_types, tmp_path, "--size", "640x200", "--view", "0,1,0", "--whole")
+    scaled = picture(two_types, tmp_path, "--size", "640x200", "--view", "0,1,0", "--whole", "--color", "bending")
+    for image, right in ((plain, 640), (scaled, 560)):
+        colored = np.ptp(image[:, :560], axis=2).max(axis=0) > 30
+        assert np.any(colored) and np.flatnonzero(colored).max() < right
+
+
+@pytest.mark.parametrize("direction", [(1.0, -1.0, 0.0), (1.0, 1.0, -1.0), (-0.42, 0.83, -0.36)])
+def test_films_show_all_filaments(two_types, direction):
+    run = analysis.load(two_types)
+    frames = [0, 10, 20, 30]
+    scene = make_scene(run, Look(), frames)
+    camera = camera_on(scene.points, (320, 240), view=np.array(direction))
+    seen = camera.seen(np.concatenate([nodes for frame in frames for nodes in run.nodes(frame)]))
+    places = camera.distance * camera.scale * seen[:, :2] / -seen[:, 2:]
+    assert np.all(np.abs(places) < [160, 120])
 
 
 @pytest.mark.parametrize("color", COLORINGS)
