@@ -13,6 +13,7 @@ FLOORS = (
     ("engine_choice",),
     ("units",),
     ("mechanics",),
+    ("beams",),
     ("filaments",),
     ("bead_spring",),
     ("theory",),

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from ..errors import InputError
+from ..filaments.beam_refusals import refuse_beams
 from ..filaments.collection import FilamentCollection
 from ..units.quantities import LENGTH, in_units_of, positive
 from ..units.types import BoolArray, BoxVectors, FloatArray, IntArray, Scalar, Vectors
@@ -240,6 +241,7 @@ class _Segments:
 
 
 def _chains_of(filaments):
+    refuse_beams(filaments, "the search for crossings")
     pairs = zip(filaments, filaments.node_indices)
     return [np.append(nodes, nodes[0]) if filament.closed else nodes for filament, nodes in pairs]
 

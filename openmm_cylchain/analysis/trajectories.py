@@ -2,6 +2,8 @@
 
 A filament is a chain of the topology; its nodes are the atoms of that chain with the name "NOD", in order. It is a ring
 if a bond joins the last one to the first.
+Of a filament of beam elements, whose control points have the name "CTL", functions take the curve: arc lengths of its
+elements, tangents at its nodes, and points along all of it.
 Anything else in the trajectory is left alone. Positions have to be those of whole filaments, not wrapped
 into a periodic box (``periodic`` makes them whole). Results are plain numbers in OpenMM's units (nm, ps).
 
@@ -17,11 +19,14 @@ from dataclasses import dataclass
 import mdtraj
 import numpy as np
 
+from ..beams.curve import arc_lengths, curve_points
 from ..errors import EquilibrationWarning, InputError
-from ..filaments.filament import NODE_NAME
+from ..filaments.filament import CONTROL_POINT_NAME, NODE_NAME
 from ..units.quantities import DIMENSIONLESS, LENGTH, TIME, in_units_of, positive, shown, whole_number
 from ..units.types import BoolArray, FloatArray, Indices, IntArray, Scalar
 from .statistics import FEWEST_FRAMES_OF_DRIFT, SIGNIFICANT_DRIFT, drift, mean_with_error
+
+_POINTS_OF_ELEMENT = 8
 
 
 def filament_nodes(trajectory_or_topology: mdtraj.Trajectory | mdtraj.Topology) -> list[IntArray]:
@@ -57,6 +62,29 @@ def node_positions(trajectory: mdtraj.Trajectory, filaments: int | Indices | Non
     """Positions of the nodes: a list of (frames, nodes, 3) arrays in nm."""
     nodes = filament_nodes(trajectory)
     return [trajectory.xyz[:, nodes[index]].astype(float) for index in _selection(filaments, len(nodes))]
+
+
+def control_point_positions(
+    trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None
+) -> list[FloatArray | None]:
+    """Positions of the control points: a list of (frames, nodes, 3) arrays in nm, None without beam elements."""
+    nodes, positions = filament_nodes(trajectory), []
+    for index in _selection(filaments, len(nodes)):
+        chain = trajectory.topology.atom(int(nodes[index][0])).residue.chain
+        own = [atom.index for atom in chain.atoms if atom.name == CONTROL_POINT_NAME]
+        if len(own) not in (0, len(nodes[index])):
+            raise InputError(
+                f"Filament {index} has {len(nodes[index])} nodes, but {len(own)} control points "
+                f"({CONTROL_POINT_NAME}): take all of its atoms."
+            )
+        positions.append(trajectory.xyz[:, own].astype(float) if own else None)
+    return positions
+
+
+def _polylines(trajectory, filaments):
+    # Nodes, or of beam elements points along their curve.
+    pairs = zip(node_positions(trajectory, filaments), control_point_positions(trajectory, filaments))
+    return [nodes if own is None else curve_points(nodes, own, _POINTS_OF_ELEMENT) for nodes, own in pairs]
 
 
 def _selection(filaments, count):
@@ -103,8 +131,11 @@ def end_to_end_vectors(trajectory: mdtraj.Trajectory, filaments: int | Indices |
 
 
 def radii_of_gyration(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> FloatArray:
-    """Radii of gyration of the nodes, all of one weight: (frames, filaments) array in nm."""
-    positions = node_positions(trajectory, filaments)
+    """Radii of gyration of the nodes, all of one weight: (frames, filaments) array in nm.
+
+    Of beam elements, those of the curve.
+    """
+    positions = _polylines(trajectory, filaments)
     return np.stack([np.sqrt(np.var(p, axis=1).sum(axis=-1)) for p in positions], axis=1)
 
 
@@ -112,8 +143,8 @@ def centers_of_mass(trajectory: mdtraj.Trajectory, filaments: int | Indices | No
     """Mean of the segments' midpoints, all of one weight: (frames, filaments, 3) array in nm."""
     rings = ring_filaments(trajectory)
     selected = _selection(filaments, len(rings))
-    nodes = node_positions(trajectory, filaments)
-    return np.stack([_center(p, rings[index]) for index, p in zip(selected, nodes)], axis=1)
+    lines = _polylines(trajectory, filaments)
+    return np.stack([_center(p, rings[index]) for index, p in zip(selected, lines)], axis=1)
 
 
 def _center(positions, ring):
@@ -122,8 +153,15 @@ def _center(positions, ring):
 
 
 def segment_lengths(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> list[FloatArray]:
-    """Lengths of the segments: a list of (frames, segments) arrays in nm."""
-    return [np.linalg.norm(vectors, axis=-1) for vectors in _segment_vectors(trajectory, filaments)]
+    """Lengths of the segments, of beam elements along their arcs: a list of (frames, segments) arrays in nm."""
+    chains = zip(_segment_vectors(trajectory, filaments), *_curves(trajectory, filaments))
+    return [
+        np.linalg.norm(vectors, axis=-1) if own is None else arc_lengths(nodes, own) for vectors, nodes, own in chains
+    ]
+
+
+def _curves(trajectory, filaments):
+    return node_positions(trajectory, filaments), control_point_positions(trajectory, filaments)
 
 
 def contour_lengths(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> FloatArray:
@@ -134,9 +172,11 @@ def contour_lengths(trajectory: mdtraj.Trajectory, filaments: int | Indices | No
 def tangents(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> list[FloatArray]:
     """Unit vectors along the segments: a list of (frames, segments, 3) arrays.
 
-    Raises InputError for a segment of zero length.
+    Of beam elements, unit vectors along the curve at the nodes: (frames, segments + 1, 3). Raises InputError for a
+    segment of zero length.
     """
-    return [_normalized(vectors) for vectors in _segment_vectors(trajectory, filaments)]
+    chains = zip(_segment_vectors(trajectory, filaments), *_curves(trajectory, filaments))
+    return [_normalized(vectors if own is None else own - nodes) for vectors, nodes, own in chains]
 
 
 def _normalized(vectors):
@@ -149,7 +189,8 @@ def _normalized(vectors):
 def joint_cosines(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> list[FloatArray]:
     """Cosines t1.t2 between neighbouring segments: a list of (frames, joints) arrays.
 
-    A ring has as many joints as segments, with the one at its first node first.
+    A ring has as many joints as segments, with the one at its first node first. Of beam elements, between neighbouring
+    nodes: (frames, segments).
     """
     rings = ring_filaments(trajectory)
     cosines = []
@@ -325,12 +366,12 @@ def bending_mode_amplitudes(
     """
     filament = whole_number(filament, 0, "filament")
     _refuse_rings(trajectory, filament, "bending modes of free ends")
-    directions = tangents(trajectory, filament)[0]
-    segments = directions.shape[1]
+    directions = _normalized(np.diff(_polylines(trajectory, filament)[0], axis=1))
+    highest, segments = segment_lengths(trajectory, filament)[0].shape[1], directions.shape[1]
     numbers = np.atleast_1d(in_units_of(modes, DIMENSIONLESS, "modes"))
-    if np.any(numbers != np.floor(numbers)) or np.any(numbers < 1) or np.any(numbers >= segments):
+    if np.any(numbers != np.floor(numbers)) or np.any(numbers < 1) or np.any(numbers >= highest):
         raise InputError(
-            f"modes must be whole numbers from 1 to {segments - 1} for {segments} segments, but are {shown(modes)}."
+            f"modes must be whole numbers from 1 to {highest - 1} for {highest} segments, but are {shown(modes)}."
         )
     if contour_length is None:
         contour_length = contour_lengths(trajectory, filament).mean()
@@ -395,7 +436,10 @@ def mean_square_displacement(
     lags = _checked_lags(lags, trajectory.n_frames)
     step = _frame_spacing(trajectory) if time_step is None else positive(time_step, TIME, "time_step")
     results = np.stack(
-        [_filament_displacements(p, lags, window_average) for p in node_positions(trajectory, filaments)]
+        [
+            _filament_displacements(nodes, line, lags, window_average)
+            for nodes, line in zip(node_positions(trajectory, filaments), _polylines(trajectory, filaments))
+        ]
     )
     count = len(results)
     errors = results.std(axis=0, ddof=1) / np.sqrt(count) if count > 1 else np.full(results.shape[1:], np.nan)
@@ -422,8 +466,8 @@ def _frame_spacing(trajectory):
     return steps.mean()
 
 
-def _filament_displacements(positions, lags, window_average):
-    centers = _center(positions, ring=False)
+def _filament_displacements(positions, line, lags, window_average):
+    centers = _center(line, ring=False)
     axes = _normalized(positions[:, -1] - positions[:, 0])
     result = np.zeros((4, len(lags)))
     for column, lag in enumerate(lags):

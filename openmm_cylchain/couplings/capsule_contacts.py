@@ -9,6 +9,7 @@ import openmm
 
 from ..engine_choice import available_engines, choose_engine
 from ..errors import ContactWarning, InputError
+from ..filaments.beam_refusals import refuse_beams
 from ..filaments.collection import FilamentCollection
 from ..units.quantities import LENGTH, STIFFNESS, positive, thermal_energy, whole_number
 from ..units.types import Indices, Numbers, Scalar
@@ -98,6 +99,7 @@ def capsule_contact_force(
     sphere_diameters = particle_diameters(particles, particle_diameter)
     if not len(diameters):
         raise InputError("There are no filaments that could touch.")
+    refuse_beams(filaments, "contacts of capsules")
     if stiffness is None:
         if filaments.temperature == 0.0:
             raise InputError("At a temperature of zero, a contact needs a stiffness.")

@@ -333,7 +333,8 @@ def particle_diameters(particles: Indices, particle_diameter: Numbers | None) ->
 def outside_particles(filaments: FilamentCollection, system: openmm.System, particles: Indices) -> IntArray:
     """Particles that take part in contacts, which are none of the filaments'; an InputError if they are not there."""
     count = system.getNumParticles()
-    own = set(np.concatenate([*filaments.node_indices, filaments.attachment_indices]).tolist())
+    filled = [*filaments.node_indices, *filaments.control_point_indices, filaments.attachment_indices]
+    own = set(np.concatenate(filled).tolist())
     indices = [whole_number(particle, 0, "an index in particles") for particle in particles]
     for index in indices:
         if index >= count:

@@ -15,6 +15,7 @@ import openmm
 
 from ..engine_choice import available_engines, choose_engine
 from ..errors import InputError
+from ..filaments.beam_refusals import refuse_beams
 from ..filaments.collection import FilamentCollection
 from ..units.quantities import LENGTH, STIFFNESS, in_units_of, positive, shown, unit_vector, vector
 from ..units.types import FloatArray, FloatOrArray, Indices, Numbers, Scalar, Vector
@@ -423,6 +424,7 @@ def filament_wall_force(
 
     if not isinstance(shape, Shape):
         raise InputError(f"shape must be a Shape such as Sphere, but is {shown(shape)}.")
+    refuse_beams(filaments, "filament_wall_force")
     stiffness = positive(stiffness, STIFFNESS, "stiffness")
     radii = _radii(radius, len(filaments), "radius", shape)
     spheres = outside_particles(filaments, system, particles)

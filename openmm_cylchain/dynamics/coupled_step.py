@@ -93,7 +93,8 @@ def mobilities(filaments: FilamentCollection, system: openmm.System, particle_fr
         mobility[nodes] = 1.0 / max(friction.perpendicular, filament.type.node_friction)
     for particle, attachment in zip(filaments.attachment_indices, filaments.attachments):
         mobility[particle] = mobility[filaments.node_indices[attachment.filament][0]]
-    others, frictions = describe_other_particles(system, np.concatenate(filaments.node_indices), particle_friction)
+    nodes = np.concatenate([*filaments.node_indices, *filaments.control_point_indices])
+    others, frictions = describe_other_particles(system, nodes, particle_friction)
     mobility[others] = 1.0 / np.asarray(frictions, dtype=float)
     return mobility
 

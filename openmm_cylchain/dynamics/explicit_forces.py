@@ -152,6 +152,12 @@ class ExplicitForces:
             for node, particle in enumerate(nodes)
         }
 
+    @cached_property
+    def _beam_particles(self):
+        # How far a force moves filaments of beam elements in a step is not known.
+        indices = zip(self._filaments.node_indices, self._filaments.control_point_indices)
+        return {int(particle) for nodes, own in indices if len(own) for particle in (*nodes, *own)}
+
     def recommended_step(self) -> TimeStep:
         """The TimeStep of these forces, one by one and together; an infinite step if there are none."""
         bounds, allowed = {}, {}
@@ -271,7 +277,7 @@ class ExplicitForces:
     # Particles
 
     def _frictions(self, particle_friction):
-        nodes = np.concatenate(self._filaments.node_indices)
+        nodes = np.concatenate([*self._filaments.node_indices, *self._filaments.control_point_indices])
         others, frictions = describe_other_particles(self._system, nodes, particle_friction)
         return dict(zip(others.tolist(), frictions.tolist()))
 
@@ -288,7 +294,8 @@ class ExplicitForces:
         for site, particle in enumerate(particles.tolist()):
             components = self._places_of(particle)
             if components is None:
-                unknown.append(f"virtual site {particle}")
+                what = "beam node or control point" if particle in self._beam_particles else "virtual site"
+                unknown.append(f"{what} {particle}")
                 continue
             self._site_of[particle] = site
             for place, weight in components:
@@ -304,6 +311,8 @@ class ExplicitForces:
         if particle in self._between_of:
             first, second, fraction = self._between_of[particle]
             return self._mean_place([first, second], [1.0 - fraction, fraction])
+        if particle in self._beam_particles:
+            return None
         if particle in self._node:
             number, node = self._node[particle]
             filament = self._filaments[number]
@@ -334,6 +343,8 @@ class ExplicitForces:
 
     def _on_segment(self, parents, weights):
         if len(parents) != 2 or any(parent not in self._node for parent in parents):
+            return None
+        if not self._beam_particles.isdisjoint(parents):
             return None
         (number, minus), (other, plus) = (self._node[parent] for parent in parents)
         nodes = len(self._filaments.node_indices[number])

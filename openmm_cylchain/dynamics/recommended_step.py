@@ -16,6 +16,7 @@ from ..units.quantities import (
 )
 from ..units.types import Scalar
 from .bead_spring_step import bead_spring_time_step
+from .beam_step import beam_time_step
 from .schemes import IMPLICIT_SCHEMES, MODES, check_scheme
 from .stability import bounds_of_chain, contact_stiffness_bound, diffusion_bound
 from .time_step import IDLE, RECOMMENDED_STRAIN, TimeStep, strain_rate
@@ -71,7 +72,8 @@ def recommended_time_step(
     to ``2 k_B T dt/gamma_rot < 0.1 gamma_rot/gamma_def``, at which free segments turn some 3 % too fast.
 
     FENE lengths narrow the bounds (``fene_bound``, for "implicit" ``fene_steps``), and a flow may strain the solvent by
-    0.03 in a step at most. For beads, see ``bead_spring_step.bead_spring_time_step``.
+    0.03 in a step at most. For beads, see ``bead_spring_step.bead_spring_time_step``, for beam elements
+    ``beam_step.beam_time_step``.
 
     Parameters
     ----------
@@ -102,6 +104,8 @@ def recommended_time_step(
         raise InputError(f"Scheme 'modes' moves chains of beads, but no cylinders, such as {filament_type.name!r}.")
     if friction is None:
         friction = filament_type.segment_friction(viscosity, temperature, segments)
+    if filament_type.has_beam_elements:
+        return beam_time_step(filament_type, temperature, scheme, segments, flow, friction)
     if scheme in IMPLICIT_SCHEMES:
         return implicit_time_step(filament_type, viscosity, temperature, segments, closed, flow, friction, scheme)
     bounds = bounds_of_chain(filament_type, friction, segments)

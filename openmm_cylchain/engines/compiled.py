@@ -4,6 +4,7 @@ platforms. Those for GPUs are in gpu_platforms.py.
 Importing this module loads the plugin into OpenMM. An ImportError says why that cannot be done.
 """
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -25,8 +26,8 @@ from ..mechanics.potentials import STRETCHING_POTENTIALS
 from ..units.quantities import TEMPERATURE, non_negative, whole_number
 from .description import (
     advice_after_blow_up,
-    describe_chains,
     filament_label,
+    fixed_nodes,
     friction_of_segments,
     refuse_constraints,
 )
@@ -86,6 +87,7 @@ class CompiledEngine(Engine):
     """The compiled engine: a CylinderChainForce and a CylinderChainIntegrator, on the Reference and CPU platforms."""
 
     has_linkers = True
+    has_beam_elements = True
 
     def add_forces(self, system, placed, stretching_force_group, bending_force_group):
         """Add one CylinderChainForce, with one force group for stretching and bending."""
@@ -96,10 +98,15 @@ class CompiledEngine(Engine):
             )
         force = CylinderChainForce()
         force.setForceGroup(int(stretching_force_group))
-        for filament, nodes in zip(placed.filaments, placed.node_indices):
-            _add_chain(force, filament, nodes, placed.viscosity, placed.temperature)
+        for number, (filament, nodes) in enumerate(zip(placed.filaments, placed.node_indices)):
+            if filament.type.has_beam_elements:
+                controls = placed.control_point_indices[number]
+                _add_beam_chain(force, filament, nodes, controls, placed.viscosity, placed.temperature)
+            else:
+                _add_chain(force, filament, nodes, placed.viscosity, placed.temperature)
         for tether in placed.tethers:
-            force.addTether(tether.filament, tether.node, openmm.Vec3(*tether.point), tether.stiffness)
+            chain = _chain_numbers(placed.filaments)[tether.filament]
+            force.addTether(chain, tether.node, openmm.Vec3(*tether.point), tether.stiffness)
         system.addForce(force)
         if placed.linkers:
             system.addForce(make_binding_force(placed.linkers, placed.filaments, placed.temperature, placed.periodic))
@@ -107,9 +114,12 @@ class CompiledEngine(Engine):
     def create_integrator(self, system, placed, settings):
         """Create a NativeIntegrator."""
         refuse_constraints(system, placed)
-        describe_chains(system, placed)
+        fixed_nodes(system, placed)
         others, frictions = describe_other_particles(system, placed.nodes, settings.particle_friction)
-        labels = [filament_label(number, filament) for number, filament in enumerate(placed.filaments)]
+        labels, beam_labels = [], []
+        for number, filament in enumerate(placed.filaments):
+            own = beam_labels if filament.type.has_beam_elements else labels
+            own.append(filament_label(number, filament))
         integrator = NativeIntegrator(
             settings.temperature,
             settings.step_size,
@@ -120,6 +130,7 @@ class CompiledEngine(Engine):
             advice_after_blow_up(system),
             settings.checks,
             settings.precision,
+            beam_labels,
         )
         for particle, friction in zip(others, frictions):
             integrator.setParticleFriction(int(particle), float(friction))
@@ -141,9 +152,10 @@ class CompiledEngine(Engine):
         for force in context.getSystem().getForces():
             if CylinderChainForce.isinstance(force):
                 force = CylinderChainForce.cast(force)
-                _set_tethers(force, tethers)
+                chains = _chain_numbers(placed.filaments)
+                _set_tethers(force, tethers, chains)
                 force.updateParametersInContext(context)
-                _set_tethers(force, {number: placed.tethers[number] for number in tethers})
+                _set_tethers(force, {number: placed.tethers[number] for number in tethers}, chains)
 
     def record_tensions(self, context):
         """See ``NativeIntegrator.setRecordsTensions``."""
@@ -170,10 +182,20 @@ class CompiledEngine(Engine):
 ENGINE = CompiledEngine()
 
 
-def _set_tethers(force, tethers):
+def _chain_numbers(filaments):
+    # Of chains in the force, which has those of straight segments and those of beam elements in lists of their own.
+    numbers, counts = [], [0, 0]
+    for filament in filaments:
+        beam = filament.type.has_beam_elements
+        numbers.append(counts[beam])
+        counts[beam] += 1
+    return numbers
+
+
+def _set_tethers(force, tethers, chains):
     for number, tether in tethers.items():
         point = openmm.Vec3(*tether.point)
-        force.setTetherParameters(number, tether.filament, tether.node, point, tether.stiffness)
+        force.setTetherParameters(number, chains[tether.filament], tether.node, point, tether.stiffness)
 
 
 def _flow_of_integrator(integrator):
@@ -228,6 +250,24 @@ def _add_chain(force, filament, nodes, viscosity, temperature):
         force.setJointParameters(chain, joint, float(stiffness))
 
 
+def _add_beam_chain(force, filament, nodes, control_points, viscosity, temperature):
+    element = filament.beam_element(temperature)
+    friction = friction_of_segments(filament, viscosity, temperature)
+    force.addBeamChain(
+        [int(particle) for pair in zip(nodes, control_points) for particle in pair],
+        element.length,
+        element.modulus,
+        element.rigidity,
+        element.shortening,
+        friction.parallel / element.length,
+        friction.perpendicular / element.length,
+        filament.planar,
+    )
+
+
+_OF_BEAM_CHAIN = re.compile(r"(?:CylinderChainIntegrator: )?(The elements of )?[Bb]eam chain (\d+)")
+
+
 class NativeIntegrator(CylinderChainIntegrator):
     """A CylinderChainIntegrator that knows filaments by their labels and raises the errors of this package.
 
@@ -241,6 +281,8 @@ class NativeIntegrator(CylinderChainIntegrator):
         0 draws a fresh seed for each Context.
     labels : sequence of str
         What to call each chain in messages.
+    beam_labels : sequence of str
+        What to call each chain of beam elements.
     flow : Flow, optional
         Of the solvent; at rest if not given.
     advice : str
@@ -271,11 +313,13 @@ class NativeIntegrator(CylinderChainIntegrator):
         advice="",
         checks=True,
         precision="automatic",
+        beam_labels=(),
     ):
         temperature = non_negative(temperature, TEMPERATURE, "temperature")
         super().__init__(temperature, _OTHER_FRICTION, as_step(step_size))
         self.checks = checks
-        self._divided_steps = DividedSteps(len(labels))
+        self._divided_steps = DividedSteps(len(labels) + len(beam_labels))
+        self._beam_labels = list(beam_labels)
         self._work = ExplicitWork()
         check_scheme(scheme)
         check_precision(precision)
@@ -333,10 +377,22 @@ class NativeIntegrator(CylinderChainIntegrator):
         except plugin.CylinderChainException as error:
             raise self._error_of(error) from None
         except openmm.OpenMMException as error:
-            instability = instability_in_force(error, self._advice)
+            instability = instability_in_force(error, self._advice) or self._error_of_beam(error)
             if instability is None:
                 raise
             raise instability from None
+
+    def _error_of_beam(self, error):
+        found = _OF_BEAM_CHAIN.match(str(error))
+        if found is None:
+            return None
+        label = self._beam_labels[int(found[2])]
+        rest = str(error)[found.end() :]
+        if found[1]:
+            return InputError(f"{found[1]}{label[0].lower()}{label[1:]}{rest}.")
+        if " has blown up in step " in rest:
+            return InstabilityError(f"{label}{rest}.{self._advice}")
+        return InputError(f"{label}{rest} (openmm_cylchain.make_whole).")
 
     def _error_of(self, error):
         message = str(error).replace("outside chains", "outside filaments")

@@ -26,7 +26,8 @@ def refuse_constraints(system, placed):
     """Raise InputError if the System has constraints, naming the filament that one is on."""
     if not system.getNumConstraints():
         return
-    owner = {int(node): number for number, nodes in enumerate(placed.node_indices) for node in nodes}
+    every = range(len(placed.filaments))
+    owner = {int(particle): number for number in every for particle in placed.particles_of(number)}
     for index in range(system.getNumConstraints()):
         first, second, _ = system.getConstraintParameters(index)
         for particle in (first, second):
@@ -51,16 +52,7 @@ def describe_chains(system, placed):
     InputError
         If a node is a virtual site, or all nodes of a filament have mass zero.
     """
-    fixed = []
-    for number, (filament, nodes) in enumerate(zip(placed.filaments, placed.node_indices)):
-        label = filament_label(number, filament)
-        virtual = [node for node in nodes if system.isVirtualSite(int(node))]
-        if virtual:
-            raise InputError(f"{label}: particle {virtual[0]} is a node and cannot be a virtual site.")
-        massless = [_mass(system, node) == 0.0 for node in nodes]
-        if all(massless):
-            raise InputError(f"{label} has only nodes of mass zero: leave at least one free to move.")
-        fixed.extend(massless)
+    fixed = fixed_nodes(system, placed)
     filaments, solvent = placed.filaments, (placed.viscosity, placed.temperature)
     frictions = [friction_of_segments(filament, *solvent) for filament in filaments]
     node_frictions = [filament.type.node_friction for filament in filaments]
@@ -77,6 +69,27 @@ def describe_chains(system, placed):
             for name in ("parallel", "perpendicular", "rotational", "extensional")
         },
     )
+
+
+def fixed_nodes(system, placed):
+    """Whether nodes have mass zero in the System: a list of bools, filament by filament, control points behind nodes.
+
+    Raises
+    ------
+    InputError
+        If a node is a virtual site, or all nodes of a filament have mass zero.
+    """
+    fixed = []
+    for number, filament in enumerate(placed.filaments):
+        label, particles = filament_label(number, filament), placed.particles_of(number)
+        virtual = [particle for particle in particles if system.isVirtualSite(int(particle))]
+        if virtual:
+            raise InputError(f"{label}: particle {virtual[0]} is a node and cannot be a virtual site.")
+        massless = [_mass(system, particle) == 0.0 for particle in particles]
+        if all(massless):
+            raise InputError(f"{label} has only nodes of mass zero: leave at least one free to move.")
+        fixed.extend(massless)
+    return fixed
 
 
 def friction_of_segments(filament, viscosity, temperature):

@@ -31,6 +31,8 @@ class PlacedFilaments:
         What binds to filaments and unbinds.
     periodic : bool
         Whether linkers join nearest periodic images.
+    control_point_indices : tuple of (n,) int arrays
+        Particles of the control points of each filament; none of straight segments.
     """
 
     filaments: tuple[Filament, ...]
@@ -40,11 +42,17 @@ class PlacedFilaments:
     temperature: float
     linkers: tuple[Linkers, ...] = ()
     periodic: bool = False
+    control_point_indices: tuple[np.ndarray, ...] = ()
 
     @property
     def nodes(self) -> np.ndarray:
-        """Particles of the nodes of all filaments, one after the other."""
-        return np.concatenate(self.node_indices)
+        """Particles of the nodes of all filaments, one after the other, and of the control points of beam elements."""
+        return np.concatenate([*self.node_indices, *self.control_point_indices])
+
+    def particles_of(self, filament: int) -> np.ndarray:
+        """Particles of the nodes of a filament and, if it has beam elements, of their control points."""
+        own = self.control_point_indices[filament] if self.control_point_indices else np.zeros(0, dtype=int)
+        return np.concatenate([self.node_indices[filament], own])
 
 
 @dataclass(frozen=True)
@@ -80,6 +88,9 @@ class Engine(ABC):
 
     has_linkers = False
     """Whether it knows linkers that bind to filaments and unbind."""
+
+    has_beam_elements = False
+    """Whether it moves filaments of beam elements."""
 
     @abstractmethod
     def add_forces(

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from ..beams.curve import BeamElement
 from ..errors import InputError
 from ..mechanics.friction import SegmentFriction
 from ..mechanics.geometry import segment_vectors
@@ -76,6 +77,15 @@ class ChainType(ABC):
     @abstractmethod
     def clamped_bending_stiffness(self) -> float:
         """``bending_stiffness`` of a joint next to a segment that is held."""
+
+    @property
+    def has_beam_elements(self) -> bool:
+        """Whether segments are beam elements, with a control point beside each node, and not straight."""
+        return False
+
+    def beam_element(self, temperature: Scalar, planar: bool = False) -> BeamElement:
+        """What the beam elements of a filament are made of; InputError if its segments are straight."""
+        raise InputError(f"Filament type {self.name!r}: its segments are straight, so it has no beam elements.")
 
     @property
     def node_friction(self) -> float:

@@ -31,6 +31,9 @@ class FilamentCollection(Protocol):
     def node_indices(self) -> list[IntArray]: ...
 
     @property
+    def control_point_indices(self) -> list[IntArray]: ...
+
+    @property
     def bead_indices(self) -> list[IntArray]: ...
 
     @property

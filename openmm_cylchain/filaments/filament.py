@@ -2,12 +2,19 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from ..beams.curve import BeamElement, element_energies
+from ..errors import InputError
 from ..units.types import FloatArray
 from .chain_type import ChainType
 from .placement import joint_stiffnesses
 
 NODE_NAME = "NOD"
 """Atom name of a filament node in topologies."""
+
+CONTROL_POINT_NAME = "CTL"
+"""Atom name of the control point of a node in topologies, which filaments of beam elements have."""
 
 
 @dataclass(frozen=True)
@@ -27,6 +34,10 @@ class Filament:
         The nodes keep their z.
     propulsion : float
         F0 in kJ/(mol nm): the force F0 t on every segment, half on either end, with its tangent t.
+    control_points : (n, 3) array or None
+        Of beam elements: P + h r'/3 in nm for a node at P, with the tangent r' there.
+    clamped_tangents : tuple of int
+        Clamped nodes of beam elements whose tangents do not turn either.
     """
 
     type: ChainType
@@ -35,6 +46,8 @@ class Filament:
     closed: bool = False
     planar: bool = False
     propulsion: float = 0.0
+    control_points: FloatArray | None = None
+    clamped_tangents: tuple[int, ...] = ()
 
     @property
     def segments(self) -> int:
@@ -49,8 +62,22 @@ class Filament:
         """
         return joint_stiffnesses(self.type, len(self.positions), self.clamped, self.closed)
 
-    def energies(self, nodes: FloatArray) -> tuple[float, float]:
-        """Stretching and bending energy, in kJ/mol, with node positions (n, 3) in nm."""
+    def beam_element(self, temperature: float) -> BeamElement:
+        """What its beam elements are made of, see ``FilamentType.beam_element``."""
+        return self.type.beam_element(temperature, self.planar)
+
+    def energies(
+        self, nodes: FloatArray, control_points: FloatArray | None = None, temperature: float = 0.0
+    ) -> tuple[float, float]:
+        """Stretching and bending energy, in kJ/mol, with node positions (n, 3) in nm.
+
+        Of beam elements, control points (n, 3) and the temperature of the solvent are needed, too.
+        """
+        if self.type.has_beam_elements:
+            if control_points is None:
+                raise InputError(f"Energies of beam elements ({self.type.name}) need the control points of its nodes.")
+            stretching, bending = element_energies(nodes, control_points, self.beam_element(temperature))
+            return float(np.sum(stretching)), float(np.sum(bending))
         return self.type.chain_energies(nodes, self.joint_stiffnesses, self.closed)
 
 

@@ -2,14 +2,18 @@
 
 import numpy as np
 
+from ..beams.curve import control_points_of, natural_tangents
+from ..beams.equilibrium import draw_beam
 from ..errors import InputError
 from ..mechanics.geometry import regular_polygon
 from ..units.quantities import (
+    DIMENSIONLESS,
     FORCE,
     LENGTH,
     finite_number,
     in_units_of,
     shown,
+    thermal_energy,
     unit_vector,
     vector,
     whole_number,
@@ -17,7 +21,7 @@ from ..units.quantities import (
 from ..units.types import FloatArray, Indices, Scalar, Vector, Vectors
 from .chain_type import ChainType
 from .filament import Filament
-from .placement import check_shape, clamped_nodes, in_one_plane, joint_stiffnesses, planar_direction
+from .placement import check_shape, clamped_nodes, in_one_plane, joint_stiffnesses, named_nodes, planar_direction
 
 MINIMUM_RING = 4
 """Segments that a ring has at least."""
@@ -63,6 +67,59 @@ def ring(filament_type: ChainType, segments: int, center: Vector, normal: Vector
     return regular_polygon(segments, filament_type.segment_length, center, unit_vector(normal, label, "normal"))
 
 
+def beam_control_points(
+    filament_type: ChainType, positions: FloatArray, tangents: Vectors | None, label: str
+) -> FloatArray | None:
+    """Control points (n, 3) in nm of nodes with tangents, which are normalised; None if segments are straight.
+
+    Tangents that are not given are those of the natural cubic spline through the nodes.
+    """
+    if not filament_type.has_beam_elements:
+        if tangents is not None:
+            raise InputError(f"{label}: tangents belong to nodes of beam elements; its segments are straight.")
+        return None
+    if tangents is None:
+        return control_points_of(positions, natural_tangents(positions), filament_type.segment_length)
+    tangents = np.asarray(in_units_of(tangents, DIMENSIONLESS, f"{label}: tangents"))
+    if tangents.shape != positions.shape:
+        raise InputError(f"{label}: tangents must have the shape {positions.shape}, but have {tangents.shape}.")
+    lengths = np.linalg.norm(tangents, axis=1, keepdims=True)
+    if np.any(lengths == 0.0):
+        raise InputError(f"{label}: the tangent of node {int(np.argmin(lengths))} is zero.")
+    return control_points_of(positions, tangents / lengths, filament_type.segment_length)
+
+
+def drawn_beam(
+    filament_type: ChainType,
+    segments: int,
+    temperature: float,
+    generator: np.random.Generator,
+    start: Vector,
+    direction: Vector | None,
+    planar: bool,
+    label: str,
+) -> tuple[FloatArray, FloatArray]:
+    """Nodes and control points, (segments + 1, 3) in nm each, from the equilibrium of a free chain of beam elements."""
+    count, origin, first_tangent, flat = _of_draw(segments, temperature, start, direction, planar, label)
+    element = filament_type.beam_element(temperature, flat)
+    try:
+        return draw_beam(element, count, thermal_energy(temperature), generator, origin, first_tangent, flat)
+    except InputError as error:
+        raise InputError(f"{label}: {error}") from None
+
+
+def _of_draw(segments, temperature, start, direction, planar, label):
+    segments = number_of_segments(segments, label)
+    start = vector(start, LENGTH, f"{label}: start")
+    planar = _flag(planar, f"{label}: planar")
+    if direction is not None:
+        direction = unit_vector(direction, label)
+        direction = planar_direction(direction, label) if planar else direction
+    if temperature == 0:
+        raise InputError(f"{label}: an equilibrium draw needs a temperature above zero.")
+    return segments, start, direction, planar
+
+
 def drawn(
     filament_type: ChainType,
     segments: int,
@@ -75,16 +132,9 @@ def drawn(
     label: str,
 ) -> FloatArray:
     """Positions (segments + 1, 3) in nm from the exact equilibrium of the free discrete chain."""
-    segments = number_of_segments(segments, label)
-    start = vector(start, LENGTH, f"{label}: start")
-    planar = _flag(planar, f"{label}: planar")
-    if direction is not None:
-        direction = unit_vector(direction, label)
-        direction = planar_direction(direction, label) if planar else direction
-    if temperature == 0:
-        raise InputError(f"{label}: an equilibrium draw needs a temperature above zero.")
-    stiffnesses = joint_stiffnesses(filament_type, segments + 1, clamped_nodes(clamped, segments + 1, label))
-    return filament_type.draw_chain(segments, temperature, generator, start, direction, planar, stiffnesses)
+    count, origin, first_tangent, flat = _of_draw(segments, temperature, start, direction, planar, label)
+    stiffnesses = joint_stiffnesses(filament_type, count + 1, clamped_nodes(clamped, count + 1, label))
+    return filament_type.draw_chain(count, temperature, generator, origin, first_tangent, flat, stiffnesses)
 
 
 def new_filament(
@@ -95,8 +145,10 @@ def new_filament(
     closed: bool = False,
     planar: bool = False,
     propulsion: Scalar = 0.0,
+    control_points: FloatArray | None = None,
+    clamped_tangents: int | Indices = (),
 ) -> Filament:
-    """A Filament with node positions (n, 3) in nm.
+    """A Filament with node positions (n, 3) in nm, and control points if it has beam elements.
 
     Raises
     ------
@@ -107,16 +159,39 @@ def new_filament(
     if closed and len(positions) < MINIMUM_RING:
         raise InputError(f"{label}: a ring needs at least {MINIMUM_RING} segments, but has {len(positions)}.")
     check_shape(filament_type, positions, label, closed)
+    propulsion = finite_number(propulsion, FORCE, f"{label}: propulsion")
     if planar:
         positions = in_one_plane(positions, filament_type.segment_length, label)
-    return Filament(
-        filament_type,
-        positions,
-        clamped_nodes(clamped, len(positions), label),
-        closed,
-        planar,
-        finite_number(propulsion, FORCE, f"{label}: propulsion"),
-    )
+    if control_points is None:
+        clamped = clamped_nodes(clamped, len(positions), label)
+        if np.size(np.asarray(clamped_tangents, dtype=object)):
+            raise InputError(f"{label}: clamped_tangents are those of beam elements; clamp two neighbouring nodes.")
+        return Filament(filament_type, positions, clamped, closed, planar, propulsion)
+    if closed or propulsion:
+        raise InputError(
+            f"{label} has beam elements, of which there are no {'rings' if closed else 'propelled filaments'} as yet: "
+            "give its type element='straight'."
+        )
+    if planar:
+        control_points = _in_plane_of_nodes(control_points, positions, filament_type.segment_length, label)
+    held, held_tangents = _clamped_beam(clamped, clamped_tangents, len(positions), label)
+    return Filament(filament_type, positions, held, False, planar, 0.0, control_points, held_tangents)
+
+
+def _clamped_beam(clamped, tangents, nodes, label):
+    clamped = named_nodes(clamped, nodes, f"{label}: clamped")
+    tangents = named_nodes(tangents, nodes, f"{label}: clamped_tangents")
+    if len(tangents) == nodes:
+        raise InputError(f"{label} has all of its nodes and tangents clamped: leave at least one free to move.")
+    for node in tangents:
+        if node not in clamped:
+            raise InputError(f"{label}: the tangent of node {node} is clamped, but the node is not: clamp it, too.")
+    return clamped, tangents
+
+
+def _in_plane_of_nodes(control_points, positions, length, label):
+    both = in_one_plane(np.concatenate([positions, control_points]), length, f"{label}, with its tangents,")
+    return both[len(positions) :]
 
 
 def _flag(value, name):

@@ -18,7 +18,9 @@ import numpy.typing as npt
 import openmm
 from openmm import app
 
+from ..beams.curve import arc_lengths
 from ..errors import InputError
+from ..filaments.beam_refusals import refuse_beams
 from ..filaments.collection import FilamentCollection
 from ..mechanics.geometry import segment_vectors
 from ..mechanics.redistribution import ChainSet
@@ -171,8 +173,19 @@ class FilamentReporter(FilamentsReporter):
 
     def _table(self, simulation, state):
         positions = state.getPositions(asNumpy=True)._value
-        rows = [_describe(filament, positions[nodes]) for filament, nodes in zip(self._filaments, self._nodes)]
+        controls, temperature = self._filaments.control_point_indices, self._filaments.temperature
+        rows = [
+            _describe_beam(filament, positions[nodes], positions[own], temperature)
+            if filament.type.has_beam_elements
+            else _describe(filament, positions[nodes])
+            for filament, nodes, own in zip(self._filaments, self._nodes, controls)
+        ]
         return range(len(rows)), rows
+
+
+def _describe_beam(filament, nodes, control_points, temperature):
+    energies = filament.energies(nodes, control_points, temperature)
+    return *energies, np.linalg.norm(nodes[-1] - nodes[0]), arc_lengths(nodes, control_points).sum()
 
 
 def _describe(filament, nodes):
@@ -232,6 +245,7 @@ class TensionReporter(FilamentsReporter):
         mean: bool = False,
     ) -> None:
         _check_filaments(filaments)
+        refuse_beams(filaments, "a TensionReporter")
         self._joints = bool(joints)
         self._mean = bool(mean)
         self._include = () if mean else ("positions", "forces")

@@ -29,6 +29,7 @@ from ..filaments.attachments import (
     locate,
     neighbors,
 )
+from ..filaments.beam_refusals import refuse_beams
 from ..filaments.chain_type import ChainType
 from ..filaments.filament import Filament, Tether
 from ..filaments.placement import named_nodes
@@ -105,6 +106,7 @@ class Filaments:
         self._attachment_indices: Any = None
         self._beads: dict[int, list[int]] = {}
         self._nodes: Any = None
+        self._control_points: Any = None
         self._engine_name = choose_engine(engine)
         self._engine = load_engine(self._engine_name)
 
@@ -139,6 +141,13 @@ class Filaments:
         return self._nodes
 
     @property
+    def control_point_indices(self) -> list[IntArray]:
+        """Particle indices of the control points of the nodes, a list of an array for each filament, once they are in a
+        System: empty ones of filaments without beam elements."""
+        self._refuse_unless_built()
+        return self._control_points
+
+    @property
     def tethers(self) -> tuple[Tether, ...]:
         """Tuple of the tethers, in the order of their numbers, as they were added; see ``tethers_in``."""
         return tuple(self._tethers)
@@ -170,6 +179,7 @@ class Filaments:
         *,
         planar: bool = False,
         propulsion: Scalar = 0.0,
+        clamped_tangents: int | Indices = (),
     ) -> int:
         """Add a straight filament with segments of rest length.
 
@@ -194,6 +204,9 @@ class Filaments:
             F0 of self-propelled filaments: a force F0 t acts on every segment, half on either end, where t is its
             tangent, away from the first node. With a negative F0 the filament moves with its first node in front. It is
             not conservative and has no energy.
+        clamped_tangents : sequence of int
+            Of beam elements: clamped nodes whose tangents do not turn either. The filament is clamped exactly there; a
+            clamped node alone is a hinge.
 
         Returns
         -------
@@ -202,7 +215,10 @@ class Filaments:
         """
         label = self._label(filament_type)
         positions = shapes.straight(filament_type, segments, start, direction, label)
-        return self._add(filament_type, positions, clamped, label, planar=planar, propulsion=propulsion)
+        controls = shapes.beam_control_points(filament_type, positions, None, label)
+        return self._add(
+            filament_type, positions, clamped, label, False, planar, propulsion, controls, clamped_tangents
+        )
 
     def add_nodes(
         self,
@@ -213,6 +229,8 @@ class Filaments:
         closed: bool = False,
         planar: bool = False,
         propulsion: Scalar = 0.0,
+        tangents: Vectors | None = None,
+        clamped_tangents: int | Indices = (),
     ) -> int:
         """Add a filament with given node positions.
 
@@ -227,7 +245,10 @@ class Filaments:
             Nodes that do not move; negative numbers count from the end.
         closed : bool
             Make a ring: a last segment leads from the last node back to the first.
-        planar, propulsion
+        tangents : (n, 3) array, optional
+            Of beam elements: directions of the curve at the nodes, which need not be normalised; those of the natural
+            cubic spline through the nodes if not given.
+        planar, propulsion, clamped_tangents
             See ``add_straight``.
 
         Returns
@@ -237,7 +258,10 @@ class Filaments:
         """
         label = self._label(filament_type)
         positions = shapes.given(positions, label)
-        return self._add(filament_type, positions, clamped, label, closed, planar, propulsion)
+        controls = shapes.beam_control_points(filament_type, positions, tangents, label)
+        return self._add(
+            filament_type, positions, clamped, label, closed, planar, propulsion, controls, clamped_tangents
+        )
 
     def add_ring(
         self,
@@ -269,6 +293,8 @@ class Filaments:
             The filament's number.
         """
         label = self._label(filament_type)
+        if filament_type.has_beam_elements:
+            raise InputError(f"{label} has beam elements, of which there are no rings as yet: take straight segments.")
         positions = shapes.ring(filament_type, segments, center, normal, label)
         return self._add(filament_type, positions, clamped, label, True, planar, propulsion)
 
@@ -283,11 +309,12 @@ class Filaments:
         *,
         planar: bool = False,
         propulsion: Scalar = 0.0,
+        clamped_tangents: int | Indices = (),
     ) -> int:
         """Add a filament drawn from the exact equilibrium of the free discrete chain.
 
         Segment lengths come from rho(l), joint angles from rho(c) (see ``filaments.equilibrium``), or, if the
-        filament is planar, from those of two dimensions.
+        filament is planar, from those of two dimensions. Beam elements are drawn from theirs (``beams.equilibrium``).
 
         Parameters
         ----------
@@ -301,7 +328,7 @@ class Filaments:
             Direction of the first segment; drawn from the sphere, or from the plane's directions, if not given.
         clamped : sequence of int
             Nodes that do not move; negative numbers count from the end.
-        planar, propulsion
+        planar, propulsion, clamped_tangents
             See ``add_straight``.
 
         Returns
@@ -311,10 +338,17 @@ class Filaments:
         """
         label = self._label(filament_type)
         generator = np.random.default_rng(whole_number(seed, 0, f"{label}: seed"))
+        if filament_type.has_beam_elements:
+            positions, controls = shapes.drawn_beam(
+                filament_type, segments, self._temperature, generator, start, direction, planar, label
+            )
+            return self._add(
+                filament_type, positions, clamped, label, False, planar, propulsion, controls, clamped_tangents
+            )
         positions = shapes.drawn(
             filament_type, segments, self._temperature, generator, start, direction, clamped, planar, label
         )
-        return self._add(filament_type, positions, clamped, label, planar=planar, propulsion=propulsion)
+        return self._add(filament_type, positions, clamped, label, False, planar, propulsion, None, clamped_tangents)
 
     def add_tether(self, filament: int, node: int, point: Vector, stiffness: Scalar) -> int:
         """Tether a node to a point by a harmonic spring, such as an optical trap: energy (k/2) |x - point|^2.
@@ -346,6 +380,7 @@ class Filaments:
         label = f"Tether {len(self._tethers)}"
         self._refuse_if_built(label)
         filament = self._filament_number(filament, label)
+        self._refuse_beam(filament, f"{label}: tethers", "a CustomExternalForce acts on particles of node_indices")
         (node,) = named_nodes([node], len(self[filament].positions), f"{label}:")
         if (filament, node) in self._tethered_nodes:
             raise InputError(f"{label}: node {node} of filament {filament} has a tether already.")
@@ -389,6 +424,7 @@ class Filaments:
         label = f"Attachment point {len(self._attachments)}"
         self._refuse_if_built(label)
         filament = self._filament_number(filament, label)
+        self._refuse_beam(filament, f"{label}: attachment points")
         return self._attach(locate(self[filament], filament, label, arc_length, segment, fraction))
 
     def segment_place(
@@ -414,6 +450,7 @@ class Filaments:
         """
         label = "Place on a segment"
         filament = self._filament_number(filament, label)
+        self._refuse_beam(filament, f"{label}: crosslinks")
         place = locate(self[filament], filament, label, arc_length, segment, fraction)
         nodes = self.node_indices[filament]
         return SegmentPlace(int(nodes[place.segment]), int(nodes[(place.segment + 1) % len(nodes)]), place.fraction)
@@ -445,6 +482,7 @@ class Filaments:
         label = f"Beads of filament {filament}"
         self._refuse_if_built(label)
         filament = self._filament_number(filament, label)
+        self._refuse_beam(filament, label)
         if filament in self._beads:
             raise InputError(f"{label}: it has beads already.")
         beads = distribute_beads(self[filament], filament, positive(spacing, LENGTH, f"{label}: spacing"))
@@ -655,14 +693,20 @@ class Filaments:
             raise InputError("There are no filaments to add: call add_straight, add_nodes or add_equilibrium first.")
         if self._nodes is not None:
             raise InputError("These filaments are already in a System; make another Filaments for another System.")
+        if self._linkers:
+            refuse_beams(self, "Systems with linkers")
         positions = check_target(topology, system, positions)
         check_force_groups(stretching_force_group, bending_force_group)
-        self._nodes = []
+        self._nodes, self._control_points = [], []
         self._attachment_indices = np.zeros(len(self._attachments), dtype=int)
         everything = [positions]
         for number, filament in enumerate(self._filaments):
-            self._nodes.append(add_nodes_to_system(system, filament))
+            nodes, control_points = add_nodes_to_system(system, filament)
+            self._nodes.append(nodes)
+            self._control_points.append(control_points)
             everything += [filament.positions, self._add_attachments(system, number)]
+            if filament.control_points is not None:
+                everything.insert(-1, filament.control_points)
             names = [self._attachments[index].name for index in self._attachments_of[number]]
             add_to_topology(topology, filament, f"F{number}", names)
         add_noninteracting_entries(system, len(positions), self._coinciding())
@@ -679,6 +723,7 @@ class Filaments:
             self._temperature,
             tuple(self._linkers),
             self._periodic,
+            tuple(self._control_points),
         )
 
     def _add_attachments(self, system, number):
@@ -844,6 +889,10 @@ class Filaments:
             for number, filament in enumerate(self):
                 refuse_modes(filament, filament_label(number, filament))
         flow = as_flow(flow)
+        if scheme != "implicit":
+            refuse_beams(self, f"scheme {scheme!r}")
+        if flow != Flow():
+            refuse_beams(self, "a solvent that flows")
         bath = self._bath(temperature)
         if checks:
             warn_of_long_step(self, system, step_size, scheme, bath, particle_friction, flow)
@@ -851,7 +900,11 @@ class Filaments:
         return self._engine.create_integrator(system, self._placed(), settings)
 
     def chain_set(self, system: openmm.System) -> ChainSet:
-        """The filaments as an engine sees them (a ``ChainSet``): friction of segments and fixed nodes."""
+        """The filaments as an engine sees them (a ``ChainSet``): friction of segments and fixed nodes.
+
+        Raises InputError for beam elements, which are no such chains.
+        """
+        refuse_beams(self, "tensions of joints and other properties of a ChainSet")
         return describe_chains(system, self._placed())
 
     def joint_tensions(self, context: openmm.Context) -> list[unit.Quantity]:
@@ -962,6 +1015,7 @@ class Filaments:
         InputError
             With the portable engine or an explicit scheme.
         """
+        refuse_beams(self, "records of mean tensions")
         self._engine.record_tensions(context)
 
     def flow(self, context: openmm.Context) -> Flow:
@@ -1055,9 +1109,36 @@ class Filaments:
             )
         return f"Filament {len(self)} ({filament_type.name})"
 
-    def _add(self, filament_type, positions, clamped, label, closed=False, planar=False, propulsion=0.0):
+    def _refuse_beam(self, filament, what, instead="give its type element='straight'"):
+        if self[filament].type.has_beam_elements:
+            raise InputError(f"{what} cannot be on filament {filament}, which has beam elements, as yet: {instead}.")
+
+    def _add(
+        self,
+        filament_type,
+        positions,
+        clamped,
+        label,
+        closed=False,
+        planar=False,
+        propulsion=0.0,
+        control_points=None,
+        clamped_tangents=(),
+    ):
         self._refuse_if_built(label)
-        filament = shapes.new_filament(filament_type, positions, clamped, label, closed, planar, propulsion)
+        if filament_type.has_beam_elements and not self._engine.has_beam_elements:
+            raise InputError(f"{label}: the {self._engine_name} engine has no beam elements: use the compiled one.")
+        filament = shapes.new_filament(
+            filament_type,
+            positions,
+            clamped,
+            label,
+            closed,
+            planar,
+            propulsion,
+            control_points,
+            clamped_tangents,
+        )
         # Friction is computed now, so that a filament that has none is refused here.
         try:
             filament_type.segment_friction(self._viscosity, self._temperature, filament.segments)

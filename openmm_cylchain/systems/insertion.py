@@ -8,7 +8,7 @@ import openmm
 from openmm import app
 
 from ..errors import InputError
-from ..filaments.filament import NODE_NAME, Filament
+from ..filaments.filament import CONTROL_POINT_NAME, NODE_NAME, Filament
 from ..units.quantities import LENGTH, in_units_of, shown, vector, whole_number
 from ..units.types import BoxVectors, FloatArray, IntArray, Vectors
 
@@ -36,19 +36,34 @@ def check_force_groups(*groups: int) -> None:
             raise InputError(f"A force group must be between 0 and 31, but is {group}.")
 
 
-def add_nodes_to_system(system: openmm.System, filament: Filament) -> IntArray:
-    """Add the nodes of a Filament to a System; return their particle indices."""
+def add_nodes_to_system(system: openmm.System, filament: Filament) -> tuple[IntArray, IntArray]:
+    """Add the nodes of a Filament to a System, and behind them their control points if it has beam elements.
+
+    Returns
+    -------
+    nodes, control_points : int arrays
+        Their particle indices; no control points of straight segments.
+    """
     masses = filament.type.node_masses(len(filament.positions), filament.closed)
+    if filament.control_points is not None:
+        masses *= 0.5
+    control_masses = masses[: 0 if filament.control_points is None else len(masses)].copy()
     masses[list(filament.clamped)] = 0.0
-    return np.array([system.addParticle(mass) for mass in masses])
+    control_masses[list(filament.clamped_tangents)] = 0.0
+    nodes, control_points = ([system.addParticle(mass) for mass in own] for own in (masses, control_masses))
+    return np.array(nodes), np.array(control_points, dtype=int)
 
 
 def add_to_topology(topology: app.Topology, filament: Filament, name: str, attachment_names: Sequence[str]) -> None:
-    """Add a Filament to a Topology: a chain with bonds, and a residue and an atom for each node or attachment point."""
+    """Add a Filament to a Topology: a chain with bonds along its nodes.
+
+    It has a residue and an atom for each node, control point or attachment point.
+    """
     chain = topology.addChain(name)
     nodes = len(filament.positions)
     atoms = []
-    for particle, atom_name in enumerate([NODE_NAME] * nodes + list(attachment_names)):
+    control_names = [CONTROL_POINT_NAME] * (0 if filament.control_points is None else nodes)
+    for particle, atom_name in enumerate([NODE_NAME] * nodes + control_names + list(attachment_names)):
         residue = topology.addResidue(filament.type.name, chain, str(particle + 1))
         atoms.append(topology.addAtom(atom_name, None, residue))
     for first, second in zip(atoms, atoms[1:nodes]):

@@ -53,7 +53,8 @@ def make_whole(positions: Vectors, filaments: Filaments, box_vectors: BoxVectors
     if not isinstance(filaments, Filaments):
         raise InputError(f"filaments must be a Filaments object, but is {filaments!r}.")
     given = np.asarray(in_units_of(positions, LENGTH, "positions"))
-    last = max([*(int(nodes[-1]) for nodes in filaments.node_indices), *filaments.attachment_indices])
+    own = [*filaments.node_indices, *filaments.control_point_indices, filaments.attachment_indices]
+    last = int(np.concatenate(own).max())
     if given.ndim not in (2, 3) or given.shape[-1] != 3 or given.shape[-2] <= last:
         raise InputError(
             "positions must have the shape (particles, 3) or (frames, particles, 3) and hold the filaments, up to "
@@ -65,6 +66,10 @@ def make_whole(positions: Vectors, filaments: Filaments, box_vectors: BoxVectors
         label = filament_label(number, filament)
         _refuse_ambiguous(np.full((len(frames), 1), filament.type.segment_length), vectors, f"{label} at rest")
         frames[:, nodes] = _whole_chains(frames[:, nodes], vectors, label)
+        control_points = filaments.control_point_indices[number]
+        if len(control_points):
+            apart = frames[:, control_points] - frames[:, nodes]
+            frames[:, control_points] -= _lattice_sums(_images_between(apart, vectors), vectors)
     for attachment, particle in zip(filaments.attachments, filaments.attachment_indices):
         nodes = filaments.node_indices[attachment.filament]
         minus, plus = (frames[:, nodes[attachment.segment + end]] for end in (0, 1))

@@ -40,6 +40,7 @@ from ..dynamics.schemes import check_scheme
 from ..dynamics.time_step import TimeStep, as_step
 from ..engine_choice import default_scheme
 from ..errors import InputError, InstabilityError
+from ..filaments.beam_refusals import refuse_beams
 from ..mechanics.flow import Flow
 from ..units.quantities import DIMENSIONLESS, positive, thermal_energy, whole_number
 from ..units.text import format_time
@@ -123,6 +124,7 @@ def check_time_step(
     InputError
         At a temperature of zero, or as ``Filaments.create_integrator``.
     """
+    refuse_beams(filaments, "the check of a step")
     step = as_step(step_size)
     scheme = default_scheme(filaments.engine) if scheme is None else scheme
     check_scheme(scheme)

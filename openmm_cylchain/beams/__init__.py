@@ -1,0 +1,1 @@
+"""Chains of elements that bend inside: their curve, energy and equilibrium."""

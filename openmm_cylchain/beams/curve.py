@@ -1,0 +1,137 @@
+"""The curve of a chain of beam elements: tangents, places, arc lengths and energies.
+
+Node i has a position P and a control point Q. Element i of length h is the cubic curve with the Bezier points P_i, Q_i,
+2 P_(i+1) - Q_(i+1) and P_(i+1), so r' = 3 (Q - P)/h at a node. Its energy is that of ``plugin_src/beams/BeamChain.h``.
+Axes in front of (nodes, 3) belong to several filaments or frames; everything is in OpenMM's units.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import CubicSpline
+
+from ..units.types import FloatArray
+
+_GAUSS_PLACES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)
+_GAUSS_PLACES, _GAUSS_WEIGHTS = 0.5 * (1.0 + _GAUSS_PLACES), 0.5 * _GAUSS_WEIGHTS
+
+
+@dataclass(frozen=True)
+class BeamElement:
+    """What an element is made of.
+
+    Attributes
+    ----------
+    length : float
+        h at rest, in nm.
+    rigidity : float
+        EI in kJ nm/mol.
+    modulus : float
+        K in kJ/(mol nm).
+    shortening : float
+        The part by which its chord is shorter because of bends inside of it for which it has no coordinates.
+    """
+
+    length: float
+    rigidity: float
+    modulus: float
+    shortening: float = 0.0
+
+
+def shortening_of(bend: float, planar: bool) -> float:
+    """``BeamElement.shortening`` where an element is ``bend`` = h k_B T/EI persistence lengths long."""
+    return bend / (30.0 if planar else 15.0)
+
+
+def node_tangents(nodes: FloatArray, control_points: FloatArray, length: float) -> FloatArray:
+    """r' = 3 (Q - P)/h at the nodes, about a unit vector: (..., nodes, 3)."""
+    return 3.0 * (control_points - nodes) / length
+
+
+def control_points_of(nodes: FloatArray, tangents: FloatArray, length: float) -> FloatArray:
+    """Q = P + h t/3 for unit vectors t at the nodes: (nodes, 3) in nm."""
+    return nodes + length / 3.0 * tangents
+
+
+def natural_tangents(nodes: FloatArray) -> FloatArray:
+    """Unit vectors (nodes, 3) along the natural cubic spline through nodes (nodes, 3), which bends least."""
+    if len(nodes) == 2:
+        slopes = np.repeat(np.diff(nodes, axis=0), 2, axis=0)
+    else:
+        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(nodes, axis=0), axis=1))])
+        slopes = CubicSpline(along, nodes, bc_type="natural")(along, 1)
+    return slopes / np.linalg.norm(slopes, axis=1, keepdims=True)
+
+
+def _hermite(places, derivative):
+    # Weights of P and Q - P of the first node and of the second one, (places, 4); slopes are by the place.
+    x, y = places, 1.0 - places
+    if derivative:
+        return np.stack([-6 * x * y, 3 * y * (1 - 3 * x), 6 * x * y, 3 * x * (3 * x - 2)], axis=-1)
+    return np.stack([y * y * (1 + 2 * x), 3 * x * y * y, x * x * (1 + 2 * y), -3 * x * x * y], axis=-1)
+
+
+def _on_elements(nodes, control_points, places, derivative=False):
+    vectors = control_points - nodes
+    ends = np.stack([nodes[..., :-1, :], vectors[..., :-1, :], nodes[..., 1:, :], vectors[..., 1:, :]], axis=-2)
+    return np.einsum("pw,...ewx->...epx", _hermite(np.asarray(places, dtype=float), derivative), ends)
+
+
+def element_points(nodes: FloatArray, control_points: FloatArray, places: npt.ArrayLike) -> FloatArray:
+    """Points of every element at places from 0, its first node, to 1, its second: (..., elements, places, 3)."""
+    return _on_elements(nodes, control_points, places)
+
+
+def element_slopes(nodes: FloatArray, control_points: FloatArray, places: npt.ArrayLike, length: float) -> FloatArray:
+    """r' = dr/ds of every element at places from 0 to 1: (..., elements, places, 3)."""
+    return _on_elements(nodes, control_points, places, derivative=True) / length
+
+
+def curve_points(nodes: FloatArray, control_points: FloatArray, per_element: int) -> FloatArray:
+    """Points along the curve, ``per_element`` for each element and the last node: (..., points, 3)."""
+    points = element_points(nodes, control_points, np.arange(per_element) / per_element)
+    points = points.reshape(*points.shape[:-3], -1, 3)
+    return np.concatenate([points, nodes[..., -1:, :]], axis=-2)
+
+
+def arc_lengths(nodes: FloatArray, control_points: FloatArray) -> FloatArray:
+    """Lengths of the elements along the curve: (..., elements) in nm, by eight Gauss points."""
+    slopes = _on_elements(nodes, control_points, _GAUSS_PLACES, derivative=True)
+    return np.linalg.norm(slopes, axis=-1) @ _GAUSS_WEIGHTS
+
+
+def _bend(first, second):
+    # The rotation from one direction to another, as vectors along its axis.
+    axis = np.cross(first, second)
+    sine, cosine = np.linalg.norm(axis, axis=-1), np.sum(first * second, axis=-1)
+    factor = np.where(sine > 0.0, np.arctan2(sine, cosine) / np.where(sine > 0.0, sine, 1.0), 1.0)
+    return axis * factor[..., None]
+
+
+def element_energies(
+    nodes: FloatArray, control_points: FloatArray, element: BeamElement
+) -> tuple[FloatArray, FloatArray]:
+    """Stretching and bending energies of the elements, (..., elements) each, in kJ/mol.
+
+    Parameters
+    ----------
+    nodes, control_points : (..., nodes, 3) arrays
+        In nm.
+    element : BeamElement
+    """
+    h = element.length
+    slopes = node_tangents(nodes, control_points, h)
+    middle = element_slopes(nodes, control_points, [0.5], h)[..., 0, :]
+    strain = np.linalg.norm(slopes, axis=-1) - 1.0
+    length = np.linalg.norm(middle, axis=-1)
+    directions, along = slopes / (1.0 + strain[..., None]), middle / length[..., None]
+    alpha, beta = _bend(directions[..., :-1, :], along), _bend(along, directions[..., 1:, :])
+    turn = np.sum((slopes[..., 1:, :] - slopes[..., :-1, :]) ** 2, axis=-1)
+    bow = np.sum((slopes[..., 1:, :] + slopes[..., :-1, :] - 2.0 * middle) ** 2, axis=-1)
+    apart = np.sum((beta - alpha) ** 2, axis=-1)
+    scale = 1.0 + turn / 40.0 + turn**2 / 560.0 + apart / 84.0
+    bending = element.rigidity / (2.0 * h) * (np.sum((alpha + beta) ** 2, axis=-1) + 4.0 / 3.0 * apart * scale**2)
+    inner = length - 1.0 - bow / 40.0 + turn**2 / 480.0 + 1.5 * element.shortening
+    ends = (strain[..., :-1] ** 2 + strain[..., 1:] ** 2) / 6.0
+    return 0.5 * element.modulus * h * (ends + 2.0 / 3.0 * inner**2), bending
