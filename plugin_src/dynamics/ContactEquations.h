@@ -2,9 +2,9 @@
 #define CYLCHAIN_CONTACT_EQUATIONS_H_
 
 #include "couplings/ContactSearch.h"
+#include "dynamics/ContactRest.h"
 #include "dynamics/ImplicitCouplings.h"
 #include "dynamics/PlaceResponses.h"
-#include "dynamics/RestGap.h"
 #include <algorithm>
 #include <cstddef>
 #include <utility>
@@ -16,16 +16,14 @@ namespace cylchain {
  * Contacts of capsules in an implicit step.
  *
  * The first iteration knows of none. Where it leads, y*, and the way there show which pairs may touch; they have the
- * gaps g*, which go on being negative where two segments have passed through each other. The others have the force
- *
- *     k_c (b-g(y)) n   where g(y) < b,
- *
- * with b of a RestGap: where an overlap is predicted, two segments come back to the gap with which
- * the step began. With b = 0, contacts would act too early by 0.58 of what diffusion moves them by in a step. Small
- * steps resolve a contact. Segments that have crossed in the end fail.
+ * gaps g*, which go on being negative where two segments have passed through each other. Where an iteration leads them
+ * behind their surfaces, they come back to where the step began, see ContactRest. With a force from the surface on,
+ * contacts would act too early by 0.58 of what diffusion moves them by in a step. Small steps resolve a contact.
+ * Segments that have crossed in the end fail.
  *
  * Where two capsules touch may jump: from a segment to its neighbour, or between the ends of nearly parallel ones. So
- * it is looked for in the first iterations alone; after that, each pair keeps the fractions where it touches.
+ * it is looked for in the first iterations alone; after that, each pair keeps the fractions where it touches. What
+ * comes back keeps them from the beginning.
  */
 class ContactEquations : public ImplicitCouplings {
 public:
@@ -52,7 +50,7 @@ private:
     struct Side {
         /** Where it touches. */
         Contact contact;
-        RestGap restGap;
+        ContactRest rest;
         /** By how much its gap has changed while one of its packs took no part. */
         double drift;
         /** Whether it touched in the last iteration. */
@@ -112,12 +110,15 @@ private:
     void takeNoteOf(int capsule, const double* moved);
     bool findPairsOf(const std::vector<int>& capsules, const double* moved);
     bool isKnown(const ContactPair& pair) const;
-    RestGap findRestGap(const ContactPair& pair, const Contact& contact, double largest) const;
+    void findCourse(const ContactPair& pair, const Contact& contact, ContactCourse& course) const;
+    int placeContacts(State& state, int known, const Contact* found, int count) const;
+    double restGapOf(const Side& side) const;
+    bool addEquation(State& state, int side, Part& part) const;
     double responseOf(int capsule, double fraction) const;
     bool isLookedFor(int pair) const;
     void look(int begin, int end, bool first, Part& part);
     void evaluate(int pair, bool first, const PairOutlook* outlook, Part& part);
-    void updateContacts(State& state, int count) const;
+    void updateGaps(State& state, int count) const;
     bool anyComeNear(const double* moved);
     bool anyCross(const double* moved);
     void findCrossed(int begin, int end, const double* moved, Part& part) const;

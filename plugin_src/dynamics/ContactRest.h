@@ -1,0 +1,88 @@
+#ifndef CYLCHAIN_CONTACT_REST_H_
+#define CYLCHAIN_CONTACT_REST_H_
+
+namespace cylchain {
+
+/** Two capsules in a step, at the places where they touch. */
+struct ContactCourse {
+    /** From the place on the second to that on the first: r0 at the beginning, and r* where an iteration has led. */
+    double begun[3], now[3];
+    /** From end to end of the two at the beginning; zero for a sphere. */
+    double along[2][3];
+    /** The normal there, and the sum of the radii. */
+    const double* normal;
+    double radii;
+};
+
+/**
+ * Where a contact comes back to in an implicit step.
+ *
+ * Its stiffness is k, and a unit force moves one capsule against the other by c in the step. A step with a = k c < 1
+ * resolves the potential: the force is k (b-g) along the normal where the gap g < b, as with a RestGap.
+ *
+ * For other steps the contact is a hard wall at the depth d behind the surface, see findDepthOfWall(). It is open while
+ * g > -d. Where the step would lead behind that, the contact comes back to where the step began, with the force
+ *
+ *     K P (R-r),   R = r0+(r0-r*)/(K c),   K = 5 k,
+ *
+ * in the rest of the step. P projects on the plane across two capsules that lie along each other: they are discs there.
+ * Two that cross at an angle are lines, which cannot pass each other along their normal n: P = n nT. Two spheres have
+ * P = 1. What began behind the wall is brought to the surface.
+ *
+ * This is a move that Metropolis refuses. Where a step without contacts keeps detailed balance and is linear, one in
+ * which P r comes back to P r0 keeps it, too: with y = y*+C PT (P C PT)^-1 (P r0-P r*), and C the response of the step
+ * to forces, the covariances of the beginning and of the end of the step with P r* are the same. Several contacts come
+ * back together in this way. The normal alone would not do for discs: it turns in a step, and gaps along it are not
+ * those at the beginning.
+ *
+ * What others push behind the wall in later iterations is held there, with k along the normal: if it came back as well,
+ * its neighbours would follow, and the step would not end.
+ */
+class ContactRest {
+public:
+    /** A contact that has not been looked at. */
+    ContactRest() = default;
+    /**
+     * Look at a contact for the first time.
+     *
+     * @param softness   a
+     * @param predicted  the gap g* that is predicted without contacts; 0 if none touched
+     */
+    ContactRest(double softness, double predicted);
+    bool isKnown() const {
+        return softness >= 0;
+    }
+    /** Get whether the step resolves the potential. */
+    bool isResolved() const {
+        return softness < LEAST_STIFF;
+    }
+    /** Get whether the contact comes back. */
+    bool isBack() const {
+        return back;
+    }
+    /** Get b of a contact that is resolved, and 0 for others. */
+    double getGap() const {
+        return gap;
+    }
+    /**
+     * Look where an iteration has led a contact that is not resolved: it may come back from now on.
+     *
+     * @param gap      g
+     * @param depth    d
+     * @param largest  the largest gap that it comes back to
+     */
+    void look(const ContactCourse& course, double gap, double depth, double largest);
+    /** Find the force K P (R-r) on the first capsule, and K P. */
+    void findForce(const double* now, double stiffness, double* force, double* projection) const;
+    /** K/k. */
+    static constexpr double STIFFENING = 5;
+private:
+    static constexpr double LEAST_STIFF = 1;
+    double softness = -1, gap = 0;
+    bool back = false;
+    double rest[3], across[6];
+};
+
+} // namespace cylchain
+
+#endif /*CYLCHAIN_CONTACT_REST_H_*/
