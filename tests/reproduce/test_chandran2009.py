@@ -114,10 +114,14 @@ def test_cantilevers_and_a_planted_fault(tmp_path, monkeypatch):
     arguments = ["reproduce", "diffusion", "--quick", "--figure", "8", "--output", str(tmp_path / "page")]
     assert cli.main(arguments) == 0
     page = (tmp_path / "page" / "diffusion.md").read_text()
-    assert "Chandran" in page and "46 of 46 results agree" in page and "(figure-08b.png)" in page
-    planted(monkeypatch, "ACTIN", bending_rigidity=1.1)
+    assert "Chandran" in page and "92 of 92 results agree" in page and "(figure-08b.png)" in page
+    assert "| deflection end load 10 2 beam elements |" in page and "ruler deflection loads of the text 2 beam" in page
+    planted(monkeypatch, "ACTIN", bending_rigidity=1.01)
     (case,) = cantilevers.CASES
-    assert verdicts(case, tmp_path / "stiff")["deflection_end_load_1"] == "differs"
+    stiff = verdicts(case, tmp_path / "stiff")
+    assert stiff["deflection_end_load_1"] == "differs"
+    assert stiff["deflection_end_load_1_1_beam_element"] == "differs"
+    assert stiff["ruler_deflection_loads_of_the_text_2_beam_elements"] == "differs"
 
 
 def test_chromosome_and_planted_faults(tmp_path, monkeypatch):
