@@ -99,7 +99,7 @@ def bent_beams(end_loads, weights, length_micrometers, elements, steps, step):
 
 
 def _bent(filaments, loads, length, steps, step):
-    # Particles (cantilevers, particles, 3) in nm after nine tenths of the steps and all, with loads over EI/L^2 on each.
+    # Particles (cantilevers, particles, 3) in nm after nine tenths of the steps and after all; loads are over EI/L^2.
     _, system, positions = filaments.build()
     pull = openmm.CustomExternalForce("-force*y")
     pull.addPerParticleParameter("force")
@@ -230,8 +230,8 @@ def _remarks(unrest, quick):
         f"of EI/L² and EI/L³, which alone matter, until no node moves by more than {unrest:.1g} L. The theory "
         "is Euler's elastica, solved numerically: the published tables that the paper compares with are solutions of "
         "it. The shape of the chain tends to it with the square of the number of segments. Beam elements are within "
-        f"{100 * _BEAM_TOLERANCE:g} % of it, one under end loads of at most 1, two under others and under weights of at "
-        "most 4, and four under heavier ones, which turn the filament most next to its clamp.\n\n"
+        f"{100 * _BEAM_TOLERANCE:g} % of it, one under end loads of at most 1, two under others and under weights of "
+        "at most 4, and four under heavier ones, which turn the filament most next to its clamp.\n\n"
         f"The ruler of {100 * _RULER['length']:g} cm and {_RULER['rigidity']} N m² carries {text[0]} N at its end and "
         f"weighs {text[1]} N in the text of the paper; in the caption of its figure it carries {caption[0]} N, weighs "
         f"{caption[1]} N and is 3 cm long, which must be misprinted: its end would move by {millimeters:.2g} mm. "
