@@ -1,19 +1,17 @@
 %module(package="openmm_cylchain") plugin
 
-// Headers of OpenMM hold nested classes, keywords of Python and typemaps that are not defined yet: nothing of this
-// module.
+// What is inherited is in OpenMM's own module. Of its classes, no more need be known here.
 
-#pragma SWIG nowarn=314,325,453
-%import(module="openmm") "swig/OpenMMSwigHeaders.i"
+%import(module="openmm") "openmm_bases.i"
 %include "swig/typemaps.i"
 %include <std_map.i>
 %include <std_string.i>
 %include <std_vector.i>
 
 namespace std {
-    %template(vectori) vector<int>;
-    %template(mapid) map<int, double>;
-    %template(vectors) vector<string>;
+    %template() vector<int>;
+    %template() map<int, double>;
+    %template() vector<string>;
 }
 
 %{
@@ -24,11 +22,9 @@ namespace std {
 #include "openmm/CylinderChainIntegrator.h"
 #include "openmm/CylinderChainLinkForce.h"
 #include "openmm/CylinderChainWallForce.h"
-#include "OpenMM.h"
-#include "OpenMMAmoeba.h"
-#include "OpenMMDrude.h"
-#include "openmm/RPMDIntegrator.h"
-#include "openmm/RPMDMonteCarloBarostat.h"
+#include "openmm/Context.h"
+#include "openmm/OpenMMException.h"
+#include "openmm/System.h"
 #include "openmm/serialization/XmlSerializer.h"
 #include <sstream>
 
