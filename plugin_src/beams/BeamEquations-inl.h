@@ -56,8 +56,11 @@ public:
     static CYLCHAIN_INLINE void addToControl(const Symmetric<Real>& m, Row& row) {
         addSymmetric(m, row.diagonal, 1);
     }
-    /** Eliminate a node, which the next one follows unless it is the last. */
-    CYLCHAIN_INLINE void eliminate(int node, Row& here, Row& after, bool last) {
+    /**
+     * Eliminate a node, which the next one follows unless it is the last. Compiled once, it is as fast as within each
+     * caller.
+     */
+    __attribute__((noinline)) void eliminate(int node, Row& here, Row& after, bool last) {
         Eliminated& own = rows[node];
         invert(node, here.diagonal);
         own.inverse = here.diagonal;

@@ -12,13 +12,13 @@ using namespace OpenMM;
 using namespace cylchain;
 using namespace std;
 
-static void require(bool condition, const string& message) {
+static void requireOfBinding(bool condition, const string& message) {
     if (!condition)
         throw OpenMMException("CylinderChainBindingForce: "+message);
 }
 
 static void requireNotNegative(double value, const char* name) {
-    require(value >= 0 && isfinite(value), string("The ")+name+" cannot be negative and must be finite");
+    requireOfBinding(value >= 0 && isfinite(value), string("The ")+name+" cannot be negative and must be finite");
 }
 
 CylinderChainBindingForce::CylinderChainBindingForce(double temperature) : randomNumberSeed(0), periodic(false) {
@@ -35,7 +35,7 @@ int CylinderChainBindingForce::addHand(double bindingRate, double reach, double 
         const vector<int>& chains) {
     requireNotNegative(bindingRate, "rate of binding");
     requireNotNegative(unbindingRate, "rate of unbinding");
-    require(reach > 0 && isfinite(reach), "The reach must be positive and finite");
+    requireOfBinding(reach > 0 && isfinite(reach), "The reach must be positive and finite");
     Hand hand;
     hand.bindingRate = bindingRate;
     hand.reach = reach;
@@ -43,8 +43,9 @@ int CylinderChainBindingForce::addHand(double bindingRate, double reach, double 
     hand.chains = chains;
     sort(hand.chains.begin(), hand.chains.end());
     for (size_t i = 0; i < chains.size(); i++) {
-        require(hand.chains[i] >= 0, "Illegal chain index: "+to_string(hand.chains[i]));
-        require(i == 0 || hand.chains[i] > hand.chains[i-1], "Chain "+to_string(hand.chains[i])+" is named twice");
+        requireOfBinding(hand.chains[i] >= 0, "Illegal chain index: "+to_string(hand.chains[i]));
+        requireOfBinding(i == 0 || hand.chains[i] > hand.chains[i-1],
+                "Chain "+to_string(hand.chains[i])+" is named twice");
     }
     hands.push_back(hand);
     return hands.size()-1;
@@ -84,11 +85,11 @@ void CylinderChainBindingForce::getHandUnbinding(int hand, double& strainShare, 
 void CylinderChainBindingForce::setHandUnbinding(int hand, double strainShare, double unbindingForce,
         double catchRate, double catchForce) {
     Hand& own = handOf(hand);
-    require(strainShare >= 0 && strainShare <= 1, "The share of strain in unbinding must be between 0 and 1");
+    requireOfBinding(strainShare >= 0 && strainShare <= 1, "The share of strain in unbinding must be between 0 and 1");
     requireNotNegative(unbindingForce, "force of unbinding");
     requireNotNegative(catchRate, "rate of the second pathway of unbinding");
     requireNotNegative(catchForce, "force of the second pathway of unbinding");
-    require(strainShare == 0 || unbindingForce == 0,
+    requireOfBinding(strainShare == 0 || unbindingForce == 0,
             "Unbinding depends on the energy of the spring or on its force: give one of them");
     own.strainShare = strainShare;
     own.unbindingForce = unbindingForce;
@@ -108,7 +109,7 @@ void CylinderChainBindingForce::getHandWalking(int hand, double& speed, double& 
 void CylinderChainBindingForce::setHandWalking(int hand, double speed, double stallForce, bool walksBackward,
         bool holdsAtEnds) {
     Hand& own = handOf(hand);
-    require(isfinite(speed), "The speed must be finite");
+    requireOfBinding(isfinite(speed), "The speed must be finite");
     requireNotNegative(stallForce, "stall force");
     own.speed = speed;
     own.stallForce = stallForce;
@@ -127,8 +128,8 @@ void CylinderChainBindingForce::setHandSiteSpacing(int hand, double spacing) {
 
 int CylinderChainBindingForce::addLinkerType(int hand1, int hand2, double restLength, double stiffness,
         bool sameChain) {
-    require(hand1 >= -1 && hand1 < getNumHands(), "Illegal hand: "+to_string(hand1));
-    require(hand2 >= 0 && hand2 < getNumHands(), "Illegal hand: "+to_string(hand2));
+    requireOfBinding(hand1 >= -1 && hand1 < getNumHands(), "Illegal hand: "+to_string(hand1));
+    requireOfBinding(hand2 >= 0 && hand2 < getNumHands(), "Illegal hand: "+to_string(hand2));
     requireNotNegative(restLength, "rest length");
     requireNotNegative(stiffness, "stiffness");
     LinkerType type;
@@ -164,15 +165,15 @@ void CylinderChainBindingForce::getLinkerTypeReservoir(int type, double& volume,
 void CylinderChainBindingForce::setLinkerTypeReservoir(int type, double volume, double concentration) {
     ASSERT_VALID_INDEX(type, types);
     requireNotNegative(volume, "volume");
-    require(concentration == -1 || (concentration >= 0 && isfinite(concentration)),
+    requireOfBinding(concentration == -1 || (concentration >= 0 && isfinite(concentration)),
             "The concentration cannot be negative and must be finite");
-    require(concentration == -1 || types[type].hands[0] >= 0, "Anchored linkers have no concentration");
+    requireOfBinding(concentration == -1 || types[type].hands[0] >= 0, "Anchored linkers have no concentration");
     types[type].volume = volume;
     types[type].concentration = concentration;
 }
 
 int CylinderChainBindingForce::addParticleAnchor(int particle) {
-    require(particle >= 0, "Illegal particle index: "+to_string(particle));
+    requireOfBinding(particle >= 0, "Illegal particle index: "+to_string(particle));
     Place place;
     place.first = particle;
     anchors.push_back(place);
@@ -182,7 +183,7 @@ int CylinderChainBindingForce::addParticleAnchor(int particle) {
 int CylinderChainBindingForce::addPointAnchor(const Vec3& point) {
     Place place;
     for (int k = 0; k < 3; k++) {
-        require(isfinite(point[k]), "The point of an anchor must be finite");
+        requireOfBinding(isfinite(point[k]), "The point of an anchor must be finite");
         place.point[k] = point[k];
     }
     anchors.push_back(place);
@@ -197,9 +198,11 @@ void CylinderChainBindingForce::getAnchor(int anchor, int& particle, Vec3& point
 
 void CylinderChainBindingForce::addLinkers(int type, int count) {
     const LinkerType& own = getLinkerType(type);
-    require(count >= 0 && count <= INT_MAX-(int) state.nextNumber, "Illegal number of linkers: "+to_string(count));
-    require(own.hands[0] >= 0, "Linkers of type "+to_string(type)+" are anchored: use addAnchoredLinker()");
-    require(own.concentration < 0, "Linkers of type "+to_string(type)+" have a concentration instead of a number");
+    requireOfBinding(count >= 0 && count <= INT_MAX-(int) state.nextNumber,
+            "Illegal number of linkers: "+to_string(count));
+    requireOfBinding(own.hands[0] >= 0, "Linkers of type "+to_string(type)+" are anchored: use addAnchoredLinker()");
+    requireOfBinding(own.concentration < 0,
+            "Linkers of type "+to_string(type)+" have a concentration instead of a number");
     for (int i = 0; i < count; i++) {
         Linker linker;
         linker.number = state.nextNumber++;
@@ -209,7 +212,8 @@ void CylinderChainBindingForce::addLinkers(int type, int count) {
 }
 
 void CylinderChainBindingForce::addAnchoredLinker(int type, int anchor) {
-    require(getLinkerType(type).hands[0] == -1, "Linkers of type "+to_string(type)+" have two hands and no anchor");
+    requireOfBinding(getLinkerType(type).hands[0] == -1,
+            "Linkers of type "+to_string(type)+" have two hands and no anchor");
     ASSERT_VALID_INDEX(anchor, anchors);
     Linker linker;
     linker.number = state.nextNumber++;

@@ -9,25 +9,25 @@
 using namespace OpenMM;
 using namespace std;
 
-static void checkPositive(double value, const char* name) {
+static void checkDiameter(double value, const char* name) {
     // Written so that NaN fails.
 
     if (!(value > 0 && isfinite(value)))
         throw OpenMMException(string("CylinderChainContactForce: ")+name+" must be positive and finite");
 }
 
-static void checkStiffness(double stiffness) {
+static void checkContactStiffness(double stiffness) {
     if (!(stiffness >= 0 && isfinite(stiffness)))
         throw OpenMMException("CylinderChainContactForce: The stiffness cannot be negative and must be finite");
 }
 
 CylinderChainContactForce::CylinderChainContactForce(double stiffness) : stiffness(stiffness), usePeriodic(false) {
-    checkStiffness(stiffness);
+    checkContactStiffness(stiffness);
     setName("CylinderChainContactForce");
 }
 
 void CylinderChainContactForce::setStiffness(double stiffness) {
-    checkStiffness(stiffness);
+    checkContactStiffness(stiffness);
     this->stiffness = stiffness;
 }
 
@@ -45,7 +45,7 @@ int CylinderChainContactForce::addChain(const vector<int>& particles, double dia
             throw OpenMMException("CylinderChainContactForce: Particle "+to_string(particle)+
                     " appears twice in a chain");
     }
-    checkPositive(diameter, "The diameter of a chain");
+    checkDiameter(diameter, "The diameter of a chain");
     if (excludedNeighbors < 0)
         throw OpenMMException("CylinderChainContactForce: The number of excluded neighbors cannot be negative");
     chains.push_back({particles, diameter, excludedNeighbors, closed});
@@ -74,14 +74,14 @@ double CylinderChainContactForce::getChainDiameter(int chain) const {
 
 void CylinderChainContactForce::setChainDiameter(int chain, double diameter) {
     ASSERT_VALID_INDEX(chain, chains);
-    checkPositive(diameter, "The diameter of a chain");
+    checkDiameter(diameter, "The diameter of a chain");
     chains[chain].diameter = diameter;
 }
 
 int CylinderChainContactForce::addSphere(int particle, double diameter) {
     if (particle < 0)
         throw OpenMMException("CylinderChainContactForce: Illegal particle index: "+to_string(particle));
-    checkPositive(diameter, "The diameter of a sphere");
+    checkDiameter(diameter, "The diameter of a sphere");
     spheres.push_back({particle, diameter});
     return spheres.size()-1;
 }
@@ -98,7 +98,7 @@ double CylinderChainContactForce::getSphereDiameter(int sphere) const {
 
 void CylinderChainContactForce::setSphereDiameter(int sphere, double diameter) {
     ASSERT_VALID_INDEX(sphere, spheres);
-    checkPositive(diameter, "The diameter of a sphere");
+    checkDiameter(diameter, "The diameter of a sphere");
     spheres[sphere].diameter = diameter;
 }
 

@@ -10,7 +10,7 @@ using namespace OpenMM;
 using namespace cylchain;
 using namespace std;
 
-static void require(bool condition, const string& message) {
+static void requireOfWall(bool condition, const string& message) {
     if (!condition)
         throw OpenMMException("CylinderChainWallForce: "+message);
 }
@@ -36,25 +36,26 @@ string CylinderChainWallForce::getRegion(Vec3& point, Vec3& vector, double& leng
 void CylinderChainWallForce::setRegion(const string& shape, const Vec3& point, const Vec3& vector, double length) {
     const std::vector<string> names = namesOf<WallShape>();
     const size_t number = find(names.begin(), names.end(), shape)-names.begin();
-    require(number < names.size(), "There is no shape '"+shape+"'");
-    require(isFinite(point) && isFinite(vector) && isfinite(length), "The region must be described by finite numbers");
+    requireOfWall(number < names.size(), "There is no shape '"+shape+"'");
+    requireOfWall(isFinite(point) && isFinite(vector) && isfinite(length),
+            "The region must be described by finite numbers");
     const WallShape kind = static_cast<WallShape>(number);
     Vec3 stored = vector;
     if (kind == WallShape::Plane || kind == WallShape::Slab || kind == WallShape::Cylinder) {
         const double size = sqrt(vector.dot(vector));
-        require(size > 0, "The direction of a "+shape+" cannot be the zero vector");
+        requireOfWall(size > 0, "The direction of a "+shape+" cannot be the zero vector");
         // What is normalized already stays the same to the bit.
 
         if (fabs(size-1) > 1e-15)
             stored = vector/size;
     }
     if (kind == WallShape::Slab || kind == WallShape::Sphere || kind == WallShape::Cylinder)
-        require(length > 0, "The length of a "+shape+" must be positive");
+        requireOfWall(length > 0, "The length of a "+shape+" must be positive");
     if (kind == WallShape::Box)
-        require(vector[0] > point[0] && vector[1] > point[1] && vector[2] > point[2],
+        requireOfWall(vector[0] > point[0] && vector[1] > point[1] && vector[2] > point[2],
                 "The upper corner of a box must exceed the lower one along every axis");
     if (kind == WallShape::Ellipsoid)
-        require(vector[0] > 0 && vector[1] > 0 && vector[2] > 0, "Semi-axes must be positive");
+        requireOfWall(vector[0] > 0 && vector[1] > 0 && vector[2] > 0, "Semi-axes must be positive");
     this->shape = shape;
     this->point = point;
     this->vector = stored;
@@ -62,13 +63,13 @@ void CylinderChainWallForce::setRegion(const string& shape, const Vec3& point, c
 }
 
 void CylinderChainWallForce::setStiffness(double stiffness) {
-    require(stiffness >= 0 && isfinite(stiffness), "The stiffness cannot be negative and must be finite");
+    requireOfWall(stiffness >= 0 && isfinite(stiffness), "The stiffness cannot be negative and must be finite");
     this->stiffness = stiffness;
 }
 
 int CylinderChainWallForce::addParticle(int particle, double radius) {
-    require(particle >= 0, "Illegal particle index: "+to_string(particle));
-    require(radius >= 0 && isfinite(radius), "A radius cannot be negative and must be finite");
+    requireOfWall(particle >= 0, "Illegal particle index: "+to_string(particle));
+    requireOfWall(radius >= 0 && isfinite(radius), "A radius cannot be negative and must be finite");
     particles.push_back({particle, radius});
     return particles.size()-1;
 }
@@ -85,7 +86,7 @@ double CylinderChainWallForce::getParticleRadius(int index) const {
 
 void CylinderChainWallForce::setParticleRadius(int index, double radius) {
     ASSERT_VALID_INDEX(index, particles);
-    require(radius >= 0 && isfinite(radius), "A radius cannot be negative and must be finite");
+    requireOfWall(radius >= 0 && isfinite(radius), "A radius cannot be negative and must be finite");
     particles[index].radius = radius;
 }
 
