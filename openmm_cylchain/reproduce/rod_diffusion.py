@@ -40,7 +40,9 @@ _FRICTIONS = {
 _LABELS = {"corrected": "end_corrections", "own": "their_own_logarithm"}
 
 
-def diffusing_rods(length_micrometers, segments, planar, friction, copies, intervals, interval_seconds, seed):
+def diffusing_rods(
+    length_micrometers, segments, planar, friction, copies, intervals, interval_seconds, seed, element="straight"
+):
     """Diffusion coefficients of rods from their displacements in intervals, eq. (14).
 
     Parameters
@@ -48,6 +50,7 @@ def diffusing_rods(length_micrometers, segments, planar, friction, copies, inter
     planar : bool
     friction : {"whole", "corrected", "own"}
         See ``_FRICTIONS``.
+    element : {"straight", "beam"}
 
     Returns
     -------
@@ -57,12 +60,13 @@ def diffusing_rods(length_micrometers, segments, planar, friction, copies, inter
     """
     column = rods_on_string.SIMULATED_ROD
     filaments = column.solvent()
-    kind = column.filament_type(length_micrometers * MICROMETER / segments, **_FRICTIONS[friction])
+    kind = column.filament_type(length_micrometers * MICROMETER / segments, element=element, **_FRICTIONS[friction])
     for angle in np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, copies):
         filaments.add_straight(kind, segments, [0, 0, 0], [math.cos(angle), math.sin(angle), 0], planar=planar)
     interval = interval_seconds * SECOND
     context = simulation.start(filaments, interval, seed)
-    frames = ((nodes.mean(axis=1), _axis(nodes)) for nodes in simulation.frames(context, copies, range(intervals + 1)))
+    shapes = (points[:, : segments + 1] for points in simulation.frames(context, copies, range(intervals + 1)))
+    frames = ((nodes.mean(axis=1), _axis(nodes)) for nodes in shapes)
     sums = np.zeros((3, copies))
     for (middle, axis), (next_middle, next_axis) in pairwise(frames):
         moved = next_middle - middle
@@ -109,10 +113,12 @@ def cut_rod_diffusion(length, segments, friction="whole"):
     }
 
 
-def _measured(records, quick, length, segments, planar=True, friction="whole"):
+def _measured(records, quick, length, segments, planar=True, friction="whole", beams=False):
     exact = cut_rod_diffusion(length * MICROMETER, segments, friction)
     name = f"figure-07-{length}-um-{segments}-segments"
     name += ("" if planar else "-space") + ("" if friction == "whole" else f"-{friction}")
+    name += "-beams" if beams else ""
+    seed = 7 + 100 * length + segments + (0 if planar else 1000) + 2000 * list(_FRICTIONS).index(friction)
     return records.measure(
         name,
         diffusing_rods,
@@ -123,7 +129,8 @@ def _measured(records, quick, length, segments, planar=True, friction="whole"):
         copies=_COPIES[quick],
         intervals=_INTERVALS,
         interval_seconds=_TURN**2 / (2.0 * exact["rotational"]) / SECOND,
-        seed=7 + 100 * length + segments + (0 if planar else 1000) + 2000 * list(_FRICTIONS).index(friction),
+        seed=seed + (10000 if beams else 0),
+        **({"element": "beam"} if beams else {}),
     )
 
 
@@ -141,6 +148,11 @@ def evaluate(records, quick):
         for segments in _SEGMENTS:
             points[length, segments] = _measured(records, quick, length, segments)
             results += _results(points[length, segments], whole, f"{length}_um_{segments}_segments")
+    for length in _LENGTHS:
+        for segments in _SEGMENTS:
+            data = _measured(records, quick, length, segments, beams=True)
+            suffix = f"{length}_um_{segments}_beam_element" + ("s" if segments > 1 else "")
+            results += _results(data, rod_diffusion(length * MICROMETER), suffix)
     for length in _LENGTHS:
         ratios = _shares(length, _SEGMENTS[-1], "whole")
         for direction in _SCALES:
@@ -184,7 +196,8 @@ def _remarks():
         "without end corrections, as Section IV has it. The paper gives the logarithm of the whole rod to all segments "
         '(`friction_length="filament"`). Then the friction of segments adds up to that of the rod, the rotational one '
         "by (A3), and a cut rod diffuses exactly as the whole, in closed form as in the simulation. The paper "
-        "simulates in a plane; rods in space have the same coefficients.\n\n"
+        "simulates in a plane; rods in space have the same coefficients. So have rods of beam elements, whose friction "
+        "is spread along them.\n\n"
         f"With the end corrections that are the default, a cut rod of {_OWN_LENGTH} µm still moves along and across as "
         f"the whole, but turns {100 * (turning - 1):.0f} % faster in {_SEGMENTS[-1]} segments: what turns it is their "
         f"friction across, with the correction {corrections.perpendicular}, and not the friction of rotation, with "

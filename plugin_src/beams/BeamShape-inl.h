@@ -93,6 +93,21 @@ template <class Real> struct BeamShape {
         return {apart-across(force1, first)*perFirst, across(force, middle)*(-perMiddle),
                 -apart-across(force2, last)*perLast};
     }
+    /** How the two bends change, across the middle, with the vectors. */
+    CYLCHAIN_INLINE void findChanges(const BeamVectors<Real>& change, Vec& ofSum, Vec& ofDifference) const {
+        const Vec dFirst = across(change.first, first)*perFirst, dMiddle = across(change.middle, middle)*perMiddle;
+        const Vec dLast = across(change.last, last)*perLast;
+        const Real dCosine1 = dFirst.dot(middle)+first.dot(dMiddle), dCosine2 = dMiddle.dot(last)+middle.dot(dLast);
+        const Vec bend1 = (crossProduct(dFirst, middle)+crossProduct(first, dMiddle))*factor1.value+
+                normal1*(factor1.slope*dCosine1);
+        const Vec bend2 = (crossProduct(dMiddle, last)+crossProduct(middle, dLast))*factor2.value+
+                normal2*(factor2.slope*dCosine2);
+        const Vec apart = bend2-bend1;
+        const Real dScale = turn.dot(change.last-change.first)*(2*SCALE_OF_TURN+turnSquare*(4*SCALE_OF_SQUARE))+
+                unscaled.dot(apart)*(2*SCALE_OF_DIFFERENCE);
+        ofSum = across(bend1+bend2, middle);
+        ofDifference = across(apart*scale+unscaled*dScale, middle);
+    }
 private:
     CYLCHAIN_INLINE BeamShape(const BeamVectors<Real>& v, Real length1, Real lengthOfMiddle, Real length2) :
             BeamShape(v, length1, lengthOfMiddle, length2, 1/(length1*lengthOfMiddle*length2)) {

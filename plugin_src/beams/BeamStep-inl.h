@@ -301,8 +301,8 @@ private:
                     own.ofMiddle.stiffness*thetaOfStrains*moved;
         }
     }
-    /** Let the change of tensions act along the mean directions as well, with the same elimination. */
-    void refine() {
+    /** Let changes of tensions and moments act as in the middle of the step as well, with the same elimination. */
+    void refine(const Six* y) {
         for (int e = 0; e < n; e++) {
             const BeamElementState<Real>& own = elements[e];
             if (e == 0)
@@ -314,6 +314,8 @@ private:
             right[e+1] = Six {};
             addForces(own.lacking*(own.ofMiddle.before-own.ofMiddle.multiplier), right[e], right[e+1]);
         }
+        for (int e = 0; e < n-1; e++)
+            refineMoments(y, e);
         equations.setRight(right);
         equations.substitute(right);
         findMultipliers<true>(right);
@@ -321,6 +323,19 @@ private:
             change[node].position = change[node].position+right[node].position;
             change[node].control = change[node].control+right[node].control;
         }
+    }
+    /** The matrix has moments change as they act at the end of the step: what they lack of those in its middle. */
+    CYLCHAIN_INLINE void refineMoments(const Six* y, int e) {
+        const BeamShape<Real> now(vectors(e, y, 1)), middle(vectors(e, y, 0.5));
+        const Real stiffness = of(BeamPack::Bending)*perLength*present(e);
+        const BeamVectors<Real> changes = BeamVectors<Real>::of(change[e].control,
+                change[e+1].position-change[e].position, change[e+1].control, perLength);
+        Vec moment1, moment2;
+        now.findChanges(changes, moment1, moment2);
+        moment1 = moment1*(stiffness*thetaOfSum);
+        moment2 = moment2*(stiffness*thetaOfDifference*Scalar(4.0/3));
+        addForces(middle.forcesOf(turned(moment1, now.middle, middle.middle),
+                turned(moment2, now.middle, middle.middle))-now.forcesOf(moment1, moment2), right[e], right[e+1]);
     }
     /** Find the tensions, and move the nodes of active lanes. */
     void advance(Six* y, Real active, bool refines) {
@@ -330,7 +345,7 @@ private:
         }
         findMultipliers<false>(change);
         if (refines)
-            refine();
+            refine(y);
         for (int node = 0; node < n; node++) {
             y[node].position = y[node].position+change[node].position*active;
             y[node].control = y[node].control+change[node].control*active;

@@ -102,7 +102,7 @@ def planted(monkeypatch, column, **changes):
 
 def test_rods_and_a_planted_fault(tmp_path, monkeypatch):
     monkeypatch.setattr(rod_diffusion, "_LENGTHS", (1, 5))
-    monkeypatch.setattr(rod_diffusion, "_SEGMENTS", (1, 5))
+    monkeypatch.setattr(rod_diffusion, "_SEGMENTS", (1, 20))
     (case,) = rod_diffusion.CASES
     assert set(verdicts(case, tmp_path / "right").values()) == {"agrees"}
     planted(monkeypatch, "ROD", viscosity=1.1)
