@@ -31,6 +31,12 @@ _RULE = Rule(3.0, 0.005, 0.03)
 _TIME_RULE = Rule(3.0, 0.01, 0.04)
 _ESTIMATE = printed("0.14")
 _RATIO = Rule(0.0, 1e-3)
+_ELEMENTS = 3
+_BEAM_STEP = 3.0
+"""In relaxation times: steps of stiff cantilevers are exact however long they are, so each is a sample of its own."""
+_BEAM_COPIES, _BEAM_STEPS = {True: 1000, False: 3000}, {True: 110, False: 410}
+_BEAM_DISCARDED = 10
+_BEAM_RULE = Rule(3.0, 0.005, 0.01)
 
 
 def fluctuating_chromosome(viscosity_factor, copies, step_seconds, seed):
@@ -66,6 +72,33 @@ def fluctuating_chromosome(viscosity_factor, copies, step_seconds, seed):
         "counts": np.histogram(angles / deviation, _BINS)[0],
         "trace": angles[:, 0],
         "time": _STRIDE * step_seconds * SECOND,
+    }
+
+
+def fluctuating_beams(elements, copies, steps, step_seconds, seed):
+    """Clamped filaments of beam elements that start straight and fluctuate in a plane.
+
+    Returns
+    -------
+    dict of arrays
+        ``angle_square`` (groups,) of the tangent at the end, and ``deflection_square`` (elements, groups) of the nodes
+        beyond the clamp in nm^2.
+    """
+    column = rods_on_string.SIMULATED_CHROMOSOME
+    filaments = column.solvent()
+    kind = column.filament_type(_LENGTH / elements, element="beam")
+    for _ in range(copies):
+        filaments.add_straight(kind, elements, [0, 0, 0], [1, 0, 0], clamped=0, clamped_tangents=0, planar=True)
+    context = simulation.start(filaments, step_seconds * SECOND, seed)
+    angles, deflections = np.zeros(copies), np.zeros((copies, elements))
+    for points in simulation.frames(context, copies, range(_BEAM_DISCARDED, steps)):
+        x, y = (points[:, -1] - points[:, elements]).T[:2]
+        angles += np.arctan2(y, x) ** 2
+        deflections += points[:, 1 : elements + 1, 1] ** 2
+    samples = steps - _BEAM_DISCARDED
+    return {
+        "angle_square": simulation.groups(angles / samples, _GROUPS),
+        "deflection_square": simulation.groups(deflections.T / samples, _GROUPS),
     }
 
 
@@ -108,6 +141,26 @@ def _medium_results(medium, data):
     ours = simulation.jackknife(_exponent, data["deflection_square"])
     results.append(Result(f"exponent_of_the_deflection_variance_{name}", "1", ours, _RULE, _exponent(exact)))
     return results
+
+
+def _beam_results(records, quick):
+    data = records.measure(
+        "figure-09-beams",
+        fluctuating_beams,
+        elements=_ELEMENTS,
+        copies=_BEAM_COPIES[quick],
+        steps=_BEAM_STEPS[quick],
+        step_seconds=_BEAM_STEP * _relaxation_time(1.0) / SECOND,
+        seed=19,
+    )
+    persistence, suffix = CHROMOSOME.persistence_length, f"{_ELEMENTS}_beam_elements"
+    ours = simulation.mean(data["angle_square"] / clamped_angle_variance(_LENGTH, persistence))
+    yield Result(f"angle_variance_over_(42)_{suffix}", "1", ours, _BEAM_RULE, 1.0)
+    for node, squares in enumerate(data["deflection_square"], 1):
+        place = node * _LENGTH / _ELEMENTS
+        exact = clamped_deflection_variance(place, persistence) / MICROMETER**2
+        name = f"deflection_variance_at_{place / MICROMETER:.3g}_um_{suffix}"
+        yield Result(name, "um^2", simulation.mean(squares / MICROMETER**2), _BEAM_RULE, exact)
 
 
 def _relaxation_result(medium, factor, data):
@@ -153,6 +206,7 @@ def evaluate(records, quick):
         )
         results += _medium_results(medium, measured[medium])
         results.append(_relaxation_result(medium, factor, measured[medium]))
+    results += _beam_results(records, quick)
     pictures = {
         "Deflections and angles of a clamped chromosome": lambda figure: _draw_fluctuations(figure, measured),
         "Relaxation of a clamped chromosome": lambda figure: _draw_relaxation(figure, measured),
@@ -168,7 +222,9 @@ def _remarks():
         "taken. (43) has the factor 32/π⁴ = 0.3285, the share of the first mode, for the exact 1/3; the theory here is "
         "the latter times 1 + 1/(2 n²), exact for the n-th node of a chain. Shape and variances do not depend on the "
         "viscosity, and the relaxation time is proportional to it: in theory it is that of the slowest mode of the "
-        "chain, from the friction of its segments and the stiffness of its joints."
+        "chain, from the friction of its segments and the stiffness of its joints.\n\n"
+        f"{_ELEMENTS} beam elements have the variances of the continuous filament at their nodes and at the very "
+        f"end, in steps of {_BEAM_STEP:g} relaxation times."
     )
 
 

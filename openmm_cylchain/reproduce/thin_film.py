@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from ..analysis.statistics import fit_relaxation_time
+from ..beams.curve import element_slopes
 from ..benchmark.measurement import scaled
 from ..dynamics.recommended_step import recommended_time_step
 from ..theory import (
@@ -39,6 +40,12 @@ _CORRELATION_RULE = Rule(3.0, 0.002, 0.03)
 _MODE_RULE = Rule(3.0, 0.02, 0.15)
 _TIME_RULE = Rule(3.0, 0.03, 0.15)
 _PAPER_SECONDS = 80.0
+_ELEMENTS = 12
+_BEAM_MODES = np.arange(1, 6)
+_BEAM_COPIES, _BEAM_FRAMES = {True: 512, False: 2048}, {True: 20, False: 80}
+_BEAM_FRAME_SECONDS = 0.1
+_BEAM_SQUARE_RULE = Rule(3.0, 0.002, 0.01)
+_BEAM_MODE_RULE = Rule(3.0, 0.01, 0.05)
 
 
 def filaments_in_a_thin_film(copies, step_microseconds, stride, discarded, frames, seed):
@@ -73,6 +80,40 @@ def filaments_in_a_thin_film(copies, step_microseconds, stride, discarded, frame
         "correlation_1": simulation.groups(_lagged(amplitudes[..., 0], _LAGS[1]), _GROUPS),
         "correlation_2": simulation.groups(_lagged(amplitudes[..., 1], _LAGS[2]), _GROUPS),
         "shapes": shapes[::_SHAPE_STRIDE][:_SHAPES],
+    }
+
+
+def beams_in_a_thin_film(elements, copies, step_microseconds, stride, frames, seed):
+    """Free filaments of beam elements in a plane that start from equilibrium.
+
+    Returns
+    -------
+    dict of arrays
+        ``square`` in nm^2 (groups,), and ``modes`` in nm, those of ``_BEAM_MODES`` (modes, groups), as those of
+        ``filaments_in_a_thin_film``, with the angle of the curve at four Gauss points of each element.
+    """
+    column = rods_on_string.SIMULATED_ACTIN
+    filaments = column.solvent()
+    one = _LENGTH / elements
+    for number in range(copies):
+        filaments.add_equilibrium(
+            column.filament_type(one, element="beam"), elements, 1000 * seed + number, planar=True
+        )
+    context = simulation.start(filaments, 1e6 * step_microseconds, seed)
+    gauss, weights = np.polynomial.legendre.leggauss(4)
+    places = 0.5 * (1.0 + gauss)
+    along = (np.arange(elements)[:, None] + places).ravel() / elements
+    cosines = np.cos(np.outer(_BEAM_MODES, np.pi * along)) * np.tile(0.5 * one * weights, elements)
+    squares, variances = np.zeros(copies), np.zeros((copies, len(_BEAM_MODES)))
+    for points in simulation.frames(context, copies, range(0, frames * stride, stride)):
+        nodes, control_points = points[:, : elements + 1], points[:, elements + 1 :]
+        slopes = element_slopes(nodes, control_points, places, one).reshape(copies, -1, 3)
+        angles = np.unwrap(np.arctan2(slopes[..., 1], slopes[..., 0]), axis=1)
+        squares += np.sum((nodes[:, -1] - nodes[:, 0]) ** 2, axis=1)
+        variances += 2.0 / _LENGTH * (angles @ cosines.T) ** 2
+    return {
+        "square": simulation.groups(squares / frames, _GROUPS),
+        "modes": simulation.groups(variances.T / frames, _GROUPS),
     }
 
 
@@ -144,6 +185,30 @@ def _shape_results(data):
         yield Result(f"variance_of_bending_mode_{mode}", "um", ours, _MODE_RULE, float(exact))
 
 
+def _beam_results(records, quick):
+    kind = ACTIN.filament_type(_LENGTH / _ELEMENTS, element="beam")
+    longest = recommended_time_step(kind, ACTIN.solvent().viscosity, ACTIN.temperature, "implicit", _ELEMENTS).step
+    stride = math.ceil(_BEAM_FRAME_SECONDS * SECOND / longest)
+    data = records.measure(
+        "figure-10-beams",
+        beams_in_a_thin_film,
+        elements=_ELEMENTS,
+        copies=_BEAM_COPIES[quick],
+        step_microseconds=1e6 * _BEAM_FRAME_SECONDS / stride,
+        stride=stride,
+        frames=_BEAM_FRAMES[quick],
+        seed=20,
+    )
+    persistence, suffix = ACTIN.persistence_length, f"{_ELEMENTS}_beam_elements"
+    exact = wlc_mean_square_end_to_end(_LENGTH, persistence, planar=True) / MICROMETER**2
+    ours = _scaled(data["square"], MICROMETER**2)
+    yield Result(f"end_to_end_square_{suffix}", "um^2", ours, _BEAM_SQUARE_RULE, exact)
+    for mode, copies in zip(_BEAM_MODES, data["modes"]):
+        exact = bending_mode_variance(mode, _LENGTH, persistence) / MICROMETER
+        ours = _scaled(copies, MICROMETER)
+        yield Result(f"variance_of_bending_mode_{mode}_{suffix}", "um", ours, _BEAM_MODE_RULE, float(exact))
+
+
 def _square_cause(exact):
     # The first mode alone: R^2 = L^2 - c a^2 with a normal amplitude a, whose square relaxes twice as fast as a.
     missing = (_LENGTH / MICROMETER) ** 2 - exact
@@ -172,7 +237,7 @@ def _time_cause():
 def evaluate(records, quick):
     """Fig. 10."""
     data = _measured(records, quick)
-    results = [*_shape_results(data), *_time_results(data)]
+    results = [*_shape_results(data), *_time_results(data), *_beam_results(records, quick)]
     pictures = {
         "An actin filament in a thin film": lambda figure: _draw_shapes(figure, data["shapes"]),
         "Correlation of tangents and variance of bending modes": lambda figure: _draw_statics(figure, data),
@@ -193,7 +258,9 @@ def _remarks(quick):
         f"angles (mode 10 has {share:.3f} times the variance (46) of the continuous filament). Relaxation times are "
         "fits to the correlation of the amplitudes of (45), the theory the same fit to the correlation that the chain "
         "has for small deflections: its modes are not quite the cosines of (45). This theory is not exact for a "
-        "filament as long as its persistence length, and its rule allows for that."
+        "filament as long as its persistence length, and its rule allows for that.\n\n"
+        f"{_ELEMENTS} beam elements are compared with the continuous filament, (44) and (46): {_BEAM_COPIES[quick]} "
+        f"filaments for {_BEAM_FRAME_SECONDS * (_BEAM_FRAMES[quick] - 1):.3g} s each, from the first step on."
     )
 
 

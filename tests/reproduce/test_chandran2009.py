@@ -136,7 +136,9 @@ def test_chromosome_and_planted_faults(tmp_path, monkeypatch):
     results = case.evaluate(Records(tmp_path / "right"), True).results
     assert not [each.name for each in results if each.unexplained]
     planted(monkeypatch, "CHROMOSOME", bending_rigidity=1.1)
-    assert verdicts(case, tmp_path / "stiff")["angle_variance_over_(42)_in_water"] == "differs"
+    stiff = verdicts(case, tmp_path / "stiff")
+    assert stiff["angle_variance_over_(42)_in_water"] == "differs"
+    assert stiff["angle_variance_over_(42)_3_beam_elements"] == "differs"
 
 
 def test_statistics_of_filaments_in_a_thin_film():
@@ -151,3 +153,16 @@ def test_statistics_of_filaments_in_a_thin_film():
         assert abs(copies.mean() - exact) < 4 * error < 0.5 * exact
     # Stiff filaments of nearly the contour length.
     assert np.all(data["square"] < (15.6 * MICROMETER) ** 2)
+
+
+def test_beams_in_a_thin_film_and_a_planted_fault(tmp_path, monkeypatch):
+    monkeypatch.setattr(thin_film, "_BEAM_COPIES", {True: 256})
+    monkeypatch.setattr(thin_film, "_BEAM_FRAMES", {True: 6})
+    monkeypatch.setattr(thin_film, "_BEAM_SQUARE_RULE", replace(thin_film._BEAM_SQUARE_RULE, resolution=0.015))
+    monkeypatch.setattr(thin_film, "_BEAM_MODE_RULE", replace(thin_film._BEAM_MODE_RULE, resolution=0.1))
+    right = list(thin_film._beam_results(Records(tmp_path / "right"), True))
+    assert len(right) == 6 and {each.verdict for each in right} == {"agrees"}
+    planted(monkeypatch, "ACTIN", bending_rigidity=1.5)
+    wrong = {each.name: each.verdict for each in thin_film._beam_results(Records(tmp_path / "stiff"), True)}
+    assert wrong["end_to_end_square_12_beam_elements"] == "differs"
+    assert wrong["variance_of_bending_mode_1_12_beam_elements"] == "differs"
