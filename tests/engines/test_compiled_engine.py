@@ -1,7 +1,10 @@
 """The compiled engine: the same step as the portable one, XML, copies, checkpoints, threads, refusals."""
 
 import copy
+import os
 import pickle
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -379,3 +382,32 @@ def test_refused_arguments():
     with pytest.raises(InputError, match="same force group"):
         filaments_of("compiled").build(stretching_force_group=0, bending_force_group=1)
     assert native.SCHEMES.keys() == set(SCHEMES)
+
+
+STEPS_OF_ONE = """
+from openmm_cylchain import F_ACTIN, Filaments
+import openmm
+filaments = Filaments(1029.8, 310.0, engine="compiled")
+filaments.add_straight(F_ACTIN, 4, [0, 0, 0], [1, 0, 0])
+_, system, positions = filaments.build()
+integrator = filaments.create_integrator(system, 1e6, scheme="implicit", random_seed=1)
+context = openmm.Context(system, integrator, openmm.Platform.getPlatformByName("Reference"))
+context.setPositions(positions)
+integrator.step(3)
+print(context.getState(positions=True).getPositions(asNumpy=True)._value.sum())
+"""
+
+
+@pytest.mark.parametrize("instruction_set", ["avx512", "avx2", "baseline"])
+def test_an_instruction_set_computes_the_same_or_says_that_it_was_not_built(instruction_set, tmp_path):
+    def run(environment):
+        command = [sys.executable, "-c", STEPS_OF_ONE]
+        # From elsewhere, so that what is installed is imported.
+        return subprocess.run(command, env={**os.environ, **environment}, cwd=tmp_path, capture_output=True, text=True)
+
+    result = run({"CYLCHAIN_INSTRUCTION_SET": instruction_set})
+    if result.returncode == 0:
+        assert np.isclose(float(result.stdout), float(run({}).stdout), rtol=1e-12)
+    else:
+        assert instruction_set == "baseline"
+        assert "CYLCHAIN_FOR_THIS_PROCESSOR=OFF" in result.stderr.splitlines()[-1]
