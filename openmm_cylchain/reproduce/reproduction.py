@@ -10,11 +10,11 @@ from matplotlib.figure import Figure
 from ..errors import InputError
 from ..output.files import write_atomically
 from ..version import __version__
-from . import chandran2009, panja2015, pesek2016, style
+from . import beam_accuracy, chandran2009, panja2015, pesek2016, style
 from .page import format_page
 from .records import Records
 
-PAPERS = {"pesek2016": pesek2016, "diffusion": chandran2009, "panja2015": panja2015}
+PAPERS = {"pesek2016": pesek2016, "diffusion": chandran2009, "panja2015": panja2015, "beams": beam_accuracy}
 _RESULTS, _MEASUREMENTS = "results.json", "measurements"
 
 
