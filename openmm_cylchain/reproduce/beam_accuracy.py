@@ -236,8 +236,8 @@ def evaluate_variances(records, quick):
     head = "variance of the deflection of the end"
     remarks = (
         "The chromosome of Fig. 9 of Chandran and Mofrad 2009. For small deflections, beam elements have "
-        "the exact distribution of the positions and tangents of their nodes, however few there are, and what is left here is the standard error of "
-        "ours: with "
+        "the exact distribution of the positions and tangents of their nodes, however few there are, and what is left "
+        "here is the standard error of ours: with "
         + "; ".join(
             f"{number} element{'s' if number > 1 else ''}, {rows[2 * i]} and {rows[2 * i + 1]}"
             for i, number in enumerate(_FLUCTUATING)
