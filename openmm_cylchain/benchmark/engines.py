@@ -6,7 +6,7 @@ run, in turn. Where two are compared on one thread, each takes part with the fas
 and the CPU platform with one thread, and stock OpenMM with the faster of its angle forces as well.
 
 The compiled engine takes steps of 1 ms with scheme "implicit" as well, in the precision that it chooses and in double
-precision.
+precision, and its recommended steps with as many beam elements, for which there is double precision alone.
 """
 
 from dataclasses import dataclass
@@ -18,12 +18,13 @@ import openmm
 from ..engine_choice import ENGINES, available_engines
 from .measurement import Case, describe_machine, median, processors, ratio, scaled, time_interleaved
 from .report import Report, row
-from .systems import IMPLICIT_TIME_STEP, SCHEME, TIME_STEP, simulate_beads, simulate_filaments
+from .systems import BEAMS, IMPLICIT_TIME_STEP, SCHEME, TIME_STEP, simulate_beads, simulate_filaments
 
 CHAINS, SEGMENTS = 200, 64
 SPEED_UNIT = "10^6 segment steps/s"
 
 _PRECISIONS = {"implicit": "automatic", "implicit_double": "double"}
+_BEAMS = "implicit_beams"
 _STOCK = ("stock_harmonic_angle", "stock_custom_angle")
 _ONE_THREAD, _ALL_THREADS, _TWO_THREADS, _REFERENCE = "1_thread", "all_threads", "2_threads", "reference"
 
@@ -82,6 +83,7 @@ def _cases(chains, segments):
         options = {"scheme": "implicit", "step": IMPLICIT_TIME_STEP}
         for name, precision in _PRECISIONS.items():
             families[name] = partial(simulate_filaments, "compiled", **options, precision=precision)
+        families[_BEAMS] = partial(simulate_filaments, "compiled", scheme="implicit", step=None, filament_type=BEAMS)
     families |= {name: partial(simulate_beads, angle) for name, angle in zip(_STOCK, ("harmonic", "custom"))}
     cases = []
     for family, simulate in families.items():
@@ -128,7 +130,7 @@ def engine_rows(times, segments):
     compared = {
         "compiled": _fastest(times, ("compiled",)),
         "portable": _fastest(times, ("portable",)),
-        **{name: _fastest(times, (name,)) for name in _PRECISIONS},
+        **{name: _fastest(times, (name,)) for name in (*_PRECISIONS, _BEAMS)},
         "stock_openmm": _fastest(times, _STOCK),
         "stock_openmm_custom_angle": _fastest(times, _STOCK[1:]),
     }
@@ -146,6 +148,7 @@ def _fastest(times, families):
 def _one_thread_ratios(times, compared):
     pairs = [("compiled", "portable"), ("compiled", "stock_openmm"), ("compiled", "stock_openmm_custom_angle")]
     pairs += [("portable", "stock_openmm"), ("portable", "stock_openmm_custom_angle"), tuple(_PRECISIONS)]
+    pairs += [(name, _BEAMS) for name in _PRECISIONS]
     for numerator, denominator in pairs:
         if numerator in compared and denominator in compared:
             speeds = ratio(times[compared[denominator]], times[compared[numerator]])

@@ -1,6 +1,6 @@
 """What is measured: actin filaments with an engine, and chains of beads of stock OpenMM."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import openmm
@@ -23,6 +23,9 @@ SCHEME = "euler"
 ONE_THREAD = ("CPU", {"Threads": "1"})
 REFERENCE = ("Reference", {})
 _SHAPES = 64
+
+
+BEAMS = replace(F_ACTIN, element="beam", extension_relaxation_time=None)
 
 
 @dataclass(frozen=True)
@@ -53,7 +56,15 @@ def one_thread_context(system, integrator, positions, platform=None):
 
 
 def simulate_filaments(
-    engine, chains, segments, platform, properties, scheme=SCHEME, step=TIME_STEP, precision="automatic"
+    engine,
+    chains,
+    segments,
+    platform,
+    properties,
+    scheme=SCHEME,
+    step=TIME_STEP,
+    precision="automatic",
+    filament_type=F_ACTIN,
 ):
     """Actin filaments in equilibrium, with an engine, ready to step.
 
@@ -66,9 +77,10 @@ def simulate_filaments(
     properties : dict
         Of the platform.
     scheme : str
-    step : float
-        In ps.
+    step : float or None
+        In ps; the recommended one if None.
     precision : {"automatic", "mixed", "double"}
+    filament_type : FilamentType
 
     Returns
     -------
@@ -76,8 +88,10 @@ def simulate_filaments(
     """
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine=engine)
     for positions in _node_positions(chains, segments):
-        filaments.add_nodes(F_ACTIN, positions)
+        filaments.add_nodes(filament_type, positions)
     topology, system, positions = filaments.build()
+    if step is None:
+        step = filaments.recommended_time_step(scheme, system=system)
     integrator = filaments.create_integrator(system, step, scheme=scheme, random_seed=1, precision=precision)
     return _started(filaments, topology, system, integrator, positions, platform, properties)
 
