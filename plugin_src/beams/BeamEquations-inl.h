@@ -44,7 +44,11 @@ public:
     template <int COORDINATES> static CYLCHAIN_INLINE void addElement(const BeamMatrix<Real, COORDINATES>& m, Row& here,
             Row& after) {
         addLower(m, 0, here.diagonal);
-        after.diagonal = SixMatrix<Real> {};
+#pragma GCC unroll 6
+        for (int i = 0; i < 6; i++)
+#pragma GCC unroll 6
+            for (int j = 0; j <= i; j++)
+                after.diagonal.a[i][j] = Real{};
         addLower(m, 2, after.diagonal);
 #pragma GCC unroll 6
         for (int k = 0; k < 2; k++)

@@ -185,18 +185,23 @@ private:
         const Vec chord = start.chord[e]+(y[e+1].position-y[e].position)*half;
         const Real size = length*present(e)*perStep;
         const Real across = perpendicular*size, more = parallel*size-across;
-        for (int pair = 0; pair < 10; pair++)
-            m.block[pair] = Symmetric<Real> {};
+        Symmetric<Real> resistance[GAUSS_POINTS] = {};
         for (int g = 0; g < GAUSS_POINTS; g++) {
             const Vec t = directionAt(g, control1, chord, control2);
-            Symmetric<Real> resistance = {};
-            resistance.addAxial(across*GAUSS_WEIGHTS[g], more*GAUSS_WEIGHTS[g], t);
-            addAt(g, -(resistance*velocityAt(g, y[e], y[e+1])), right[e], right[e+1]);
-            int pair = 0;
-            for (int k = 0; k < 4; k++)
-                for (int l = k; l < 4; l++)
-                    addTimes(m.block[pair++], resistance, WEIGHTS.value[g][k]*WEIGHTS.value[g][l]);
+            resistance[g].addAxial(across*GAUSS_WEIGHTS[g], more*GAUSS_WEIGHTS[g], t);
+            addAt(g, -(resistance[g]*velocityAt(g, y[e], y[e+1])), right[e], right[e+1]);
         }
+        int pair = 0;
+#pragma GCC unroll 4
+        for (int k = 0; k < 4; k++)
+#pragma GCC unroll 4
+            for (int l = k; l < 4; l++) {
+                Symmetric<Real> sum = {};
+#pragma GCC unroll 4
+                for (int g = 0; g < GAUSS_POINTS; g++)
+                    addTimes(sum, resistance[g], WEIGHTS.value[g][k]*WEIGHTS.value[g][l]);
+                m.block[pair++] = sum;
+            }
     }
     static CYLCHAIN_INLINE void addTimes(Symmetric<Real>& sum, const Symmetric<Real>& one, Scalar factor) {
         sum.xx += one.xx*factor;
@@ -242,6 +247,7 @@ private:
         Symmetric<Real> across = {};
         across.addAxial(taut, -taut, now.middle);
         const Scalar weights[] = {2.25, 1.125, -2.25, 1.125, 0.5625, -1.125, 0.5625, 2.25, -1.125, 0.5625};
+#pragma GCC unroll 10
         for (int pair = 0; pair < 10; pair++)
             addTimes(m.block[pair], across, weights[pair]);
     }
