@@ -21,6 +21,11 @@ const double LARGEST_RETURN = 1;
 const double LARGEST_GAP = 0.3;
 /** Capsules that have travelled less touch where they did, over the same. */
 const double SAME_PLACE = 0.01;
+/**
+ * What solving the equations leaves. An iteration tells which contacts come back, and what it leaves are iterations
+ * that all have to go through: with 0.05, bundles take a seventh more time.
+ */
+const double RELATIVE_TOLERANCE = 5e-4;
 /** The largest change of a gap in the last iteration, over the thermal fluctuation of a contact. */
 const double TOLERANCE = 0.3;
 /** The same for the change of a gap that one of the two does not know of. */
@@ -31,7 +36,7 @@ const double LATE = 4;
 /** What counts as no change of a gap, over how near pairs come. */
 const double LEAST_CHANGE = 3e-3;
 /** The number of iterations that look where capsules touch. */
-const int SEARCHING_ITERATIONS = 6;
+const int SEARCHING_ITERATIONS = 4;
 /**
  * Up to this iteration, contacts that would be behind their surface come back. The first of them knows where the step
  * leads without contacts, the second one what others that come back change of it. With one alone, bends of a dense
@@ -42,15 +47,14 @@ const int RETURNING_ITERATIONS = 2;
 const int PASSING_ITERATIONS = 3;
 /** From this iteration on, contacts that touch go on to do so, even if that takes a small force which pulls. */
 const int HOLDING_ITERATIONS = 9;
-/** Contacts of a pair are the same if their fractions differ by less, in all. */
-const double SAME_FRACTIONS = 0.3;
-/** Pairs or capsules that a thread looks at together. */
+/** Capsules that a thread looks at together. */
 const int CHUNK = 128;
 
 } // namespace
 
 void ContactEquations::setContacts(ContactSearch* newSearch, double newStiffness, const double* newBox) {
     search = newSearch;
+    pairs.setSearch(search);
     stiffness = newStiffness;
     box = newBox;
 }
@@ -86,9 +90,11 @@ void ContactEquations::begin(const CoupledStart& start, const Loop& newLoop) {
     reaches[1] = LEAST_REACH*diameter;
     leavesBox = false;
     pairs.clear();
-    states.clear();
-    watches.clear();
-    searched.clear();
+    motion.clear();
+}
+
+double ContactEquations::getRelativeTolerance() const {
+    return RELATIVE_TOLERANCE;
 }
 
 void ContactEquations::beginStage(int, int, const double*) {
@@ -101,73 +107,35 @@ PlaceOnChain ContactEquations::placeOf(int capsule, double fraction) const {
     return place;
 }
 
-void ContactEquations::takeNoteOf(int capsule, const double* moved) {
-    const Capsule& own = search->getSystem().capsules[capsule];
-    copy_n(moved+3*own.first, 3, &searched[6*capsule]);
-    copy_n(moved+3*own.end(), 3, &searched[6*capsule+3]);
-}
-
 void ContactEquations::findPairs(const double* moved) {
     leavesBox = true;
     for (int i = 0; i < 2 && leavesBox; i++)
         try {
             reach = reaches[i];
-            search->findPairs(begun, moved, box, reach, pairs, *loop);
+            search->findPairs(begun, moved, box, reach, found, *loop);
             leavesBox = false;
         }
         catch (const NarrowBoxError&) {
-            pairs.clear();
+            found.clear();
         }
-    searched.resize(6*places.size());
-    before.resize(6*places.size());
-    runInChunks(*loop, places.size(), CHUNK, [&] (int i) {
-        takeNoteOf(i, moved);
-        copy_n(&searched[6*i], 6, &before[6*i]);
-    });
-    travelled.assign(places.size(), 0.0);
-    motion.assign(places.size(), 0.0);
-    firstPairs.assign(places.size()+1, 0);
-    for (const ContactPair& pair : pairs) {
-        firstPairs[pair.a+1]++;
-        addState(pair);
-    }
-    for (size_t i = 1; i < firstPairs.size(); i++)
-        firstPairs[i] += firstPairs[i-1];
-    added.assign(places.size(), {});
+    motion.begin(search->getSystem().capsules, moved, *loop);
+    pairs.begin(found, places.size());
 }
 
-void ContactEquations::addState(const ContactPair& pair) {
-    states.push_back({pair, {}});
-    watches.push_back({pair.a, pair.b, -HUGE_VAL, 0, -1, pair.clearance});
-}
-
-/** Whether a pair takes part already. */
-bool ContactEquations::isKnown(const ContactPair& pair) const {
-    const auto first = watches.begin()+firstPairs[pair.a], last = watches.begin()+firstPairs[pair.a+1];
-    const auto found = lower_bound(first, last, pair.b, [] (const Watch& one, int other) {return one.b < other;});
-    const vector<int>& others = added[pair.a];
-    return (found != last && found->b == pair.b) || find(others.begin(), others.end(), pair.b) != others.end();
-}
-
-/** Look for pairs of some capsules again; false if all that are found take part already. */
-bool ContactEquations::findPairsOf(const vector<int>& capsules, const double* moved) {
+/** Look for pairs of capsules that have moved far, which no search has seen; false if none are new. */
+bool ContactEquations::findNewPairs(const double* moved) {
     try {
-        search->findPairsOf(capsules, begun, moved, pairs, *loop);
+        search->findPairsOf(motion.getMovers(), begun, moved, found, *loop);
     }
     catch (const NarrowBoxError&) {
         leavesBox = true;
         return false;
     }
-    for (int capsule : capsules) {
-        takeNoteOf(capsule, moved);
-        motion[capsule] = 0;
-    }
+    motion.beginAgain(motion.getMovers(), moved);
     bool any = false;
-    for (const ContactPair& pair : pairs)
-        if (!isKnown(pair)) {
-            added[pair.a].push_back(pair.b);
-            addState(pair);
-            mark(states.size()-1);
+    for (const ContactPair& pair : found)
+        if (pairs.add(pair)) {
+            mark(pairs.getNumPairs()-1);
             any = true;
         }
     return any;
@@ -175,10 +143,10 @@ bool ContactEquations::findPairsOf(const vector<int>& capsules, const double* mo
 
 /** Mark the packs of the pairs that a function finds in each chunk of them; false if there are none. */
 template <class Function> bool ContactEquations::markPairs(Function findIn) {
-    const int count = states.size(), chunks = (count+CHUNK-1)/CHUNK;
+    const int count = pairs.getNumPairs(), chunks = pairs.getNumChunks();
     (*loop)(chunks, [&] (int chunk) {
         parts[chunk].pairs.clear();
-        findIn(chunk*CHUNK, min(count, (chunk+1)*CHUNK), parts[chunk]);
+        findIn(chunk*CapsulePairs::CHUNK, min(count, (chunk+1)*CapsulePairs::CHUNK), parts[chunk]);
     });
     bool any = false;
     for (int chunk = 0; chunk < chunks; chunk++)
@@ -189,60 +157,6 @@ template <class Function> bool ContactEquations::markPairs(Function findIn) {
     return any;
 }
 
-void ContactEquations::updateGaps(State& state, int count) const {
-    const vector<Capsule>& capsules = search->getSystem().capsules;
-    const double radii = capsules[state.pair.a].radius+capsules[state.pair.b].radius;
-    for (int i = 0; i < count; i++) {
-        Contact& contact = state.sides[i].contact;
-        double r[3];
-        search->findVector(state.pair, contact.s, contact.t, true, r);
-        const double* n = contact.normal;
-        contact.gap = r[0]*n[0]+r[1]*n[1]+r[2]*n[2]-radii;
-    }
-}
-
-void ContactEquations::findCourse(const ContactPair& pair, const Contact& contact, ContactCourse& course) const {
-    const Capsule &a = search->getSystem().capsules[pair.a], &b = search->getSystem().capsules[pair.b];
-    search->findVector(pair, contact.s, contact.t, false, course.begun);
-    search->findVector(pair, contact.s, contact.t, true, course.now);
-    double ends[3][3];
-    search->findVector(pair, 0, 0, false, ends[0]);
-    search->findVector(pair, 1, 0, false, ends[1]);
-    search->findVector(pair, 0, 1, false, ends[2]);
-    for (int k = 0; k < 3; k++) {
-        course.along[0][k] = ends[1][k]-ends[0][k];
-        course.along[1][k] = ends[0][k]-ends[2][k];
-    }
-    course.normal = contact.normal;
-    course.radii = a.radius+b.radius;
-}
-
-/**
- * Take the contacts of a pair that were found, instead of those that do not come back.
- *
- * @param known  the number of contacts that it had
- * @return the number that it has now
- */
-int ContactEquations::placeContacts(State& state, int known, const Contact* found, int count) const {
-    int kept = 0;
-    for (int i = 0; i < known; i++)
-        if (state.sides[i].rest.isBack())
-            swap(state.sides[kept++], state.sides[i]);
-    int total = kept;
-    for (int i = 0; i < count; i++) {
-        const Side* same = find_if(state.sides, state.sides+kept, [&] (const Side& side) {
-            return fabs(side.contact.s-found[i].s)+fabs(side.contact.t-found[i].t) < SAME_FRACTIONS;
-        });
-        if (same != state.sides+kept || total == 2)
-            continue;
-        Side& side = state.sides[total++];
-        side.contact = found[i];
-        if (side.rest.isBack())
-            side.rest = ContactRest();
-    }
-    return total;
-}
-
 /** How far a unit force across a capsule moves a place on it in the step. */
 double ContactEquations::responseOf(int capsule, double fraction) const {
     const PlaceOnChain place = placeOf(capsule, fraction);
@@ -251,27 +165,30 @@ double ContactEquations::responseOf(int capsule, double fraction) const {
 
 /** Whether it is looked for where a pair touches: not where that was known a moment ago. */
 bool ContactEquations::isLookedFor(int number) const {
-    const Watch& watch = watches[number];
+    const CapsulePairs::Watch& watch = pairs.getWatch(number);
     if (!takesPart(watch.a) && !takesPart(watch.b))
         return false;
-    const double way = travelled[watch.a]+travelled[watch.b];
-    return watch.count < 0 || (iterations < SEARCHING_ITERATIONS && !(way < watch.samePlace));
+    return watch.count < 0 ||
+            (iterations < SEARCHING_ITERATIONS && !(motion.getWay(watch.a, watch.b) < watch.samePlace));
 }
 
 /** Evaluate some pairs that may touch. */
 void ContactEquations::look(int begin, int end, bool first, Part& part) {
     part.due.clear();
     part.numbers.clear();
-    for (int i = begin; i < end; i++)
-        if (!(travelled[watches[i].a]+travelled[watches[i].b] < watches[i].due)) {
-            const bool isDue = isLookedFor(i);
-            prefetch(&states[i].pair);
-            prefetch(&states[i].sides[0]);
-            search->prefetchMotion(watches[i].a, watches[i].b);
-            part.numbers.push_back(isDue ? i : -1-i);
-            if (isDue)
-                part.due.push_back(&states[i].pair);
-        }
+    for (int i = begin; i < end; i++) {
+        const CapsulePairs::Watch& watch = pairs.getWatch(i);
+        if (motion.getWay(watch.a, watch.b) < watch.due)
+            continue;
+        const bool isDue = isLookedFor(i);
+        prefetch(&pairs.getPair(i));
+        if (pairs.hasContacts(i))
+            prefetch(&pairs.getContact(i, 0));
+        search->prefetchMotion(watch.a, watch.b);
+        part.numbers.push_back(isDue ? i : -1-i);
+        if (isDue)
+            part.due.push_back(&pairs.getPair(i));
+    }
     part.outlooks.resize(part.due.size());
     search->findOutlooks(part.due.data(), part.due.size(), part.outlooks.data());
     const PairOutlook* next = part.outlooks.data();
@@ -284,16 +201,15 @@ void ContactEquations::look(int begin, int end, bool first, Part& part) {
 
 /** Add the equations of a pair, with the outlook of one that is looked for. */
 void ContactEquations::evaluate(int number, bool first, const PairOutlook* outlook, Part& part) {
-    State& state = states[number];
-    Watch& watch = watches[number];
-    const ContactPair& pair = state.pair;
+    CapsulePairs::Watch& watch = pairs.getWatch(number);
+    const ContactPair& pair = pairs.getPair(number);
     if (!takesPart(pair.a) && !takesPart(pair.b))
         return;
     const double diameter = search->getSystem().capsules[pair.a].radius+search->getSystem().capsules[pair.b].radius;
-    const double way = travelled[pair.a]+travelled[pair.b];
+    const double way = motion.getWay(pair.a, pair.b);
     double gap = HUGE_VAL;
     // What is farther away is left out, until it may have come near. Gaps of contacts that the step resolves count.
-    const double largest = max({0.0, state.sides[0].rest.getGap(), state.sides[1].rest.getGap()});
+    const double largest = pairs.getLargestRestGap(number);
     const double limit = LARGEST_GAP*diameter+largest;
     if (outlook != NULL) {
         Contact contacts[2];
@@ -305,19 +221,18 @@ void ContactEquations::evaluate(int number, bool first, const PairOutlook* outlo
             count = outlook->isOfNeighbor ? 0 : search->evaluate(pair, contacts, limit);
         // A contact at a joint may pass from one segment to the next and back: in the end, it must not be lost.
         if (count == 0 && watch.count > 0 && iterations >= PASSING_ITERATIONS)
-            updateGaps(state, watch.count);
+            pairs.updateGaps(number);
         else {
-            const int placed = placeContacts(state, watch.count, contacts, count);
-            watch.count = placed > 0 ? placed : count;
+            pairs.placeContacts(number, contacts, count);
             watch.samePlace = way+SAME_PLACE*diameter;
             gap = contacts[0].gap-largest;
         }
     }
     else
-        updateGaps(state, watch.count);
+        pairs.updateGaps(number);
     bool touches = false;
     for (int i = 0; i < watch.count; i++) {
-        Side& side = state.sides[i];
+        PairContact& side = pairs.getContact(number, i);
         const Contact& contact = side.contact;
         if (!side.rest.isKnown()) {
             const double c = responseOf(pair.a, contact.s)+responseOf(pair.b, contact.t);
@@ -325,14 +240,14 @@ void ContactEquations::evaluate(int number, bool first, const PairOutlook* outlo
         }
         if (iterations <= RETURNING_ITERATIONS && !side.rest.isResolved() && !side.rest.isBack() && contact.gap < 0) {
             ContactCourse course;
-            findCourse(pair, contact, course);
+            pairs.findCourse(number, contact, course);
             side.rest.look(course, contact.gap, wallDepth, LARGEST_RETURN*diameter);
         }
         // Where contacts are not looked for any more, anyCross() sees whether they have come back.
         if (contact.crossed && iterations < SEARCHING_ITERATIONS)
             part.pairs.push_back(number);
         gap = min(gap, contact.gap-restGapOf(side));
-        if (addEquation(state, i, part)) {
+        if (addEquation(number, i, part)) {
             touches = true;
             part.contacts.push_back(2*number+i);
         }
@@ -341,13 +256,14 @@ void ContactEquations::evaluate(int number, bool first, const PairOutlook* outlo
 }
 
 /** The gap below which a contact pushes that does not come back. */
-double ContactEquations::restGapOf(const Side& side) const {
-    return side.rest.isResolved() ? side.rest.getGap() : -wallDepth;
+double ContactEquations::restGapOf(const PairContact& contact) const {
+    return contact.rest.isResolved() ? contact.rest.getGap() : -wallDepth;
 }
 
 /** Add the equation of a contact, if it touches. */
-bool ContactEquations::addEquation(State& state, int number, Part& part) const {
-    Side& side = state.sides[number];
+bool ContactEquations::addEquation(int number, int which, Part& part) {
+    const ContactPair& pair = pairs.getPair(number);
+    PairContact& side = pairs.getContact(number, which);
     const Contact& contact = side.contact;
     const double overlap = restGapOf(side)-contact.gap;
     const bool touched = side.touched;
@@ -358,12 +274,12 @@ bool ContactEquations::addEquation(State& state, int number, Part& part) const {
     if (!side.touched)
         return false;
     CouplingEquation equation;
-    equation.places[0] = placeOf(state.pair.a, contact.s);
-    equation.places[1] = placeOf(state.pair.b, contact.t);
+    equation.places[0] = placeOf(pair.a, contact.s);
+    equation.places[1] = placeOf(pair.b, contact.t);
     const double own = contact.weight*stiffness;
     if (side.rest.isBack()) {
         double now[3];
-        search->findVector(state.pair, contact.s, contact.t, true, now);
+        search->findVector(pair, contact.s, contact.t, true, now);
         side.rest.findForce(now, own, equation.force, equation.stiffness);
     }
     else {
@@ -382,13 +298,13 @@ void ContactEquations::linearise(int iteration, const double* moved, vector<Coup
     firstEquation = all.size();
     contactsOfEquations.clear();
     crossed.clear();
-    if (iteration == 0 && searched.empty())
+    const bool first = !motion.hasBegun();
+    if (iteration == 0 && first)
         return;
-    const bool first = searched.empty();
     if (first)
         findPairs(moved);
     search->setMotion(begun, moved, *loop);
-    const int count = states.size(), chunks = (count+CHUNK-1)/CHUNK;
+    const int count = pairs.getNumPairs(), chunks = pairs.getNumChunks();
     if ((int) parts.size() < chunks)
         parts.resize(chunks);
     (*loop)(chunks, [&] (int chunk) {
@@ -396,7 +312,7 @@ void ContactEquations::linearise(int iteration, const double* moved, vector<Coup
         part.equations.clear();
         part.contacts.clear();
         part.pairs.clear();
-        look(chunk*CHUNK, min(count, (chunk+1)*CHUNK), first, part);
+        look(chunk*CapsulePairs::CHUNK, min(count, (chunk+1)*CapsulePairs::CHUNK), first, part);
     });
     for (int chunk = 0; chunk < chunks; chunk++) {
         const Part& part = parts[chunk];
@@ -406,62 +322,26 @@ void ContactEquations::linearise(int iteration, const double* moved, vector<Coup
     }
 }
 
-/** Find how far some capsules have moved. */
-void ContactEquations::follow(int first, int last, const double* moved, Motion& result) {
-    const vector<Capsule>& capsules = search->getSystem().capsules;
-    result = Motion();
-    for (int i = first; i < last; i++) {
-        if (!takesPart(i)) {
-            result.include(motion[i]);
-            continue;
-        }
-        double square = 0, last = 0;
-        for (int end = 0; end < 2; end++) {
-            const double* now = moved+3*(end == 0 ? capsules[i].first : capsules[i].end());
-            const double* then = &searched[6*i+3*end];
-            double* const lately = &before[6*i+3*end];
-            double own = 0, late = 0;
-            for (int k = 0; k < 3; k++) {
-                own += (now[k]-then[k])*(now[k]-then[k]);
-                late += (now[k]-lately[k])*(now[k]-lately[k]);
-                lately[k] = now[k];
-            }
-            square = max(square, own);
-            last = max(last, late);
-        }
-        motion[i] = sqrt(square);
-        travelled[i] += sqrt(last);
-        result.include(motion[i]);
-        if (2*motion[i] > reach)
-            result.movers.push_back(i);
-    }
-}
-
 /** Whether pairs that were left out may touch, or new ones: they take part from now on. */
 bool ContactEquations::anyComeNear(const double* moved) {
-    const int count = places.size(), chunks = (count+CHUNK-1)/CHUNK;
-    motions.resize(chunks);
-    parts.resize(max(parts.size(), (states.size()+CHUNK-1)/CHUNK));
-    (*loop)(chunks, [&] (int chunk) {
-        follow(chunk*CHUNK, min(count, (chunk+1)*CHUNK), moved, motions[chunk]);
-    });
+    motion.follow([&] (int capsule) {
+        return takesPart(capsule);
+    }, moved, reach, *loop);
+    if ((int) parts.size() < pairs.getNumChunks())
+        parts.resize(pairs.getNumChunks());
     if (iterations < 2)
         return true;
     const double tolerance = TOLERANCE*sqrt(kT/stiffness)+LEAST_CHANGE*reach;
     bool any = markPairs([&] (int begin, int end, Part& part) {
-        for (int i = begin; i < end; i++)
-            if (watches[i].due > 0 && travelled[watches[i].a]+travelled[watches[i].b] > watches[i].due+tolerance)
+        for (int i = begin; i < end; i++) {
+            const CapsulePairs::Watch& watch = pairs.getWatch(i);
+            if (watch.due > 0 && motion.getWay(watch.a, watch.b) > watch.due+tolerance)
                 part.pairs.push_back(i);
+        }
     });
-    Motion all;
-    for (const Motion& motion : motions) {
-        all.include(motion.largest);
-        all.include(motion.second);
-        all.movers.insert(all.movers.end(), motion.movers.begin(), motion.movers.end());
-    }
     // Pairs that no search has seen were out of reach: one of the two has moved by more than half of it.
-    if (all.largest+all.second > reach)
-        any |= findPairsOf(all.movers, moved);
+    if (motion.exceedsReach())
+        any |= findNewPairs(moved);
     return any;
 }
 
@@ -469,7 +349,7 @@ bool ContactEquations::anyComeNear(const double* moved) {
 bool ContactEquations::isUnfinished(int number, const double* move) {
     const int contact = contactsOfEquations[number];
     const CouplingEquation& equation = (*equations)[firstEquation+number];
-    Side& side = states[contact/2].sides[contact%2];
+    PairContact& side = pairs.getContact(contact/2, contact%2);
     // The squared change of the gap, times the stiffness.
     double pull[3];
     multiply(equation.stiffness, move, pull);
@@ -495,7 +375,7 @@ bool ContactEquations::finishIteration(const double* moves, const double* moved)
     unfinished.assign(active->size(), 0);
     if (leavesBox)
         return false;
-    if (searched.empty())
+    if (!motion.hasBegun())
         return true;
     bool any = anyComeNear(moved);
     if (leavesBox)
@@ -526,7 +406,7 @@ bool ContactEquations::markUnfinished(PackFlags& packs) const {
 
 /** The packs of a pair take part in the next iteration. */
 void ContactEquations::mark(int pair) {
-    for (int capsule : {watches[pair].a, watches[pair].b})
+    for (int capsule : {pairs.getWatch(pair).a, pairs.getWatch(pair).b})
         if (places[capsule].place.pack >= 0)
             unfinished[places[capsule].place.pack] = 1;
 }
@@ -535,11 +415,13 @@ void ContactEquations::mark(int pair) {
 void ContactEquations::findCrossed(int begin, int end, const double* moved, Part& part) const {
     part.due.clear();
     part.numbers.clear();
-    for (int i = begin; i < end; i++)
-        if (!(travelled[watches[i].a]+travelled[watches[i].b] < watches[i].clearance)) {
-            part.numbers.push_back(i);
-            part.due.push_back(&states[i].pair);
-        }
+    for (int i = begin; i < end; i++) {
+        const CapsulePairs::Watch& watch = pairs.getWatch(i);
+        if (motion.getWay(watch.a, watch.b) < watch.clearance)
+            continue;
+        part.numbers.push_back(i);
+        part.due.push_back(&pairs.getPair(i));
+    }
     part.outlooks.resize(part.due.size());
     search->findOutlooks(part.due.data(), part.due.size(), part.outlooks.data());
     for (size_t i = 0; i < part.due.size(); i++)
@@ -553,8 +435,8 @@ bool ContactEquations::anyCross(const double* moved) {
     return markPairs([&] (int begin, int end, Part& part) {
         findCrossed(begin, end, moved, part);
         for (int pair : part.pairs) {
-            watches[pair].count = -1;
-            watches[pair].due = -HUGE_VAL;
+            pairs.getWatch(pair).count = -1;
+            pairs.getWatch(pair).due = -HUGE_VAL;
         }
     });
 }
@@ -565,9 +447,9 @@ void ContactEquations::findFailures(const double* moved, vector<bool>& failed) c
     for (size_t i = 0; leavesBox && i < places.size(); i++)
         if (places[i].place.pack >= 0)
             failed[places[i].place.chain] = true;
-    for (const State& state : states)
-        if (search->crosses(state.pair, begun, moved))
-            for (int capsule : {state.pair.a, state.pair.b})
+    for (int i = 0; i < pairs.getNumPairs(); i++)
+        if (search->crosses(pairs.getPair(i), begun, moved))
+            for (int capsule : {pairs.getPair(i).a, pairs.getPair(i).b})
                 if (places[capsule].place.pack >= 0)
                     failed[places[capsule].place.chain] = true;
 }
@@ -594,12 +476,12 @@ bool ContactEquations::findCulprit(const double* moved, const CouplingEquation* 
         culprit.places[0] = describePlace(places[findFastest(moved)].place);
         return true;
     }
-    for (const State& state : states)
-        if (search->crosses(state.pair, begun, moved)) {
+    for (int i = 0; i < pairs.getNumPairs(); i++)
+        if (search->crosses(pairs.getPair(i), begun, moved)) {
             culprit.kind = BrokenCoupling::Contact;
             culprit.reason = BrokenCoupling::Crosses;
-            culprit.places[0] = describePlace(places[state.pair.a].place);
-            culprit.places[1] = describePlace(places[state.pair.b].place);
+            culprit.places[0] = describePlace(places[pairs.getPair(i).a].place);
+            culprit.places[1] = describePlace(places[pairs.getPair(i).b].place);
             return true;
         }
     if (unsettled < 0)
@@ -611,8 +493,8 @@ bool ContactEquations::findCulprit(const double* moved, const CouplingEquation* 
 }
 
 void ContactEquations::findNeighbours(vector<pair<int, int> >& neighbours) const {
-    for (const State& state : states) {
-        const PlaceOnChain &a = places[state.pair.a].place, &b = places[state.pair.b].place;
+    for (int i = 0; i < pairs.getNumPairs(); i++) {
+        const PlaceOnChain &a = places[pairs.getPair(i).a].place, &b = places[pairs.getPair(i).b].place;
         if (a.pack >= 0 && b.pack >= 0)
             neighbours.push_back(make_pair(a.chain, b.chain));
     }

@@ -2,10 +2,10 @@
 #define CYLCHAIN_CONTACT_EQUATIONS_H_
 
 #include "couplings/ContactSearch.h"
-#include "dynamics/ContactRest.h"
+#include "dynamics/CapsuleMotion.h"
+#include "dynamics/CapsulePairs.h"
 #include "dynamics/ImplicitCouplings.h"
 #include "dynamics/PlaceResponses.h"
-#include <algorithm>
 #include <cstddef>
 #include <utility>
 #include <vector>
@@ -38,6 +38,7 @@ public:
     void beginStage(int stage, int numStages, const double* moved) override;
     void linearise(int iteration, const double* moved, std::vector<CouplingEquation>& equations) override;
     bool finishIteration(const double* moves, const double* moved) override;
+    double getRelativeTolerance() const override;
     bool letsPacksRest() const override {
         return true;
     }
@@ -46,33 +47,6 @@ public:
     bool findCulprit(const double* moved, const CouplingEquation* equations, BrokenCoupling& culprit) const override;
     void findNeighbours(std::vector<std::pair<int, int> >& neighbours) const override;
 private:
-    /** One of the two contacts that a pair may have. */
-    struct Side {
-        /** Where it touches. */
-        Contact contact;
-        ContactRest rest;
-        /** By how much its gap has changed while one of its packs took no part. */
-        double drift;
-        /** Whether it touched in the last iteration. */
-        bool touched;
-    };
-    /** A pair of capsules. */
-    struct State {
-        ContactPair pair;
-        Side sides[2];
-    };
-    /** What tells whether a pair is looked at: many are not. */
-    struct Watch {
-        int a, b;
-        /** How far both capsules must have travelled before they may touch. */
-        double due;
-        /** They touch where they did, as long as they have not travelled this far. */
-        double samePlace;
-        /** The number of its contacts; -1 if they are too far apart, or if that is not known. */
-        int count;
-        /** How far they must have travelled before they may cross. */
-        float clearance;
-    };
     /** Where a capsule is: its place at fraction 0, and by how much the fraction grows along it. */
     struct CapsulePlace {
         PlaceOnChain place;
@@ -89,36 +63,20 @@ private:
         std::vector<int> numbers;
         std::vector<PairOutlook> outlooks;
     };
-    /** How far some capsules have moved: the largest two motions, and who may meet others that no search has seen. */
-    struct Motion {
-        double largest = 0, second = 0;
-        std::vector<int> movers;
-        void include(double motion) {
-            second = std::max(second, std::min(largest, motion));
-            largest = std::max(largest, motion);
-        }
-    };
     template <class Function> bool markPairs(Function findIn);
     void mark(int pair);
     bool takesPart(int capsule) const {
         return packs[capsule] >= 0 && (*active)[packs[capsule]];
     }
     bool isUnfinished(int equation, const double* move);
-    void follow(int first, int last, const double* moved, Motion& result);
     void findPairs(const double* moved);
-    void addState(const ContactPair& pair);
-    void takeNoteOf(int capsule, const double* moved);
-    bool findPairsOf(const std::vector<int>& capsules, const double* moved);
-    bool isKnown(const ContactPair& pair) const;
-    void findCourse(const ContactPair& pair, const Contact& contact, ContactCourse& course) const;
-    int placeContacts(State& state, int known, const Contact* found, int count) const;
-    double restGapOf(const Side& side) const;
-    bool addEquation(State& state, int side, Part& part) const;
+    bool findNewPairs(const double* moved);
+    double restGapOf(const PairContact& contact) const;
+    bool addEquation(int pair, int which, Part& part);
     double responseOf(int capsule, double fraction) const;
     bool isLookedFor(int pair) const;
     void look(int begin, int end, bool first, Part& part);
     void evaluate(int pair, bool first, const PairOutlook* outlook, Part& part);
-    void updateGaps(State& state, int count) const;
     bool anyComeNear(const double* moved);
     bool anyCross(const double* moved);
     void findCrossed(int begin, int end, const double* moved, Part& part) const;
@@ -134,20 +92,10 @@ private:
     std::vector<CapsulePlace> places;
     /** The packs of these places. */
     std::vector<int> packs;
-    std::vector<ContactPair> pairs;
-    /** Those of the first search in its order, and behind them those that others have found. */
-    std::vector<State> states;
-    /** Where those of the first search begin for each first capsule, and the second capsules of others. */
-    std::vector<int> firstPairs;
-    std::vector<std::vector<int> > added;
-    std::vector<Watch> watches;
-    /** Where the ends of each capsule were when its pairs were looked for. */
-    std::vector<double> searched;
-    /** Where they were after the last iteration, and how far each capsule has travelled in all since the first. */
-    std::vector<double> before, travelled;
-    /** How far it has moved since its pairs were looked for. */
-    std::vector<double> motion;
-    std::vector<Motion> motions;
+    CapsulePairs pairs;
+    /** Those of the last search. */
+    std::vector<ContactPair> found;
+    CapsuleMotion motion;
     std::vector<Part> parts;
     /** All equations of the iteration, the first of these, and which contacts they are of, as in a part. */
     const std::vector<CouplingEquation>* equations = nullptr;

@@ -9,12 +9,10 @@ using namespace std;
 
 namespace {
 
-/** What conjugate gradients leave of the energy of the error that they begin with. */
-const double RELATIVE_TOLERANCE = 0.05;
-/** The energy of an error that is left anyway, for each pack, in units of k_B T. */
+/** The energy of an error that conjugate gradients leave anyway, for each pack, in units of k_B T. */
 const double LEAST_ENERGY = 1e-2;
 /**
- * Both over these where tensions of segments are wanted that are right. These energies are those of forces in P, which
+ * The tolerances over these where tensions of segments are wanted that are right. These energies are those of forces in P, which
  * is stiff where two places move as one: that of their motion in A is larger by the stiffness of the coupling over
  * that of the chains.
  */
@@ -132,10 +130,10 @@ double CoupledEquations::total() const {
 
 void CoupledEquations::solve(const vector<PackStep*>& packs, const PackFlags& active,
             const vector<CouplingEquation>& equations, double kT, bool forTensions, double stiffness,
-            const Loop& loop) {
+            double tolerance, const Loop& loop) {
     const int numPacks = packs.size();
     const bool stiff = stiffness > STIFF;
-    const double tolerance = min(forTensions ? OF_TENSIONS : 1, stiff ? OF_STIFF/stiffness : 1);
+    const double tighter = min(forTensions ? OF_TENSIONS : 1, stiff ? OF_STIFF/stiffness : 1);
     gatherTerms(equations, active, loop);
     loop(numPacks, [&] (int pack) {
         const int first = firstTerms[pack], last = firstTerms[pack+1];
@@ -170,7 +168,7 @@ void CoupledEquations::solve(const vector<PackStep*>& packs, const PackFlags& ac
     });
     iterations = 1;
     double energy = total(), ratio = 0;
-    const double least = tolerance*max(RELATIVE_TOLERANCE*energy,
+    const double least = tighter*max(tolerance*energy,
             LEAST_ENERGY*kT*(stiff ? 1 : count(active.begin(), active.end(), 1)));
     while (energy > least && iterations < LARGEST_NUMBER_OF_ITERATIONS) {
         forCoupled([&] (int pack, int first, int last) {

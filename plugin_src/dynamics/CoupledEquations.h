@@ -44,10 +44,11 @@ public:
      * @param active       the packs that take part; others stay where they are
      * @param forTensions  whether tensions of segments must be right, not moves alone
      * @param stiffness    see ImplicitCouplings::getDemandingStiffness()
+     * @param tolerance    see ImplicitCouplings::getRelativeTolerance()
      */
     void solve(const std::vector<PackStep*>& packs, const PackFlags& active,
             const std::vector<CouplingEquation>& equations, double kT, bool forTensions, double stiffness,
-            const Loop& loop);
+            double tolerance, const Loop& loop);
     /** For each equation, how much its first place moves against the second: three numbers. */
     const std::vector<double>& getMoves() const {
         return moves;

@@ -1,0 +1,126 @@
+#include "dynamics/CapsulePairs.h"
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+using namespace cylchain;
+using namespace std;
+
+namespace {
+
+/** Contacts of a pair are the same if their fractions differ by less, in all. */
+const double SAME_FRACTIONS = 0.3;
+
+} // namespace
+
+void CapsulePairs::clear() {
+    pairs.clear();
+    watches.clear();
+    slots.clear();
+    contacts.clear();
+    added.clear();
+}
+
+void CapsulePairs::begin(const vector<ContactPair>& found, int numCapsules) {
+    pairs.assign(found.begin(), found.end());
+    firstPairs.assign(numCapsules+1, 0);
+    watches.clear();
+    for (const ContactPair& pair : pairs) {
+        firstPairs[pair.a+1]++;
+        watches.push_back({pair.a, pair.b, -HUGE_VAL, 0, -1, pair.clearance});
+    }
+    for (int i = 0; i < numCapsules; i++)
+        firstPairs[i+1] += firstPairs[i];
+    slots.assign(pairs.size(), -1);
+    contacts.resize(getNumChunks());
+    for (vector<Contacts>& ofChunk : contacts)
+        ofChunk.clear();
+    added.assign(numCapsules, {});
+}
+
+bool CapsulePairs::isKnown(const ContactPair& pair) const {
+    const auto first = watches.begin()+firstPairs[pair.a], last = watches.begin()+firstPairs[pair.a+1];
+    const auto found = lower_bound(first, last, pair.b, [] (const Watch& one, int other) {return one.b < other;});
+    const vector<int>& others = added[pair.a];
+    return (found != last && found->b == pair.b) || find(others.begin(), others.end(), pair.b) != others.end();
+}
+
+bool CapsulePairs::add(const ContactPair& pair) {
+    if (isKnown(pair))
+        return false;
+    added[pair.a].push_back(pair.b);
+    pairs.push_back(pair);
+    watches.push_back({pair.a, pair.b, -HUGE_VAL, 0, -1, pair.clearance});
+    slots.push_back(-1);
+    contacts.resize(getNumChunks());
+    return true;
+}
+
+double CapsulePairs::radiiOf(const ContactPair& pair) const {
+    const vector<Capsule>& capsules = search->getSystem().capsules;
+    return capsules[pair.a].radius+capsules[pair.b].radius;
+}
+
+double CapsulePairs::getLargestRestGap(int number) const {
+    if (!hasContacts(number))
+        return 0;
+    const PairContact* own = contacts[number/CHUNK][slots[number]].of;
+    return max({0.0, own[0].rest.getGap(), own[1].rest.getGap()});
+}
+
+void CapsulePairs::updateGaps(int number) {
+    for (int i = 0; i < watches[number].count; i++) {
+        Contact& contact = getContact(number, i).contact;
+        double r[3];
+        search->findVector(pairs[number], contact.s, contact.t, true, r);
+        const double* n = contact.normal;
+        contact.gap = r[0]*n[0]+r[1]*n[1]+r[2]*n[2]-radiiOf(pairs[number]);
+    }
+}
+
+void CapsulePairs::placeContacts(int number, const Contact* found, int count) {
+    int& known = watches[number].count;
+    if (!hasContacts(number)) {
+        if (count <= 0) {
+            known = count;
+            return;
+        }
+        vector<Contacts>& ofChunk = contacts[number/CHUNK];
+        slots[number] = ofChunk.size();
+        ofChunk.emplace_back();
+    }
+    PairContact* const own = contacts[number/CHUNK][slots[number]].of;
+    int kept = 0;
+    for (int i = 0; i < known; i++)
+        if (own[i].rest.isBack())
+            swap(own[kept++], own[i]);
+    int total = kept;
+    for (int i = 0; i < count && total < 2; i++) {
+        const bool same = any_of(own, own+kept, [&] (const PairContact& other) {
+            return fabs(other.contact.s-found[i].s)+fabs(other.contact.t-found[i].t) < SAME_FRACTIONS;
+        });
+        if (same)
+            continue;
+        PairContact& next = own[total++];
+        next.contact = found[i];
+        if (next.rest.isBack())
+            next.rest = ContactRest();
+    }
+    known = total > 0 ? total : count;
+}
+
+void CapsulePairs::findCourse(int number, const Contact& contact, ContactCourse& course) const {
+    const ContactPair& pair = pairs[number];
+    search->findVector(pair, contact.s, contact.t, false, course.begun);
+    search->findVector(pair, contact.s, contact.t, true, course.now);
+    double ends[3][3];
+    search->findVector(pair, 0, 0, false, ends[0]);
+    search->findVector(pair, 1, 0, false, ends[1]);
+    search->findVector(pair, 0, 1, false, ends[2]);
+    for (int k = 0; k < 3; k++) {
+        course.along[0][k] = ends[1][k]-ends[0][k];
+        course.along[1][k] = ends[0][k]-ends[2][k];
+    }
+    course.normal = contact.normal;
+    course.radii = radiiOf(pair);
+}
