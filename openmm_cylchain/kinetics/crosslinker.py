@@ -56,7 +56,8 @@ class Crosslinker:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        hands = (self.hands, self.hands) if isinstance(self.hands, Hand) else tuple(self.hands)
+        given = [self.hands, self.hands] if isinstance(self.hands, Hand) else self.hands
+        hands = tuple(given) if isinstance(given, Sequence) else ()
         if len(hands) != 2 or not all(isinstance(hand, Hand) for hand in hands):
             raise InputError(f"Crosslinker {self.name!r}: hands must be a Hand or two of them, but are {self.hands!r}.")
         label = f"Crosslinker {self.name!r}:"

@@ -21,6 +21,9 @@ from ..units.quantities import (
 from ..units.types import FloatArray, Scalar
 from .crosslinker import Crosslinker
 
+MOST_LINKERS = 10**9
+"""They are numbered by 32 bits."""
+
 LARGEST_REACH_OF_WIDTH = 10.0
 """How many thermal extensions of a spring without rest length a reach may be before that is warned of."""
 
@@ -106,6 +109,8 @@ def as_linkers(
             raise InputError(f"{label} give a count if some of them are to begin bound.")
         return Linkers(kind, 0, density, room, None, 0, seed)
     number = whole_number(count, 0, f"{label} count")
+    if number > MOST_LINKERS:
+        raise InputError(f"{label} count must be at most {MOST_LINKERS}, but is {number}.")
     return Linkers(kind, number, None, room, None, _as_bound(bound, number, label), seed)
 
 

@@ -59,9 +59,6 @@ void CylinderChainBindingForceImpl::initialize(ContextImpl& context) {
         lengths.push_back(contours.getLength(chain));
     system = {};
     set<double> spacings;
-    Vec3 box[3];
-    context.getPeriodicBoxVectors(box[0], box[1], box[2]);
-    const double room = 0.5*min(min(box[0][0], box[1][1]), box[2][2]);
     for (int i = 0; i < owner.getNumHands(); i++) {
         system.hands.push_back(owner.getHand(i));
         const cylchain::Hand& hand = system.hands.back();
@@ -75,9 +72,8 @@ void CylinderChainBindingForceImpl::initialize(ContextImpl& context) {
             spacings.insert(hand.siteSpacing);
         require(spacings.size() <= MOST_SPACINGS, "Hands have more than "+to_string(MOST_SPACINGS)+
                 " different spacings of sites");
-        require(!owner.usesPeriodicBoundaryConditions() || hand.reach < room, "The reach of hand "+to_string(i)+
-                " must be less than half of the periodic box, which is "+to_string(2*room)+" nm wide");
     }
+    checkReaches(context);
     for (int i = 0; i < owner.getNumLinkerTypes(); i++) {
         system.types.push_back(owner.getLinkerType(i));
         const cylchain::LinkerType& type = system.types.back();
@@ -105,6 +101,17 @@ void CylinderChainBindingForceImpl::initialize(ContextImpl& context) {
     linkKernel.getAs<CalcCylinderChainLinkForceKernel>().initialize(ofContext, owner.usesPeriodicBoundaryConditions(),
             nearestParticles);
     upToDate = false;
+}
+
+void CylinderChainBindingForceImpl::checkReaches(ContextImpl& context) const {
+    if (!owner.usesPeriodicBoundaryConditions())
+        return;
+    Vec3 box[3];
+    context.getPeriodicBoxVectors(box[0], box[1], box[2]);
+    const double width = min(min(box[0][0], box[1][1]), box[2][2]);
+    for (size_t i = 0; i < system.hands.size(); i++)
+        require(2*system.hands[i].reach < width, "The reach of hand "+to_string(i)+
+                " must be less than half of the periodic box, which is "+to_string(width)+" nm wide");
 }
 
 double CylinderChainBindingForceImpl::getTemperature() const {
@@ -142,6 +149,7 @@ void CylinderChainBindingForceImpl::updateContextState(ContextImpl& context, boo
     const double stepSize = context.getIntegrator().getStepSize();
     if (!(stepSize > 0))
         return;
+    checkReaches(context);
     const bool pulled = !getLinks().empty();
     const long long failed = linkerKernel.getAs<UpdateCylinderChainLinkersKernel>().execute(context, state,
             BOLTZ*getTemperature(), stepSize, seed, number, links);

@@ -98,10 +98,6 @@ static vector<CylinderChainLinkForceImpl*> findLinkForces(ContextImpl& context) 
 }
 
 static void giveTables(const vector<LinkTable>& tables, ContextImpl& context) {
-    // Of a System without such Forces, or an earlier version: it says nothing about links.
-
-    if (tables.empty())
-        return;
     const vector<CylinderChainLinkForceImpl*> forces = findLinkForces(context);
     if (tables.size() != forces.size())
         throw OpenMMException("CylinderChainIntegrator: The State or checkpoint has the links of "+
@@ -170,7 +166,11 @@ void readLinks(const SerializationNode& node, ContextImpl& context) {
     for (const SerializationNode& child : node.getChildren())
         if (child.getName() == "Links")
             tables.push_back(readTable(child));
-    giveTables(tables, context);
+
+    // That of a System without such Forces, or of an earlier version, says nothing about links.
+
+    if (!tables.empty())
+        giveTables(tables, context);
 }
 
 } // namespace OpenMM

@@ -76,10 +76,6 @@ static vector<CylinderChainBindingForceImpl*> findBindingForces(ContextImpl& con
 }
 
 static void giveStates(const vector<LinkerState>& states, const vector<uint32_t>& seeds, ContextImpl& context) {
-    // Of a System without such Forces, or an earlier version: it says nothing about linkers.
-
-    if (states.empty())
-        return;
     const vector<CylinderChainBindingForceImpl*> forces = findBindingForces(context);
     if (states.size() != forces.size())
         throw OpenMMException("CylinderChainIntegrator: The State or checkpoint has the linkers of "+
@@ -169,7 +165,11 @@ void readLinkers(const SerializationNode& node, ContextImpl& context) {
     for (const SerializationNode& child : node.getChildren())
         if (child.getName() == "Linkers")
             states.push_back(readLinkerState(child));
-    giveStates(states, {}, context);
+
+    // That of a System without such Forces, or of an earlier version, says nothing about linkers.
+
+    if (!states.empty())
+        giveStates(states, {}, context);
 }
 
 } // namespace OpenMM

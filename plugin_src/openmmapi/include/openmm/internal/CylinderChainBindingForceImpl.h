@@ -75,6 +75,10 @@ public:
 private:
     void follow() const;
     void accept();
+    /**
+     * Throw an exception if a hand reaches beyond half of the periodic box, which may have shrunk.
+     */
+    void checkReaches(ContextImpl& context) const;
     double getTemperature() const;
     const CylinderChainBindingForce& owner;
     ContextImpl* context;
