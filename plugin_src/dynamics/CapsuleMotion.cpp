@@ -35,6 +35,13 @@ void CapsuleMotion::begin(const vector<Capsule>& newCapsules, const double* move
     motion.assign(capsules->size(), 0.0);
 }
 
+void CapsuleMotion::beginAgain(const double* moved, const Loop& loop) {
+    runInChunks(loop, capsules->size(), CHUNK, [&] (int i) {
+        takeNoteOf(i, moved);
+        motion[i] = 0;
+    });
+}
+
 void CapsuleMotion::beginAgain(const vector<int>& numbers, const double* moved) {
     for (int number : numbers) {
         takeNoteOf(number, moved);

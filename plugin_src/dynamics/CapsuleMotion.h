@@ -27,7 +27,8 @@ public:
      * @param moved     where particles are, three doubles for each
      */
     void begin(const std::vector<Capsule>& capsules, const double* moved, const Loop& loop);
-    /** The same for some capsules, after the first search. */
+    /** The same after another search, of all capsules or of some. */
+    void beginAgain(const double* moved, const Loop& loop);
     void beginAgain(const std::vector<int>& numbers, const double* moved);
     /**
      * Follow capsules to where an iteration has led them.

@@ -27,39 +27,38 @@ bool normalize(double* v) {
 }
 
 /**
- * Find P.
+ * Find the axis that two capsules have together which lie along each other.
  *
- * @return false if it is n nT
+ * @param axis  receives it; zero for spheres
+ * @return false if they cross at an angle
  */
-bool findAcross(const ContactCourse& course, double* across) {
+bool findAxis(const ContactCourse& course, double* axis) {
     double e[2][3];
     bool hasLength[2];
     for (int i = 0; i < 2; i++) {
         copy_n(course.along[i], 3, e[i]);
         hasLength[i] = normalize(e[i]);
     }
-    double* axis = hasLength[0] ? e[0] : e[1];
+    fill(axis, axis+3, 0.0);
+    if (!hasLength[0] && !hasLength[1])
+        return true;
+    copy_n(hasLength[0] ? e[0] : e[1], 3, axis);
     if (hasLength[0] && hasLength[1]) {
         const double cosine = dot(e[0], e[1]);
         if (1-cosine*cosine > LARGEST_SINE*LARGEST_SINE)
-            axis = NULL;
-        else
-            for (int k = 0; k < 3; k++)
-                axis[k] += (cosine < 0 ? -1 : 1)*e[1][k];
-    }
-    if (axis != NULL && (hasLength[0] || hasLength[1])) {
+            return false;
+        for (int k = 0; k < 3; k++)
+            axis[k] += (cosine < 0 ? -1 : 1)*e[1][k];
         normalize(axis);
-        if (fabs(dot(axis, course.normal)) > LARGEST_SINE)
-            axis = NULL;
     }
-    if (axis == NULL) {
-        setOuter(1, course.normal, across);
-        return false;
-    }
-    setOuter(hasLength[0] || hasLength[1] ? -1 : 0, axis, across);
-    for (int k : {0, 3, 5})
-        across[k] += 1;
-    return true;
+    return fabs(dot(axis, course.normal)) <= LARGEST_SINE;
+}
+
+/** Find what of a vector is across an axis of length 1. */
+void findAcross(const double* v, const double* axis, double* result) {
+    const double along = dot(v, axis);
+    for (int k = 0; k < 3; k++)
+        result[k] = v[k]-along*axis[k];
 }
 
 } // namespace
@@ -72,35 +71,38 @@ ContactRest::ContactRest(double softness, double predicted) : softness(softness)
 void ContactRest::look(const ContactCourse& course, double gap, double depth, double largest) {
     if (!(gap < 0))
         return;
-    const bool isDisc = findAcross(course, across);
-    double begun[3], now[3];
-    multiply(across, course.begun, begun);
-    multiply(across, course.now, now);
+    copy_n(course.normal, 3, normal);
+    double axis[3], begun[3], now[3];
+    copy_n(course.begun, 3, begun);
+    copy_n(course.now, 3, now);
     // Lines have a side, which they may have left: discs have none.
-    const double distance = isDisc ? sqrt(dot(begun, begun)) : dot(begun, course.normal);
+    double distance = dot(begun, normal);
+    if (findAxis(course, axis)) {
+        findAcross(course.begun, axis, begun);
+        findAcross(course.now, axis, now);
+        distance = sqrt(dot(begun, begun));
+        double middle[3];
+        for (int k = 0; k < 3; k++)
+            middle[k] = begun[k]+now[k];
+        if (normalize(middle))
+            copy_n(middle, 3, normal);
+    }
     const double before = distance-course.radii;
     const bool beginsBehind = !(before > -depth);
     if (!(gap < (beginsBehind ? 0 : -depth)))
         return;
     back = true;
-    const double wanted = course.radii+(beginsBehind ? 0 : min(before, largest));
-    if (isDisc && distance > 0)
-        for (int k = 0; k < 3; k++)
-            begun[k] *= wanted/distance;
-    else
-        for (int k = 0; k < 3; k++)
-            begun[k] = wanted*course.normal[k];
-    for (int k = 0; k < 3; k++)
-        rest[k] = begun[k]+(begun[k]-now[k])/(STIFFENING*softness);
+    double wanted = dot(begun, normal);
+    if (beginsBehind)
+        wanted = course.radii;
+    else if (before > largest)
+        wanted = min(wanted, course.radii+largest);
+    target = wanted+(wanted-dot(now, normal))/(STIFFENING*softness);
 }
 
 void ContactRest::findForce(const double* now, double stiffness, double* force, double* projection) const {
-    double difference[3];
+    const double size = STIFFENING*stiffness*(target-dot(normal, now));
     for (int k = 0; k < 3; k++)
-        difference[k] = rest[k]-now[k];
-    multiply(across, difference, force);
-    for (int k = 0; k < 3; k++)
-        force[k] *= STIFFENING*stiffness;
-    for (int k = 0; k < 6; k++)
-        projection[k] = STIFFENING*stiffness*across[k];
+        force[k] = size*normal[k];
+    setOuter(STIFFENING*stiffness, normal, projection);
 }

@@ -23,17 +23,19 @@ struct ContactCourse {
  * For other steps the contact is a hard wall at the depth d behind the surface, see findDepthOfWall(). It is open while
  * g > -d. Where the step would lead behind that, the contact comes back to where the step began, with the force
  *
- *     K P (R-r),   R = r0+(r0-r*)/(K c),   K = 5 k,
+ *     K n (b-n.r),   b = n.r0+(n.r0-n.r*)/(K c),   K = 5 k,
  *
- * in the rest of the step. P projects on the plane across two capsules that lie along each other: they are discs there.
- * Two that cross at an angle are lines, which cannot pass each other along their normal n: P = n nT. Two spheres have
- * P = 1. What began behind the wall is brought to the surface.
+ * in the rest of the step. Two that cross at an angle are lines, which cannot pass each other along their normal n. Two
+ * capsules that lie along each other are discs: r0 and r* are those across them, and n has the direction of r0+r*. Then
+ * n.r = n.r0, and along the surface t.r = t.r* = -t.r0: they have their distance back, and have turned about each other
+ * as far as they wanted to. n along r0 or r* would not do for discs, for it turns in the step. Spheres are as discs
+ * are. What began behind the wall is brought to the surface.
  *
  * This is a move that Metropolis refuses. Where a step without contacts keeps detailed balance and is linear, one in
- * which P r comes back to P r0 keeps it, too: with y = y*+C PT (P C PT)^-1 (P r0-P r*), and C the response of the step
- * to forces, the covariances of the beginning and of the end of the step with P r* are the same. Several contacts come
- * back together in this way. The normal alone would not do for discs: it turns in a step, and gaps along it are not
- * those at the beginning.
+ * which n.r comes back to n.r0 keeps it, too: with y = y*+C n (n C n)^-1 (n.r0-n.r*), and C the response of the step to
+ * forces, the covariances of the beginning and of the end of the step with n.r* are the same. Several contacts come
+ * back together in this way. For discs with the same friction in both directions, (n, t.r0, n.r0) -> (n, -t.r0, n.r0)
+ * is its own inverse, and each n.r* is as probable from one as from the other.
  *
  * What others push behind the wall in later iterations is held there, with k along the normal: if it came back as well,
  * its neighbours would follow, and the step would not end.
@@ -72,7 +74,7 @@ public:
      * @param largest  the largest gap that it comes back to
      */
     void look(const ContactCourse& course, double gap, double depth, double largest);
-    /** Find the force K P (R-r) on the first capsule, and K P. */
+    /** Find the force on the first capsule, and K n nT. */
     void findForce(const double* now, double stiffness, double* force, double* projection) const;
     /** K/k. */
     static constexpr double STIFFENING = 5;
@@ -80,7 +82,7 @@ private:
     static constexpr double LEAST_STIFF = 1;
     double softness = -1, gap = 0;
     bool back = false;
-    double rest[3], across[6];
+    double normal[3], target;
 };
 
 } // namespace cylchain

@@ -12,9 +12,9 @@ namespace {
 /** The energy of an error that conjugate gradients leave anyway, for each pack, in units of k_B T. */
 const double LEAST_ENERGY = 1e-2;
 /**
- * The tolerances over these where tensions of segments are wanted that are right. These energies are those of forces in P, which
- * is stiff where two places move as one: that of their motion in A is larger by the stiffness of the coupling over
- * that of the chains.
+ * The tolerances over these where tensions of segments are wanted that are right. These energies are those of forces
+ * in P, which is stiff where two places move as one: that of their motion in A is larger by the stiffness of the
+ * coupling over that of the chains.
  */
 const double OF_TENSIONS = 2e-4;
 /**

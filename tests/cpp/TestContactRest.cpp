@@ -1,7 +1,7 @@
 /**
- * This tests where contacts come back to: discs with the whole vector across them, lines along their normal alone, and
- * what began behind its surface to the surface. The responses are those of free motion, so that what comes back gets
- * exactly to where it was.
+ * This tests where contacts come back to: discs and spheres to their distance, lines along their normal, and what began
+ * behind its surface to the surface. The responses are those of free motion, so that what comes back gets exactly to
+ * where it belongs. Discs and spheres that diffuse in steps as long as their radius have no preferred distance.
  */
 
 #include "TestChains.h"
@@ -10,6 +10,14 @@
 #include <random>
 
 static const double STIFFNESS = 3, DEPTH = 0.2, RADII = 2, LARGEST = 2;
+
+struct Vector {
+    double v[3];
+};
+
+static double dot(const double* a, const double* b) {
+    return a[0]*b[0]+a[1]*b[1]+a[2]*b[2];
+}
 
 static ContactCourse makeCourse(const double (&begun)[3], const double (&now)[3], const double (&other)[3],
         const double* normal) {
@@ -50,15 +58,22 @@ static void testDiscs() {
         double found[3], axis[3] = {5, 0, 0};
         balance(rest, 10, now, found);
         // Across the mean of both directions.
-        const double size = sqrt(other[0]*other[0]+other[1]*other[1]+other[2]*other[2]);
+        const double size = sqrt(dot(other, other));
         for (int k = 0; k < 3; k++)
             axis[k] = axis[k]/5+(i%2 ? 1 : -1)*other[k]/size;
-        const double square = axis[0]*axis[0]+axis[1]*axis[1]+axis[2]*axis[2];
-        double along = 0;
-        for (int k = 0; k < 3; k++)
-            along += (found[k]-begun[k])*axis[k]/square;
-        for (int k = 0; k < 3; k++)
-            checkClose(along*axis[k], found[k]-begun[k], RADII, 1e-12, "the vector across is that of the beginning");
+        auto across = [&] (const double* v) {
+            const double along = dot(v, axis)/dot(axis, axis);
+            return Vector {v[0]-along*axis[0], v[1]-along*axis[1], v[2]-along*axis[2]};
+        };
+        const Vector first = across(begun), last = across(found), moved = {found[0]-now[0], found[1]-now[1],
+                found[2]-now[2]};
+        checkClose(sqrt(dot(first.v, first.v)), sqrt(dot(last.v, last.v)), RADII, 1e-12,
+                "discs have their distance back");
+        const double with = (first.v[0]+last.v[0])*moved.v[0]+(first.v[1]+last.v[1])*moved.v[1]+
+                (first.v[2]+last.v[2])*moved.v[2];
+        const Vector sum = {first.v[0]+last.v[0], first.v[1]+last.v[1], first.v[2]+last.v[2]};
+        checkClose(dot(sum.v, sum.v)*dot(moved.v, moved.v), with*with, pow(RADII, 4), 1e-12,
+                "the way back is along the mean of both");
     }
 }
 
@@ -80,8 +95,58 @@ static void testSpheres() {
     rest.look(course, -1, DEPTH, LARGEST);
     double found[3];
     balance(rest, 4, now, found);
-    for (int k = 0; k < 3; k++)
-        checkClose(begun[k], found[k], RADII, 1e-12, "spheres come back to where they were");
+    checkClose(sqrt(dot(begun, begun)), sqrt(dot(found, found)), RADII, 1e-12, "spheres have their distance back");
+}
+
+/**
+ * Two discs, or spheres, which diffuse in long steps: within a distance, all places are as probable.
+ *
+ * @param dimensions  2 for discs, 3 for spheres
+ */
+static void checkDiffusion(int dimensions, double step) {
+    mt19937_64 generator(dimensions);
+    normal_distribution<double> normal(0, step);
+    const double farthest = RADII+3, softness = 50;
+    const int steps = 4000000, blocks = 40;
+    double r[3] = {0, RADII+1, 0}, length = dimensions == 2 ? 5 : 0, sum = 0, squares = 0;
+    const double along[3] = {length, 0, 0};
+    for (int block = 0; block < blocks; block++) {
+        double near = 0;
+        for (int i = 0; i < steps/blocks; i++) {
+            double now[3] = {0, 0, 0};
+            for (int k = 3-dimensions; k < 3; k++)
+                now[k] = r[k]+normal(generator);
+            const double distance = sqrt(dot(now, now)), gap = distance-RADII;
+            if (gap < 0) {
+                const double outwards[3] = {now[0]/distance, now[1]/distance, now[2]/distance};
+                ContactCourse course = makeCourse(r, now, along, outwards);
+                course.along[0][0] = length;
+                ContactRest rest(softness, gap);
+                // The wall at the surface, where spheres that began outside are.
+                rest.look(course, gap, 0, LARGEST+2);
+                double found[3];
+                balance(rest, softness, now, found);
+                copy_n(found, 3, r);
+            }
+            else if (distance < farthest)
+                copy_n(now, 3, r);
+            near += sqrt(dot(r, r)) < RADII+0.5;
+        }
+        near *= (double) blocks/steps;
+        sum += near/blocks;
+        squares += near*near/blocks;
+    }
+    auto volume = [&] (double radius) {
+        return pow(radius, dimensions)-pow(RADII, dimensions);
+    };
+    const double exact = volume(RADII+0.5)/volume(farthest), error = sqrt((squares-sum*sum)/(blocks-1));
+    check(error < 0.01*exact, "enough steps");
+    checkClose(exact, sum, 4*error, 1, "discs and spheres have no preferred distance");
+}
+
+static void testDiffusion() {
+    checkDiffusion(2, 0.7*RADII);
+    checkDiffusion(3, 0.7*RADII);
 }
 
 static void testSurface() {
@@ -107,7 +172,7 @@ static void testSurface() {
 
 int main() {
     try {
-        for (auto test : {testDiscs, testLines, testSpheres, testSurface})
+        for (auto test : {testDiscs, testLines, testSpheres, testDiffusion, testSurface})
             test();
     }
     catch (const exception& error) {
