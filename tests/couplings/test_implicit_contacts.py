@@ -249,12 +249,13 @@ def test_errors_name_both_segments_of_a_contact():
     with pytest.raises(InstabilityError, match="would pass through segment .* of filament 2 .*ContactForce") as raised:
         context.getIntegrator().step(100)
     error = raised.value
-    assert str(error).startswith("Filament 1 (ACT) has blown up at segment 10 in step ")
-    assert (error.filament, error.segment, error.other_filament) == (1, 10, 2)
-    # The second filament slides: it is the segment that was above the first one before the step, or its neighbour.
-    along = positions_of(context)[filaments.node_indices[2], 1]
-    above = np.argmin(np.abs(along[1:] + along[:-1]))
-    assert abs(error.other_segment - above) <= 1
+    # Both filaments slide: it is the segments that were above each other before the step, or their neighbours.
+    held, torn = (positions_of(context)[filaments.node_indices[filament]] for filament in (1, 2))
+    above = np.argmin(np.abs(torn[1:, 1] + torn[:-1, 1]))
+    below = np.argmin(np.abs(held[1:, 0] + held[:-1, 0] - torn[above, 0] - torn[above + 1, 0]))
+    assert (error.filament, error.other_filament) == (1, 2)
+    assert abs(error.segment - below) <= 1 and abs(error.other_segment - above) <= 1
+    assert str(error).startswith(f"Filament 1 (ACT) has blown up at segment {error.segment} in step ")
     assert f"segment {error.other_segment} of filament 2" in str(error)
     assert error.step == context.getStepCount() + 1 > 1
     assert (error.link, error.particle) == (None, None)
