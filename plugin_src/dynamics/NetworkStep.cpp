@@ -187,10 +187,11 @@ bool NetworkStep::iterate(const Attempt& attempt, int stage) {
     const bool turns = any_of(couplings.begin(), couplings.end(), [] (const ImplicitCouplings* own) {
         return own->needsCompliances();
     });
-    double stiffness = 0, tolerance = 1;
+    CoupledEquations::Demands demands;
+    demands.single = attempt.settings.precision != Precision::Double;
     for (const ImplicitCouplings* own : couplings) {
-        stiffness = max(stiffness, own->getDemandingStiffness());
-        tolerance = min(tolerance, own->getRelativeTolerance());
+        demands.stiffness = max(demands.stiffness, own->getDemandingStiffness());
+        demands.tolerance = min(demands.tolerance, own->getRelativeTolerance());
     }
     const int most = turns ? NEWTON_ITERATIONS_OF_TURNING_LINKS : NEWTON_ITERATIONS;
     for (int iteration = 0; iteration < most; iteration++) {
@@ -201,9 +202,8 @@ bool NetworkStep::iterate(const Attempt& attempt, int stage) {
         }
         first[couplings.size()] = equations.size();
         // What the first stage takes for taut segments stays as it is for the second one.
-        const bool forTensions = iteration == 0 && stage == 0 && steps[0]->getNumStages() > 1;
-        coupled.solve(stepsOfPacks, active, equations, attempt.settings.kT, forTensions, stiffness, tolerance,
-                attempt.loop);
+        demands.forTensions = iteration == 0 && stage == 0 && steps[0]->getNumStages() > 1;
+        coupled.solve(stepsOfPacks, active, equations, attempt.settings.kT, demands, attempt.loop);
         substitutions += coupled.getNumIterations();
         if (iteration == 0 && stage == 0) {
             if (turns) {

@@ -47,6 +47,8 @@ public:
     virtual void eliminate(const CouplingTerm* terms, int numTerms, double* moves) = 0;
     /** Find how forces on the places of the terms, three numbers for each, move them, with the same elimination. */
     virtual void respond(const double* forces, double* moves) = 0;
+    /** The same in single precision, with the number of terms. */
+    virtual void respond(const float* forces, int numTerms, float* moves);
     /**
      * Find for each term how a force on its place moves this place: a symmetric matrix in the order of a term's
      * stiffness.
