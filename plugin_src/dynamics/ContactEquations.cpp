@@ -12,7 +12,7 @@ using namespace std;
 namespace {
 
 /** How near pairs come that are looked at in a step, over their diameter: further iterations move them. */
-const double REACH = 0.5;
+const double REACH = 0.25;
 /** The same where a periodic box is too narrow for that. */
 const double LEAST_REACH = 0.2;
 /** The largest predicted overlap, and the largest gap that two come back to, over the same. */

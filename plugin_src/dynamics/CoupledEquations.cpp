@@ -10,7 +10,7 @@ using namespace std;
 namespace {
 
 /** The energy of an error that conjugate gradients leave anyway, for each pack, in units of k_B T. */
-const double LEAST_ENERGY = 1e-2;
+const double LEAST_ENERGY = 5e-2;
 /**
  * The tolerances over these where tensions of segments are wanted that are right. These energies are those of forces
  * in P, which is stiff where two places move as one: that of their motion in A is larger by the stiffness of the
