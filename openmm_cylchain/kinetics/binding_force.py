@@ -17,6 +17,9 @@ from .linkers import LinkerPulls, Linkers
 
 BINDING_FORCE_NAME = "Linkers"
 
+_MOST_SITES = 1e9
+"""Of a filament: more of them are refused when a Context is made."""
+
 
 def is_binding_force(force: openmm.Force) -> bool:
     """Whether a force of a System is a CylinderChainBindingForce."""
@@ -57,6 +60,8 @@ def make_binding_force(
     force.setUsesPeriodicBoundaryConditions(periodic)
     hands: dict[Hand, int] = {}
     columns: list[Any] = [[], [], [], []]
+    # By the distance of sites, filaments and numbers of those that are taken: hands of all types share them.
+    taken: dict[float, IntArray] = {}
     for own in linkers:
         numbers = []
         for hand in own.kind.hands:
@@ -75,7 +80,7 @@ def make_binding_force(
         chains, places = np.full((own.count, 2), -1), np.zeros((own.count, 2))
         side = 0 if own.anchors is None else 1
         generator = np.random.default_rng((own.seed, number))
-        where = _random_places(own.kind.hands[side], filaments, own.bound, generator, own.kind.name)
+        where = _random_places(own.kind.hands[side], filaments, own.bound, generator, own.kind.name, taken)
         chains[: own.bound, side], places[: own.bound, side] = where
         for column, values in zip(columns, (np.full(own.count, number), anchors, chains, places)):
             column.append(values)
@@ -112,21 +117,27 @@ def _add_anchor(force, anchor):
     return force.addPointAnchor(openmm.Vec3(*(float(x) for x in anchor)))
 
 
-def _random_places(hand, filaments, count, generator, name):
+def _random_places(hand, filaments, count, generator, name, taken):
     # Uniform along filaments; of sites, each once.
-    lengths = np.array([contour_of(f)[-1] if hand.binds(f.type) else 0.0 for f in filaments])
     if count == 0:
         return np.zeros(0, dtype=int), np.zeros(0)
+    lengths = np.array([contour_of(f)[-1] if hand.binds(f.type) else 0.0 for f in filaments])
     if hand.site_spacing is not None:
-        sites = np.floor(lengths / hand.site_spacing + 1e-9).astype(int)
-        if count > sites.sum():
-            raise InputError(
-                f"Linkers {name!r}: {count} are to begin bound, but there are only {sites.sum()} sites for them."
-            )
-        chosen = np.sort(generator.choice(sites.sum(), count, replace=False))
+        sites = np.floor(np.minimum(lengths / hand.site_spacing, _MOST_SITES) + 1e-9).astype(int)
         ends = np.cumsum(sites)
+        others = taken.get(hand.site_spacing, np.zeros((0, 2), dtype=int))
+        others = others[sites[others[:, 0]] > 0]
+        occupied = np.sort((ends - sites)[others[:, 0]] + others[:, 1])
+        free = ends[-1] - len(occupied)
+        if count > free:
+            raise InputError(f"Linkers {name!r}: {count} are to begin bound, but there are only {free} sites for them.")
+        chosen = np.sort(generator.choice(free, count, replace=False))
+        # Counted without those that are occupied.
+        chosen += np.searchsorted(occupied - np.arange(len(occupied)), chosen, side="right")
         chains = np.searchsorted(ends, chosen, side="right")
-        return chains, (chosen - (ends - sites)[chains] + 0.5) * hand.site_spacing
+        own = np.column_stack([chains, chosen - (ends - sites)[chains]])
+        taken[hand.site_spacing] = np.concatenate([taken.get(hand.site_spacing, own[:0]), own])
+        return chains, (own[:, 1] + 0.5) * hand.site_spacing
     chains = generator.choice(len(lengths), count, p=lengths / lengths.sum())
     return chains, generator.uniform(0.0, lengths[chains])
 
