@@ -10,15 +10,14 @@ from ..engine_choice import load_plugin
 from ..errors import InputError
 from ..filaments.filament import Filament
 from ..mechanics.geometry import to_nearest_images
+from ..units.quantities import thermal_energy
 from ..units.types import FloatArray, IntArray
+from .first_places import FirstPlaces, contour_of
 from .hand import Hand
 from .linker_table import LinkerTable
 from .linkers import LinkerPulls, Linkers
 
 BINDING_FORCE_NAME = "Linkers"
-
-_MOST_SITES = 1e9
-"""Of a filament: more of them are refused when a Context is made."""
 
 
 def is_binding_force(force: openmm.Force) -> bool:
@@ -36,7 +35,11 @@ def find_binding_force(system: openmm.System) -> Any:
 
 
 def make_binding_force(
-    linkers: Sequence[Linkers], filaments: Sequence[Filament], temperature: float, periodic: bool
+    linkers: Sequence[Linkers],
+    filaments: Sequence[Filament],
+    temperature: float,
+    positions: FloatArray,
+    box: FloatArray | None,
 ) -> openmm.Force:
     """The force of linkers that bind to filaments, which are the chains of a System in their order.
 
@@ -47,21 +50,22 @@ def make_binding_force(
     filaments : sequence of Filament
     temperature : float
         In K.
-    periodic : bool
-        Whether distances are those of nearest periodic images.
+    positions : (particles, 3) array
+        In nm, of the System: some particles may be anchors.
+    box : (3, 3) array or None
+        Periodic box vectors if distances are those of nearest images.
 
     Raises
     ------
     InputError
-        If there is nothing that a hand binds to, or no site for all that are to begin bound.
+        If there is nothing that a hand binds to, or no place for all that are to begin bound.
     """
     force = load_plugin().CylinderChainBindingForce(temperature)
     force.setName(BINDING_FORCE_NAME)
-    force.setUsesPeriodicBoundaryConditions(periodic)
+    force.setUsesPeriodicBoundaryConditions(box is not None)
     hands: dict[Hand, int] = {}
     columns: list[Any] = [[], [], [], []]
-    # By the distance of sites, filaments and numbers of those that are taken: hands of all types share them.
-    taken: dict[float, IntArray] = {}
+    first_places = FirstPlaces(filaments, thermal_energy(temperature), box)
     for own in linkers:
         numbers = []
         for hand in own.kind.hands:
@@ -78,21 +82,19 @@ def make_binding_force(
         if own.anchors is not None:
             anchors = np.array([_add_anchor(force, anchor) for anchor in own.anchors], dtype=int)
         chains, places = np.full((own.count, 2), -1), np.zeros((own.count, 2))
-        side = 0 if own.anchors is None else 1
         generator = np.random.default_rng((own.seed, number))
-        where = _random_places(own.kind.hands[side], filaments, own.bound, generator, own.kind.name, taken)
-        chains[: own.bound, side], places[: own.bound, side] = where
+        if own.anchors is None:
+            where = first_places.anywhere(own.kind.hands[0], own.bound, generator, own.kind.name)
+            chains[: own.bound, 0], places[: own.bound, 0] = where
+        elif own.bound:
+            which, where = first_places.near(_anchor_points(own, positions), own.kind, own.bound, generator)
+            chains[which, 1], places[which, 1] = where
         for column, values in zip(columns, (np.full(own.count, number), anchors, chains, places)):
             column.append(values)
     rows: list[list[Any]] = [np.concatenate(column).ravel().tolist() for column in columns]
     count = len(rows[0])
     force.setLinkers(list(range(count)), *rows, count)
     return force
-
-
-def contour_of(filament: Filament) -> FloatArray:
-    """Where the segments of a filament begin along it, with segments at rest, and its length: (segments + 1,) in nm."""
-    return np.concatenate([[0.0], np.cumsum(filament.type.segment_lengths(filament.segments, filament.closed))])
 
 
 def _add_hand(force, hand, filaments, name):
@@ -111,35 +113,22 @@ def _add_hand(force, hand, filaments, name):
     return number
 
 
+def _anchor_points(linkers, positions):
+    anchors = np.asarray(linkers.anchors)
+    if anchors.ndim == 2:
+        return anchors
+    if anchors.max() >= len(positions):
+        raise InputError(
+            f"Linkers {linkers.kind.name!r}: {linkers.bound} are to begin bound, but where particle {anchors.max()} is, "
+            f"an anchor, is not known: there are only {len(positions)} particles yet."
+        )
+    return positions[anchors]
+
+
 def _add_anchor(force, anchor):
     if np.ndim(anchor) == 0:
         return force.addParticleAnchor(int(anchor))
     return force.addPointAnchor(openmm.Vec3(*(float(x) for x in anchor)))
-
-
-def _random_places(hand, filaments, count, generator, name, taken):
-    # Uniform along filaments; of sites, each once.
-    if count == 0:
-        return np.zeros(0, dtype=int), np.zeros(0)
-    lengths = np.array([contour_of(f)[-1] if hand.binds(f.type) else 0.0 for f in filaments])
-    if hand.site_spacing is not None:
-        sites = np.floor(np.minimum(lengths / hand.site_spacing, _MOST_SITES) + 1e-9).astype(int)
-        ends = np.cumsum(sites)
-        others = taken.get(hand.site_spacing, np.zeros((0, 2), dtype=int))
-        others = others[sites[others[:, 0]] > 0]
-        occupied = np.sort((ends - sites)[others[:, 0]] + others[:, 1])
-        free = ends[-1] - len(occupied)
-        if count > free:
-            raise InputError(f"Linkers {name!r}: {count} are to begin bound, but there are only {free} sites for them.")
-        chosen = np.sort(generator.choice(free, count, replace=False))
-        # Counted without those that are occupied.
-        chosen += np.searchsorted(occupied - np.arange(len(occupied)), chosen, side="right")
-        chains = np.searchsorted(ends, chosen, side="right")
-        own = np.column_stack([chains, chosen - (ends - sites)[chains]])
-        taken[hand.site_spacing] = np.concatenate([taken.get(hand.site_spacing, own[:0]), own])
-        return chains, (own[:, 1] + 0.5) * hand.site_spacing
-    chains = generator.choice(len(lengths), count, p=lengths / lengths.sum())
-    return chains, generator.uniform(0.0, lengths[chains])
 
 
 def table_of(force: Any, context: openmm.Context) -> LinkerTable:

@@ -43,7 +43,7 @@ class Linkers:
         Of those that are not bound, in nm^3; the periodic box if None.
     anchors : (count,) int array of particles, (count, 3) array of points in nm, or None
     bound : int
-        How many begin with their first hand bound, or their only one, at random places.
+        How many begin with their first hand bound at random places, or their only one within reach of its anchor.
     seed : int
         Of these places.
     """
@@ -98,16 +98,21 @@ def as_linkers(
     if (count is not None) + (concentration is not None) + (anchors is not None) != 1:
         raise InputError(f"{label} give one of count, concentration and anchors.")
     room = None if volume is None else positive(volume, VOLUME, f"{label} volume")
+    if room is not None and count is None:
+        raise InputError(
+            f"{label} a volume is that of a count of unbound linkers: those with "
+            f"{'a concentration' if anchors is None else 'anchors'} need none."
+        )
     if anchors is not None:
         if kind.hands[0] != kind.hands[1]:
             raise InputError(f"{label} a linker with an anchor has one hand, but this type has two that differ.")
         places = _as_anchors(anchors, label)
-        return Linkers(kind, len(places), None, room, places, _as_bound(bound, len(places), label), seed)
+        return Linkers(kind, len(places), None, None, places, _as_bound(bound, len(places), label), seed)
     if concentration is not None:
         density = _as_density(concentration, f"{label} concentration")
         if bound:
             raise InputError(f"{label} give a count if some of them are to begin bound.")
-        return Linkers(kind, 0, density, room, None, 0, seed)
+        return Linkers(kind, 0, density, None, None, 0, seed)
     number = whole_number(count, 0, f"{label} count")
     if number > MOST_LINKERS:
         raise InputError(f"{label} count must be at most {MOST_LINKERS}, but is {number}.")

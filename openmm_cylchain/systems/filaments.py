@@ -522,7 +522,8 @@ class Filaments:
         volume : length^3, optional
             V; that of the periodic box if not given.
         bound : int
-            How many begin with their first hand bound, at random places; of those with anchors, their only one.
+            How many begin with their first hand bound, at random places. Of those with anchors, the first that have a
+            filament within reach begin with their only hand bound to it, as the energy of the spring has it.
         seed : int
             Of these places.
 
@@ -711,8 +712,10 @@ class Filaments:
             add_to_topology(topology, filament, f"F{number}", names)
         add_noninteracting_entries(system, len(positions), self._coinciding())
         self._periodic = topology.getPeriodicBoxVectors() is not None or system.usesPeriodicBoundaryConditions()
-        self._engine.add_forces(system, self._placed(), stretching_force_group, bending_force_group)
-        return np.concatenate(everything) * unit.nanometer
+        positions = np.concatenate(everything)
+        placed = replace(self._placed(), positions=positions)
+        self._engine.add_forces(system, placed, stretching_force_group, bending_force_group)
+        return positions * unit.nanometer
 
     def _placed(self):
         return PlacedFilaments(
