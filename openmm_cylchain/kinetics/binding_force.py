@@ -1,6 +1,7 @@
 """The CylinderChainBindingForce of a System: linkers of the compiled engine."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -119,8 +120,8 @@ def _anchor_points(linkers, positions):
         return anchors
     if anchors.max() >= len(positions):
         raise InputError(
-            f"Linkers {linkers.kind.name!r}: {linkers.bound} are to begin bound, but where particle {anchors.max()} is, "
-            f"an anchor, is not known: there are only {len(positions)} particles yet."
+            f"Linkers {linkers.kind.name!r}: {linkers.bound} are to begin bound, but where particle {anchors.max()}, "
+            f"an anchor, is, is not known: there are only {len(positions)} particles yet."
         )
     return positions[anchors]
 
@@ -131,9 +132,19 @@ def _add_anchor(force, anchor):
     return force.addPointAnchor(openmm.Vec3(*(float(x) for x in anchor)))
 
 
+@contextmanager
+def naming_unknown_linkers() -> Iterator[None]:
+    """InputError in place of what the plugin raises where it is not known where linkers are."""
+    try:
+        yield
+    except openmm.OpenMMException as error:
+        raise InputError(str(error)) from None
+
+
 def table_of(force: Any, context: openmm.Context) -> LinkerTable:
-    """The linkers of a Context."""
-    columns = force.getLinkersInContext(context)
+    """The linkers of a Context; InputError if it is not known where they are."""
+    with naming_unknown_linkers():
+        columns = force.getLinkersInContext(context)
     numbers, types, anchors, chains, places = (np.array(column) for column in columns[:5])
     return LinkerTable(
         numbers.astype(int),

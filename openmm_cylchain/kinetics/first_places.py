@@ -83,27 +83,37 @@ class FirstPlaces:
         InputError
             If fewer anchors have one.
         """
-        hand, found = kind.hands[1], []
+        hand = kind.hands[1]
+        found: list[tuple[int, int, float]] = []
         starts, vectors, chains, begins, lengths = self._segments(hand)
+        squares = np.sum(vectors**2, axis=1)
+        halves = 0.5 * vectors
+        farthest = hand.reach + 0.5 * np.sqrt(squares.max())
         for anchor, point in enumerate(points):
             if len(found) == count:
                 break
-            middles = self._nearest(starts + 0.5 * vectors - point)
-            relative = middles - 0.5 * vectors
-            fractions = -np.sum(relative * vectors, axis=1) / np.sum(vectors**2, axis=1)
-            nearest = relative + np.clip(fractions, 0.0, 1.0)[:, None] * vectors
-            around = np.flatnonzero(np.linalg.norm(nearest, axis=1) <= hand.reach)
-            if len(around) == 0:
+            middles = self._nearest(starts + halves - point)
+            around = np.flatnonzero(np.einsum("ij,ij->i", middles, middles) <= farthest**2)
+            relative = middles[around] - halves[around]
+            # Fractions of segments: the nearest one, and those at which they come within reach and leave it.
+            nearest = -np.sum(relative * vectors[around], axis=1) / squares[around]
+            apart = np.sum((relative + nearest[:, None] * vectors[around]) ** 2, axis=1)
+            half = np.sqrt(np.maximum(hand.reach**2 - apart, 0.0) / squares[around])
+            first, last = np.clip(nearest - half, 0.0, 1.0), np.clip(nearest + half, 0.0, 1.0)
+            within = lengths[around] * (last - first)
+            if not np.any(within > 0.0):
                 continue
-            segments = generator.choice(around, _CANDIDATES, p=lengths[around] / lengths[around].sum())
-            along = begins[segments] + generator.uniform(0.0, lengths[segments])
+            chosen = generator.choice(len(around), _CANDIDATES, p=within / within.sum())
+            fractions = generator.uniform(first[chosen], last[chosen])
+            segments = around[chosen]
+            along = begins[segments] + fractions * lengths[segments]
             place = self._choose(kind, point, chains[segments], along, generator)
             if place is not None:
                 found.append((anchor, *place))
         if len(found) < count:
             raise InputError(
-                f"Linkers {kind.name!r}: {count} are to begin bound, but only {len(found)} of the {len(points)} anchors "
-                "have a free place on a filament within reach of their hands."
+                f"Linkers {kind.name!r}: {count} are to begin bound, but only {len(found)} of the {len(points)} "
+                "anchors have a free place on a filament within reach of their hands."
             )
         columns = np.array(found, dtype=float).reshape(-1, 3)
         return columns[:, 0].astype(int), (columns[:, 1].astype(int), columns[:, 2])
@@ -132,7 +142,7 @@ class FirstPlaces:
 
     def _segments(self, hand):
         # Of all filaments to which it binds: where they begin, their vectors, filaments, and lengths along them.
-        columns: list[list] = [[], [], [], [], []]
+        columns: list[list[FloatArray]] = [[], [], [], [], []]
         for number, (filament, contour) in enumerate(zip(self._filaments, self._contours)):
             if not hand.binds(filament.type):
                 continue
