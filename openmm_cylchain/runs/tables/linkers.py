@@ -119,7 +119,7 @@ LINKERS = TableKind(
         Key("concentration", Quantity(units.NUMBER_DENSITY, "zero"), None, "In place of that: of unbound ones."),
         Key("volume", Quantity(units.VOLUME), None, "Of unbound ones; that of the box if not given."),
         Key("anchors", _Anchors(), None, "Points to which they are tied, one each, in place of their first hands."),
-        Key("bound", Whole(0, 10**7, "100"), 0, "How many begin with one hand bound, at random places, or near their anchors."),
+        Key("bound", Whole(0, 10**7, "100"), 0, "How many begin with one hand bound, at random or near anchors."),
     ),
     "Crosslinkers or motors that bind to filaments, walk along them and unbind; `docs/kinetics.md` has their laws.",
     repeated=True,
