@@ -405,7 +405,7 @@ class ExplicitForces:
         if links is not None or is_link_force(force):
             return None if links is None else self._crosslinks(links, label)
         if is_binding_force(force):
-            return [] if self._scheme in IMPLICIT_SCHEMES else self._linkers(label)
+            return self._linkers(label)
         if force.getName().startswith("CylinderChain") or isinstance(force, _WITHOUT_STIFFNESS):
             return []
         if isinstance(force, openmm.HarmonicBondForce):
@@ -441,7 +441,17 @@ class ExplicitForces:
         linkers = find_binding_force(self._system)
         kinds = range(linkers.getNumLinkerTypes())
         stiffness = max((linkers.getLinkerTypeParameters(kind)[3] for kind in kinds), default=0.0)
-        return [self._to_come(label, "linker", stiffness)] if stiffness > 0.0 else []
+        anchors = np.unique([linkers.getAnchor(index)[0] for index in range(linkers.getNumAnchors())]).astype(int)
+        anchors = anchors[anchors != _NOWHERE]
+        # Implicit steps have linkers in their equations, unless a virtual site is an anchor.
+        if self._scheme in IMPLICIT_SCHEMES and not any(map(self._system.isVirtualSite, anchors.tolist())):
+            return []
+        found = [self._to_come(label, "linker", stiffness)]
+        if len(anchors):
+            first, last = (int(self._filaments.node_indices[number][number]) for number in (0, -1))
+            ends, stiffnesses = np.where(anchors == first, last, first), np.full(len(anchors), stiffness)
+            found.append(Springs(label, "linker to come, on particle", anchors, anchors, ends, stiffnesses))
+        return found
 
     def _to_come(self, label, what, stiffness):
         # What may join any two places: ends of filaments move most.

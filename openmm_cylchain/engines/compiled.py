@@ -109,7 +109,11 @@ class CompiledEngine(Engine):
             force.addTether(chain, tether.node, openmm.Vec3(*tether.point), tether.stiffness)
         system.addForce(force)
         if placed.linkers:
-            system.addForce(make_binding_force(placed.linkers, placed.filaments, placed.temperature, placed.periodic))
+            box = None
+            if placed.periodic:
+                box = np.array([vector._value for vector in system.getDefaultPeriodicBoxVectors()])
+            linkers, filaments = placed.linkers, placed.filaments
+            system.addForce(make_binding_force(linkers, filaments, placed.temperature, placed.positions, box))
 
     def create_integrator(self, system, placed, settings):
         """Create a NativeIntegrator."""
