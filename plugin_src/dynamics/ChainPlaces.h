@@ -68,6 +68,10 @@ public:
     int getNumFilaments() const {
         return chains.size()+beams.size();
     }
+    /** Whether a chain is one of beam elements. */
+    bool isBeam(int chain) const {
+        return chain >= (int) chains.size() && !isParticle(chain);
+    }
     /** The length of a chain of segments whose segments have their rest lengths. */
     double getLength(int chain) const {
         return lengths[chain];
@@ -84,9 +88,6 @@ private:
     }
     const CoupledParticle& particleOf(int chain) const {
         return particles[chain-getNumFilaments()];
-    }
-    bool isBeam(int chain) const {
-        return chain >= (int) chains.size() && !isParticle(chain);
     }
     const BeamChain& beamOf(int chain) const {
         return beams[chain-chains.size()];

@@ -111,10 +111,14 @@ void checkLink(const Link& link) {
 void checkLink(const Link& link, const PlaceResolver& places) {
     const System& system = places.getSystem();
     for (const Place* place : {&link.first, &link.second})
-        for (int particle : {place->first, place->second})
+        for (int particle : {place->first, place->second}) {
             if (particle >= system.getNumParticles())
                 refuseLink(link, "has particle "+to_string(particle)+", which does not exist; the System has "+
                         to_string(system.getNumParticles()));
+            if (particle >= 0 && places.isControlPoint(particle))
+                refuseLink(link, "has particle "+to_string(particle)+", a control point of beam elements, which is on no "
+                        "curve: take places between nodes");
+        }
     if (areSame(places.resolve(link.first), places.resolve(link.second)))
         refuseLink(link, "joins a place to itself, "+describePlaces(link)+
                 ": one is a virtual site at the other");

@@ -1,6 +1,7 @@
 #include "openmm/internal/PlaceResolver.h"
 #include "beams/BezierWeights.h"
 #include "openmm/CylinderChainForce.h"
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -18,10 +19,12 @@ PlaceResolver::PlaceResolver(const System& system) : system(system) {
             continue;
         controls.resize(system.getNumParticles(), -1);
         next.resize(system.getNumParticles(), -1);
+        isControl.resize(system.getNumParticles(), false);
         for (int chain = 0; chain < force->getNumBeamChains(); chain++) {
             const vector<int>& particles = force->getBeamChainParticles(chain);
             for (size_t node = 0; node+1 < particles.size(); node += 2) {
                 controls[particles[node]] = particles[node+1];
+                isControl[particles[node+1]] = true;
                 if (node+2 < particles.size())
                     next[particles[node]] = particles[node+2];
             }

@@ -22,6 +22,12 @@ public:
     const System& getSystem() const {
         return system;
     }
+    /**
+     * Get whether a particle is the control point of a node of beam elements.
+     */
+    bool isControlPoint(int particle) const {
+        return !isControl.empty() && isControl[particle];
+    }
 private:
     bool findOnCurve(const VirtualSite& site, cylchain::Place& place) const;
     bool isControlOf(int particle, int node) const {
@@ -31,6 +37,7 @@ private:
     // The control point of each node of beam elements, and the next node, or -1. Empty without any.
 
     std::vector<int> controls, next;
+    std::vector<bool> isControl;
 };
 
 } // namespace OpenMM
