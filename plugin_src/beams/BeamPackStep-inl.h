@@ -35,6 +35,8 @@ public:
         iteration = 0;
     }
     void eliminate(const CouplingTerm* newTerms, int count, double* moves) override {
+        given = newTerms;
+        joints.clear();
         terms.set(newTerms, count);
         step->eliminate(y, &terms);
         terms.gather(step->getChange(), moves);
@@ -47,6 +49,16 @@ public:
     void findCompliances(double* compliances) override {
         terms.findCompliances(step->getEquations(), compliances);
     }
+    bool needsJointStiffness() const override {
+        return settings.kT > 0;
+    }
+    void setJointStiffness(const double* stiffness) override {
+        joints.assign(given, given+terms.size());
+        for (CouplingTerm& term : joints) {
+            std::copy(stiffness, stiffness+6, term.stiffness);
+            stiffness += 6;
+        }
+    }
     void advance(const double* forces, double share, bool* unfinished) override {
         terms.spread(forces, pack.nodes, ofPlaces);
         step->respond(ofPlaces, moved);
@@ -55,6 +67,8 @@ public:
             change[node].position = change[node].position+moved[node].position;
             change[node].control = change[node].control+moved[node].control;
         }
+        if (!joints.empty())
+            softenJoints();
         step->advance(y, iteration, active*splat<Real>(share));
         iteration++;
         Real still = active;
@@ -87,7 +101,22 @@ private:
     Real active;
     typename BeamStep<W>::Memory memory;
     std::unique_ptr<BeamStep<W> > step;
+    const CouplingTerm* given;
+    std::vector<CouplingTerm> joints;
     int iteration;
+
+    /**
+     * Eliminate once more for the metric forces, which need to know how strains respond to tensions: with places that
+     * were held as if what they are linked to could not move, bends of single elements would be 5 % too small.
+     */
+    void softenJoints() {
+        Six* const change = step->getChange();
+        std::copy(change, change+pack.nodes, moved);
+        terms.set(joints.data(), joints.size());
+        step->eliminate(y, &terms);
+        std::copy(moved, moved+pack.nodes, change);
+        joints.clear();
+    }
 
     /** Call a function with each coordinate of the particles of active lanes, and how much that has changed. */
     template <class Function> void forOwnParticles(Function function) const {

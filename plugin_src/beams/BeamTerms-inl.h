@@ -22,6 +22,9 @@ public:
             weights.push_back({{own.position1, own.control1, own.position2, own.control2}});
         }
     }
+    int size() const {
+        return numTerms;
+    }
     /** Add the terms of an element, the next ones, to the equations of its nodes. */
     void add(int element, int& next, Row& here, Row& after, Six* right) const {
         for (; next < numTerms && terms[next].node == element; next++) {

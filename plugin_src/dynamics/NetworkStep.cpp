@@ -213,6 +213,7 @@ bool NetworkStep::iterate(const Attempt& attempt, int stage) {
                 attempt.loop);
         substitutions += coupled.getNumIterations();
         if (iteration == 0 && stage == 0) {
+            coupled.findJointStiffness(stepsOfPacks, attempt.loop);
             if (turns) {
                 coupled.findCompliances(stepsOfPacks, compliances, attempt.loop);
                 for (size_t i = 0; i < couplings.size(); i++)

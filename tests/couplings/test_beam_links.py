@@ -7,11 +7,11 @@ import openmm
 import pytest
 from openmm import unit
 
-from openmm_cylchain import Crosslinks, Filaments, InputError, SegmentPlace
+from openmm_cylchain import Crosslinks, Filaments, InputError, InstabilityError, SegmentPlace
 from openmm_cylchain.beams.curve import element_energies, element_points
 from openmm_cylchain.engines.compiled import CylinderChainForce, CylinderChainIntegrator, plugin
 from support.contexts import energy_of, forces_of, new_context, positions_of
-from support.linked_beams import BEAM, LENGTH, STRAIGHT, linked_pairs
+from support.linked_beams import BEAM, STRAIGHT, linked_pairs, mean_energy
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 
 SIGMAS = 4.0
@@ -120,12 +120,14 @@ def test_links_to_attachment_points_are_those_to_their_places():
     results = []
     for attached in (False, True):
         filaments, system, positions, links = network(attached=attached)
-        integrator = filaments.create_integrator(system, 1e5, random_seed=4, checks=False, particle_friction=100.0)
+        # The noise of the particle belongs to its number, which is another one.
+        integrator = filaments.create_integrator(system, 1e5, random_seed=4, temperature=0.0, particle_friction=100.0)
         context = new_context(system, positions, integrator)
         before = links.lengths(context)
         integrator.step(20)
         after = positions_of(context)
         results.append((before, links.lengths(context), after[filaments.node_indices[0]], after[-1]))
+        assert np.abs(after - positions).max() > 1.0
         if attached:
             nodes, controls = (after[own[0]] for own in (filaments.node_indices, filaments.control_point_indices))
             place = after[filaments.attachment_indices[0]]
@@ -143,13 +145,12 @@ BENDS = 1.93
 """Of an element of a quarter of a persistence length in space, in k_B T: see the tests of chains without links."""
 
 
-@pytest.mark.parametrize("stiffness", [0.01, 100.0])
+@pytest.mark.parametrize(("stiffness", "rest_length"), [(0.01, 0.0), (100.0, 0.0), (1.0, 60.0)])
 @pytest.mark.parametrize("pair", PAIRS)
-def test_links_and_bends_keep_their_energies_at_the_recommended_step(pair, stiffness):
+def test_links_and_bends_keep_their_energies_at_the_recommended_step(pair, stiffness, rest_length):
     """Exactly 3/2 k_B T in a link without a rest length; bends and strains are those of chains without links."""
     kinds, places = PAIRS[pair]
-    copies = 250
-    filaments, system, positions, links = linked_pairs(kinds, places, stiffness, copies)
+    filaments, system, positions, links = linked_pairs(kinds, places, stiffness, 300, rest_length=rest_length)
     step = filaments.recommended_time_step(system=system)
     integrator = filaments.create_integrator(system, step, random_seed=2)
     context = new_context(system, positions, integrator, "CPU")
@@ -159,16 +160,17 @@ def test_links_and_bends_keep_their_energies_at_the_recommended_step(pair, stiff
     for _ in range(80):
         integrator.step(4)
         now = positions_of(context)
-        energies.append(0.5 * stiffness * links.lengths(context) ** 2 / KT)
-        curves = ([now[own[number]] for number in beams] for own in (filaments.node_indices, filaments.control_point_indices))
-        stretching, bending = element_energies(*map(np.array, curves), filaments[0].beam_element(TEMPERATURE))
+        energies.append(0.5 * stiffness * links.extensions(context) ** 2 / KT)
+        indices = filaments.node_indices, filaments.control_point_indices
+        nodes, controls = (now[np.array([own[number] for number in beams])] for own in indices)
+        stretching, bending = element_energies(nodes, controls, filaments[0].beam_element(TEMPERATURE))
         bends.append(bending.mean(axis=1) / KT)
         strains.append(stretching.sum(axis=1) / KT)
     divided = integrator.getNumDividedSteps() / (len(filaments) * 370)
     assert divided < 5e-3
     elements = kinds[0][1]
     for values, expected, allowed, power in (
-        (energies, 1.5, 0.005, 0.012),
+        (energies, mean_energy(stiffness, rest_length), 0.005, 0.012),
         (bends, BENDS, 0.01 * BENDS, 0.012),
         (strains, 0.5 * (2 * elements + 1), 0.01 * elements, 0.01),
     ):
@@ -178,7 +180,7 @@ def test_links_and_bends_keep_their_energies_at_the_recommended_step(pair, stiff
         assert abs(np.mean(mean) - expected) < SIGMAS * error + allowed
 
 
-def sums_of(filament, particles, positions, before=None):
+def sums_of(particles, positions, before=None):
     """The integral of r along a beam, or of (r_before + r)/2 x (r - r_before), which isotropic friction weighs."""
     places, weights = np.polynomial.legendre.leggauss(4)
     places, weights = 0.5 * (1.0 + places), 0.5 * weights
@@ -191,8 +193,9 @@ def sums_of(filament, particles, positions, before=None):
     return np.einsum("epx,p->x", values, weights)
 
 
-def test_links_exert_neither_a_force_nor_a_torque_on_the_whole():
-    """Beams with isotropic friction and a link between their curves: what it moves one of them, it moves the other."""
+@pytest.mark.parametrize("step", [0.02, 1e-4])
+def test_links_exert_neither_a_force_nor_a_torque_on_the_whole(step):
+    """Beams with isotropic friction: the integral of r along both stays, and that of r x dr in short steps."""
     system, force = openmm.System(), CylinderChainForce()
     generator = np.random.default_rng(5)
     chains = []
@@ -206,9 +209,10 @@ def test_links_exert_neither_a_force_nor_a_torque_on_the_whole():
     links.addLink(2, 4, 0.5, 6, 8, 0.2, links.Harmonic, 0.0, 50.0, 0.0)
     system.addForce(links)
     x = np.array([0, 1 / 3, 1, 4 / 3, 2, 7 / 3])
-    positions = np.concatenate([np.stack([x, 0 * x, 0 * x], axis=1), np.stack([0 * x + 1, x - 0.5, 0 * x + 1], axis=1)])
+    first, second = np.stack([x, 0 * x, 0 * x], axis=1), np.stack([0 * x + 1, x - 0.5, 0 * x + 1], axis=1)
+    positions = np.concatenate([first, second])
     positions += generator.normal(0.0, 0.02, positions.shape)
-    integrator = CylinderChainIntegrator(0.0, 1.0, 0.02)
+    integrator = CylinderChainIntegrator(0.0, 1.0, step)
     context = new_context(system, positions, integrator)
     energy = energy_of(context)
     for _ in range(20):
@@ -216,11 +220,11 @@ def test_links_exert_neither_a_force_nor_a_torque_on_the_whole():
         integrator.step(1)
         after = positions_of(context)
         moved = np.abs(after - before).max()
-        centers = [sum(sums_of(None, own, now) for own in chains) for now in (before, after)]
+        centers = [sum(sums_of(own, now) for own in chains) for now in (before, after)]
         assert centers[1] == pytest.approx(centers[0], abs=1e-3 * moved)
-        turned = sum(sums_of(None, own, after, before) for own in chains)
-        assert turned == pytest.approx(np.zeros(3), abs=1e-2 * moved)
-    assert energy_of(context) < 0.3 * energy
+        turned = sum(sums_of(own, after, before) for own in chains)
+        assert step > 1e-3 or turned == pytest.approx(np.zeros(3), abs=1e-2 * moved)
+    assert energy_of(context) < 0.9 * energy
 
 
 def test_steps_do_not_depend_on_threads_and_go_on_from_a_checkpoint():
@@ -259,19 +263,21 @@ def test_steps_that_cannot_be_solved_are_divided_for_all_that_is_linked():
     assert abs(np.mean(mean) - 1.5) < SIGMAS * error
 
 
-def test_errors_name_both_filaments():
+def test_errors_name_the_link_and_both_filaments():
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
-    filaments.add_straight(BEAM, 2, [0, 0, 0], [1, 0, 0])
     filaments.add_straight(STRAIGHT, 4, [0, 100, 0], [1, 0, 0])
+    filaments.add_straight(BEAM, 2, [0, 0, 0], [1, 0, 0])
+    filaments.add_straight(BEAM, 2, [0, 50, 0], [1, 0, 0])
     _, system, positions = filaments.build()
-    links = Crosslinks(1.0, 50.0, "fene", 60.0)
-    links.add(None, filaments.segment_place(0, segment=1), filaments.segment_place(1, segment=3))
+    # Both ends of one are held at the middle of the other, from two sides that it cannot reach.
+    links = Crosslinks(1.0, 0.0, "fene", 60.0)
+    links.add(None, filaments.segment_place(1, segment=1), filaments.segment_place(2, segment=1))
     links.add_to(system)
-    integrator = filaments.create_integrator(system, 1e9, checks=False, temperature=0.0)
+    pull = openmm.CustomExternalForce("-1e6*y")
+    pull.addParticle(int(filaments.node_indices[2][1]))
+    system.addForce(pull)
+    integrator = filaments.create_integrator(system, 1e6, checks=False, temperature=0.0)
     context = new_context(system, positions, integrator)
-    context.setParameter(next(iter(context.getParameters())), context.getParameters()[next(iter(context.getParameters()))])
-    broken = positions._value.copy()
-    broken[filaments.node_indices[0][1]] = np.nan
-    context.setPositions(broken)
-    with pytest.raises((RuntimeError, openmm.OpenMMException)):
-        integrator.step(1)
+    with pytest.raises(InstabilityError, match=r"Filament [12] \(BEAM\) has blown up") as raised:
+        integrator.step(100)
+    assert "Positions are those before this step" in str(raised.value)

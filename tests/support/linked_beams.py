@@ -38,7 +38,28 @@ def add_moved(filaments, kind, segments, seed, place, target):
     return filaments.add_equilibrium(kind, segments, seed=seed, start=start)
 
 
-def linked_pairs(kinds, places, stiffness, copies, seed=0, spread=KT):
+def distances_of(stiffness, rest_length):
+    """A grid of distances, and the density of that of a link whose vector has no other weight than its energy."""
+    width = np.sqrt(KT / stiffness)
+    distances = np.linspace(max(0.0, rest_length - 8.0 * width), rest_length + 8.0 * width, 4001)
+    density = distances**2 * np.exp(-0.5 * ((distances - rest_length) / width) ** 2)
+    return distances, density / density.sum()
+
+
+def draw_vector(stiffness, rest_length, generator):
+    """The vector of a link in its own equilibrium."""
+    distances, density = distances_of(stiffness, rest_length)
+    direction = generator.normal(size=3)
+    return direction / np.linalg.norm(direction) * generator.choice(distances, p=density)
+
+
+def mean_energy(stiffness, rest_length):
+    """Of such a link, in k_B T."""
+    distances, density = distances_of(stiffness, rest_length)
+    return float(density @ (0.5 * stiffness * (distances - rest_length) ** 2)) / KT
+
+
+def linked_pairs(kinds, places, stiffness, copies, seed=0, rest_length=0.0):
     """Pairs of filaments in equilibrium, of which a place of the first is linked to one of the second.
 
     Parameters
@@ -47,8 +68,6 @@ def linked_pairs(kinds, places, stiffness, copies, seed=0, spread=KT):
         With the numbers of segments.
     places : ((int, float), (int, float))
         Segments and fractions.
-    spread : float
-        The thermal energy of the links as they are drawn.
 
     Returns
     -------
@@ -58,10 +77,10 @@ def linked_pairs(kinds, places, stiffness, copies, seed=0, spread=KT):
     for copy in range(copies):
         kind, segments = kinds[0]
         first = filaments.add_equilibrium(kind, segments, seed=2 * copy + seed)
-        target = place_of(filaments[first], *places[0]) + generator.normal(0.0, np.sqrt(spread / stiffness), 3)
+        target = place_of(filaments[first], *places[0]) + draw_vector(stiffness, rest_length, generator)
         add_moved(filaments, *kinds[1], 2 * copy + 1 + seed, places[1], target)
     _, system, positions = filaments.build()
-    links = Crosslinks(stiffness, 0.0)
+    links = Crosslinks(stiffness, rest_length)
     for number in range(0, len(filaments), 2):
         ends = [filaments.segment_place(number + i, segment=s, fraction=f) for i, (s, f) in enumerate(places)]
         links.add(None, *ends)
