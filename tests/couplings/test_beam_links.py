@@ -6,9 +6,11 @@ import numpy as np
 import openmm
 import pytest
 from openmm import unit
+from scipy.spatial.transform import Rotation
 
 from openmm_cylchain import Crosslinks, Filaments, InputError, InstabilityError, SegmentPlace
 from openmm_cylchain.beams.curve import element_energies, element_points
+from openmm_cylchain.beams.equilibrium import draw_beam
 from openmm_cylchain.engines.compiled import CylinderChainForce, CylinderChainIntegrator, plugin
 from support.contexts import energy_of, forces_of, new_context, positions_of
 from support.linked_beams import BEAM, STRAIGHT, linked_pairs, mean_energy
@@ -178,6 +180,76 @@ def test_links_and_bends_keep_their_energies_at_the_recommended_step(pair, stiff
         error = np.std(mean, ddof=1) / np.sqrt(len(mean))
         assert error < power * expected
         assert abs(np.mean(mean) - expected) < SIGMAS * error + allowed
+
+
+@pytest.mark.parametrize("samples", [60, pytest.param(1200, marks=pytest.mark.slow)])
+def test_a_loop_of_two_links_is_that_of_weighted_draws(samples):
+    """Elements that are linked at one place are drawn exactly; a second, soft link weighs them by its energy.
+
+    That energy itself takes long to average.
+    """
+    stiffness, soft, draws, copies, elements = 1.0, 1e-4, 20000, 600, 1
+    generator, element = np.random.default_rng(11), BEAM.beam_element(TEMPERATURE)
+    kT = KT
+    # The elements of one chain, of which each is as good as one that is alone, but for the strains of its ends.
+    chain = draw_beam(element, 2 * draws, kT, generator, np.zeros(3), None, False)
+    nodes, controls = (np.stack([own[:-1], own[1:]], axis=1) for own in chain)
+    turns = Rotation.random(2 * draws, random_state=1)
+    origins = nodes[:, :1].copy()
+    nodes, controls = (
+        np.stack([turns.apply(own[:, end] - origins[:, 0]) for end in (0, 1)], axis=1) for own in (nodes, controls)
+    )
+    places = [(0, 0.2), (0, 0.9)]
+
+    def at(place):
+        return element_points(nodes, controls, [place[1]])[:, place[0], 0]
+
+    vectors = generator.normal(0.0, np.sqrt(kT / stiffness), (draws, 3))
+    moved = at(places[0])[::2] - at(places[0])[1::2] + vectors
+    nodes[1::2] += moved[:, None]
+    controls[1::2] += moved[:, None]
+    apart = at(places[1])[::2] - at(places[1])[1::2]
+    energy = 0.5 * soft * np.sum(apart**2, axis=1) / kT
+    weights = np.exp(-energy)
+    weights /= weights.sum()
+    assert 1.0 / np.sum(weights**2) > 0.2 * draws
+    bends = element_energies(nodes, controls, element)[1].reshape(draws, -1).mean(axis=1) / kT
+    expected = [float(weights @ values) for values in (energy, bends)]
+    errors = [np.sqrt(np.sum((weights * (v - e)) ** 2)) for v, e in zip((energy, bends), expected)]
+    # Copies begin in the equilibrium of the loop.
+    chosen = generator.choice(draws, copies, p=weights)
+    filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
+    for _ in range(2 * copies):
+        filaments.add_straight(BEAM, elements, [0, 0, 0], [1, 0, 0])
+    _, system, positions = filaments.build()
+    positions = positions._value
+    rows = np.ravel([2 * chosen, 2 * chosen + 1], order="F")
+    positions[np.array(filaments.node_indices)] = nodes[rows]
+    positions[np.array(filaments.control_point_indices)] = controls[rows]
+    links = Crosslinks(stiffness, 0.0)
+    for number in range(0, 2 * copies, 2):
+        for (segment, fraction), own in zip(places, (stiffness, soft)):
+            ends = [filaments.segment_place(number + i, segment=segment, fraction=fraction) for i in (0, 1)]
+            links.add(None, *ends, stiffness=own)
+    links.add_to(system)
+    integrator = filaments.create_integrator(system, filaments.recommended_time_step(system=system), random_seed=7)
+    context = new_context(system, positions, integrator, "CPU")
+    integrator.step(100)
+    measured = [[], [], []]
+    for _ in range(samples):
+        integrator.step(6)
+        lengths = links.lengths(context)
+        measured[0].append(0.5 * soft * lengths[1::2] ** 2 / kT)
+        now = positions_of(context)
+        indices = (np.array(own) for own in (filaments.node_indices, filaments.control_point_indices))
+        curves = (now[own] for own in indices)
+        measured[1].append(element_energies(*curves, element)[1].reshape(copies, -1).mean(axis=1) / kT)
+        measured[2].append(0.5 * stiffness * lengths[::2] ** 2 / kT)
+    for values, value, uncertainty in zip(measured, [*expected, 1.5], [*errors, 0.0]):
+        mean = np.mean(values, axis=0)
+        error = np.hypot(np.std(mean, ddof=1) / np.sqrt(copies), uncertainty)
+        assert error < 0.01 * value or (samples < 1000 and value == expected[0])
+        assert abs(np.mean(mean) - value) < SIGMAS * error + 0.01 * value
 
 
 def sums_of(particles, positions, before=None):
