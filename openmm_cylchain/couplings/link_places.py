@@ -110,9 +110,9 @@ class LinkPlaces:
         else:
             places[between] += fractions * to_nearest_images(others - places[between], box)
         if curves is not None:
-            first, second, fractions = (column[:, side] for column in (self.pairs, self.partners, self.fractions))
+            first, second = self.pairs[:, side], self.partners[:, side]
             rows = np.flatnonzero(curves.on_curve(first, second))
-            places[rows] = curves.places(first[rows], second[rows], fractions[rows], positions, box)
+            places[rows] = curves.places(first[rows], second[rows], self.fractions[rows, side], positions, box)
         if side == 1:
             places[self.at_points] = self.points[self.at_points]
         return places

@@ -30,8 +30,8 @@ from ..errors import TimeStepWarning
 from ..filaments.collection import FilamentCollection
 from ..kinetics.binding_force import find_binding_force, is_binding_force
 from ..units.types import FloatArray, Indices, IntArray, Numbers
-from .coupled_step import is_coupled
 from .beam_response import BeamResponse
+from .coupled_step import is_coupled
 from .mobility import FilamentResponse, PlaceResponse
 from .other_particles import describe_other_particles
 from .schemes import EXPLICIT_SCHEMES, IMPLICIT_SCHEMES
@@ -384,7 +384,7 @@ class ExplicitForces:
 
     def _response(self, number):
         filament = self._filaments[number]
-        key = (filament.type, filament.segments, filament.clamped, filament.closed)
+        key: tuple[Any, ...] = (filament.type, filament.segments, filament.clamped, filament.closed)
         if filament.type.has_beam_elements:
             key = (*key, filament.clamped_tangents, filament.planar)
         if key not in self._responses:

@@ -71,9 +71,7 @@ class PlaceResponse(ABC):
         return np.max([np.sum(one**2, axis=1) for one in self._factors(piece, segments, fractions, step)], axis=0)
 
     @abstractmethod
-    def _factors(
-        self, piece: int, segments: IntArray, fractions: FloatArray, step: float
-    ) -> Iterator[FloatArray]:
+    def _factors(self, piece: int, segments: IntArray, fractions: FloatArray, step: float) -> Iterator[FloatArray]:
         """Yield, across and along the filament, F (places, unknowns) so that F F^T is the response between places."""
 
 

@@ -415,7 +415,9 @@ class NativeIntegrator(CylinderChainIntegrator):
         if error.kind == "link-out-of-range":
             return InstabilityError(message + self._advice, link=error.link)
         if error.kind in ("unstable-chain", "unstable-particle"):
-            place = numbers | {name: getattr(error, name) for name in ("segment", "other_segment", "particle", "link", "step")}
+            place = numbers | {
+                name: getattr(error, name) for name in ("segment", "other_segment", "particle", "link", "step")
+            }
             return InstabilityError(message + self._advice, **place)
         return error
 

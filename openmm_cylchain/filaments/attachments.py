@@ -120,9 +120,7 @@ def _fraction(fraction, label):
     return fraction
 
 
-def add_virtual_site(
-    system: openmm.System, attachment: Attachment, nodes: IntArray, control_points: IntArray
-) -> int:
+def add_virtual_site(system: openmm.System, attachment: Attachment, nodes: IntArray, control_points: IntArray) -> int:
     """Add the particle of an attachment point to a System that holds the nodes of its filament; return its index.
 
     Control points are those of beam elements, none of straight segments.

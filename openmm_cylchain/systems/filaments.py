@@ -395,10 +395,10 @@ class Filaments:
     ) -> int:
         """Add an attachment point: a virtual site on a segment, on which any OpenMM force can act.
 
-        On a beam element, it is on the curve, at the parameter ``fraction``. On a straight segment, it is at ``(1 - fraction) x_minus + fraction x_plus`` of its segment's ends and follows them in the same
-        step; a force on it acts at that place of the cylinder (step 5 of Section 4 of the paper). It becomes a
-        particle of its own behind the nodes of its filament, in the Topology with the name "ATT";
-        ``attachment_indices`` says which.
+        It is at ``(1 - fraction) x_minus + fraction x_plus`` of its segment's ends, or on the curve of a beam element
+        at the parameter ``fraction``, and follows them in the same step; a force on it acts at that place of the
+        cylinder (step 5 of Section 4 of the paper). It becomes a particle of its own behind the nodes of its filament,
+        in the Topology with the name "ATT"; ``attachment_indices`` says which.
 
         Parameters
         ----------

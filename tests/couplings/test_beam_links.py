@@ -1,7 +1,5 @@
 """Links at places on the curves of beam elements: energies, forces, equilibrium, balance of momentum, and States."""
 
-from dataclasses import replace
-
 import numpy as np
 import openmm
 import pytest
@@ -96,13 +94,11 @@ def boxes_of(links, context):
 def test_places_are_on_the_curve():
     filaments, system, positions, links = network()
     context = new_context(system, positions)
-    nodes, controls = (
-        positions[own[0]] for own in (filaments.node_indices, filaments.control_point_indices)
-    )
+    nodes, controls = (positions[own[0]] for own in (filaments.node_indices, filaments.control_point_indices))
     on_curve = element_points(nodes, controls, [0.3])[1, 0]
-    other = element_points(
-        positions[filaments.node_indices[1]], positions[filaments.control_point_indices[1]], [0.6]
-    )[0, 0]
+    other = element_points(positions[filaments.node_indices[1]], positions[filaments.control_point_indices[1]], [0.6])[
+        0, 0
+    ]
     assert links.lengths(context)[0] == pytest.approx(np.linalg.norm(on_curve - other), rel=1e-12)
     chord = 0.7 * nodes[1] + 0.3 * nodes[2]
     assert np.linalg.norm(on_curve - chord) > 1.0
@@ -350,6 +346,8 @@ def test_errors_name_the_link_and_both_filaments():
     system.addForce(pull)
     integrator = filaments.create_integrator(system, 1e6, checks=False, temperature=0.0)
     context = new_context(system, positions, integrator)
+    before = positions_of(context)
     with pytest.raises(InstabilityError, match=r"Filament [12] \(BEAM\) has blown up") as raised:
         integrator.step(100)
     assert "Positions are those before this step" in str(raised.value)
+    assert np.all(np.isfinite(positions_of(context))) and before.shape == positions.shape
