@@ -402,10 +402,10 @@ class Filaments:
     ) -> int:
         """Add an attachment point: a virtual site on a segment, on which any OpenMM force can act.
 
-        It is at ``(1 - fraction) x_minus + fraction x_plus`` of its segment's ends and follows them in the same
-        step; a force on it acts at that place of the cylinder (step 5 of Section 4 of the paper). It becomes a
-        particle of its own behind the nodes of its filament, in the Topology with the name "ATT";
-        ``attachment_indices`` says which.
+        It is at ``(1 - fraction) x_minus + fraction x_plus`` of its segment's ends, or on the curve of a beam element
+        at the parameter ``fraction``, and follows them in the same step; a force on it acts at that place of the
+        cylinder (step 5 of Section 4 of the paper). It becomes a particle of its own behind the nodes of its filament,
+        in the Topology with the name "ATT"; ``attachment_indices`` says which.
 
         Parameters
         ----------
@@ -431,7 +431,6 @@ class Filaments:
         label = f"Attachment point {len(self._attachments)}"
         self._refuse_if_built(label)
         filament = self._filament_number(filament, label)
-        self._refuse_beam(filament, f"{label}: attachment points")
         return self._attach(locate(self[filament], filament, label, arc_length, segment, fraction))
 
     def segment_place(
@@ -457,7 +456,6 @@ class Filaments:
         """
         label = "Place on a segment"
         filament = self._filament_number(filament, label)
-        self._refuse_beam(filament, f"{label}: crosslinks")
         place = locate(self[filament], filament, label, arc_length, segment, fraction)
         nodes = self.node_indices[filament]
         return SegmentPlace(int(nodes[place.segment]), int(nodes[(place.segment + 1) % len(nodes)]), place.fraction)
@@ -489,7 +487,6 @@ class Filaments:
         label = f"Beads of filament {filament}"
         self._refuse_if_built(label)
         filament = self._filament_number(filament, label)
-        self._refuse_beam(filament, label)
         if filament in self._beads:
             raise InputError(f"{label}: it has beads already.")
         beads = distribute_beads(self[filament], filament, positive(spacing, LENGTH, f"{label}: spacing"))
@@ -743,8 +740,11 @@ class Filaments:
         # Those of one filament; returns their positions.
         attachments = [self._attachments[index] for index in self._attachments_of[number]]
         for index, attachment in zip(self._attachments_of[number], attachments):
-            self._attachment_indices[index] = add_virtual_site(system, attachment, self._nodes[number])
-        return attachment_positions(attachments, self._filaments[number].positions)
+            self._attachment_indices[index] = add_virtual_site(
+                system, attachment, self._nodes[number], self._control_points[number]
+            )
+        own = self._filaments[number]
+        return attachment_positions(attachments, own.positions, own.control_points)
 
     def _coinciding(self):
         for number, nodes in enumerate(self._nodes):

@@ -4,7 +4,8 @@
 #include "beams/BeamLoops-inl.h"
 
 const cylchain::BeamKernels& cylchain::avx2BeamKernels() {
-    static const BeamKernels kernels = {CYLCHAIN_LANES, avx2::addForcesOfBeams, avx2::stepOfBeams};
+    static const BeamKernels kernels = {CYLCHAIN_LANES, avx2::addForcesOfBeams, avx2::stepOfBeams,
+            avx2::newStepOfBeams};
     return kernels;
 }
 #endif

@@ -272,13 +272,54 @@ void CoupledEquations::advance(const vector<PackStep*>& packs, const PackFlags& 
     });
 }
 
-void CoupledEquations::findCompliances(const vector<PackStep*>& packs, vector<double>& compliances,
-            const Loop& loop) {
+void CoupledEquations::findCompliancesOfTerms(const vector<PackStep*>& packs, const Loop& loop) {
     compliancesOfTerms.resize(6*terms.size());
     loop(packs.size(), [&] (int pack) {
         if (firstTerms[pack] < firstTerms[pack+1])
             packs[pack]->findCompliances(compliancesOfTerms.data()+6*firstTerms[pack]);
     });
+}
+
+void CoupledEquations::findJointStiffness(const vector<PackStep*>& packs, const Loop& loop) {
+    auto needsIt = [&] (int pack) {
+        return firstTerms[pack] < firstTerms[pack+1] && packs[pack]->needsJointStiffness();
+    };
+    bool any = false;
+    for (size_t pack = 0; pack < packs.size(); pack++)
+        any |= needsIt(pack);
+    if (!any)
+        return;
+    findCompliancesOfTerms(packs, loop);
+    jointStiffness.resize(6*terms.size());
+    loop(packs.size(), [&] (int pack) {
+        if (!needsIt(pack))
+            return;
+        for (int i = firstTerms[pack]; i < firstTerms[pack+1]; i++) {
+            double* const result = &jointStiffness[6*i];
+            copy_n(terms[i].stiffness, 6, result);
+            if (partners[i] < 0)
+                continue;
+            // Column by column: K e, C K e, K C K e.
+            int entry = 0;
+            double columns[3][3] = {};
+            for (int column = 0; column < 3; column++) {
+                double unit[3] = {}, pull[3] = {}, move[3] = {};
+                unit[column] = 1;
+                multiply(terms[i].stiffness, unit, pull);
+                multiply(&compliancesOfTerms[6*partners[i]], pull, move);
+                multiply(terms[i].stiffness, move, columns[column]);
+            }
+            for (int row = 0; row < 3; row++)
+                for (int column = row; column < 3; column++)
+                    result[entry++] -= 0.5*(columns[column][row]+columns[row][column]);
+        }
+        packs[pack]->setJointStiffness(&jointStiffness[6*firstTerms[pack]]);
+    });
+}
+
+void CoupledEquations::findCompliances(const vector<PackStep*>& packs, vector<double>& compliances,
+            const Loop& loop) {
+    findCompliancesOfTerms(packs, loop);
     compliances.assign(6*termOf.size(), 0.0);
     for (size_t i = 0; i < termOf.size(); i++)
         if (termOf[i] >= 0)

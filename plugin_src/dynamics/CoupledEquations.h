@@ -66,6 +66,11 @@ public:
      * couplings pass on from chain to chain is left out, but each couplings' own stiffness at its places is there.
      */
     void findCompliances(const std::vector<PackStep*>& packs, std::vector<double>& compliances, const Loop& loop);
+    /**
+     * Tell the packs that need it how stiff what holds each place is, with the other place of its coupling as mobile as
+     * it is by itself: with the compliance C of that place, K-K C K.
+     */
+    void findJointStiffness(const std::vector<PackStep*>& packs, const Loop& loop);
     /** The number of substitutions that the last call of solve() took. */
     int getNumIterations() const {
         return iterations;
@@ -92,6 +97,7 @@ private:
     template <class Real> void iterate(const std::vector<PackStep*>& packs, Vectors<Real>& vectors, double tolerance,
             double least, const Loop& loop);
     double total() const;
+    void findCompliancesOfTerms(const std::vector<PackStep*>& packs, const Loop& loop);
     /** One for each place on a chain, pack by pack, in the order of their nodes. */
     std::vector<CouplingTerm> terms;
     /** For each term, the number of that of the other place of its coupling, or -1. */
@@ -112,7 +118,7 @@ private:
     std::vector<double> change, found;
     Vectors<float> single;
     Vectors<double> twice;
-    std::vector<double> moves, compliancesOfTerms;
+    std::vector<double> moves, compliancesOfTerms, jointStiffness;
     std::vector<int> firstOfPack, firstOfNode;
     int iterations = 0;
 };

@@ -54,6 +54,16 @@ public:
      * stiffness.
      */
     virtual void findCompliances(double* compliances) = 0;
+    /** Whether setJointStiffness() is to be called in the first iteration. */
+    virtual bool needsJointStiffness() const {
+        return false;
+    }
+    /**
+     * Take note of how stiff what holds each term's place is when the other place of its coupling can move: a symmetric
+     * matrix in the order of a term's stiffness, which is that where it cannot.
+     */
+    virtual void setJointStiffness(const double*) {
+    }
     /**
      * End the iteration: add what forces on the places of the terms do, and move the nodes.
      *

@@ -55,9 +55,11 @@ double PlaceResponses::find(const PlaceOnChain& place) const {
 double PlaceResponses::findLeast(int chain) const {
     if (chain < (int) beams.size())
         return beams[chain].least;
-    PlaceOnChain particle;
-    particle.chain = chain;
-    return find(particle);
+    // In its middle, an element has the largest friction.
+    PlaceOnChain place;
+    place.chain = chain;
+    place.fraction = 0.5;
+    return find(place);
 }
 
 bool PlaceResponses::moveTogether(int chain) const {
