@@ -4,8 +4,8 @@ A hundred and fifty actin filaments of 1 um along a cylinder of 5 um in a solven
 as many crosslinkers, on one thread (see ``kinetic_systems``). From the same relaxed filaments, each linker with one
 hand bound, bundles take steps of each length over the same time, with several seeds; and a tenth of the longest step. A
 bundle is not in equilibrium: energies, numbers of linkers and lengths are compared at the same times. Then the bundles
-as they are, linked, are timed in turn. They are the more contracted, and the slower, the later that is: what the courses
-took is there, too. The same without contacts shows what linkers cost, and what they change.
+as they are, linked, are timed in turn. They are the more contracted, and the slower, the later that is: what the
+courses took is there, too. The same without contacts shows what linkers cost, and what they change.
 In turn with them, ``many_linkers`` are timed beside the mechanics of their filaments, and their memory is measured.
 """
 

@@ -198,8 +198,8 @@ def test_periodic_images_are_the_same(form, scheme, precision, steps):
         filaments, _, _, context = mixed_network(
             FORMS[form], scheme, 0.02 * MICROSECOND, periodic=True, moved=moved, precision=precision
         )
-        # Links of hundreds of nm that are far too long go to and fro in long steps: each makes a thousand times as much of
-        # rounding.
+        # Links of hundreds of nm that are far too long go to and fro in long steps. Each of these makes a thousand
+        # times as much of rounding.
         advance(context, 100)
         context.getIntegrator().setStepSize(MICROSECOND)
         end = advance(context, steps)
