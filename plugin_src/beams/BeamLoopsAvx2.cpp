@@ -1,4 +1,3 @@
-#ifdef CYLCHAIN_X86_64
 #define CYLCHAIN_LOOPS avx2
 #define CYLCHAIN_LANES 4
 #include "beams/BeamLoops-inl.h"
@@ -7,4 +6,3 @@ const cylchain::BeamKernels& cylchain::avx2BeamKernels() {
     static const BeamKernels kernels = {CYLCHAIN_LANES, avx2::addForcesOfBeams, avx2::stepOfBeams};
     return kernels;
 }
-#endif

@@ -1,4 +1,3 @@
-#ifdef CYLCHAIN_X86_64
 #define CYLCHAIN_LOOPS avx512
 #define CYLCHAIN_LANES 8
 #include "beams/BeamLoops-inl.h"
@@ -7,4 +6,3 @@ const cylchain::BeamKernels& cylchain::avx512BeamKernels() {
     static const BeamKernels kernels = {CYLCHAIN_LANES, avx512::addForcesOfBeams, avx512::stepOfBeams};
     return kernels;
 }
-#endif
