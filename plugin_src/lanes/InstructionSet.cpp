@@ -14,7 +14,8 @@ namespace {
 InstructionSet bestOfProcessor() {
     const char* asked = getenv("CYLCHAIN_INSTRUCTION_SET");
     const string limit = (asked == NULL ? "avx512" : asked);
-    if (limit == "avx512" && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq"))
+    if (limit == "avx512" && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+            __builtin_cpu_supports("avx512vl"))
         return InstructionSet::Avx512;
     if (limit != "baseline" && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
         return InstructionSet::Avx2;

@@ -3,7 +3,7 @@
 
 namespace cylchain {
 
-/** The instruction sets that loops over lanes are compiled for. For other processors than x86-64, there is the first. */
+/** The instruction sets that loops over lanes are compiled for. Processors other than x86-64 have the first alone. */
 enum class InstructionSet {Baseline, Avx2, Avx512};
 
 /** Which of them have been compiled: see InstructionSets.cmake. The functions of others must not be named. */
@@ -12,8 +12,8 @@ constexpr bool HAS_BASELINE = CYLCHAIN_HAS_BASELINE, HAS_AVX2 = CYLCHAIN_HAS_AVX
 /**
  * Get the best one that this processor has, of those that have been compiled.
  *
- * The variable CYLCHAIN_INSTRUCTION_SET of the environment, "avx512", "avx2" or "baseline", names the best one to use, for
- * tests and comparisons.
+ * The variable CYLCHAIN_INSTRUCTION_SET of the environment, "avx512", "avx2" or "baseline", names the best one to use,
+ * for tests and comparisons.
  *
  * @throws std::runtime_error if there is none
  */

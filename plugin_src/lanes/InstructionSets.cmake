@@ -9,7 +9,8 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64|amd64)$")
     if(CYLCHAIN_FOR_THIS_PROCESSOR AND NOT CMAKE_CROSSCOMPILING)
         include(CheckCXXSourceRuns)
         check_cxx_source_runs("int main() {
-            return __builtin_cpu_supports(\"avx512f\") && __builtin_cpu_supports(\"avx512dq\") ? 0 : 1;
+            return __builtin_cpu_supports(\"avx512f\") && __builtin_cpu_supports(\"avx512dq\") &&
+                __builtin_cpu_supports(\"avx512vl\") ? 0 : 1;
             }" CYLCHAIN_AVX512_IS_HERE)
         check_cxx_source_runs("int main() {
             return __builtin_cpu_supports(\"avx2\") && __builtin_cpu_supports(\"fma\") ? 0 : 1;
@@ -27,8 +28,8 @@ message(STATUS "Instruction sets: ${listed}")
 set(CYLCHAIN_OPTIONS_FOR_Avx512 -mavx512f -mavx512dq -mfma)
 set(CYLCHAIN_OPTIONS_FOR_Avx2 -mavx2 -mfma)
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64|amd64)$")
-    # Only processors from before 2013 run these, which take half the time to compile so. They compute the same, for they
-    # have no fused operations.
+    # Only processors from before 2013 run these, which take half the time to compile so. They compute the same, for
+    # they have no fused operations.
     set(CYLCHAIN_OPTIONS_FOR_Baseline -O1)
     if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
         list(APPEND CYLCHAIN_OPTIONS_FOR_Baseline -Wno-maybe-uninitialized)
@@ -45,8 +46,8 @@ foreach(set Avx512 Avx2 Baseline)
     endif()
 endforeach()
 
-# Add files to a target, of each pattern one for each instruction set: its name is where the pattern has an @. What follows
-# OPTIONS are options for all of them.
+# Add files to a target, of each pattern one for each instruction set, whose name is where the pattern has an @. What
+# follows OPTIONS are options for all of them.
 function(add_for_instruction_sets target)
     cmake_parse_arguments(PARSE_ARGV 1 given "" "" "OPTIONS")
     foreach(pattern ${given_UNPARSED_ARGUMENTS})
