@@ -72,6 +72,17 @@ def _hermite(places, derivative):
     return np.stack([y * y * (1 + 2 * x), 3 * x * y * y, x * x * (1 + 2 * y), -3 * x * x * y], axis=-1)
 
 
+def place_weights(places: npt.ArrayLike) -> FloatArray:
+    """Weights of P and Q - P of the first node of an element and of the second one at places from 0 to 1: (..., 4)."""
+    return _hermite(np.asarray(places, dtype=float), False)
+
+
+def particle_weights(place: float) -> tuple[float, float, float, float]:
+    """Weights of the particles P and Q of the first node of an element and of the second one: their sum is 1."""
+    first, control, second, other = place_weights(place).tolist()
+    return first - control, control, second - other, other
+
+
 def _on_elements(nodes, control_points, places, derivative=False):
     vectors = control_points - nodes
     ends = np.stack([nodes[..., :-1, :], vectors[..., :-1, :], nodes[..., 1:, :], vectors[..., 1:, :]], axis=-2)

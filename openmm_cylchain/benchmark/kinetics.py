@@ -4,7 +4,8 @@ A hundred and fifty actin filaments of 1 um along a cylinder of 5 um in a solven
 as many crosslinkers, on one thread (see ``kinetic_systems``). From the same relaxed filaments, each linker with one
 hand bound, bundles take steps of each length over the same time, with several seeds; and a tenth of the longest step. A
 bundle is not in equilibrium: energies, numbers of linkers and lengths are compared at the same times. Then the bundles
-as they are, linked, are timed in turn. The same without contacts shows what linkers cost, and what they change.
+as they are, linked, are timed in turn. They are the more contracted, and the slower, the later that is: what the
+courses took is there, too. The same without contacts shows what linkers cost, and what they change.
 In turn with them, ``many_linkers`` are timed beside the mechanics of their filaments, and their memory is measured.
 """
 
@@ -84,6 +85,8 @@ class Course:
         Of the bundle, in nm, from the start on.
     divided : float
         The share of steps of filaments that were taken in parts.
+    speed : float
+        Simulated seconds per second of processor time.
     """
 
     times: np.ndarray
@@ -91,6 +94,7 @@ class Course:
     numbers: dict
     lengths: np.ndarray
     divided: float
+    speed: float
 
     @property
     def shortening(self):
@@ -102,9 +106,11 @@ def follow(bundle, step, duration, frames):
     """The Course of a bundle over a duration in us, with steps in us."""
     interval = max(1, round(duration / (frames * step)))
     energies, numbers, lengths = [], [], [bundle.length()]
-    before = bundle.integrator.getNumDividedSteps()
+    before, seconds = bundle.integrator.getNumDividedSteps(), 0.0
     for _ in range(frames):
+        begun = time.process_time()
         bundle.integrator.step(interval)
+        seconds += time.process_time() - begun
         energies.append(bundle.energies())
         table = bundle.linkers()
         numbers.append({one.kind.name: table.counts(type_) for type_, one in enumerate(bundle.filaments.linkers)})
@@ -116,6 +122,7 @@ def follow(bundle, step, duration, frames):
         {name: np.array([one[name] for one in numbers]) for name in numbers[0]},
         np.array(lengths),
         divided / (frames * interval * bundle.system.filaments),
+        step * interval * frames / MICROSECOND / seconds,
     )
 
 
@@ -272,6 +279,8 @@ def course_rows(name, courses, crossings=None):
             number = over_seeds([_at_end(course.numbers[kind][:, state]) for course in courses])
             rows.append(row(f"{kind}_{label}_{name}", number, "linkers"))
     rows.append(row(f"divided_steps_{name}", over_seeds([course.divided for course in courses]), "1"))
+    speed = over_seeds([course.speed for course in courses])
+    rows.append(row(f"simulated_seconds_per_second_course_{name}", speed, "s/s"))
     if crossings is not None:
         rows.append(Row(f"crossings_{name}", float(crossings), None, "crossings"))
     for frame, elapsed in enumerate(courses[0].times):
@@ -285,8 +294,11 @@ def format_courses(courses, crossings):
     one = next(iter(courses.values()))[0]
     numbers = [(kind, state) for kind in one.numbers for state in (1, 2)]
     heads = [*one.energies, *(f"{kind}s {('', '1 hand', '2 hands')[state]}" for kind, state in numbers)]
-    heads += ["divided", "crossings"]
-    lines = ["At the end: energies in k_BT, linkers with one and two hands bound, the share of divided steps"]
+    heads += ["divided", "crossings", "s/s"]
+    lines = [
+        "At the end: energies in k_BT, and linkers with one and two hands bound; of all the time: the share of divided "
+        "steps, and simulated seconds per second"
+    ]
     table = [["step", *heads]]
     for step, own in courses.items():
         cells = [_text(over_seeds([_at_end(course.energies[kind]) for course in own]), 0) for kind in one.energies]
@@ -294,6 +306,7 @@ def format_courses(courses, crossings):
             cells.append(_text(over_seeds([_at_end(course.numbers[kind][:, state]) for course in own]), 0))
         cells.append(_text(over_seeds([course.divided for course in own]), 4))
         cells.append(str(crossings.get(step, "")))
+        cells.append(_text(over_seeds([course.speed for course in own]), 3))
         table.append([_milliseconds(step), *cells])
     widths = [max(map(len, column)) for column in zip(*table)]
     lines += ["  ".join(f"{cell:>{width}}" for cell, width in zip(cells, widths)) for cells in table]

@@ -6,6 +6,7 @@ import openmm
 from ..errors import InputError, note_raised_in_force
 from ..mechanics.potentials import STRETCHING_POTENTIALS
 from ..units.types import FloatArray
+from .beam_curves import BeamCurves
 from .crosslink_tables import RECENT_TABLES, TABLES, CrosslinkTable
 from .link_store import unknown_crosslinks
 
@@ -69,6 +70,7 @@ def lengths_and_vectors(
     positions: FloatArray,
     box: FloatArray | None,
     segment_box: FloatArray | None = None,
+    curves: BeamCurves | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Lengths (n,) of crosslinks and vectors (n, 3) from their first to their second places, in nm.
 
@@ -78,6 +80,7 @@ def lengths_and_vectors(
     table : CrosslinkTable
     positions : (particles, 3) array
     box, segment_box : (3, 3) array, optional
+    curves : BeamCurves, optional
         As for ``CrosslinkTable.displacements``.
 
     Raises
@@ -85,7 +88,7 @@ def lengths_and_vectors(
     InputError
         If a crosslink that is on has a length that its potential does not allow.
     """
-    vectors = table.displacements(positions, box, segment_box)
+    vectors = table.displacements(positions, box, segment_box, curves)
     lengths = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
     if model == "fene":
         _check_extensions(table, lengths)

@@ -16,6 +16,7 @@ from ..errors import InputError
 from ..mechanics.geometry import to_nearest_images
 from ..units.quantities import whole_number
 from ..units.types import BoolArray, FloatArray, IntArray
+from .beam_curves import BeamCurves
 from .link_places import PLACE_COLUMNS, LinkPlaces
 
 RECENT_TABLES = 256
@@ -203,7 +204,11 @@ class CrosslinkTable:
             return cls(**columns, next_number=int(content["next_number"]))
 
     def displacements(
-        self, positions: FloatArray, box: FloatArray | None = None, segment_box: FloatArray | None = None
+        self,
+        positions: FloatArray,
+        box: FloatArray | None = None,
+        segment_box: FloatArray | None = None,
+        curves: BeamCurves | None = None,
     ) -> FloatArray:
         """Vectors (n, 3) from first to second places.
 
@@ -215,8 +220,11 @@ class CrosslinkTable:
             Of which to take the nearest images of places.
         segment_box : (3, 3) array, optional
             Of which to take the nearest images of the two particles of a place.
+        curves : BeamCurves, optional
+            Those of beam elements, on which places between their nodes are.
         """
-        vectors = self.places.positions(positions, 1, segment_box) - self.places.positions(positions, 0, segment_box)
+        second, first = (self.places.positions(positions, side, segment_box, curves) for side in (1, 0))
+        vectors = second - first
         return vectors if box is None else to_nearest_images(vectors, box)
 
 

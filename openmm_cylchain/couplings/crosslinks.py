@@ -5,8 +5,9 @@ A crosslink joins two places with the energy of their distance d
     harmonic    (k/2) (d - d0)^2
     fene        -(k/2) D^2 ln(1 - ((d - d0)/D)^2)
 
-A place is a particle, which may be an attachment point or a node of a filament or anything else; a place on a segment;
-or, for one of the two, a point that does not move. Where the places coincide, the force has no direction and is zero.
+A place is a particle, which may be an attachment point or a node of a filament or anything else; a place on a segment
+or on the curve of a beam element; or, for one of the two, a point that does not move. Where the places coincide, the
+force has no direction and is zero.
 
 Where a System has filaments of the compiled engine, its CylinderChainLinkForce computes them; elsewhere a PythonForce
 does, on any platform. Which crosslinks there are belongs to each Context. A context parameter holds a digest of them:
@@ -383,7 +384,8 @@ class Crosslinks:
         store = self._store_in(context)
         table = store.table(context)
         positions = state.getPositions(asNumpy=True)._value
-        lengths, _ = lengths_and_vectors(self._model, table, positions, *store.boxes(context, state))
+        box, segment_box = store.boxes(context, state)
+        lengths, _ = lengths_and_vectors(self._model, table, positions, box, segment_box, store.curves(context))
         return table, lengths, slopes_of(self._model, table, lengths)
 
     @property

@@ -13,6 +13,7 @@ from ..filaments.segment_place import SegmentPlace
 from ..mechanics.geometry import to_nearest_images
 from ..units.quantities import LENGTH, shown, vector, whole_number
 from ..units.types import BoolArray, FloatArray, IntArray
+from .beam_curves import BeamCurves
 
 NOWHERE = -1
 """In place of a particle that there is none of."""
@@ -90,10 +91,13 @@ class LinkPlaces:
         both = (np.concatenate([getattr(self, name), getattr(others, name)]) for name in PLACE_COLUMNS)
         return LinkPlaces(*both)
 
-    def positions(self, positions: FloatArray, side: int, box: FloatArray | None = None) -> FloatArray:
+    def positions(
+        self, positions: FloatArray, side: int, box: FloatArray | None = None, curves: BeamCurves | None = None
+    ) -> FloatArray:
         """Where the first (side 0) or the second (side 1) places are: (n, 3).
 
-        Of the two particles of a place the images that are nearest in a box (3, 3), if one is given.
+        Of the two particles of a place the images that are nearest in a box (3, 3), if one is given. Those between the
+        nodes of beam elements are on ``curves``.
         """
         places = positions[self.pairs[:, side]]
         if self.are_particles:
@@ -105,6 +109,10 @@ class LinkPlaces:
             places[between] = (1.0 - fractions) * places[between] + fractions * others
         else:
             places[between] += fractions * to_nearest_images(others - places[between], box)
+        if curves is not None:
+            first, second = self.pairs[:, side], self.partners[:, side]
+            rows = np.flatnonzero(curves.on_curve(first, second))
+            places[rows] = curves.places(first[rows], second[rows], self.fractions[rows, side], positions, box)
         if side == 1:
             places[self.at_points] = self.points[self.at_points]
         return places

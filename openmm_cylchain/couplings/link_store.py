@@ -7,6 +7,7 @@ import openmm
 
 from ..errors import InputError
 from ..units.types import FloatArray, IntArray
+from .beam_curves import BeamCurves
 from .crosslink_tables import CrosslinkTable
 from .link_places import LinkPlaces
 
@@ -42,6 +43,10 @@ class LinkStore(ABC):
     @abstractmethod
     def boxes(self, context: openmm.Context, state: openmm.State) -> tuple[FloatArray | None, FloatArray | None]:
         """The boxes (3, 3) of nearest images of places, and of the two particles of a place, or None."""
+
+    def curves(self, context: openmm.Context) -> BeamCurves | None:
+        """The curves of the beam elements of a Context, or None if it has none."""
+        return None
 
     def next_number(self, context: openmm.Context) -> int:
         """The number of the next crosslink of a Context."""

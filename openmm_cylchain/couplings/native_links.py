@@ -9,6 +9,7 @@ import openmm
 from ..engine_choice import load_plugin
 from ..errors import InputError
 from ..units.types import FloatArray, IntArray
+from .beam_curves import BeamCurves
 from .crosslink_tables import CrosslinkTable
 from .link_places import LinkPlaces
 from .link_store import LinkStore, not_of_this_system, unknown_crosslinks
@@ -52,6 +53,7 @@ class NativeLinks(LinkStore):
         self.defaults = defaults
         self.initial = initial
         self._order = order
+        self._curves: tuple[BeamCurves | None] | None = None
         self._address = int(force.this)
         self._known: WeakKeyDictionary[openmm.Context, tuple[float, CrosslinkTable]] = WeakKeyDictionary()
 
@@ -127,6 +129,13 @@ class NativeLinks(LinkStore):
         nearest = any(one.usesPeriodicBoundaryConditions() for one in forces)
         periodic = self._force_in(context).usesPeriodicBoundaryConditions()
         return (box if periodic else None), (box if nearest else None)
+
+    def curves(self, context: openmm.Context) -> BeamCurves | None:
+        """See LinkStore."""
+        if self._curves is None:
+            # Of the System, whose Contexts have the same.
+            self._curves = (BeamCurves.of_system(context.getSystem()),)
+        return self._curves[0]
 
     def next_number(self, context: openmm.Context) -> int:
         """See LinkStore."""

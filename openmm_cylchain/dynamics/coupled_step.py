@@ -31,6 +31,9 @@ from .time_step import TimeStep
 RELATIVE_MOTION = 0.6
 """The largest standard deviation of relative motion in a step, over the distance."""
 
+_END_OF_ELEMENT = 4.0
+"""How much more than all of an element that is alone its end moves, as that of a rod: elements are long."""
+
 _REASON = (
     "{what}: the two may diffuse against each other by {share:g} of {distance}, {value:.3g} nm, in an implicit step"
 )
@@ -86,11 +89,16 @@ def steps_of_couplings(
 
 
 def mobilities(filaments: FilamentCollection, system: openmm.System, particle_friction: Numbers | None) -> FloatArray:
-    """Of all particles of a System, across segments; zero for those that do not move. In nm^2 mol/(kJ ps)."""
+    """Of all particles of a System, across segments; zero for those that do not move. In nm^2 mol/(kJ ps).
+
+    Of beam elements, that of the end of one.
+    """
     mobility = np.zeros(system.getNumParticles())
     for filament, nodes in zip(filaments, filaments.node_indices):
         friction = filament.type.segment_friction(filaments.viscosity, filaments.temperature, filament.segments)
         mobility[nodes] = 1.0 / max(friction.perpendicular, filament.type.node_friction)
+        if filament.type.has_beam_elements:
+            mobility[nodes] *= _END_OF_ELEMENT
     for particle, attachment in zip(filaments.attachment_indices, filaments.attachments):
         mobility[particle] = mobility[filaments.node_indices[attachment.filament][0]]
     nodes = np.concatenate([*filaments.node_indices, *filaments.control_point_indices])

@@ -30,8 +30,9 @@ from ..errors import TimeStepWarning
 from ..filaments.collection import FilamentCollection
 from ..kinetics.binding_force import find_binding_force, is_binding_force
 from ..units.types import FloatArray, Indices, IntArray, Numbers
+from .beam_response import BeamResponse
 from .coupled_step import is_coupled
-from .mobility import FilamentResponse
+from .mobility import FilamentResponse, PlaceResponse
 from .other_particles import describe_other_particles
 from .schemes import EXPLICIT_SCHEMES, IMPLICIT_SCHEMES
 from .time_step import TimeStep
@@ -125,7 +126,7 @@ class ExplicitForces:
         self._filaments = filaments
         self._scheme = scheme
         self._other_friction = self._frictions(particle_friction)
-        self._responses: dict[Any, FilamentResponse] = {}
+        self._responses: dict[Any, PlaceResponse] = {}
         # Places between two particles that have none of their own, with numbers behind those of all particles.
         self._between: dict[tuple[int, int, float], int] = {}
         self.springs: list[Springs] = []
@@ -153,10 +154,18 @@ class ExplicitForces:
         }
 
     @cached_property
-    def _beam_particles(self):
-        # How far a force moves filaments of beam elements in a step is not known.
-        indices = zip(self._filaments.node_indices, self._filaments.control_point_indices)
-        return {int(particle) for nodes, own in indices if len(own) for particle in (*nodes, *own)}
+    def _control_points(self):
+        # How far a force on one of them moves it is not known.
+        return {int(particle) for own in self._filaments.control_point_indices for particle in own}
+
+    @cached_property
+    def _on_curves(self):
+        # The place of each attachment point on a beam element.
+        return {
+            int(particle): (one.filament, one.segment, one.fraction)
+            for particle, one in zip(self._filaments.attachment_indices, self._filaments.attachments)
+            if self._filaments[one.filament].type.has_beam_elements
+        }
 
     def recommended_step(self) -> TimeStep:
         """The TimeStep of these forces, one by one and together; an infinite step if there are none."""
@@ -294,7 +303,7 @@ class ExplicitForces:
         for site, particle in enumerate(particles.tolist()):
             components = self._places_of(particle)
             if components is None:
-                what = "beam node or control point" if particle in self._beam_particles else "virtual site"
+                what = "control point of beam elements" if particle in self._control_points else "virtual site"
                 unknown.append(f"{what} {particle}")
                 continue
             self._site_of[particle] = site
@@ -311,8 +320,10 @@ class ExplicitForces:
         if particle in self._between_of:
             first, second, fraction = self._between_of[particle]
             return self._mean_place([first, second], [1.0 - fraction, fraction])
-        if particle in self._beam_particles:
+        if particle in self._control_points:
             return None
+        if particle in self._on_curves:
+            return [(self._on_curves[particle], 1.0)]
         if particle in self._node:
             number, node = self._node[particle]
             filament = self._filaments[number]
@@ -344,10 +355,11 @@ class ExplicitForces:
     def _on_segment(self, parents, weights):
         if len(parents) != 2 or any(parent not in self._node for parent in parents):
             return None
-        if not self._beam_particles.isdisjoint(parents):
-            return None
         (number, minus), (other, plus) = (self._node[parent] for parent in parents)
         nodes = len(self._filaments.node_indices[number])
+        if self._filaments[number].type.has_beam_elements:
+            # The line between two nodes is not on the curve.
+            return None
         if number != other or (minus + 1) % nodes != plus or not 0.0 <= weights[1] <= 1.0:
             return None
         return (number, minus, weights[1])
@@ -372,11 +384,17 @@ class ExplicitForces:
 
     def _response(self, number):
         filament = self._filaments[number]
-        key = (filament.type, filament.segments, filament.clamped, filament.closed)
+        key: tuple[Any, ...] = (filament.type, filament.segments, filament.clamped, filament.closed)
+        if filament.type.has_beam_elements:
+            key = (*key, filament.clamped_tangents, filament.planar)
         if key not in self._responses:
             solvent = (self._filaments.viscosity, self._filaments.temperature)
             friction = filament.type.segment_friction(*solvent, filament.segments)
-            self._responses[key] = FilamentResponse(filament, friction, self._scheme)
+            if filament.type.has_beam_elements:
+                element = filament.beam_element(self._filaments.temperature)
+                self._responses[key] = BeamResponse(filament, friction, element)
+            else:
+                self._responses[key] = FilamentResponse(filament, friction, self._scheme)
         return self._responses[key]
 
     def _response_of_places(self, step):
@@ -405,7 +423,7 @@ class ExplicitForces:
         if links is not None or is_link_force(force):
             return None if links is None else self._crosslinks(links, label)
         if is_binding_force(force):
-            return [] if self._scheme in IMPLICIT_SCHEMES else self._linkers(label)
+            return self._linkers(label)
         if force.getName().startswith("CylinderChain") or isinstance(force, _WITHOUT_STIFFNESS):
             return []
         if isinstance(force, openmm.HarmonicBondForce):
@@ -441,7 +459,17 @@ class ExplicitForces:
         linkers = find_binding_force(self._system)
         kinds = range(linkers.getNumLinkerTypes())
         stiffness = max((linkers.getLinkerTypeParameters(kind)[3] for kind in kinds), default=0.0)
-        return [self._to_come(label, "linker", stiffness)] if stiffness > 0.0 else []
+        anchors = np.unique([linkers.getAnchor(index)[0] for index in range(linkers.getNumAnchors())]).astype(int)
+        anchors = anchors[anchors != _NOWHERE]
+        # Implicit steps have linkers in their equations, unless a virtual site is an anchor.
+        if self._scheme in IMPLICIT_SCHEMES and not any(map(self._system.isVirtualSite, anchors.tolist())):
+            return []
+        found = [self._to_come(label, "linker", stiffness)]
+        if len(anchors):
+            first, last = (int(self._filaments.node_indices[number][number]) for number in (0, -1))
+            ends, stiffnesses = np.where(anchors == first, last, first), np.full(len(anchors), stiffness)
+            found.append(Springs(label, "linker to come, on particle", anchors, anchors, ends, stiffnesses))
+        return found
 
     def _to_come(self, label, what, stiffness):
         # What may join any two places: ends of filaments move most.

@@ -7,7 +7,7 @@ bind, walk and unbind, and linkers while filaments move:
   under the stall force if load changes it;
 - a hand should walk by a fifth of its reach at most;
 - a hand that walks against its spring relaxes towards its stall force with the rate k_s v/F_s, of which a step should
-  take a fifth at most (walking is explicit; at once, it is stopped where its spring stalls it);
+  take a fifth at most (in longer steps it walks in parts, past filaments that stand still);
 - implicit steps lose the direction of a spring that has a rest length when its ends diffuse by that, as those of
   crosslinks: see ``coupled_step``.
 """

@@ -19,6 +19,8 @@ keeps its equilibrium and that under a constant force does so with h 2 (1 - R)/(
 scheme "implicit-second-order", R is ``schemes.amplification_of_second_order``.
 """
 
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -32,8 +34,49 @@ from .schemes import IMPLICIT_SCHEMES, amplification_of_second_order
 _LONGEST_PIECE = 128
 
 
-class FilamentResponse:
-    """The response of one filament, taken as straight, to explicit forces in a step.
+class PlaceResponse(ABC):
+    """The response of places on a filament, or on a piece of one, to explicit forces in a step."""
+
+    _piece: int
+
+    def piece_of(self, segment: int) -> int:
+        """The piece that a segment belongs to."""
+        return int(segment) // self._piece
+
+    def largest_eigenvalue(
+        self, piece: int, segments: IntArray, fractions: FloatArray, stiffness: FloatArray, step: float
+    ) -> float:
+        """lambda, the largest eigenvalue of A^-1 S for springs at places of a piece, in the worst direction.
+
+        Parameters
+        ----------
+        piece : int
+        segments, fractions : (places,) arrays
+            The places: at ``fraction`` from the first to the second end of a segment, or of the curve of an element.
+        stiffness : (places,) array
+            Of a spring from each place to a fixed point, in kJ/(mol nm^2).
+        step : float
+            In ps.
+        """
+        root = np.sqrt(stiffness)[:, None]
+        largest = 0.0
+        for factor in self._factors(piece, segments, fractions, step):
+            scaled = root * factor
+            gram = scaled @ scaled.T if scaled.shape[0] <= scaled.shape[1] else scaled.T @ scaled
+            largest = max(largest, float(eigvalsh(gram, subset_by_index=[len(gram) - 1] * 2)[0]))
+        return largest
+
+    def at(self, piece: int, segments: IntArray, fractions: FloatArray, step: float) -> FloatArray:
+        """The response of each place to a force on it, in the worst direction: an array in nm^2 mol/kJ."""
+        return np.max([np.sum(one**2, axis=1) for one in self._factors(piece, segments, fractions, step)], axis=0)
+
+    @abstractmethod
+    def _factors(self, piece: int, segments: IntArray, fractions: FloatArray, step: float) -> Iterator[FloatArray]:
+        """Yield, across and along the filament, F (places, unknowns) so that F F^T is the response between places."""
+
+
+class FilamentResponse(PlaceResponse):
+    """The response of one filament of straight segments, taken as straight, to explicit forces in a step.
 
     Clamped nodes stay. Tethers are left out, and filaments of more than 128 segments are cut into pieces: both make it
     more mobile than it is.
@@ -55,39 +98,7 @@ class FilamentResponse:
         self._piece = self.segments if whole_ring else min(self.segments, _LONGEST_PIECE)
         self._pieces: dict[int, list[Any]] = {}
 
-    def piece_of(self, segment: int) -> int:
-        """The piece that a segment belongs to."""
-        return int(segment) // self._piece
-
-    def largest_eigenvalue(
-        self, piece: int, segments: IntArray, fractions: FloatArray, stiffness: FloatArray, step: float
-    ) -> float:
-        """lambda, the largest eigenvalue of A^-1 S for springs at places of a piece, in the worst direction.
-
-        Parameters
-        ----------
-        piece : int
-        segments, fractions : (places,) arrays
-            The places: (1 - fraction) x_minus + fraction x_plus of a segment's ends.
-        stiffness : (places,) array
-            Of a spring from each place to a fixed point, in kJ/(mol nm^2).
-        step : float
-            In ps.
-        """
-        root = np.sqrt(stiffness)[:, None]
-        largest = 0.0
-        for factor in self._factors(piece, segments, fractions, step):
-            scaled = root * factor
-            gram = scaled @ scaled.T if scaled.shape[0] <= scaled.shape[1] else scaled.T @ scaled
-            largest = max(largest, float(eigvalsh(gram, subset_by_index=[len(gram) - 1] * 2)[0]))
-        return largest
-
-    def at(self, piece: int, segments: IntArray, fractions: FloatArray, step: float) -> FloatArray:
-        """The response of each place to a force on it, in the worst direction: an array in nm^2 mol/kJ."""
-        return np.max([np.sum(one**2, axis=1) for one in self._factors(piece, segments, fractions, step)], axis=0)
-
     def _factors(self, piece, segments, fractions, step):
-        # Across and along the filament: F (places, modes) so that F F^T is the response between places.
         if piece not in self._pieces:
             self._pieces[piece] = list(self._modes(piece))
         minus = np.asarray(segments) - piece * self._piece

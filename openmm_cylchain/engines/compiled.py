@@ -109,28 +109,31 @@ class CompiledEngine(Engine):
             force.addTether(chain, tether.node, openmm.Vec3(*tether.point), tether.stiffness)
         system.addForce(force)
         if placed.linkers:
-            system.addForce(make_binding_force(placed.linkers, placed.filaments, placed.temperature, placed.periodic))
+            box = None
+            if placed.periodic:
+                box = np.array([vector._value for vector in system.getDefaultPeriodicBoxVectors()])
+            linkers, filaments = placed.linkers, placed.filaments
+            system.addForce(make_binding_force(linkers, filaments, placed.temperature, placed.positions, box))
 
     def create_integrator(self, system, placed, settings):
         """Create a NativeIntegrator."""
         refuse_constraints(system, placed)
         fixed_nodes(system, placed)
         others, frictions = describe_other_particles(system, placed.nodes, settings.particle_friction)
-        labels, beam_labels = [], []
+        labels: list[dict[int, str]] = [{}, {}]
         for number, filament in enumerate(placed.filaments):
-            own = beam_labels if filament.type.has_beam_elements else labels
-            own.append(filament_label(number, filament))
+            labels[filament.type.has_beam_elements][number] = filament_label(number, filament)
         integrator = NativeIntegrator(
             settings.temperature,
             settings.step_size,
             settings.scheme,
             settings.random_seed,
-            labels,
+            labels[False],
             settings.flow,
             advice_after_blow_up(system),
             settings.checks,
             settings.precision,
-            beam_labels,
+            labels[True],
         )
         for particle, friction in zip(others, frictions):
             integrator.setParticleFriction(int(particle), float(friction))
@@ -279,10 +282,10 @@ class NativeIntegrator(CylinderChainIntegrator):
     scheme : {"implicit", "implicit-second-order", "midpoint", "euler"}
     random_seed : int
         0 draws a fresh seed for each Context.
-    labels : sequence of str
-        What to call each chain in messages.
-    beam_labels : sequence of str
-        What to call each chain of beam elements.
+    labels : dict of int and str
+        The number of the filament that each chain is, and what to call it in messages.
+    beam_labels : dict of int and str
+        The same for each chain of beam elements.
     flow : Flow, optional
         Of the solvent; at rest if not given.
     advice : str
@@ -308,22 +311,25 @@ class NativeIntegrator(CylinderChainIntegrator):
         step_size,
         scheme="implicit",
         random_seed=0,
-        labels=(),
+        labels=None,
         flow=None,
         advice="",
         checks=True,
         precision="automatic",
-        beam_labels=(),
+        beam_labels=None,
     ):
         temperature = non_negative(temperature, TEMPERATURE, "temperature")
         super().__init__(temperature, _OTHER_FRICTION, as_step(step_size))
         self.checks = checks
-        self._divided_steps = DividedSteps(len(labels) + len(beam_labels))
-        self._beam_labels = list(beam_labels)
+        # The engine numbers chains of beam elements behind all others.
+        labels, beam_labels = labels or {}, beam_labels or {}
+        self._first_beam = len(labels)
+        self._numbers = [*labels, *beam_labels]
+        self._labels = [*labels.values(), *beam_labels.values()]
+        self._divided_steps = DividedSteps(len(self._labels))
         self._work = ExplicitWork()
         check_scheme(scheme)
         check_precision(precision)
-        self._labels = list(labels)
         self._advice = advice
         self.setScheme(SCHEMES[scheme])
         self.setPrecision(PRECISIONS[precision])
@@ -386,7 +392,7 @@ class NativeIntegrator(CylinderChainIntegrator):
         found = _OF_BEAM_CHAIN.match(str(error))
         if found is None:
             return None
-        label = self._beam_labels[int(found[2])]
+        label = self._labels[self._first_beam + int(found[2])]
         rest = str(error)[found.end() :]
         if found[1]:
             return InputError(f"{found[1]}{label[0].lower()}{label[1:]}{rest}.")
@@ -396,11 +402,14 @@ class NativeIntegrator(CylinderChainIntegrator):
 
     def _error_of(self, error):
         message = str(error).replace("outside chains", "outside filaments")
+        numbers: dict[str, int | None] = {"filament": error.chain, "other_filament": error.other_chain}
         if error.chain is not None and error.chain < len(self._labels):
-            message = self._labels[error.chain] + message.removeprefix(f"Chain {error.chain}")
+            message = self._labels[error.chain] + message.removeprefix(self._name_of_chain(error.chain))
+            numbers["filament"] = self._numbers[error.chain]
         if error.other_chain is not None and error.other_chain < len(self._labels):
-            label = self._labels[error.other_chain]
-            message = message.replace(f" of chain {error.other_chain}", f" of {label[0].lower()}{label[1:]}")
+            label, name = self._labels[error.other_chain], self._name_of_chain(error.other_chain)
+            message = message.replace(f" of {name[0].lower()}{name[1:]}", f" of {label[0].lower()}{label[1:]}")
+            numbers["other_filament"] = self._numbers[error.other_chain]
         if error.kind == "torn-chain":
             return InputError(f"{message} (openmm_cylchain.make_whole).")
         if error.kind == "length-out-of-range":
@@ -410,10 +419,16 @@ class NativeIntegrator(CylinderChainIntegrator):
         if error.kind == "link-out-of-range":
             return InstabilityError(message + self._advice, link=error.link)
         if error.kind in ("unstable-chain", "unstable-particle"):
-            place = {"filament": error.chain, "other_filament": error.other_chain}
-            place |= {name: getattr(error, name) for name in ("segment", "other_segment", "particle", "link", "step")}
+            place = numbers | {
+                name: getattr(error, name) for name in ("segment", "other_segment", "particle", "link", "step")
+            }
             return InstabilityError(message + self._advice, **place)
         return error
+
+    def _name_of_chain(self, chain):
+        # As the engine calls it.
+        beam = chain - self._first_beam
+        return f"Chain {chain}" if beam < 0 else f"Beam chain {beam}"
 
     def setRandomNumberSeed(self, seed):
         """Set the seed of the noise; 0 draws one for each Context that is created."""

@@ -1,7 +1,7 @@
 """What an engine is given, and what it does."""
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -33,6 +33,8 @@ class PlacedFilaments:
         Whether linkers join nearest periodic images.
     control_point_indices : tuple of (n,) int arrays
         Particles of the control points of each filament; none of straight segments.
+    positions : (particles, 3) array
+        In nm, of the System, while forces are added; empty later.
     """
 
     filaments: tuple[Filament, ...]
@@ -43,6 +45,7 @@ class PlacedFilaments:
     linkers: tuple[Linkers, ...] = ()
     periodic: bool = False
     control_point_indices: tuple[np.ndarray, ...] = ()
+    positions: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
 
     @property
     def nodes(self) -> np.ndarray:

@@ -3,7 +3,8 @@
 An attachment point is a virtual site between the two ends of a segment, x = (1-s) x_minus + s x_plus, and follows them
 in the same step. OpenMM hands a force on it to the ends in the same proportions, which is what a force F at the place s
 of a cylinder does: the sum is F, and the torque around the segment's middle (s-1/2) l t x F (step 5 of Section 4 of
-Pesek et al., Soft Matter 2016, 12, 3360).
+Pesek et al., Soft Matter 2016, 12, 3360). On a beam element, it is the point of its curve at the parameter s, a mean of
+its two nodes and their control points with the weights of the curve.
 """
 
 import math
@@ -15,6 +16,7 @@ from itertools import combinations
 import numpy as np
 import openmm
 
+from ..beams.curve import particle_weights, place_weights
 from ..errors import InputError
 from ..units.quantities import DIMENSIONLESS, LENGTH, in_units_of, non_negative, whole_number
 from ..units.types import FloatArray, Indices, IntArray, Scalar
@@ -38,7 +40,7 @@ class Attachment:
     ----------
     filament, segment : int
     fraction : float
-        Of the segment's length, from its minus end: 0 to 1.
+        Of the segment's length, from its minus end: 0 to 1. On a beam element, the parameter of its curve.
     name : str
         Of its atom in topologies.
     """
@@ -118,9 +120,20 @@ def _fraction(fraction, label):
     return fraction
 
 
-def add_virtual_site(system: openmm.System, attachment: Attachment, nodes: IntArray) -> int:
-    """Add the particle of an attachment point to a System that holds the nodes of its filament; return its index."""
+def add_virtual_site(system: openmm.System, attachment: Attachment, nodes: IntArray, control_points: IntArray) -> int:
+    """Add the particle of an attachment point to a System that holds the nodes of its filament; return its index.
+
+    Control points are those of beam elements, none of straight segments.
+    """
     particle = system.addParticle(0.0)
+    if len(control_points):
+        ends = [attachment.segment, attachment.segment + 1]
+        parents = [int(own[end]) for end in ends for own in (nodes, control_points)]
+        # A mean of four particles, without an offset in a frame that would have axes.
+        none = [0.0] * 4
+        weights = particle_weights(attachment.fraction)
+        system.setVirtualSite(particle, openmm.LocalCoordinatesSite(parents, weights, none, none, openmm.Vec3(0, 0, 0)))
+        return particle
     minus, plus = int(nodes[attachment.segment]), int(nodes[(attachment.segment + 1) % len(nodes)])
     site = openmm.TwoParticleAverageSite(minus, plus, 1.0 - attachment.fraction, attachment.fraction)
     system.setVirtualSite(particle, site)
@@ -149,10 +162,20 @@ def neighbors(attachments: Sequence[Attachment], particles: Indices, nodes: Indi
         yield from ((point, other) for point in points for other in others)
 
 
-def attachment_positions(attachments: Sequence[Attachment], positions: FloatArray) -> FloatArray:
-    """Where attachment points are on a filament with node positions (n, 3): an array (attachments, 3)."""
+def attachment_positions(
+    attachments: Sequence[Attachment], positions: FloatArray, control_points: FloatArray | None = None
+) -> FloatArray:
+    """Where attachment points are on a filament with node positions (n, 3): an array (attachments, 3).
+
+    Of beam elements, the control points (n, 3) are needed, too.
+    """
     segments = np.array([one.segment for one in attachments], dtype=int)
     fractions = np.array([one.fraction for one in attachments], dtype=float)[:, None]
+    if control_points is not None:
+        weights = place_weights(fractions[:, 0])
+        vectors = control_points - positions
+        columns = (positions[segments], vectors[segments], positions[segments + 1], vectors[segments + 1])
+        return np.einsum("pw,wpx->px", weights, np.array(columns))
     return (1.0 - fractions) * positions[segments] + fractions * positions[(segments + 1) % len(positions)]
 
 

@@ -11,6 +11,9 @@ from ..units.quantities import shown, whole_number
 class SegmentPlace:
     """A place between two particles, such as the ends of a segment: (1 - fraction) x_first + fraction x_second.
 
+    Where the two are neighbouring nodes of a filament of beam elements, it is on the curve between them, at the
+    parameter ``fraction``: that share of the arc length where the element is as long as at rest.
+
     ``Filaments.segment_place`` finds that of a filament, a segment and a fraction.
 
     Attributes

@@ -1,6 +1,7 @@
 """The CylinderChainBindingForce of a System: linkers of the compiled engine."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,9 @@ from ..engine_choice import load_plugin
 from ..errors import InputError
 from ..filaments.filament import Filament
 from ..mechanics.geometry import to_nearest_images
+from ..units.quantities import thermal_energy
 from ..units.types import FloatArray, IntArray
+from .first_places import FirstPlaces, contour_of
 from .hand import Hand
 from .linker_table import LinkerTable
 from .linkers import LinkerPulls, Linkers
@@ -33,7 +36,11 @@ def find_binding_force(system: openmm.System) -> Any:
 
 
 def make_binding_force(
-    linkers: Sequence[Linkers], filaments: Sequence[Filament], temperature: float, periodic: bool
+    linkers: Sequence[Linkers],
+    filaments: Sequence[Filament],
+    temperature: float,
+    positions: FloatArray,
+    box: FloatArray | None,
 ) -> openmm.Force:
     """The force of linkers that bind to filaments, which are the chains of a System in their order.
 
@@ -44,19 +51,22 @@ def make_binding_force(
     filaments : sequence of Filament
     temperature : float
         In K.
-    periodic : bool
-        Whether distances are those of nearest periodic images.
+    positions : (particles, 3) array
+        In nm, of the System: some particles may be anchors.
+    box : (3, 3) array or None
+        Periodic box vectors if distances are those of nearest images.
 
     Raises
     ------
     InputError
-        If there is nothing that a hand binds to, or no site for all that are to begin bound.
+        If there is nothing that a hand binds to, or no place for all that are to begin bound.
     """
     force = load_plugin().CylinderChainBindingForce(temperature)
     force.setName(BINDING_FORCE_NAME)
-    force.setUsesPeriodicBoundaryConditions(periodic)
+    force.setUsesPeriodicBoundaryConditions(box is not None)
     hands: dict[Hand, int] = {}
     columns: list[Any] = [[], [], [], []]
+    first_places = FirstPlaces(filaments, thermal_energy(temperature), box)
     for own in linkers:
         numbers = []
         for hand in own.kind.hands:
@@ -73,21 +83,19 @@ def make_binding_force(
         if own.anchors is not None:
             anchors = np.array([_add_anchor(force, anchor) for anchor in own.anchors], dtype=int)
         chains, places = np.full((own.count, 2), -1), np.zeros((own.count, 2))
-        side = 0 if own.anchors is None else 1
         generator = np.random.default_rng((own.seed, number))
-        where = _random_places(own.kind.hands[side], filaments, own.bound, generator, own.kind.name)
-        chains[: own.bound, side], places[: own.bound, side] = where
+        if own.anchors is None:
+            where = first_places.anywhere(own.kind.hands[0], own.bound, generator, own.kind.name)
+            chains[: own.bound, 0], places[: own.bound, 0] = where
+        elif own.bound:
+            which, where = first_places.near(_anchor_points(own, positions), own.kind, own.bound, generator)
+            chains[which, 1], places[which, 1] = where
         for column, values in zip(columns, (np.full(own.count, number), anchors, chains, places)):
             column.append(values)
     rows: list[list[Any]] = [np.concatenate(column).ravel().tolist() for column in columns]
     count = len(rows[0])
     force.setLinkers(list(range(count)), *rows, count)
     return force
-
-
-def contour_of(filament: Filament) -> FloatArray:
-    """Where the segments of a filament begin along it, with segments at rest, and its length: (segments + 1,) in nm."""
-    return np.concatenate([[0.0], np.cumsum(filament.type.segment_lengths(filament.segments, filament.closed))])
 
 
 def _add_hand(force, hand, filaments, name):
@@ -106,34 +114,37 @@ def _add_hand(force, hand, filaments, name):
     return number
 
 
+def _anchor_points(linkers, positions):
+    anchors = np.asarray(linkers.anchors)
+    if anchors.ndim == 2:
+        return anchors
+    if anchors.max() >= len(positions):
+        raise InputError(
+            f"Linkers {linkers.kind.name!r}: {linkers.bound} are to begin bound, but where particle {anchors.max()}, "
+            f"an anchor, is, is not known: there are only {len(positions)} particles yet."
+        )
+    return positions[anchors]
+
+
 def _add_anchor(force, anchor):
     if np.ndim(anchor) == 0:
         return force.addParticleAnchor(int(anchor))
     return force.addPointAnchor(openmm.Vec3(*(float(x) for x in anchor)))
 
 
-def _random_places(hand, filaments, count, generator, name):
-    # Uniform along filaments; of sites, each once.
-    lengths = np.array([contour_of(f)[-1] if hand.binds(f.type) else 0.0 for f in filaments])
-    if count == 0:
-        return np.zeros(0, dtype=int), np.zeros(0)
-    if hand.site_spacing is not None:
-        sites = np.floor(lengths / hand.site_spacing + 1e-9).astype(int)
-        if count > sites.sum():
-            raise InputError(
-                f"Linkers {name!r}: {count} are to begin bound, but there are only {sites.sum()} sites for them."
-            )
-        chosen = np.sort(generator.choice(sites.sum(), count, replace=False))
-        ends = np.cumsum(sites)
-        chains = np.searchsorted(ends, chosen, side="right")
-        return chains, (chosen - (ends - sites)[chains] + 0.5) * hand.site_spacing
-    chains = generator.choice(len(lengths), count, p=lengths / lengths.sum())
-    return chains, generator.uniform(0.0, lengths[chains])
+@contextmanager
+def naming_unknown_linkers() -> Iterator[None]:
+    """InputError in place of what the plugin raises where it is not known where linkers are."""
+    try:
+        yield
+    except openmm.OpenMMException as error:
+        raise InputError(str(error)) from None
 
 
 def table_of(force: Any, context: openmm.Context) -> LinkerTable:
-    """The linkers of a Context."""
-    columns = force.getLinkersInContext(context)
+    """The linkers of a Context; InputError if it is not known where they are."""
+    with naming_unknown_linkers():
+        columns = force.getLinkersInContext(context)
     numbers, types, anchors, chains, places = (np.array(column) for column in columns[:5])
     return LinkerTable(
         numbers.astype(int),

@@ -27,6 +27,9 @@ MOST_LINKERS = 10**9
 LARGEST_REACH_OF_WIDTH = 10.0
 """How many thermal extensions of a spring without rest length a reach may be before that is warned of."""
 
+LARGEST_EXPONENT_AT_REACH = 3.0
+"""By which exponent binding may be slower everywhere within reach of a spring of rest length before it is warned of."""
+
 
 @dataclass(frozen=True)
 class Linkers:
@@ -43,7 +46,7 @@ class Linkers:
         Of those that are not bound, in nm^3; the periodic box if None.
     anchors : (count,) int array of particles, (count, 3) array of points in nm, or None
     bound : int
-        How many begin with their first hand bound, or their only one, at random places.
+        How many begin with their first hand bound at random places, or their only one within reach of its anchor.
     seed : int
         Of these places.
     """
@@ -98,29 +101,36 @@ def as_linkers(
     if (count is not None) + (concentration is not None) + (anchors is not None) != 1:
         raise InputError(f"{label} give one of count, concentration and anchors.")
     room = None if volume is None else positive(volume, VOLUME, f"{label} volume")
+    if room is not None and count is None:
+        raise InputError(
+            f"{label} a volume is that of a count of unbound linkers: those with "
+            f"{'a concentration' if anchors is None else 'anchors'} need none."
+        )
     if anchors is not None:
         if kind.hands[0] != kind.hands[1]:
             raise InputError(f"{label} a linker with an anchor has one hand, but this type has two that differ.")
         places = _as_anchors(anchors, label)
-        return Linkers(kind, len(places), None, room, places, _as_bound(bound, len(places), label), seed)
+        return Linkers(kind, len(places), None, None, places, _as_bound(bound, len(places), label), seed)
     if concentration is not None:
         density = _as_density(concentration, f"{label} concentration")
         if bound:
             raise InputError(f"{label} give a count if some of them are to begin bound.")
-        return Linkers(kind, 0, density, room, None, 0, seed)
+        return Linkers(kind, 0, density, None, None, 0, seed)
     number = whole_number(count, 0, f"{label} count")
     if number > MOST_LINKERS:
         raise InputError(f"{label} count must be at most {MOST_LINKERS}, but is {number}.")
     return Linkers(kind, number, None, room, None, _as_bound(bound, number, label), seed)
 
 
-def warn_if_springs_are_short(kind: Crosslinker, temperature: Scalar) -> None:
-    """Warn where a spring without rest length lets hands bind only very near to the other end, whatever their reach is.
+def warn_if_springs_do_not_fit(kind: Crosslinker, temperature: Scalar) -> None:
+    """Warn where a spring hardly lets hands bind, whatever their rates are.
 
-    Its length in equilibrium has the standard deviation (k_BT/k)^(1/2) along each axis; binding at the distance d from
-    the other end is slower by exp(-k d^2/(2 k_BT)).
+    That is one which is much longer at rest than hands reach; or one without rest length that is so stiff that they
+    bind only very near to the other end: its length in equilibrium has the standard deviation (k_BT/k)^(1/2) along each
+    axis, and binding at the distance d from the other end is slower by exp(-k d^2/(2 k_BT)).
     """
     if kind.rest_length > 0.0:
+        _warn_if_reach_is_short(kind, temperature)
         return
     width = math.sqrt(thermal_energy(temperature) / kind.stiffness)
     reach = max(hand.reach for hand in kind.hands if hand.binding_rate > 0.0) if _any_binds(kind) else 0.0
@@ -134,6 +144,20 @@ def warn_if_springs_are_short(kind: Crosslinker, temperature: Scalar) -> None:
             LinkerWarning,
             stacklevel=3,
         )
+
+
+def _warn_if_reach_is_short(kind, temperature):
+    for hand in dict.fromkeys(kind.hands):
+        exponent = -(1.0 - hand.strain_share) * kind.energy_at_reach(hand, temperature)
+        if hand.binding_rate > 0.0 and exponent > LARGEST_EXPONENT_AT_REACH:
+            warnings.warn(
+                f"Linkers {kind.name!r}: a hand with a reach of {hand.reach:.4g} nm binds only where the spring, with "
+                f"its rest length of {kind.rest_length:.4g} nm, is compressed, and thus slower by exp({-exponent:.3g}) "
+                "at least. Give it a reach somewhat beyond the rest length, or a smaller stiffness.",
+                LinkerWarning,
+                stacklevel=4,
+            )
+            return
 
 
 def _any_binds(kind):

@@ -34,10 +34,17 @@ from ..filaments.chain_type import ChainType
 from ..filaments.filament import Filament, Tether
 from ..filaments.placement import named_nodes
 from ..filaments.segment_place import SegmentPlace
-from ..kinetics.binding_force import find_binding_force, places_of, pulls_of, set_table, table_of
+from ..kinetics.binding_force import (
+    find_binding_force,
+    naming_unknown_linkers,
+    places_of,
+    pulls_of,
+    set_table,
+    table_of,
+)
 from ..kinetics.crosslinker import Crosslinker
 from ..kinetics.linker_table import LinkerTable
-from ..kinetics.linkers import LinkerPulls, Linkers, as_linkers, warn_if_springs_are_short
+from ..kinetics.linkers import LinkerPulls, Linkers, as_linkers, warn_if_springs_do_not_fit
 from ..mechanics.flow import Flow, as_flow
 from ..mechanics.redistribution import ChainSet
 from ..mechanics.tension import components_along, filament_tensions
@@ -395,10 +402,10 @@ class Filaments:
     ) -> int:
         """Add an attachment point: a virtual site on a segment, on which any OpenMM force can act.
 
-        It is at ``(1 - fraction) x_minus + fraction x_plus`` of its segment's ends and follows them in the same
-        step; a force on it acts at that place of the cylinder (step 5 of Section 4 of the paper). It becomes a
-        particle of its own behind the nodes of its filament, in the Topology with the name "ATT";
-        ``attachment_indices`` says which.
+        It is at ``(1 - fraction) x_minus + fraction x_plus`` of its segment's ends, or on the curve of a beam element
+        at the parameter ``fraction``, and follows them in the same step; a force on it acts at that place of the
+        cylinder (step 5 of Section 4 of the paper). It becomes a particle of its own behind the nodes of its filament,
+        in the Topology with the name "ATT"; ``attachment_indices`` says which.
 
         Parameters
         ----------
@@ -424,7 +431,6 @@ class Filaments:
         label = f"Attachment point {len(self._attachments)}"
         self._refuse_if_built(label)
         filament = self._filament_number(filament, label)
-        self._refuse_beam(filament, f"{label}: attachment points")
         return self._attach(locate(self[filament], filament, label, arc_length, segment, fraction))
 
     def segment_place(
@@ -450,7 +456,6 @@ class Filaments:
         """
         label = "Place on a segment"
         filament = self._filament_number(filament, label)
-        self._refuse_beam(filament, f"{label}: crosslinks")
         place = locate(self[filament], filament, label, arc_length, segment, fraction)
         nodes = self.node_indices[filament]
         return SegmentPlace(int(nodes[place.segment]), int(nodes[(place.segment + 1) % len(nodes)]), place.fraction)
@@ -482,7 +487,6 @@ class Filaments:
         label = f"Beads of filament {filament}"
         self._refuse_if_built(label)
         filament = self._filament_number(filament, label)
-        self._refuse_beam(filament, label)
         if filament in self._beads:
             raise InputError(f"{label}: it has beads already.")
         beads = distribute_beads(self[filament], filament, positive(spacing, LENGTH, f"{label}: spacing"))
@@ -520,9 +524,10 @@ class Filaments:
         anchors : (n,) int or (n, 3) length
             Particles of the System, or points, to which n linkers are tied, in the place of their first hands.
         volume : length^3, optional
-            V; that of the periodic box if not given.
+            V, of a count of linkers; that of the periodic box if not given.
         bound : int
-            How many begin with their first hand bound, at random places; of those with anchors, their only one.
+            How many begin with their first hand bound, at random places. Of those with anchors, the first that have a
+            filament within reach begin with their only hand bound to it, as the energy of the spring has it.
         seed : int
             Of these places.
 
@@ -540,7 +545,8 @@ class Filaments:
         Warns
         -----
         LinkerWarning
-            For a spring without rest length that is so stiff that hands do not bind anywhere near their reach.
+            For a spring without rest length that is so stiff that hands do not bind anywhere near their reach, or one
+            that is much longer at rest than they reach.
         """
         if not self._engine.has_linkers:
             raise InputError(
@@ -550,7 +556,7 @@ class Filaments:
         if self._nodes is not None:
             raise InputError("These filaments are already in a System: add linkers before.")
         self._linkers.append(as_linkers(kind, count, concentration, volume, anchors, bound, seed))
-        warn_if_springs_are_short(kind, self.temperature)
+        warn_if_springs_do_not_fit(kind, self.temperature)
         return len(self._linkers) - 1
 
     @property
@@ -601,7 +607,8 @@ class Filaments:
         Raises
         ------
         InputError
-            If there are no linkers, or none of this type.
+            If there are no linkers, or none of this type, or the Context has got a State that does not say where
+            linkers are.
         """
         force = self._binding_force(context)
         if linker_type is not None:
@@ -609,7 +616,8 @@ class Filaments:
             if linker_type >= len(self._linkers):
                 raise InputError(f"There is no type {linker_type} of linkers: there are {len(self._linkers)}.")
         types = range(len(self._linkers)) if linker_type is None else [linker_type]
-        bindings, unbindings = zip(*(force.getNumEventsInContext(context, number) for number in types))
+        with naming_unknown_linkers():
+            bindings, unbindings = zip(*(force.getNumEventsInContext(context, number) for number in types))
         return sum(bindings), sum(unbindings)
 
     def _seen_linkers(self, context):
@@ -711,8 +719,10 @@ class Filaments:
             add_to_topology(topology, filament, f"F{number}", names)
         add_noninteracting_entries(system, len(positions), self._coinciding())
         self._periodic = topology.getPeriodicBoxVectors() is not None or system.usesPeriodicBoundaryConditions()
-        self._engine.add_forces(system, self._placed(), stretching_force_group, bending_force_group)
-        return np.concatenate(everything) * unit.nanometer
+        positions = np.concatenate(everything)
+        placed = replace(self._placed(), positions=positions)
+        self._engine.add_forces(system, placed, stretching_force_group, bending_force_group)
+        return positions * unit.nanometer
 
     def _placed(self):
         return PlacedFilaments(
@@ -730,8 +740,11 @@ class Filaments:
         # Those of one filament; returns their positions.
         attachments = [self._attachments[index] for index in self._attachments_of[number]]
         for index, attachment in zip(self._attachments_of[number], attachments):
-            self._attachment_indices[index] = add_virtual_site(system, attachment, self._nodes[number])
-        return attachment_positions(attachments, self._filaments[number].positions)
+            self._attachment_indices[index] = add_virtual_site(
+                system, attachment, self._nodes[number], self._control_points[number]
+            )
+        own = self._filaments[number]
+        return attachment_positions(attachments, own.positions, own.control_points)
 
     def _coinciding(self):
         for number, nodes in enumerate(self._nodes):

@@ -124,6 +124,14 @@ int BeamEngine::getNumPacks() const {
     return implementation->packs.size();
 }
 
+unique_ptr<PackStep> BeamEngine::createStep(int pack) const {
+    return unique_ptr<PackStep>(kernels().newStep(implementation->packs[pack]));
+}
+
+const vector<int>& BeamEngine::getChainsOfLanes(int pack) const {
+    return implementation->packs[pack].chain;
+}
+
 ParticleRange BeamEngine::getParticles(int pack) const {
     const vector<int>& particles = implementation->packs[pack].particlesOfChains;
     return {particles.data(), particles.data()+particles.size()};

@@ -3,6 +3,7 @@
 
 #include "beams/BeamChain.h"
 #include "dynamics/ChainEngine.h"
+#include "dynamics/PackStepSource.h"
 #include <memory>
 #include <vector>
 
@@ -13,7 +14,7 @@ namespace cylchain {
  * each other, and no result depends on which thread computes what. Positions, forces and displacements are arrays of
  * three doubles for each particle.
  */
-class BeamEngine {
+class BeamEngine : public PackStepSource {
 public:
     /** The longest element that a step takes, over its persistence length. */
     static constexpr double LONGEST_ELEMENT = 1;
@@ -23,8 +24,10 @@ public:
      */
     explicit BeamEngine(const std::vector<BeamChain>& chains, int firstNoise = 0);
     ~BeamEngine();
-    /** Get the number of packs, which hold each chain once. */
-    int getNumPacks() const;
+    int getNumPacks() const override;
+    /** Create an object that takes steps of scheme "implicit" of a pack whose chains are coupled to others. */
+    std::unique_ptr<PackStep> createStep(int pack) const override;
+    const std::vector<int>& getChainsOfLanes(int pack) const override;
     /** Get the particles of a pack. */
     ParticleRange getParticles(int pack) const;
     /** Set the forces on the particles of a pack to zero. */

@@ -6,12 +6,15 @@
  */
 
 #include "beams/BeamPack.h"
+#include "beams/BezierWeights.h"
+#include "dynamics/PackStep.h"
 #include "lanes/Noise.h"
 #include "mechanics/PeriodicBox.h"
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
+#include <memory>
 #include <new>
 #include <type_traits>
 #include <utility>
@@ -26,9 +29,11 @@ namespace CYLCHAIN_LOOPS {
 #include "beams/BeamElements-inl.h"
 #include "beams/BeamNoise-inl.h"
 #include "beams/BeamMetricForces-inl.h"
+#include "beams/BeamTerms-inl.h"
 #include "beams/BeamStep-inl.h"
 #include "beams/BeamPlaces-inl.h"
 #include "beams/DividedBeamStep-inl.h"
+#include "beams/BeamPackStep-inl.h"
 
 template <int W> ChainEnergy addForcesTo(const BeamPack& pack, const double* positions, double* forces,
             const double* box, bool includeEnergy) {
@@ -91,6 +96,12 @@ Instability stepOfBeams(const BeamPack& pack, const double* positions, const dou
             const StepSettings& settings, double* displacements) {
     return withLanesOf(pack, [&] (auto lanes) {
         return stepBeams<lanes>(pack, positions, forces, box, settings, displacements);
+    });
+}
+
+PackStep* newStepOfBeams(const BeamPack& pack) {
+    return withLanesOf(pack, [&] (auto lanes) -> PackStep* {
+        return new BeamPackStep<lanes>(pack);
     });
 }
 

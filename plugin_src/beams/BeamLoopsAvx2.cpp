@@ -3,6 +3,7 @@
 #include "beams/BeamLoops-inl.h"
 
 const cylchain::BeamKernels& cylchain::avx2BeamKernels() {
-    static const BeamKernels kernels = {CYLCHAIN_LANES, avx2::addForcesOfBeams, avx2::stepOfBeams};
+    static const BeamKernels kernels = {CYLCHAIN_LANES, avx2::addForcesOfBeams, avx2::stepOfBeams,
+            avx2::newStepOfBeams};
     return kernels;
 }

@@ -3,6 +3,7 @@
 #include "beams/BeamLoops-inl.h"
 
 const cylchain::BeamKernels& cylchain::baselineBeamKernels() {
-    static const BeamKernels kernels = {CYLCHAIN_LANES, baseline::addForcesOfBeams, baseline::stepOfBeams};
+    static const BeamKernels kernels = {CYLCHAIN_LANES, baseline::addForcesOfBeams, baseline::stepOfBeams,
+            baseline::newStepOfBeams};
     return kernels;
 }

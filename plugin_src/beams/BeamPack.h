@@ -2,6 +2,7 @@
 #define CYLCHAIN_BEAM_PACK_H_
 
 #include "dynamics/ChainEngine.h"
+#include "dynamics/PackStep.h"
 #include <vector>
 
 namespace cylchain {
@@ -40,6 +41,8 @@ struct BeamKernels {
             bool includeEnergy);
     Instability (*step)(const BeamPack& pack, const double* positions, const double* forces, const double* box,
             const StepSettings& settings, double* displacements);
+    /** Create what takes steps of a pack that is coupled to others. */
+    PackStep* (*newStep)(const BeamPack& pack);
 };
 
 const BeamKernels& baselineBeamKernels();

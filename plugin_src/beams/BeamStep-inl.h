@@ -59,6 +59,23 @@ public:
      * @return the number of iterations
      */
     int take(const Six* external, Six* y, bool* failed) {
+        begin(external, y);
+        Real active = splat<Real>(1);
+        int iterations = 0;
+        while (iterations < MOST_BEAM_ITERATIONS) {
+            eliminate(y, NULL);
+            advance(y, iterations, active);
+            iterations++;
+            if (iterations >= LEAST_BEAM_ITERATIONS && !anyUnfinished(active))
+                break;
+        }
+        for (int i = 0; i < W; i++)
+            failed[i] = lane(active, i) != 0;
+        findExcessiveChanges(y, failed);
+        return iterations;
+    }
+    /** Describe the start of a step, and draw its noise. */
+    void begin(const Six* external, Six* y) {
         for (int node = 0; node < n; node++) {
             y[node] = Six {};
             forces[node] = external[node];
@@ -71,21 +88,70 @@ public:
             for (int e = 0; e < n; e++)
                 noise.draw(e);
         }
-        Real active = splat<Real>(1);
-        int iterations = 0;
-        while (iterations < MOST_BEAM_ITERATIONS) {
-            eliminate(y);
-            if (iterations == 0 && settings.kT > 0)
-                BeamMetricForces<W>(pack, start, elements, equations, settings.kT*(2*thetaOfStrains-1)).add(forces);
-            advance(y, active, iterations > 0);
-            iterations++;
-            if (iterations >= LEAST_BEAM_ITERATIONS && !anyUnfinished(active))
+    }
+    /** Linearise the equations around y with those of couplings, or NULL, and solve them: see getChange(). */
+    void eliminate(const Six* y, const BeamTerms<W>* terms) {
+        if (pack.planar)
+            eliminateAs<3>(y, terms);
+        else
+            eliminateAs<5>(y, terms);
+    }
+    /** Finish an iteration with the change that was found: find the tensions, and move the nodes of active lanes. */
+    void advance(Six* y, int iteration, Real active) {
+        if (iteration == 0 && settings.kT > 0)
+            BeamMetricForces<W>(pack, start, elements, equations, settings.kT*(2*thetaOfStrains-1)).add(forces);
+        move(y, active, iteration > 0);
+    }
+    /** Find how forces on positions and control vectors move these, with the last elimination. */
+    void respond(const Six* onNodes, Six* moves) {
+        equations.setRight(onNodes);
+        equations.substitute(moves);
+    }
+    Six* getChange() {
+        return change;
+    }
+    const Equations& getEquations() const {
+        return equations;
+    }
+    /** Whether any lane has not converged; those that have are taken out. NaN counts as not converged. */
+    bool anyUnfinished(Real& active) const {
+        const Scalar perDirection = 1/(DIRECTION_TOLERANCE*DIRECTION_TOLERANCE);
+        const Scalar perPlace = 1/(PLACE_TOLERANCE*PLACE_TOLERANCE);
+        const Real held = 1-loaded<Real>(pack.free, 0);
+        const Real perEnergy = held*(1/(settings.kT+TINY))*(settings.kT > 0 ? 1 : 0);
+        Real excess = Real{};
+        for (int e = 0; e < n; e++) {
+            const Vec turn = change[e].control*(3*perLength), place = change[e].position*perLength;
+            include(turn.dot(turn), elements[e].ofNode.stiffness*perEnergy, perDirection, excess);
+            const Real far = place.dot(place)*perPlace;
+            excess = far < excess ? excess : far;
+            if (e == n-1)
                 break;
+            const Vec middle = BeamVectors<Real>::of(change[e].control, change[e+1].position-change[e].position,
+                    change[e+1].control, perLength).middle;
+            include(middle.dot(middle), elements[e].ofMiddle.stiffness*perEnergy, perDirection, excess);
         }
-        for (int i = 0; i < W; i++)
-            failed[i] = lane(active, i) != 0;
-        findExcessiveChanges(y, failed);
-        return iterations;
+        bool any = false;
+        for (int i = 0; i < W; i++) {
+            if (lane(excess, i) < 1)
+                lane(active, i) = 0;
+            any |= lane(active, i) != 0;
+        }
+        return any;
+    }
+    /** Mark lanes of which a vector has changed by more than a quarter of a turn would do. */
+    void findExcessiveChanges(const Six* y, bool* failed) const {
+        for (int e = 0; e < n; e++) {
+            const Vec turn = y[e].control*(3*perLength);
+            Real square = turn.dot(turn);
+            if (e < n-1) {
+                const Vec middle = BeamVectors<Real>::of(y[e].control, y[e+1].position-y[e].position, y[e+1].control,
+                        perLength).middle;
+                square = larger<Real>(square, middle.dot(middle));
+            }
+            for (int i = 0; i < W; i++)
+                failed[i] |= e < pack.nodesOfLane[i] && !(lane(square, i) < 2);
+        }
     }
 private:
     const BeamPack& pack;
@@ -145,15 +211,9 @@ private:
     CYLCHAIN_INLINE void addForces(const BeamGradient<Real>& force, Six& first, Six& second) const {
         addForcesOf(force, perLength, first, second);
     }
-    /** Linearise the equations around y, and solve them. */
-    void eliminate(const Six* y) {
-        if (pack.planar)
-            eliminateAs<3>(y);
-        else
-            eliminateAs<5>(y);
-    }
     /** An element has its strain in the middle, and one or two components of two bends. */
-    template <int COORDINATES> void eliminateAs(const Six* y) {
+    template <int COORDINATES> void eliminateAs(const Six* y, const BeamTerms<W>* terms) {
+        int nextTerm = 0;
         typename Equations::Row rows[2];
         typename Equations::Row *here = rows, *after = rows+1;
         *here = typename Equations::Row {};
@@ -172,6 +232,8 @@ private:
                 const Vec control = (start.control[e+1]+y[e+1].control)*(3*perLength);
                 addNodeStrain(now.last, root(control.dot(control))-1, middle.last, e+1, *after);
             }
+            if (terms != NULL)
+                terms->add(e, nextTerm, *here, *after, right);
             equations.eliminate(e, *here, *after, false);
             std::swap(here, after);
         }
@@ -344,7 +406,7 @@ private:
                 turned(moment2, now.middle, middle.middle))-now.forcesOf(moment1, moment2), right[e], right[e+1]);
     }
     /** Find the tensions, and move the nodes of active lanes. */
-    void advance(Six* y, Real active, bool refines) {
+    void move(Six* y, Real active, bool refines) {
         for (int e = 0; e < n; e++) {
             elements[e].ofNode.before = elements[e].ofNode.multiplier;
             elements[e].ofMiddle.before = elements[e].ofMiddle.multiplier;
@@ -394,51 +456,11 @@ private:
             y[node].control = y[node].control+(right[node].control-y[node].control)*taken;
         }
     }
-    /** Whether any lane has not converged; those that have are taken out. NaN counts as not converged. */
-    bool anyUnfinished(Real& active) const {
-        const Scalar perDirection = 1/(DIRECTION_TOLERANCE*DIRECTION_TOLERANCE);
-        const Scalar perPlace = 1/(PLACE_TOLERANCE*PLACE_TOLERANCE);
-        const Real held = 1-loaded<Real>(pack.free, 0);
-        const Real perEnergy = held*(1/(settings.kT+TINY))*(settings.kT > 0 ? 1 : 0);
-        Real excess = Real{};
-        for (int e = 0; e < n; e++) {
-            const Vec turn = change[e].control*(3*perLength), place = change[e].position*perLength;
-            include(turn.dot(turn), elements[e].ofNode.stiffness*perEnergy, perDirection, excess);
-            const Real far = place.dot(place)*perPlace;
-            excess = far < excess ? excess : far;
-            if (e == n-1)
-                break;
-            const Vec middle = BeamVectors<Real>::of(change[e].control, change[e+1].position-change[e].position,
-                    change[e+1].control, perLength).middle;
-            include(middle.dot(middle), elements[e].ofMiddle.stiffness*perEnergy, perDirection, excess);
-        }
-        bool any = false;
-        for (int i = 0; i < W; i++) {
-            if (lane(excess, i) < 1)
-                lane(active, i) = 0;
-            any |= lane(active, i) != 0;
-        }
-        return any;
-    }
     /** An iteration takes a strain to first order in the change, so that half its square is left. */
     CYLCHAIN_INLINE void include(Real square, Real stiffness, Scalar perDirection, Real& excess) const {
         const Real ratio = square*perDirection;
         excess = ratio < excess ? excess : ratio;
         const Real error = square*(Scalar(0.5)/STRAIN_TOLERANCE);
         excess = larger<Real>(excess, error*error*stiffness*thetaOfStrains);
-    }
-    /** Mark lanes of which a vector has changed by more than a quarter of a turn would do. */
-    void findExcessiveChanges(const Six* y, bool* failed) const {
-        for (int e = 0; e < n; e++) {
-            const Vec turn = y[e].control*(3*perLength);
-            Real square = turn.dot(turn);
-            if (e < n-1) {
-                const Vec middle = BeamVectors<Real>::of(y[e].control, y[e+1].position-y[e].position, y[e+1].control,
-                        perLength).middle;
-                square = larger<Real>(square, middle.dot(middle));
-            }
-            for (int i = 0; i < W; i++)
-                failed[i] |= e < pack.nodesOfLane[i] && !(lane(square, i) < 2);
-        }
     }
 };

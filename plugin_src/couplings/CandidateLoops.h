@@ -31,9 +31,15 @@ struct CandidatePairs {
     float *distance, *clearance;
 };
 
-/** A segment at the start and at the end of a step, and the one that follows it in its chain at the end, or zero. */
+/**
+ * A segment at the start and at the end of a step, the one that follows it in its chain at the end, or zero, and its
+ * radius. A sphere is one that has no length.
+ */
 struct MovingSegment {
-    double first[3], along[3], laterFirst[3], laterAlong[3], laterNext[3], unused;
+    double first[3], along[3], laterFirst[3], laterAlong[3], laterNext[3], radius;
+    bool hasLength() const {
+        return along[0] != 0 || along[1] != 0 || along[2] != 0;
+    }
 };
 
 /** Pairs of segments, the first ones shifted, and what outlook() finds of them at the end of a step. */

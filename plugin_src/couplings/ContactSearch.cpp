@@ -952,7 +952,7 @@ void ContactSearch::setMotion(const double* x, const double* y, const Loop& run)
             set(segment.laterFirst, position(y, own.first));
             set(segment.laterAlong, search.along(own, y));
             set(segment.laterNext, next < 0 ? Vec3d {0, 0, 0} : search.along(capsules[next], y));
-            segment.unused = 0;
+            segment.radius = own.radius;
         }
     });
 }
@@ -974,7 +974,7 @@ void ContactSearch::findOutlooks(const ContactPair* const* pairs, int count, Pai
     int first[most], second[most], flags[most];
     double x[most], y[most], z[most], distance[most];
     const CandidateKernels& kernels = candidateKernels();
-    const vector<Capsule>& capsules = implementation->system.capsules;
+    const vector<MovingSegment>& moving = implementation->moving;
     for (int start = 0; start < count; start += most) {
         const int own = min(most, count-start);
         for (int i = 0; i < (own+7)/8*8; i++) {
@@ -985,15 +985,16 @@ void ContactSearch::findOutlooks(const ContactPair* const* pairs, int count, Pai
             y[i] = pair.shift[1];
             z[i] = pair.shift[2];
         }
-        kernels.outlook(implementation->moving.data(), LARGEST_PARALLEL, AT_END,
+        kernels.outlook(moving.data(), LARGEST_PARALLEL, AT_END,
                 {first, second, {x, y, z}, distance, flags}, own);
         for (int i = 0; i < own; i++) {
             const ContactPair& pair = *pairs[start+i];
             // How near a sphere comes on its way is not known here.
-            const bool anySphere = capsules[pair.a].second < 0 || capsules[pair.b].second < 0;
-            const bool mayCross = anySphere || (flags[i] & MAY_CROSS) != 0;
+            const MovingSegment &a = moving[pair.a], &b = moving[pair.b];
+            const bool mayCross = !a.hasLength() || !b.hasLength() || (flags[i] & MAY_CROSS) != 0;
             const bool isKnown = !mayCross && (flags[i] & MAY_BE_PARALLEL) == 0;
-            outlooks[start+i] = {distance[i]-implementation->radii(pair.a, pair.b), mayCross,
+            const double radii = a.radius+b.radius;
+            outlooks[start+i] = {distance[i]-radii, radii, mayCross,
                     isKnown && implementation->isOfNeighbor(pair, flags[i])};
         }
     }

@@ -19,8 +19,8 @@ public:
 
 /** A first look at a pair of capsules at y. */
 struct PairOutlook {
-    /** The distance less the radii, not signed. */
-    double gap;
+    /** The distance less the radii, not signed, and the sum of these. */
+    double gap, radii;
     /** Whether they may have crossed. */
     bool mayCross;
     /** Whether evaluate() finds no contact: it is that of a neighbor. */

@@ -30,3 +30,32 @@ bool cylchain::areSame(const Place& a, const Place& b) {
         return one.point[0] == other.point[0] && one.point[1] == other.point[1] && one.point[2] == other.point[2];
     return one.first == other.first && one.second == other.second && fabs(one.fraction-other.fraction) < SAME_PLACE;
 }
+
+void cylchain::locateOnCurve(const Place& place, const double* positions, const double* box, double* result) {
+    const BezierWeights weights(place.fraction);
+    double chord[3], controls[2][3];
+    const int nodes[] = {place.first, place.second};
+    auto vectorBetween = [&] (int from, int to, double* vector) {
+        for (int k = 0; k < 3; k++)
+            vector[k] = positions[3*to+k]-positions[3*from+k];
+        if (box != nullptr)
+            takeToNearestImage(vector, box);
+    };
+    vectorBetween(place.first, place.second, chord);
+    for (int side = 0; side < 2; side++)
+        vectorBetween(nodes[side], place.controls[side], controls[side]);
+    for (int k = 0; k < 3; k++)
+        result[k] = positions[3*place.first+k]+weights.control1*controls[0][k]+weights.position2*chord[k]+
+                weights.control2*controls[1][k];
+}
+
+void cylchain::addForceOnCurve(const Place& place, const double* force, double factor, double* forces) {
+    const BezierWeights weights(place.fraction);
+    for (int k = 0; k < 3; k++) {
+        const double own = factor*force[k];
+        forces[3*place.first+k] += (weights.position1-weights.control1)*own;
+        forces[3*place.controls[0]+k] += weights.control1*own;
+        forces[3*place.second+k] += (weights.position2-weights.control2)*own;
+        forces[3*place.controls[1]+k] += weights.control2*own;
+    }
+}

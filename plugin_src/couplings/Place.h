@@ -1,12 +1,14 @@
 #ifndef CYLCHAIN_PLACE_H_
 #define CYLCHAIN_PLACE_H_
 
+#include "beams/BezierWeights.h"
 #include "mechanics/PeriodicBox.h"
 
 namespace cylchain {
 
 /**
- * Where a coupling takes hold: on the line between two particles, at one of them, or at a point that does not move.
+ * Where a coupling takes hold: on the line between two particles, on the curve of a beam element between its two nodes,
+ * at a particle, or at a point that does not move.
  */
 struct Place {
     /** The particle at fraction 0, or -1 for a point. */
@@ -17,22 +19,34 @@ struct Place {
     double fraction = 0;
     /** Where it is, if it is a point. */
     double point[3] = {};
+    /** On a curve, the control points of the first and of the second particle, which are its nodes; -1 elsewhere. */
+    int controls[2] = {-1, -1};
     bool isPoint() const {
         return first < 0;
     }
+    /** Whether it is between two particles, on a line or on a curve. */
     bool isOnSegment() const {
         return second >= 0;
+    }
+    bool isOnCurve() const {
+        return controls[0] >= 0;
     }
 };
 
 /** Whether two places are one, wherever particles are, but for rounding of their fractions. */
 bool areSame(const Place& a, const Place& b);
 
+/** Find where a place on a curve is, see locate(). */
+void locateOnCurve(const Place& place, const double* positions, const double* box, double* result);
+
+/** Add a force on a place on a curve, times a factor, to those on its four particles. */
+void addForceOnCurve(const Place& place, const double* force, double factor, double* forces);
+
 /**
- * Find where a place is: (1-f) x1+f x2 between two particles.
+ * Find where a place is: (1-f) x1+f x2 between two particles, or on the curve between them.
  *
  * @param positions    those of all particles
- * @param box          nine numbers if the second particle is the image nearest to the first one, or NULL
+ * @param box          nine numbers if the other particles are the images nearest to the first one, or NULL
  * @param[out] result  three numbers
  */
 inline void locate(const Place& place, const double* positions, const double* box, double* result) {
@@ -40,6 +54,10 @@ inline void locate(const Place& place, const double* positions, const double* bo
     if (!place.isOnSegment()) {
         for (int k = 0; k < 3; k++)
             result[k] = first[k];
+        return;
+    }
+    if (place.isOnCurve()) {
+        locateOnCurve(place, positions, box, result);
         return;
     }
     const double* second = positions+3*place.second;
@@ -60,6 +78,10 @@ inline void locate(const Place& place, const double* positions, const double* bo
 inline void addForce(const Place& place, const double* force, double factor, double* forces) {
     if (place.isPoint())
         return;
+    if (place.isOnCurve()) {
+        addForceOnCurve(place, force, factor, forces);
+        return;
+    }
     const double first = place.isOnSegment() ? factor*(1-place.fraction) : factor;
     for (int k = 0; k < 3; k++)
         forces[3*place.first+k] += first*force[k];

@@ -56,11 +56,6 @@ bool CapsulePairs::add(const ContactPair& pair) {
     return true;
 }
 
-double CapsulePairs::radiiOf(const ContactPair& pair) const {
-    const vector<Capsule>& capsules = search->getSystem().capsules;
-    return capsules[pair.a].radius+capsules[pair.b].radius;
-}
-
 double CapsulePairs::getLargestRestGap(int number) const {
     if (!hasContacts(number))
         return 0;

@@ -53,6 +53,11 @@ public:
     const ContactPair& getPair(int number) const {
         return pairs[number];
     }
+    /** Get the sum of the radii of a pair. */
+    double radiiOf(const ContactPair& pair) const {
+        const std::vector<Capsule>& capsules = search->getSystem().capsules;
+        return capsules[pair.a].radius+capsules[pair.b].radius;
+    }
     Watch& getWatch(int number) {
         return watches[number];
     }
@@ -82,7 +87,6 @@ private:
     };
     bool isKnown(const ContactPair& pair) const;
     void append(const ContactPair& pair);
-    double radiiOf(const ContactPair& pair) const;
     const ContactSearch* search = nullptr;
     /** Those of the first search in its order, and behind them those that others have found. */
     std::vector<ContactPair> pairs;

@@ -5,8 +5,12 @@
 using namespace cylchain;
 using namespace std;
 
-ChainPlaces::ChainPlaces(const vector<Chain>& chains, int particles) : chains(chains), chainOfParticle(particles, -1),
-        nodeOfParticle(particles, -1), packOfChain(chains.size(), -1), laneOfChain(chains.size(), -1) {
+/** How far a force at the end of an element moves it that is alone, over how far it moves all of the element. */
+static const double MOBILITY_OF_END = 16;
+
+ChainPlaces::ChainPlaces(const vector<Chain>& chains, const vector<BeamChain>& beams, int particles) : chains(chains),
+        beams(beams), chainOfParticle(particles, -1), nodeOfParticle(particles, -1),
+        packOfChain(chains.size()+beams.size(), -1), laneOfChain(chains.size()+beams.size(), -1) {
     for (size_t chain = 0; chain < chains.size(); chain++) {
         for (size_t node = 0; node < chains[chain].nodes.size(); node++) {
             chainOfParticle[chains[chain].nodes[node]] = chain;
@@ -17,6 +21,11 @@ ChainPlaces::ChainPlaces(const vector<Chain>& chains, int particles) : chains(ch
             length += segment.restLength;
         lengths.push_back(length);
     }
+    for (size_t beam = 0; beam < beams.size(); beam++)
+        for (size_t i = 0; i < beams[beam].particles.size(); i++) {
+            chainOfParticle[beams[beam].particles[i]] = chains.size()+beam;
+            nodeOfParticle[beams[beam].particles[i]] = i%2 == 0 ? i/2 : -1;
+        }
 }
 
 void ChainPlaces::setParticles(const vector<CoupledParticle>& newParticles) {
@@ -24,7 +33,7 @@ void ChainPlaces::setParticles(const vector<CoupledParticle>& newParticles) {
         chainOfParticle[own.particle] = -1;
     particles = newParticles;
     for (size_t i = 0; i < particles.size(); i++)
-        chainOfParticle[particles[i].particle] = chains.size()+i;
+        chainOfParticle[particles[i].particle] = getNumFilaments()+i;
     packOfChain.resize(getNumChains(), -1);
     laneOfChain.resize(getNumChains(), -1);
 }
@@ -50,23 +59,29 @@ bool ChainPlaces::find(const Place& place, PlaceOnChain& result) const {
     result.pack = packOfChain[chain];
     result.lane = laneOfChain[chain];
     result.chain = chain;
-    if (chain >= (int) chains.size()) {
+    if (isParticle(chain)) {
         if (place.isOnSegment())
             result = PlaceOnChain();
         return !place.isOnSegment();
     }
-    const Chain& own = chains[chain];
-    const int nodes = own.nodes.size(), first = nodeOfParticle[place.first];
+    const bool closed = !isBeam(chain) && chains[chain].closed;
+    const int nodes = isBeam(chain) ? beamOf(chain).numNodes() : chains[chain].nodes.size();
+    const int first = nodeOfParticle[place.first];
     int node = first;
     double fraction = 0;
+    // The line between two nodes of beam elements is no place of theirs, nor is a control point.
+    if (first < 0 || (place.isOnSegment() && isBeam(chain) != place.isOnCurve())) {
+        result = PlaceOnChain();
+        return false;
+    }
     if (place.isOnSegment()) {
         if (chainOfParticle[place.second] != chain) {
             result = PlaceOnChain();
             return false;
         }
         const int second = nodeOfParticle[place.second];
-        const bool forwards = second == first+1 || (own.closed && second == (first+1)%nodes);
-        const bool backwards = first == second+1 || (own.closed && first == (second+1)%nodes);
+        const bool forwards = second == first+1 || (closed && second == (first+1)%nodes);
+        const bool backwards = first == second+1 || (closed && first == (second+1)%nodes);
         if (!forwards && !backwards) {
             result = PlaceOnChain();
             return false;
@@ -74,7 +89,7 @@ bool ChainPlaces::find(const Place& place, PlaceOnChain& result) const {
         node = forwards ? first : second;
         fraction = forwards ? place.fraction : 1-place.fraction;
     }
-    else if (!own.closed && first == nodes-1) {
+    else if (!closed && first == nodes-1) {
         node = first-1;
         fraction = 1;
     }
@@ -84,22 +99,34 @@ bool ChainPlaces::find(const Place& place, PlaceOnChain& result) const {
 }
 
 double ChainPlaces::getFriction(const PlaceOnChain& place) const {
-    if (place.chain >= (int) chains.size())
-        return particles[place.chain-chains.size()].friction;
+    if (isParticle(place.chain))
+        return particleOf(place.chain).friction;
+    if (isBeam(place.chain)) {
+        const BeamChain& beam = beamOf(place.chain);
+        return beam.elementLength*min(beam.parallelFriction, beam.perpendicularFriction)/MOBILITY_OF_END;
+    }
     const Chain& chain = chains[place.chain];
     const Segment& segment = chain.segments[place.node];
     return chain.nodeFriction+0.25*min(segment.parallel, segment.perpendicular);
 }
 
 int ChainPlaces::getParticle(const PlaceOnChain& place) const {
-    if (place.chain >= (int) chains.size())
-        return particles[place.chain-chains.size()].particle;
+    if (isParticle(place.chain))
+        return particleOf(place.chain).particle;
+    if (isBeam(place.chain))
+        return beamOf(place.chain).particles[2*place.node];
     return chains[place.chain].nodes[place.node];
 }
 
 double ChainPlaces::getLateralFriction(const PlaceOnChain& place) const {
-    if (place.chain >= (int) chains.size())
-        return particles[place.chain-chains.size()].friction;
+    if (isParticle(place.chain))
+        return particleOf(place.chain).friction;
+    if (isBeam(place.chain)) {
+        // An element is moved as four Legendre polynomials of the place, of which the second turns it.
+        const BeamChain& beam = beamOf(place.chain);
+        const double x = 2*place.fraction-1;
+        return beam.elementLength*beam.perpendicularFriction/(1+3*x*x);
+    }
     const Chain& chain = chains[place.chain];
     const Segment& segment = chain.segments[place.node];
     if (!(segment.perpendicular > 0 && segment.rotational > 0))
@@ -109,7 +136,9 @@ double ChainPlaces::getLateralFriction(const PlaceOnChain& place) const {
 }
 
 vector<int> ChainPlaces::getNodes(int chain) const {
-    if (chain >= (int) chains.size())
-        return {particles[chain-chains.size()].particle};
+    if (isParticle(chain))
+        return {particleOf(chain).particle};
+    if (isBeam(chain))
+        return beamOf(chain).particles;
     return chains[chain].nodes;
 }

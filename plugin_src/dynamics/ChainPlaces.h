@@ -1,6 +1,7 @@
 #ifndef CYLCHAIN_CHAIN_PLACES_H_
 #define CYLCHAIN_CHAIN_PLACES_H_
 
+#include "beams/BeamChain.h"
 #include "couplings/Place.h"
 #include "dynamics/ParticleStep.h"
 #include "mechanics/Chain.h"
@@ -8,28 +9,30 @@
 
 namespace cylchain {
 
-/** A place on a segment of a chain, or at a particle outside chains, and where that is among packs. */
+/** A place on a segment or an element of a chain, or at a particle outside chains, and where that is among packs. */
 struct PlaceOnChain {
     /** The number of the pack among those of the step, or -1 for a place that does not move. */
     int pack = -1;
-    /** The segment is the one between this node and the next. */
+    /** The segment or element is the one between this node and the next. */
     int node = 0, lane = 0;
-    /** The chain; for a particle, its number behind those of all chains. */
+    /** The chain; of beam elements, its number behind those of segments; for a particle, behind those of all chains. */
     int chain = -1;
+    /** Of the segment; on an element, the parameter of its curve. */
     double fraction = 0;
 };
 
 /**
- * Finds places on chains, and at particles outside chains that are coupled to them. These particles count as further
- * chains.
+ * Finds places on chains, and at particles outside chains that are coupled to them. Chains of beam elements count as
+ * further chains, and these particles as further ones behind them.
  */
 class ChainPlaces {
 public:
     /**
      * @param chains     they must exist as long as this object
+     * @param beams      so must they
      * @param particles  the number of particles of the System
      */
-    ChainPlaces(const std::vector<Chain>& chains, int particles);
+    ChainPlaces(const std::vector<Chain>& chains, const std::vector<BeamChain>& beams, int particles);
     /** Set the particles outside chains. */
     void setParticles(const std::vector<CoupledParticle>& particles);
     /**
@@ -42,7 +45,7 @@ public:
      * Find a place.
      *
      * @return whether it moves with a chain or a particle; a point does not, nor does one between particles that are no
-     *         segment
+     *         segment, or at the control point of a beam element
      */
     bool find(const Place& place, PlaceOnChain& result) const;
     /** The particle at a place, or at the beginning of its segment. */
@@ -57,23 +60,43 @@ public:
      * much more than the least friction against any motion.
      */
     double getLateralFriction(const PlaceOnChain& place) const;
+    /** The chains of segments, whose numbers come first. */
     const std::vector<Chain>& getChains() const {
         return chains;
     }
-    /** The length of a chain whose segments have their rest lengths. */
+    /** The number of chains, those of beam elements among them, behind which particles are counted. */
+    int getNumFilaments() const {
+        return chains.size()+beams.size();
+    }
+    /** Whether a chain is one of beam elements. */
+    bool isBeam(int chain) const {
+        return chain >= (int) chains.size() && !isParticle(chain);
+    }
+    /** The length of a chain of segments whose segments have their rest lengths. */
     double getLength(int chain) const {
         return lengths[chain];
     }
     /** The number of chains and particles. */
     int getNumChains() const {
-        return chains.size()+particles.size();
+        return getNumFilaments()+particles.size();
     }
     /** The particles that move with a chain, or the one that is counted as one. */
     std::vector<int> getNodes(int chain) const;
 private:
+    bool isParticle(int chain) const {
+        return chain >= getNumFilaments();
+    }
+    const CoupledParticle& particleOf(int chain) const {
+        return particles[chain-getNumFilaments()];
+    }
+    const BeamChain& beamOf(int chain) const {
+        return beams[chain-chains.size()];
+    }
     const std::vector<Chain>& chains;
+    const std::vector<BeamChain>& beams;
     std::vector<CoupledParticle> particles;
     std::vector<double> lengths;
+    /** Of a control point, the node is -1. */
     std::vector<int> chainOfParticle, nodeOfParticle, packOfChain, laneOfChain;
 };
 

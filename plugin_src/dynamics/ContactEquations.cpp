@@ -12,7 +12,7 @@ using namespace std;
 namespace {
 
 /** How near pairs come that are looked at in a step, over their diameter: further iterations move them. */
-const double REACH = 0.5;
+const double REACH = 0.25;
 /** The same where a periodic box is too narrow for that. */
 const double LEAST_REACH = 0.2;
 /** The largest predicted overlap, and the largest gap that two come back to, over the same. */
@@ -72,6 +72,7 @@ void ContactEquations::begin(const CoupledStart& start, const Loop& newLoop) {
     const vector<Capsule>& capsules = search->getSystem().capsules;
     places.resize(capsules.size());
     packs.resize(capsules.size());
+    leastResponses.resize(capsules.size());
     double diameter = 0;
     for (const Capsule& capsule : capsules)
         diameter = max(diameter, 2*capsule.radius);
@@ -87,6 +88,7 @@ void ContactEquations::begin(const CoupledStart& start, const Loop& newLoop) {
         else
             found = PlaceOnChain();
         packs[i] = found.pack;
+        leastResponses[i] = found.pack < 0 ? 0 : responses.findLeast(found.chain);
     });
     reaches[0] = REACH*diameter;
     reaches[1] = LEAST_REACH*diameter;
@@ -122,6 +124,13 @@ void ContactEquations::findPairs(const double* moved) {
         }
     motion.begin(search->getSystem().capsules, moved, *loop);
     pairs.begin(found, places.size());
+    // Of most pairs, the search has told that they are far apart.
+    runInChunks(*loop, found.size(), CHUNK, [&] (int i) {
+        const ContactPair& pair = found[i];
+        const double radii = pairs.radiiOf(pair);
+        if (pair.clearance > 0 && pair.distance-radii >= LARGEST_GAP*radii)
+            pairs.getWatch(i).due = pair.distance-radii;
+    });
 }
 
 /** Look for pairs of capsules that have moved far, which no search has seen; false if none are new. */
@@ -172,6 +181,11 @@ double ContactEquations::responseOf(int capsule, double fraction) const {
     return place.pack < 0 ? 0 : responses.find(place);
 }
 
+/** a of a contact, see ContactRest. */
+double ContactEquations::softnessOf(const ContactPair& pair, const Contact& contact) const {
+    return stiffness*(responseOf(pair.a, contact.s)+responseOf(pair.b, contact.t));
+}
+
 /** Whether it is looked for where a pair touches: not where that was known a moment ago. */
 bool ContactEquations::isLookedFor(int number) const {
     const CapsulePairs::Watch& watch = pairs.getWatch(number);
@@ -179,6 +193,19 @@ bool ContactEquations::isLookedFor(int number) const {
         return false;
     return watch.count < 0 ||
             (iterations < SEARCHING_ITERATIONS && !(motion.getWay(watch.a, watch.b) < watch.samePlace));
+}
+
+/** Take note of when a pair that has had no contact may have one; false if it may now. */
+bool ContactEquations::waits(int number, const PairOutlook& outlook) {
+    const bool isFar = !outlook.mayCross && outlook.gap >= LARGEST_GAP*outlook.radii;
+    if (pairs.hasContacts(number) || !(isFar || outlook.isOfNeighbor))
+        return false;
+    CapsulePairs::Watch& watch = pairs.getWatch(number);
+    const double way = motion.getWay(watch.a, watch.b);
+    watch.count = isFar ? -1 : 0;
+    watch.samePlace = way+SAME_PLACE*outlook.radii;
+    watch.due = outlook.gap > 0 ? way+outlook.gap : -HUGE_VAL;
+    return true;
 }
 
 /** Evaluate some pairs that may touch. */
@@ -202,10 +229,10 @@ void ContactEquations::look(int begin, int end, bool first, Part& part) {
     search->findOutlooks(part.due.data(), part.due.size(), part.outlooks.data());
     const PairOutlook* next = part.outlooks.data();
     for (int number : part.numbers)
-        if (number >= 0)
-            evaluate(number, first, next++, part);
-        else
+        if (number < 0)
             evaluate(-1-number, first, NULL, part);
+        else if (const PairOutlook& outlook = *next++; !waits(number, outlook))
+            evaluate(number, first, &outlook, part);
 }
 
 /** Add the equations of a pair, with the outlook of one that is looked for. */
@@ -214,7 +241,7 @@ void ContactEquations::evaluate(int number, bool first, const PairOutlook* outlo
     const ContactPair& pair = pairs.getPair(number);
     if (!takesPart(pair.a) && !takesPart(pair.b))
         return;
-    const double diameter = search->getSystem().capsules[pair.a].radius+search->getSystem().capsules[pair.b].radius;
+    const double diameter = pairs.radiiOf(pair);
     const double way = motion.getWay(pair.a, pair.b);
     double gap = HUGE_VAL;
     // What is farther away is left out, until it may have come near. Gaps of contacts that the step resolves count.
@@ -244,12 +271,15 @@ void ContactEquations::evaluate(int number, bool first, const PairOutlook* outlo
         PairContact& side = pairs.getContact(number, i);
         const Contact& contact = side.contact;
         if (!side.rest.isKnown()) {
-            const double c = responseOf(pair.a, contact.s)+responseOf(pair.b, contact.t);
-            side.rest = ContactRest(stiffness*c, first ? max(contact.gap, -LARGEST_RETURN*diameter) : 0);
+            double softness = stiffness*(leastResponses[pair.a]+leastResponses[pair.b]);
+            if (softness < 1)
+                softness = softnessOf(pair, contact);
+            side.rest = ContactRest(softness, first ? max(contact.gap, -LARGEST_RETURN*diameter) : 0);
         }
         if (iterations <= RETURNING_ITERATIONS && !side.rest.isResolved() && !side.rest.isBack() && contact.gap < 0) {
             ContactCourse course;
             pairs.findCourse(number, contact, course);
+            course.softness = softnessOf(pair, contact);
             side.rest.look(course, contact.gap, wallDepth, LARGEST_RETURN*diameter);
         }
         // Where contacts are not looked for any more, anyCross() sees whether they have come back.

@@ -74,7 +74,9 @@ private:
     double restGapOf(const PairContact& contact) const;
     bool addEquation(int pair, int which, Part& part);
     double responseOf(int capsule, double fraction) const;
+    double softnessOf(const ContactPair& pair, const Contact& contact) const;
     bool isLookedFor(int pair) const;
+    bool waits(int pair, const PairOutlook& outlook);
     void look(int begin, int end, bool first, Part& part);
     void evaluate(int pair, bool first, const PairOutlook* outlook, Part& part);
     bool anyComeNear(const double* moved);
@@ -90,8 +92,9 @@ private:
     PlaceResponses responses;
     double kT = 0, stepSize = 0, wallDepth = 0, reach = 0, reaches[2] = {};
     std::vector<CapsulePlace> places;
-    /** The packs of these places. */
+    /** The packs of these places, and their least responses. */
     std::vector<int> packs;
+    std::vector<double> leastResponses;
     CapsulePairs pairs;
     /** Those of the last search. */
     std::vector<ContactPair> found;

@@ -97,7 +97,7 @@ void ContactRest::look(const ContactCourse& course, double gap, double depth, do
         wanted = course.radii;
     else if (before > largest)
         wanted = min(wanted, course.radii+largest);
-    target = wanted+(wanted-dot(now, normal))/(STIFFENING*softness);
+    target = wanted+(wanted-dot(now, normal))/(STIFFENING*course.softness);
 }
 
 void ContactRest::findForce(const double* now, double stiffness, double* force, double* projection) const {

@@ -9,9 +9,9 @@ struct ContactCourse {
     double begun[3], now[3];
     /** From end to end of the two at the beginning; zero for a sphere. */
     double along[2][3];
-    /** The normal there, and the sum of the radii. */
+    /** The normal there, the sum of the radii, and a = k c, see ContactRest. */
     const double* normal;
-    double radii;
+    double radii, softness;
 };
 
 /**
@@ -47,7 +47,7 @@ public:
     /**
      * Look at a contact for the first time.
      *
-     * @param softness   a
+     * @param softness   a; where that is not less than 1, anything between
      * @param predicted  the gap g* that is predicted without contacts; 0 if none touched
      */
     ContactRest(double softness, double predicted);

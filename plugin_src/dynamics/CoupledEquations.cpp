@@ -10,7 +10,7 @@ using namespace std;
 namespace {
 
 /** The energy of an error that conjugate gradients leave anyway, for each pack, in units of k_B T. */
-const double LEAST_ENERGY = 1e-2;
+const double LEAST_ENERGY = 5e-2;
 /**
  * The tolerances over these where tensions of segments are wanted that are right. These energies are those of forces
  * in P, which is stiff where two places move as one: that of their motion in A is larger by the stiffness of the
@@ -29,11 +29,34 @@ const int CHUNK = 256;
 /** What a term far from the processor's caches shows is asked for this many terms ahead. */
 const int AHEAD = 16;
 
-/** Add the product of a symmetric matrix and a vector, times a factor. */
-inline void addProduct(const double* k, const double* v, double factor, double* result) {
-    result[0] += factor*(k[0]*v[0]+k[1]*v[1]+k[2]*v[2]);
-    result[1] += factor*(k[1]*v[0]+k[3]*v[1]+k[4]*v[2]);
-    result[2] += factor*(k[2]*v[0]+k[4]*v[1]+k[5]*v[2]);
+/** In lanes, as compilers may not add in another order. */
+template <class Real> double sumOfProducts(const Real* a, const Real* b, int first, int last) {
+    const int LANES = 8;
+    double sums[LANES] = {};
+    for (; first+LANES <= last; first += LANES)
+        for (int lane = 0; lane < LANES; lane++)
+            sums[lane] += (double) a[first+lane]*b[first+lane];
+    for (int lane = 0; first < last; first++, lane++)
+        sums[lane] += (double) a[first]*b[first];
+    double sum = 0;
+    for (double ofLane : sums)
+        sum += ofLane;
+    return sum;
+}
+
+/** Find the product of a symmetric matrix and a vector. */
+template <class Real, class Other> inline void multiply(const Real* k, const Other* v, Other* result) {
+    result[0] = k[0]*v[0]+k[1]*v[1]+k[2]*v[2];
+    result[1] = k[1]*v[0]+k[3]*v[1]+k[4]*v[2];
+    result[2] = k[2]*v[0]+k[4]*v[1]+k[5]*v[2];
+}
+
+inline void respondTo(PackStep& pack, const double* forces, int, double* moves) {
+    pack.respond(forces, moves);
+}
+
+inline void respondTo(PackStep& pack, const float* forces, int numTerms, float* moves) {
+    pack.respond(forces, numTerms, moves);
 }
 
 } // namespace
@@ -83,9 +106,8 @@ void CoupledEquations::sortPlaces(const vector<CouplingEquation>& equations, con
     terms.resize(count);
     partners.resize(count);
     coupled.assign(numPacks, 0);
-    for (vector<double>* values : {&change, &residual, &response, &force, &direction, &image, &found})
-        values->resize(3*count);
-    exchanged.resize(count);
+    change.resize(3*count);
+    found.resize(3*count);
     termOf.assign(2*equations.size(), -1);
     forPlaces([&] (const PlaceOnChain& place, size_t i, int side) {
         termOf[2*i+side] = firstOfNode[firstOfPack[place.pack]+place.node]++;
@@ -129,79 +151,110 @@ double CoupledEquations::total() const {
 }
 
 void CoupledEquations::solve(const vector<PackStep*>& packs, const PackFlags& active,
-            const vector<CouplingEquation>& equations, double kT, bool forTensions, double stiffness,
-            double tolerance, const Loop& loop) {
+            const vector<CouplingEquation>& equations, double kT, const Demands& demands, const Loop& loop) {
     const int numPacks = packs.size();
-    const bool stiff = stiffness > STIFF;
-    const double tighter = min(forTensions ? OF_TENSIONS : 1, stiff ? OF_STIFF/stiffness : 1);
+    const bool stiff = demands.stiffness > STIFF;
+    const double tighter = min(demands.forTensions ? OF_TENSIONS : 1, stiff ? OF_STIFF/demands.stiffness : 1);
     gatherTerms(equations, active, loop);
     loop(numPacks, [&] (int pack) {
         const int first = firstTerms[pack], last = firstTerms[pack+1];
-        for (vector<double>* values : {&residual, &force, &direction, &found})
-            fill(values->begin()+3*first, values->begin()+3*last, 0.0);
-        fill(exchanged.begin()+first, exchanged.begin()+last, Exchanged());
+        fill(found.begin()+3*first, found.begin()+3*last, 0.0);
         if (active[pack])
             packs[pack]->eliminate(terms.data()+first, last-first, change.data()+3*first);
     });
+    const double least = tighter*LEAST_ENERGY*kT*(stiff ? 1 : count(active.begin(), active.end(), 1));
+    if (demands.single)
+        iterate(packs, single, tighter*demands.tolerance, least, loop);
+    else
+        iterate(packs, twice, tighter*demands.tolerance, least, loop);
+    moves.resize(3*equations.size());
+    runInChunks(loop, equations.size(), CHUNK, [&] (int i) {
+        const int first = termOf[2*i], second = termOf[2*i+1];
+        for (int k = 0; k < 3; k++)
+            moves[3*i+k] = (first >= 0 ? change[3*first+k] : 0)-(second >= 0 ? change[3*second+k] : 0);
+    });
+}
+
+/** Conjugate gradients, until what is left of the energy is less than a part of it, or than some energy. */
+template <class Real> void CoupledEquations::iterate(const vector<PackStep*>& packs, Vectors<Real>& vectors,
+            double tolerance, double leastEnergy, const Loop& loop) {
+    const size_t count = terms.size();
+    for (vector<Real>* values :
+            {&vectors.residual, &vectors.response, &vectors.force, &vectors.direction, &vectors.image})
+        values->resize(3*count);
+    vectors.exchanged.resize(count);
+    vectors.stiffness.resize(6*count);
+    Real *const residual = vectors.residual.data(), *const response = vectors.response.data();
+    Real *const force = vectors.force.data(), *const direction = vectors.direction.data();
+    Real *const image = vectors.image.data(), *const stiffness = vectors.stiffness.data();
+    auto* const exchanged = vectors.exchanged.data();
     auto forCoupled = [&] (auto function) {
-        loop(numPacks, [&] (int pack) {
+        loop(packs.size(), [&] (int pack) {
             if (coupled[pack])
                 function(pack, firstTerms[pack], firstTerms[pack+1]);
         });
     };
     // Of the matrix, X joins places of different terms: its product with a vector is that of K with the partner's.
     auto respond = [&] (int pack, int first, int last) {
-        packs[pack]->respond(residual.data()+3*first, response.data()+3*first);
-        double sum = 0;
+        respondTo(*packs[pack], residual+3*first, last-first, response+3*first);
+        sums[pack] = sumOfProducts(residual, response, 3*first, 3*last);
         for (int i = first; i < last; i++)
-            for (int k = 0; k < 3; k++) {
-                sum += residual[3*i+k]*response[3*i+k];
+            for (int k = 0; k < 3; k++)
                 exchanged[i].response[k] = response[3*i+k];
-            }
-        sums[pack] = sum;
     };
     forCoupled([&] (int pack, int first, int last) {
-        for (int i = first; i < last; i++)
+        for (int i = first; i < last; i++) {
+            double pull[3] = {};
             if (partners[i] >= 0)
-                addProduct(terms[i].stiffness, &change[3*partners[i]], 1, &residual[3*i]);
+                multiply(terms[i].stiffness, &change[3*partners[i]], pull);
+            for (int k = 0; k < 6; k++)
+                stiffness[6*i+k] = terms[i].stiffness[k];
+            for (int k = 0; k < 3; k++) {
+                residual[3*i+k] = pull[k];
+                force[3*i+k] = direction[3*i+k] = 0;
+                exchanged[i].direction[k] = 0;
+            }
+        }
         respond(pack, first, last);
     });
     iterations = 1;
-    double energy = total(), ratio = 0;
-    const double least = tighter*max(tolerance*energy,
-            LEAST_ENERGY*kT*(stiff ? 1 : count(active.begin(), active.end(), 1)));
+    double energy = total();
+    const double least = max(tolerance*energy, leastEnergy);
+    Real ratio = 0;
     while (energy > least && iterations < LARGEST_NUMBER_OF_ITERATIONS) {
         forCoupled([&] (int pack, int first, int last) {
-            double sum = 0;
             for (int i = first; i < last; i++) {
                 if (i+AHEAD < last && partners[i+AHEAD] >= 0)
                     __builtin_prefetch(&exchanged[partners[i+AHEAD]]);
-                for (int k = 0; k < 3; k++) {
-                    force[3*i+k] = residual[3*i+k]+ratio*force[3*i+k];
-                    direction[3*i+k] = response[3*i+k]+ratio*direction[3*i+k];
-                    image[3*i+k] = force[3*i+k];
-                }
+                Real pull[3] = {};
                 if (partners[i] >= 0) {
-                    const Exchanged& partner = exchanged[partners[i]];
-                    double ofPartner[3];
+                    const auto& partner = exchanged[partners[i]];
+                    Real ofPartner[3];
                     for (int k = 0; k < 3; k++)
                         ofPartner[k] = partner.response[k]+ratio*partner.direction[k];
-                    addProduct(terms[i].stiffness, ofPartner, -1, &image[3*i]);
+                    multiply(stiffness+6*i, ofPartner, pull);
                 }
                 for (int k = 0; k < 3; k++)
-                    sum += direction[3*i+k]*image[3*i+k];
+                    image[3*i+k] = pull[k];
             }
-            sums[pack] = sum;
+            for (int j = 3*first; j < 3*last; j++) {
+                force[j] = residual[j]+ratio*force[j];
+                direction[j] = response[j]+ratio*direction[j];
+                image[j] = force[j]-image[j];
+            }
+            sums[pack] = sumOfProducts(direction, image, 3*first, 3*last);
         });
         const double length = energy/total();
+        const Real step = length;
         forCoupled([&] (int pack, int first, int last) {
+            for (int j = 3*first; j < 3*last; j++) {
+                found[j] += length*force[j];
+                change[j] += length*direction[j];
+                residual[j] -= step*image[j];
+            }
             for (int i = first; i < last; i++)
-                for (int k = 0; k < 3; k++) {
-                    found[3*i+k] += length*force[3*i+k];
-                    change[3*i+k] += length*direction[3*i+k];
-                    residual[3*i+k] -= length*image[3*i+k];
+                for (int k = 0; k < 3; k++)
                     exchanged[i].direction[k] = direction[3*i+k];
-                }
             respond(pack, first, last);
         });
         iterations++;
@@ -209,12 +262,6 @@ void CoupledEquations::solve(const vector<PackStep*>& packs, const PackFlags& ac
         energy = total();
         ratio = energy/before;
     }
-    moves.resize(3*equations.size());
-    runInChunks(loop, equations.size(), CHUNK, [&] (int i) {
-        const int first = termOf[2*i], second = termOf[2*i+1];
-        for (int k = 0; k < 3; k++)
-            moves[3*i+k] = (first >= 0 ? change[3*first+k] : 0)-(second >= 0 ? change[3*second+k] : 0);
-    });
 }
 
 void CoupledEquations::advance(const vector<PackStep*>& packs, const PackFlags& active, double share,
@@ -225,13 +272,54 @@ void CoupledEquations::advance(const vector<PackStep*>& packs, const PackFlags& 
     });
 }
 
-void CoupledEquations::findCompliances(const vector<PackStep*>& packs, vector<double>& compliances,
-            const Loop& loop) {
+void CoupledEquations::findCompliancesOfTerms(const vector<PackStep*>& packs, const Loop& loop) {
     compliancesOfTerms.resize(6*terms.size());
     loop(packs.size(), [&] (int pack) {
         if (firstTerms[pack] < firstTerms[pack+1])
             packs[pack]->findCompliances(compliancesOfTerms.data()+6*firstTerms[pack]);
     });
+}
+
+void CoupledEquations::findJointStiffness(const vector<PackStep*>& packs, const Loop& loop) {
+    auto needsIt = [&] (int pack) {
+        return firstTerms[pack] < firstTerms[pack+1] && packs[pack]->needsJointStiffness();
+    };
+    bool any = false;
+    for (size_t pack = 0; pack < packs.size(); pack++)
+        any |= needsIt(pack);
+    if (!any)
+        return;
+    findCompliancesOfTerms(packs, loop);
+    jointStiffness.resize(6*terms.size());
+    loop(packs.size(), [&] (int pack) {
+        if (!needsIt(pack))
+            return;
+        for (int i = firstTerms[pack]; i < firstTerms[pack+1]; i++) {
+            double* const result = &jointStiffness[6*i];
+            copy_n(terms[i].stiffness, 6, result);
+            if (partners[i] < 0)
+                continue;
+            // Column by column: K e, C K e, K C K e.
+            int entry = 0;
+            double columns[3][3] = {};
+            for (int column = 0; column < 3; column++) {
+                double unit[3] = {}, pull[3] = {}, move[3] = {};
+                unit[column] = 1;
+                multiply(terms[i].stiffness, unit, pull);
+                multiply(&compliancesOfTerms[6*partners[i]], pull, move);
+                multiply(terms[i].stiffness, move, columns[column]);
+            }
+            for (int row = 0; row < 3; row++)
+                for (int column = row; column < 3; column++)
+                    result[entry++] -= 0.5*(columns[column][row]+columns[row][column]);
+        }
+        packs[pack]->setJointStiffness(&jointStiffness[6*firstTerms[pack]]);
+    });
+}
+
+void CoupledEquations::findCompliances(const vector<PackStep*>& packs, vector<double>& compliances,
+            const Loop& loop) {
+    findCompliancesOfTerms(packs, loop);
     compliances.assign(6*termOf.size(), 0.0);
     for (size_t i = 0; i < termOf.size(); i++)
         if (termOf[i] >= 0)

@@ -38,17 +38,22 @@ struct CouplingEquation {
  */
 class CoupledEquations {
 public:
+    /** How well the equations of an iteration are solved. */
+    struct Demands {
+        /** Whether tensions of segments must be right, not moves alone. */
+        bool forTensions = false;
+        /** See ImplicitCouplings::getDemandingStiffness() and getRelativeTolerance(). */
+        double stiffness = 0, tolerance = 1;
+        /** Whether the vectors of the method are in single precision, as those of packs are. */
+        bool single = false;
+    };
     /**
      * Linearise packs and solve the equations, to within a tolerance of energy.
      *
-     * @param active       the packs that take part; others stay where they are
-     * @param forTensions  whether tensions of segments must be right, not moves alone
-     * @param stiffness    see ImplicitCouplings::getDemandingStiffness()
-     * @param tolerance    see ImplicitCouplings::getRelativeTolerance()
+     * @param active  the packs that take part; others stay where they are
      */
     void solve(const std::vector<PackStep*>& packs, const PackFlags& active,
-            const std::vector<CouplingEquation>& equations, double kT, bool forTensions, double stiffness,
-            double tolerance, const Loop& loop);
+            const std::vector<CouplingEquation>& equations, double kT, const Demands& demands, const Loop& loop);
     /** For each equation, how much its first place moves against the second: three numbers. */
     const std::vector<double>& getMoves() const {
         return moves;
@@ -61,16 +66,38 @@ public:
      * couplings pass on from chain to chain is left out, but each couplings' own stiffness at its places is there.
      */
     void findCompliances(const std::vector<PackStep*>& packs, std::vector<double>& compliances, const Loop& loop);
+    /**
+     * Tell the packs that need it how stiff what holds each place is, with the other place of its coupling as mobile as
+     * it is by itself: with the compliance C of that place, K-K C K.
+     */
+    void findJointStiffness(const std::vector<PackStep*>& packs, const Loop& loop);
     /** The number of substitutions that the last call of solve() took. */
     int getNumIterations() const {
         return iterations;
     }
 private:
+    /**
+     * The vectors of conjugate gradients: three numbers for each term. Few and small ones stay in the cache, which most
+     * of the time of an iteration depends on.
+     */
+    template <class Real> struct Vectors {
+        /** What a term shows its partner, in one place: its response, and its last direction. */
+        struct Exchanged {
+            Real response[3], direction[3];
+        };
+        std::vector<Real> residual, response, force, direction, image;
+        std::vector<Exchanged> exchanged;
+        /** Six numbers for each term. */
+        std::vector<Real> stiffness;
+    };
     bool hasSamePlaces(const std::vector<CouplingEquation>& equations, const PackFlags& active, const Loop& loop);
     void sortPlaces(const std::vector<CouplingEquation>& equations, const PackFlags& active);
     void gatherTerms(const std::vector<CouplingEquation>& equations, const PackFlags& active,
             const Loop& loop);
+    template <class Real> void iterate(const std::vector<PackStep*>& packs, Vectors<Real>& vectors, double tolerance,
+            double least, const Loop& loop);
     double total() const;
+    void findCompliancesOfTerms(const std::vector<PackStep*>& packs, const Loop& loop);
     /** One for each place on a chain, pack by pack, in the order of their nodes. */
     std::vector<CouplingTerm> terms;
     /** For each term, the number of that of the other place of its coupling, or -1. */
@@ -87,14 +114,11 @@ private:
     std::vector<int> firstTerms;
     PackFlags coupled;
     std::vector<double> sums;
-    /** Three numbers for each term: solution, residual, its response, direction and its image, and the forces found. */
-    std::vector<double> change, residual, response, force, direction, image, found;
-    /** What each term shows its partner, in one place: its response, and its last direction. */
-    struct Exchanged {
-        double response[3], direction[3];
-    };
-    std::vector<Exchanged> exchanged;
-    std::vector<double> moves, compliancesOfTerms;
+    /** Three numbers for each term: the solution, and the forces found. */
+    std::vector<double> change, found;
+    Vectors<float> single;
+    Vectors<double> twice;
+    std::vector<double> moves, compliancesOfTerms, jointStiffness;
     std::vector<int> firstOfPack, firstOfNode;
     int iterations = 0;
 };

@@ -100,7 +100,8 @@ void LinkEquations::begin(const CoupledStart& start, const Loop& newLoop) {
     demandingStiffness = 0;
     for (const State& state : states)
         for (int side = 0; side < 2; side++)
-            if ((state.turns || twoStages) && state.places[side].pack >= 0)
+            if (state.places[side].pack >= 0 &&
+                    (state.turns || twoStages || start.places.isBeam(state.places[side].chain)))
                 demandingStiffness = max(demandingStiffness, stepSize*state.link->stiffness/state.friction[side]);
     unfinished.assign(states.size(), 0);
     if (kT > 0)

@@ -30,8 +30,9 @@ struct NetworkStep::Attempt {
     const Loop& loop;
 };
 
-NetworkStep::NetworkStep(const ChainEngine& engine, const vector<Chain>& chains, int particles) : engine(engine),
-        places(chains, particles), moved(3*(size_t) particles) {
+NetworkStep::NetworkStep(const ChainEngine& engine, const vector<Chain>& chains, const PackStepSource& beamEngine,
+        const vector<BeamChain>& beams, int particles) : engine(engine), beamEngine(beamEngine),
+        places(chains, beams, particles), moved(3*(size_t) particles) {
 }
 
 NetworkStep::~NetworkStep() {
@@ -92,10 +93,16 @@ void NetworkStep::choosePacks(const StepSettings& settings) {
         steps.push_back(engine.createStep(pack));
         chainsOfLanes.push_back(engine.getChainsOfLanes(pack));
     }
+    for (int pack = 0; pack < beamEngine.getNumPacks(); pack++) {
+        steps.push_back(beamEngine.createStep(pack));
+        chainsOfLanes.push_back(beamEngine.getChainsOfLanes(pack));
+        for (int& chain : chainsOfLanes.back())
+            chain += places.getChains().size();
+    }
     if (!particles.empty()) {
         // They are numbered behind the chains.
         vector<int> numbers(particles.size());
-        iota(numbers.begin(), numbers.end(), (int) places.getChains().size());
+        iota(numbers.begin(), numbers.end(), places.getNumFilaments());
         steps.emplace_back(new ParticleStep(particles));
         chainsOfLanes.push_back(numbers);
     }
@@ -187,10 +194,12 @@ bool NetworkStep::iterate(const Attempt& attempt, int stage) {
     const bool turns = any_of(couplings.begin(), couplings.end(), [] (const ImplicitCouplings* own) {
         return own->needsCompliances();
     });
-    double stiffness = 0, tolerance = 1;
+    CoupledEquations::Demands demands;
+    // Beam elements have double precision alone.
+    demands.single = attempt.settings.precision != Precision::Double && beamEngine.getNumPacks() == 0;
     for (const ImplicitCouplings* own : couplings) {
-        stiffness = max(stiffness, own->getDemandingStiffness());
-        tolerance = min(tolerance, own->getRelativeTolerance());
+        demands.stiffness = max(demands.stiffness, own->getDemandingStiffness());
+        demands.tolerance = min(demands.tolerance, own->getRelativeTolerance());
     }
     const int most = turns ? NEWTON_ITERATIONS_OF_TURNING_LINKS : NEWTON_ITERATIONS;
     for (int iteration = 0; iteration < most; iteration++) {
@@ -201,11 +210,11 @@ bool NetworkStep::iterate(const Attempt& attempt, int stage) {
         }
         first[couplings.size()] = equations.size();
         // What the first stage takes for taut segments stays as it is for the second one.
-        const bool forTensions = iteration == 0 && stage == 0 && steps[0]->getNumStages() > 1;
-        coupled.solve(stepsOfPacks, active, equations, attempt.settings.kT, forTensions, stiffness, tolerance,
-                attempt.loop);
+        demands.forTensions = iteration == 0 && stage == 0 && steps[0]->getNumStages() > 1;
+        coupled.solve(stepsOfPacks, active, equations, attempt.settings.kT, demands, attempt.loop);
         substitutions += coupled.getNumIterations();
         if (iteration == 0 && stage == 0) {
+            coupled.findJointStiffness(stepsOfPacks, attempt.loop);
             if (turns) {
                 coupled.findCompliances(stepsOfPacks, compliances, attempt.loop);
                 for (size_t i = 0; i < couplings.size(); i++)

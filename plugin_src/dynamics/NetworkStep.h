@@ -6,6 +6,7 @@
 #include "dynamics/CoupledForces.h"
 #include "dynamics/ImplicitCouplings.h"
 #include "dynamics/LinkEquations.h"
+#include "dynamics/PackStepSource.h"
 #include "dynamics/WallEquations.h"
 #include <cstddef>
 #include <memory>
@@ -24,11 +25,14 @@ namespace cylchain {
 class NetworkStep {
 public:
     /**
-     * @param engine     the engine of the chains
-     * @param chains     they must exist as long as this object, and so must the engine
-     * @param particles  the number of particles of the System
+     * @param engine      the engine of the chains
+     * @param chains      they must exist as long as this object, and so must the engine
+     * @param beamEngine  the engine of chains of beam elements
+     * @param beams       these chains, which must exist as long
+     * @param particles   the number of particles of the System
      */
-    NetworkStep(const ChainEngine& engine, const std::vector<Chain>& chains, int particles);
+    NetworkStep(const ChainEngine& engine, const std::vector<Chain>& chains, const PackStepSource& beamEngine,
+            const std::vector<BeamChain>& beams, int particles);
     ~NetworkStep();
     /**
      * Set the forces that steps have in their equations. What they point to must exist while steps are taken.
@@ -38,7 +42,8 @@ public:
     void setForces(const CoupledForces& forces, const double* box);
     /**
      * Compute the displacements of all nodes and of the coupled particles in a step, as ChainEngine::step() does. Of
-     * the result, the chain by which the step has gone wrong may be a particle: the number behind those of all chains.
+     * the result, the chain by which the step has gone wrong may be one of beam elements, with a number behind those of
+     * segments, or a particle, behind those of all chains.
      */
     Instability step(const double* positions, const double* forces, const double* box, const StepSettings& settings,
             double* displacements, const Loop& loop);
@@ -57,6 +62,7 @@ private:
     std::vector<bool> findComponents(const std::vector<bool>& failed) const;
     void choosePacks(const StepSettings& settings);
     const ChainEngine& engine;
+    const PackStepSource& beamEngine;
     ChainPlaces places;
     std::vector<std::unique_ptr<LinkEquations> > links;
     std::vector<std::unique_ptr<ContactEquations> > contacts;

@@ -38,14 +38,18 @@ public:
     void eliminate(const CouplingTerm* newTerms, int count, double* moves) override {
         terms = newTerms;
         numTerms = count;
+        placed.resize(count);
+        for (int i = 0; i < count; i++)
+            placed[i] = {3*W*terms[i].node+terms[i].lane, Scalar(1-terms[i].fraction), Scalar(terms[i].fraction)};
         step->getEquations().setTerms(terms, numTerms);
         step->eliminate(y, iteration);
         gatherMoves(step->getChange(), moves);
     }
     void respond(const double* forces, double* moves) override {
-        spreadForces(forces);
-        step->getEquations().respond(forcesOnNodes, movesOfNodes);
-        gatherMoves(movesOfNodes, moves);
+        respondAs(forces, moves);
+    }
+    void respond(const float* forces, int, float* moves) override {
+        respondAs(forces, moves);
     }
     void findCompliances(double* compliances) override {
         step->getEquations().findResponses(UseOfResponses<W, CLOSED, true>(terms, numTerms, compliances));
@@ -89,6 +93,12 @@ private:
     std::unique_ptr<ImplicitStep<W, CLOSED> > step;
     const CouplingTerm* terms;
     int numTerms, iteration;
+    /** Where the terms are: the first coordinate of the first node in its lane, and the parts of both nodes. */
+    struct PlacedTerm {
+        int first;
+        Scalar ofFirst, ofSecond;
+    };
+    std::vector<PlacedTerm> placed;
 
     /** Call a function with each coordinate of the nodes of active lanes, and how much that has changed. */
     template <class Function> CYLCHAIN_INLINE void forOwnNodes(Function function) const {
@@ -101,31 +111,34 @@ private:
             }
         });
     }
-    /** The coordinates of a node in a lane are this many numbers apart. */
-    static Scalar* coordinates(Vec* vectors, const CouplingTerm& term) {
-        return reinterpret_cast<Scalar*>(vectors+term.node)+term.lane;
+    template <class Number> void respondAs(const Number* forces, Number* moves) {
+        spreadForces(forces);
+        step->getEquations().respond(forcesOnNodes, movesOfNodes);
+        gatherMoves(movesOfNodes, moves);
     }
-    void spreadForces(const double* forces) {
+    template <class Number> void spreadForces(const Number* forces) {
         for (int node = 0; node < pack.nodes; node++)
             forcesOnNodes[node] = Vec {};
         for (int i = 0; i < numTerms; i++) {
-            const Scalar second = terms[i].fraction, first = 1-second;
-            Scalar* const force = coordinates(forcesOnNodes, terms[i]);
+            const PlacedTerm& place = placed[i];
+            // The coordinates of a node in a lane are W numbers apart.
+            Scalar* const force = reinterpret_cast<Scalar*>(forcesOnNodes)+place.first;
             for (int k = 0; k < 3; k++) {
-                force[k*W] += first*forces[3*i+k];
-                force[(3+k)*W] += second*forces[3*i+k];
+                const Scalar own = forces[3*i+k];
+                force[k*W] += place.ofFirst*own;
+                force[(3+k)*W] += place.ofSecond*own;
             }
         }
         if (pack.planar)
             for (int node = 0; node < pack.nodes; node++)
                 forcesOnNodes[node].z = Real{};
     }
-    void gatherMoves(Vec* ofNodes, double* moves) const {
+    template <class Number> void gatherMoves(const Vec* ofNodes, Number* moves) const {
         for (int i = 0; i < numTerms; i++) {
-            const double second = terms[i].fraction, first = 1-second;
-            const Scalar* const move = coordinates(ofNodes, terms[i]);
+            const PlacedTerm& place = placed[i];
+            const Scalar* const move = reinterpret_cast<const Scalar*>(ofNodes)+place.first;
             for (int k = 0; k < 3; k++)
-                moves[3*i+k] = first*move[k*W]+second*move[(3+k)*W];
+                moves[3*i+k] = place.ofFirst*move[k*W]+place.ofSecond*move[(3+k)*W];
         }
     }
 };

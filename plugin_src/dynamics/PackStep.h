@@ -47,11 +47,23 @@ public:
     virtual void eliminate(const CouplingTerm* terms, int numTerms, double* moves) = 0;
     /** Find how forces on the places of the terms, three numbers for each, move them, with the same elimination. */
     virtual void respond(const double* forces, double* moves) = 0;
+    /** The same in single precision, with the number of terms. */
+    virtual void respond(const float* forces, int numTerms, float* moves);
     /**
      * Find for each term how a force on its place moves this place: a symmetric matrix in the order of a term's
      * stiffness.
      */
     virtual void findCompliances(double* compliances) = 0;
+    /** Whether setJointStiffness() is to be called in the first iteration. */
+    virtual bool needsJointStiffness() const {
+        return false;
+    }
+    /**
+     * Take note of how stiff what holds each term's place is when the other place of its coupling can move: a symmetric
+     * matrix in the order of a term's stiffness, which is that where it cannot.
+     */
+    virtual void setJointStiffness(const double*) {
+    }
     /**
      * End the iteration: add what forces on the places of the terms do, and move the nodes.
      *

@@ -26,6 +26,7 @@ public:
     int getNumStages() const override;
     void beginStage(int stage) override;
     void eliminate(const CouplingTerm* terms, int numTerms, double* moves) override;
+    using PackStep::respond;
     void respond(const double* forces, double* moves) override;
     void findCompliances(double* compliances) override;
     void advance(const double* forces, double share, bool* unfinished) override;

@@ -13,11 +13,15 @@ void PlaceResponses::begin(const ChainPlaces& newPlaces, double newStepSize) {
     places = &newPlaces;
     stepSize = newStepSize;
     const vector<Chain>& chains = places->getChains();
-    beams.assign(chains.size(), {0, 0, 0, 0});
+    beams.assign(chains.size(), Beam());
     for (size_t i = 0; i < chains.size(); i++) {
         const Chain& chain = chains[i];
         const Segment& segment = chain.segments[0];
         const double friction = segment.perpendicular/segment.restLength;
+        double largest = 0;
+        for (const Segment& one : chain.segments)
+            largest = max(largest, one.perpendicular);
+        beams[i].least = stepSize/(chain.nodeFriction+largest);
         const double rigidity = chain.joints.empty() ? 0 : chain.joints[0]*segment.restLength;
         if (!(friction > 0 && rigidity > 0))
             continue;
@@ -26,6 +30,7 @@ void PlaceResponses::begin(const ChainPlaces& newPlaces, double newStepSize) {
         beam.wave = M_SQRT2*pow(rigidity*stepSize/friction, 0.25);
         beam.bending = 0.5*stepSize/(friction*beam.wave);
         beam.whole = stepSize/(friction*beam.length);
+        beam.least = min(beam.least, max(beam.bending, beam.whole));
     }
 }
 
@@ -45,6 +50,16 @@ double PlaceResponses::find(const PlaceOnChain& place) const {
         whole = beam.whole*(1+12*off*off);
     }
     return min(alone, cbrt(bending*bending*bending+whole*whole*whole));
+}
+
+double PlaceResponses::findLeast(int chain) const {
+    if (chain < (int) beams.size())
+        return beams[chain].least;
+    // In its middle, an element has the largest friction.
+    PlaceOnChain place;
+    place.chain = chain;
+    place.fraction = 0.5;
+    return find(place);
 }
 
 bool PlaceResponses::moveTogether(int chain) const {

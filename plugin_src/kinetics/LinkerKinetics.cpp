@@ -13,8 +13,8 @@ namespace {
 
 /** Linkers that a thread looks at together. */
 const int CHUNK = 256;
-/** After so many events in a step, something is wrong with rates. */
-const int MOST_EVENTS = 100000;
+/** Of linkers of a type that come out of their concentration in a step. */
+const int MOST_NEW_LINKERS = 10000000;
 /** The random numbers of when linkers come out of a concentration belong to this, less the number of the type. */
 const uint32_t NEW_LINKERS = 0xffffffff;
 
@@ -195,8 +195,8 @@ void LinkerKinetics::takeTogether(LinkerState& state, const KineticStep& step, C
     while (!queue.empty()) {
         Pending next = queue.top();
         queue.pop();
-        if (next.events > MOST_EVENTS) {
-            count.failed = next.index >= 0 ? linkers[next.index].number : state.nextNumber;
+        if (next.events > (next.index >= 0 ? MOST_EVENTS : MOST_NEW_LINKERS)) {
+            count.failed = next.index >= 0 ? static_cast<long long>(linkers[next.index].number) : -2-next.type;
             return;
         }
         if (next.index >= 0) {

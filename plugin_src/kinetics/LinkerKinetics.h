@@ -63,7 +63,8 @@ public:
      * Take a step.
      *
      * @param links  the springs of linkers that join two places then, unless it is NULL
-     * @return the number of a linker the rates of which are too large for the step, or -1
+     * @return the number of a linker the rates of which are too large for the step, or -1; or -2 less the number of a
+     *         type, if too many of its linkers come out of their concentration
      */
     long long advance(LinkerState& state, const KineticStep& step, const Loop& loop,
             std::vector<Link>* links = nullptr);
@@ -78,6 +79,8 @@ private:
     typedef std::unordered_set<std::uint64_t> Sites;
     struct Event;
     struct Pending;
+    /** After so many events of a linker in a step, or so many rounds of a ring, something is wrong with rates. */
+    static constexpr int MOST_EVENTS = 100000;
     struct Count {
         /** Of each type. */
         std::vector<LinkerEvents> events;
@@ -110,6 +113,7 @@ private:
     double pull(const Linker& linker, int side, const Spring& spring, const KineticStep& step, double& stiffness) const;
     double speedUnder(const Hand& hand, double pull) const;
     void walk(Linker& linker, const KineticStep& step, Count& count) const;
+    void walkPart(Linker& linker, const KineticStep& step, double duration, Count& count) const;
     bool draw(LinkerState& state, const KineticStep& step, Pending& next) const;
     void apply(Linker& linker, const KineticStep& step, Pending& next, Sites* sites, Count& count) const;
     void stayOnChain(Linker& linker, int side, Count& count) const;

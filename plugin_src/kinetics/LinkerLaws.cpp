@@ -10,6 +10,9 @@ namespace {
 
 /** Exponents of rates are at most this. */
 const double LARGEST_EXPONENT = 500;
+/** Hands walk in parts of a step: in each, they relax towards their stall force by this share, unless there are most. */
+const double SHARE_OF_RELAXATION = 0.25;
+const double MOST_PARTS = 100;
 
 double boundedExp(double x) {
     return exp(min(x, LARGEST_EXPONENT));
@@ -117,6 +120,21 @@ double LinkerKinetics::speedUnder(const Hand& hand, double pull) const {
 /** Hands that are bound walk, those which bind to sites excepted. */
 void LinkerKinetics::walk(Linker& linker, const KineticStep& step, Count& count) const {
     const LinkerType& type = system.types[linker.type];
+    double rate = 0;
+    for (int side = 0; side < 2; side++)
+        if (linker.hands[side].isBound()) {
+            const Hand& hand = system.hands[type.hands[side]];
+            if (hand.siteSpacing == 0 && hand.stallForce > 0)
+                rate = max(rate, type.stiffness*fabs(hand.speed)/hand.stallForce);
+        }
+    const double needed = linker.pulls() ? ceil(rate*step.stepSize/SHARE_OF_RELAXATION) : 1;
+    const int parts = static_cast<int>(min(MOST_PARTS, max(1.0, needed)));
+    for (int part = 0; part < parts; part++)
+        walkPart(linker, step, step.stepSize/parts, count);
+}
+
+void LinkerKinetics::walkPart(Linker& linker, const KineticStep& step, double duration, Count& count) const {
+    const LinkerType& type = system.types[linker.type];
     double moves[2] = {0, 0};
     int walking = 0;
     for (int side = 0; side < 2; side++)
@@ -137,8 +155,8 @@ void LinkerKinetics::walk(Linker& linker, const KineticStep& step, Count& count)
         const double direction = hand.speed > 0 ? 1 : -1;
         double stiffness = 0;
         const double along = pulls ? direction*pull(linker, side, spring, step, stiffness) : 0;
-        double move = speedUnder(hand, along)*step.stepSize;
-        // However long the step is, it ends where the spring stops it.
+        double move = speedUnder(hand, along)*duration;
+        // However long it is, it ends where the spring stops it.
         if (pulls && hand.stallForce > 0 && stiffness > 0) {
             const double toStall = (along+hand.stallForce)/(stiffness*walking);
             move = move > 0 ? min(move, max(0.0, toStall)) : max(move, min(0.0, toStall));
@@ -157,7 +175,12 @@ void LinkerKinetics::stayOnChain(Linker& linker, int side, Count& count) const {
     HandPlace& place = linker.hands[side];
     const double length = contours.getLength(place.chain);
     if (contours.isClosed(place.chain)) {
-        place.position -= length*floor(place.position/length);
+        const double rounds = floor(place.position/length);
+        // Written so that NaN fails, too.
+        if (!(fabs(rounds) <= MOST_EVENTS))
+            count.failed = linker.number;
+        else
+            place.position = max(0.0, place.position-length*rounds);
         return;
     }
     if (place.position >= 0 && place.position <= length)

@@ -9,6 +9,8 @@ using namespace std;
 static const double LARGEST_COORDINATE = 1e9;
 /** Cells grow in steps of this, so that they mostly stay what they are while segments stretch. */
 static const double GROWTH = 1.02;
+/** Of a segment: hands that reach less far have longer pieces, and more proposals that come to nothing. */
+static const double MOST_PIECES = 1000;
 
 void SegmentCells::setGrid(double size, const double* box) {
     double changed[9] = {};
@@ -150,7 +152,7 @@ void SegmentCells::cut(const Contours& contours, double reach) {
     longest = 0;
     for (int segment = 0; segment < contours.getNumSegments(); segment++) {
         const double length = contours.getSegmentLength(segment);
-        const int parts = static_cast<int>(max(1.0, ceil(length/reach)));
+        const int parts = static_cast<int>(min(MOST_PIECES, max(1.0, ceil(length/reach))));
         firstOfSegment.push_back(static_cast<int>(pieces.size()));
         for (int part = 0; part < parts; part++)
             pieces.push_back({segment, part*length/parts, length/parts,

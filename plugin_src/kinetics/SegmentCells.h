@@ -28,7 +28,8 @@ public:
         int numCells = 0, numPieces = 0;
     };
     /**
-     * Cut segments into pieces that are no longer than the reach, and sort these into cells.
+     * Cut segments into pieces that are no longer than the reach, or a thousandth of the segment, and sort these into
+     * cells.
      *
      * @param reach       pieces that come this near to a point, or to any place of a piece, are among those around it
      * @param box         the periodic box if distances are those of nearest images, or NULL

@@ -103,6 +103,7 @@ def test_course(relaxed):
     assert (course.numbers["crosslinker"][:, 0] == 0).all()
     np.testing.assert_allclose(course.shortening, 1.0 - course.lengths[1:] / course.lengths[0])
     assert 0 <= course.divided < 1
+    assert course.speed > 0
 
 
 def given_courses(factor, shift):
@@ -111,7 +112,7 @@ def given_courses(factor, shift):
     for own in (-shift, shift):
         energies = {name: factor * np.array([50.0, 100.0 + own]) for name in ("bending", "motor", "crosslinker")}
         numbers = {"motor": np.array([[1, 5, 4], [0, 4, 6]])}
-        yield Course(times, energies, numbers, np.array([1000.0, 950.0, 900.0]), 0.25)
+        yield Course(times, energies, numbers, np.array([1000.0, 950.0, 900.0]), 0.25, 0.1)
 
 
 def test_rows_of_courses():
@@ -122,6 +123,7 @@ def test_rows_of_courses():
     assert values["motor_both_hands_bound_bundle_2000_us"].value == 6.0
     assert values["crossings_bundle_2000_us"].value == 7.0
     assert values["divided_steps_bundle_2000_us"].value == 0.25
+    assert values["simulated_seconds_per_second_course_bundle_2000_us"].value == pytest.approx(0.1)
     assert values["shortening_bundle_2000_us_at_0.1_s"].value == pytest.approx(0.05)
     assert values["shortening_bundle_2000_us_at_0.2_s"].value == pytest.approx(0.1)
     assert len(values) == len(rows)

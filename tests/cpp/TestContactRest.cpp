@@ -19,7 +19,7 @@ static double dot(const double* a, const double* b) {
     return a[0]*b[0]+a[1]*b[1]+a[2]*b[2];
 }
 
-static ContactCourse makeCourse(const double (&begun)[3], const double (&now)[3], const double (&other)[3],
+static ContactCourse makeCourse(double softness, const double (&begun)[3], const double (&now)[3], const double (&other)[3],
         const double* normal) {
     ContactCourse course = {};
     copy_n(begun, 3, course.begun);
@@ -28,6 +28,7 @@ static ContactCourse makeCourse(const double (&begun)[3], const double (&now)[3]
     copy_n(other, 3, course.along[1]);
     course.normal = normal;
     course.radii = RADII;
+    course.softness = softness;
     return course;
 }
 
@@ -53,7 +54,7 @@ static void testDiscs() {
         const double normal[3] = {0, cos(turned), sin(turned)};
         ContactRest rest(10, -0.5);
         check(rest.isKnown() && !rest.isResolved(), "a long step");
-        rest.look(makeCourse(begun, now, other, normal), -0.5, DEPTH, LARGEST);
+        rest.look(makeCourse(10, begun, now, other, normal), -0.5, DEPTH, LARGEST);
         check(rest.isBack(), "it comes back");
         double found[3], axis[3] = {5, 0, 0};
         balance(rest, 10, now, found);
@@ -80,7 +81,7 @@ static void testDiscs() {
 static void testLines() {
     const double other[3] = {0, 5, 0}, begun[3] = {0.4, 0.3, 2.5}, now[3] = {0.1, -0.2, -1}, normal[3] = {0, 0, 1};
     ContactRest rest(4, -3);
-    rest.look(makeCourse(begun, now, other, normal), -3, DEPTH, LARGEST);
+    rest.look(makeCourse(4, begun, now, other, normal), -3, DEPTH, LARGEST);
     double found[3];
     balance(rest, 4, now, found);
     check(found[0] == now[0] && found[1] == now[1], "lines slide");
@@ -89,7 +90,7 @@ static void testLines() {
 
 static void testSpheres() {
     const double none[3] = {0, 0, 0}, begun[3] = {2.1, 0.3, 0.4}, now[3] = {0.2, 1.0, 0}, normal[3] = {0, 1, 0};
-    ContactCourse course = makeCourse(begun, now, none, normal);
+    ContactCourse course = makeCourse(4, begun, now, none, normal);
     course.along[0][0] = 0;
     ContactRest rest(4, -1);
     rest.look(course, -1, DEPTH, LARGEST);
@@ -119,7 +120,7 @@ static void checkDiffusion(int dimensions, double step) {
             const double distance = sqrt(dot(now, now)), gap = distance-RADII;
             if (gap < 0) {
                 const double outwards[3] = {now[0]/distance, now[1]/distance, now[2]/distance};
-                ContactCourse course = makeCourse(r, now, along, outwards);
+                ContactCourse course = makeCourse(softness, r, now, along, outwards);
                 course.along[0][0] = length;
                 ContactRest rest(softness, gap);
                 // The wall at the surface, where spheres that began outside are.
@@ -152,20 +153,20 @@ static void testDiffusion() {
 static void testSurface() {
     const double other[3] = {5, 0, 0}, behind[3] = {0, 0, 1.5}, now[3] = {0, 0, 1.9}, normal[3] = {0, 0, 1};
     ContactRest rest(4, -0.1), open(4, -0.1), resolved(0.5, -0.1);
-    rest.look(makeCourse(behind, now, other, normal), -0.1, DEPTH, LARGEST);
+    rest.look(makeCourse(4, behind, now, other, normal), -0.1, DEPTH, LARGEST);
     check(rest.isBack(), "what began behind comes to the surface");
     double found[3];
     balance(rest, 4, now, found);
     checkClose(RADII, found[2], RADII, 1e-12, "at the surface");
     const double before[3] = {0, 0, 2.5};
-    open.look(makeCourse(before, now, other, normal), -0.1, DEPTH, LARGEST);
+    open.look(makeCourse(4, before, now, other, normal), -0.1, DEPTH, LARGEST);
     check(!open.isBack(), "less than the depth behind the surface is no overlap");
     check(resolved.isResolved() && resolved.getGap() > 0 && resolved.getGap() < 0.1, "short steps resolve");
     check(!ContactRest().isKnown(), "not looked at");
     // What comes from far away comes back no farther than it is told.
     const double far[3] = {0, 0, 50};
     ContactRest limited(4, -1);
-    limited.look(makeCourse(far, now, other, normal), -1, DEPTH, LARGEST);
+    limited.look(makeCourse(4, far, now, other, normal), -1, DEPTH, LARGEST);
     balance(limited, 4, now, found);
     checkClose(RADII+LARGEST, found[2], RADII, 1e-12, "not too far");
 }

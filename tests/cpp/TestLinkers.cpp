@@ -228,19 +228,21 @@ static int countBound(const LinkerState& state) {
     });
 }
 
-/** Bound linkers, none of which binds again, become fewer exponentially, whatever the step is. */
+/** Bound linkers, none of which binds again, become fewer exponentially at all times, whatever the step is. */
 static void checkLifetimes(const Hand& hand, double rate, const string& what) {
     Rods rods;
     rods.add(ORIGIN, ALONG_X, 2, 100);
     const double point[] = {50, 30, 40};
     LinkerKinetics kinetics(anchoredSystem(hand, 0.1, point), rods.chains);
     for (double stepSize : {0.02/rate, 0.7/rate}) {
-        const int number = 40000, steps = (int) round(1.4/(stepSize*rate));
+        const int number = 40000, interval = (int) round(0.7/(stepSize*rate));
         LinkerState state = boundLinkers(number, 50);
-        for (int i = 0; i < steps; i++)
-            kinetics.advance(state, stepOf(rods.x, stepSize), SERIAL);
-        const double share = exp(-1.4), error = sqrt(share*(1-share)/number);
-        checkClose(share, countBound(state)/(double) number, 4*error, 1, what);
+        for (int lifetimes = 1; lifetimes <= 4; lifetimes++) {
+            for (int i = 0; i < interval; i++)
+                kinetics.advance(state, stepOf(rods.x, stepSize), SERIAL);
+            const double share = exp(-0.7*lifetimes), error = sqrt(share*(1-share)/number);
+            checkClose(share, countBound(state)/(double) number, 4*error, 1, what);
+        }
     }
 }
 
@@ -296,6 +298,150 @@ static void testStalling() {
             check(state.linkers[0].hands[1].position < 580.001, "it passes where it should stall");
         }
         checkClose(580, state.linkers[0].hands[1].position, 1, 0.01, "stall");
+    }
+}
+
+/** Hands that walk side by side pull at nothing: no step is too long for their speed. */
+static void testWalkingTogether() {
+    Rods rods;
+    const double beside[] = {0, 20, 0};
+    rods.add(ORIGIN, ALONG_X, 10, 1000);
+    rods.add(beside, ALONG_X, 10, 1000);
+    LinkerSystem system;
+    system.kT = KT;
+    system.hands = {handOf(0, 100, 0, {0, 1})};
+    system.hands[0].speed = 2;
+    system.hands[0].stallForce = 4;
+    LinkerType type;
+    type.hands[0] = type.hands[1] = 0;
+    type.stiffness = 0.05;
+    system.types = {type};
+    // The rate at which they relax to their stall force is 0.025.
+    for (double stepSize : {4.0, 40.0, 400.0}) {
+        LinkerKinetics kinetics(system, rods.chains);
+        LinkerState state = freeLinkers(1);
+        for (int side = 0; side < 2; side++)
+            state.linkers[0].hands[side] = {side, 100};
+        for (int i = 0; i < 2; i++)
+            kinetics.advance(state, stepOf(rods.x, stepSize), SERIAL);
+        for (const HandPlace& hand : state.linkers[0].hands)
+            checkClose(100+4*stepSize, hand.position, 1, 1e-6, "walking together");
+    }
+}
+
+/** A closed chain of segments along a regular polygon. */
+static Rods ringOf(int segments, double length) {
+    Rods ring;
+    ring.add(ORIGIN, ALONG_X, segments-1, length);
+    Chain& chain = ring.chains[0];
+    chain.closed = true;
+    chain.segments.push_back(chain.segments[0]);
+    for (int i = 0; i < segments; i++) {
+        ring.x[3*i] = 0.5*length/sin(M_PI/segments)*cos(2*M_PI*i/segments);
+        ring.x[3*i+1] = 0.5*length/sin(M_PI/segments)*sin(2*M_PI*i/segments);
+    }
+    return ring;
+}
+
+/** Steps from site to site, of a hand on each rod, under springs so soft that their force stays what it is. */
+static void testSpeedFromSiteToSite() {
+    const int number = 100;
+    const double far = 1e7;
+    Rods rods;
+    vector<int> all;
+    for (int i = 0; i < number; i++) {
+        const double start[] = {0, 10.0*i, 0};
+        rods.add(start, ALONG_X, 100, 100);
+        all.push_back(i);
+    }
+    for (double force : {-9.0, -2.0, 0.0, 2.0, 30.0})
+        for (int direction : {1, -1})
+            for (bool backward : {false, true}) {
+                Hand hand = handOf(0, 100, 0, all);
+                hand.speed = 2*direction;
+                hand.stallForce = 4;
+                hand.walksBackward = backward;
+                hand.siteSpacing = 8;
+                const double point[] = {force*direction > 0 ? far : -far, 0, 0};
+                LinkerKinetics kinetics(anchoredSystem(hand, fabs(force)/far, point), rods.chains);
+                LinkerState state = boundLinkers(number, 5004);
+                for (int i = 0; i < number; i++)
+                    state.linkers[i].hands[1].chain = i;
+                // In each step, many from site to site.
+                for (int i = 0; i < 25; i++)
+                    kinetics.advance(state, stepOf(rods.x, 40), SERIAL);
+                const double speed = 2*min(2.0, max(backward ? -1.0 : 0.0, 1+force/4));
+                Mean found;
+                for (const Linker& linker : state.linkers) {
+                    found.add(direction*(linker.hands[1].position-5004)/1000);
+                    found.endBlock();
+                }
+                if (speed == 0)
+                    for (double own : found.blocks)
+                        check(own == 0, "it walks where it should stall");
+                else
+                    found.check("speed from site to site", speed);
+            }
+}
+
+/**
+ * Hands on the sites of a ring stand in each other's way: all arrangements of M on N sites are equally likely, so that
+ * they have (N-M)/(N-1) of their speed. At an end, they let go or stay, and those behind them wait.
+ */
+static void testTrafficOnSites() {
+    const Rods ring = ringOf(16, 25);
+    Hand hand = handOf(0, 30, 0, {0});
+    hand.speed = -40;
+    hand.siteSpacing = 8;
+    const double point[] = {0, 0, 0};
+    for (int walking : {20, 35})
+        for (double stepSize : {0.04, 0.5}) {
+            LinkerKinetics kinetics(anchoredSystem(hand, 0, point), ring.chains);
+            LinkerState state = freeLinkers(walking);
+            for (int i = 0; i < walking; i++) {
+                state.linkers[i].anchor = 0;
+                state.linkers[i].hands[1] = {0, 8*(i+0.5)};
+            }
+            Mean speed;
+            for (int block = 0; block < 25; block++) {
+                double sum = 0;
+                for (int i = 0; i < (int) (160/stepSize); i++) {
+                    vector<double> before;
+                    for (const Linker& linker : state.linkers)
+                        before.push_back(linker.hands[1].position);
+                    kinetics.advance(state, stepOf(ring.x, stepSize), SERIAL);
+                    set<double> places;
+                    for (int j = 0; j < walking; j++) {
+                        const double place = state.linkers[j].hands[1].position;
+                        double moved = before[j]-place;
+                        moved -= 400*floor((moved+40)/400);
+                        sum += moved;
+                        check(places.insert(place).second, "two hands on a site");
+                    }
+                }
+                speed.add(sum/(walking*stepSize*(int) (160/stepSize)));
+                if (block > 0)
+                    speed.endBlock();
+                else
+                    speed = Mean();
+            }
+            speed.check("speed in traffic", 40*(50-walking)/49.0);
+        }
+    Rods rod;
+    rod.add(ORIGIN, ALONG_X, 4, 25);
+    for (bool holds : {false, true}) {
+        hand.holdsAtEnds = holds;
+        LinkerKinetics kinetics(anchoredSystem(hand, 0, point), rod.chains);
+        LinkerState state = freeLinkers(3);
+        for (int i = 0; i < 3; i++) {
+            state.linkers[i].anchor = 0;
+            state.linkers[i].hands[1] = {0, 8*(2*i+5.5)};
+        }
+        for (int i = 0; i < 50; i++)
+            kinetics.advance(state, stepOf(rod.x, 1), SERIAL);
+        check(countBound(state) == (holds ? 3 : 0), "what they do at the end");
+        for (int i = 0; i < 3 && holds; i++)
+            check(state.linkers[i].hands[1].position == 8*(i+0.5), "where they wait");
     }
 }
 
@@ -368,6 +514,70 @@ static void testSites() {
                 taken.endBlock();
         }
         taken.check("sites that are taken", 39*weight/(1+weight));
+    }
+}
+
+/**
+ * Linkers of two types compete for the sites of two rods, which have one each: with the weights s of a linker that holds
+ * one of them, and d of one that holds both, summed over types and hands, Z = (1+s)^2+d.
+ */
+static void testCompetitionForSites() {
+    const int pairs = 60;
+    Rods rods;
+    vector<int> all;
+    for (int i = 0; i < pairs; i++)
+        for (int j = 0; j < 2; j++) {
+            const double start[] = {0, 12.0*j, 100.0*i};
+            rods.add(start, ALONG_X, 2, 5);
+            all.push_back(2*i+j);
+        }
+    LinkerSystem system;
+    system.kT = KT;
+    system.hands = {handOf(0.05, 30, 1, all), handOf(0.07, 30, 0.7, all)};
+    system.hands[0].strainShare = 0.4;
+    for (Hand& hand : system.hands)
+        hand.siteSpacing = 10;
+    const double concentrations[] = {4e-6, 3e-6};
+    vector<double> one, both;
+    for (int i = 0; i < 2; i++) {
+        LinkerType type;
+        type.hands[0] = i;
+        type.hands[1] = 1;
+        type.stiffness = 0.1;
+        type.restLength = 8;
+        type.concentration = concentrations[i];
+        system.types.push_back(type);
+        const double first = 10*system.hands[i].bindingRate/system.hands[i].unbindingRate, second = 10*0.07/0.7;
+        const double outside = 4*M_PI/3*27000*concentrations[i];
+        one.push_back(outside*(first+second));
+        both.push_back(2*outside*first*second*exp(-0.5*0.1*16/KT));
+    }
+    const double s = one[0]+one[1], d = both[0]+both[1], z = (1+s)*(1+s)+d;
+    for (double stepSize : {0.05, 5.0}) {
+        LinkerKinetics kinetics(system, rods.chains);
+        LinkerState state;
+        vector<Mean> found(4);
+        const int interval = max(1, (int) (1.5/stepSize));
+        for (int block = 0; block < 25; block++) {
+            for (int sample = 0; sample < 120; sample++) {
+                for (int i = 0; i < interval; i++)
+                    kinetics.advance(state, stepOf(rods.x, stepSize), SERIAL);
+                double counts[4] = {};
+                for (const Linker& linker : state.linkers)
+                    counts[2*linker.type+linker.pulls()]++;
+                for (int i = 0; i < 4; i++)
+                    found[i].add(counts[i]/pairs);
+            }
+            for (Mean& own : found)
+                if (block > 0)
+                    own.endBlock();
+                else
+                    own = Mean();
+        }
+        for (int i = 0; i < 2; i++) {
+            found[2*i].check("linkers that hold a site", 2*one[i]*(1+s)/z);
+            found[2*i+1].check("linkers that hold two", both[i]/z);
+        }
     }
 }
 
@@ -461,6 +671,32 @@ static void testOrderOfStorage() {
     }
 }
 
+/** Hands that hardly reach anything, and those that walk around a ring more often than can be counted. */
+static void testExtremes() {
+    Rods rods;
+    rods.add(ORIGIN, ALONG_X, 3, 25);
+    const Contours contours(rods.chains);
+    SegmentCells cells;
+    cells.build(contours, rods.x.data(), 1e-9, NULL, NULL, true);
+    check(cells.getNumPieces() == 3000, "too many pieces, or none");
+    check(cells.lookAround(cells.findPiece(contours, 1, 12.5)).numPieces >= 1, "a piece does not find itself");
+    const Rods ring = ringOf(8, 100);
+    const double point[] = {0, 0, 0};
+    for (double speed : {30.0, 1e6, 1e13, -1e300}) {
+        Hand hand = handOf(0, 100, 0, {0});
+        hand.speed = speed;
+        LinkerKinetics kinetics(anchoredSystem(hand, 0, point), ring.chains);
+        LinkerState state = boundLinkers(1, 50);
+        const long long failed = kinetics.advance(state, stepOf(ring.x, 10), SERIAL);
+        check(failed == (fabs(speed) > 1e7 ? 0 : -1), "too many rounds of a ring");
+        const double position = state.linkers[0].hands[1].position;
+        if (failed == -1)
+            check(position >= 0 && position <= 800, "where it is on the ring");
+        if (speed == 30)
+            checkClose(350, position, 1, 1e-9, "on the ring");
+    }
+}
+
 static void testSegmentsAround() {
     NormalNumbers normal(3);
     const double box[] = {300, 0, 0, 70, 280, 0, -60, 40, 310};
@@ -537,8 +773,13 @@ int main() {
         testUnbindingUnderLoad();
         testSpeedUnderLoad();
         testStalling();
+        testWalkingTogether();
+        testSpeedFromSiteToSite();
+        testTrafficOnSites();
+        testExtremes();
         testRunLengthsAndEnds();
         testSites();
+        testCompetitionForSites();
         testThreadsAndImages();
         testOrderOfStorage();
         testEquilibriumOnRods();

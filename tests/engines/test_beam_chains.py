@@ -207,10 +207,10 @@ def test_what_beams_cannot_have_is_refused():
         force.addBeamChain([0, 1, 1, 2], 1.0, 1e3, 20.0, 0.0, 1.0, 2.0)
     with pytest.raises(openmm.OpenMMException, match="bending rigidity of a chain of beam elements must be positive"):
         force.addBeamChain([0, 1, 2, 3], 1.0, 1e3, 0.0, 0.0, 1.0, 2.0)
-    links = plugin.CylinderChainLinkForce()
-    links.addLink(0, 2, 0.5, 2, 4, 0.5, STRETCHING_MODELS["harmonic"], 1.0, 1.0, 0.0)
-    number = system.addForce(links)
-    refused_step(system, positions, "cannot have links, contacts, walls or linkers of this plugin as yet")
+    contacts = plugin.CylinderChainContactForce(1.0)
+    contacts.addChain([0, 2, 4], 0.2)
+    number = system.addForce(contacts)
+    refused_step(system, positions, "cannot have contacts or walls of this plugin, and their System no linkers, as yet")
     system.removeForce(number)
     system.setParticleMass(3, 0.0)
     with pytest.raises(Exception, match="Beam chain 0"):

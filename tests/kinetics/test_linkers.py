@@ -141,6 +141,8 @@ def test_bad_crosslinkers_are_refused(changed, message):
         ({"concentration": 1.0 * unit.nanometer}, "unit"),
         ({"concentration": 1.0, "bound": 1}, "give a count"),
         ({"count": 1, "volume": 0.0}, "volume must be positive"),
+        ({"concentration": 1.0, "volume": 1.0}, "a volume is that of a count .* a concentration need none"),
+        ({"anchors": [[0.0, 0.0, 0.0]], "volume": 1.0}, "a volume is that of a count .* anchors need none"),
         ({"anchors": [[0.0, 0.0]]}, "anchors must be"),
         ({"anchors": [-1]}, "cannot be negative"),
         ({"anchors": [[0.0, 0.0, np.nan]]}, "finite"),
@@ -166,6 +168,21 @@ def test_springs_much_shorter_than_the_reach_are_warned_of(rest_length, stiffnes
     messages = [str(one.message) for one in caught if one.category is LinkerWarning]
     assert len(messages) == warned
     assert not warned or ("'stiff'" in messages[0] and "reach of 60 nm" in messages[0] and "5.72 nm" in messages[0])
+    assert all(one.filename == __file__ for one in caught)
+
+
+@pytest.mark.parametrize(("energy", "share", "warned"), [(3.1, 0.0, True), (2.9, 0.0, False), (3.1, 0.1, False)])
+def test_springs_much_longer_than_the_reach_are_warned_of(energy, share, warned):
+    """Energies of a spring that is compressed by 40 nm within all of the reach, in k_BT."""
+    hands = [replace(HAND, binding_rate=0.0, reach=1.0), replace(HAND, strain_share=share)]
+    kind = Crosslinker(hands=hands, stiffness=2.0 * energy * KT / 40.0**2, rest_length=HAND.reach + 40.0)
+    filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        filaments.add_linkers(kind, count=1)
+    messages = [str(one.message) for one in caught if one.category is LinkerWarning]
+    assert len(messages) == warned
+    assert not warned or ("reach of 60 nm" in messages[0] and r"slower by exp(-3.1)" in messages[0])
     assert all(one.filename == __file__ for one in caught)
 
 
@@ -383,8 +400,7 @@ def test_forces_of_systems_survive_xml():
     assert force.getNumLinkers() == 23 and force.getNumAnchors() == 3 and force.usesPeriodicBoundaryConditions()
 
 
-@pytest.mark.parametrize("scheme", ["implicit", "midpoint"])
-def test_forces_and_energies_are_those_of_the_springs(scheme):
+def test_forces_and_energies_are_those_of_the_springs():
     filaments, context = network()
     context.getIntegrator().step(120)
     pulls = filaments.linker_pulls(context)

@@ -83,7 +83,7 @@ HAND = TableKind(
     "hand",
     (
         *(Key(name, Quantity(unit, least), None, text) for name, (unit, least, text) in _QUANTITIES.items()),
-        Key("strain_share", Number("0.5"), None, "Share of a spring's energy that binding feels, see `Hand`."),
+        Key("strain_share", Number("0.5"), None, "Share of a spring's energy that speeds up unbinding, see `Hand`."),
         Key("walks_backward", Flag(), None, "Whether a load above the stall force drives it back."),
         Key("at_end", Choice(AT_ENDS), None, "What a hand does at the end of a filament."),
         Key("binds_to", _Names(), None, "Names of filament types; all if not given."),
@@ -119,7 +119,7 @@ LINKERS = TableKind(
         Key("concentration", Quantity(units.NUMBER_DENSITY, "zero"), None, "In place of that: of unbound ones."),
         Key("volume", Quantity(units.VOLUME), None, "Of unbound ones; that of the box if not given."),
         Key("anchors", _Anchors(), None, "Points to which they are tied, one each, in place of their first hands."),
-        Key("bound", Whole(0, 10**7, "100"), 0, "How many begin with one hand bound, at random places."),
+        Key("bound", Whole(0, 10**7, "100"), 0, "How many begin with one hand bound, at random or near anchors."),
     ),
     "Crosslinkers or motors that bind to filaments, walk along them and unbind; `docs/kinetics.md` has their laws.",
     repeated=True,

@@ -30,6 +30,18 @@ ChainCouplings::ChainCouplings(ContextImpl& context, const CylinderChainDescript
             }
         }
     }
+    isOfBeam.assign(system.getNumParticles(), false);
+    isControlPoint.assign(system.getNumParticles(), false);
+    for (const BeamChain& beam : chains.getBeams())
+        for (size_t i = 0; i < beam.particles.size(); i++) {
+            const int particle = beam.particles[i];
+            isNode[particle] = isOfBeam[particle] = true;
+            isControlPoint[particle] = (i%2 == 1);
+            if (i%2 == 0 && i > 0) {
+                before[particle] = beam.particles[i-2];
+                behind[beam.particles[i-2]] = particle;
+            }
+        }
     for (ForceImpl* impl : context.getForceImpls()) {
         CylinderChainLinkForceImpl* ofLinks = dynamic_cast<CylinderChainLinkForceImpl*>(impl);
         if (ofLinks != NULL)
@@ -63,10 +75,17 @@ ChainCouplings::ChainCouplings(ContextImpl& context, const CylinderChainDescript
     }
 }
 
-void ChainCouplings::refuseAll(const string& what) const {
-    if (!links.empty() || !linkers.empty() || !walls.empty() || !contacts.empty())
-        throw OpenMMException("CylinderChainIntegrator: A System with "+what+" cannot have links, contacts, walls or "
-                "linkers of this plugin as yet: take segments, or remove them");
+void ChainCouplings::refuseBeams() const {
+    bool any = !linkers.empty();
+    for (const Walls& own : walls)
+        for (const WallParticle& particle : own.force->getWalls().particles)
+            any |= isOfBeam[particle.particle];
+    for (const Contacts& own : contacts)
+        for (const Capsule& capsule : own.force->getSearch().getSystem().capsules)
+            any |= isOfBeam[capsule.first] || (capsule.second >= 0 && isOfBeam[capsule.second]);
+    if (any)
+        throw OpenMMException("CylinderChainIntegrator: Chains of beam elements cannot have contacts or walls of this "
+                "plugin, and their System no linkers, as yet: take segments, or remove them");
 }
 
 void ChainCouplings::refuseNarrowBox(const CylinderChainDescription& chains) const {
@@ -103,9 +122,11 @@ bool ChainCouplings::canTake(const Place& place) const {
         return system.getParticleMass(particle) == 0.0 && !isNode[particle] && !system.isVirtualSite(particle);
     };
     if (!place.isOnSegment())
-        return !system.isVirtualSite(place.first);
-    return behind[place.first] == place.second || before[place.first] == place.second ||
-            (isFixed(place.first) && isFixed(place.second));
+        return !system.isVirtualSite(place.first) && !isControlPoint[place.first];
+    // The line between two nodes of a beam element is not on it.
+    const bool isOnChain = place.isOnCurve() == isOfBeam[place.first] &&
+            (behind[place.first] == place.second || before[place.first] == place.second);
+    return isOnChain || (isFixed(place.first) && isFixed(place.second));
 }
 
 void ChainCouplings::update() {

@@ -21,6 +21,33 @@ using namespace std;
 /** A site is known by a number of 32 bits, and a spacing by one of four. */
 static const double MOST_SITES = 1e9;
 static const size_t MOST_SPACINGS = 16;
+/** Numbers of linkers are below 2^31, also of those that come out of their concentration in one more step. */
+static const uint32_t LAST_NUMBER = 2000000000;
+
+/**
+ * Compute a number by which linkers are told from those of another time, or of a Context to which other things have
+ * happened: below 2^52, so that it is exact as the value of a parameter.
+ */
+static double digestOf(const cylchain::LinkerState& state) {
+    uint64_t digest = 0;
+    auto mix = [&] (uint64_t value) {
+        // One round of the generator splitmix64.
+        digest += value+0x9e3779b97f4a7c15ull;
+        digest = (digest^(digest>>30))*0xbf58476d1ce4e5b9ull;
+        digest = (digest^(digest>>27))*0x94d049bb133111ebull;
+        digest ^= digest>>31;
+    };
+    mix(state.steps);
+    mix(state.nextNumber);
+    // Before the first step, there are no counts of events.
+    for (size_t type = 0; type < state.events.size(); type++)
+        if (state.events[type].bindings+state.events[type].unbindings > 0) {
+            mix(type);
+            mix(state.events[type].bindings);
+            mix(state.events[type].unbindings);
+        }
+    return (double) (digest>>12);
+}
 
 static void require(bool condition, const string& message) {
     if (!condition)
@@ -93,7 +120,10 @@ void CylinderChainBindingForceImpl::initialize(ContextImpl& context) {
     }
     state = owner.getState();
     checkLinkers(state.linkers, system, lengths);
-    seed = (uint32_t) (owner.getRandomNumberSeed() == 0 ? osrngseed() : owner.getRandomNumberSeed());
+    const CylinderChainIntegrator* integrator = findIntegrator();
+    seed = (uint32_t) (integrator == NULL ? owner.getRandomNumberSeed() : integrator->getRandomNumberSeed());
+    if (seed == 0)
+        seed = (uint32_t) osrngseed();
     linkerKernel = context.getPlatform().createKernel(UpdateCylinderChainLinkersKernel::Name(), context);
     linkerKernel.getAs<UpdateCylinderChainLinkersKernel>().initialize(system, description.getChains(),
             owner.usesPeriodicBoundaryConditions(), nearestParticles);
@@ -114,14 +144,17 @@ void CylinderChainBindingForceImpl::checkReaches(ContextImpl& context) const {
                 " must be less than half of the periodic box, which is "+to_string(width)+" nm wide");
 }
 
+const CylinderChainIntegrator* CylinderChainBindingForceImpl::findIntegrator() const {
+    return dynamic_cast<const CylinderChainIntegrator*>(&context->getIntegrator());
+}
+
 double CylinderChainBindingForceImpl::getTemperature() const {
-    const CylinderChainIntegrator* integrator = dynamic_cast<const CylinderChainIntegrator*>(
-            &context->getIntegrator());
+    const CylinderChainIntegrator* integrator = findIntegrator();
     return integrator == NULL ? owner.getTemperature() : integrator->getTemperature();
 }
 
 map<string, double> CylinderChainBindingForceImpl::getDefaultParameters() {
-    return {{parameter, (double) state.steps}};
+    return {{parameter, digestOf(state)}};
 }
 
 vector<string> CylinderChainBindingForceImpl::getKernelNames() {
@@ -129,11 +162,11 @@ vector<string> CylinderChainBindingForceImpl::getKernelNames() {
 }
 
 void CylinderChainBindingForceImpl::follow() const {
-    if (context->getParameter(parameter) == (double) state.steps)
+    if (context->getParameter(parameter) == digestOf(state))
         return;
     throw CylinderChainException(CylinderChainException::UnknownLinks, {},
             "CylinderChainBindingForce: Where the linkers of this Context are is not known: it has got a State or "
-            "checkpoint of another time that does not say it. Give it the linkers that belong to it by "
+            "checkpoint of another time, or of another Context, that does not say it. Give it the linkers that belong to it by "
             "setLinkersInContext(), or Filaments.set_linkers() in Python. The checkpoints of a "
             "CylinderChainIntegrator, and States that hold its parameters (getState(integratorParameters=True)), "
             "restore linkers themselves");
@@ -141,7 +174,7 @@ void CylinderChainBindingForceImpl::follow() const {
 
 void CylinderChainBindingForceImpl::accept() {
     upToDate = false;
-    context->setParameter(parameter, (double) state.steps);
+    context->setParameter(parameter, digestOf(state));
 }
 
 void CylinderChainBindingForceImpl::updateContextState(ContextImpl& context, bool& forcesInvalid) {
@@ -150,11 +183,16 @@ void CylinderChainBindingForceImpl::updateContextState(ContextImpl& context, boo
     if (!(stepSize > 0))
         return;
     checkReaches(context);
+    require(state.nextNumber <= LAST_NUMBER, "Two thousand million linkers have come out of their concentrations, and "
+            "there are no more numbers for others. Give them new ones, from zero on: read them by "
+            "getLinkersInContext(), and set them by setLinkersInContext()");
     const bool pulled = !getLinks().empty();
     const long long failed = linkerKernel.getAs<UpdateCylinderChainLinkersKernel>().execute(context, state,
             BOLTZ*getTemperature(), stepSize, seed, number, links);
     accept();
     upToDate = true;
+    require(failed >= -1, "More than ten million linkers of type "+to_string(-2-failed)+" come out of their "
+            "concentration within a step: use a smaller step, or look at the concentration and the rates");
     require(failed == -1, "The hands of linker "+to_string(failed)+" bind, unbind or walk more than a hundred thousand "
             "times within a step: use a smaller step, or look at the rates");
     // An implicit step computes the forces itself.

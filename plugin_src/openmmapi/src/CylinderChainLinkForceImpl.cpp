@@ -19,6 +19,7 @@ CylinderChainLinkForceImpl::CylinderChainLinkForceImpl(const CylinderChainLinkFo
 void CylinderChainLinkForceImpl::initialize(ContextImpl& context) {
     this->context = &context;
     const System& system = context.getSystem();
+    places.reset(new PlaceResolver(system));
 
     // Each such Force of a System has a parameter of its own.
 
@@ -51,7 +52,7 @@ vector<string> CylinderChainLinkForceImpl::getKernelNames() {
 
 void CylinderChainLinkForceImpl::check(const cylchain::LinkChange& change) const {
     for (const cylchain::LinkEntry& entry : change.put)
-        checkLink(entry.link, context->getSystem());
+        checkLink(entry.link, *places);
 }
 
 void CylinderChainLinkForceImpl::follow() {
@@ -105,13 +106,12 @@ void CylinderChainLinkForceImpl::setTable(const cylchain::LinkTable& table) {
 const vector<cylchain::Link>& CylinderChainLinkForceImpl::getLinks() {
     follow();
     if (!upToDate) {
-        const System& system = context->getSystem();
         links.clear();
         for (const cylchain::LinkEntry& entry : history.getTable().getEntries())
             if (entry.active) {
                 links.push_back(entry.link);
-                links.back().first = resolvePlace(entry.link.first, system);
-                links.back().second = resolvePlace(entry.link.second, system);
+                links.back().first = places->resolve(entry.link.first);
+                links.back().second = places->resolve(entry.link.second);
             }
         upToDate = true;
     }

@@ -49,7 +49,7 @@ CylinderChainStepper::CylinderChainStepper(ContextImpl& context, const CylinderC
     if (isImplicit(static_cast<Scheme>(integrator.getScheme())))
         couplings.refuseNarrowBox(chains);
     if (!chains.getBeams().empty())
-        couplings.refuseAll("chains of beam elements");
+        couplings.refuseBeams();
     explicitWork.initialize(findMobileParticles(chains, others));
 }
 
@@ -245,12 +245,13 @@ void CylinderChainStepper::step(uint64_t seed, int level, uint64_t step, bool fo
             getKernel().displaceCoupledChains(context, settings, coupled);
     if (found.chain != -1 && found.coupling.kind != BrokenCoupling::None && areForcesFinite())
         reportCoupling(found.coupling, coupled, settings);
-    if (found.chain >= (int) chains.getChains().size() && coupled.empty())
-        throw OpenMMException("Beam chain "+to_string(found.chain-chains.getChains().size())+" has blown up in step "+
+    const int numChains = chains.getChains().size(), numFilaments = numChains+chains.getBeams().size();
+    if (found.chain >= numChains && found.chain < numFilaments)
+        throw OpenMMException("Beam chain "+to_string(found.chain-numChains)+" has blown up in step "+
                 to_string(settings.step+1)+": its equations cannot be solved. Positions are those before this step. "
                 "Use a smaller time step, or look for excessive forces");
-    if (found.chain >= (int) chains.getChains().size())
-        reportParticle(coupled.particles[found.chain-chains.getChains().size()].particle, settings);
+    if (found.chain >= numFilaments)
+        reportParticle(coupled.particles[found.chain-numFilaments].particle, settings);
     if (found.chain != -1)
         reportInstability(found.chain, settings);
     divided += found.divided;
@@ -387,12 +388,15 @@ string CylinderChainStepper::describeLink(const BrokenCoupling& coupling, const 
 
 void CylinderChainStepper::reportCoupling(const BrokenCoupling& coupling, const CoupledForces& coupled,
         const StepSettings& settings) {
-    const int numChains = chains.getChains().size();
-    auto isSegment = [&] (const BrokenCoupling::Place& place) {return place.chain >= 0 && place.chain < numChains;};
+    const int numChains = chains.getChains().size(), numFilaments = numChains+chains.getBeams().size();
+    auto isSegment = [&] (const BrokenCoupling::Place& place) {return place.chain >= 0 && place.chain < numFilaments;};
+    auto isElement = [&] (const BrokenCoupling::Place& place) {return isSegment(place) && place.chain >= numChains;};
     auto particleOf = [&] (const BrokenCoupling::Place& place) {
-        return place.chain < numChains ? -1 : coupled.particles[place.chain-numChains].particle;
+        return place.chain < numFilaments ? -1 : coupled.particles[place.chain-numFilaments].particle;
     };
     auto describe = [&] (const BrokenCoupling::Place& place) {
+        if (isElement(place))
+            return "element "+to_string(place.segment)+" of beam chain "+to_string(place.chain-numChains);
         if (isSegment(place))
             return "segment "+to_string(place.segment)+" of chain "+to_string(place.chain);
         const int particle = particleOf(place);
@@ -411,7 +415,10 @@ void CylinderChainStepper::reportCoupling(const BrokenCoupling& coupling, const 
     if (isSegment(first)) {
         place.chain = first.chain;
         place.segment = first.segment;
-        message << "Chain " << first.chain << " has blown up at segment " << first.segment;
+        if (isElement(first))
+            message << "Beam chain " << first.chain-numChains << " has blown up at element " << first.segment;
+        else
+            message << "Chain " << first.chain << " has blown up at segment " << first.segment;
     }
     else
         message << "Particle " << place.particle << ", outside chains, has blown up";

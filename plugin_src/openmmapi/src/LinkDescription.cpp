@@ -1,6 +1,5 @@
 #include "openmm/internal/LinkDescription.h"
 #include "openmm/OpenMMException.h"
-#include "openmm/VirtualSite.h"
 #include <algorithm>
 #include <cmath>
 #include <climits>
@@ -109,30 +108,20 @@ void checkLink(const Link& link) {
         refuseLink(link, "has a maximum extension that is not positive and finite");
 }
 
-void checkLink(const Link& link, const System& system) {
+void checkLink(const Link& link, const PlaceResolver& places) {
+    const System& system = places.getSystem();
     for (const Place* place : {&link.first, &link.second})
-        for (int particle : {place->first, place->second})
+        for (int particle : {place->first, place->second}) {
             if (particle >= system.getNumParticles())
                 refuseLink(link, "has particle "+to_string(particle)+", which does not exist; the System has "+
                         to_string(system.getNumParticles()));
-    if (areSame(resolvePlace(link.first, system), resolvePlace(link.second, system)))
+            if (particle >= 0 && places.isControlPoint(particle))
+                refuseLink(link, "has particle "+to_string(particle)+", a control point of beam elements, which is on no "
+                        "curve: take places between nodes");
+        }
+    if (areSame(places.resolve(link.first), places.resolve(link.second)))
         refuseLink(link, "joins a place to itself, "+describePlaces(link)+
                 ": one is a virtual site at the other");
-}
-
-Place resolvePlace(const Place& place, const System& system) {
-    if (place.isPoint() || place.isOnSegment() || !system.isVirtualSite(place.first))
-        return place;
-    const TwoParticleAverageSite* site = dynamic_cast<const TwoParticleAverageSite*>(
-            &system.getVirtualSite(place.first));
-    if (site == NULL)
-        return place;
-    const int first = site->getParticle(0), second = site->getParticle(1);
-    const double fraction = site->getWeight(1);
-    const bool between = (fabs(site->getWeight(0)+fraction-1) < 1e-12 && fraction >= 0 && fraction <= 1);
-    if (!between || first == second || system.isVirtualSite(first) || system.isVirtualSite(second))
-        return place;
-    return makePlace(first, second, fraction);
 }
 
 LinkTable makeTable(const vector<int>& numbers, const LinkColumns& columns, const vector<int>& active,

@@ -59,7 +59,8 @@ public:
         return randomNumberSeed;
     }
     /**
-     * Set the random number seed.  With 0, each Context chooses one.
+     * Set the random number seed.  With 0, each Context chooses one.  That of a CylinderChainIntegrator counts instead,
+     * so that Contexts of one System whose integrators have other seeds have other random numbers.
      */
     void setRandomNumberSeed(int seed) {
         randomNumberSeed = seed;

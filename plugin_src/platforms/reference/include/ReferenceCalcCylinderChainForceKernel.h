@@ -46,6 +46,12 @@ public:
         return chains->getChains();
     }
     /**
+     * Get the chains of beam elements.
+     */
+    const std::vector<cylchain::BeamChain>& getBeams() const {
+        return chains->getBeams();
+    }
+    /**
      * Get the box in which segments are taken as their shortest images, as nine numbers, or NULL if they are taken as
      * they are.
      */

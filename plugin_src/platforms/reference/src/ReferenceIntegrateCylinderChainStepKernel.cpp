@@ -85,8 +85,10 @@ Instability ReferenceIntegrateCylinderChainStepKernel::displaceCoupledChains(Con
         const StepSettings& settings, const CoupledForces& coupled) {
     ReferencePlatform::PlatformData& data = extractData(context);
     const ChainEngine& engine = chainKernel->getEngine();
+    const BeamEngine& beams = chainKernel->getBeamEngine();
     if (!network || versionOfNetwork != chainKernel->getEngineVersion()) {
-        network.reset(new NetworkStep(engine, chainKernel->getChains(), context.getSystem().getNumParticles()));
+        network.reset(new NetworkStep(engine, chainKernel->getChains(), beams, chainKernel->getBeams(),
+                context.getSystem().getNumParticles()));
         versionOfNetwork = chainKernel->getEngineVersion();
     }
     network->setForces(coupled, &data.periodicBoxVectors[0][0]);
@@ -100,6 +102,9 @@ Instability ReferenceIntegrateCylinderChainStepKernel::displaceCoupledChains(Con
     const vector<int> packs = engine.getPacksOfStep(settings);
     for (int pack : packs)
         for (int particle : engine.getParticles(pack))
+            findNewPosition(context, particle, settings.stepSize);
+    for (int pack = 0; pack < beams.getNumPacks(); pack++)
+        for (int particle : beams.getParticles(pack))
             findNewPosition(context, particle, settings.stepSize);
     mixedChains = engine.getNumMixedChains(packs);
     return result;

@@ -33,9 +33,9 @@ public:
      */
     void refuseNarrowBox(const CylinderChainDescription& chains) const;
     /**
-     * Throw an exception if there is any coupling, because what there is in the Context cannot have one.
+     * Throw an exception if there are couplings that chains of beam elements, which the Context has, cannot have.
      */
-    void refuseAll(const std::string& what) const;
+    void refuseBeams() const;
     /**
      * While an object of this class exists, the Forces that implicit steps take contribute nothing.
      */
@@ -81,10 +81,10 @@ private:
     ContextImpl& context;
     const System& system;
     const OtherParticles& others;
-    // The nodes before and behind a particle in its chain, or -1.
+    // The nodes before and behind a particle in its chain, or -1, and which particles are nodes or control points.
 
     std::vector<int> before, behind;
-    std::vector<bool> isNode;
+    std::vector<bool> isNode, isOfBeam, isControlPoint;
     std::vector<Links> links;
     std::vector<Linkers> linkers;
     std::vector<Contacts> contacts;

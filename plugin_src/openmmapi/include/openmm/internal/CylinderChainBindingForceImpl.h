@@ -13,11 +13,14 @@
 
 namespace OpenMM {
 
+class CylinderChainIntegrator;
+
 /**
  * This is the internal implementation of CylinderChainBindingForce.  It holds the linkers of a Context.
  *
- * A parameter of the Context has the number of steps that they have taken.  Where that is another one, because the
- * Context has got a State or a checkpoint that does not say where linkers were, there is nothing to go on with.
+ * A parameter of the Context has a digest of how many steps they have taken, and how often they have bound and unbound.
+ * Where that is another one, because the Context has got a State or a checkpoint that does not say where linkers were,
+ * there is nothing to go on with.
  */
 class CylinderChainBindingForceImpl : public StepForceImpl {
 public:
@@ -79,6 +82,10 @@ private:
      * Throw an exception if a hand reaches beyond half of the periodic box, which may have shrunk.
      */
     void checkReaches(ContextImpl& context) const;
+    /**
+     * Find the integrator of the Context, NULL if it is none of this plugin.
+     */
+    const CylinderChainIntegrator* findIntegrator() const;
     double getTemperature() const;
     const CylinderChainBindingForce& owner;
     ContextImpl* context;

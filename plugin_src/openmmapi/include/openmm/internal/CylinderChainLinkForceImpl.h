@@ -4,8 +4,10 @@
 #include "couplings/LinkTable.h"
 #include "openmm/CylinderChainLinkForce.h"
 #include "openmm/Kernel.h"
+#include "openmm/internal/PlaceResolver.h"
 #include "openmm/internal/StepForceImpl.h"
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -29,7 +31,8 @@ public:
     std::vector<std::string> getKernelNames();
     /**
      * Get the links of the Context that are switched on, in the order of their numbers.  Places at virtual sites
-     * between two particles are those between these particles.  An exception is thrown if the links are not known.
+     * between two particles are those between these particles, and those between the nodes of a beam element are on its
+     * curve.  An exception is thrown if the links are not known.
      */
     const std::vector<cylchain::Link>& getLinks();
     /**
@@ -67,6 +70,7 @@ private:
     void reportLink(int index);
     const CylinderChainLinkForce& owner;
     ContextImpl* context;
+    std::unique_ptr<PlaceResolver> places;
     Kernel kernel;
     std::string parameter;
     cylchain::LinkHistory history;

@@ -2,7 +2,7 @@
 #define OPENMM_LINKDESCRIPTION_H_
 
 #include "couplings/LinkTable.h"
-#include "openmm/System.h"
+#include "openmm/internal/PlaceResolver.h"
 #include <cstddef>
 #include <string>
 #include <vector>
@@ -41,12 +41,7 @@ void checkLink(const cylchain::Link& link);
 /**
  * Throw an exception if a link does not fit a System.
  */
-void checkLink(const cylchain::Link& link, const System& system);
-
-/**
- * Find the place between the parents of a virtual site, or return a place unchanged if it is at no such site.
- */
-cylchain::Place resolvePlace(const cylchain::Place& place, const System& system);
+void checkLink(const cylchain::Link& link, const PlaceResolver& places);
 
 /**
  * Put a table together; an exception is thrown if something is wrong with it.
