@@ -1,6 +1,7 @@
 #include "beams/BeamEngine.h"
 #include "beams/BeamPack.h"
 #include "dynamics/PackPlaces.h"
+#include "lanes/InstructionSet.h"
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -16,12 +17,17 @@ using namespace std;
 static const double LARGEST_FILLING = 0.2;
 
 static const BeamKernels& kernels() {
-#ifdef CYLCHAIN_X86_64
-    static const string set = ChainEngine::getInstructionSet();
-    return set == "avx512" ? avx512BeamKernels() : set == "avx2" ? avx2BeamKernels() : baselineBeamKernels();
-#else
-    return baselineBeamKernels();
-#endif
+    const InstructionSet best = instructionSet();
+    if constexpr (HAS_AVX512)
+        if (best == InstructionSet::Avx512)
+            return avx512BeamKernels();
+    if constexpr (HAS_AVX2)
+        if (best == InstructionSet::Avx2)
+            return avx2BeamKernels();
+    if constexpr (HAS_BASELINE)
+        if (best == InstructionSet::Baseline)
+            return baselineBeamKernels();
+    noOtherEntry();
 }
 
 static void check(const BeamChain& chain, int index) {

@@ -1,4 +1,3 @@
-#ifdef CYLCHAIN_X86_64
 #define CYLCHAIN_LOOPS avx2
 #define CYLCHAIN_LANES 4
 #include "beams/BeamLoops-inl.h"
@@ -8,4 +7,3 @@ const cylchain::BeamKernels& cylchain::avx2BeamKernels() {
             avx2::newStepOfBeams};
     return kernels;
 }
-#endif

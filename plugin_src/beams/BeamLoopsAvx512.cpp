@@ -1,4 +1,3 @@
-#ifdef CYLCHAIN_X86_64
 #define CYLCHAIN_LOOPS avx512
 #define CYLCHAIN_LANES 8
 #include "beams/BeamLoops-inl.h"
@@ -8,4 +7,3 @@ const cylchain::BeamKernels& cylchain::avx512BeamKernels() {
             avx512::newStepOfBeams};
     return kernels;
 }
-#endif

@@ -46,10 +46,8 @@ struct BeamKernels {
 };
 
 const BeamKernels& baselineBeamKernels();
-#ifdef CYLCHAIN_X86_64
 const BeamKernels& avx2BeamKernels();
 const BeamKernels& avx512BeamKernels();
-#endif
 
 } // namespace cylchain
 

@@ -1,4 +1,3 @@
-#ifdef CYLCHAIN_X86_64
 #define CYLCHAIN_LOOPS avx2
 #define CYLCHAIN_LOOPS_NAME "avx2"
 #define CYLCHAIN_LANES 8
@@ -7,4 +6,3 @@
 const cylchain::CandidateKernels& cylchain::avx2CandidateKernels() {
     return avx2::KERNELS;
 }
-#endif

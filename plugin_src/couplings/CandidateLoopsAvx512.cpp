@@ -1,4 +1,3 @@
-#ifdef CYLCHAIN_X86_64
 #define CYLCHAIN_LOOPS avx512
 #define CYLCHAIN_LOOPS_NAME "avx512"
 #define CYLCHAIN_LANES 16
@@ -7,4 +6,3 @@
 const cylchain::CandidateKernels& cylchain::avx512CandidateKernels() {
     return avx512::KERNELS;
 }
-#endif

@@ -4,10 +4,10 @@
 #include "dynamics/ModePacks.h"
 #include "dynamics/PackStep.h"
 #include "dynamics/PackPlaces.h"
+#include "lanes/InstructionSet.h"
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <cstdlib>
 #include <mutex>
 #include <numeric>
 #include <optional>
@@ -23,16 +23,17 @@ namespace {
 const double LARGEST_FILLING = 0.2;
 
 const ChainKernels& bestKernels() {
-#ifdef CYLCHAIN_X86_64
-    // CYLCHAIN_INSTRUCTION_SET names a lesser instruction set to use, for tests and comparisons.
-    const char* chosen = getenv("CYLCHAIN_INSTRUCTION_SET");
-    const string limit = (chosen == NULL ? "avx512" : chosen);
-    if (limit == "avx512" && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq"))
-        return avx512Kernels();
-    if (limit != "baseline" && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
-        return avx2Kernels();
-#endif
-    return baselineKernels();
+    const InstructionSet best = instructionSet();
+    if constexpr (HAS_AVX512)
+        if (best == InstructionSet::Avx512)
+            return avx512Kernels();
+    if constexpr (HAS_AVX2)
+        if (best == InstructionSet::Avx2)
+            return avx2Kernels();
+    if constexpr (HAS_BASELINE)
+        if (best == InstructionSet::Baseline)
+            return baselineKernels();
+    noOtherEntry();
 }
 
 const ChainKernels& kernels() {

@@ -1,4 +1,3 @@
-#ifdef CYLCHAIN_X86_64
 #define CYLCHAIN_LOOPS avx2
 #define CYLCHAIN_LANES 4
 #include "dynamics/ChainLoops-inl.h"
@@ -9,4 +8,3 @@ const cylchain::ChainKernels& cylchain::avx2Kernels() {
             avx2::stepOfModesOfPack, avx2::transformCosinesOf, avx2WideKernels()};
     return kernels;
 }
-#endif

@@ -1,4 +1,3 @@
-#ifdef CYLCHAIN_X86_64
 #define CYLCHAIN_SINGLE_PRECISION
 #define CYLCHAIN_LOOPS avx2_single
 #define CYLCHAIN_LANES 8
@@ -9,4 +8,3 @@ const cylchain::WideKernels& cylchain::avx2WideKernels() {
             avx2_single::drawNormalsOf, avx2_single::stepOfModesOfPack, avx2_single::transformCosinesOf};
     return kernels;
 }
-#endif

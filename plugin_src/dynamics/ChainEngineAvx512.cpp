@@ -1,7 +1,8 @@
-#ifdef CYLCHAIN_X86_64
 #define CYLCHAIN_LOOPS avx512
 #define CYLCHAIN_LANES 8
+#if CYLCHAIN_HAS_AVX2
 #define CYLCHAIN_SMALL_PACKS avx2Kernels
+#endif
 #include "dynamics/ChainLoops-inl.h"
 
 const cylchain::ChainKernels& cylchain::avx512Kernels() {
@@ -10,4 +11,3 @@ const cylchain::ChainKernels& cylchain::avx512Kernels() {
             avx512::stepOfModesOfPack, avx512::transformCosinesOf, avx512WideKernels()};
     return kernels;
 }
-#endif

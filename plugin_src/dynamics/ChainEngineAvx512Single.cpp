@@ -1,4 +1,3 @@
-#ifdef CYLCHAIN_X86_64
 #define CYLCHAIN_SINGLE_PRECISION
 #define CYLCHAIN_LOOPS avx512_single
 #define CYLCHAIN_LANES 16
@@ -9,4 +8,3 @@ const cylchain::WideKernels& cylchain::avx512WideKernels() {
             avx512_single::drawNormalsOf, avx512_single::stepOfModesOfPack, avx512_single::transformCosinesOf};
     return kernels;
 }
-#endif

@@ -39,6 +39,7 @@ typedef ChainPack<Scalar> Pack;
 #include "dynamics/ImplicitStages-inl.h"
 #include "dynamics/ImplicitNoise-inl.h"
 #include "dynamics/ImplicitPositions-inl.h"
+#include "dynamics/SegmentEquations-inl.h"
 #include "dynamics/ImplicitEquations-inl.h"
 #include "dynamics/MetricForces-inl.h"
 #include "dynamics/ImplicitTensions-inl.h"
@@ -54,7 +55,7 @@ typedef ChainPack<Scalar> Pack;
 /** All lanes there are, and open chains alone: what is not in single precision need not be compiled for it. */
 Instability stepOfPack(const Pack& pack, const double* positions, const double* forces, const double* box,
             const StepSettings& settings, double* displacements) {
-    return stepPackImplicitly<CYLCHAIN_LANES, false>(pack, positions, forces, box, settings, displacements);
+    return stepPackImplicitly<CYLCHAIN_LANES>(pack, positions, forces, box, settings, displacements);
 }
 
 PackStep* createStepOfPack(const Pack& pack) {
@@ -92,8 +93,7 @@ template <int W> Instability stepPackAs(const Pack& pack, const double* position
     if constexpr (isSmall<W>())
         return CYLCHAIN_SMALL_PACKS().step(pack, positions, forces, box, settings, displacements);
     else if (isImplicit(settings.scheme))
-        return pack.closed ? stepPackImplicitly<W, true>(pack, positions, forces, box, settings, displacements) :
-                stepPackImplicitly<W, false>(pack, positions, forces, box, settings, displacements);
+        return stepPackImplicitly<W>(pack, positions, forces, box, settings, displacements);
     else
         return stepPack<W>(pack, positions, forces, box, settings, displacements);
 }

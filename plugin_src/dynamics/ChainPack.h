@@ -119,12 +119,10 @@ struct ChainKernels {
 
 const ChainKernels& baselineKernels();
 const WideKernels& baselineWideKernels();
-#ifdef CYLCHAIN_X86_64
 const ChainKernels& avx2Kernels();
 const WideKernels& avx2WideKernels();
 const ChainKernels& avx512Kernels();
 const WideKernels& avx512WideKernels();
-#endif
 
 } // namespace cylchain
 

@@ -52,13 +52,24 @@ template <int W> void moveStart(const Pack& pack, const StepStart<W>& start,
     }
 }
 
+/** Take one step of the scheme that begins from somewhere, and return the number of iterations: see ImplicitStep. */
+template <int W> using TakeStep = int (*)(const Pack& pack, const StepSettings& settings, const StepStart<W>& start,
+        const Vector<typename Lanes<W>::Type>* forces, Vector<typename Lanes<W>::Type>* y, bool* failed);
+
+template <int W, bool CLOSED> int takeImplicitStep(const Pack& pack, const StepSettings& settings,
+            const StepStart<W>& start, const Vector<typename Lanes<W>::Type>* forces,
+            Vector<typename Lanes<W>::Type>* y, bool* failed) {
+    static thread_local typename ImplicitStep<W, CLOSED>::Memory memory;
+    return ImplicitStep<W, CLOSED>(pack, settings, start, memory).take(forces, y, failed);
+}
+
 /**
  * Advance the lanes that failed, from the start, by the same time in more and more parts. They follow the Brownian path
  * of the step, so that what failed is not left out of the noise.
  */
-template <int W, bool CLOSED> void divideStep(const Pack& pack, const StepStart<W>& start,
+template <int W> void divideStep(TakeStep<W> takeStep, const Pack& pack, const StepStart<W>& start,
             const Vector<typename Lanes<W>::Type>* f, StepSettings settings, Vector<typename Lanes<W>::Type>* y,
-            bool* failed, typename ImplicitStep<W, CLOSED>::Memory& memory) {
+            bool* failed) {
     typedef typename Lanes<W>::Type Real;
     static thread_local Scratch vectors, tethers;
     const double h = settings.stepSize;
@@ -79,7 +90,7 @@ template <int W, bool CLOSED> void divideStep(const Pack& pack, const StepStart<
         for (int part = 0; part < parts && hope; part++) {
             settings.step = (step<<division)+part;
             moveStart<W>(pack, start, moved, settings.flow.present, from);
-            ImplicitStep<W, CLOSED>(pack, settings, from, memory).take(f, change, failedPart);
+            takeStep(pack, settings, from, f, change, failedPart);
             for (int node = 0; node < n; node++)
                 moved[node] = moved[node]+change[node];
             mean.add(part, parts, failed);
@@ -107,8 +118,8 @@ template <int W, bool CLOSED> void divideStep(const Pack& pack, const StepStart<
 }
 
 /** Bring what a step begins with into lanes. */
-template <int W> void gatherStepStart(const Pack& pack, const double* positions, const double* box, bool needsNodes,
-            const StepStart<W>& start) {
+template <int W> __attribute__((noinline)) void gatherStepStart(const Pack& pack, const double* positions,
+            const double* box, bool needsNodes, const StepStart<W>& start) {
     if (needsNodes)
         gatherStart<W>(pack, positions, box, start.nodes);
     gatherSegments<W>(pack, positions, box, start.segments);
@@ -119,10 +130,9 @@ template <int W> void gatherStepStart(const Pack& pack, const double* positions,
     }
 }
 
-template <int W, bool CLOSED> Instability stepPackImplicitly(const Pack& pack, const double* positions,
-            const double* forces, const double* box, const StepSettings& settings, double* displacements) {
+template <int W> Instability stepPackImplicitly(const Pack& pack, const double* positions, const double* forces,
+            const double* box, const StepSettings& settings, double* displacements) {
     typedef typename Lanes<W>::Type Real;
-    static thread_local typename ImplicitStep<W, CLOSED>::Memory memory;
     static thread_local Scratch vectors, tethers;
     const int n = pack.nodes;
     Vector<Real>* f = vectors.reserve<Vector<Real> >(4*n);
@@ -132,11 +142,16 @@ template <int W, bool CLOSED> Instability stepPackImplicitly(const Pack& pack, c
     gatherForces<W>(pack, forces, f);
     bool failed[W];
     Instability result;
-    result.iterations = ImplicitStep<W, CLOSED>(pack, settings, start, memory).take(f, y, failed);
+    TakeStep<W> takeStep = takeImplicitStep<W, false>;
+#ifndef CYLCHAIN_SINGLE_PRECISION
+    if (pack.closed)
+        takeStep = takeImplicitStep<W, true>;
+#endif
+    result.iterations = takeStep(pack, settings, start, f, y, failed);
     for (int i = 0; i < W; i++)
         result.divided += failed[i];
     if (result.divided > 0 && settings.mayDivide)
-        divideStep<W, CLOSED>(pack, start, f, settings, y, failed, memory);
+        divideStep<W>(takeStep, pack, start, f, settings, y, failed);
     scatter<W>(pack, y, 1, displacements);
     for (int i = 0; i < W; i++)
         if (failed[i] && result.chain < 0)

@@ -9,7 +9,7 @@ const Scalar NODE_TOLERANCE = 0.1;
 /** The tolerances of its stages over those of scheme "implicit". */
 const Scalar TOLERANCE_OF_STAGES = 0.3;
 
-template <int W, bool CLOSED> class ImplicitConvergence {
+template <int W> class ImplicitConvergence {
     typedef typename Lanes<W>::Type Real;
     typedef Vector<Real> Vec;
 public:
@@ -19,7 +19,7 @@ public:
     /** Whether any lane has not converged; those that have are taken out. NaN counts as not converged. */
     bool anyUnfinished(Real& active) const {
         Real excess = Real{};
-        const Real perEnergy = (CLOSED ? splat<Real>(1) : 1-loaded<Real>(pack.free, 0))*(1/(kT+TINY));
+        const Real perEnergy = (pack.closed ? splat<Real>(1) : 1-loaded<Real>(pack.free, 0))*(1/(kT+TINY));
         const Scalar tighter = step.twoStages ? 1/(TOLERANCE_OF_STAGES*TOLERANCE_OF_STAGES) : 1;
         const Scalar tolerance = Elements<W>::limitsOf(pack).tolerance;
         const Scalar ofSegments = tolerance*tolerance;

@@ -4,7 +4,7 @@
  * New nodes that no linear equations give: where an iteration begins, and lengths after segments have turned.
  */
 
-template <int W, bool CLOSED> class ImplicitPositions {
+template <int W> class ImplicitPositions {
     typedef typename Lanes<W>::Type Real;
     typedef Vector<Real> Vec;
 public:
@@ -15,7 +15,7 @@ public:
      * Begin the second stage where the noise of the first would have taken chains, had it been that of the whole step.
      */
     void extrapolate(Vec* y) const {
-        const Real scale = splat<Real>(1/NOISE_OF_FIRST), free = CLOSED ? Real{} : loaded<Real>(pack.free, 0);
+        const Real scale = splat<Real>(1/NOISE_OF_FIRST), free = pack.closed ? Real{} : loaded<Real>(pack.free, 0);
         Vec end = y[0];
         for (int node = 0; node < n; node++) {
             const Vec found = y[node];
@@ -25,7 +25,7 @@ public:
                 rest[node] = rest[node]+segments[node-1].difference;
             end = found;
         }
-        if (!CLOSED)
+        if (!pack.closed)
             rebuild(y, [&] (int s, const Vec&) {return root(rest[s+1].dot(rest[s+1]));});
     }
     /**

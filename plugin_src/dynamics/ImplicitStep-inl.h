@@ -40,7 +40,8 @@ public:
      */
     ImplicitStep(const Pack& pack, const StepSettings& settings, const StepStart<W>& start, Memory& memory) :
             step(pack, settings, start, memory.state), stages(step), noise(step), positions(step),
-            equations(step, memory.equations), metricForces(step), tensions(step, equations), convergence(step) {
+            equations(step, memory.equations), metricForces(step),
+            tensions(step, equations.getEquationsOfSegments()), convergence(step) {
     }
     /**
      * Take one step.
@@ -64,7 +65,7 @@ public:
         return iterations;
     }
     /** Describe the start of a step, and draw its noise. */
-    void begin(const Vec* forces, Vec* y) {
+    __attribute__((noinline)) void begin(const Vec* forces, Vec* y) {
         for (int node = 0; node < step.n; node++) {
             y[node] = Vec {};
             step.external[node] = forces[node];
@@ -96,8 +97,11 @@ public:
         if (iteration > 0 || step.stage == Stage::Second) {
             if (step.settings.segmentForces == NULL || step.stage == Stage::First)
                 equations.refine();
-            else
-                tensions.refineAndRecord(y, active);
+            else {
+                tensions.beginRefinement();
+                equations.refine();
+                tensions.record(y, active);
+            }
         }
         else if (step.settings.kT > 0) {
             if (metricForces.stiffenTautSegments()) {
@@ -120,7 +124,7 @@ public:
         const bool needsThree = step.stage == Stage::Only || step.settings.flow.varies();
         return needsThree ? 3 : step.stage == Stage::First ? 2 : 1;
     }
-    const ImplicitConvergence<W, CLOSED>& getConvergence() const {
+    const ImplicitConvergence<W>& getConvergence() const {
         return convergence;
     }
     ImplicitEquations<W, CLOSED>& getEquations() {
@@ -133,11 +137,11 @@ private:
     ImplicitState<W> step;
     ImplicitStages<W> stages;
     ImplicitNoise<W> noise;
-    ImplicitPositions<W, CLOSED> positions;
+    ImplicitPositions<W> positions;
     ImplicitEquations<W, CLOSED> equations;
-    MetricForces<W, CLOSED> metricForces;
-    ImplicitTensions<W, CLOSED> tensions;
-    ImplicitConvergence<W, CLOSED> convergence;
+    MetricForces<W> metricForces;
+    ImplicitTensions<W> tensions;
+    ImplicitConvergence<W> convergence;
 
     /**
      * Solve the equations of a stage by Newton's method; returns the number of iterations, and marks lanes that fail.

@@ -7,35 +7,45 @@
  * to zero but for rounding. Each segment and each joint is added to empty equations once more, as in the elimination.
  */
 
-template <int W, bool CLOSED> class ImplicitTensions {
+template <int W> class ImplicitTensions {
     typedef typename Lanes<W>::Type Real;
     typedef Vector<Real> Vec;
-    typedef ImplicitEquations<W, CLOSED> Equations;
-    typedef typename Equations::Row Row;
-    typedef typename Equations::Geometry Geometry;
+    typedef BandRow<Real, false> Row;
+    typedef typename SegmentEquations<W>::Geometry Geometry;
+    /** The equations of tensions are left as they are. */
+    struct NoBand {
+        CYLCHAIN_INLINE void setTension(int, const Vec&, Real, Real) {
+        }
+    };
 public:
-    ImplicitTensions(const ImplicitState<W>& step, Equations& equations) : step(step), equations(equations),
-            pack(step.pack), segments(step.segments), change(step.change) {
+    ImplicitTensions(const ImplicitState<W>& step, const SegmentEquations<W>& equations) : step(step),
+            equations(equations), pack(step.pack), segments(step.segments), change(step.change) {
     }
-    /** Solve the equations as Equations::refine() does, and record the forces of the segments of active lanes. */
-    void refineAndRecord(const Vec* y, Real active);
+    /** Remember what ImplicitEquations::refine() is about to change. */
+    void beginRefinement() {
+        minus = scratch().template reserve<Vec>(3*step.n);
+        plus = minus+step.n;
+        refined = plus+step.n;
+        for (int s = 0; s < pack.segments; s++)
+            refined[s] = segments[s].turned*(segments[s].multiplier-segments[s].multiplierBefore);
+    }
+    /** Record the forces of the segments of active lanes, after this. */
+    void record(const Vec* y, Real active) const;
 private:
     const ImplicitState<W>& step;
-    Equations& equations;
+    const SegmentEquations<W>& equations;
     const Pack& pack;
     ImplicitSegment<Real>* const segments;
     const Vec* const change;
+    Vec *minus, *plus, *refined;
+    static Scratch& scratch() {
+        static thread_local Scratch memory;
+        return memory;
+    }
 };
 
-template <int W, bool CLOSED>
-void ImplicitTensions<W, CLOSED>::refineAndRecord(const Vec* y, Real active) {
-    static thread_local Scratch scratch;
-    Vec* const minus = scratch.reserve<Vec>(3*step.n);
-    Vec* const plus = minus+step.n;
-    Vec* const refined = plus+step.n;
-    for (int s = 0; s < pack.segments; s++)
-        refined[s] = segments[s].turned*(segments[s].multiplier-segments[s].multiplierBefore);
-    equations.refine();
+template <int W> void ImplicitTensions<W>::record(const Vec* y, Real active) const {
+    NoBand band;
     const LaneFlow<W> flow(step.settings.flow, pack.planar, step.start.nodes[0]);
     Geometry previous = {}, current;
     for (int s = 0; s < pack.segments; s++) {
@@ -47,7 +57,7 @@ void ImplicitTensions<W, CLOSED>::refineAndRecord(const Vec* y, Real active) {
         Row here = {}, after = {};
         const Real multiplier = segment.multiplier;
         segment.multiplier = segment.multiplierBefore;
-        equations.addSegment(y, s, current, here, after);
+        equations.addSegment(y, s, current, band, here, after);
         segment.multiplier = multiplier;
         const Vec t = segment.newTangent;
         const Vec pull = t*(multiplier-segment.shift*t.dot(second-first))+refined[s];

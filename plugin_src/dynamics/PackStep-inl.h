@@ -52,12 +52,7 @@ public:
         respondAs(forces, moves);
     }
     void findCompliances(double* compliances) override {
-        int next = numTerms;
-        step->getEquations().findResponses([] (int, const Vec&) {}, [&] (int s, const Symmetric<Real>& first,
-                    const Matrix<Real>& both, const Symmetric<Real>& second) {
-            for (; next > 0 && terms[next-1].node == s; next--)
-                findCompliance(terms[next-1], first, both, second, compliances+6*(next-1));
-        });
+        step->getEquations().findResponses(UseOfResponses<W, CLOSED, true>(terms, numTerms, compliances));
     }
     void advance(const double* forces, double share, bool* unfinished) override {
         spreadForces(forces);
@@ -145,20 +140,6 @@ private:
             for (int k = 0; k < 3; k++)
                 moves[3*i+k] = place.ofFirst*move[k*W]+place.ofSecond*move[(3+k)*W];
         }
-    }
-    static void findCompliance(const CouplingTerm& term, Symmetric<Real> first, Matrix<Real> both,
-            Symmetric<Real> second, double* result) {
-        const double f = term.fraction, g = 1-f;
-        const int i = term.lane;
-        auto mean = [&] (Real& a, Real& ab, Real& ba, Real& b) {
-            return g*g*lane(a, i)+f*g*(lane(ab, i)+lane(ba, i))+f*f*lane(b, i);
-        };
-        result[0] = mean(first.xx, both.x.x, both.x.x, second.xx);
-        result[1] = mean(first.yx, both.x.y, both.y.x, second.yx);
-        result[2] = mean(first.zx, both.x.z, both.z.x, second.zx);
-        result[3] = mean(first.yy, both.y.y, both.y.y, second.yy);
-        result[4] = mean(first.zy, both.y.z, both.z.y, second.zy);
-        result[5] = mean(first.zz, both.z.z, both.z.z, second.zz);
     }
 };
 

@@ -178,9 +178,8 @@ public:
         setRightSides(ofBorder, [&] (int node, const Vec& right) {return right+forces[node];});
     }
     /** See TensionResponses-inl.h. */
-    template <class Function, class Blocks = NoBlocks> void findResponses(Function use,
-            Blocks useBlocks = Blocks()) const {
-        cylchain::CYLCHAIN_LOOPS::findResponses<W, CLOSED>(n, nodes, equations, use, useBlocks);
+    template <class Use> void findResponses(const Use& use) const {
+        cylchain::CYLCHAIN_LOOPS::findResponses<W, CLOSED>(n, nodes, equations, use);
     }
 private:
     const Pack& pack;

@@ -1,24 +1,19 @@
 // Included into the namespace of an instruction set. It does not compile alone.
 
-/** Does not ask for the blocks of the inverse. */
-struct NoBlocks {
-    template <class First, class Both, class Second> void operator()(int, const First&, const Both&,
-            const Second&) const {
-    }
-};
-
 /**
- * For each segment, call a function with its number and with how far a unit force along the segment, which pushes its
- * ends apart, moves its second end from its first. These are blocks of the inverse of the equations of TensionBand,
- * from the last node to the first; those of A with the tensions in it.
+ * For each segment, tell with its number how far a unit force along the segment, which pushes its ends apart, moves its
+ * second end from its first. These are blocks of the inverse of the equations of TensionBand, from the last node to the
+ * first; those of A with the tensions in it.
  *
- * @param useBlocks   is called with the number of each segment and three of the blocks: that of its first node, the
- *                    one between its nodes, and that of its second node
+ * That of rings is long: there should be one type of use for each number of lanes.
+ *
+ * @param use   use.takeResponse is called with the number of each segment and that vector; use.takeBlocks with the
+ *              number of each segment and three of the blocks: that of its first node, the one between its nodes, and
+ *              that of its second node
  */
-template <int W, bool CLOSED, class Function, class Blocks> void findResponses(int n,
+template <int W, bool CLOSED, class Use> void findResponses(int n,
             const EliminatedPair<typename Lanes<W>::Type, CLOSED>* nodes,
-            const TensionEquation<typename Lanes<W>::Type>* equations, Function use, Blocks useBlocks) {
-    const bool needsBlocks = !std::is_same<Blocks, NoBlocks>::value;
+            const TensionEquation<typename Lanes<W>::Type>* equations, const Use& use) {
     typedef typename Lanes<W>::Type Real;
     typedef Vector<Real> Vec;
     typedef Matrix<Real> Mat;
@@ -37,7 +32,7 @@ template <int W, bool CLOSED, class Function, class Blocks> void findResponses(i
         const Sym last = nodes[1].inverse;
         const Vec after1 = -nodes[1].give;
         const Vec here = node.pull*nodes[1].reciprocal-node.next*after1;
-        use(0, (here-after1)*equations[0].compliance);
+        use.takeResponse(0, (here-after1)*equations[0].compliance);
         borders[1][1] = Mat::of(last);
         borders[0][1] = -(node.next*borders[1][1]+Mat::outer(node.pull, after1));
         borders[1][0] = borders[0][1].transposed();
@@ -61,11 +56,11 @@ template <int W, bool CLOSED, class Function, class Blocks> void findResponses(i
         Vec here = node.pull*own-node.next*after-node.second*afterNext;
         if constexpr (CLOSED) {
             here = here-node.border[0]*ofBorder[0]-node.border[1]*ofBorder[1];
-            use(s, (here-(s == n-1 ? ofBorder[0] : after))*equations[s].compliance);
+            use.takeResponse(s, (here-(s == n-1 ? ofBorder[0] : after))*equations[s].compliance);
         }
         else {
-            use(s, (here-after)*equations[s].compliance);
-            if (s == 0 && !needsBlocks)
+            use.takeResponse(s, (here-after)*equations[s].compliance);
+            if (s == 0 && !Use::NEEDS_BLOCKS)
                 return;
         }
         // The node's own block, and those with the next two.
@@ -86,7 +81,7 @@ template <int W, bool CLOSED, class Function, class Blocks> void findResponses(i
         newSame.subtractProductTransposed(node.second, newSecond);
         newSame.addOuter(-node.pull, here);
         if constexpr (!CLOSED) {
-            useBlocks(s, newSame, newOther, same);
+            use.takeBlocks(s, newSame, newOther, same);
             if (s == 0)
                 return;
         }
@@ -107,9 +102,9 @@ template <int W, bool CLOSED, class Function, class Blocks> void findResponses(i
                         borders[k][1]*node.tensionBorder[1];
             }
             if (s == n-1)
-                useBlocks(s, newSame, newBorder[0], borders[0][0].lower());
+                use.takeBlocks(s, newSame, newBorder[0], borders[0][0].lower());
             else
-                useBlocks(s, newSame, newOther, same);
+                use.takeBlocks(s, newSame, newOther, same);
             after = node.pull*mutual-node.give-node.next*newAfterNext-node.second*beyond-node.border[0]*newOfBorder[0]-
                     node.border[1]*newOfBorder[1];
             own = node.reciprocal+node.first.dot(newAfterNext)+node.last.dot(beyond)+node.share*mutual+
@@ -130,8 +125,8 @@ template <int W, bool CLOSED, class Function, class Blocks> void findResponses(i
         other = newOther;
     }
     if constexpr (CLOSED) {
-        use(1, (ofBorder[1]-after)*equations[1].compliance);
-        useBlocks(1, borders[1][1].lower(), next[1].transposed(), same);
-        useBlocks(0, borders[0][0].lower(), borders[0][1], borders[1][1].lower());
+        use.takeResponse(1, (ofBorder[1]-after)*equations[1].compliance);
+        use.takeBlocks(1, borders[1][1].lower(), next[1].transposed(), same);
+        use.takeBlocks(0, borders[0][0].lower(), borders[0][1], borders[1][1].lower());
     }
 }

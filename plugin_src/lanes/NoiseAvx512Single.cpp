@@ -1,6 +1,4 @@
-#ifdef CYLCHAIN_X86_64
 #define CYLCHAIN_SINGLE_PRECISION
 #define CYLCHAIN_LOOPS avx512_single
 #define CYLCHAIN_LANES 16
 #include "lanes/NoiseLoops-inl.h"
-#endif

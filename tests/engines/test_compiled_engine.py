@@ -405,9 +405,11 @@ def test_an_instruction_set_computes_the_same_or_says_that_it_was_not_built(inst
         # From elsewhere, so that what is installed is imported.
         return subprocess.run(command, env={**os.environ, **environment}, cwd=tmp_path, capture_output=True, text=True)
 
-    result = run({"CYLCHAIN_INSTRUCTION_SET": instruction_set})
+    best, result = run({}), run({"CYLCHAIN_INSTRUCTION_SET": instruction_set})
+    assert best.returncode == 0
     if result.returncode == 0:
-        assert np.isclose(float(result.stdout), float(run({}).stdout), rtol=1e-12)
+        assert np.isclose(float(result.stdout), float(best.stdout), rtol=1e-12)
     else:
-        assert instruction_set == "baseline"
+        # No better one than AVX-512 is built.
+        assert instruction_set != "avx512"
         assert "CYLCHAIN_FOR_THIS_PROCESSOR=OFF" in result.stderr.splitlines()[-1]

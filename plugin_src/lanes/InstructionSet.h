@@ -1,0 +1,24 @@
+#ifndef CYLCHAIN_INSTRUCTION_SET_H_
+#define CYLCHAIN_INSTRUCTION_SET_H_
+
+namespace cylchain {
+
+/** The instruction sets that loops over lanes are compiled for. Processors other than x86-64 have the first alone. */
+enum class InstructionSet {Baseline, Avx2, Avx512};
+
+/** Which of them have been compiled: see InstructionSets.cmake. The functions of others must not be named. */
+constexpr bool HAS_BASELINE = CYLCHAIN_HAS_BASELINE, HAS_AVX2 = CYLCHAIN_HAS_AVX2, HAS_AVX512 = CYLCHAIN_HAS_AVX512;
+
+/**
+ * Get the best one that this processor has, of those that have been compiled.
+ *
+ * The variable CYLCHAIN_INSTRUCTION_SET of the environment, "avx512", "avx2" or "baseline", names the best one to use,
+ * for tests and comparisons.
+ *
+ * @throws std::runtime_error if there is none
+ */
+InstructionSet instructionSet();
+
+} // namespace cylchain
+
+#endif /*CYLCHAIN_INSTRUCTION_SET_H_*/
