@@ -178,13 +178,13 @@ def test_links_and_bends_keep_their_energies_at_the_recommended_step(pair, stiff
         assert abs(np.mean(mean) - expected) < SIGMAS * error + allowed
 
 
-@pytest.mark.parametrize("samples", [40, pytest.param(600, marks=pytest.mark.slow)])
-def test_a_loop_of_two_links_is_that_of_weighted_draws(samples):
+def test_a_loop_of_two_links_is_that_of_weighted_draws():
     """Elements that are linked at one place are drawn exactly; a second, soft link weighs them by its energy.
 
-    That energy itself takes long to average.
+    Bends and the stiff link are held to 5 %. The energy of the soft one, which relaxes with the turns of elements, has
+    its own, larger error.
     """
-    stiffness, soft, draws, copies, elements = 1.0, 3e-4, (20000 if samples < 600 else 150000), 600, 1
+    stiffness, soft, draws, copies, elements, samples = 1.0, 3e-4, 20000, 600, 1, 40
     generator, element = np.random.default_rng(11), BEAM.beam_element(TEMPERATURE)
     kT = KT
     # The elements of one chain, of which each is as good as one that is alone, but for the strains of its ends.
@@ -244,7 +244,7 @@ def test_a_loop_of_two_links_is_that_of_weighted_draws(samples):
     for values, value, uncertainty in zip(measured, [*expected, 1.5], [*errors, 0.0]):
         mean = np.mean(values, axis=0)
         error = np.hypot(np.std(mean, ddof=1) / np.sqrt(copies), uncertainty)
-        assert error < 0.01 * value or (samples < 600 and value == expected[0])
+        assert error < (0.05 if value == expected[0] else 0.01) * value
         assert abs(np.mean(mean) - value) < SIGMAS * error + 0.01 * value
 
 
