@@ -225,13 +225,16 @@ def _draw_energies(axis, groups, temperature, energies):
     segments = np.array([group.count * group.segments for group in kinds])
     joints = np.array([group.count * group.joints for group in kinds])
     stretching, bending = np.array([mean_energies(group, temperature) for group in kinds]).T / kT
+    beams = all(group.has_beam_elements for group in kinds)
     curves = [("stretching", "segment", np.average(stretching, weights=segments), _STRETCHING_COLOUR)]
     if np.any(joints * bending):
         curves.append(("bending", "joint", np.average(bending, weights=joints), _BENDING_COLOUR))
     free = "exact in equilibrium" if all(map(is_in_equilibrium, kinds)) else "free chains"
     for label, per, exact, colour in curves:
         values = energies[f"{label} energy per {per} (kT)"]
-        axis.plot(time, values, color=colour, linewidth=1.0, alpha=0.8, label=f"{label}, per {per}")
+        axis.plot(
+            time, values, color=colour, linewidth=1.0, alpha=0.8, label=f"{label}, per {'element' if beams else per}"
+        )
         axis.axhline(exact, color=colour, linewidth=1.8, linestyle="--", label=f"{free}: {exact:.4g}")
     axis.set_xlim(time[0], time[-1])
     bottom, top = axis.get_ylim()
@@ -320,11 +323,17 @@ def _draw_joint_angles(axis, groups, temperature, trajectory):
             label=_exact_label(group),
         )
     axis.set_xlim(left=0.0)
-    beams = any(group.has_beam_elements for group, *_ in groups)
-    axis.set_xlabel(f"angle between neighbouring segments{', or ends of a beam element' if beams else ''} (degrees)")
+    axis.set_xlabel(f"angle between {_bends(groups)} (degrees)")
     axis.set_ylabel("probability density (1/degree)")
-    axis.set_title("Joint angles")
+    axis.set_title("Bends of elements" if all(group.has_beam_elements for group, *_ in groups) else "Joint angles")
     _legend(axis, loc="upper right")
+
+
+def _bends(groups):
+    # What has the angles of joint_cosines between it.
+    kinds = {group.has_beam_elements for group, *_ in groups}
+    names = {False: "neighbouring segments", True: "ends of an element"}
+    return " or ".join(names[kind] for kind in sorted(kinds))
 
 
 def _draw_extensions(axis, groups, temperature, trajectory):
