@@ -131,7 +131,7 @@ for axes, shape, title in zip(discs, (held[0], held[-1], released[-1]), titles):
 discs[0].set_ylabel("y (µm)")
 discs[0].plot([], [], color="#1f6f8b", linewidth=1.5, label="microtubule")
 discs[0].plot([], [], "o", color="#c0392b", markersize=4, label="its plus end")
-discs[0].legend(frameon=False, loc="upper left", bbox_to_anchor=(-0.02, 1.0), fontsize=9)
+top.legend(*discs[0].get_legend_handles_labels(), frameon=False, loc="outside lower center", ncols=2)
 panel, zoom = bottom.subplots(1, 2, width_ratios=(1.6, 1))
 for label, (counts, colour, style) in curves.items():
     panel.plot(time, counts, style, color=colour, linewidth=2, label=label)

@@ -125,6 +125,8 @@ nodes = np.array(filaments.node_indices)
 figure, axes = plt.subplots(2, 2, figsize=(12.5, 8.4), layout="constrained")
 _, _, _, before, after = results[-1]
 shade = (before[nodes[:, :-1]] + before[nodes[:, 1:]])[..., 0].ravel() / 2000
+# Some filaments that nothing holds have left.
+places = np.concatenate([before, after])[:, 0] / 1000
 for panel, shape, title in (
     (axes[0, 0], before, "Before the shear"),
     (axes[0, 1], after, f"After it, at {time[-1]:.3g} ms"),
@@ -132,7 +134,7 @@ for panel, shape, title in (
     lines = np.stack([shape[nodes[:, :-1]], shape[nodes[:, 1:]]], axis=2).reshape(-1, 2, 3)[..., [0, 2]] / 1000
     drawn = LineCollection(lines, array=shade, cmap="viridis", linewidths=1.4, capstyle="round")
     panel.add_collection(drawn)
-    panel.set(xlim=(-0.2, (WIDTH + STRAIN * THICKNESS) / 1000 + 0.2), ylim=(-0.1, THICKNESS / 1000 + 0.1))
+    panel.set(xlim=(places.min() - 0.1, places.max() + 0.1), ylim=(-0.1, THICKNESS / 1000 + 0.1))
     panel.set(aspect="equal", xlabel="x (µm)", ylabel="z (µm)")
     panel.set_title(title, loc="left", fontsize=11)
     moved = 0 if shape is before else STRAIN * THICKNESS / 1000

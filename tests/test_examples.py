@@ -17,6 +17,7 @@ CASES = [
     ("mixed_system", "mixed", 40, 40, 60 + 8 * (11 + 5) + 3 * 6, 8 * 10 + 3 * 5),
     ("two_filament_types", "filaments", 50, 50, 16 * (49 + 17), 16 * (48 + 16)),
     ("clamped_filament", "filaments", 200, 100, 8 * 9, 8 * 8),
+    ("buckling_columns", "columns", 200, 100, 6 * 2 * 3, 6 * 2),
     ("gliding_filaments", "gliding", 60, 60, 40 * 7, 40 * 6),
     ("tumbling_in_shear", "shear", 60, 60, 24 * 13 + 6 * 12, 24 * 12 + 6 * 12),
     ("tumbling_dna", "tumbling", 60, 60, 12 * 256, 12 * 255),

@@ -45,13 +45,13 @@ def filament_distances(run: Run, frame: int, cutoff: Scalar) -> FloatArray:
 
 
 class _NearSegments:
-    # All segments, and the pairs of those of two filaments within a cutoff.
+    # All segments, or pieces of beam elements, and the pairs of those of two filaments within a cutoff.
 
     def __init__(self, run, frame, cutoff):
-        nodes = run.nodes(frame)
-        starts = np.concatenate([own if filament.ring else own[:-1] for filament, own in zip(run.filaments, nodes)])
-        self.vectors = np.concatenate([segment_vectors(own, each.ring) for each, own in zip(run.filaments, nodes)])
-        self.owners = np.repeat(np.arange(len(run.filaments)), [own.segments for own in run.filaments])
+        lines = run.lines(frame)
+        starts = np.concatenate([own if filament.ring else own[:-1] for filament, own in zip(run.filaments, lines)])
+        self.vectors = np.concatenate([segment_vectors(own, each.ring) for each, own in zip(run.filaments, lines)])
+        self.owners = np.repeat(np.arange(len(run.filaments)), [own.segments * own.pieces for own in run.filaments])
         # Two segments within the cutoff have middles within that and half of their lengths.
         reach = cutoff + float(np.linalg.norm(self.vectors, axis=1).max())
         pairs = pairs_of_points(starts + 0.5 * self.vectors, reach, run.box)
@@ -168,5 +168,5 @@ def contraction(run: Run) -> FloatArray:
     """
     if run.box is not None:
         raise InputError("A periodic box does not contract: look at contacts or distances instead.")
-    radii = [math.sqrt(float(np.var(np.concatenate(run.nodes(frame)), axis=0).sum())) for frame in range(len(run))]
+    radii = [math.sqrt(float(np.var(np.concatenate(run.lines(frame)), axis=0).sum())) for frame in range(len(run))]
     return np.array(radii) / radii[0]

@@ -3,7 +3,7 @@
 import csv
 import math
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -12,17 +12,21 @@ import mdtraj
 import numpy as np
 import numpy.typing as npt
 
+from ..beams.curve import arc_lengths, curve_points
 from ..couplings.contact_frames import ContactFrame, DescribedContactFinder, joined_contacts
 from ..couplings.crosslink_records import CROSSLINK_RECORD, CrosslinkFrame, crosslinks_at
 from ..couplings.walls import Box, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere
 from ..errors import InputError, PrecisionWarning
-from ..mechanics.geometry import segment_vectors
+from ..mechanics.geometry import joint_cosines, segment_vectors
 from ..output.dcd_frames import DCDFrames
 from ..output.linker_records import LINKER_RECORD
 from ..output.run_description import DescribedFilament, DescribedLinkers, RunDescription, read_run_description
 from ..output.run_files import RunFiles
 from ..units.quantities import VOLUME, positive, thermal_energy, whole_number
 from ..units.types import FloatArray, Indices, IntArray, Scalar
+
+PIECES_OF_ELEMENT = 8
+"""Straight pieces by which a beam element is drawn, alike in its parameter."""
 
 _COARSE = 0.2
 _SHAPES = {
@@ -50,6 +54,8 @@ class RunFilament:
         Whether the last node is joined to the first.
     clamped : tuple of int
         Nodes that do not move, counted along the filament.
+    control_points : (n,) int array
+        Particles of the control points of nodes of beam elements; empty of straight segments.
     """
 
     type: Any
@@ -57,11 +63,22 @@ class RunFilament:
     diameter: float
     ring: bool
     clamped: tuple[int, ...] = ()
+    control_points: IntArray = field(default_factory=lambda: np.zeros(0, dtype=int))
 
     @property
     def segments(self) -> int:
         """Number of segments."""
         return len(self.nodes) - (0 if self.ring else 1)
+
+    @property
+    def has_beam_elements(self) -> bool:
+        """Whether its segments are elements that bend inside."""
+        return len(self.control_points) > 0
+
+    @property
+    def pieces(self) -> int:
+        """Straight pieces by which each of its segments is drawn: 1, or ``PIECES_OF_ELEMENT`` of a beam element."""
+        return PIECES_OF_ELEMENT if self.has_beam_elements else 1
 
 
 class Run:
@@ -295,7 +312,7 @@ class Run:
         )
         radii = np.zeros(len(atoms))
         for own in self.filaments:
-            radii[own.nodes] = 5.0 * own.diameter
+            radii[own.nodes] = radii[own.control_points] = 5.0 * own.diameter
         names = [atom.name for atom in atoms]
         universe.add_TopologyAttr("names", names)
         universe.add_TopologyAttr("types", [self._type_names.get(i, name) for i, name in enumerate(names)])
@@ -321,8 +338,41 @@ class Run:
         positions = self.positions(frame)
         return [positions[own.nodes] for own in self.filaments]
 
+    def lines(self, frame: int) -> list[FloatArray]:
+        """Points (n, 3) in nm of each filament in a frame, by which it is drawn: nodes, or those of a curve.
+
+        The curve of beam elements has ``PIECES_OF_ELEMENT`` points for each of them, from its first node on, and the
+        last node.
+        """
+        positions = self.positions(frame)
+        return [
+            curve_points(positions[own.nodes], positions[own.control_points], own.pieces)
+            if own.has_beam_elements
+            else positions[own.nodes]
+            for own in self.filaments
+        ]
+
+    def bends(self, frame: int) -> list[FloatArray]:
+        """Angles in radians by which each segment of each filament bends: (segments,) arrays.
+
+        Of a beam element, between the tangents at its ends; of a straight segment, the mean of those at its joints.
+        """
+        positions = self.positions(frame)
+        angles = []
+        for own in self.filaments:
+            nodes = positions[own.nodes]
+            vectors = (
+                positions[own.control_points] - nodes if own.has_beam_elements else segment_vectors(nodes, own.ring)
+            )
+            units = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+            between = np.arccos(np.clip(joint_cosines(units, own.ring), -1.0, 1.0))
+            angles.append(between if own.has_beam_elements else _of_segments(between, own.ring))
+        return angles
+
     def segment_tensions(self, frame: int, average: int = 1) -> list[FloatArray]:
         """Tensions dV_el/dl of the segments of each filament in kJ/(mol nm), averaged over frames about one.
+
+        Of a beam element, EA times the mean strain along its arc.
 
         They hold the thermal fluctuation ``(k k_BT)^(1/2)`` of a stiff spring, which an average over n independent
         frames brings down by n^(1/2).
@@ -343,10 +393,30 @@ class Run:
         self.warn_of_rounding()
         totals = [np.zeros(own.segments) for own in self.filaments]
         for each in frames:
-            for own, nodes, total in zip(self.filaments, self.nodes(each), totals):
-                lengths = np.linalg.norm(segment_vectors(nodes, own.ring), axis=1)
-                total += own.type.stretching_derivatives(lengths, own.ring)
+            positions = self.positions(each)
+            for own, total in zip(self.filaments, totals):
+                nodes = positions[own.nodes]
+                if own.has_beam_elements:
+                    total += self._beam_tensions(own, nodes, positions[own.control_points])
+                else:
+                    lengths = np.linalg.norm(segment_vectors(nodes, own.ring), axis=1)
+                    total += own.type.stretching_derivatives(lengths, own.ring)
         return [total / len(frames) for total in totals]
+
+    def _beam_tensions(self, own, nodes, control_points):
+        planar = bool(np.all(np.concatenate([nodes, control_points])[:, 2] == nodes[0, 2]))
+        element = own.type.beam_element(self.temperature, planar)
+        return element.modulus * (arc_lengths(nodes, control_points) / element.length - 1.0 + element.shortening)
+
+
+def _of_segments(angles, ring):
+    # The mean of the angles at the joints of a segment.
+    if ring:
+        return 0.5 * (angles + np.roll(angles, -1))
+    if not len(angles):
+        return np.zeros(1)
+    padded = np.concatenate([angles[:1], angles, angles[-1:]])
+    return 0.5 * (padded[1:] + padded[:-1])
 
 
 def volume_of(run: Run, volume: Scalar | None) -> float:
@@ -363,7 +433,8 @@ def _frames_of(description):
 
 
 def _filament(own: DescribedFilament) -> RunFilament:
-    return RunFilament(own.type, np.array(own.nodes, dtype=int), own.diameter, own.ring, own.clamped)
+    nodes, control_points = (np.array(particles, dtype=int) for particles in (own.nodes, own.control_points))
+    return RunFilament(own.type, nodes, own.diameter, own.ring, own.clamped, control_points)
 
 
 def load(path: str | Path, incomplete: bool = False) -> Run:

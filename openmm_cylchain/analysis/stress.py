@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..errors import InputError
 from ..filaments.placement import joint_stiffnesses
 from ..mechanics.geometry import segment_vectors
 from ..units.quantities import thermal_energy
@@ -61,7 +62,7 @@ def stress(run: Run, frame: int, volume: Scalar | None = None) -> Stress:
     Raises
     ------
     InputError
-        Without a periodic box and a volume; with contacts, if the compiled engine is missing.
+        Without a periodic box and a volume; for beam elements; with contacts, if the compiled engine is missing.
 
     Warns
     -----
@@ -71,7 +72,12 @@ def stress(run: Run, frame: int, volume: Scalar | None = None) -> Stress:
     room = volume_of(run, volume)
     run.warn_of_rounding()
     chains, free = np.zeros((3, 3)), 0
-    for own, nodes in zip(run.filaments, run.nodes(frame)):
+    for number, (own, nodes) in enumerate(zip(run.filaments, run.nodes(frame))):
+        if own.has_beam_elements:
+            raise InputError(
+                f"Filament {number} ({own.type.name}) has beam elements, whose stress is not known as yet: give its "
+                "type element='straight'."
+            )
         chains += _virial_of_chain(own, nodes)
         free += len(nodes) - len(own.clamped)
     linkers = run.linkers[frame]

@@ -81,8 +81,13 @@ def control_point_positions(
     return positions
 
 
-def _polylines(trajectory, filaments):
-    # Nodes, or of beam elements points along their curve.
+def filament_lines(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> list[FloatArray]:
+    """Points by which filaments are drawn: nodes, or of beam elements eight along the curve of each and the last node.
+
+    Returns
+    -------
+    list of (frames, points, 3) arrays in nm
+    """
     pairs = zip(node_positions(trajectory, filaments), control_point_positions(trajectory, filaments))
     return [nodes if own is None else curve_points(nodes, own, _POINTS_OF_ELEMENT) for nodes, own in pairs]
 
@@ -135,7 +140,7 @@ def radii_of_gyration(trajectory: mdtraj.Trajectory, filaments: int | Indices | 
 
     Of beam elements, those of the curve.
     """
-    positions = _polylines(trajectory, filaments)
+    positions = filament_lines(trajectory, filaments)
     return np.stack([np.sqrt(np.var(p, axis=1).sum(axis=-1)) for p in positions], axis=1)
 
 
@@ -143,7 +148,7 @@ def centers_of_mass(trajectory: mdtraj.Trajectory, filaments: int | Indices | No
     """Mean of the segments' midpoints, all of one weight: (frames, filaments, 3) array in nm."""
     rings = ring_filaments(trajectory)
     selected = _selection(filaments, len(rings))
-    lines = _polylines(trajectory, filaments)
+    lines = filament_lines(trajectory, filaments)
     return np.stack([_center(p, rings[index]) for index, p in zip(selected, lines)], axis=1)
 
 
@@ -366,7 +371,7 @@ def bending_mode_amplitudes(
     """
     filament = whole_number(filament, 0, "filament")
     _refuse_rings(trajectory, filament, "bending modes of free ends")
-    directions = _normalized(np.diff(_polylines(trajectory, filament)[0], axis=1))
+    directions = _normalized(np.diff(filament_lines(trajectory, filament)[0], axis=1))
     highest, segments = segment_lengths(trajectory, filament)[0].shape[1], directions.shape[1]
     numbers = np.atleast_1d(in_units_of(modes, DIMENSIONLESS, "modes"))
     if np.any(numbers != np.floor(numbers)) or np.any(numbers < 1) or np.any(numbers >= highest):
@@ -438,7 +443,7 @@ def mean_square_displacement(
     results = np.stack(
         [
             _filament_displacements(nodes, line, lags, window_average)
-            for nodes, line in zip(node_positions(trajectory, filaments), _polylines(trajectory, filaments))
+            for nodes, line in zip(node_positions(trajectory, filaments), filament_lines(trajectory, filaments))
         ]
     )
     count = len(results)

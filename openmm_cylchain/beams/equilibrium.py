@@ -12,6 +12,7 @@ bends a little: those of an element a quarter of a persistence length long have 
 are drawn one behind the other, by rejection from the normal distribution that has beta - alpha in place of d.
 """
 
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -185,9 +186,36 @@ def _sinc(twice):
     return np.where(angle < np.pi, np.sinc(angle / np.pi), 0.0)
 
 
-@lru_cache(maxsize=64)
+@dataclass(frozen=True)
+class ElementAverages:
+    """Averages of an element in space with stiff lengths, with its chord c over h and unit tangents t, t' at its ends.
+
+    Attributes
+    ----------
+    cosine : float
+        <t.t'>.
+    bending : float
+        Energy over k_B T.
+    chord_along : float
+        <c.t>.
+    chord_square : float
+        <c^2>.
+    """
+
+    cosine: float
+    bending: float
+    chord_along: float
+    chord_square: float
+
+
 def mean_cosine(bend: float) -> float:
     """<t.t'> between the ends of an element in space that is ``bend`` = h k_B T/EI long, with stiff lengths."""
+    return element_averages(bend).cosine
+
+
+@lru_cache(maxsize=64)
+def element_averages(bend: float) -> ElementAverages:
+    """Averages of an element in space that is ``bend`` = h k_B T/EI long, by quadrature over its bends."""
     radii, weights = np.polynomial.legendre.leggauss(48)
     largest = min(np.pi, _WIDEST_BEND * np.sqrt(bend))
     radii, weights = 0.5 * largest * (1.0 + radii), 0.5 * largest * weights
@@ -198,12 +226,16 @@ def mean_cosine(bend: float) -> float:
     ends = np.cos(a) * np.cos(b) - np.sin(a) * np.sin(b) * cosine
     turn = 2.0 - 2.0 * ends
     scale = 1.0 + turn / 40.0 + turn**2 / 560.0 + apart / 84.0
-    density = np.exp(-(total + 4.0 / 3.0 * apart * scale**2) / (2.0 * bend)) * np.sin(a) * np.sin(b)
+    energy = (total + 4.0 / 3.0 * apart * scale**2) / (2.0 * bend)
+    density = np.exp(-energy) * np.sin(a) * np.sin(b)
     # Of stiff lengths.
     square = 2.0 + 2.0 * ends
     length, slope = _middle_length(-1.5 * shortening_of(bend, False), np.cos(a) + np.cos(b), square, turn)
     density *= length**2 * slope * weights[:, None, None] * weights[None, :, None]
-    return float(np.sum(ends * density) / np.sum(density))
+    along = (length * np.cos(a) + 0.25 * (1.0 + ends)) / 1.5
+    chord = (length**2 + 0.5 * length * (np.cos(a) + np.cos(b)) + square / 16.0) / 2.25
+    density /= np.sum(density)
+    return ElementAverages(*(float(np.sum(values * density)) for values in (ends, energy, along, chord)))
 
 
 @lru_cache(maxsize=64)

@@ -15,7 +15,8 @@ def write_ovito(run: Run, path: str | Path) -> None:
     """Write all frames of a run for OVITO, in angstrom.
 
     Particles are the nodes of filaments, the hands of linkers that are bound and the ends of crosslinks, with the names
-    of their types and radii; bonds are segments and springs, so that their number changes from frame to frame. Lines on
+    of their types and radii; bonds are segments and springs, so that their number changes from frame to frame. Beam
+    elements are drawn by points of their curve. Lines on
     walls are particles and bonds of the type "wall". ``time_ps`` is an attribute of each frame, beside its step.
     Without a periodic box, the cell is three times as wide as what it holds.
 
@@ -42,20 +43,18 @@ def write_ovito(run: Run, path: str | Path) -> None:
     wall_points, wall_bonds = _joined(walls(run))
     walls_there = ["wall"] if len(wall_points) else []
     center, cell = _cell(run)
-    segments = np.concatenate([_bonds(own) for own in run.filaments])
-    kinds = np.concatenate([np.full(own.segments, names.index(own.type.name)) for own in run.filaments])
-    order = np.concatenate([own.nodes for own in run.filaments])
-    position_of = np.zeros(order.max() + 1, dtype=int)
-    position_of[order] = np.arange(len(order))
-    types = np.concatenate([np.full(len(own.nodes), names.index(own.type.name)) for own in run.filaments])
-    diameters = np.concatenate([np.full(len(own.nodes), own.diameter) for own in run.filaments])
+    segments = _bonds(run)
+    kinds = np.concatenate([np.full(own.segments * own.pieces, names.index(own.type.name)) for own in run.filaments])
+    points = [_points(own) for own in run.filaments]
+    types = np.concatenate([np.full(own, names.index(each.type.name)) for own, each in zip(points, run.filaments)])
+    diameters = np.concatenate([np.full(own, each.diameter) for own, each in zip(points, run.filaments)])
     temporary = path.with_name(f".{path.stem}.new.gsd")
     try:
         with gsd.hoomd.open(str(temporary), mode="w") as file:
             for frame in range(len(run)):
-                positions, bonds = [run.positions(frame)[order]], [position_of[segments]]
+                positions, bonds = [np.concatenate(run.lines(frame))], [segments]
                 particle_types, bond_types, widths = [types], [kinds], [diameters]
-                count = len(order)
+                count = len(types)
                 for kind in range(len(springs)):
                     lines, places = run.springs(frame, kind)
                     # Ends of springs are particles of their own, at the places of hands or anchors.
@@ -102,9 +101,18 @@ def _joined(lines):
     return np.concatenate([np.zeros((0, 3)), *lines]), np.concatenate([np.zeros((0, 2), dtype=int), *bonds])
 
 
-def _bonds(own):
-    first, last = own.nodes, np.roll(own.nodes, -1)
-    return np.stack([first, last], axis=1)[: own.segments]
+def _points(own):
+    return own.segments * own.pieces + (not own.ring)
+
+
+def _bonds(run):
+    # Between points that are neighbours on a filament, counted along all of them.
+    bonds, count = [], 0
+    for own in run.filaments:
+        points = count + np.arange(_points(own))
+        bonds.append(np.stack([points, np.roll(points, -1)], axis=1)[: own.segments * own.pieces])
+        count += len(points)
+    return np.concatenate(bonds)
 
 
 def _cell(run):

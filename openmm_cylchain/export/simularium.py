@@ -21,7 +21,8 @@ def write_simularium(run: Run, path: str | Path) -> None:
 
     The format is version 3 of the trajectory, version 1 of its frames, https://github.com/simularium. Lengths are in
     nm, about the middle of the box; times are in the unit of the last frame. A filament keeps its number from frame to
-    frame, linkers do not. A ring goes on to its first node. Lines on walls are fibers of the type "wall".
+    frame, linkers do not. A ring goes on to its first node; beam elements are drawn by points of their curve. Lines on
+    walls are fibers of the type "wall".
 
     Parameters
     ----------
@@ -101,8 +102,8 @@ def _box(run, outlines):
 
 def _agents(run, frame, types, center, outlines):
     data: list[float] = []
-    for number, (own, nodes) in enumerate(zip(run.filaments, run.nodes(frame))):
-        points = np.concatenate([nodes, nodes[:1]]) if own.ring else nodes
+    for number, (own, points) in enumerate(zip(run.filaments, run.lines(frame))):
+        points = np.concatenate([points, points[:1]]) if own.ring else points
         data += _agent(_FIBER, number, types["filament", own.type.name], 0.5 * own.diameter, points - center)
     number = len(run.filaments)
     radius = 0.5 * thickness(run)

@@ -15,7 +15,8 @@ _FIRST_COLOR = 17  # Those before have a meaning of their own in VMD.
 
 _PROCEDURES = """
 proc draw_frame {args} {
-    global molecule times time_unit links link_colors link_radius corner walls wall_color
+    global molecule times time_unit links link_colors link_radius corner walls wall_color \\
+        curves curve_colors curve_radii
     set frame [molinfo $molecule get frame]
     graphics $molecule delete all
     graphics $molecule color black
@@ -24,6 +25,15 @@ proc draw_frame {args} {
     foreach line $walls {
         foreach first [lrange $line 0 end-1] second [lrange $line 1 end] {
             graphics $molecule line $first $second width 2
+        }
+    }
+    foreach color $curve_colors radius $curve_radii lines [lindex $curves $frame] {
+        graphics $molecule color $color
+        foreach line $lines {
+            foreach first [lrange $line 0 end-1] second [lrange $line 1 end] {
+                graphics $molecule cylinder $first $second radius $radius resolution 12
+                graphics $molecule sphere $second radius $radius resolution 12
+            }
         }
     }
     foreach color $link_colors lines [lindex $links $frame] {
@@ -45,8 +55,8 @@ def write_vmd(run: Run, path: str | Path) -> None:
     """Write a script that opens a run in VMD: ``vmd -e FILE``.
 
     It loads ``topology.psf`` and ``trajectory.dcd`` from the directory of the run, which must stay where it is. Bonds
-    are as thick as filaments, or as can be seen. Linkers that join two places, crosslinks and lines on walls
-    are drawn for each frame, and the time, which VMD does not read from DCD files.
+    are as thick as filaments, or as can be seen. Linkers that join two places, crosslinks, lines on walls
+    and curves of beam elements are drawn for each frame, and the time, which VMD does not read from DCD files.
 
     Parameters
     ----------
@@ -67,15 +77,23 @@ def write_vmd(run: Run, path: str | Path) -> None:
         "color Display Background white",
         "display projection Perspective",
     ]
-    # Licorice knows the radius of bonds.
+    # Licorice knows the radius of bonds. Those of beam elements are chords, and their curves are drawn in their place.
     widest = max(own.diameter for own in run.filaments)
+    curves: dict[int, tuple[float, list[int]]] = {}
     for number, (kind, color) in enumerate(filament_colors(run).items()):
         diameter = max(own.diameter for own in run.filaments if own.type.name == kind)
         radius = _ANGSTROM * 0.5 * max(diameter, 0.006 * extent * diameter / widest)
+        members = [i for i, own in enumerate(run.filaments) if own.type.name == kind]
+        beams = [i for i in members if run.filaments[i].has_beam_elements]
+        lines.append(_color(_FIRST_COLOR + number, color))
+        if beams:
+            curves[_FIRST_COLOR + number] = radius, beams
+        if len(beams) == len(members):
+            continue
+        hidden = " ".join(str(node) for i in beams for own in _particles(run.filaments[i]) for node in own)
         lines += [
-            _color(_FIRST_COLOR + number, color),
             f"mol representation Licorice {radius:.6g} 12 12",
-            f"mol selection {{resname {_word(kind)}}}",
+            f"mol selection {{resname {_word(kind)}{f' and not index {hidden}' if hidden else ''}}}",
             f"mol color ColorID {_FIRST_COLOR + number}",
             "mol material AOChalky",
             "mol addrep $molecule",
@@ -94,6 +112,10 @@ def write_vmd(run: Run, path: str | Path) -> None:
     lines += [
         f"set times {{{times}}}",
         f"set time_unit {name}",
+        f"set curve_colors {{{' '.join(map(str, curves))}}}",
+        f"set curve_radii {{{' '.join(f'{radius:.6g}' for radius, _ in curves.values())}}}",
+        "set curves {}",
+        *(f"lappend curves {{{_curves(run, frame, curves)}}}" for frame in range(len(run) if curves else 0)),
         f"set link_colors {{{colors}}}",
         f"set link_radius {_ANGSTROM * 0.5 * max(0.5 * thickness(run), 0.003 * extent):.6g}",
         f"set wall_color {wall_color}",
@@ -103,6 +125,18 @@ def write_vmd(run: Run, path: str | Path) -> None:
         *(f"lappend links {{{_links(run, frame)}}}" for frame in range(len(run))),
     ]
     write_atomically(path, ("\n".join(lines) + "\n" + _PROCEDURES).encode())
+
+
+def _particles(own):
+    return own.nodes.tolist(), own.control_points.tolist()
+
+
+def _curves(run, frame, curves):
+    drawn = run.lines(frame)
+    kinds = []
+    for _, members in curves.values():
+        kinds.append("{" + " ".join("{" + " ".join(map(_point, drawn[i])) + "}" for i in members) + "}")
+    return " ".join(kinds)
 
 
 def _links(run, frame):

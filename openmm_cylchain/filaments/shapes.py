@@ -174,11 +174,14 @@ def new_filament(
         )
     if planar:
         control_points = _in_plane_of_nodes(control_points, positions, filament_type.segment_length, label)
-    held, held_tangents = _clamped_beam(clamped, clamped_tangents, len(positions), label)
+    held, held_tangents = clamped_beam(clamped, clamped_tangents, len(positions), label)
     return Filament(filament_type, positions, held, False, planar, 0.0, control_points, held_tangents)
 
 
-def _clamped_beam(clamped, tangents, nodes, label):
+def clamped_beam(
+    clamped: int | Indices, tangents: int | Indices, nodes: int, label: str
+) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Clamped nodes of beam elements, and those whose tangents are clamped, too; InputError if they cannot be."""
     clamped = named_nodes(clamped, nodes, f"{label}: clamped")
     tangents = named_nodes(tangents, nodes, f"{label}: clamped_tangents")
     if len(tangents) == nodes:

@@ -1,16 +1,18 @@
 """Crosslinkers and motors with numbers from the literature.
 
 Rates and speeds depend on temperature, salt and ATP by factors of two and more, and many numbers have not been measured
-but are what models take: each docstring says which. Rates of binding are chosen, since what a hand meets depends on its
-reach and the stiffness of the spring. A preset with other values is made by ``dataclasses.replace``.
+but are what models take: each docstring says which. A reach is chosen such that it hardly cuts off what the spring
+allows; rates of binding are chosen, since what a hand meets depends on its reach and the stiffness of the spring. A
+preset with other values is made by ``dataclasses.replace``.
 
 Papers
 ------
 Coppin, Pierce, Hsu, Vale, PNAS 1997, 94, 8539. Ferrer, Lee, Chen, Pelz, Nakamura, Kamm, Lang, PNAS 2008, 105, 9221.
-Kerssemakers, Howard, Hess, Diez, PNAS 2006, 103, 15812. Kuhlman, Ellis, Critchley, Bagshaw, FEBS Lett. 1994, 339, 297.
-Leduc et al., PNAS 2004, 101, 17096. Mallik, Carter, Lex, King, Gross, Nature 2004, 427, 649. Müller, Klumpp, Lipowsky,
-PNAS 2008, 105, 4609. Popov, Komianos, Papoian, PLoS Comput. Biol. 2016, 12, e1004877 (MEDYAN). Schnitzer, Visscher,
-Block, Nat. Cell Biol. 2000, 2, 718. Svoboda, Block, Cell 1994, 77, 773.
+Kerssemakers, Howard, Hess, Diez, PNAS 2006, 103, 15812. Klumpp, Lipowsky, PNAS 2005, 102, 17284. Kuhlman, Ellis,
+Critchley, Bagshaw, FEBS Lett. 1994, 339, 297. Leduc et al., PNAS 2004, 101, 17096. Mallik, Carter, Lex, King, Gross,
+Nature 2004, 427, 649. Müller, Klumpp, Lipowsky, PNAS 2008, 105, 4609. Nakamura, Osborn, Hartemink, Hartwig, Stossel, J.
+Cell Biol. 2007, 179, 1011. Popov, Komianos, Papoian, PLoS Comput. Biol. 2016, 12, e1004877 (MEDYAN). Schnitzer,
+Visscher, Block, Nat. Cell Biol. 2000, 2, 718. Svoboda, Block, Cell 1994, 77, 773.
 """
 
 from openmm import unit
@@ -59,10 +61,10 @@ FILAMIN = Crosslinker(
 )
 """Filamin, a long and soft crosslinker of actin.
 
-- length: a dimer of two arms of about 80 nm; network models take 150 nm.
+- length: a dimer of two arms of about 80 nm (Nakamura et al. 2007), which are flexible; 150 nm are chosen.
 - unbinding as for ALPHA_ACTININ, which is an assumption: both have similar rupture forces of 40 to 80 pN (Ferrer et al.
   2008).
-- stiffness 0.1 pN/nm: a value that network models use, not measured; filamin is no harmonic spring.
+- stiffness 0.1 pN/nm is chosen, not measured; filamin is no harmonic spring.
 - ``binding_rate`` is chosen: one hand in solution binds to actin, a site every 2.7 nm, with K_d = 1 uM, an assumption.
 """
 
@@ -85,10 +87,12 @@ These are effective values of models, not measurements of one molecule:
 
 - 22 heads a side, of 15 to 30, that bind with k_on = 0.2/s and unbind with k_off = 1.7/s, and act over 175 to 225 nm,
   as in MEDYAN (Popov et al. 2016). Together they let go with N k_on/((1 + k_on/k_off)^N - 1) = 0.42/s (Klumpp,
-  Lipowsky, PNAS 2005, 102, 17284), and the first of them binds with N k_on = 4.4/s: that is what a straight filament at
+  Lipowsky 2005), and the first of them binds with N k_on = 4.4/s: that is what a straight filament at
   200 nm from the other hand meets. Load does not change these rates here; in MEDYAN it is a catch bond.
-- speed 0.5 um/s, ``stall_force`` 4 pN, stiffness 0.1 pN/nm: of the order that models with effective hands take, such as
-  Cytosim; ATP is not limiting. MEDYAN lets a filament stall at much larger forces.
+- speed 0.5 um/s, ``stall_force`` 4 pN, stiffness 0.1 pN/nm: those of the contractile bundle among the examples of
+  Cytosim (cym/bundle_contract.cym, after a model of D. Cortes), a program with effective hands; ATP is not limiting.
+  MEDYAN lets a filament stall at much larger forces.
+- ``rest_length`` 200 nm: the middle of the 175 to 225 nm.
 """
 
 KINESIN_1 = Crosslinker(

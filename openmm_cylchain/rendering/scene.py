@@ -8,7 +8,7 @@ import numpy as np
 from ..analysis.order import director
 from ..analysis.runs import Run
 from ..errors import InputError
-from ..mechanics.geometry import joint_cosines, segment_vectors
+from ..mechanics.geometry import segment_vectors
 from ..units.quantities import AVOGADRO
 from ..units.types import FloatArray, IntArray
 from .colors import filament_colors, linker_color
@@ -93,9 +93,9 @@ class Scene:
         parts = list(self._fixed)
         values = None if self.scale is None else _values(self.run, self.look, self._director, frame)
         colors = filament_colors(self.run)
-        for number, (own, nodes) in enumerate(zip(self.run.filaments, self.run.nodes(frame))):
-            ends = np.stack([nodes, np.roll(nodes, -1, axis=0)], axis=1)[: own.segments]
-            color = np.tile(_rgb(colors[own.type.name]), (own.segments, 1))
+        for number, (own, points) in enumerate(zip(self.run.filaments, self.run.lines(frame))):
+            ends = np.stack([points, np.roll(points, -1, axis=0)], axis=1)[: own.segments * own.pieces]
+            color = np.tile(_rgb(colors[own.type.name]), (len(ends), 1))
             if self.scale is not None and values is not None:
                 color = self.scale.colors(values[number])
             ends, which = self._wrapped(ends)
@@ -182,8 +182,8 @@ def _framed_points(run, look, frames):
         corners = np.array(np.meshgrid(*[[0.0, 1.0]] * 3)).reshape(3, 8).T
         return corners @ run.box
     sampled = {frames[round(place)] for place in np.linspace(0, len(frames) - 1, min(len(frames), 20))}
-    nodes = np.concatenate([own for frame in sampled for own in run.nodes(frame)])
-    return np.concatenate([nodes, *wall_lines(run, nodes)])
+    points = np.concatenate([own for frame in sampled for own in run.lines(frame)])
+    return np.concatenate([points, *wall_lines(run, points)])
 
 
 def _rgb(color):
@@ -191,28 +191,19 @@ def _rgb(color):
 
 
 def _segments(run, frame):
-    return [segment_vectors(nodes, own.ring) for own, nodes in zip(run.filaments, run.nodes(frame))]
+    return [segment_vectors(points, own.ring) for own, points in zip(run.filaments, run.lines(frame))]
 
 
 def _values(run: Run, look: Look, axis: FloatArray | None, frame: int) -> list[FloatArray]:
-    # Of each segment of each filament.
-    if look.color == "tension":
-        return [tensions / _PICONEWTON for tensions in run.segment_tensions(frame, look.average)]
-    units = [own / np.linalg.norm(own, axis=1, keepdims=True) for own in _segments(run, frame)]
+    # Of each piece of each filament that is drawn.
     if look.color == "orientation":
+        units = [own / np.linalg.norm(own, axis=1, keepdims=True) for own in _segments(run, frame)]
         return [np.degrees(np.arccos(np.clip(np.abs(own @ axis), 0.0, 1.0))) for own in units]
-    return [_bends(own, filament.ring) for own, filament in zip(units, run.filaments)]
-
-
-def _bends(units, ring):
-    # The mean of the angles at the joints of a segment.
-    angles = np.degrees(np.arccos(np.clip(joint_cosines(units, ring), -1.0, 1.0)))
-    if ring:
-        return 0.5 * (angles + np.roll(angles, -1))
-    if len(units) == 1:
-        return np.zeros(1)
-    padded = np.concatenate([angles[:1], angles, angles[-1:]])
-    return 0.5 * (padded[1:] + padded[:-1])
+    if look.color == "tension":
+        values = [tensions / _PICONEWTON for tensions in run.segment_tensions(frame, look.average)]
+    else:
+        values = [np.degrees(bends) for bends in run.bends(frame)]
+    return [np.repeat(own, filament.pieces) for own, filament in zip(values, run.filaments)]
 
 
 def _color_scale(run, look, axis, frames):

@@ -14,7 +14,8 @@ from ..theory import (
     clamped_deflection_variance,
     wlc_mean_square_end_to_end,
 )
-from . import cantilevers, chromosome, rods_on_string, simulation, style
+from . import beam_networks, cantilevers, chromosome, rods_on_string, simulation, style
+from .beam_networks import Network
 from .case import Case, Outcome
 from .result import Estimate, Result, Rule
 from .rods_on_string import ACTIN, CHROMOSOME, MICROMETER
@@ -37,6 +38,37 @@ _ACTIN_LENGTH = 15.5 * MICROMETER
 _DRAWN, _DRAWS = (2, 3, 6, 12), {True: 500, False: 8000}
 _DRAWN_RULE = Rule(3.0, 0.003, 0.012)
 _GROUPS = 20
+_SEEDS = (1, 2)
+_NETWORK_COUNTS = {
+    "lattice": [*(("straight", n) for n in (1, 2, 4, 8)), *(("beam", n) for n in (1, 2, 3))],
+    "random": [*(("straight", n) for n in (4, 8, 16, 32, 64)), *(("beam", n) for n in (2, 4, 8, 16))],
+}
+_NETWORK_TOLERANCES = {
+    ("lattice", "beam", 1): 0.001,
+    ("lattice", "beam", 2): 0.0005,
+    ("lattice", "beam", 3): 0.0005,
+    ("lattice", "straight", 8): 0.02,
+    ("random", "beam", 16): 0.02,
+    ("random", "straight", 64): 0.002,
+}
+_ON_NETWORKS = """Networks of actin in a plane without thermal motion, of which one line is moved along another that
+is held, and the force that this takes, beside that of continuous filaments, whose linear equations
+are solved exactly. Means over {networks} networks.
+
+In a lattice of triangles, {present:g} % of whose spans are there, nodes are where filaments are
+linked: numbers are those of elements, and unknowns, for each span. One beam element for each span
+is enough, because a span that forces at its ends bend is a cubic curve. What is left is due to
+tangents of one length on both sides of a link, where strains would jump. Straight segments bend at
+their joints alone, and need more than eight.
+
+{lattice}
+
+Filaments that lie anywhere are linked anywhere, here to {spans:.1f} spans each on the average;
+numbers, and unknowns, are those for each filament. With the same number of unknowns, straight
+segments err less: shear forces jump at links, and no element has such a curve inside. Nodes belong
+where filaments are linked.
+
+{random}"""
 
 
 def loaded_columns(loads, length_micrometers, segments, element, steps, step):
@@ -279,9 +311,43 @@ def evaluate_distances(records, quick):
     return Outcome(results, {"Error of the mean square distance": lambda figure: _draw(figure, errors, heads)}, remarks)
 
 
+def evaluate_networks(records, quick):
+    """The shear modulus of crosslinked networks against elements per span."""
+    errors, results = {}, []
+    networks = {kind: [Network.of_kind(kind, seed) for seed in _SEEDS] for kind in _NETWORK_COUNTS}
+    for kind, counts in _NETWORK_COUNTS.items():
+        exact = np.array([beam_networks.continuous_force(network) for network in networks[kind]])
+        errors[kind] = {}
+        for element, number in counts:
+            name = f"{kind}-{number}-{element}"
+            settings = {"kind": kind, "seeds": list(_SEEDS), "elements": number, "element": element}
+            data = records.measure(f"network-{name}", beam_networks.network_forces, **settings)
+            ratio = float(np.mean(data["force"] / exact))
+            errors[kind][element, number] = [ratio - 1.0]
+            if (kind, element, number) in _NETWORK_TOLERANCES:
+                rule = Rule(3.0, _NETWORK_TOLERANCES[kind, element, number])
+                name = f"modulus_of_{kind}_over_exact_{number}_{_NAMES[element].replace(' ', '_')}"
+                results.append(Result(name, "1", Estimate(ratio, None), rule, 1.0))
+    heads = {"lattice": ["linked at nodes"], "random": ["linked anywhere"]}
+    spans = np.mean([network.spans for network in networks["random"]])
+    remarks = _ON_NETWORKS.format(
+        networks=len(_SEEDS),
+        present=100 * beam_networks.PRESENT,
+        lattice=_table(heads["lattice"], errors["lattice"]),
+        spans=spans,
+        random=_table(heads["random"], errors["random"]),
+    )
+    pictures = {
+        "Error of the modulus of a lattice": lambda figure: _draw(figure, errors["lattice"], heads["lattice"]),
+        "Error of the modulus of a random network": lambda figure: _draw(figure, errors["random"], heads["random"]),
+    }
+    return Outcome(results, pictures, remarks)
+
+
 CASES = (
     Case("cantilevers", "Cantilevers", (), evaluate_cantilevers),
     Case("columns", "Buckling of columns", (), evaluate_columns),
     Case("variances", "Thermal fluctuations", (), evaluate_variances),
     Case("distances", "Distance of the ends", (), evaluate_distances),
+    Case("networks", "Shear modulus of crosslinked networks", (), evaluate_networks),
 )

@@ -10,6 +10,7 @@ import openmm
 from openmm import app, unit
 from scipy.spatial import cKDTree
 
+from ..beams.curve import curve_points, element_points
 from ..couplings.capsule_contacts import capsule_contact_force
 from ..couplings.crosslinks import Crosslinks
 from ..couplings.pulling import constant_force, constant_tension
@@ -19,10 +20,13 @@ from ..errors import InputError
 from ..filaments import shapes
 from ..systems.filaments import Filaments
 from ..theory import chain_mean_square_end_to_end
+from ..theory.beam_elements import beam_mean_square_end_to_end
 from .keys import ConfigurationError
 
 _ATTEMPTS, _NODES_OF_ATTEMPTS = 2000, 10**5
 """To place a filament within a region: how often, and how many nodes may be drawn for it if it is long."""
+_POINTS_OF_ELEMENT = 8
+"""By which the curve of a beam element is looked at."""
 
 
 @dataclass(frozen=True)
@@ -142,7 +146,7 @@ def place_filaments(configuration, engine, seed, linkers=True):
         for index in range(group.count):
             number = len(filaments)
             places = np.random.default_rng([seed, number, 1])
-            _add(filaments, group, _nodes(group, index, solvent.temperature, seed, number, places, box, centers))
+            _add(filaments, group, *_nodes(group, index, solvent.temperature, seed, number, places, box, centers))
     for own in configuration.tethers:
         for number in own.filaments:
             point = filaments[number].positions[own.node] if own.point is None else own.point
@@ -166,39 +170,54 @@ def box_vectors(box):
     return None if box is None else np.diag(box)
 
 
-def _add(filaments, group, nodes):
+def _add(filaments, group, nodes, control_points):
+    own = {"control_points": control_points} if group.has_beam_elements else {}
     filaments.add_nodes(
-        group.type, nodes, group.clamped, closed=group.closed, planar=group.planar, propulsion=group.propulsion
+        group.type,
+        nodes,
+        group.clamped,
+        closed=group.closed,
+        planar=group.planar,
+        propulsion=group.propulsion,
+        clamped_tangents=group.clamped_tangents,
+        **own,
     )
 
 
 def _nodes(group, index, temperature, seed, number, places, box, centers):
+    # Nodes and control points, which straight segments do not have.
     if group.positions is not None:
-        return _flat(group, group.positions[index].copy())
+        controls = None if group.control_points is None else group.control_points[index]
+        return _moved(group, (group.positions[index], controls), 0.0, 0.0)
     if group.inside is not None:
         return _inside(group, temperature, seed, number, places)
     free = box is not None
-    nodes = _shape(group, temperature, seed, number, places if free else None)
+    shape = _shape(group, temperature, seed, number, places if free else None)
+    nodes, _ = shape
     if group.position is not None:
-        return nodes + (np.array(group.position) - (nodes.mean(axis=0) if group.closed else 0.0))
+        shift = np.array(group.position) - (nodes.mean(axis=0) if group.closed else 0.0)
+        return tuple(None if points is None else points + shift for points in shape)
     center = places.uniform(0.0, box) if free else next(centers)
-    return _flat(group, nodes + center - nodes.mean(axis=0), group.height)
+    return _moved(group, shape, center, nodes.mean(axis=0), group.height)
 
 
-def _flat(group, nodes, height=None):
-    # Those of planar filaments have one z, to the bit.
+def _moved(group, shape, to, middle, height=None):
+    # Points of planar filaments have one z, to the bit.
+    nodes, controls = (None if points is None else points + to - middle for points in shape)
     if group.planar:
         nodes[:, 2] = nodes[0, 2] if height is None else height
-    return nodes
+        if controls is not None:
+            controls[:, 2] = nodes[0, 2]
+    return nodes, controls
 
 
 def _inside(group, temperature, seed, number, places):
     attempts = _attempts(group)
     for attempt in range(attempts):
-        nodes = _shape(group, temperature, seed, number, places, attempt)
-        nodes = _flat(group, nodes + group.inside.draw(places) - nodes.mean(axis=0), group.height)
-        if group.inside.contains(nodes):
-            return nodes
+        shape = _shape(group, temperature, seed, number, places, attempt)
+        nodes, controls = _moved(group, shape, group.inside.draw(places), shape[0].mean(axis=0), group.height)
+        if group.inside.contains(nodes if controls is None else curve_points(nodes, controls, _POINTS_OF_ELEMENT)):
+            return nodes, controls
     raise ConfigurationError(
         f"[[filament]] number {group.table}: filament {number} of {group.segments} segments does not fit into its "
         f"region: none of {attempts} random places has all of its nodes inside. Take shorter filaments or a "
@@ -215,10 +234,10 @@ def _attempts(group):
 
 
 def _shape(group, temperature, seed, number, places, attempt=0):
-    # Nodes with the first one at the origin. Each filament has a seed of its own.
+    # Nodes with the first one at the origin, and control points. Each filament has a seed of its own.
     kind, origin, label = group.type, (0.0, 0.0, 0.0), f"Filament {number}"
     if group.closed:
-        return shapes.ring(kind, group.segments, origin, group.normal, label)
+        return shapes.ring(kind, group.segments, origin, group.normal, label), None
     direction = group.direction
     generator = np.random.default_rng([seed, number, *([2, attempt] if attempt else [])])
     if direction is not None and group.orientation == "nematic":
@@ -228,10 +247,12 @@ def _shape(group, temperature, seed, number, places, attempt=0):
             direction = (1.0, 0.0, 0.0) if places is None else places.normal(size=3)
             if group.planar:
                 direction = (*direction[:2], 0.0)
-        return shapes.straight(kind, group.segments, origin, direction, label)
-    return shapes.drawn(
-        kind, group.segments, temperature, generator, origin, direction, group.clamped, group.planar, label
-    )
+        nodes = shapes.straight(kind, group.segments, origin, direction, label)
+        return nodes, shapes.beam_control_points(kind, nodes, None, label)
+    drawn = kind, group.segments, temperature, generator, origin, direction
+    if group.has_beam_elements:
+        return shapes.drawn_beam(*drawn, group.planar, label)
+    return shapes.drawn(*drawn, group.clamped, group.planar, label), None
 
 
 def _grid_centers(groups, temperature):
@@ -250,7 +271,8 @@ def _extent(group, temperature):
         return group.segments * group.type.segment_length / np.pi
     if group.start == "straight":
         return group.segments * group.type.segment_length
-    return np.sqrt(chain_mean_square_end_to_end(group.type, group.segments, temperature))
+    mean_square = beam_mean_square_end_to_end if group.has_beam_elements else chain_mean_square_end_to_end
+    return np.sqrt(mean_square(group.type, group.segments, temperature))
 
 
 def _add_particles(configuration, seed, topology, system, positions):
@@ -334,8 +356,11 @@ def _place(entries, filaments):
 
 
 def _position_of(place, filaments, number):
-    first = filaments.node_indices[number][0]
-    nodes = filaments[number].positions
+    first, own = filaments.node_indices[number][0], filaments[number]
+    nodes = own.positions
+    if own.control_points is not None:
+        element = slice(place.first - first, place.second - first + 1)
+        return element_points(nodes[element], own.control_points[element], [place.fraction])[0, 0]
     return (1.0 - place.fraction) * nodes[place.first - first] + place.fraction * nodes[place.second - first]
 
 

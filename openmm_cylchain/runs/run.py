@@ -358,6 +358,21 @@ class _Recorder:
         if np.isfinite(stretching) and np.isfinite(bending) and np.all(np.isfinite(positions)):
             return
         filaments = self._filaments
+        for number, own in enumerate(filaments):
+            particles = np.concatenate([filaments.node_indices[number], filaments.control_point_indices[number]])
+            if own.type.has_beam_elements and not np.all(np.isfinite(positions[particles])):
+                node = int(np.argmin(np.isfinite(positions[particles]).all(axis=1))) % len(own.positions)
+                raise InstabilityError(
+                    f"{filament_label(number, own)} has blown up at node {node} by step {self._step}: its position is "
+                    "not finite. Use a smaller time step.",
+                    filament=number,
+                    segment=min(node, own.segments - 1),
+                    step=self._step,
+                )
+        if any(own.type.has_beam_elements for own in filaments):
+            raise InstabilityError(
+                f"The energy is not finite in step {self._step}. Use a smaller time step.", step=self._step
+            )
         chains = filaments.chain_set(self._simulation.system)
         nodes = np.concatenate(filaments.node_indices)
         broken = find_broken_segment(chains, *describe_lengths(filaments), positions[nodes])

@@ -6,7 +6,7 @@ from pathlib import Path
 import mdtraj
 import numpy as np
 
-from ..analysis.trajectories import filament_nodes, ring_filaments
+from ..analysis.trajectories import control_point_positions, filament_nodes, ring_filaments
 from .silence import silenced_c_library
 
 COPIES = "start_files"
@@ -32,7 +32,9 @@ def digest_of(path):
 
 
 def read_start(folder, place, name, topology, frame, numbers, type_name):
-    """Filaments of a file: a list of node positions (n, 3) in nm, and whether each one is a ring.
+    """Filaments of a file: a list of node positions (n, 3) in nm, whether each one is a ring, and its control points.
+
+    Control points, (n, 3) in nm, are those of beam elements in structure files and trajectories, and None of others.
 
     Parameters
     ----------
@@ -82,7 +84,9 @@ def read_start(folder, place, name, topology, frame, numbers, type_name):
         chains = [chain for chain, own in zip(chains, names) if own == type_name]
         if not chains:
             raise place.error(f"{name!r} has filaments of the types {', '.join(sorted(set(names)))}, not {type_name}.")
-    for number, (nodes, _) in enumerate(chains):
+    for number, (nodes, _, controls) in enumerate(chains):
+        if controls is not None and not np.all(np.isfinite(controls)):
+            raise place.error(f"{name!r}: control points of filament {number} are not finite.")
         if nodes.ndim != 2 or nodes.shape[1] != 3 or len(nodes) < 2 or not np.all(np.isfinite(nodes)):
             raise place.error(
                 f"{name!r}: filament {number} has the shape {nodes.shape}; it must be two nodes or more of three "
@@ -100,7 +104,7 @@ def _arrays(path):
     for array in arrays:
         array = np.asarray(array, dtype=float)
         chains += list(array) if array.ndim == 3 else [array]
-    return [(chain, False) for chain in chains]
+    return [(chain, False, None) for chain in chains]
 
 
 def _structure(path, topology, frame):
@@ -115,5 +119,6 @@ def _structure(path, topology, frame):
         loaded = mdtraj.load_frame(str(path), number, top=mdtraj.load_topology(str(topology)))
     positions = loaded.xyz[0].astype(float)
     nodes, rings = filament_nodes(loaded), ring_filaments(loaded)
+    controls = [None if own is None else own[0] for own in control_point_positions(loaded)]
     names = [loaded.topology.atom(int(own[0])).residue.name for own in nodes]
-    return [(positions[own], bool(ring)) for own, ring in zip(nodes, rings)], names
+    return [(positions[own], bool(ring), each) for own, ring, each in zip(nodes, rings, controls)], names

@@ -13,6 +13,7 @@ from .. import theory
 from ..analysis.statistics import FEWEST_FRAMES_OF_DRIFT, SIGNIFICANT_DRIFT, mean_with_error, statistical_inefficiency
 from ..analysis.trajectories import (
     bending_drift,
+    control_point_positions,
     end_to_end_vectors,
     joint_cosines,
     node_positions,
@@ -20,9 +21,11 @@ from ..analysis.trajectories import (
     segment_lengths,
 )
 from ..bead_spring.bead_spring_type import BeadSpringType
+from ..beams.curve import element_energies
 from ..errors import EquilibrationWarning, InputError
 from ..filaments.equilibrium import SegmentLengthDistribution
 from ..output.files import write_atomically
+from ..theory import beam_elements
 from ..units.quantities import AVOGADRO, thermal_energy
 from ..units.text import format_time, format_with_error
 from ..version import __version__
@@ -30,7 +33,7 @@ from .configuration import linker_labels
 from .run_directory import read_linkers
 from .silence import silenced_c_library
 
-_STRETCHING = "stretching energy per segment"
+_STRETCHING, _STRETCHING_OF_ELEMENTS = "stretching energy per segment", "stretching energy per element"
 _WORMLIKE = "the same, theory of the wormlike chain (25)"
 _EXTENSION = "extension along the tension, second half of the run"
 _ROUNDING_OF_STRETCHING, _ROUNDING_OF_ALL = 0.01, 1.0
@@ -124,7 +127,8 @@ def group_members(configuration):
 def group_labels(configuration):
     """A short name for each [[filament]] table, distinct if there are several."""
     labels = [
-        f"{group.count} × {group.type.name}, {group.segments} segment{'s' * (group.segments > 1)}"
+        f"{group.count} × {group.type.name}, {group.segments} "
+        f"{'beam element' if group.has_beam_elements else 'segment'}{'s' * (group.segments > 1)}"
         for group in configuration.filaments
     ]
     if len(set(labels)) < len(labels):
@@ -135,10 +139,11 @@ def group_labels(configuration):
 def is_in_equilibrium(group):
     """Whether the exact averages of the free chain hold for a group from its first frame on.
 
-    One clamped node, or one tether, leaves lengths and angles alone; several hold the chain, and linkers pull at it.
+    One clamped node, or one tether, leaves lengths and angles alone; several hold the chain, and linkers pull at it. So
+    does a clamped tangent, whose length does not fluctuate.
     """
     free = not (group.disturbed or group.planar or group.closed)
-    return free and group.start == "equilibrium" and len(group.clamped) <= 1
+    return free and group.start == "equilibrium" and len(group.clamped) <= 1 and not group.clamped_tangents
 
 
 def summarise(configuration, trajectory):
@@ -212,7 +217,7 @@ def _summarise_group(configuration, group, members, label, trajectory):
         slow = len(members) < _ENOUGH_FILAMENTS and statistical_inefficiency(series) > len(series) / 10
         if slow and name != _WORMLIKE:
             short.append(name)
-        rounded = name == _STRETCHING and rounding > _ROUNDING_OF_STRETCHING
+        rounded = name in (_STRETCHING, _STRETCHING_OF_ELEMENTS) and rounding > _ROUNDING_OF_STRETCHING
         observables.append(_compared(name, unit, value, error, exact, comparable and not rounded))
     if has_exact_extension(group):
         series = extensions(group, trajectory, members)
@@ -234,7 +239,8 @@ def _summarise_group(configuration, group, members, label, trajectory):
 
 def has_exact_extension(group):
     """Whether the exact extension of a group under its tension is known."""
-    plain = not (group.closed or group.planar or group.clamped or isinstance(group.type, BeadSpringType))
+    plain = not (group.closed or group.planar or group.clamped or group.has_beam_elements)
+    plain = plain and not isinstance(group.type, BeadSpringType)
     return plain and group.tension is not None and group.tension[0] >= 0.0
 
 
@@ -252,6 +258,9 @@ def _series(group, temperature, trajectory, members):
         # Nothing is known of rings of beads.
         if not group.closed:
             yield from _series_of_beads(kind, group.segments, temperature, trajectory, members)
+        return
+    if group.has_beam_elements:
+        yield from _series_of_beams(group, temperature, trajectory, members)
         return
     lengths = np.stack(segment_lengths(trajectory, members), axis=1)
     distribution = SegmentLengthDistribution(kind, temperature)
@@ -276,6 +285,30 @@ def _series(group, temperature, trajectory, members):
         yield from _end_to_end(kind, group.segments, temperature, trajectory, members)
 
 
+def _series_of_beams(group, temperature, trajectory, members):
+    # Averages over all elements of a chain.
+    kT = thermal_energy(temperature)
+    kind, exact = group.type, beam_elements.beam_averages(group.type, temperature)
+    nodes, controls = node_positions(trajectory, members), control_point_positions(trajectory, members)
+    element = kind.beam_element(temperature, group.planar)
+    stretching, bending = element_energies(np.stack(nodes, axis=1), np.stack(controls, axis=1), element)
+    theory_of_stretching = beam_elements.beam_stretching_energy_mean(kind, group.segments, temperature) / kT
+    yield _STRETCHING_OF_ELEMENTS, "kT", stretching.mean(axis=2) / kT, theory_of_stretching
+    yield "bending energy per element", "kT", bending.mean(axis=2) / kT, exact.bending
+    cosines = np.stack(joint_cosines(trajectory, members), axis=1)
+    yield "cosine between ends of an element", "", cosines.mean(axis=2), exact.cosine
+    squares = np.sum(end_to_end_vectors(trajectory, members) ** 2, axis=2)
+    mean_square = beam_elements.beam_mean_square_end_to_end(kind, group.segments, temperature)
+    yield "mean square end-to-end distance", "nm^2", squares, mean_square
+    length = group.segments * kind.segment_length
+    yield (
+        _WORMLIKE,
+        "nm^2",
+        squares,
+        float(theory.wlc_mean_square_end_to_end(length, kind.persistence_length_at(temperature))),
+    )
+
+
 def _series_of_beads(kind, bonds, temperature, trajectory, members):
     # Averages over all bonds, or joints, of a chain, which are not alike.
     kT = thermal_energy(temperature)
@@ -292,8 +325,14 @@ def _series_of_beads(kind, bonds, temperature, trajectory, members):
 
 
 def mean_energies(group, temperature):
-    """Exact mean energies in kJ/mol of a segment and of a joint of free chains; zero if there is no joint."""
+    """Exact mean energies in kJ/mol of a segment and of a joint of free chains; zero if there is no joint.
+
+    Of beam elements, those of an element.
+    """
     kind = group.type
+    if group.has_beam_elements:
+        stretching = beam_elements.beam_stretching_energy_mean(kind, group.segments, temperature)
+        return stretching, beam_elements.beam_averages(kind, temperature).bending * thermal_energy(temperature)
     if not isinstance(kind, BeadSpringType):
         return theory.stretching_energy_mean(kind, temperature), theory.bending_energy_mean(kind, temperature)
     free = kind, group.segments, temperature
@@ -322,6 +361,8 @@ def _mean_with_error(series):
 
 def _persistence_length(group, temperature, trajectory, members, comparable):
     # In chains of beads, mean cosines depend on the place along the chain.
+    if group.has_beam_elements:
+        return [_persistence_length_of_beams(group, temperature, trajectory, members, comparable)]
     if group.closed or group.segments < 2 or group.type.bending_rigidity == 0 or isinstance(group.type, BeadSpringType):
         return []
     try:
@@ -334,6 +375,15 @@ def _persistence_length(group, temperature, trajectory, members, comparable):
         return []
     exact = theory.chain_persistence_length(group.type, temperature)
     return [_compared("persistence length", "nm", value, error, exact, comparable)]
+
+
+def _persistence_length_of_beams(group, temperature, trajectory, members, comparable):
+    # -h/ln<c> of the cosine c between tangents at the ends of an element, and its error.
+    cosine, error = _mean_with_error(np.stack(joint_cosines(trajectory, members), axis=1).mean(axis=2))
+    exact = beam_elements.beam_persistence_length(group.type, temperature)
+    value = -group.type.segment_length / math.log(cosine) if 0.0 < cosine < 1.0 else math.inf
+    error *= value**2 / (group.type.segment_length * cosine) if math.isfinite(value) else math.inf
+    return _compared("persistence length", "nm", value, error, exact, comparable)
 
 
 def _compared(name, unit, value, error, exact, comparable):
@@ -370,6 +420,8 @@ def _notes(configuration, group, members, trajectory, short, rounding):
         )
     if len(group.clamped) > 1:
         yield "Several nodes are clamped: the exact values are those of free chains, so they are not compared."
+    elif group.clamped_tangents:
+        yield "A tangent is clamped: the exact values are those of free chains, so they are not compared."
     if group.disturbed:
         reasons = "; ".join(_DISTURBANCES[name] for name in group.disturbed)
         yield f"{reasons[0].upper()}{reasons[1:]}: the exact values are those of free chains, so they are not compared."
@@ -378,6 +430,8 @@ def _notes(configuration, group, members, trajectory, short, rounding):
         yield f"They are {what}: the exact values are those of open chains in space, so they are not compared."
     if group.start == "file":
         yield "Started from a file: whether that is equilibrium is not known, so nothing is compared with it."
+    if group.start == "nodes":
+        yield "Started from given nodes: whether that is equilibrium is not known, so nothing is compared with it."
     if group.count >= _ENOUGH_FILAMENTS:
         yield (
             f"Errors: standard error of the time averages of {group.count} independent filaments, which holds "
@@ -404,6 +458,9 @@ def _rounding_share(configuration, group, trajectory):
     # DCD holds single-precision angstroms and mdtraj single-precision nm; each rounds both ends of a segment.
     spacing = float(np.spacing(np.float32(10.0 * np.abs(trajectory.xyz).max()))) / 10.0
     variance = 4.0 * spacing**2 / 12.0
+    if group.has_beam_elements:
+        # The strain at a node is that of Q - P, a third of an element long, with a share of an element of its energy.
+        variance *= 3.0
     return variance * group.type.segment_stiffness / thermal_energy(configuration.solvent.temperature)
 
 

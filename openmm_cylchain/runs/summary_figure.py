@@ -10,8 +10,9 @@ from scipy.integrate import trapezoid
 
 from .. import theory
 from ..analysis.statistics import mean_with_error
-from ..analysis.trajectories import joint_cosines, node_positions, segment_lengths, tangent_correlation
+from ..analysis.trajectories import filament_lines, joint_cosines, segment_lengths, tangent_correlation
 from ..output.files import write_atomically
+from ..theory.beam_elements import beam_persistence_length
 from ..units.quantities import thermal_energy
 from ..units.text import time_unit
 from .configuration import linker_labels
@@ -107,11 +108,11 @@ def _length_unit(length):
 def _draw_conformations(axis, groups, trajectory):
     last = trajectory[-1]
     for _, members, label, colour in groups:
-        for number, positions in enumerate(node_positions(last, members)):
-            nodes = positions[0]
+        for number, positions in enumerate(filament_lines(last, members)):
+            points = positions[0]
             axis.plot(
-                nodes[:, 0],
-                nodes[:, 1],
+                points[:, 0],
+                points[:, 1],
                 color=colour,
                 linewidth=1.8,
                 solid_capstyle="round",
@@ -224,13 +225,16 @@ def _draw_energies(axis, groups, temperature, energies):
     segments = np.array([group.count * group.segments for group in kinds])
     joints = np.array([group.count * group.joints for group in kinds])
     stretching, bending = np.array([mean_energies(group, temperature) for group in kinds]).T / kT
+    beams = all(group.has_beam_elements for group in kinds)
     curves = [("stretching", "segment", np.average(stretching, weights=segments), _STRETCHING_COLOUR)]
     if np.any(joints * bending):
         curves.append(("bending", "joint", np.average(bending, weights=joints), _BENDING_COLOUR))
     free = "exact in equilibrium" if all(map(is_in_equilibrium, kinds)) else "free chains"
     for label, per, exact, colour in curves:
         values = energies[f"{label} energy per {per} (kT)"]
-        axis.plot(time, values, color=colour, linewidth=1.0, alpha=0.8, label=f"{label}, per {per}")
+        axis.plot(
+            time, values, color=colour, linewidth=1.0, alpha=0.8, label=f"{label}, per {'element' if beams else per}"
+        )
         axis.axhline(exact, color=colour, linewidth=1.8, linestyle="--", label=f"{free}: {exact:.4g}")
     axis.set_xlim(time[0], time[-1])
     bottom, top = axis.get_ylim()
@@ -264,7 +268,8 @@ def _draw_tangent_correlation(axis, groups, temperature, trajectory):
             linewidth=1.2,
             label=label,
         )
-        persistence = theory.chain_persistence_length(group.type, temperature)
+        persistence_length = beam_persistence_length if group.has_beam_elements else theory.chain_persistence_length
+        persistence = persistence_length(group.type, temperature)
         if persistence > 0:
             distance = np.linspace(0.0, group.segments * group.type.segment_length, 200)
             label = f"exp(-s/lp), lp = {_format_length(persistence)}"
@@ -296,8 +301,9 @@ def _draw_joint_angles(axis, groups, temperature, trajectory):
         cosines = np.clip(np.concatenate([c.ravel() for c in joint_cosines(trajectory, members)]), -1.0, 1.0)
         angles = np.degrees(np.arccos(cosines))
         _draw_histogram(axis, angles, label, colour)
-        if group.type.node_friction > 0.0:
-            # Those of beads have no distribution that holds all along the chain.
+        if group.type.node_friction > 0.0 or group.has_beam_elements:
+            # Those of beads have no distribution that holds all along the chain, and of those of beam elements there is
+            # no closed form.
             continue
         angle = np.linspace(0.0, np.pi, 20001)
         density = np.sin(angle)
@@ -317,10 +323,17 @@ def _draw_joint_angles(axis, groups, temperature, trajectory):
             label=_exact_label(group),
         )
     axis.set_xlim(left=0.0)
-    axis.set_xlabel("angle between neighbouring segments (degrees)")
+    axis.set_xlabel(f"angle between {_bends(groups)} (degrees)")
     axis.set_ylabel("probability density (1/degree)")
-    axis.set_title("Joint angles")
+    axis.set_title("Bends of elements" if all(group.has_beam_elements for group, *_ in groups) else "Joint angles")
     _legend(axis, loc="upper right")
+
+
+def _bends(groups):
+    # What has the angles of joint_cosines between it.
+    kinds = {group.has_beam_elements for group, *_ in groups}
+    names = {False: "neighbouring segments", True: "ends of an element"}
+    return " or ".join(names[kind] for kind in sorted(kinds))
 
 
 def _draw_extensions(axis, groups, temperature, trajectory):

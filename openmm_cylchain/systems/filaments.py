@@ -237,6 +237,7 @@ class Filaments:
         planar: bool = False,
         propulsion: Scalar = 0.0,
         tangents: Vectors | None = None,
+        control_points: Vectors | None = None,
         clamped_tangents: int | Indices = (),
     ) -> int:
         """Add a filament with given node positions.
@@ -255,6 +256,8 @@ class Filaments:
         tangents : (n, 3) array, optional
             Of beam elements: directions of the curve at the nodes, which need not be normalised; those of the natural
             cubic spline through the nodes if not given.
+        control_points : (n, 3) length, optional
+            Of beam elements, in place of tangents: those of another chain, as it is, with its strains.
         planar, propulsion, clamped_tangents
             See ``add_straight``.
 
@@ -265,7 +268,10 @@ class Filaments:
         """
         label = self._label(filament_type)
         positions = shapes.given(positions, label)
-        controls = shapes.beam_control_points(filament_type, positions, tangents, label)
+        if control_points is None:
+            controls = shapes.beam_control_points(filament_type, positions, tangents, label)
+        else:
+            controls = self._given_control_points(filament_type, positions, tangents, control_points, label)
         return self._add(
             filament_type, positions, clamped, label, closed, planar, propulsion, controls, clamped_tangents
         )
@@ -1125,6 +1131,22 @@ class Filaments:
     def _refuse_beam(self, filament, what, instead="give its type element='straight'"):
         if self[filament].type.has_beam_elements:
             raise InputError(f"{what} cannot be on filament {filament}, which has beam elements, as yet: {instead}.")
+
+    @staticmethod
+    def _given_control_points(filament_type, positions, tangents, control_points, label):
+        if tangents is not None:
+            raise InputError(f"{label}: give either tangents or control_points, not both.")
+        if not filament_type.has_beam_elements:
+            raise InputError(f"{label}: control_points belong to nodes of beam elements; its segments are straight.")
+        controls = np.array(in_units_of(control_points, LENGTH, f"{label}: control_points"))
+        if controls.shape != positions.shape:
+            raise InputError(
+                f"{label}: control_points must have the shape {positions.shape}, but have {controls.shape}."
+            )
+        apart = np.linalg.norm(controls - positions, axis=1)
+        if not np.all(apart > 0.0):
+            raise InputError(f"{label}: the control point of node {int(np.argmin(apart))} is at the node.")
+        return controls
 
     def _add(
         self,

@@ -24,15 +24,21 @@ public:
     double find(const PlaceOnChain& place) const;
     /** Find what no place of a chain, or a particle, responds less than. It takes less time. */
     double findLeast(int chain) const;
-    /** Get whether places of a chain at neighbouring nodes are moved together by what moves one of them. */
+    /**
+     * Get whether places of a chain at neighbouring nodes are moved together by what moves one of them. Those of beam
+     * elements are: several of them are on one element.
+     */
     bool moveTogether(int chain) const;
 private:
     /** A chain, as a beam and as a rod. */
     struct Beam {
-        double length, wave, bending, whole;
+        double length = 0, wave = 0, bending = 0, whole = 0;
         /** The least response of a place. */
-        double least;
+        double least = 0;
+        int segments = 0;
+        bool closed = false;
     };
+    void describe(double friction, double rigidity, Beam& beam) const;
     const ChainPlaces* places = nullptr;
     double stepSize = 0;
     std::vector<Beam> beams;

@@ -10,7 +10,7 @@ namespace {
 
 /** Exponents of rates are at most this. */
 const double LARGEST_EXPONENT = 500;
-/** Hands walk in parts of a step: in each, they relax towards their stall force by this share, unless there are most. */
+/** Hands walk in parts of a step: in each, they relax towards their stall force by this, unless there are most. */
 const double SHARE_OF_RELAXATION = 0.25;
 const double MOST_PARTS = 100;
 

@@ -178,13 +178,13 @@ def test_links_and_bends_keep_their_energies_at_the_recommended_step(pair, stiff
         assert abs(np.mean(mean) - expected) < SIGMAS * error + allowed
 
 
-@pytest.mark.parametrize("samples", [60, pytest.param(1200, marks=pytest.mark.slow)])
-def test_a_loop_of_two_links_is_that_of_weighted_draws(samples):
+def test_a_loop_of_two_links_is_that_of_weighted_draws():
     """Elements that are linked at one place are drawn exactly; a second, soft link weighs them by its energy.
 
-    That energy itself takes long to average.
+    Bends and the stiff link are held to 5 %. The energy of the soft one, which relaxes with the turns of elements, has
+    its own, larger error.
     """
-    stiffness, soft, draws, copies, elements = 1.0, 1e-4, 20000, 600, 1
+    stiffness, soft, draws, copies, elements, samples = 1.0, 3e-4, 20000, 600, 1, 40
     generator, element = np.random.default_rng(11), BEAM.beam_element(TEMPERATURE)
     kT = KT
     # The elements of one chain, of which each is as good as one that is alone, but for the strains of its ends.
@@ -208,7 +208,7 @@ def test_a_loop_of_two_links_is_that_of_weighted_draws(samples):
     energy = 0.5 * soft * np.sum(apart**2, axis=1) / kT
     weights = np.exp(-energy)
     weights /= weights.sum()
-    assert 1.0 / np.sum(weights**2) > 0.2 * draws
+    assert 1.0 / np.sum(weights**2) > 0.05 * draws
     bends = element_energies(nodes, controls, element)[1].reshape(draws, -1).mean(axis=1) / kT
     expected = [float(weights @ values) for values in (energy, bends)]
     errors = [np.sqrt(np.sum((weights * (v - e)) ** 2)) for v, e in zip((energy, bends), expected)]
@@ -233,7 +233,7 @@ def test_a_loop_of_two_links_is_that_of_weighted_draws(samples):
     integrator.step(100)
     measured = [[], [], []]
     for _ in range(samples):
-        integrator.step(6)
+        integrator.step(10)
         lengths = links.lengths(context)
         measured[0].append(0.5 * soft * lengths[1::2] ** 2 / kT)
         now = positions_of(context)
@@ -244,7 +244,7 @@ def test_a_loop_of_two_links_is_that_of_weighted_draws(samples):
     for values, value, uncertainty in zip(measured, [*expected, 1.5], [*errors, 0.0]):
         mean = np.mean(values, axis=0)
         error = np.hypot(np.std(mean, ddof=1) / np.sqrt(copies), uncertainty)
-        assert error < 0.01 * value or (samples < 1000 and value == expected[0])
+        assert error < (0.05 if value == expected[0] else 0.01) * value
         assert abs(np.mean(mean) - value) < SIGMAS * error + 0.01 * value
 
 

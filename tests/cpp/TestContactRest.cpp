@@ -19,8 +19,8 @@ static double dot(const double* a, const double* b) {
     return a[0]*b[0]+a[1]*b[1]+a[2]*b[2];
 }
 
-static ContactCourse makeCourse(double softness, const double (&begun)[3], const double (&now)[3], const double (&other)[3],
-        const double* normal) {
+static ContactCourse makeCourse(double softness, const double (&begun)[3], const double (&now)[3],
+        const double (&other)[3], const double* normal) {
     ContactCourse course = {};
     copy_n(begun, 3, course.begun);
     copy_n(now, 3, course.now);

@@ -518,8 +518,8 @@ static void testSites() {
 }
 
 /**
- * Linkers of two types compete for the sites of two rods, which have one each: with the weights s of a linker that holds
- * one of them, and d of one that holds both, summed over types and hands, Z = (1+s)^2+d.
+ * Linkers of two types compete for the sites of two rods, which have one each: with the weights s of a linker that
+ * holds one of them, and d of one that holds both, summed over types and hands, Z = (1+s)^2+d.
  */
 static void testCompetitionForSites() {
     const int pairs = 60;

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...filaments.chain_type import ChainType
 from ...filaments.placement import clamped_nodes
-from ...filaments.shapes import MINIMUM_RING
+from ...filaments.shapes import MINIMUM_RING, beam_control_points, clamped_beam
 from ...units import quantities as units
 from ..keys import Choice, Either, Flag, Inline, Key, Listing, Quantity, Text, Whole, direction, point
 from ..start_files import read_start
@@ -21,7 +21,19 @@ MOST_NODES = 10**7
 
 _ORIENTATIONS = ("polar", "nematic")
 _SEGMENTS = Whole(1, MOST_NODES, "64")
-_FROM_FILE = ("segments", "count", "concentration", "start", "position", "direction", "orientation", "inside", "normal")
+_FROM_NODES = (
+    "segments",
+    "count",
+    "concentration",
+    "start",
+    "position",
+    "direction",
+    "orientation",
+    "inside",
+    "normal",
+    "height",
+)
+_FROM_FILE = (*_FROM_NODES[:-1], "tangents")
 
 FILAMENT = TableKind(
     "filament",
@@ -51,6 +63,24 @@ FILAMENT = TableKind(
             Listing(Whole(-MOST_NODES, MOST_NODES, "0"), "node numbers", "[0]", 0),
             (),
             "Nodes that do not move; -1 is the last one.",
+        ),
+        Key(
+            "clamped_tangents",
+            Listing(Whole(-MOST_NODES, MOST_NODES, "0"), "node numbers", "[0]", 0),
+            (),
+            'Of element = "beam": clamped nodes at which it does not turn; one that is clamped alone is a hinge.',
+        ),
+        Key(
+            "nodes",
+            Listing(point(), "points", '[["0 nm", "0 nm", "0 nm"], ["1 um", "0 nm", "0 nm"]]', 2),
+            None,
+            "Where the nodes of one filament begin, in place of segments and all that places it.",
+        ),
+        Key(
+            "tangents",
+            Listing(direction(), "directions", "[[1, 0, 0], [1, 0, 0]]", 2),
+            None,
+            'Of element = "beam", with nodes: directions of its curve there; those of a smooth curve if not given.',
         ),
         Key("closed", Flag(), False, "A ring, which begins as a regular polygon."),
         Key("normal", direction(), (0.0, 0.0, 1.0), "Of the plane of a ring."),
@@ -85,7 +115,7 @@ class FilamentGroup:
 
     ``table`` is the number of the table, from 1; ``disturbed`` what makes them no free chains, in words: links, walls
     and so on; ``tension`` that of their ends in kJ/(mol nm), with its direction, if nothing else is. ``positions`` are
-    those of a file, for each filament.
+    those of a file, or given ones, for each filament, and ``control_points`` those of beam elements or None.
     """
 
     type: ChainType
@@ -106,6 +136,8 @@ class FilamentGroup:
     disturbed: tuple = ()
     tension: tuple | None = None
     positions: tuple | None = dataclasses.field(default=None, compare=False, repr=False)
+    control_points: tuple | None = dataclasses.field(default=None, compare=False, repr=False)
+    clamped_tangents: tuple = ()
 
     @property
     def nodes(self):
@@ -114,8 +146,13 @@ class FilamentGroup:
 
     @property
     def joints(self):
-        """Joints of each filament."""
-        return self.segments - (not self.closed)
+        """Joints of each filament; beam elements bend themselves, and there are as many bends."""
+        return self.segments - (not (self.closed or self.has_beam_elements))
+
+    @property
+    def has_beam_elements(self):
+        """Whether segments are elements that bend inside."""
+        return self.type.has_beam_elements
 
     @property
     def linked(self):
@@ -137,20 +174,69 @@ def read_filaments(entries, table, solvent, box, folder):
         That files are named from.
     """
     kind = read_filament_type(entries, solvent)
-    groups = (_from_file if "file" in entries else _placed)(entries, kind, box, folder)
+    _check_element(entries, kind)
+    if "file" in entries:
+        groups = _from_file(entries, kind, box, folder)
+    else:
+        groups = _from_nodes(entries, kind) if "nodes" in entries else _placed(entries, kind, box)
     own = {"planar": True} if entries["planar"] else {}
     common = {"propulsion": entries["propulsion"], "height": entries["height"], "table": table}
     finished = []
     for group in groups:
         with entries.naming():
-            clamped = clamped_nodes(entries["clamped"], group.nodes, entries.label.rstrip(":"))
+            label = entries.label.rstrip(":")
+            if kind.has_beam_elements:
+                clamped, tangents = clamped_beam(entries["clamped"], entries["clamped_tangents"], group.nodes, label)
+            else:
+                clamped, tangents = clamped_nodes(entries["clamped"], group.nodes, label), ()
             kind.segment_friction(solvent.viscosity, solvent.temperature, group.segments)
-        finished.append(dataclasses.replace(group, clamped=clamped, **own, **common))
+        finished.append(dataclasses.replace(group, clamped=clamped, clamped_tangents=tangents, **own, **common))
     return finished
 
 
-def _placed(entries, kind, box, folder):
+def _check_element(entries, kind):
+    # What beam elements alone have, and what they do not have.
+    if not kind.has_beam_elements:
+        entries.refuse(("tangents", "clamped_tangents"), 'belongs to element = "beam".')
+        return
+    if entries["closed"]:
+        raise entries.at("closed").error('cannot be with element = "beam", of which there are no rings as yet.')
+    if entries["propulsion"]:
+        raise entries.at("propulsion").error('cannot be with element = "beam" as yet: take straight segments.')
+
+
+def _from_nodes(entries, kind):
+    entries.refuse(_FROM_NODES, "cannot be with nodes, which say it.")
     entries.refuse(("topology", "frame", "filaments"), "belongs to a file.")
+    nodes, closed = np.array(entries["nodes"]), entries["closed"]
+    label = entries.label.rstrip(":")
+    if closed and len(nodes) < MINIMUM_RING:
+        raise entries.at("nodes").error(f"must be at least {MINIMUM_RING} of a ring, but are {len(nodes)}.")
+    if entries["planar"] and np.any(nodes[:, 2] != nodes[0, 2]):
+        raise entries.at("nodes").error("must have one z, because this filament is planar.")
+    _check_lengths(entries, "nodes", kind, nodes, closed, None)
+    with entries.naming():
+        tangents = None if entries["tangents"] is None else np.array(entries["tangents"])
+        controls = beam_control_points(kind, nodes, tangents, label)
+    if entries["planar"] and controls is not None and np.any(controls[:, 2] != nodes[0, 2]):
+        raise entries.at("tangents").error("must lie in the xy plane, because this filament is planar.")
+    yield FilamentGroup(
+        kind,
+        len(nodes) - (not closed),
+        1,
+        "nodes",
+        None,
+        None,
+        (),
+        closed=closed,
+        positions=(nodes,),
+        control_points=(controls,),
+    )
+
+
+def _placed(entries, kind, box):
+    entries.refuse(("topology", "frame", "filaments"), "belongs to a file.")
+    entries.refuse(("tangents",), "belongs to nodes.")
     entries.require("segments")
     entries.only_one("count", "concentration")
     entries.only_one("position", "inside")
@@ -225,16 +311,41 @@ def _from_file(entries, kind, box, folder):
         kind.name,
     )
     shapes = {}
-    for nodes, closed in chains:
+    for nodes, closed, controls in chains:
         closed = closed or entries["closed"]
-        _check_lengths(entries, kind, nodes, closed, box)
-        shapes.setdefault((len(nodes) - (not closed), closed), []).append(_whole(nodes, box))
-    for (segments, closed), positions in shapes.items():
+        whole = _whole(nodes, box)
+        _check_lengths(entries, "file", kind, whole, closed, box)
+        shapes.setdefault((len(nodes) - (not closed), closed), []).append(
+            (whole, _control_points(entries, kind, nodes, whole, controls, box))
+        )
+    for (segments, closed), starts in shapes.items():
         if segments < (MINIMUM_RING if closed else 1):
             raise entries.at("file").error(f"has a filament of {segments} segments.")
+        positions, control_points = zip(*starts)
         yield FilamentGroup(
-            kind, segments, len(positions), "file", None, None, (), closed=closed, positions=tuple(positions)
+            kind,
+            segments,
+            len(positions),
+            "file",
+            None,
+            None,
+            (),
+            closed=closed,
+            positions=positions,
+            control_points=control_points,
         )
+
+
+def _control_points(entries, kind, nodes, whole, controls, box):
+    # Those of a file next to whole nodes; of a smooth curve where it has none.
+    if not kind.has_beam_elements:
+        if controls is not None:
+            raise entries.at("file").error('has beam elements: write element = "beam".')
+        return None
+    if controls is None:
+        return beam_control_points(kind, whole, None, entries.label.rstrip(":"))
+    vectors = controls - nodes
+    return whole + (vectors if box is None else vectors - np.round(vectors / box) * box)
 
 
 def _whole(nodes, box):
@@ -245,12 +356,13 @@ def _whole(nodes, box):
     return nodes - np.concatenate([np.zeros((1, 3)), np.cumsum(jumps, axis=0)]) * box
 
 
-def _check_lengths(entries, kind, nodes, closed, box):
-    nodes = _whole(nodes, box)
+def _check_lengths(entries, key, kind, nodes, closed, box):
     vectors = np.diff(nodes, axis=0, append=nodes[:1]) if closed else np.diff(nodes, axis=0)
     lengths = np.linalg.norm(vectors, axis=1)
     if len(lengths) and not (0.5 * kind.segment_length < lengths.min() and lengths.max() < 2.0 * kind.segment_length):
-        raise entries.at("file").error(
-            f"has segments of {lengths.min():.4g} to {lengths.max():.4g} nm, but those of {kind.name} are of "
-            f"{kind.segment_length:g} nm: change segment_length, or the file (lengths in arrays are in nm)."
+        what = "has segments of" if key == "file" else "are apart by"
+        raise entries.at(key).error(
+            f"{what} {lengths.min():.4g} to {lengths.max():.4g} nm, but segments of {kind.name} are of "
+            f"{kind.segment_length:g} nm: change segment_length, or "
+            + ("the file (lengths in arrays are in nm)." if key == "file" else "the nodes.")
         )

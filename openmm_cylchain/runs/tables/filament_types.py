@@ -35,7 +35,7 @@ _QUANTITIES = {
     "extensional_friction": (units.ROTATIONAL_FRICTION, "In place of that."),
     "mass_per_length": (units.MASS_PER_LENGTH, "For other programs: motion does not depend on it."),
 }
-_TEXTS = ("name", "bending_model", "stretching_model")
+_TEXTS = ("name", "element", "bending_model", "stretching_model")
 _CYLINDER_KEYS = (*_TEXTS, *_QUANTITIES, "friction_length", "end_corrections")
 _BEAD_QUANTITIES = {
     "bead_spacing": (units.LENGTH, "Of a chain of beads: at rest."),
@@ -50,6 +50,7 @@ _SHARED_KEYS = ("name", "diameter", "bending_rigidity", "persistence_length", "t
 TYPE_KEYS = (
     Key("type", Choice(tuple(PRESETS)), None, "A preset, of which any property can be changed by the keys below."),
     Key("name", Text('"DNA"'), None, "Of a type of one's own: up to 5 letters or digits."),
+    Key("element", Choice(("straight", "beam")), None, 'What segments are: "beam" elements bend inside.'),
     Key("bending_model", Choice(tuple(BENDING_POTENTIALS)), None, "See `FilamentType`."),
     Key("stretching_model", Choice(tuple(STRETCHING_POTENTIALS)), None, "See `FilamentType`."),
     *(
@@ -67,6 +68,12 @@ TYPE_KEYS = (
 )
 """Of a [[filament]] table: what kind of filament it is."""
 
+# What presets have and beam elements do not.
+_OF_STRAIGHT_SEGMENTS = {
+    "bending_model": "inscribed-circle",
+    "extension_relaxation_time": None,
+    "extensional_friction": None,
+}
 # Setting one of a pair in a preset takes the place of the other.
 _EXCLUSIVE = (
     ("bending_rigidity", "persistence_length"),
@@ -102,6 +109,8 @@ def _cylinder_type(entries, solvent, preset):
     if preset is None:
         entries.require("diameter", "segment_length")
         return FilamentType(**properties)
+    if properties.get("element") == "beam":
+        properties = {**_OF_STRAIGHT_SEGMENTS, **properties}
     if "segment_length" in properties:
         preset = preset.with_segment_length(properties.pop("segment_length"))
     return dataclasses.replace(preset, **_without_alternatives(properties)) if properties else preset

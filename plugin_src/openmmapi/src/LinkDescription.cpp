@@ -116,8 +116,8 @@ void checkLink(const Link& link, const PlaceResolver& places) {
                 refuseLink(link, "has particle "+to_string(particle)+", which does not exist; the System has "+
                         to_string(system.getNumParticles()));
             if (particle >= 0 && places.isControlPoint(particle))
-                refuseLink(link, "has particle "+to_string(particle)+", a control point of beam elements, which is on no "
-                        "curve: take places between nodes");
+                refuseLink(link, "has particle "+to_string(particle)+", a control point of beam elements, which is on "
+                        "no curve: take places between nodes");
         }
     if (areSame(places.resolve(link.first), places.resolve(link.second)))
         refuseLink(link, "joins a place to itself, "+describePlaces(link)+

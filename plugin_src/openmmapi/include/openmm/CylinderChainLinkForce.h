@@ -18,9 +18,9 @@ class CylinderChainLinkForceImpl;
  * that come and go while a simulation runs.
  *
  * A place is between two particles, such as the ends of a segment, at (1-f) x1+f x2 for a fraction f between 0 and 1;
- * or at a particle; or a point that does not move.  Where the two are neighbouring nodes of a chain of beam elements, it
- * is on the curve between them, at the parameter f.  A link has an energy of the distance d of its places.  Where they
- * coincide, the force of a link has no direction and is zero, even if its rest length is not.
+ * or at a particle; or a point that does not move.  Where the two are neighbouring nodes of a chain of beam elements,
+ * it is on the curve between them, at the parameter f.  A link has an energy of the distance d of its places.  Where
+ * they coincide, the force of a link has no direction and is zero, even if its rest length is not.
  *
  * A particle that is a TwoParticleAverageSite whose weights are not negative and add up to 1 is replaced by the place
  * between its parents when a Context is created: forces act on them, as they would by OpenMM.  So is one that is a
