@@ -18,11 +18,13 @@ template <class Real> struct SixMatrix {
  * What four vectors of an element have in the equations: symmetric blocks of them, and products for so many
  * coordinates.
  */
-template <class Real, int COORDINATES> struct BeamMatrix {
+template <class Real> struct BeamMatrix {
     /** The pairs 00, 01, 02, 03, 11, 12, 13, 22, 23 and 33. */
     Symmetric<Real> block[10];
     /** Plus each of these times itself, for the four vectors. */
-    Vector<Real> outer[COORDINATES][4];
+    Vector<Real> outer[5][4];
+    /** Whether there are three of these alone. */
+    bool planar;
 };
 
 template <int W> class BeamEquations {
@@ -41,8 +43,7 @@ public:
             rows(memory) {
     }
     /** Add an element to the equations of its nodes; it is the first to do so for the second one. */
-    template <int COORDINATES> static CYLCHAIN_INLINE void addElement(const BeamMatrix<Real, COORDINATES>& m, Row& here,
-            Row& after) {
+    static CYLCHAIN_INLINE void addElement(const BeamMatrix<Real>& m, Row& here, Row& after) {
         addLower(m, 0, here.diagonal);
 #pragma GCC unroll 6
         for (int i = 0; i < 6; i++)
@@ -224,14 +225,17 @@ private:
         m.a[o+2][o+2] = m.a[o+2][o+2]+s.zz;
     }
     /** Add the blocks of the vectors k and k+1 to the lower half of a matrix. */
-    template <int COORDINATES> static CYLCHAIN_INLINE void addLower(const BeamMatrix<Real, COORDINATES>& m, int k,
-            SixMatrix<Real>& result) {
+    static CYLCHAIN_INLINE void addLower(const BeamMatrix<Real>& m, int k, SixMatrix<Real>& result) {
 #pragma GCC unroll 6
         for (int l = 0; l < 2; l++) {
             Symmetric<Real> own = m.block[indexOf(k+l, k+l)];
 #pragma GCC unroll 6
-            for (int i = 0; i < COORDINATES; i++)
+            for (int i = 0; i < 3; i++)
                 own.addOuter(m.outer[i][k+l], m.outer[i][k+l]);
+            if (!m.planar)
+#pragma GCC unroll 6
+                for (int i = 3; i < 5; i++)
+                    own.addOuter(m.outer[i][k+l], m.outer[i][k+l]);
             addSymmetric(own, result, l);
         }
         SixMatrix<Real> below;
@@ -243,16 +247,20 @@ private:
                 result.a[i][j] = result.a[i][j]+below.a[i][j];
     }
     /** Set a block of a matrix to that of two vectors of an element. */
-    template <int COORDINATES> static CYLCHAIN_INLINE void setBlock(const BeamMatrix<Real, COORDINATES>& matrix,
-            int first, int second, SixMatrix<Real>& m, int k, int l) {
+    static CYLCHAIN_INLINE void setBlock(const BeamMatrix<Real>& matrix, int first, int second, SixMatrix<Real>& m,
+            int k, int l) {
         Real (*const a)[6] = m.a;
         const int o = 3*k, p = 3*l;
         const Symmetric<Real> s = matrix.block[indexOf(std::min(first, second),
                 std::max(first, second))];
         Matrix<Real> sum = Matrix<Real>::of(s);
 #pragma GCC unroll 6
-        for (int i = 0; i < COORDINATES; i++)
+        for (int i = 0; i < 3; i++)
             sum = sum+Matrix<Real>::outer(matrix.outer[i][first], matrix.outer[i][second]);
+        if (!matrix.planar)
+#pragma GCC unroll 6
+            for (int i = 3; i < 5; i++)
+                sum = sum+Matrix<Real>::outer(matrix.outer[i][first], matrix.outer[i][second]);
         a[o][p] = sum.x.x;
         a[o][p+1] = sum.x.y;
         a[o][p+2] = sum.x.z;

@@ -91,10 +91,35 @@ public:
     }
     /** Linearise the equations around y with those of couplings, or NULL, and solve them: see getChange(). */
     void eliminate(const Six* y, const BeamTerms<W>* terms) {
-        if (pack.planar)
-            eliminateAs<3>(y, terms);
-        else
-            eliminateAs<5>(y, terms);
+        int nextTerm = 0;
+        typename Equations::Row rows[2];
+        typename Equations::Row *here = rows, *after = rows+1;
+        *here = typename Equations::Row {};
+        for (int node = 0; node < n; node++)
+            right[node] = forces[node];
+        for (int e = 0; e < n-1; e++) {
+            BeamElementState<Real>& own = elements[e];
+            const BeamShape<Real> now(vectors(e, y, 1)), middle(vectors(e, y, 0.5));
+            BeamMatrix<Real> m;
+            // The strain in the middle, and one or two components of two bends.
+            m.planar = pack.planar;
+            addFriction(y, e, m);
+            addBends(now, middle, own, e, m);
+            addMiddleStrain(now, middle, own, e, m);
+            Equations::addElement(m, *here, *after);
+            addNodeStrain(now.first, now.strain, middle.first, e, *here);
+            if (e == n-2) {
+                const Vec control = (start.control[e+1]+y[e+1].control)*(3*perLength);
+                addNodeStrain(now.last, root(control.dot(control))-1, middle.last, e+1, *after);
+            }
+            if (terms != NULL)
+                terms->add(e, nextTerm, *here, *after, right);
+            equations.eliminate(e, *here, *after, false);
+            std::swap(here, after);
+        }
+        equations.eliminate(n-1, *here, *after, true);
+        equations.setRight(right);
+        equations.substitute(change);
     }
     /** Finish an iteration with the change that was found: find the tensions, and move the nodes of active lanes. */
     void advance(Six* y, int iteration, Real active) {
@@ -211,37 +236,7 @@ private:
     CYLCHAIN_INLINE void addForces(const BeamGradient<Real>& force, Six& first, Six& second) const {
         addForcesOf(force, perLength, first, second);
     }
-    /** An element has its strain in the middle, and one or two components of two bends. */
-    template <int COORDINATES> void eliminateAs(const Six* y, const BeamTerms<W>* terms) {
-        int nextTerm = 0;
-        typename Equations::Row rows[2];
-        typename Equations::Row *here = rows, *after = rows+1;
-        *here = typename Equations::Row {};
-        for (int node = 0; node < n; node++)
-            right[node] = forces[node];
-        for (int e = 0; e < n-1; e++) {
-            BeamElementState<Real>& own = elements[e];
-            const BeamShape<Real> now(vectors(e, y, 1)), middle(vectors(e, y, 0.5));
-            BeamMatrix<Real, COORDINATES> m;
-            addFriction(y, e, m);
-            addBends(now, middle, own, e, m);
-            addMiddleStrain(now, middle, own, e, m);
-            Equations::addElement(m, *here, *after);
-            addNodeStrain(now.first, now.strain, middle.first, e, *here);
-            if (e == n-2) {
-                const Vec control = (start.control[e+1]+y[e+1].control)*(3*perLength);
-                addNodeStrain(now.last, root(control.dot(control))-1, middle.last, e+1, *after);
-            }
-            if (terms != NULL)
-                terms->add(e, nextTerm, *here, *after, right);
-            equations.eliminate(e, *here, *after, false);
-            std::swap(here, after);
-        }
-        equations.eliminate(n-1, *here, *after, true);
-        equations.setRight(right);
-        equations.substitute(change);
-    }
-    template <int COORDINATES> CYLCHAIN_INLINE void addFriction(const Six* y, int e, BeamMatrix<Real, COORDINATES>& m) {
+    CYLCHAIN_INLINE void addFriction(const Six* y, int e, BeamMatrix<Real>& m) {
         const Real half = splat<Real>(0.5);
         const Vec control1 = start.control[e]+y[e].control*half, control2 = start.control[e+1]+y[e+1].control*half;
         const Vec chord = start.chord[e]+(y[e+1].position-y[e].position)*half;
@@ -280,8 +275,8 @@ private:
         return v*cosine+crossProduct(axis, v)+axis*(axis.dot(v)/(1+cosine+Scalar(1e-9)));
     }
     /** Add the bends, and what the tension of the middle does against turning. */
-    template <int COORDINATES> CYLCHAIN_INLINE void addBends(const BeamShape<Real>& now, const BeamShape<Real>& middle,
-            const BeamElementState<Real>& own, int e, BeamMatrix<Real, COORDINATES>& m) {
+    CYLCHAIN_INLINE void addBends(const BeamShape<Real>& now, const BeamShape<Real>& middle,
+            const BeamElementState<Real>& own, int e, BeamMatrix<Real>& m) {
         const Real stiffness = of(BeamPack::Bending)*perLength*present(e), other = stiffness*Scalar(4.0/3);
         const Real theta1 = thetaOfSum, theta2 = thetaOfDifference;
         // All bends turn with the middle, so that what a bend is does not depend on how far the element turns.
@@ -294,15 +289,18 @@ private:
         addForces(middle.forcesOf(moment1, moment2), right[e], right[e+1]);
 
         Vec e1 = {Real{}, Real{}, splat<Real>(1)}, e2 = {};
-        if constexpr (COORDINATES > 3)
+        if (!pack.planar)
             orthogonal(now.middle, e1, e2);
         const Real root1 = root(stiffness*theta1), root2 = root(other*theta2);
         setCoordinate(now.forcesOf(e1*root1, Vec {}), m.outer[1]);
         setCoordinate(now.forcesOf(Vec {}, e1*root2), m.outer[2]);
-        if constexpr (COORDINATES > 3) {
+        if (!pack.planar) {
             setCoordinate(now.forcesOf(e2*root1, Vec {}), m.outer[3]);
             setCoordinate(now.forcesOf(Vec {}, e2*root2), m.outer[4]);
         }
+        else
+            for (int k = 0; k < 4; k++)
+                m.outer[3][k] = m.outer[4][k] = Vec {};
 
         const Real least = perpendicular*length*length*length*present(e)*(-BEAM_COMPRESSION/MIDDLE_MOBILITY*perStep);
         const Real taut = 0.5*larger<Real>(own.ofMiddle.multiplier*now.perMiddle, least)*perLength*perLength;
@@ -322,8 +320,8 @@ private:
         outer[2] = second.position;
         outer[3] = second.control;
     }
-    template <int COORDINATES> CYLCHAIN_INLINE void addMiddleStrain(const BeamShape<Real>& now,
-            const BeamShape<Real>& middle, BeamElementState<Real>& own, int e, BeamMatrix<Real, COORDINATES>& m) {
+    CYLCHAIN_INLINE void addMiddleStrain(const BeamShape<Real>& now,
+            const BeamShape<Real>& middle, BeamElementState<Real>& own, int e, BeamMatrix<Real>& m) {
         const BeamGradient<Real> gradient = now.middleGradient();
         const Real response = findTension(own.ofMiddle, now.middleStrain+shortening);
         const BeamGradient<Real> lacking = middle.middleGradient()-gradient;
