@@ -6,6 +6,7 @@ import numpy as np
 from scipy import sparse
 
 from ..errors import InputError
+from ..filaments.beam_refusals import refuse_beams
 from ..mechanics.geometry import segment_vectors
 from ..units.quantities import ANGLE, LENGTH, non_negative, positive
 from ..units.types import BoolArray, FloatArray, IntArray, Scalar
@@ -48,6 +49,7 @@ class _NearSegments:
     # All segments, and the pairs of those of two filaments within a cutoff.
 
     def __init__(self, run, frame, cutoff):
+        refuse_beams(run.filaments, "the search for segments that are near")
         nodes = run.nodes(frame)
         starts = np.concatenate([own if filament.ring else own[:-1] for filament, own in zip(run.filaments, nodes)])
         self.vectors = np.concatenate([segment_vectors(own, each.ring) for each, own in zip(run.filaments, nodes)])

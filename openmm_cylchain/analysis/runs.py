@@ -3,7 +3,7 @@
 import csv
 import math
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -12,10 +12,13 @@ import mdtraj
 import numpy as np
 import numpy.typing as npt
 
+from ..beams.curve import curve_points
+from ..couplings.beam_curves import BeamCurves
 from ..couplings.contact_frames import ContactFrame, DescribedContactFinder, joined_contacts
 from ..couplings.crosslink_records import CROSSLINK_RECORD, CrosslinkFrame, crosslinks_at
 from ..couplings.walls import Box, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere
 from ..errors import InputError, PrecisionWarning
+from ..filaments.beam_refusals import refuse_beams
 from ..mechanics.geometry import segment_vectors
 from ..output.dcd_frames import DCDFrames
 from ..output.linker_records import LINKER_RECORD
@@ -50,6 +53,8 @@ class RunFilament:
         Whether the last node is joined to the first.
     clamped : tuple of int
         Nodes that do not move, counted along the filament.
+    control_points : (n,) int array
+        Of beam elements: particles beside the nodes; empty of straight segments.
     """
 
     type: Any
@@ -57,6 +62,7 @@ class RunFilament:
     diameter: float
     ring: bool
     clamped: tuple[int, ...] = ()
+    control_points: IntArray = field(default_factory=lambda: np.zeros(0, dtype=int))
 
     @property
     def segments(self) -> int:
@@ -178,7 +184,14 @@ class Run:
         frame = self._frame(frame)
         if not len(self._crosslink_records):
             return crosslinks_at(self._crosslink_records, 0, np.zeros((0, 3)), None)
-        return crosslinks_at(self._crosslink_records, int(self.steps[frame]), self.positions(frame), self.box)
+        return crosslinks_at(
+            self._crosslink_records, int(self.steps[frame]), self.positions(frame), self.box, self._beam_curves
+        )
+
+    @cached_property
+    def _beam_curves(self):
+        chains = [(own.nodes, own.control_points) for own in self.filaments if len(own.control_points)]
+        return BeamCurves(chains, self._description.particles) if chains else None
 
     @cached_property
     def _contact_finders(self):
@@ -321,6 +334,20 @@ class Run:
         positions = self.positions(frame)
         return [positions[own.nodes] for own in self.filaments]
 
+    def curves(self, frame: int, per_element: int = 8) -> list[FloatArray]:
+        """Points (points, 3) in nm along each filament in a frame.
+
+        Its nodes where segments are straight; of beam elements, ``per_element`` points of the curve of each, and the
+        last node.
+        """
+        positions = self.positions(frame)
+        return [
+            curve_points(positions[own.nodes], positions[own.control_points], per_element)
+            if len(own.control_points)
+            else positions[own.nodes]
+            for own in self.filaments
+        ]
+
     def segment_tensions(self, frame: int, average: int = 1) -> list[FloatArray]:
         """Tensions dV_el/dl of the segments of each filament in kJ/(mol nm), averaged over frames about one.
 
@@ -337,6 +364,7 @@ class Run:
         -------
         list of (segments,) arrays
         """
+        refuse_beams(self.filaments, "tensions of segments")
         frame, average = self._frame(frame), whole_number(average, 1, "average")
         first = max(0, frame - (average - 1) // 2)
         frames = range(first, min(len(self), first + average))
@@ -363,7 +391,8 @@ def _frames_of(description):
 
 
 def _filament(own: DescribedFilament) -> RunFilament:
-    return RunFilament(own.type, np.array(own.nodes, dtype=int), own.diameter, own.ring, own.clamped)
+    nodes, controls = (np.array(particles, dtype=int) for particles in (own.nodes, own.control_points))
+    return RunFilament(own.type, nodes, own.diameter, own.ring, own.clamped, controls)
 
 
 def load(path: str | Path, incomplete: bool = False) -> Run:

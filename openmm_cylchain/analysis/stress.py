@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..filaments.beam_refusals import refuse_beams
 from ..filaments.placement import joint_stiffnesses
 from ..mechanics.geometry import segment_vectors
 from ..units.quantities import thermal_energy
@@ -68,6 +69,7 @@ def stress(run: Run, frame: int, volume: Scalar | None = None) -> Stress:
     PrecisionWarning
         If positions are far from the origin, see ``load``.
     """
+    refuse_beams(run.filaments, "the stress of a run")
     room = volume_of(run, volume)
     run.warn_of_rounding()
     chains, free = np.zeros((3, 3)), 0

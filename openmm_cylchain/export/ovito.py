@@ -6,6 +6,7 @@ import numpy as np
 
 from ..analysis.runs import Run
 from ..errors import InputError
+from ..filaments.beam_refusals import refuse_beams
 from .drawn import check_path, spring_labels, thickness, walls
 
 _ANGSTROM = 10.0  # in a nm
@@ -31,6 +32,7 @@ def write_ovito(run: Run, path: str | Path) -> None:
     InputError
         If the package gsd is not installed.
     """
+    refuse_beams(run.filaments, "files for OVITO")
     path = check_path(path, ".gsd")
     try:
         import gsd.hoomd

@@ -101,8 +101,8 @@ def _box(run, outlines):
 
 def _agents(run, frame, types, center, outlines):
     data: list[float] = []
-    for number, (own, nodes) in enumerate(zip(run.filaments, run.nodes(frame))):
-        points = np.concatenate([nodes, nodes[:1]]) if own.ring else nodes
+    for number, (own, curve) in enumerate(zip(run.filaments, run.curves(frame))):
+        points = np.concatenate([curve, curve[:1]]) if own.ring else curve
         data += _agent(_FIBER, number, types["filament", own.type.name], 0.5 * own.diameter, points - center)
     number = len(run.filaments)
     radius = 0.5 * thickness(run)

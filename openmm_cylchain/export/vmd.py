@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from ..analysis.runs import Run
+from ..filaments.beam_refusals import refuse_beams
 from ..output.files import write_atomically
 from ..rendering.colors import WALL_COLOR, filament_colors, linker_color
 from ..units.text import time_unit
@@ -55,6 +56,7 @@ def write_vmd(run: Run, path: str | Path) -> None:
     path : str or Path
         Ends in ``.tcl``.
     """
+    refuse_beams(run.filaments, "scripts for VMD")
     path = check_path(path, ".tcl")
     directory = run.path.resolve()
     extent = float(np.linalg.norm(np.ptp(run.positions(-1), axis=0)))

@@ -31,12 +31,15 @@ class DescribedFilament:
         Whether the last node is joined to the first.
     clamped : tuple of int
         Nodes that do not move, counted along the filament.
+    control_points : tuple of int
+        Of beam elements: their particles, one for each node.
     """
 
     type: ChainType
     nodes: tuple[int, ...]
     ring: bool = False
     clamped: tuple[int, ...] = ()
+    control_points: tuple[int, ...] = ()
 
     @property
     def diameter(self) -> float:
@@ -128,7 +131,13 @@ class RunDescription:
             "version": __version__,
             "types": [_type_entries(kind) for kind in types],
             "filaments": [
-                {"type": types.index(own.type), "nodes": own.nodes, "ring": own.ring, "clamped": own.clamped}
+                {
+                    "type": types.index(own.type),
+                    "nodes": own.nodes,
+                    "ring": own.ring,
+                    "clamped": own.clamped,
+                    **({"control_points": own.control_points} if own.control_points else {}),
+                }
                 for own in self.filaments
             ],
             "linkers": [dataclasses.asdict(own) for own in self.linkers],
@@ -154,7 +163,13 @@ def read_run_description(path: Path) -> RunDescription:
         content.pop("version")
         types = [_type_of(entries) for entries in content.pop("types")]
         content["filaments"] = tuple(
-            DescribedFilament(types[own["type"]], tuple(own["nodes"]), own["ring"], tuple(own["clamped"]))
+            DescribedFilament(
+                types[own["type"]],
+                tuple(own["nodes"]),
+                own["ring"],
+                tuple(own["clamped"]),
+                tuple(own.get("control_points", ())),
+            )
             for own in content["filaments"]
         )
         content["box"] = None if content["box"] is None else tuple(map(tuple, content["box"]))

@@ -64,8 +64,8 @@ def describe_system(
         steps_per_frame=steps_per_frame,
         particles=system.getNumParticles(),
         filaments=tuple(
-            DescribedFilament(own.type, tuple(int(node) for node in nodes), own.closed, tuple(own.clamped))
-            for own, nodes in zip(filaments, filaments.node_indices)
+            DescribedFilament(own.type, tuple(nodes.tolist()), own.closed, tuple(own.clamped), tuple(controls.tolist()))
+            for own, nodes, controls in zip(filaments, filaments.node_indices, filaments.control_point_indices)
         ),
         box=None if box is None else tuple(tuple(float(edge) for edge in vector) for vector in box),
         linkers=tuple(
@@ -140,9 +140,9 @@ def write_topology(files: RunFiles, topology: app.Topology, system: openmm.Syste
 def total_energies(filaments: Any, positions: FloatArray) -> tuple[float, float]:
     """Stretching and bending energy of all filaments in kJ/mol, for positions in nm."""
     stretching = bending = 0.0
-    for filament, nodes in zip(filaments, filaments.node_indices):
+    for filament, nodes, controls in zip(filaments, filaments.node_indices, filaments.control_point_indices):
         with np.errstate(all="ignore"):
-            energies = filament.energies(positions[nodes])
+            energies = filament.energies(positions[nodes], positions[controls], filaments.temperature)
         stretching += energies[0]
         bending += energies[1]
     return stretching, bending

@@ -13,7 +13,6 @@ from ..couplings.crosslink_records import CrosslinkFile
 from ..couplings.crosslinks import Crosslinks
 from ..couplings.walls import Shape
 from ..errors import InputError
-from ..filaments.beam_refusals import refuse_beams
 from ..output.linker_records import LinkerFile, measure_linkers
 from ..output.run_files import RunFiles
 from ..output.run_tables import (
@@ -83,7 +82,6 @@ class RunReporter:
                 raise InputError(f"walls must be Shapes such as Sphere, but one is {shape!r}.")
         if not isinstance(directory, (str, Path)):
             raise InputError(f"directory must be a path, but is {directory!r}.")
-        refuse_beams(filaments, "a RunReporter")
         self._filaments, self._title, self._walls = filaments, str(title), tuple(walls)
         self._kT = thermal_energy(filaments.temperature)
         self._append = bool(append)
