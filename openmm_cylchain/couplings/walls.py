@@ -15,7 +15,6 @@ import openmm
 
 from ..engine_choice import available_engines, choose_engine
 from ..errors import InputError
-from ..filaments.beam_refusals import refuse_beams
 from ..filaments.collection import FilamentCollection
 from ..units.quantities import LENGTH, STIFFNESS, in_units_of, positive, shown, unit_vector, vector
 from ..units.types import FloatArray, FloatOrArray, Indices, Numbers, Scalar, Vector
@@ -387,10 +386,11 @@ def filament_wall_force(
 ) -> Any:
     """A wall around the nodes of filaments, which implicit schemes have in their equations.
 
-    The energy is ``(k/2) d^2`` for the depth d to which a node, or a sphere around it, gets beyond the wall: that of
-    ``wall_force`` at a radius of zero. Schemes "implicit" and "implicit-second-order" take the wall at the end of the
-    step and bring back what would get into it, so that its stiffness does not limit their steps. In other schemes, and
-    in other Integrators, it is explicit.
+    Of a filament of beam elements, it is around its beads, which are places on its curve (``Filaments.add_beads``), or
+    around its nodes if it has none. The energy is ``(k/2) d^2`` for the depth d to which a node, or a sphere around it,
+    gets beyond the wall: that of ``wall_force`` at a radius of zero. Schemes "implicit" and "implicit-second-order"
+    take the wall at the end of the step and bring back what would get into it, so that its stiffness does not limit
+    their steps. In other schemes, and in other Integrators, it is explicit.
 
     Parameters
     ----------
@@ -424,7 +424,6 @@ def filament_wall_force(
 
     if not isinstance(shape, Shape):
         raise InputError(f"shape must be a Shape such as Sphere, but is {shown(shape)}.")
-    refuse_beams(filaments, "filament_wall_force")
     stiffness = positive(stiffness, STIFFNESS, "stiffness")
     radii = _radii(radius, len(filaments), "radius", shape)
     spheres = outside_particles(filaments, system, particles)
@@ -432,9 +431,9 @@ def filament_wall_force(
     name, point, direction, length = shape.region
     force = plugin.CylinderChainWallForce(name, openmm.Vec3(*point), openmm.Vec3(*direction), length, stiffness)
     force.setName(f"CylinderChainWallForce ({name})")
-    for nodes, value in zip(filaments.node_indices, radii):
-        for node in nodes:
-            force.addParticle(int(node), float(value))
+    for filament, nodes, beads, value in zip(filaments, filaments.node_indices, filaments.bead_indices, radii):
+        for place in beads if filament.type.has_beam_elements and len(beads) else nodes:
+            force.addParticle(int(place), float(value))
     for particle, value in zip(spheres, sphere_radii):
         force.addParticle(int(particle), float(value))
     return force

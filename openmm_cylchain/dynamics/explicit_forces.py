@@ -442,8 +442,9 @@ class ExplicitForces:
 
     def _at_wall(self, label, wall):
         particles = [wall.getParticle(index) for index in range(wall.getNumParticles())]
-        # Implicit steps have the wall in their equations, unless a virtual site is at it.
-        if self._scheme in IMPLICIT_SCHEMES and not any(map(self._system.isVirtualSite, particles)):
+        # Implicit steps have the wall in their equations, unless a virtual site is at it that is on no curve.
+        sites = set(filter(self._system.isVirtualSite, particles))
+        if self._scheme in IMPLICIT_SCHEMES and sites.issubset(self._on_curves if sites else ()):
             return []
         return [Springs.at_points(label, "entry", particles, wall.getStiffness()._value)]
 

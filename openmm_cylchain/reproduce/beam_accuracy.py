@@ -64,9 +64,9 @@ their joints alone, and need more than eight.
 {lattice}
 
 Filaments that lie anywhere are linked anywhere, here to {spans:.1f} spans each on the average;
-numbers, and unknowns, are those for each filament. With the same number of unknowns, beam elements
-are no better than straight segments there: shear forces jump at links, and no element has such a
-curve inside. Nodes belong where filaments are linked.
+numbers, and unknowns, are those for each filament. With the same number of unknowns, straight
+segments err less: shear forces jump at links, and no element has such a curve inside. Nodes belong
+where filaments are linked.
 
 {random}"""
 

@@ -1,6 +1,7 @@
 #ifndef CYLCHAIN_WALLS_H_
 #define CYLCHAIN_WALLS_H_
 
+#include "couplings/Place.h"
 #include "mechanics/Enumerators.h"
 #include <vector>
 
@@ -46,6 +47,16 @@ struct Wall {
 struct WallParticle {
     int particle;
     double radius;
+    /** Where the particle is on the curve of a beam element, if it is a virtual site there. */
+    Place onCurve = {};
+    /** What moves it: the particle itself, or the curve. */
+    Place getPlace() const {
+        if (onCurve.isOnCurve())
+            return onCurve;
+        Place place;
+        place.first = particle;
+        return place;
+    }
 };
 
 /** A wall and what it keeps in. */

@@ -65,7 +65,7 @@ bool ChainPlaces::find(const Place& place, PlaceOnChain& result) const {
         return !place.isOnSegment();
     }
     const bool closed = !isBeam(chain) && chains[chain].closed;
-    const int nodes = isBeam(chain) ? beamOf(chain).numNodes() : chains[chain].nodes.size();
+    const int nodes = isBeam(chain) ? getBeam(chain).numNodes() : chains[chain].nodes.size();
     const int first = nodeOfParticle[place.first];
     int node = first;
     double fraction = 0;
@@ -102,7 +102,7 @@ double ChainPlaces::getFriction(const PlaceOnChain& place) const {
     if (isParticle(place.chain))
         return particleOf(place.chain).friction;
     if (isBeam(place.chain)) {
-        const BeamChain& beam = beamOf(place.chain);
+        const BeamChain& beam = getBeam(place.chain);
         return beam.elementLength*min(beam.parallelFriction, beam.perpendicularFriction)/MOBILITY_OF_END;
     }
     const Chain& chain = chains[place.chain];
@@ -114,7 +114,7 @@ int ChainPlaces::getParticle(const PlaceOnChain& place) const {
     if (isParticle(place.chain))
         return particleOf(place.chain).particle;
     if (isBeam(place.chain))
-        return beamOf(place.chain).particles[2*place.node];
+        return getBeam(place.chain).particles[2*place.node];
     return chains[place.chain].nodes[place.node];
 }
 
@@ -123,7 +123,7 @@ double ChainPlaces::getLateralFriction(const PlaceOnChain& place) const {
         return particleOf(place.chain).friction;
     if (isBeam(place.chain)) {
         // An element is moved as four Legendre polynomials of the place, of which the second turns it.
-        const BeamChain& beam = beamOf(place.chain);
+        const BeamChain& beam = getBeam(place.chain);
         const double x = 2*place.fraction-1;
         return beam.elementLength*beam.perpendicularFriction/(1+3*x*x);
     }
@@ -139,6 +139,6 @@ vector<int> ChainPlaces::getNodes(int chain) const {
     if (isParticle(chain))
         return {particleOf(chain).particle};
     if (isBeam(chain))
-        return beamOf(chain).particles;
+        return getBeam(chain).particles;
     return chains[chain].nodes;
 }

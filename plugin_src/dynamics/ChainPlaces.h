@@ -72,6 +72,10 @@ public:
     bool isBeam(int chain) const {
         return chain >= (int) chains.size() && !isParticle(chain);
     }
+    /** A chain of beam elements, by its number among all chains. */
+    const BeamChain& getBeam(int chain) const {
+        return beams[chain-chains.size()];
+    }
     /** The length of a chain of segments whose segments have their rest lengths. */
     double getLength(int chain) const {
         return lengths[chain];
@@ -88,9 +92,6 @@ private:
     }
     const CoupledParticle& particleOf(int chain) const {
         return particles[chain-getNumFilaments()];
-    }
-    const BeamChain& beamOf(int chain) const {
-        return beams[chain-chains.size()];
     }
     const std::vector<Chain>& chains;
     const std::vector<BeamChain>& beams;

@@ -13,20 +13,31 @@ void PlaceResponses::begin(const ChainPlaces& newPlaces, double newStepSize) {
     places = &newPlaces;
     stepSize = newStepSize;
     const vector<Chain>& chains = places->getChains();
-    beams.assign(chains.size(), {0, 0, 0, 0});
+    beams.assign(places->getNumFilaments(), {0, 0, 0, 0, 0, false});
     for (size_t i = 0; i < chains.size(); i++) {
         const Chain& chain = chains[i];
         const Segment& segment = chain.segments[0];
-        const double friction = segment.perpendicular/segment.restLength;
-        const double rigidity = chain.joints.empty() ? 0 : chain.joints[0]*segment.restLength;
-        if (!(friction > 0 && rigidity > 0))
-            continue;
         Beam& beam = beams[i];
         beam.length = places->getLength(i);
-        beam.wave = M_SQRT2*pow(rigidity*stepSize/friction, 0.25);
-        beam.bending = 0.5*stepSize/(friction*beam.wave);
-        beam.whole = stepSize/(friction*beam.length);
+        beam.segments = chain.segments.size();
+        beam.closed = chain.closed;
+        describe(segment.perpendicular/segment.restLength,
+                chain.joints.empty() ? 0 : chain.joints[0]*segment.restLength, beam);
     }
+    for (size_t i = chains.size(); i < beams.size(); i++) {
+        const BeamChain& chain = places->getBeam(i);
+        beams[i].segments = chain.numNodes()-1;
+        beams[i].length = beams[i].segments*chain.elementLength;
+        describe(chain.perpendicularFriction, chain.bendingRigidity, beams[i]);
+    }
+}
+
+void PlaceResponses::describe(double friction, double rigidity, Beam& beam) const {
+    if (!(friction > 0 && rigidity > 0))
+        return;
+    beam.wave = M_SQRT2*pow(rigidity*stepSize/friction, 0.25);
+    beam.bending = 0.5*stepSize/(friction*beam.wave);
+    beam.whole = stepSize/(friction*beam.length);
 }
 
 double PlaceResponses::find(const PlaceOnChain& place) const {
@@ -34,11 +45,10 @@ double PlaceResponses::find(const PlaceOnChain& place) const {
     if (place.chain >= (int) beams.size() || !(beams[place.chain].wave > 0))
         return alone;
     const Beam& beam = beams[place.chain];
-    const Chain& chain = places->getChains()[place.chain];
     // A ring turns, too, but about axes in its plane alone: 3/2 on the average over directions.
     double bending = beam.bending, whole = 1.5*beam.whole;
-    if (!chain.closed) {
-        const double at = (place.node+place.fraction)*beam.length/chain.segments.size();
+    if (!beam.closed) {
+        const double at = (place.node+place.fraction)*beam.length/beam.segments;
         const double x = min(at, beam.length-at)/beam.wave, off = at/beam.length-0.5;
         if (x < LENGTHS_OF_END)
             bending *= 1+exp(-2*x)*(1+2*cos(x)*(cos(x)-sin(x)));
@@ -50,7 +60,9 @@ double PlaceResponses::find(const PlaceOnChain& place) const {
 bool PlaceResponses::moveTogether(int chain) const {
     if (chain >= (int) beams.size())
         return false;
+    if (places->isBeam(chain))
+        return true;
     const Beam& beam = beams[chain];
-    const double segment = beam.length/places->getChains()[chain].segments.size();
+    const double segment = beam.length/beam.segments;
     return segment < min(beam.wave, 0.25*beam.length);
 }

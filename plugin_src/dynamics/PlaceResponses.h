@@ -22,13 +22,19 @@ public:
     /** Set chains, which must exist while responses are found, and the length of the step. */
     void begin(const ChainPlaces& places, double stepSize);
     double find(const PlaceOnChain& place) const;
-    /** Get whether places of a chain at neighbouring nodes are moved together by what moves one of them. */
+    /**
+     * Get whether places of a chain at neighbouring nodes are moved together by what moves one of them. Those of beam
+     * elements are: several of them are on one element.
+     */
     bool moveTogether(int chain) const;
 private:
     /** A chain, as a beam and as a rod. */
     struct Beam {
         double length, wave, bending, whole;
+        int segments;
+        bool closed;
     };
+    void describe(double friction, double rigidity, Beam& beam) const;
     const ChainPlaces* places = nullptr;
     double stepSize = 0;
     std::vector<Beam> beams;

@@ -59,9 +59,7 @@ void WallEquations::begin(const CoupledStart& start, const Loop& newLoop) {
     parts.resize((count+CHUNK-1)/CHUNK);
     (*loop)(parts.size(), [&] (int part) {
         for (size_t i = (size_t) part*CHUNK; i < min(count, (size_t) (part+1)*CHUNK); i++) {
-            Place place;
-            place.first = system->particles[i].particle;
-            if (start.places.find(place, places[i]) && start.taken[places[i].chain]) {
+            if (start.places.find(system->particles[i].getPlace(), places[i]) && start.taken[places[i].chain]) {
                 responses[i] = found.find(places[i]);
                 together[i] = found.moveTogether(places[i].chain);
             }
@@ -78,8 +76,19 @@ void WallEquations::beginStage(int stage, int numStages, const double*) {
         part.states.clear();
 }
 
+WallEquations::Position WallEquations::positionOf(int particle, const double* positions) const {
+    const WallParticle& own = system->particles[particle];
+    Position result;
+    if (own.onCurve.isOnCurve())
+        locate(own.onCurve, positions, NULL, result.at);
+    else
+        copy_n(positions+3*own.particle, 3, result.at);
+    return result;
+}
+
 double WallEquations::findDepthAt(const State& state, const double* positions) const {
-    const double* y = positions+3*system->particles[state.particle].particle;
+    const Position position = positionOf(state.particle, positions);
+    const double* y = position.at;
     const double* g = state.gradient;
     return state.offset+g[0]*y[0]+g[1]*y[1]+g[2]*y[2];
 }
@@ -92,7 +101,8 @@ void WallEquations::linearise(int iteration, const double* moved, vector<Couplin
         for (State& state : part.states) {
             const WallParticle& particle = system->particles[state.particle];
             if (iteration <= SEARCHING_ITERATIONS) {
-                const double* y = moved+3*particle.particle;
+                const Position position = positionOf(state.particle, moved);
+                const double* y = position.at;
                 double* const g = state.gradient;
                 const double depth = findDepth(system->wall, state.face, y, particle.radius, g);
                 state.offset = depth-(g[0]*y[0]+g[1]*y[1]+g[2]*y[2]);
@@ -122,7 +132,7 @@ void WallEquations::linearise(int iteration, const double* moved, vector<Couplin
 RestGap WallEquations::findRestGap(int particle, int face, double depth) const {
     const WallParticle& own = system->particles[particle];
     double gradient[3];
-    const double before = findDepth(system->wall, face, begun+3*own.particle, own.radius, gradient);
+    const double before = findDepth(system->wall, face, positionOf(particle, begun).at, own.radius, gradient);
     const double largest = isFlat(system->wall) ? HUGE_VAL : LARGEST_RETURN*(getRoom(system->wall)-own.radius);
     return RestGap(max(-largest, -depth), min(largest, -before), implicit*system->stiffness*responses[particle],
             wallDepth);
@@ -138,7 +148,7 @@ bool WallEquations::isBesideDeeper(int particle, int face, double depth, const d
             continue;
         const WallParticle& own = system->particles[other];
         double gradient[3];
-        if (findDepth(system->wall, face, moved+3*own.particle, own.radius, gradient) > depth)
+        if (findDepth(system->wall, face, positionOf(other, moved).at, own.radius, gradient) > depth)
             return true;
     }
     return false;
@@ -160,7 +170,8 @@ bool WallEquations::finishPart(int number, const double* moves, const double* mo
         // The particle may be beyond a curved face, but not beyond its tangent plane elsewhere.
         const WallParticle& own = system->particles[state.particle];
         double gradient[3];
-        const double real = findDepth(system->wall, state.face, moved+3*own.particle, own.radius, gradient);
+        const double real = findDepth(system->wall, state.face, positionOf(state.particle, moved).at, own.radius,
+                gradient);
         state.unfinished |= !(real+b-max(0.0, beyond) <= max(tolerance, LARGEST_DEVIATION*b));
         if (state.unfinished)
             state.restGap.correct(-depth);
@@ -171,13 +182,14 @@ bool WallEquations::finishPart(int number, const double* moves, const double* mo
         if (places[i].pack < 0)
             continue;
         const WallParticle& own = system->particles[i];
+        const Position position = positionOf(i, moved);
         for (int face = 0; face < numFaces; face++) {
             if ((reached[i]>>face)&1)
                 continue;
             State state;
             state.particle = i;
             state.face = face;
-            const double depth = findDepth(system->wall, face, moved+3*own.particle, own.radius, state.gradient);
+            const double depth = findDepth(system->wall, face, position.at, own.radius, state.gradient);
             // What is beyond a face later on has been pushed there or was beside what was deeper: no prediction.
             const bool predicts = iterations < FREE_ITERATIONS;
             if (!(depth > (predicts ? 0 : tolerance)))
@@ -189,7 +201,7 @@ bool WallEquations::finishPart(int number, const double* moves, const double* mo
             if (iterations < FREE_ITERATIONS-1 || (predicts && isBesideDeeper(i, face, depth, moved)))
                 continue;
             reached[i] |= 1<<face;
-            const double* y = moved+3*own.particle;
+            const double* y = position.at;
             state.offset = depth-(state.gradient[0]*y[0]+state.gradient[1]*y[1]+state.gradient[2]*y[2]);
             part.states.push_back(state);
         }

@@ -58,6 +58,10 @@ private:
         std::vector<State> states;
         bool unfinished;
     };
+    struct Position {
+        double at[3];
+    };
+    Position positionOf(int particle, const double* positions) const;
     double findDepthAt(const State& state, const double* positions) const;
     bool finishPart(int part, const double* moves, const double* moved);
     bool isBesideDeeper(int particle, int face, double depth, const double* moved) const;

@@ -23,7 +23,7 @@ def test_the_page(tmp_path, monkeypatch):
     monkeypatch.setattr(beam_accuracy, "_DRAWN", (3,))
     assert cli.main(["reproduce", "beams", "--quick", "--output", str(tmp_path)]) == 0
     page = (tmp_path / "beams.md").read_text()
-    assert "24 of 24 results agree" in page and "(columns.png)" in page
+    assert "30 of 30 results agree" in page and "(columns.png)" in page
     assert "| beam elements | 1 | 4 | +0.75" in page
 
 

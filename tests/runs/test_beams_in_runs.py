@@ -203,7 +203,7 @@ def test_mdtraj_has_nodes_with_bonds_and_control_points_without(unbroken):
     assert trajectory.topology.n_bonds == ELEMENTS + STRAIGHT
     assert all(one.name == other.name == "NOD" for one, other in trajectory.topology.bonds)
     run = analysis.load(unbroken)
-    for ours, own in zip(analysis.filament_lines(trajectory[-1]), run.lines(-1)):
+    for ours, own in zip(analysis.filament_curves(trajectory[-1]), run.curves(-1)):
         np.testing.assert_allclose(ours[0], own, atol=1e-2)
 
 
@@ -302,7 +302,7 @@ def test_pictures_show_the_curve_and_not_its_control_points(bent, tmp_path):
     middle = np.abs(columns - 0.5 * (columns.min() + columns.max())) < 3
     ends = columns < columns.min() + 12
     nm_per_pixel = 940.0 / (columns.max() - columns.min() + 1)
-    (line,) = analysis.load(bent).lines(0)
+    (line,) = analysis.load(bent).curves(0)
     # The bow is as high above the ends as that of the curve, and there is nothing on the chord.
     assert rows[middle].max() < rows[ends].min()
     height = (np.mean(rows[ends]) - np.mean(rows[middle])) * nm_per_pixel
@@ -325,7 +325,7 @@ def test_bends_and_tensions_are_those_of_elements(bent):
     run = analysis.load(bent)
     (angles,) = run.bends(0)
     assert angles == pytest.approx([2.0 * np.arctan(1.2)], rel=1e-5)
-    (line,), (nodes,) = run.lines(0), run.nodes(0)
+    (line,), (nodes,) = run.curves(0), run.nodes(0)
     assert line.shape == (9, 3) and np.array_equal(line[[0, -1]], nodes)
     (tension,) = run.segment_tensions(0)
     fine = curve_points(nodes, run.positions(0)[run.filaments[0].control_points], 1000)
@@ -336,7 +336,7 @@ def test_bends_and_tensions_are_those_of_elements(bent):
 
 def test_exports_have_the_curve(unbroken, tmp_path):
     run = analysis.load(unbroken)
-    lines, pieces = run.lines(-1), 8 * ELEMENTS + STRAIGHT
+    lines, pieces = run.curves(-1), 8 * ELEMENTS + STRAIGHT
     for kind, ending in (("simularium", "simularium"), ("ovito", "gsd"), ("vmd", "tcl")):
         assert main(["export", str(unbroken), "--format", kind, "--output", str(tmp_path / f"run.{ending}")]) == 0
     with gsd.hoomd.open(str(tmp_path / "run.gsd")) as file:
@@ -379,9 +379,9 @@ def test_a_run_reporter_writes_what_is_loaded_and_drawn_alike(tmp_path):
     assert run.energies["bending energy (kJ/mol)"][1:] == pytest.approx(energies["bending_energy"].sum(axis=1))
     now = positions_of(simulation.context)
     expected = curve_points(now[filaments.node_indices[0]], now[filaments.control_point_indices[0]], 8)
-    np.testing.assert_allclose(run.lines(-1)[0], expected, atol=1e-3)
+    np.testing.assert_allclose(run.curves(-1)[0], expected, atol=1e-3)
     assert analysis.filament_distances(run, -1, 5000.0)[0, 1] < 5000.0
-    with pytest.raises(InputError, match=r"Filament 0 \(BEAM\) has beam elements, whose stress"):
+    with pytest.raises(InputError, match=r"Filament 0 \(BEAM\) has beam elements, which the stress"):
         analysis.stress(run, -1, 1e9)
 
 

@@ -57,7 +57,7 @@ ChainCouplings::ChainCouplings(ContextImpl& context, const CylinderChainDescript
         if (ofWalls != NULL) {
             const vector<WallParticle>& particles = ofWalls->getWalls().particles;
             const bool taken = all_of(particles.begin(), particles.end(), [&] (const WallParticle& own) {
-                return !system.isVirtualSite(own.particle);
+                return own.onCurve.isOnCurve() || !(system.isVirtualSite(own.particle) || isControlPoint[own.particle]);
             });
             walls.push_back({ofWalls, taken});
         }
@@ -77,15 +77,12 @@ ChainCouplings::ChainCouplings(ContextImpl& context, const CylinderChainDescript
 
 void ChainCouplings::refuseBeams() const {
     bool any = !linkers.empty();
-    for (const Walls& own : walls)
-        for (const WallParticle& particle : own.force->getWalls().particles)
-            any |= isOfBeam[particle.particle];
     for (const Contacts& own : contacts)
         for (const Capsule& capsule : own.force->getSearch().getSystem().capsules)
             any |= isOfBeam[capsule.first] || (capsule.second >= 0 && isOfBeam[capsule.second]);
     if (any)
-        throw OpenMMException("CylinderChainIntegrator: Chains of beam elements cannot have contacts or walls of this "
-                "plugin, and their System no linkers, as yet: take segments, or remove them");
+        throw OpenMMException("CylinderChainIntegrator: Chains of beam elements cannot have contacts of this plugin, "
+                "and their System no linkers, as yet: take segments, or remove them");
 }
 
 void ChainCouplings::refuseNarrowBox(const CylinderChainDescription& chains) const {

@@ -23,7 +23,11 @@ WallSystem CylinderChainWallForceImpl::describe() const {
     copy(&vector[0], &vector[0]+3, result.wall.vector);
     result.stiffness = owner.getStiffness();
     for (int i = 0; i < owner.getNumParticles(); i++) {
-        result.particles.push_back({owner.getParticle(i), owner.getParticleRadius(i)});
+        Place place;
+        place.first = owner.getParticle(i);
+        const Place resolved = places->resolve(place);
+        result.particles.push_back({owner.getParticle(i), owner.getParticleRadius(i),
+                resolved.isOnCurve() ? resolved : Place()});
         if (!(owner.getParticleRadius(i) < getRoom(result.wall)))
             throw OpenMMException("CylinderChainWallForce: Particle "+to_string(owner.getParticle(i))+
                     " with its radius does not fit into the "+shape);
@@ -32,10 +36,12 @@ WallSystem CylinderChainWallForceImpl::describe() const {
 }
 
 void CylinderChainWallForceImpl::initialize(ContextImpl& context) {
+    const System& system = context.getSystem();
+    for (int i = 0; i < owner.getNumParticles(); i++)
+        if (owner.getParticle(i) >= system.getNumParticles())
+            throw OpenMMException("CylinderChainWallForce: Illegal particle index: "+to_string(owner.getParticle(i)));
+    places.reset(new PlaceResolver(system));
     walls = describe();
-    for (const WallParticle& own : walls.particles)
-        if (own.particle >= context.getSystem().getNumParticles())
-            throw OpenMMException("CylinderChainWallForce: Illegal particle index: "+to_string(own.particle));
     kernel = context.getPlatform().createKernel(CalcCylinderChainWallForceKernel::Name(), context);
     kernel.getAs<CalcCylinderChainWallForceKernel>().initialize(context.getSystem(), walls);
 }

@@ -4,8 +4,10 @@
 #include "couplings/Walls.h"
 #include "openmm/CylinderChainWallForce.h"
 #include "openmm/Kernel.h"
+#include "openmm/internal/PlaceResolver.h"
 #include "openmm/internal/StepForceImpl.h"
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -36,6 +38,7 @@ public:
 private:
     cylchain::WallSystem describe() const;
     const CylinderChainWallForce& owner;
+    std::unique_ptr<PlaceResolver> places;
     cylchain::WallSystem walls;
     Kernel kernel;
 };
