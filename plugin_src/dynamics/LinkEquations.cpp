@@ -25,6 +25,8 @@ const double TOLERANCE_OF_TURNS = 0.1;
 const double TOLERANCE_OF_ONE_SIDE = 0.05;
 /** What counts as no change: over the change of the whole step, and over the length. */
 const double OF_CHANGE = 1e-3, OF_CHANGE_WITH_NOISE = 1e-5, OF_LENGTH = 1e-7;
+/** What rounding of positions may leave of a change, over the largest coordinate; without noise, nothing else is left. */
+const double OF_ROUNDING = 1e-11;
 /** The least length for metric forces, over the rest length. */
 const double LEAST_LENGTH = 0.05;
 /** The largest stiffness of a link that has a direction, over the friction of a place in a step. */
@@ -47,6 +49,16 @@ double dot(const double* a, const double* b) {
 /** Whether a link has a direction. */
 bool turns(const Link& link) {
     return link.restLength > 0 || hasRange(link.model);
+}
+
+/** The largest coordinate of the particles of a link. */
+double largestCoordinate(const Link& link, const double* positions) {
+    double largest = 0;
+    for (const Place& place : {link.first, link.second})
+        for (int particle : {place.first, place.second})
+            for (int k = 0; k < 3 && particle >= 0; k++)
+                largest = max(largest, fabs(positions[3*particle+k]));
+    return largest;
 }
 
 } // namespace
@@ -360,7 +372,8 @@ bool LinkEquations::isUnfinished(State& state, const double* move, const double*
     for (int k = 0; k < 3; k++)
         ofStep += (r[k]-state.start[k])*(r[k]-state.start[k]);
     const double ofChange = kT > 0 ? OF_CHANGE_WITH_NOISE : OF_CHANGE;
-    const double least = ofChange*ofChange*ofStep+
+    const double rounding = kT > 0 ? 0 : OF_ROUNDING*largestCoordinate(*state.link, moved);
+    const double least = ofChange*ofChange*ofStep+rounding*rounding+
             OF_LENGTH*OF_LENGTH*(state.length*state.length+state.link->restLength*state.link->restLength);
     const int a = state.places[0].pack, b = state.places[1].pack;
     const bool oneSided = a >= 0 && b >= 0 && (*active)[a] != (*active)[b];

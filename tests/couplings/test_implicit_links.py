@@ -371,6 +371,26 @@ def test_a_hundred_times_too_long_steps_are_right_or_counted(form, scheme):
     assert divided > 1e-3 or energies.mean() == pytest.approx(exact, rel=0.05), (divided, energies.mean(), exact)
 
 
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("stiffness", [0.25, 100.0])
+@pytest.mark.parametrize("offset", [0.0, 1e3, 1e5])
+def test_links_come_to_rest_without_noise(offset, stiffness, scheme):
+    """Wherever they are: when nothing but rounding moves them, a step has converged."""
+    filaments = Filaments(VISCOSITY, TEMPERATURE)
+    filaments.add_straight(ACTIN, 4, [offset, offset, offset], [1, 0, 0])
+    filaments.add_straight(ACTIN, 4, [offset, offset + 1, offset], [0, 1, 0])
+    _, system, positions = filaments.build()
+    links = Crosslinks(stiffness * PICONEWTON_PER_NANOMETER, 0.0)
+    links.add(None, filaments.segment_place(0, segment=1, fraction=0.3), filaments.segment_place(1, segment=0))
+    links.add_to(system)
+    integrator = filaments.create_integrator(system, MICROSECOND, scheme=scheme, random_seed=1, checks=False)
+    context = new_context(system, positions, integrator, "CPU", {"Threads": "1"})
+    integrator.setTemperature(0.0)
+    integrator.step(500)
+    assert links.lengths(context)[0] < 1e-6
+    assert integrator.getNumDividedSteps() == 0
+
+
 def test_links_of_no_stiffness_and_no_links_do_nothing():
     filaments = Filaments(VISCOSITY, TEMPERATURE)
     filaments.add_equilibrium(ACTIN, 5, seed=1)
