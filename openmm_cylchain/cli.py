@@ -242,13 +242,15 @@ def _time_step(options):
     for group in configuration.filaments:
         arguments = (group.type, solvent.viscosity, solvent.temperature)
         recommended = recommended_time_step(*arguments, settings.scheme, group.segments)
-        stability = min(stability_bounds(*arguments, group.segments).values())
-        print(f"{group.type.name}, {group.segments} segments of {group.type.segment_length:g} nm")
-        # Table 1 is of cylinders.
-        bounds = {} if group.type.node_friction > 0.0 else time_step_bounds(*arguments, segments=group.segments)
-        for name, bound in bounds.items():
+        segments = "beam elements" if group.has_beam_elements else "segments"
+        print(f"{group.type.name}, {group.segments} {segments} of {group.type.segment_length:g} nm")
+        # Table 1 is of cylinders that are straight, and explicit schemes are for straight segments and beads.
+        cylinders = group.type.node_friction == 0.0 and not group.has_beam_elements
+        for name, bound in (time_step_bounds(*arguments, segments=group.segments) if cylinders else {}).items():
             print(f"  {_BOUND_LABELS[name]:<36} {format_time(bound, 4):>12}")
-        print(f"  {'stability of explicit schemes':<36} {format_time(stability, 4):>12}")
+        if not group.has_beam_elements:
+            stability = min(stability_bounds(*arguments, group.segments).values())
+            print(f"  {'stability of explicit schemes':<36} {format_time(stability, 4):>12}")
         for name, allowed in recommended.allowed.items():
             time = format_time(allowed, 4) if math.isfinite(allowed) else "any"
             print(f"  {f'allowed by {name}':<36} {time:>12}")

@@ -31,6 +31,9 @@ class PlacedRun:
     def nodes(self, frame):
         return self._frames[frame]
 
+    def curves(self, frame):
+        return self._frames[frame]
+
 
 CROSS = [[[-50, 0, 0], [0, 0, 0], [50, 0, 0]], [[10, -40, 8], [10, 40, 8]], [[0, 0, 300], [0, 50, 300]]]
 

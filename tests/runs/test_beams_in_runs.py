@@ -170,6 +170,16 @@ def test_dry_run_names_beam_elements(tmp_path, capsys):
     assert f"{ELEMENTS + STRAIGHT} segments, {PARTICLES} particles" in text and "1 links" in text
 
 
+def test_timestep_explains_that_of_beam_elements(tmp_path, capsys):
+    (tmp_path / "input.toml").write_text(BEAMS)
+    assert main(["timestep", str(tmp_path / "input.toml")]) == 0
+    text = capsys.readouterr().out
+    assert "BEAM, 3 beam elements of 1000 nm" in text and "ACT, 2 segments of 360 nm" in text
+    assert text.count("recommended  ") == 5 + 1 and text.count("stability of explicit schemes") == 1
+    assert main(["timestep", str(tmp_path / "input.toml"), "--check"]) == 2
+    assert "has beam elements, which the check of a step cannot have as yet" in capsys.readouterr().err
+
+
 def test_energies_are_those_of_the_curve(unbroken):
     energies, run = read_energies(unbroken / "energies.csv"), analysis.load(unbroken)
     configuration = read_configuration(unbroken / "configuration.toml")

@@ -360,9 +360,9 @@ def _check_lengths(entries, key, kind, nodes, closed, box):
     vectors = np.diff(nodes, axis=0, append=nodes[:1]) if closed else np.diff(nodes, axis=0)
     lengths = np.linalg.norm(vectors, axis=1)
     if len(lengths) and not (0.5 * kind.segment_length < lengths.min() and lengths.max() < 2.0 * kind.segment_length):
-        what = "has segments of" if key == "file" else "are apart by"
+        what, whose = ("has segments of", "those") if key == "file" else ("are apart by", "segments")
         raise entries.at(key).error(
-            f"{what} {lengths.min():.4g} to {lengths.max():.4g} nm, but segments of {kind.name} are of "
+            f"{what} {lengths.min():.4g} to {lengths.max():.4g} nm, but {whose} of {kind.name} are of "
             f"{kind.segment_length:g} nm: change segment_length, or "
             + ("the file (lengths in arrays are in nm)." if key == "file" else "the nodes.")
         )
