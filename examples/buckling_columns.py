@@ -73,7 +73,7 @@ simulation.step(steps)
 
 # Points along the curves, eight for each element.
 last = mdtraj.load(str(folder / "columns.dcd"), top=str(folder / "columns.cif"))[-1]
-shapes = [line[0][:, [0, 2]] for line in analysis.filament_lines(last)]
+shapes = [line[0][:, [0, 2]] for line in analysis.filament_curves(last)]
 tips = np.array([shape[-1] - shape[0] for shape in shapes]) / LENGTH
 
 

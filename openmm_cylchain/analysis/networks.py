@@ -48,7 +48,7 @@ class _NearSegments:
     # All segments, or pieces of beam elements, and the pairs of those of two filaments within a cutoff.
 
     def __init__(self, run, frame, cutoff):
-        lines = run.lines(frame)
+        lines = run.curves(frame)
         starts = np.concatenate([own if filament.ring else own[:-1] for filament, own in zip(run.filaments, lines)])
         self.vectors = np.concatenate([segment_vectors(own, each.ring) for each, own in zip(run.filaments, lines)])
         self.owners = np.repeat(np.arange(len(run.filaments)), [own.segments * own.pieces for own in run.filaments])
@@ -168,5 +168,5 @@ def contraction(run: Run) -> FloatArray:
     """
     if run.box is not None:
         raise InputError("A periodic box does not contract: look at contacts or distances instead.")
-    radii = [math.sqrt(float(np.var(np.concatenate(run.lines(frame)), axis=0).sum())) for frame in range(len(run))]
+    radii = [math.sqrt(float(np.var(np.concatenate(run.curves(frame)), axis=0).sum())) for frame in range(len(run))]
     return np.array(radii) / radii[0]

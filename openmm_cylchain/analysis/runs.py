@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..beams.curve import arc_lengths, curve_points
+from ..couplings.beam_curves import BeamCurves
 from ..couplings.contact_frames import ContactFrame, DescribedContactFinder, joined_contacts
 from ..couplings.crosslink_records import CROSSLINK_RECORD, CrosslinkFrame, crosslinks_at
 from ..couplings.walls import Box, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere
@@ -195,7 +196,14 @@ class Run:
         frame = self._frame(frame)
         if not len(self._crosslink_records):
             return crosslinks_at(self._crosslink_records, 0, np.zeros((0, 3)), None)
-        return crosslinks_at(self._crosslink_records, int(self.steps[frame]), self.positions(frame), self.box)
+        return crosslinks_at(
+            self._crosslink_records, int(self.steps[frame]), self.positions(frame), self.box, self._beam_curves
+        )
+
+    @cached_property
+    def _beam_curves(self):
+        chains = [(own.nodes, own.control_points) for own in self.filaments if len(own.control_points)]
+        return BeamCurves(chains, self._description.particles) if chains else None
 
     @cached_property
     def _contact_finders(self):
@@ -338,15 +346,15 @@ class Run:
         positions = self.positions(frame)
         return [positions[own.nodes] for own in self.filaments]
 
-    def lines(self, frame: int) -> list[FloatArray]:
-        """Points (n, 3) in nm of each filament in a frame, by which it is drawn: nodes, or those of a curve.
+    def curves(self, frame: int, per_element: int = PIECES_OF_ELEMENT) -> list[FloatArray]:
+        """Points (points, 3) in nm along each filament in a frame.
 
-        The curve of beam elements has ``PIECES_OF_ELEMENT`` points for each of them, from its first node on, and the
+        Its nodes where segments are straight; of beam elements, ``per_element`` points of the curve of each, and the
         last node.
         """
         positions = self.positions(frame)
         return [
-            curve_points(positions[own.nodes], positions[own.control_points], own.pieces)
+            curve_points(positions[own.nodes], positions[own.control_points], per_element)
             if own.has_beam_elements
             else positions[own.nodes]
             for own in self.filaments

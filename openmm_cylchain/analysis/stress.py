@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import InputError
+from ..filaments.beam_refusals import refuse_beams
 from ..filaments.placement import joint_stiffnesses
 from ..mechanics.geometry import segment_vectors
 from ..units.quantities import thermal_energy
@@ -69,15 +69,11 @@ def stress(run: Run, frame: int, volume: Scalar | None = None) -> Stress:
     PrecisionWarning
         If positions are far from the origin, see ``load``.
     """
+    refuse_beams(run.filaments, "the stress of a run")
     room = volume_of(run, volume)
     run.warn_of_rounding()
     chains, free = np.zeros((3, 3)), 0
-    for number, (own, nodes) in enumerate(zip(run.filaments, run.nodes(frame))):
-        if own.has_beam_elements:
-            raise InputError(
-                f"Filament {number} ({own.type.name}) has beam elements, whose stress is not known as yet: give its "
-                "type element='straight'."
-            )
+    for own, nodes in zip(run.filaments, run.nodes(frame)):
         chains += _virial_of_chain(own, nodes)
         free += len(nodes) - len(own.clamped)
     linkers = run.linkers[frame]

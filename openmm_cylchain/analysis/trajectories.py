@@ -81,7 +81,7 @@ def control_point_positions(
     return positions
 
 
-def filament_lines(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> list[FloatArray]:
+def filament_curves(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> list[FloatArray]:
     """Points by which filaments are drawn: nodes, or of beam elements eight along the curve of each and the last node.
 
     Returns
@@ -140,7 +140,7 @@ def radii_of_gyration(trajectory: mdtraj.Trajectory, filaments: int | Indices | 
 
     Of beam elements, those of the curve.
     """
-    positions = filament_lines(trajectory, filaments)
+    positions = filament_curves(trajectory, filaments)
     return np.stack([np.sqrt(np.var(p, axis=1).sum(axis=-1)) for p in positions], axis=1)
 
 
@@ -148,7 +148,7 @@ def centers_of_mass(trajectory: mdtraj.Trajectory, filaments: int | Indices | No
     """Mean of the segments' midpoints, all of one weight: (frames, filaments, 3) array in nm."""
     rings = ring_filaments(trajectory)
     selected = _selection(filaments, len(rings))
-    lines = filament_lines(trajectory, filaments)
+    lines = filament_curves(trajectory, filaments)
     return np.stack([_center(p, rings[index]) for index, p in zip(selected, lines)], axis=1)
 
 
@@ -371,7 +371,7 @@ def bending_mode_amplitudes(
     """
     filament = whole_number(filament, 0, "filament")
     _refuse_rings(trajectory, filament, "bending modes of free ends")
-    directions = _normalized(np.diff(filament_lines(trajectory, filament)[0], axis=1))
+    directions = _normalized(np.diff(filament_curves(trajectory, filament)[0], axis=1))
     highest, segments = segment_lengths(trajectory, filament)[0].shape[1], directions.shape[1]
     numbers = np.atleast_1d(in_units_of(modes, DIMENSIONLESS, "modes"))
     if np.any(numbers != np.floor(numbers)) or np.any(numbers < 1) or np.any(numbers >= highest):
@@ -443,7 +443,7 @@ def mean_square_displacement(
     results = np.stack(
         [
             _filament_displacements(nodes, line, lags, window_average)
-            for nodes, line in zip(node_positions(trajectory, filaments), filament_lines(trajectory, filaments))
+            for nodes, line in zip(node_positions(trajectory, filaments), filament_curves(trajectory, filaments))
         ]
     )
     count = len(results)

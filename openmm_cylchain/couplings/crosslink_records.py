@@ -10,6 +10,7 @@ import openmm
 
 from ..output.record_file import RecordFile
 from ..units.types import BoolArray, FloatArray, IntArray
+from .beam_curves import BeamCurves
 from .crosslink_computation import lengths_and_vectors, slopes_of
 from .crosslink_tables import CrosslinkTable
 from .crosslinks import Crosslinks
@@ -123,7 +124,11 @@ class CrosslinkFrame:
 
 
 def crosslinks_at(
-    records: npt.NDArray[Any], step: int, positions: FloatArray, box: FloatArray | None
+    records: npt.NDArray[Any],
+    step: int,
+    positions: FloatArray,
+    box: FloatArray | None,
+    curves: BeamCurves | None = None,
 ) -> CrosslinkFrame:
     """The crosslinks of a step: those of the last records that are not later.
 
@@ -134,6 +139,8 @@ def crosslinks_at(
     positions : (particles, 3) array
         In nm, with filaments that are whole.
     box : (3, 3) array or None
+    curves : BeamCurves, optional
+        Those of beam elements, on which places between their nodes are.
     """
     end = int(np.searchsorted(records["step"], step, "right"))
     begin = 0 if end == 0 else int(np.searchsorted(records["step"], records["step"][end - 1], "left"))
@@ -148,8 +155,8 @@ def crosslinks_at(
             own, nearest = present[rows], box if periodic else None
             table = CrosslinkTable(np.arange(len(own)), next_number=len(own), **{name: own[name] for name in _COLUMNS})
             model = "harmonic" if harmonic else "fene"
-            lengths, vectors = lengths_and_vectors(model, table, positions, nearest, nearest)
-            first = table.places.positions(positions, 0, nearest)
+            lengths, vectors = lengths_and_vectors(model, table, positions, nearest, nearest, curves)
+            first = table.places.positions(positions, 0, nearest, curves)
             places[rows] = np.stack([first, first + vectors], axis=1)
             tensions[rows] = slopes_of(model, table, lengths)
     return CrosslinkFrame(present["number"], places, tensions, present["active"], present["pairs"][:, 1] < 0)

@@ -26,7 +26,7 @@ def thickness(run: Run) -> float:
 
 def walls(run: Run) -> list[FloatArray]:
     """Lines (n, 3) in nm on the walls of a run, as far as filaments are beside them at its ends."""
-    return wall_lines(run, np.concatenate([points for frame in (0, -1) for points in run.lines(frame)]))
+    return wall_lines(run, np.concatenate([points for frame in (0, -1) for points in run.curves(frame)]))
 
 
 def spring_labels(run: Run) -> list[str]:

@@ -52,7 +52,7 @@ def write_ovito(run: Run, path: str | Path) -> None:
     try:
         with gsd.hoomd.open(str(temporary), mode="w") as file:
             for frame in range(len(run)):
-                positions, bonds = [np.concatenate(run.lines(frame))], [segments]
+                positions, bonds = [np.concatenate(run.curves(frame))], [segments]
                 particle_types, bond_types, widths = [types], [kinds], [diameters]
                 count = len(types)
                 for kind in range(len(springs)):

@@ -102,7 +102,7 @@ def _box(run, outlines):
 
 def _agents(run, frame, types, center, outlines):
     data: list[float] = []
-    for number, (own, points) in enumerate(zip(run.filaments, run.lines(frame))):
+    for number, (own, points) in enumerate(zip(run.filaments, run.curves(frame))):
         points = np.concatenate([points, points[:1]]) if own.ring else points
         data += _agent(_FIBER, number, types["filament", own.type.name], 0.5 * own.diameter, points - center)
     number = len(run.filaments)

@@ -132,7 +132,7 @@ def _particles(own):
 
 
 def _curves(run, frame, curves):
-    drawn = run.lines(frame)
+    drawn = run.curves(frame)
     kinds = []
     for _, members in curves.values():
         kinds.append("{" + " ".join("{" + " ".join(map(_point, drawn[i])) + "}" for i in members) + "}")

@@ -1,17 +1,18 @@
 """What filaments of beam elements cannot have as yet: an error in place of a wrong result."""
 
 from collections.abc import Iterable
+from typing import Any
 
 from ..errors import InputError
-from .filament import Filament
 
 
-def refuse_beams(filaments: Iterable[Filament], what: str) -> None:
+def refuse_beams(filaments: Iterable[Any], what: str) -> None:
     """Raise InputError, naming the first filament of beam elements, for something that knows straight segments alone.
 
     Parameters
     ----------
     filaments : iterable of Filament
+        Or of anything else that has a ``type``, such as the filaments of a Run.
     what : str
         That cannot have them, such as "contacts of capsules".
     """

@@ -136,7 +136,7 @@ class RunDescription:
                     "nodes": own.nodes,
                     "ring": own.ring,
                     "clamped": own.clamped,
-                    "control_points": own.control_points,
+                    **({"control_points": own.control_points} if own.control_points else {}),
                 }
                 for own in self.filaments
             ],

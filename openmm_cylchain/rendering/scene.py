@@ -93,7 +93,7 @@ class Scene:
         parts = list(self._fixed)
         values = None if self.scale is None else _values(self.run, self.look, self._director, frame)
         colors = filament_colors(self.run)
-        for number, (own, points) in enumerate(zip(self.run.filaments, self.run.lines(frame))):
+        for number, (own, points) in enumerate(zip(self.run.filaments, self.run.curves(frame))):
             ends = np.stack([points, np.roll(points, -1, axis=0)], axis=1)[: own.segments * own.pieces]
             color = np.tile(_rgb(colors[own.type.name]), (len(ends), 1))
             if self.scale is not None and values is not None:
@@ -182,7 +182,7 @@ def _framed_points(run, look, frames):
         corners = np.array(np.meshgrid(*[[0.0, 1.0]] * 3)).reshape(3, 8).T
         return corners @ run.box
     sampled = {frames[round(place)] for place in np.linspace(0, len(frames) - 1, min(len(frames), 20))}
-    points = np.concatenate([own for frame in sampled for own in run.lines(frame)])
+    points = np.concatenate([own for frame in sampled for own in run.curves(frame)])
     return np.concatenate([points, *wall_lines(run, points)])
 
 
@@ -191,7 +191,7 @@ def _rgb(color):
 
 
 def _segments(run, frame):
-    return [segment_vectors(points, own.ring) for own, points in zip(run.filaments, run.lines(frame))]
+    return [segment_vectors(points, own.ring) for own, points in zip(run.filaments, run.curves(frame))]
 
 
 def _values(run: Run, look: Look, axis: FloatArray | None, frame: int) -> list[FloatArray]:

@@ -362,7 +362,7 @@ def _mean_with_error(series):
 def _persistence_length(group, temperature, trajectory, members, comparable):
     # In chains of beads, mean cosines depend on the place along the chain.
     if group.has_beam_elements:
-        return [_persistence_length_of_beams(group, temperature, trajectory, members, comparable)]
+        return _persistence_length_of_beams(group, temperature, trajectory, members, comparable)
     if group.closed or group.segments < 2 or group.type.bending_rigidity == 0 or isinstance(group.type, BeadSpringType):
         return []
     try:
@@ -381,9 +381,11 @@ def _persistence_length_of_beams(group, temperature, trajectory, members, compar
     # -h/ln<c> of the cosine c between tangents at the ends of an element, and its error.
     cosine, error = _mean_with_error(np.stack(joint_cosines(trajectory, members), axis=1).mean(axis=2))
     exact = beam_elements.beam_persistence_length(group.type, temperature)
-    value = -group.type.segment_length / math.log(cosine) if 0.0 < cosine < 1.0 else math.inf
-    error *= value**2 / (group.type.segment_length * cosine) if math.isfinite(value) else math.inf
-    return _compared("persistence length", "nm", value, error, exact, comparable)
+    if not 0.0 < cosine < 1.0:
+        return []
+    value = -group.type.segment_length / math.log(cosine)
+    error *= value**2 / (group.type.segment_length * cosine)
+    return [_compared("persistence length", "nm", value, error, exact, comparable)]
 
 
 def _compared(name, unit, value, error, exact, comparable):

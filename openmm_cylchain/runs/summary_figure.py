@@ -10,7 +10,7 @@ from scipy.integrate import trapezoid
 
 from .. import theory
 from ..analysis.statistics import mean_with_error
-from ..analysis.trajectories import filament_lines, joint_cosines, segment_lengths, tangent_correlation
+from ..analysis.trajectories import filament_curves, joint_cosines, segment_lengths, tangent_correlation
 from ..output.files import write_atomically
 from ..theory.beam_elements import beam_persistence_length
 from ..units.quantities import thermal_energy
@@ -108,7 +108,7 @@ def _length_unit(length):
 def _draw_conformations(axis, groups, trajectory):
     last = trajectory[-1]
     for _, members, label, colour in groups:
-        for number, positions in enumerate(filament_lines(last, members)):
+        for number, positions in enumerate(filament_curves(last, members)):
             points = positions[0]
             axis.plot(
                 points[:, 0],

@@ -375,6 +375,7 @@ def test_threads_change_nothing(threads):
     linkers = [
         (SPRING, {"count": 900, "bound": 600}),
         (Crosslinker(hands=MOTOR, stiffness=0.1), {"count": 100, "bound": 80}),
+        (Crosslinker(hands=MOTOR, stiffness=0.1), {"concentration": 1e-7}),
     ]
     results = []
     for number in ("1", threads):

@@ -12,7 +12,7 @@ from openmm_cylchain.runs.beginnings import START_NAMES, start_text
 from openmm_cylchain.runs.configuration import TABLES, parse_configuration
 from openmm_cylchain.runs.reference import reference_page
 from openmm_cylchain.runs.schema import configuration_schema, format_schema
-from support.configurations import EVERYTHING
+from support.configurations import BEAMS, EVERYTHING
 from support.repository import EXAMPLES, ROOT
 
 if sys.version_info >= (3, 11):
@@ -25,6 +25,7 @@ FILES = [
     *(path.read_text() for path in sorted(EXAMPLES.glob("*.toml"))),
     *map(start_text, START_NAMES),
     EVERYTHING,
+    BEAMS,
 ]
 
 
@@ -51,7 +52,7 @@ def test_files_are_valid(text):
 
 
 def test_everything_has_every_table_and_the_examples_are_there():
-    assert len(FILES) == 8
+    assert len(FILES) == 9
     assert all(kind.name in tomllib.loads(EVERYTHING) for kind in TABLES)
 
 

@@ -87,3 +87,56 @@ threads = 1
 checks = false
 """
 """A small run, which takes a second."""
+
+BEAMS = """
+title = "beams"
+[solvent]
+temperature = "310 K"
+viscosity = "1.71 mPa*s"
+[[filament]]
+name = "BEAM"
+element = "beam"
+diameter = "8 nm"
+segment_length = "1 um"
+persistence_length = "5 um"
+stretching_modulus = "10 nN"
+friction_length = "filament"
+segments = 3
+count = 2
+[[filament]]
+type = "F_ACTIN"
+element = "beam"
+friction_length = "filament"
+segment_length = "1 um"
+nodes = [["0 um", "4 um", "1 um"], ["0.95 um", "4.2 um", "1 um"], ["1.9 um", "4 um", "1 um"]]
+tangents = [[1, 0.5, 0], [1, 0, 0], [1, -0.5, 0]]
+clamped = [0, -1]
+clamped_tangents = [0]
+[[filament]]
+type = "F_ACTIN"
+nodes = [["0 um", "6 um", "0 um"], ["360 nm", "6 um", "0 um"], ["720 nm", "6 um", "0 um"]]
+planar = true
+[[filament]]
+name = "FLAT"
+element = "beam"
+diameter = "8 nm"
+segment_length = "500 nm"
+bending_rigidity = "7e-26 N*m^2"
+stretching_modulus = "10 nN"
+friction_length = "filament"
+segments = [2, 3]
+count = 2
+planar = true
+height = "200 nm"
+inside = { shape = "sphere", radius = "3 um" }
+[[link]]
+between = [{ filament = 0, arc_length = "1.25 um" }, { filament = 1, node = -1 }]
+stiffness = "0.001 pN/nm"
+[simulation]
+time_step = "20 us"
+duration = "2.4 ms"
+report_interval = "40 us"
+checkpoint_interval = "120 us"
+seed = 5
+"""
+"""Filaments of beam elements, beside one of straight segments: clamped, linked, planar, in a region, of given nodes."""
