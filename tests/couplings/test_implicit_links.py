@@ -387,7 +387,8 @@ def test_links_come_to_rest_without_noise(offset, stiffness, scheme):
     context = new_context(system, positions, integrator, "CPU", {"Threads": "1"})
     integrator.setTemperature(0.0)
     integrator.step(500)
-    assert links.lengths(context)[0] < 1e-6
+    # Of thermal fluctuations, it is a thousandth.
+    assert links.lengths(context)[0] < 1e-4
     assert integrator.getNumDividedSteps() == 0
 
 
