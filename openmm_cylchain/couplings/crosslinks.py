@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 import openmm
+from openmm import unit
 
 from ..errors import InputError
 from ..filaments.segment_place import SegmentPlace
@@ -158,7 +159,8 @@ class Crosslinks:
         Raises
         ------
         InputError
-            If these crosslinks are in a System already, or join particles that it does not have.
+            If these crosslinks are in a System already, or join particles that it does not have; if one of them is
+            longer at rest than nearest images can be apart.
         """
         if self._store is not None:
             raise InputError("These crosslinks are already in a System; make another Crosslinks for another System.")
@@ -166,6 +168,8 @@ class Crosslinks:
             raise InputError(f"force_group must be between 0 and 31, but is {force_group}.")
         self._initial.places.check(self._initial.numbers, system.getNumParticles())
         periodic = system.usesPeriodicBoundaryConditions() if periodic is None else bool(periodic)
+        if periodic:
+            self._check_rest_lengths(system)
         kind: Any = NativeLinks if is_of_compiled_engine(system) else PortableLinks
         store, force = kind.make_for(system, self._model, self._initial, periodic, self._defaults)
         force.setName(CROSSLINKS_NAME)
@@ -173,6 +177,18 @@ class Crosslinks:
         system.addForce(force)
         self._store = store
         return force
+
+    def _check_rest_lengths(self, system):
+        # No point is farther from the nearest image of another one than half of all the box's vectors together.
+        box = system.getDefaultPeriodicBoxVectors()
+        farthest = 0.5 * sum(np.linalg.norm(vector.value_in_unit(unit.nanometer)) for vector in box)
+        too_long = np.flatnonzero(self._initial.rest_length > farthest)
+        if len(too_long):
+            raise InputError(
+                f"Crosslink {self._initial.numbers[too_long[0]]} has a rest length of "
+                f"{self._initial.rest_length[too_long[0]]:.6g} nm, but in the periodic box, nearest images are never "
+                f"more than {farthest:.6g} nm apart. Give it a shorter one, or take a larger box."
+            )
 
     def add(
         self,

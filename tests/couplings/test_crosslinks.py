@@ -570,6 +570,13 @@ def test_bad_input_is_refused():
         fene.add_to(_particles(1))
     with pytest.raises(InputError, match="force_group must be between 0 and 31"):
         fene.add_to(_particles(), force_group=32)
+    longer = Crosslinks(1, 1e4)
+    longer.add(None, 0, 1)
+    with pytest.raises(
+        InputError, match="Crosslink 0 has a rest length of 10000 nm, but .* never more than 4.56419 nm apart"
+    ):
+        longer.add_to(_particles(), periodic=True)
+    longer.add_to(_particles(), periodic=False)
     with pytest.raises(InputError, match="context must be an openmm.Context"):
         links.add(system, 0, 1)
     with pytest.raises(InputError, match="a System that does not have these crosslinks"):
