@@ -163,7 +163,8 @@ void CoupledEquations::solve(const vector<PackStep*>& packs, const PackFlags& ac
             packs[pack]->eliminate(terms.data()+first, last-first, change.data()+3*first);
     });
     const double least = tighter*LEAST_ENERGY*kT*(stiff ? 1 : count(active.begin(), active.end(), 1));
-    if (demands.single)
+    // What is stiff, or must be right in tensions, needs more digits.
+    if (demands.single && tighter == 1)
         iterate(packs, single, tighter*demands.tolerance, least, loop);
     else
         iterate(packs, twice, tighter*demands.tolerance, least, loop);

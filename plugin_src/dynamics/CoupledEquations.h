@@ -44,7 +44,7 @@ public:
         bool forTensions = false;
         /** See ImplicitCouplings::getDemandingStiffness() and getRelativeTolerance(). */
         double stiffness = 0, tolerance = 1;
-        /** Whether the vectors of the method are in single precision, as those of packs are. */
+        /** Whether the vectors of the method may be in single precision, as those of packs are. */
         bool single = false;
     };
     /**
