@@ -1,4 +1,5 @@
 #include "dynamics/CoupledEquations.h"
+#include "dynamics/SymmetricMatrices.h"
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
@@ -42,13 +43,6 @@ template <class Real> double sumOfProducts(const Real* a, const Real* b, int fir
     for (double ofLane : sums)
         sum += ofLane;
     return sum;
-}
-
-/** Find the product of a symmetric matrix and a vector. */
-template <class Real, class Other> inline void multiply(const Real* k, const Other* v, Other* result) {
-    result[0] = k[0]*v[0]+k[1]*v[1]+k[2]*v[2];
-    result[1] = k[1]*v[0]+k[3]*v[1]+k[4]*v[2];
-    result[2] = k[2]*v[0]+k[4]*v[1]+k[5]*v[2];
 }
 
 inline void respondTo(PackStep& pack, const double* forces, int, double* moves) {

@@ -7,7 +7,7 @@
 namespace cylchain {
 
 /** Find the product with a vector. */
-inline void multiply(const double* m, const double* v, double* result) {
+template <class Number> inline void multiply(const Number* m, const Number* v, Number* result) {
     result[0] = m[0]*v[0]+m[1]*v[1]+m[2]*v[2];
     result[1] = m[1]*v[0]+m[3]*v[1]+m[4]*v[2];
     result[2] = m[2]*v[0]+m[4]*v[1]+m[5]*v[2];
