@@ -8,7 +8,7 @@ from ..errors import InputError, InstabilityError
 from ..output.progress import ProgressMessages
 from .initial_state import build_system
 
-# Lengths of steps in those of the run, first in the cold.
+# Lengths of steps in those of the run or, where those are longer, in recommended ones; first in the cold.
 _COLD, _WARM = (1e-3, 1e-2, 0.1, 0.5), (0.1, 0.5, 1.0)
 _STEPS = 20
 _COLD_TEMPERATURE = 1.0
@@ -48,9 +48,11 @@ def relaxed_positions(configuration, built, say=None):
 def _come_apart(configuration, positions, progress):
     settings, temperature = configuration.simulation, configuration.solvent.temperature
     alone = build_system(configuration, settings.engine, settings.seed, linkers=False)
+    recommended = alone.filaments.recommended_time_step(settings.scheme, system=alone.system, **alone.arguments())
+    longest = min(settings.time_step, recommended.step)
     integrator = alone.filaments.create_integrator(
         alone.system,
-        settings.time_step,
+        longest,
         scheme=settings.scheme,
         random_seed=settings.seed,
         checks=False,
@@ -63,7 +65,7 @@ def _come_apart(configuration, positions, progress):
         for bath, lengths in ((_COLD_TEMPERATURE, _COLD), (temperature, _WARM)):
             integrator.setTemperature(bath)
             for length in lengths:
-                integrator.setStepSize(length * settings.time_step)
+                integrator.setStepSize(length * longest)
                 for _ in range(_STEPS):
                     integrator.step(1)
                     progress.step_is_done()

@@ -270,6 +270,12 @@ def test_anchors_at_random_places():
     assert not np.array_equal(two[0].anchors, two[1].anchors)
 
 
+def energy_of(system, positions, temperature):
+    context = openmm.Context(system, openmm.VerletIntegrator(1.0), openmm.Platform.getPlatform("Reference"))
+    context.setPositions(positions)
+    return context.getState(energy=True).getPotentialEnergy()._value / (8.31446261815324e-3 * temperature)
+
+
 def test_filaments_with_contacts_come_apart_before_the_run():
     text = FILAMENT + 'count = 40\ninside = { shape = "sphere", radius = "400 nm" }\n'
     configuration = parse(CONTACTS, filament=text)
@@ -277,14 +283,9 @@ def test_filaments_with_contacts_come_apart_before_the_run():
     overlaps = [f for f in one.system.getForces() if f.getName() == "CylinderChainContactForce"]
     assert len(overlaps) == 1
 
-    def energy(positions):
-        context = openmm.Context(one.system, openmm.VerletIntegrator(1.0), openmm.Platform.getPlatform("Reference"))
-        context.setPositions(positions)
-        return context.getState(energy=True).getPotentialEnergy()._value / (8.31446261815324e-3 * 310)
-
     before, relaxed = one.positions, relaxed_positions(configuration, one)
     # Equilibrium of 240 segments and 200 joints has about 320 k_B T, contacts a few tens.
-    assert energy(before) > 700 > 500 > energy(relaxed)
+    assert energy_of(one.system, before, 310) > 700 > 500 > energy_of(one.system, relaxed, 310)
     np.testing.assert_array_equal(relaxed._value, relaxed_positions(configuration, one)._value)
     kept = parse(CONTACTS + "relax = false\n", filament=text)
     assert relaxed_positions(kept, one) is before
@@ -293,7 +294,7 @@ def test_filaments_with_contacts_come_apart_before_the_run():
 OVERLAPPING = """
 [solvent]
 temperature = "298 K"
-viscosity = "1e-05 mPa*s"
+viscosity = "1 mPa*s"
 [box]
 edges = ["1 um", "1 um", "1 um"]
 [[filament]]
@@ -313,10 +314,19 @@ checks = false
 """
 
 
+def test_filaments_come_apart_in_short_steps_where_those_of_the_run_are_far_too_long():
+    # A solvent of a hundred-thousandth of the viscosity of water, where 17 ps are recommended.
+    configuration = parse_configuration(OVERLAPPING.replace("1 mPa", "1e-05 mPa"))
+    one = build_system(configuration, None, 1)
+    before, after = (energy_of(one.system, x, 298) for x in (one.positions, relaxed_positions(configuration, one)))
+    # Equilibrium of 600 segments and 540 joints has about 840 k_B T, of which chance takes 29 either way.
+    assert before > 1200 > 1000 > after
+
+
 @pytest.mark.slow
 def test_a_start_that_takes_long_says_how_far_it_is(tmp_path):
-    # Half a minute in a solvent of a hundred-thousandth of the viscosity of water: all steps are divided.
-    (tmp_path / "run.toml").write_text(OVERLAPPING)
+    # 15 000 segments: about ten seconds.
+    (tmp_path / "run.toml").write_text(OVERLAPPING.replace('"1 um"', '"3 um"').replace("count = 60", "count = 1500"))
     command = [sys.executable, "-m", "openmm_cylchain.cli", "run", "run.toml", "--output", "out"]
     with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
         lines = [process.stderr.readline() for _ in range(2)]
