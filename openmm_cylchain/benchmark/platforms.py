@@ -2,10 +2,11 @@
 
 The same filaments take the same steps with scheme "implicit" on the CPU platform, with all its threads, and on each
 platform for GPUs that filaments can be computed on here, in each precision of OpenMM. All of them are timed in turn.
-The Reference platform, which is there to check others, takes no part.
+So are particles with ten filaments among them and without. The Reference platform, which checks others, takes no part.
 """
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import openmm
@@ -26,12 +27,18 @@ PRECISIONS = ("single", "mixed", "double")
 DIAMETER = 100.0
 """Of Lennard-Jones particles, in nm: their sigma. They attract each other with k_BT."""
 
+PARTICLE_MASS = 1.0e6
+"""Of Lennard-Jones particles, in dalton. It has no effect on how they diffuse."""
+
 SPACING = 1.2 * DIAMETER
 """Between particles at the start, on a cubic lattice, and between filaments."""
 
 MIXED_SEGMENTS = 10
 MIXED_TIME_STEP = 2.0e5
 """In ps: particles diffuse by 1 % of their diameter in it."""
+
+ADDED_FILAMENTS = 10
+"""Filaments that are added to a System that runs without them."""
 
 
 @dataclass(frozen=True)
@@ -80,19 +87,33 @@ class Effort:
     Attributes
     ----------
     sizes : tuple of ChainsSize and MixedSize
+    particles : int
+        Of the System to which a few filaments are added.
     repetitions : int
     seconds : float
         For each platform and precision of a size in each repetition.
     """
 
     sizes: tuple
+    particles: int
     repetitions: int
     seconds: float
 
 
 _CHAINS = tuple(ChainsSize(chains, segments) for segments in (64, 10) for chains in (200, 2000, 20000))
-FULL = Effort((*_CHAINS, MixedSize(100000, 1000)), 7, 1.0)
-QUICK = Effort((ChainsSize(200, 64), ChainsSize(200, 10), ChainsSize(2000, 10), MixedSize(10000, 100)), 3, 0.2)
+FULL = Effort((*_CHAINS, MixedSize(100000, 1000)), 100000, 7, 1.0)
+QUICK = Effort((ChainsSize(200, 64), ChainsSize(200, 10), ChainsSize(2000, 10), MixedSize(10000, 100)), 20000, 3, 0.2)
+
+
+def particles_alone(particles, platform, properties):
+    """A Context of the particles of a MixedSize without filaments, with OpenMM's own integrator for such particles."""
+    system, positions, _ = mixed_system(particles, 0)
+    # OpenMM divides forces by mass and friction: this one lets particles move as stokes_friction does.
+    friction = stokes_friction(0.5 * DIAMETER, VISCOSITY) / PARTICLE_MASS
+    integrator = openmm.BrownianIntegrator(TEMPERATURE, friction, MIXED_TIME_STEP)
+    context = openmm.Context(system, integrator, openmm.Platform.getPlatform(platform), properties)
+    context.setPositions(positions)
+    return context
 
 
 def mixed_system(particles, chains):
@@ -106,7 +127,7 @@ def mixed_system(particles, chains):
     -------
     system : openmm.System
     positions : Quantity of (particles and nodes, 3)
-    integrator : CylinderChainIntegrator
+    integrator : CylinderChainIntegrator, or None without filaments
     """
     columns = max(
         int(np.ceil(particles ** (1 / 3))), int(np.ceil((MIXED_SEGMENTS + 2) * F_ACTIN.segment_length / SPACING))
@@ -118,14 +139,16 @@ def mixed_system(particles, chains):
     chain = topology.addChain()
     for _ in range(particles):
         topology.addAtom("LJ", None, topology.addResidue("PAR", chain))
-        system.addParticle(1.0e6)
+        system.addParticle(PARTICLE_MASS)
     numbers = np.arange(particles)
     lattice = SPACING * np.stack([numbers % columns, numbers // columns % columns, numbers // columns**2], axis=1)
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
     for number in range(chains):
         start = SPACING * np.array([0.5, number % columns, layers + number // columns])
         filaments.add_straight(F_ACTIN, MIXED_SEGMENTS, start, [1.0, 0.0, 0.0])
-    positions = filaments.add_to(topology, system, lattice * unit.nanometer)
+    positions = lattice * unit.nanometer
+    if chains:
+        positions = filaments.add_to(topology, system, positions)
     attraction = openmm.NonbondedForce()
     attraction.setNonbondedMethod(openmm.NonbondedForce.CutoffPeriodic)
     attraction.setCutoffDistance(2.5 * DIAMETER)
@@ -133,6 +156,8 @@ def mixed_system(particles, chains):
     for _ in range(system.getNumParticles()):
         attraction.addParticle(0.0, DIAMETER, unit.MOLAR_GAS_CONSTANT_R * TEMPERATURE * unit.kelvin)
     system.addForce(attraction)
+    if not chains:
+        return system, positions, None
     friction = stokes_friction(0.5 * DIAMETER, VISCOSITY)
     integrator = filaments.create_integrator(
         system, MIXED_TIME_STEP, "implicit", particle_friction=friction, random_seed=1, checks=False
@@ -187,22 +212,33 @@ def benchmark_platforms(effort=FULL, say=lambda message: None):
     machine = describe_machine()
     found, missing = places()
     rows, devices = [], {}
-    for size in effort.sizes:
+
+    def measure(name, simulations, ways):
+        """Seconds by (place, number of the callable that makes a Context there, way in which it is kept busy)."""
         cases = []
         for place, (platform, properties) in found.items():
-            say(f"{size.name}: {place}")
+            say(f"{name}: {place}")
             try:
-                context = size.simulate(platform, properties)
-                context.getIntegrator().step(1)
+                contexts = [simulate(platform, properties) for simulate in simulations]
+                for context in contexts:
+                    context.getIntegrator().step(1)
             except openmm.OpenMMException as error:
-                missing[f"{size.name}_{place}"] = str(error)
+                missing[f"{name}_{place}"] = str(error)
             else:
-                cases.append(Case(place, lambda steps, context=context: context.getIntegrator().step(steps)))
-                devices[platform] = _device(context)
-        times = time_interleaved(
-            cases, effort.repetitions, effort.seconds, lambda text, size=size: say(f"{size.name}: {text}")
-        )
-        rows += platform_rows(size.name, times)
+                cases += [
+                    Case((place, number, way.__name__), partial(way, context))
+                    for number, context in enumerate(contexts)
+                    for way in ways
+                ]
+                devices[platform] = _device(contexts[0])
+        return time_interleaved(cases, effort.repetitions, effort.seconds, lambda text: say(f"{name}: {text}"))
+
+    for size in effort.sizes:
+        times = measure(size.name, [size.simulate], [steps])
+        rows += platform_rows(size.name, {place: own for (place, *_), own in times.items()})
+    added = MixedSize(effort.particles, ADDED_FILAMENTS)
+    times = measure(added.name, [added.simulate, partial(particles_alone, effort.particles)], [steps, energies])
+    rows += added_rows(effort.particles, times)
     settings = {
         "scheme": "implicit",
         "time_step_ps": IMPLICIT_TIME_STEP,
@@ -213,6 +249,7 @@ def benchmark_platforms(effort=FULL, say=lambda message: None):
         "repetitions": effort.repetitions,
         "seconds_per_repetition": effort.seconds,
         "sizes": [size.name for size in effort.sizes],
+        "particles_with_and_without_filaments": effort.particles,
     }
     title = f"Platforms, {effort.repetitions} interleaved repetitions; the CPU with {processors()} threads"
     return Report(title, machine, settings, rows, missing)
@@ -222,6 +259,38 @@ def _device(context):
     platform = context.getPlatform()
     name = "DeviceName"
     return platform.getPropertyValue(context, name) if name in platform.getPropertyNames() else "the processor"
+
+
+def steps(context, number):
+    """Take steps."""
+    context.getIntegrator().step(number)
+
+
+def energies(context, number):
+    """Compute all forces and energies of the System, and nothing else."""
+    for _ in range(number):
+        context.getState(energy=True)
+
+
+def added_rows(particles, times):
+    """Rows of how much longer steps of particles, and their energies, take with a few filaments among them.
+
+    Parameters
+    ----------
+    particles : int
+        Their number.
+    times : dict
+        Seconds, one for each repetition, by the names of places, 0 with filaments or 1 without, and what is timed.
+    """
+    return [
+        row(
+            f"{way}_with_{ADDED_FILAMENTS}_filaments_over_without_{particles}_particles_{place}",
+            ratio(own, times[place, 1, way]),
+            "1",
+        )
+        for (place, number, way), own in times.items()
+        if number == 0
+    ]
 
 
 def platform_rows(size, times):

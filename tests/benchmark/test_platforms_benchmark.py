@@ -7,7 +7,7 @@ import openmm
 import pytest
 from openmm import unit
 
-from openmm_cylchain import InputError, cli
+from openmm_cylchain import InputError, cli, stokes_friction
 from openmm_cylchain.benchmark import platforms
 from openmm_cylchain.benchmark.platforms import ChainsSize, Effort, MixedSize
 from support.contexts import forces_of, new_context, positions_of
@@ -69,6 +69,23 @@ def test_rows_are_ratios_to_the_cpu():
     assert [row.name for row in alone] == ["time_per_step_few_opencl_mixed"]
 
 
+def test_rows_of_added_filaments_are_ratios_to_the_particles_alone():
+    times = {("gpu", 0, "steps"): np.array([4e-3, 4e-3, 8e-3]), ("gpu", 1, "steps"): np.array([2e-3, 2e-3, 4e-3])}
+    (ratio,) = platforms.added_rows(50, times)
+    assert ratio.name == "steps_with_10_filaments_over_without_50_particles_gpu"
+    assert ratio.value == pytest.approx(2.0)
+
+
+def test_particles_alone_diffuse_as_those_beside_filaments():
+    context = platforms.particles_alone(60, "Reference", {})
+    mobility = 1 / stokes_friction(0.5 * platforms.DIAMETER, platforms.VISCOSITY)
+    expected = positions_of(context) + platforms.MIXED_TIME_STEP * mobility * forces_of(context)
+    context.getIntegrator().step(1)
+    moved = positions_of(context) - expected
+    variance = 2 * 8.31446261815324e-3 * 310 * platforms.MIXED_TIME_STEP * mobility
+    assert np.mean(moved**2) == pytest.approx(variance, rel=4 * np.sqrt(2 / 180))
+
+
 def test_platforms_that_are_not_there_are_missing_with_the_reason(monkeypatch):
     def refuse(name):
         raise InputError(f"no {name} today")
@@ -81,7 +98,7 @@ def test_platforms_that_are_not_there_are_missing_with_the_reason(monkeypatch):
 
 
 def _run(monkeypatch, tmp_path):
-    monkeypatch.setattr(platforms, "QUICK", Effort(SMALL, 2, 1e-3))
+    monkeypatch.setattr(platforms, "QUICK", Effort(SMALL, 60, 2, 1e-3))
     path = tmp_path / "result.json"
     assert cli.main(["benchmark", "platforms", "--quick", "--json", str(path)]) == 0
     content = json.loads(path.read_text())
@@ -91,7 +108,8 @@ def _run(monkeypatch, tmp_path):
 def test_benchmark_without_a_gpu(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr(platforms, "why_not_on", lambda name: "there is none")
     content, rows = _run(monkeypatch, tmp_path)
-    assert set(rows) == {f"time_per_step_{size.name}_cpu" for size in SMALL}
+    added = {f"{way}_with_10_filaments_over_without_60_particles_cpu" for way in ("steps", "energies")}
+    assert set(rows) == added | {f"time_per_step_{size.name}_cpu" for size in SMALL}
     assert min(rows.values()) > 0
     assert content["settings"]["devices"] == {"CPU": "the processor"}
     assert "HIP missing: there is none" in capsys.readouterr().out

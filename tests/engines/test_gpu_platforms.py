@@ -38,8 +38,8 @@ def gpu(request):
     return request.param
 
 
-def _context(variant, scheme, platform, precision=None, flow=None):
-    filaments, system, positions, arguments = filaments_of_variant(variant, flow)
+def _context(variant, scheme, platform, precision=None, flow=None, pushed=True):
+    filaments, system, positions, arguments = filaments_of_variant(variant, flow, pushed)
     integrator = filaments.create_integrator(
         system, step_of_variant(variant, scheme), scheme, random_seed=4, precision="double", checks=False, **arguments
     )
@@ -72,6 +72,22 @@ def test_trajectories_with_noise_agree(gpu, precision):
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_all_variants_agree(gpu, variant, scheme):
     _compare(gpu, variant, scheme, "double")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_without_forces_of_openmm_they_agree_to_rounding(gpu, variant):
+    """A hundred steps with noise. What OpenMM computes itself is added in units of 2^-32 kJ/(mol nm) there."""
+    contexts = [
+        _context(variant, "implicit", platform, precision, pushed=False)
+        for platform, precision in (("Reference", None), (gpu, "double"))
+    ]
+    start = positions_of(contexts[0])
+    for context in contexts:
+        context.getIntegrator().step(100)
+    expected, found = map(positions_of, contexts)
+    assert np.abs(expected - start).max() > 1.0
+    assert np.abs(found - expected).max() < 1e-10
 
 
 @pytest.mark.slow

@@ -53,8 +53,8 @@ VARIANTS = {
 }
 
 
-def filaments_of_variant(name, flow=None):
-    """The filaments, their System with four beads, positions and the arguments of an integrator."""
+def filaments_of_variant(name, flow=None, pushed=True):
+    """The filaments, their System with four beads and a force on all, positions and the arguments of an integrator."""
     filaments = Filaments(VISCOSITY, TEMPERATURE, "compiled")
     VARIANTS[name](filaments)
     topology, system = app.Topology(), openmm.System()
@@ -64,10 +64,11 @@ def filaments_of_variant(name, flow=None):
         system.addParticle(1e5)
     beads = np.random.default_rng(3).uniform(-200, 0, size=(4, 3))
     positions = filaments.add_to(topology, system, beads * unit.nanometer)
-    push = openmm.CustomExternalForce("-0.3*x-0.1*y")
-    for particle in range(system.getNumParticles()):
-        push.addParticle(particle, [])
-    system.addForce(push)
+    if pushed:
+        push = openmm.CustomExternalForce("-0.3*x-0.1*y")
+        for particle in range(system.getNumParticles()):
+            push.addParticle(particle, [])
+        system.addForce(push)
     return filaments, system, positions, {"particle_friction": stokes_friction(50, VISCOSITY), "flow": flow}
 
 
