@@ -34,7 +34,8 @@ void CommonUpdateCylinderChainLinkersKernel::refuseImplicitSteps(ContextImpl& co
             &context.getIntegrator());
     if (integrator != NULL && isImplicit(static_cast<Scheme>(integrator->getScheme())))
         throw OpenMMException("On the "+getPlatform().getName()+" platform, filaments with linkers take explicit "
-                "steps. Use scheme \"euler\" or \"midpoint\", or the CPU platform");
+                "steps. Use scheme \"euler\" or \"midpoint\", with a step of at most "
+                "filaments.recommended_time_step(\"midpoint\", system=system), or the CPU platform");
 }
 
 long long CommonUpdateCylinderChainLinkersKernel::execute(ContextImpl& context, LinkerState& state, double kT,
