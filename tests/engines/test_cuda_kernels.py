@@ -8,26 +8,21 @@ import os
 
 import pytest
 
-from support.cuda_compiler import MISSING, compile_to_ptx, resources_of, source_of
+from support.cuda_compiler import MISSING, compile_to_ptx, resources_of
+from support.gpu_sources import COUPLINGS, OTHERS, PARTICLES, USUAL, source_of
 
 if MISSING and os.environ.get("OPENMM_CYLCHAIN_TEST_CUDA"):
     raise RuntimeError(f"kernels for CUDA cannot be compiled without {', '.join(MISSING)}")
 
 pytestmark = pytest.mark.skipif(bool(MISSING), reason=f"not installed: {', '.join(MISSING)}")
 
-USUAL = ("BENDING_InscribedCircle", "STRETCHING_Harmonic")
-OTHERS = {
-    "single": ("BENDING_Quadratic", "STRETCHING_Harmonic"),
-    "mixed": ("BENDING_KratkyPorod", "STRETCHING_FENE", "PLANAR"),
-    "double": ("BENDING_BondDifference", "STRETCHING_Harmonic", "CLOSED"),
-}
 # Bytes that a change may spill, and keep on the stack, in an A100. There were 236 and 256 at the last change; the most
 # registers that there can be are 255.
 LARGEST_SPILLS, LARGEST_STACK = 300, 300
 
 
 def test_registers_suffice(tmp_path):
-    ptx = compile_to_ptx(source_of(USUAL, "mixed"), "compute_80")
+    ptx = compile_to_ptx(source_of("CUDA", USUAL, "mixed"), "compute_80")
     found = resources_of(ptx, "sm_80", tmp_path)
     assert set(found) == {"advanceChains", "computeForces"}
     assert found["computeForces"]["registers"] <= 96 and found["computeForces"]["spills"] == 0
@@ -38,25 +33,25 @@ def test_registers_suffice(tmp_path):
 @pytest.mark.parametrize("precision", OTHERS)
 def test_kernels_of_particles_compile(precision, tmp_path):
     found = resources_of(
-        compile_to_ptx(source_of((), precision, "compile", "particles"), "compute_80"), "sm_80", tmp_path
+        compile_to_ptx(source_of("CUDA", (), precision, "compile", "particles"), "compute_80"), "sm_80", tmp_path
     )
-    assert {"gatherNodes", "scatterForces", "moveNodes", "displaceOthers", "moveOthers"} == set(found)
+    assert set(found) == set(PARTICLES)
     assert all(one["spills"] == 0 for one in found.values()), found
 
 
 @pytest.mark.parametrize("precision", OTHERS)
 def test_kernels_of_couplings_compile(precision, tmp_path):
     found = resources_of(
-        compile_to_ptx(source_of((), precision, "compile", "couplings", "contacts"), "compute_80"), "sm_80", tmp_path
+        compile_to_ptx(source_of("CUDA", (), precision, "compile", "couplings", "contacts"), "compute_80"),
+        "sm_80",
+        tmp_path,
     )
-    assert {"gatherParticles", "finishForces", "computeLinks", "computeWalls", "countMoved", "computeContacts"} == set(
-        found
-    )
+    assert set(found) == set(COUPLINGS)
     assert all(one["spills"] == 0 and one["registers"] <= 168 for one in found.values()), found
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("precision", OTHERS)
 def test_kernels_of_other_chains_compile(precision):
-    ptx = compile_to_ptx(source_of(OTHERS[precision], precision), "compute_70")
+    ptx = compile_to_ptx(source_of("CUDA", OTHERS[precision], precision), "compute_70")
     assert ".entry advanceChains" in ptx and ".entry computeForces" in ptx

@@ -1,6 +1,6 @@
 """Kernels for CUDA, compiled without a device as OpenMM would: by NVRTC to PTX, and by ptxas to what a GPU runs.
 
-Both are in packages of NVIDIA on the package index, and what OpenMM puts before each kernel is in its library for CUDA.
+Both are in packages of NVIDIA on the package index.
 """
 
 import ctypes
@@ -9,14 +9,7 @@ import subprocess
 from importlib.util import find_spec
 from pathlib import Path
 
-import openmm
-
-from support.repository import ROOT
-
-_KERNELS = ROOT / "plugin_src" / "platforms" / "common" / "kernels"
-_HOST = ROOT / "plugin_src" / "platforms" / "common" / "src" / "CommonCylinderChains.cpp"
-_SITE_PACKAGES = Path(openmm.__file__).parents[1]
-_OPENMM_LIBRARY = _SITE_PACKAGES / "OpenMM.libs" / "lib" / "plugins" / "libOpenMMCUDA.so"
+from support.gpu_sources import library_of_openmm
 
 
 def _in_package(package, pattern):
@@ -32,44 +25,13 @@ _PTXAS = _in_package("cuda_nvcc", "bin/ptxas")
 MISSING = [
     name
     for name, path in (
-        ("OpenMM-CUDA-12", _OPENMM_LIBRARY if _OPENMM_LIBRARY.exists() else None),
+        ("OpenMM-CUDA-12", library_of_openmm("CUDA")),
         ("nvidia-cuda-nvrtc-cu12", _NVRTC),
         ("nvidia-cuda-nvcc-cu12", _PTXAS),
     )
     if path is None
 ]
 """The packages that are not installed."""
-
-
-def _text_of_openmm(marker):
-    """The source text in OpenMM's library that contains a marker."""
-    texts = [text for text in _OPENMM_LIBRARY.read_bytes().split(b"\0") if marker in text]
-    assert len(texts) == 1, f"{len(texts)} texts in {_OPENMM_LIBRARY.name} have {marker!r}"
-    return texts[0].decode()
-
-
-def source_of(defines=(), precision="double", program="programFor", *more):
-    """A program as the host puts it together, with more kernels, behind what OpenMM puts before it."""
-    host = re.search(rf"::{program}\(.*?\n}}\n", _HOST.read_text(), re.DOTALL).group()
-    parts = "".join((_KERNELS / f"{name}.cc").read_text() for name in [*re.findall(r"Sources::(\w+)", host), *more])
-    real, mixed = ("double", "double") if precision == "double" else ("float", "float")
-    if precision == "mixed":
-        mixed = "double"
-    types = "".join(
-        f"typedef {kind}{count} {name}{count};\n"
-        + (f"#define make_{name}{count} make_{kind}{count}\n" if count else "")
-        for name, kind in (("real", real), ("mixed", mixed))
-        for count in ("", "2", "3", "4")
-    )
-    switch = {"double": "#define USE_DOUBLE_PRECISION 1\n", "mixed": "#define USE_MIXED_PRECISION 1\n", "single": ""}
-    return (
-        switch[precision]
-        + types
-        + _text_of_openmm(b"#define KERNEL extern")
-        + "".join(f"#define {name} 1\n" for name in defines)
-        + _text_of_openmm(b"inline __device__ double3 make_double3(double a)")
-        + parts
-    )
 
 
 def compile_to_ptx(source, architecture):
