@@ -25,6 +25,7 @@ from openmm_cylchain.output.run_description import (
     DescribedContacts,
     DescribedFilament,
     DescribedLinkers,
+    DescribedParticles,
     DescribedWall,
     RunDescription,
     read_run_description,
@@ -262,11 +263,11 @@ def test_far_from_the_origin_the_trajectory_is_coarse(tmp_path):
 def test_walls_are_described():
     configuration = parse_configuration(TWO_TYPES)
     filaments = create_filaments(configuration)
-    _, system, _ = filaments.build()
+    topology, system, _ = filaments.build()
     for shape in (Sphere([1, 2, 3], 5e4), Box([-1e4] * 3, [2e4] * 3), Cylinder([0, 0, 1], [0, 0, 2], 3e4)):
         system.addForce(filament_wall_force(filaments, system, shape, 1.0))
     held = {"stiffness": 1.0, "particles": tuple(range(24)), "radii": (0.0,) * 24}
-    assert describe(configuration, filaments, system).walls == (
+    assert describe(configuration, filaments, system, topology).walls == (
         DescribedWall("sphere", (1.0, 2.0, 3.0), (0.0, 0.0, 0.0), 5e4, **held),
         DescribedWall("box", (-1e4,) * 3, (2e4,) * 3, 0.0, **held),
         DescribedWall("cylinder", (0.0, 0.0, 1.0), (0.0, 0.0, 1.0), 3e4, **held),
@@ -295,6 +296,7 @@ def test_description_is_kept_as_it_is(tmp_path):
                 0.1, True, (((0, 1, 2), 8.0, 2, True), ((7, 8), 25.0, 1, False)), ((12, 3.0),), ((0, 1, 1, 0),)
             ),
         ),
+        others=(DescribedParticles("BEAD", (12, 13), 3.0), DescribedParticles("ION", (14,), 0.0)),
     )
     description.write(tmp_path / "description.json")
     assert read_run_description(tmp_path / "description.json") == description
