@@ -27,7 +27,7 @@ from openmm_cylchain.runs.initial_state import build_system
 from openmm_cylchain.runs.run_directory import RunDirectory, read_energies
 from openmm_cylchain.runs.summary import group_labels, load_trajectory, summarise
 from support.configurations import BEAMS
-from support.contexts import positions_of
+from support.contexts import forces_of, positions_of
 from support.small_runs import simulated
 
 SHORT_ELEMENT = {
@@ -351,7 +351,7 @@ def test_bends_and_tensions_are_those_of_elements(bent):
     (tension,) = run.segment_tensions(0)
     fine = curve_points(nodes, run.positions(0)[run.filaments[0].control_points], 1000)
     length = np.linalg.norm(np.diff(fine, axis=0), axis=1).sum()
-    element = run.filaments[0].type.beam_element(310.0, planar=True)
+    element = run.filaments[0].type.beam_element(310.0)
     assert tension == pytest.approx([6022.14076 * (length / 1000.0 - 1.0 + element.shortening)], rel=1e-4)
 
 
@@ -402,8 +402,30 @@ def test_a_run_reporter_writes_what_is_loaded_and_drawn_alike(tmp_path):
     expected = curve_points(now[filaments.node_indices[0]], now[filaments.control_point_indices[0]], 8)
     np.testing.assert_allclose(run.curves(-1)[0], expected, atol=1e-3)
     assert analysis.filament_distances(run, -1, 5000.0)[0, 1] < 5000.0
-    with pytest.raises(InputError, match=r"Filament 0 \(BEAM\) has beam elements, which the stress"):
-        analysis.stress(run, -1, 1e9)
+
+
+def test_stress_of_a_run_is_the_virial_of_the_forces(tmp_path):
+    """Those of the engine, at the positions of the trajectory; clamped nodes and tangents have no ideal part."""
+    filaments = Filaments(602.214, 300.0)
+    kind = FilamentType(
+        name="BEAM", diameter=8.0, segment_length=1000.0, bending_rigidity=2e4, stretching_modulus=6e3, element="beam"
+    )
+    filaments.add_equilibrium(kind, 2, seed=3)
+    filaments.add_straight(kind, 1, [0, 900, 0], [1, 0, 0], clamped=0, clamped_tangents=0, planar=True)
+    filaments.add_straight(F_ACTIN, 3, [0, 2000, 0], [1, 0, 0])
+    topology, system, positions = filaments.build()
+    integrator = filaments.create_integrator(system, 1e7, random_seed=3)
+    simulation = app.Simulation(topology, system, integrator, openmm.Platform.getPlatformByName("Reference"))
+    simulation.context.setPositions(positions)
+    simulation.reporters.append(RunReporter(tmp_path / "run", 5, filaments))
+    simulation.step(10)
+    run = analysis.load(tmp_path / "run")
+    found = analysis.stress(run, -1, 1e9)
+    simulation.context.setPositions(run.positions(-1))
+    expected = -np.einsum("ni,nj->ij", run.positions(-1), forces_of(simulation.context))
+    np.testing.assert_allclose(1e9 * found.chains, expected, atol=1e-5 * np.abs(expected).max())
+    # Six particles, two of four in a plane, and four.
+    np.testing.assert_allclose(-1e9 / 8.31446261815324e-3 / 300.0 * found.ideal, np.diag([12.0, 12.0, 10.0]))
 
 
 @pytest.mark.parametrize("particle", ["node", "control point"])

@@ -6,7 +6,7 @@ import pytest
 from openmm import app
 from PIL import Image
 
-from openmm_cylchain import Crosslinks, Filaments, InputError, RunReporter, analysis
+from openmm_cylchain import Crosslinks, Filaments, RunReporter, analysis
 from openmm_cylchain.beams.curve import curve_points
 from openmm_cylchain.cli import main
 from support.contexts import close_reporters, energy_of, positions_of
@@ -61,9 +61,3 @@ def test_pictures_show_the_curve(simulated, tmp_path, color):
     assert main(["render", str(path), "--output", str(tmp_path / "run.png"), "--color", color]) == 0
     assert np.ptp(np.array(Image.open(tmp_path / "run.png"))) > 100
     assert main(["export", str(path), "--format", "simularium", "--output", str(tmp_path / "run.simularium")]) == 0
-
-
-def test_runs_of_beams_have_no_stress(simulated):
-    run = analysis.load(simulated[0])
-    with pytest.raises(InputError, match="Filament 1 .BEAM. has beam elements, which the stress of a run cannot have"):
-        analysis.stress(run, 0, 1e9)
