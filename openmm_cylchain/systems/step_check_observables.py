@@ -38,7 +38,7 @@ class Kind:
 def _kinds(filaments, temperature):
     groups: dict[Any, list[int]] = {}
     for number, one in enumerate(filaments):
-        key = (one.type, one.segments, one.closed, one.planar, one.clamped, one.propulsion)
+        key = (one.type, one.segments, one.closed, one.planar, one.clamped, one.clamped_tangents, one.propulsion)
         groups.setdefault(key, []).append(number)
     kinds: list[Kind] = []
     for numbers in groups.values():
