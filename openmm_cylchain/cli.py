@@ -53,7 +53,10 @@ def main(arguments=None):
                 if _resumable(options)
                 else ""
             )
-            _say("error", f"{error}.{hint}")
+            if isinstance(error, FileNotFoundError) and _has_lost_its_directory(options):
+                _say("error", f"{options.output} has been removed while the run went on. Start it again ({error}).")
+            else:
+                _say("error", f"{error}.{hint}")
             return _FAILED
         except KeyboardInterrupt:
             _say("error", f"interrupted{'; a run can be continued with --resume' if _resumable(options) else ''}.")
@@ -61,6 +64,10 @@ def main(arguments=None):
         except SystemExit as exit_request:
             return exit_request.code
     return 0
+
+
+def _has_lost_its_directory(options):
+    return options.command is _run and options.output is not None and not Path(options.output).is_dir()
 
 
 def _resumable(options):

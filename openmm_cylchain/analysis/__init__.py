@@ -7,7 +7,7 @@ from .crossings import CrossingCounter, Crossings, find_crossings
 from .moduli import RelaxationModulus, relaxation_modulus
 from .networks import contact_map, contraction, filament_distances, find_bundles, mesh_size
 from .order import director, order_parameter, order_tensor
-from .runs import Run, RunFilament, load
+from .runs import Run, RunFilament, RunParticles, load
 from .stress import Stress, stress
 from .trajectories import (
     MeanSquareDisplacement,
@@ -39,6 +39,7 @@ __all__ = [
     "RelaxationModulus",
     "Run",
     "RunFilament",
+    "RunParticles",
     "Stress",
     "TangentCorrelation",
     "bending_drift",

@@ -92,6 +92,24 @@ class RunFilament:
         return PIECES_OF_ELEMENT if self.has_beam_elements else 1
 
 
+@dataclass(frozen=True)
+class RunParticles:
+    """Particles of a run beside its filaments.
+
+    Attributes
+    ----------
+    name : str
+        Of their residues.
+    indices : (n,) int array
+    diameter : float
+        In nm, 0 if it is not known.
+    """
+
+    name: str
+    indices: IntArray
+    diameter: float
+
+
 class Run:
     """A run that has been simulated into a directory; ``load`` makes it.
 
@@ -112,6 +130,8 @@ class Run:
     box : (3, 3) array or None
         Vectors of a periodic box in nm.
     filaments : tuple of RunFilament
+    particles : tuple of RunParticles
+        Beside filaments; each with one name and diameter.
     linker_types : tuple
         Of the kinds of linkers, with ``name``, ``stiffness`` in kJ/(mol nm^2) and ``rest_length`` in nm.
     walls : tuple of Shape
@@ -135,6 +155,9 @@ class Run:
         self.energies: dict[str, FloatArray] = {name: values[:frames] for name, values in energies.items()}
         self.box: FloatArray | None = None if description.box is None else np.array(description.box)
         self.filaments = tuple(_filament(own) for own in description.filaments)
+        self.particles = tuple(
+            RunParticles(own.name, np.array(own.particles, dtype=int), own.diameter) for own in description.others
+        )
         self.linker_types: tuple[DescribedLinkers, ...] = description.linkers
         self.walls: tuple[Shape, ...] = tuple(
             _SHAPES[own.shape](own.point, own.vector, own.length) for own in description.walls

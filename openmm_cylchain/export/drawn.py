@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..analysis.runs import Run
+from ..analysis.runs import Run, RunParticles
 from ..errors import InputError
 from ..output.files import check_output_path
 from ..rendering.outlines import wall_lines
@@ -22,6 +22,11 @@ def check_path(path: str | Path, ending: str) -> Path:
 def thickness(run: Run) -> float:
     """The diameter in nm of the thinnest filament, of which linkers are drawn."""
     return min(own.diameter for own in run.filaments)
+
+
+def visible_diameter(run: Run, own: RunParticles) -> float:
+    """The diameter in nm of particles; where it is not known, twice that of the thinnest filament."""
+    return own.diameter or 2.0 * thickness(run)
 
 
 def walls(run: Run) -> list[FloatArray]:

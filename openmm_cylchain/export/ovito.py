@@ -1,4 +1,4 @@
-"""A run as a GSD file for OVITO: nodes and bound hands as particles with radii, segments and springs as bonds."""
+"""A run as a GSD file for OVITO: nodes, bound hands and particles with radii, segments and springs as bonds."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from ..analysis.runs import Run
 from ..errors import InputError
-from .drawn import check_path, spring_labels, thickness, walls
+from .drawn import check_path, spring_labels, thickness, visible_diameter, walls
 
 _ANGSTROM = 10.0  # in a nm
 
@@ -16,7 +16,7 @@ def write_ovito(run: Run, path: str | Path) -> None:
 
     Particles are the nodes of filaments, the hands of linkers that are bound and the ends of crosslinks, with the names
     of their types and radii; bonds are segments and springs, so that their number changes from frame to frame. Beam
-    elements are drawn by points of their curve. Lines on
+    elements are drawn by points of their curve. Particles beside filaments have their name and radius. Lines on
     walls are particles and bonds of the type "wall". ``time_ps`` is an attribute of each frame, beside its step.
     Without a periodic box, the cell is three times as wide as what it holds.
 
@@ -40,8 +40,10 @@ def write_ovito(run: Run, path: str | Path) -> None:
     names = list(dict.fromkeys(own.type.name for own in run.filaments))
     springs = spring_labels(run)
     hands = [f"{name} hand" for name in springs]
+    particle_names = list(dict.fromkeys(own.name for own in run.particles))
     wall_points, wall_bonds = _joined(walls(run))
     walls_there = ["wall"] if len(wall_points) else []
+    first_particle = len(names) + len(hands) + len(walls_there)
     center, cell = _cell(run)
     segments = _bonds(run)
     kinds = np.concatenate([np.full(own.segments * own.pieces, names.index(own.type.name)) for own in run.filaments])
@@ -72,11 +74,16 @@ def write_ovito(run: Run, path: str | Path) -> None:
                     bond_types.append(np.full(len(wall_bonds), len(names) + len(springs)))
                     widths.append(np.full(len(wall_points), 0.2 * thickness(run)))
                     count += len(wall_points)
+                for own in run.particles:
+                    positions.append(run.positions(frame)[own.indices])
+                    particle_types.append(np.full(len(own.indices), first_particle + particle_names.index(own.name)))
+                    widths.append(np.full(len(own.indices), visible_diameter(run, own)))
+                    count += len(own.indices)
                 snapshot = gsd.hoomd.Frame()
                 snapshot.configuration.step = int(run.steps[frame])
                 snapshot.configuration.box = _ANGSTROM * cell
                 snapshot.particles.N = count
-                snapshot.particles.types = names + hands + walls_there
+                snapshot.particles.types = names + hands + walls_there + particle_names
                 snapshot.particles.typeid = np.concatenate(particle_types)
                 snapshot.particles.position = _ANGSTROM * (np.concatenate(positions) - center)
                 snapshot.particles.diameter = _ANGSTROM * np.concatenate(widths)

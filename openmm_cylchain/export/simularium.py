@@ -1,4 +1,5 @@
-"""A run as a Simularium file (JSON): filaments, linkers, crosslinks and walls as fibers, hands as spheres."""
+"""A run as a Simularium file (JSON): filaments, linkers, crosslinks and walls as fibers, hands and
+particles as spheres."""
 
 import json
 from pathlib import Path
@@ -8,10 +9,10 @@ import numpy as np
 
 from ..analysis.runs import Run
 from ..output.files import write_atomically
-from ..rendering.colors import WALL_COLOR, filament_colors, linker_color
+from ..rendering.colors import WALL_COLOR, filament_colors, linker_color, particle_colors
 from ..units.text import time_unit
 from ..version import __version__
-from .drawn import check_path, spring_labels, thickness, walls
+from .drawn import check_path, spring_labels, thickness, visible_diameter, walls
 
 _SPHERE, _FIBER = 1000.0, 1001.0
 
@@ -83,6 +84,7 @@ def _types(run):
     for kind, label in enumerate(spring_labels(run)):
         agents.append((("linker", kind), label, "FIBER", linker_color(kind)))
         agents.append((("hand", kind), f"{label}#hand", "SPHERE", linker_color(kind)))
+    agents += [(("particle", name), name, "SPHERE", color) for name, color in particle_colors(run).items()]
     if run.walls:
         agents.append((("wall", 0), "wall", "FIBER", WALL_COLOR))
     for number, (key, label, shape, color) in enumerate(agents):
@@ -106,6 +108,17 @@ def _agents(run, frame, types, center, outlines):
         points = np.concatenate([points, points[:1]]) if own.ring else points
         data += _agent(_FIBER, number, types["filament", own.type.name], 0.5 * own.diameter, points - center)
     number = len(run.filaments)
+    for own in run.particles:
+        for position in run.positions(frame)[own.indices] if len(own.indices) else ():
+            data += _agent(
+                _SPHERE,
+                number,
+                types["particle", own.name],
+                0.5 * visible_diameter(run, own),
+                np.zeros((0, 3)),
+                position - center,
+            )
+            number += 1
     radius = 0.5 * thickness(run)
     for kind in range(len(run.spring_names)):
         lines, hands = run.springs(frame, kind)

@@ -6,9 +6,9 @@ import numpy as np
 
 from ..analysis.runs import Run
 from ..output.files import write_atomically
-from ..rendering.colors import WALL_COLOR, filament_colors, linker_color
+from ..rendering.colors import WALL_COLOR, filament_colors, linker_color, particle_colors
 from ..units.text import time_unit
-from .drawn import check_path, thickness, walls
+from .drawn import check_path, thickness, visible_diameter, walls
 
 _ANGSTROM = 10.0
 _FIRST_COLOR = 17  # Those before have a meaning of their own in VMD.
@@ -100,6 +100,23 @@ def write_vmd(run: Run, path: str | Path) -> None:
         ]
     first = _FIRST_COLOR + len(filament_colors(run))
     lines += [_color(first + kind, linker_color(kind)) for kind in range(len(run.spring_names))]
+    particle_color = first + len(run.spring_names) + 1
+    for number, (name, color) in enumerate(particle_colors(run).items()):
+        members = [own for own in run.particles if own.name == name]
+        lines.append(_color(particle_color + number, color))
+        for own in members:
+            selection = f"index {' '.join(map(str, own.indices))}"
+            radius = _ANGSTROM * 0.5 * visible_diameter(run, own)
+            lines += [
+                f"set particles [atomselect $molecule {_word(selection)}]",
+                f"$particles set radius {radius:.6g}",
+                "$particles delete",
+                "mol representation VDW 1.0 16",
+                f"mol selection {{{selection}}}",
+                f"mol color ColorID {particle_color + number}",
+                "mol material AOChalky",
+                "mol addrep $molecule",
+            ]
     if run.box is not None:
         edges = " ".join(f"{_ANGSTROM * edge:.8g}" for edge in np.diag(run.box))
         lines += ["package require pbctools", f"pbc set {{{edges}}} -all -molid $molecule", "pbc box -molid $molecule"]

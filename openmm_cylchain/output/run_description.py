@@ -63,6 +63,15 @@ class DescribedLinkers:
 
 
 @dataclass(frozen=True)
+class DescribedParticles:
+    """Particles of a run that are no part of filaments: of one name, with a diameter in nm, 0 if it is not known."""
+
+    name: str
+    particles: tuple[int, ...]
+    diameter: float
+
+
+@dataclass(frozen=True)
 class DescribedWall:
     """A wall of a run by its region: see ``Shape.region``; lengths in nm.
 
@@ -114,6 +123,8 @@ class RunDescription:
     linkers : tuple of DescribedLinkers
     walls : tuple of DescribedWall
     contacts : tuple of DescribedContacts
+    others : tuple of DescribedParticles
+        Beside filaments.
     """
 
     title: str
@@ -127,6 +138,7 @@ class RunDescription:
     linkers: tuple[DescribedLinkers, ...] = ()
     walls: tuple[DescribedWall, ...] = ()
     contacts: tuple[DescribedContacts, ...] = ()
+    others: tuple[DescribedParticles, ...] = ()
 
     def write(self, path: Path) -> None:
         """Write the description as JSON."""
@@ -154,6 +166,7 @@ class RunDescription:
             "linkers": [dataclasses.asdict(own) for own in self.linkers],
             "walls": [dataclasses.asdict(own) for own in self.walls],
             "contacts": [dataclasses.asdict(own) for own in self.contacts],
+            "others": [dataclasses.asdict(own) for own in self.others],
         }
         write_atomically(path, (json.dumps(content, allow_nan=False) + "\n").encode())
 
@@ -189,6 +202,7 @@ def read_run_description(path: Path) -> RunDescription:
         content["linkers"] = tuple(DescribedLinkers(**own) for own in content["linkers"])
         content["walls"] = tuple(DescribedWall(**_as_tuples(own)) for own in content["walls"])
         content["contacts"] = tuple(DescribedContacts(**_as_tuples(own)) for own in content.get("contacts", ()))
+        content["others"] = tuple(DescribedParticles(**_as_tuples(own)) for own in content.get("others", ()))
         return RunDescription(**content)
     except (ValueError, KeyError, TypeError, IndexError, AttributeError):
         raise InputError(

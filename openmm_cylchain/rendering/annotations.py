@@ -119,6 +119,9 @@ def _draw_legend(figure, scene, text):
         if kind == "filament":
             label = _FULL_NAMES.get(label, label)
             handles.append(Line2D([], [], color=color, linewidth=0.45 * text, solid_capstyle="round", label=label))
+        elif kind == "particle":
+            marker = dict(marker="o", markersize=0.8 * text, linestyle="none")
+            handles.append(Line2D([], [], color=color, label=label, **marker))
         else:
             handles.append(
                 Line2D([], [], color=color, linewidth=0.15 * text, marker="o", markersize=0.55 * text, label=label)

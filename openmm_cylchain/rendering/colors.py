@@ -1,12 +1,13 @@
-"""Colors of filaments and linkers: those of Okabe and Ito, which the color-blind can tell apart."""
+"""Colors of what is in pictures of runs."""
 
 from ..analysis.runs import Run
+from ..output.colors import FILAMENT_COLORS, LINKER_COLORS
 
-_FILAMENTS = ("#0072B2", "#009E73", "#56B4E9", "#6B6B6B")
-_LINKERS = ("#E69F00", "#D55E00", "#CC79A7", "#F0E442")
 # Of linkers where colors of filaments are numbers.
 _GREYS = ("#333333", "#8A8A8A", "#5E5E5E", "#B0B0B0")
 
+# Of particles beside filaments, which are many.
+_PARTICLES = ("#B9BDC6", "#D8B98A", "#9C8FB5", "#A9C4A0")
 
 WALL_COLOR = "#9EA3AD"
 
@@ -14,10 +15,16 @@ WALL_COLOR = "#9EA3AD"
 def filament_colors(run: Run) -> dict[str, str]:
     """Colors "#RRGGBB" of the types of filaments of a run, by their names."""
     names = dict.fromkeys(own.type.name for own in run.filaments)
-    return {name: _FILAMENTS[number % len(_FILAMENTS)] for number, name in enumerate(names)}
+    return {name: FILAMENT_COLORS[number % len(FILAMENT_COLORS)] for number, name in enumerate(names)}
+
+
+def particle_colors(run: Run) -> dict[str, str]:
+    """Colors "#RRGGBB" of the particles of a run beside its filaments, by their names."""
+    names = dict.fromkeys(own.name for own in run.particles)
+    return {name: _PARTICLES[number % len(_PARTICLES)] for number, name in enumerate(names)}
 
 
 def linker_color(kind: int, grey: bool = False) -> str:
     """The color "#RRGGBB" of a kind of linkers, or of crosslinks."""
-    colors = _GREYS if grey else _LINKERS
+    colors = _GREYS if grey else LINKER_COLORS
     return colors[kind % len(colors)]

@@ -33,7 +33,8 @@ def add_command(commands):
     parser.add_argument("--projection", default="perspective", metavar="P", help="perspective (default), orthographic")
     parser.add_argument("--view", metavar="X,Y,Z", help="the direction in which the camera looks")
     parser.add_argument("--whole", action="store_true", help="let filaments leave the periodic box")
-    parser.add_argument("--no-linkers", action="store_true", help="draw filaments alone")
+    parser.add_argument("--no-linkers", action="store_true", help="leave linkers and crosslinks out")
+    parser.add_argument("--no-particles", action="store_true", help="leave particles beside filaments out")
     parser.add_argument("--incomplete", action="store_true", help="draw a run that is not at its end")
     parser.set_defaults(command=_render)
 
@@ -48,7 +49,14 @@ def _render(options):
     from .pictures import View, write_film, write_picture
     from .scene import Look
 
-    look = Look(options.color, _diameter(options.diameter), options.whole, not options.no_linkers, options.average)
+    look = Look(
+        options.color,
+        _diameter(options.diameter),
+        options.whole,
+        not options.no_linkers,
+        options.average,
+        not options.no_particles,
+    )
     direction = None if options.view is None else _numbers(options.view, ",", 3, "--view")
     view = View(_size(options.size), options.projection, direction, options.turn)
     run = load(options.run, options.incomplete)

@@ -1,4 +1,5 @@
-"""What a picture of a run shows: filaments, linkers, the periodic box and walls as tubes, with their colors."""
+"""What a picture of a run shows, with its colors: filaments, linkers, the periodic box and walls as tubes, particles as
+balls."""
 
 from dataclasses import dataclass, field
 
@@ -11,7 +12,7 @@ from ..errors import InputError
 from ..mechanics.geometry import segment_vectors
 from ..units.quantities import AVOGADRO
 from ..units.types import FloatArray, IntArray
-from .colors import filament_colors, linker_color
+from .colors import filament_colors, linker_color, particle_colors
 from .outlines import box_edges, wall_lines
 from .tubes import Tubes
 
@@ -19,6 +20,7 @@ COLORINGS = ("type", "tension", "orientation", "bending")
 
 _LINE_COLOR, _LINE_WIDTH = np.array([0.62, 0.64, 0.68]), 0.0011
 _VISIBLE = 0.009  # Of the extent of the scene: what a tube is wide at least.
+_VISIBLE_BALL = 0.012
 _PICONEWTON = 1e-15 * AVOGADRO * 1e-9
 
 
@@ -38,6 +40,8 @@ class Look:
         Whether linkers and crosslinks are drawn.
     average : int
         Over how many frames a tension is averaged.
+    particles : bool
+        Whether particles beside filaments are drawn.
     """
 
     color: str = "type"
@@ -45,6 +49,7 @@ class Look:
     whole: bool = False
     linkers: bool = True
     average: int = 1
+    particles: bool = True
 
     def __post_init__(self) -> None:
         if self.color not in COLORINGS:
@@ -74,7 +79,7 @@ class Scene:
     ----------
     points : (n, 3) array
         In nm: what a camera has to see.
-    legend : list of (label, color, kind) with the kind "filament" or "linker"
+    legend : list of (label, color, kind) with the kind "filament", "particle" or "linker"
     scale : ColorScale or None
         If filaments are not colored by their type.
     """
@@ -83,6 +88,7 @@ class Scene:
     look: Look
     points: FloatArray
     diameters: FloatArray
+    ball_diameters: list[float]
     legend: list[tuple[str, str, str]]
     scale: ColorScale | None
     _director: FloatArray | None = None
@@ -102,7 +108,17 @@ class Scene:
             parts.append(Tubes.of_one_kind(ends, 0.5 * self.diameters[number], color[which]))
         if self.look.linkers:
             parts += self._linkers(frame)
+        if self.look.particles:
+            parts += self._balls(frame)
         return Tubes.joined(parts)
+
+    def _balls(self, frame):
+        colors, positions = particle_colors(self.run), self.run.positions(frame)
+        parts = []
+        for own, diameter in zip(self.run.particles, self.ball_diameters):
+            balls, _ = self._wrapped(np.repeat(positions[own.indices][:, None], 2, axis=1).astype(float))
+            parts.append(Tubes.of_one_kind(balls, 0.5 * diameter, _rgb(colors[own.name])))
+        return parts
 
     def _linkers(self, frame):
         radius = 0.5 * float(np.median(self.diameters))
@@ -158,18 +174,22 @@ def make_scene(run: Run, look: Look, frames: list[int]) -> Scene:
         diameters = np.maximum(own, _VISIBLE * extent * own / own.max())
     else:
         diameters = own if look.diameter == 0.0 else np.full(len(own), look.diameter)
-    # Tubes stand out from the points by half their width.
-    points = np.concatenate([points + 0.5 * diameters.max(), points - 0.5 * diameters.max()])
+    balls = [max(own.diameter, _VISIBLE_BALL * extent) for own in run.particles] if look.particles else []
+    # Tubes and balls stand out from the points by half their width.
+    widest = max(diameters.max(), *balls) if balls else diameters.max()
+    points = np.concatenate([points + 0.5 * widest, points - 0.5 * widest])
     axis = director(np.concatenate(_segments(run, frames[0]))) if look.color == "orientation" else None
     scale = _color_scale(run, look, axis, frames)
     fixed = _lines(box_edges(run) + wall_lines(run, points), _LINE_WIDTH * extent)
-    return Scene(run, look, points, diameters, legend_of(run, look), scale, axis, fixed)
+    return Scene(run, look, points, diameters, balls, legend_of(run, look), scale, axis, fixed)
 
 
 def legend_of(run: Run, look: Look) -> list[tuple[str, str, str]]:
     """Labels, colors "#RRGGBB" and kinds of what the legend of a picture has; see ``Scene``."""
     colors = filament_colors(run)
     legend = [(name, color, "filament") for name, color in colors.items()] if look.color == "type" else []
+    if look.particles:
+        legend += [(name, color, "particle") for name, color in particle_colors(run).items()]
     if look.linkers:
         legend += [
             (name, linker_color(kind, look.color != "type"), "linker") for kind, name in enumerate(run.spring_names)
@@ -183,6 +203,9 @@ def _framed_points(run, look, frames):
         return corners @ run.box
     sampled = {frames[round(place)] for place in np.linspace(0, len(frames) - 1, min(len(frames), 20))}
     points = np.concatenate([own for frame in sampled for own in run.curves(frame)])
+    if look.particles:
+        own = [run.positions(frame)[each.indices] for frame in sampled for each in run.particles]
+        points = np.concatenate([points, *own])
     return np.concatenate([points, *wall_lines(run, points)])
 
 

@@ -4,7 +4,7 @@ from ..systems.described_runs import describe_system
 from .initial_state import box_vectors
 
 
-def describe(configuration, filaments, system):
+def describe(configuration, filaments, system, topology):
     """What a run of a configuration simulates.
 
     Parameters
@@ -12,13 +12,15 @@ def describe(configuration, filaments, system):
     configuration : Configuration
     filaments : Filaments
     system : openmm.System
-        With the filaments.
+        With the filaments, and behind them the particles.
+    topology : openmm.app.Topology
 
     Returns
     -------
     RunDescription
     """
     settings = configuration.simulation
+    diameters = [own.diameter for own in configuration.particles for _ in range(own.count)]
     return describe_system(
         filaments,
         system,
@@ -29,4 +31,6 @@ def describe(configuration, filaments, system):
         box=box_vectors(configuration.box),
         # Those of the portable engine do not say what they are.
         shapes=() if filaments.engine == "compiled" else [own.shape for own in configuration.walls],
+        topology=topology,
+        diameters=dict(enumerate(diameters, system.getNumParticles() - len(diameters))),
     )

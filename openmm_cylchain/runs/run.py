@@ -84,7 +84,7 @@ def run(configuration, output, resume=False):
                 print("No checkpoint yet: starting from the beginning.")
             positions = relaxed_positions(configuration, built)
             write_topology(directory, simulation.topology, simulation.system, positions)
-            describe(configuration, filaments, simulation.system).write(directory.description)
+            describe(configuration, filaments, simulation.system, simulation.topology).write(directory.description)
             simulation.context.setPositions(positions)
             _write_crosslinks(directory, simulation)
         else:

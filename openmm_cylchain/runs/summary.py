@@ -506,6 +506,12 @@ _EXPLANATIONS = {
 }
 
 
+def _rounded(value, digits):
+    # To significant digits; large numbers without an exponent, as long as they can be read.
+    text = f"{value:.{digits}g}"
+    return f"{float(text):.0f}" if "e+" in text and abs(value) < 1e9 else text
+
+
 def format_summary(configuration, groups, linkers=()):
     """The summary as text for a terminal."""
     settings = configuration.simulation
@@ -548,9 +554,9 @@ def _table(observables):
         rows.append(
             (
                 observable.name + (f" ({observable.unit})" if observable.unit else ""),
-                f"{observable.value:.6g}",
-                f"{observable.standard_error:.2g}",
-                f"{observable.theory:.6g}",
+                _rounded(observable.value, 6),
+                _rounded(observable.standard_error, 2),
+                _rounded(observable.theory, 6),
                 deviation,
                 "" if relative is None else f"{100 * relative:+.2g} %",
                 observable.verdict,

@@ -11,6 +11,7 @@ from scipy.integrate import trapezoid
 from .. import theory
 from ..analysis.statistics import mean_with_error
 from ..analysis.trajectories import filament_curves, joint_cosines, segment_lengths, tangent_correlation
+from ..output.colors import FILAMENT_COLORS, LINKER_COLORS
 from ..output.files import write_atomically
 from ..theory.beam_elements import beam_persistence_length
 from ..units.quantities import thermal_energy
@@ -27,7 +28,8 @@ from .summary import (
     mean_energies,
 )
 
-_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
+_COLOURS = (*FILAMENT_COLORS, "#CC79A7", "#000000")
+_EXACT_COLOUR = "0.25"  # Of a line that is that of several kinds of filaments.
 _STRETCHING_COLOUR, _BENDING_COLOUR = "#D55E00", "#0072B2"
 _FONT_SIZE = 11
 
@@ -91,6 +93,11 @@ def _legend(axis, **options):
     axis.legend(fontsize=_FONT_SIZE - 1, framealpha=0.85, edgecolor="none", **options)
 
 
+def _legend_below(axis):
+    # Where there are too many lines to leave room for it.
+    _legend(axis, loc="upper center", bbox_to_anchor=(0.5, -0.15), ncols=2)
+
+
 def _draw_histogram(axis, values, label, colour):
     bins = int(np.clip(2.0 * len(values) ** (1.0 / 3.0), 10, 60))
     axis.hist(values, bins=bins, density=True, color=colour, alpha=0.35, label=label)
@@ -126,8 +133,13 @@ def _draw_conformations(axis, groups, trajectory):
         spine.set_color("0.7")
     name, length = _time_unit(trajectory.time[-1])
     axis.set_title(f"Filaments at {trajectory.time[-1] / length:.4g} {name}, projected on the xy plane")
-    _legend(axis, loc="upper left", bbox_to_anchor=(0.0, -0.01), borderaxespad=0.0)
+    _legend_of_conformations(axis)
     _draw_scale_bar(axis)
+
+
+def _legend_of_conformations(axis):
+    # Below the frame, beside the scale bar.
+    _legend(axis, loc="upper left", bbox_to_anchor=(0.0, -0.01), borderaxespad=0.0)
 
 
 def _draw_scale_bar(axis):
@@ -167,12 +179,13 @@ def _draw_linkers(axis, labels, path):
         places = last["places"][last["type"] == number]
         ends = places[~np.isnan(places).any(axis=(1, 2))]
         lines = np.concatenate([ends, np.full((len(ends), 1, 3), np.nan)], axis=1).reshape(-1, 3)
-        axis.plot(lines[:, 0], lines[:, 1], color=_linker_colour(number), linewidth=1.4, zorder=3)
+        label = f"{labels[number]}, both hands bound" if len(ends) else None
+        axis.plot(lines[:, 0], lines[:, 1], color=_linker_colour(number), linewidth=1.4, zorder=3, label=label)
+    _legend_of_conformations(axis)
 
 
 def _linker_colour(number):
-    # Those behind the colours of groups of filaments, as far as there are as many.
-    return _COLOURS[-1 - number % len(_COLOURS)]
+    return LINKER_COLORS[number % len(LINKER_COLORS)]
 
 
 def _draw_numbers_bound(axis, labels, table):
@@ -193,7 +206,7 @@ def _draw_numbers_bound(axis, labels, table):
     axis.set_xlabel(f"time ({name})")
     axis.set_ylabel("linkers")
     axis.set_title("Linkers that are bound")
-    _legend(axis, loc="best")
+    _legend_below(axis)
 
 
 def _draw_tensions(axis, labels, table):
@@ -214,7 +227,7 @@ def _draw_tensions(axis, labels, table):
     axis.set_xlabel(f"time ({name})")
     axis.set_ylabel("tension (pN)")
     axis.set_title("Tension of linkers with both hands bound")
-    _legend(axis, loc="best")
+    _legend_below(axis)
 
 
 def _draw_energies(axis, groups, temperature, energies):
@@ -254,6 +267,7 @@ def _draw_tangent_correlation(axis, groups, temperature, trajectory):
     if not drawn:
         axis.text(0.5, 0.5, "single segments or rings", transform=axis.transAxes, ha="center", fontsize=_FONT_SIZE)
         return
+    exact: dict[float, tuple[float, str]] = {}
     for group, members, label, colour in drawn:
         correlation = tangent_correlation(trajectory, members)
         every = slice(None, None, max(1, len(correlation.lag) // 20))
@@ -270,22 +284,26 @@ def _draw_tangent_correlation(axis, groups, temperature, trajectory):
         )
         persistence_length = beam_persistence_length if group.has_beam_elements else theory.chain_persistence_length
         persistence = persistence_length(group.type, temperature)
+        length, own = group.segments * group.type.segment_length, colour
+        if persistence in exact:
+            length, own = max(length, exact[persistence][0]), _EXACT_COLOUR
+        exact[persistence] = length, own
+    for persistence, (length, colour) in exact.items():
         if persistence > 0:
-            distance = np.linspace(0.0, group.segments * group.type.segment_length, 200)
-            label = f"exp(-s/lp), lp = {_format_length(persistence)}"
+            distance = np.linspace(0.0, length, 200)
             axis.plot(
                 distance / scale,
                 theory.wlc_tangent_correlation(distance, persistence),
                 color=colour,
                 linestyle="--",
                 linewidth=1.8,
-                label=label,
+                label=f"exp(-s/lp), lp = {_format_length(persistence)}",
             )
     axis.set_xlim(0.0, max(group.segments * group.type.segment_length for group, *_ in drawn) / scale)
     if len(drawn) == 1:
         _legend(axis, loc="best")
     else:
-        _legend(axis, loc="upper center", bbox_to_anchor=(0.5, -0.15), ncols=2)
+        _legend_below(axis)
 
 
 def _format_length(length):
@@ -294,7 +312,7 @@ def _format_length(length):
 
 
 def _draw_joint_angles(axis, groups, temperature, trajectory):
-    kT = thermal_energy(temperature)
+    kinds = {}
     for group, members, label, colour in groups:
         if not group.joints:
             continue
@@ -305,28 +323,36 @@ def _draw_joint_angles(axis, groups, temperature, trajectory):
             # Those of beads have no distribution that holds all along the chain, and of those of beam elements there is
             # no closed form.
             continue
-        angle = np.linspace(0.0, np.pi, 20001)
-        density = np.sin(angle)
-        if group.type.bending_rigidity > 0:
-            with np.errstate(divide="ignore"):
-                density *= np.exp(-group.type.bending_energy(np.cos(angle)) / kT)
-        degrees = np.degrees(angle)
-        density /= trapezoid(density, degrees)
-        widest = degrees[np.flatnonzero(density > 1e-3 * density.max())[-1]]
-        shown = degrees <= max(angles.max(), widest)
-        axis.plot(
-            degrees[shown],
-            density[shown],
-            color=colour,
-            linewidth=1.8,
-            linestyle=_line(group),
-            label=_exact_label(group),
-        )
+        widest, own = angles.max(), colour
+        if (group.type, is_in_equilibrium(group)) in kinds:
+            widest, own = max(widest, kinds[group.type, is_in_equilibrium(group)][1]), _EXACT_COLOUR
+        kinds[group.type, is_in_equilibrium(group)] = group, widest, own
+    for group, widest, colour in kinds.values():
+        _draw_exact_joint_angles(axis, group, temperature, widest, colour)
     axis.set_xlim(left=0.0)
     axis.set_xlabel(f"angle between {_bends(groups)} (degrees)")
     axis.set_ylabel("probability density (1/degree)")
     axis.set_title("Bends of elements" if all(group.has_beam_elements for group, *_ in groups) else "Joint angles")
     _legend(axis, loc="upper right")
+
+
+def _draw_exact_joint_angles(axis, group, temperature, widest, colour):
+    angle = np.linspace(0.0, np.pi, 20001)
+    density = np.sin(angle)
+    if group.type.bending_rigidity > 0:
+        with np.errstate(divide="ignore"):
+            density *= np.exp(-group.type.bending_energy(np.cos(angle)) / thermal_energy(temperature))
+    degrees = np.degrees(angle)
+    density /= trapezoid(density, degrees)
+    shown = degrees <= max(widest, degrees[np.flatnonzero(density > 1e-3 * density.max())[-1]])
+    axis.plot(
+        degrees[shown],
+        density[shown],
+        color=colour,
+        linewidth=1.8,
+        linestyle=_line(group),
+        label=_exact_label(group),
+    )
 
 
 def _bends(groups):

@@ -46,6 +46,7 @@ def _draw(scan, results):
         _draw_panel(axis, scan, own)
         of, quantity, unit = panel
         axis.set_title(of, fontsize=_FONT_SIZE)
+        unit = unit.replace("^2", "²").replace("^3", "³")
         axis.set_ylabel(f"{quantity}{f' ({unit})' if unit else ''}".replace(", ", ",\n"), fontsize=_FONT_SIZE - 1)
         axis.tick_params(labelsize=_FONT_SIZE - 1)
     for axis in axes.flat[len(panels) :]:
@@ -57,7 +58,8 @@ def _draw(scan, results):
         handles.values(),
         handles.keys(),
         loc="outside lower center",
-        ncols=min(4, len(handles)),
+        # About as many as the width has room for.
+        ncols=max(1, min(len(handles), int(12.0 * figure.get_figwidth() / (6 + max(map(len, handles)))))),
         fontsize=_FONT_SIZE - 1,
     )
     image = io.BytesIO()

@@ -2,7 +2,7 @@
 
 import dataclasses
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from ..output.run_description import (
     DescribedContacts,
     DescribedFilament,
     DescribedLinkers,
+    DescribedParticles,
     DescribedWall,
     RunDescription,
 )
@@ -33,6 +34,8 @@ def describe_system(
     steps_per_frame: int,
     box: FloatArray | None,
     shapes: Sequence[Shape] = (),
+    topology: app.Topology | None = None,
+    diameters: Mapping[int, float] | None = None,
 ) -> RunDescription:
     """What a run of a System simulates: filaments, linkers, walls and contacts.
 
@@ -49,6 +52,11 @@ def describe_system(
     box : (3, 3) array in nm, or None
     shapes : sequence of Shape
         Walls beside those in the System.
+    topology : openmm.app.Topology or None
+        Names particles beside filaments by their residues; they are not described without it.
+    diameters : mapping, optional
+        Of particles beside filaments, in nm, by their indices. Those of contacts and the sigma of a
+        ``NonbondedForce`` if not given.
 
     Returns
     -------
@@ -81,7 +89,35 @@ def describe_system(
         ),
         walls=(*walls, *(DescribedWall(*_region(shape.region)) for shape in shapes)),
         contacts=tuple(contacts),
+        others=() if topology is None else _others(filaments, system, topology, contacts, diameters or {}),
     )
+
+
+def _others(filaments, system, topology, contacts, diameters):
+    # Virtual sites are places on filaments, or on what is drawn already.
+    known = {
+        **_sigmas(system),
+        **{sphere: diameter for own in contacts for sphere, diameter in own.spheres},
+        **diameters,
+    }
+    nodes = {int(node) for own in (*filaments.node_indices, *filaments.control_point_indices) for node in own}
+    kinds: dict[tuple[str, float], list[int]] = {}
+    for atom in topology.atoms():
+        if atom.index not in nodes and not system.isVirtualSite(atom.index):
+            kinds.setdefault((atom.residue.name, known.get(atom.index, 0.0)), []).append(atom.index)
+    return tuple(DescribedParticles(name, tuple(own), diameter) for (name, diameter), own in kinds.items())
+
+
+def _sigmas(system):
+    # Of particles that have a Lennard-Jones interaction.
+    sigmas = {}
+    for force in system.getForces():
+        if isinstance(force, openmm.NonbondedForce):
+            for index in range(force.getNumParticles()):
+                _, sigma, epsilon = force.getParticleParameters(index)
+                if epsilon._value > 0.0:
+                    sigmas[index] = sigma._value
+    return sigmas
 
 
 def _region(region):

@@ -1,7 +1,7 @@
 """A reporter that writes what ``openmm-cylchain run`` writes, so that scripts are loaded, drawn and exported alike."""
 
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,8 @@ from ..output.run_tables import (
     size_of_lines,
     start_of_trajectory,
 )
-from ..units.quantities import thermal_energy, whole_number
+from ..units.quantities import LENGTH, positive, thermal_energy, whole_number
+from ..units.types import Scalar
 from .described_runs import describe_system, energy_cells, total_energies, write_topology
 from .filaments import Filaments
 
@@ -48,6 +49,9 @@ class RunReporter:
     walls : sequence of Shape
         Those to be drawn beside walls of ``filament_wall_force``: of ``wall_force``, whose formula alone is in the
         System.
+    particle_diameters : mapping of names of residues to lengths, optional
+        Of particles beside filaments, to be drawn so. Of those that are not named: the diameter in contacts, or the
+        sigma of a ``NonbondedForce``; where there is neither, they are drawn so that they can be seen.
     append : bool
         Go on with a directory that this reporter has written; frames behind the present step are forgotten, so that
         a run can go on from a checkpoint. The description stays what it was.
@@ -55,7 +59,8 @@ class RunReporter:
     Raises
     ------
     InputError
-        If the directory holds a run already (without ``append``), or none (with it), or another one.
+        If the directory holds a run already (without ``append``), or none (with it), or another one; in the first
+        step, if there are no particles of a name that has a diameter.
 
     Examples
     --------
@@ -72,6 +77,7 @@ class RunReporter:
         title: str = "",
         walls: Sequence[Shape] = (),
         append: bool = False,
+        particle_diameters: Mapping[str, Scalar] | None = None,
     ) -> None:
         self._closed = True
         self._interval = whole_number(reportInterval, 1, "reportInterval")
@@ -85,6 +91,12 @@ class RunReporter:
         self._filaments, self._title, self._walls = filaments, str(title), tuple(walls)
         self._kT = thermal_energy(filaments.temperature)
         self._append = bool(append)
+        if not isinstance(particle_diameters or {}, Mapping):
+            raise InputError("particle_diameters must have lengths by names of residues, such as {'PRT': 5.0}.")
+        self._diameters = {
+            str(name): positive(diameter, LENGTH, f"the diameter of {name!r}")
+            for name, diameter in (particle_diameters or {}).items()
+        }
         self._files = RunFiles(directory)
         self._open: list[Any] = []
         self._last = -1
@@ -123,7 +135,16 @@ class RunReporter:
             periodic = system.usesPeriodicBoundaryConditions()
             box = state.getPeriodicBoxVectors(asNumpy=True)._value if periodic else None
             description = describe_system(
-                filaments, system, self._title, time_step, None, self._interval, box, self._walls
+                filaments,
+                system,
+                self._title,
+                time_step,
+                None,
+                self._interval,
+                box,
+                self._walls,
+                simulation.topology,
+                self._diameters_of(simulation.topology),
             )
             description.write(files.description)
             write_topology(files, simulation.topology, system, state.getPositions(asNumpy=True))
@@ -155,6 +176,14 @@ class RunReporter:
             stack.pop_all()
         if not self._append and step % self._interval == 0:
             self.report(simulation, state)
+
+    def _diameters_of(self, topology):
+        names = {atom.index: atom.residue.name for atom in topology.atoms()}
+        for name in self._diameters:
+            if name not in names.values():
+                there = ", ".join(sorted(set(names.values())))
+                raise InputError(f"particle_diameters has {name!r}, but residues are named {there}.")
+        return {index: self._diameters[name] for index, name in names.items() if name in self._diameters}
 
     def report(self, simulation: app.Simulation, state: openmm.State) -> None:
         """Write a frame; OpenMM calls it."""

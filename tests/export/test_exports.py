@@ -9,7 +9,7 @@ import pytest
 
 from openmm_cylchain import analysis
 from openmm_cylchain.cli import main
-from support.small_runs import NETWORK, TWO_TYPES, simulated
+from support.small_runs import AMONG_SPHERES, NETWORK, TWO_TYPES, simulated
 
 ENDINGS = {"simularium": "simularium", "ovito": "gsd", "vmd": "tcl"}
 
@@ -17,6 +17,11 @@ ENDINGS = {"simularium": "simularium", "ovito": "gsd", "vmd": "tcl"}
 @pytest.fixture(scope="module")
 def two_types(tmp_path_factory):
     return simulated(tmp_path_factory.mktemp("two"), TWO_TYPES.replace("two types", "[two] {types} $x"))
+
+
+@pytest.fixture(scope="module")
+def among_spheres(tmp_path_factory):
+    return simulated(tmp_path_factory.mktemp("spheres"), AMONG_SPHERES)
 
 
 @pytest.fixture(scope="module")
@@ -113,6 +118,30 @@ def test_ovito_has_bonds_radii_linkers_and_times(network, tmp_path):
             np.testing.assert_allclose(np.sort(lengths[80:]), np.sort(expected), rtol=1e-3)
 
 
+def test_particles_are_spheres_in_every_export(among_spheres, tmp_path):
+    run, middle = analysis.load(among_spheres), np.array([200.0, 200.0, 250.0])
+    places, diameters = run.positions(2)[10:], [80.0] * 3 + [40.0] * 2
+    for folder in ENDINGS:
+        (tmp_path / folder).mkdir()
+    content = json.loads(exported(among_spheres, tmp_path / "simularium", "simularium").read_text())
+    names = {int(key): own["name"] for key, own in content["trajectoryInfo"]["typeMapping"].items()}
+    spheres = [own for own in agents_of(content["spatialData"]["bundleData"][2]) if own[0] == 1000]
+    assert [names[kind] for _, _, kind, *_ in spheres] == ["BIG"] * 3 + ["SMALL"] * 2
+    assert [2.0 * radius for *_, radius, _ in spheres] == diameters
+    np.testing.assert_allclose([own[3] for own in spheres], places - middle, atol=2e-4)
+    with gsd.hoomd.open(str(exported(among_spheres, tmp_path / "ovito", "ovito"))) as file:
+        particles = file[2].particles
+    assert particles.types == ["ACT", "BIG", "SMALL"]
+    assert particles.typeid.tolist() == [0] * 10 + [1] * 3 + [2] * 2
+    np.testing.assert_allclose(particles.diameter[10:], 10.0 * np.array(diameters))
+    np.testing.assert_allclose(particles.position[10:], 10.0 * (places - middle), atol=2e-3)
+    calls = _calls_of_vmd(exported(among_spheres, tmp_path / "vmd", "vmd"), 2)
+    for indices, diameter in (("10 11 12", 80.0), ("13 14", 40.0)):
+        assert ("atomselect", "5", f"index {indices}") in calls and ("mol", "selection", f"index {indices}") in calls
+        assert ("selected", "set", "radius", f"{5.0 * diameter:g}") in calls
+    assert len([call for call in calls if call[:3] == ("mol", "representation", "VDW")]) == 2
+
+
 def test_ovito_without_a_box(two_types, tmp_path):
     with gsd.hoomd.open(str(exported(two_types, tmp_path, "ovito"))) as file:
         frame = file[12]
@@ -157,11 +186,11 @@ def _calls_of_vmd(path, frame):
     def command(name):
         def note(*arguments):
             calls.append((name, *map(str, arguments)))
-            return {"mol": 5, "molinfo": frame}.get(name, "")
+            return {"mol": 5, "molinfo": frame, "atomselect": "selected"}.get(name, "")
 
         return note
 
-    for name in ("mol", "molinfo", "color", "display", "graphics", "pbc"):
+    for name in ("mol", "molinfo", "atomselect", "selected", "color", "display", "graphics", "pbc"):
         interpreter.createcommand(name, command(name))
     interpreter.eval("package provide pbctools 1")
     interpreter.evalfile(str(path))

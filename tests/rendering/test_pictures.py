@@ -16,7 +16,7 @@ from openmm_cylchain.rendering.camera import camera_on
 from openmm_cylchain.rendering.colors import filament_colors, linker_color
 from openmm_cylchain.rendering.pictures import View, images, write_film
 from openmm_cylchain.rendering.scene import COLORINGS, Look, make_scene
-from support.small_runs import NETWORK, TWO_TYPES, simulated
+from support.small_runs import AMONG_SPHERES, NETWORK, TWO_TYPES, simulated
 
 SIZE = ["--size", "160x120"]
 SMALL = View(size=(160, 120))
@@ -170,6 +170,32 @@ def test_tubes_are_as_wide_as_asked(two_types):
     visible = make_scene(run, Look(), [0]).diameters
     assert visible[0] / visible[3] == pytest.approx(6.0 / run.filaments[3].diameter)
     assert visible[3] > 20.0
+
+
+def test_particles_are_balls_of_their_diameter(tmp_path):
+    run = analysis.load(simulated(tmp_path, AMONG_SPHERES))
+    positions = run.positions(-1)
+    assert [(own.name, own.indices.tolist(), own.diameter) for own in run.particles] == [
+        ("BIG", [10, 11, 12], 80.0),
+        ("SMALL", [13, 14], 40.0),
+    ]
+    bare, wrapped, whole = (
+        make_scene(run, look, [-1]).tubes(-1) for look in (Look(particles=False), Look(), Look(whole=True))
+    )
+    for drawn in (wrapped, whole):
+        np.testing.assert_allclose(drawn.radii[-5:], [40.0] * 3 + [20.0] * 2)
+        assert np.all(drawn.ends[-5:, 0] == drawn.ends[-5:, 1])
+    assert len(wrapped.ends) == len(bare.ends) + 5
+    np.testing.assert_allclose(whole.ends[-5:, 0], positions[10:])
+    inside = wrapped.ends[-5:, 0]
+    assert np.all((inside >= 0.0) & (inside <= [400.0, 400.0, 500.0]))
+    images = (inside - positions[10:]) / [400.0, 400.0, 500.0]
+    np.testing.assert_allclose(images, np.round(images), atol=1e-6)
+    legends = [make_scene(run, look, [-1]).legend for look in (Look(), Look(particles=False))]
+    assert [name for name, _, kind in legends[0] if kind == "particle"] == ["BIG", "SMALL"]
+    assert legends[0][0] == legends[1][0] and len(legends[1]) == 1
+    pictures = [picture(run.path, tmp_path, *SIZE, *options) for options in ([], ["--no-particles"])]
+    assert np.mean(np.any(pictures[0] != pictures[1], axis=2)) > 0.02
 
 
 def test_linkers_are_drawn_where_they_are(network):

@@ -399,7 +399,7 @@ def test_directory_that_is_removed_cannot_be_resumed(tmp_path, capsys, monkeypat
     config = configured(tmp_path, duration='"0.2 us"', checkpoint_interval='"0.2 us"')
     assert main(["run", config, "--output", str(output)]) == 1
     errors = capsys.readouterr().err
-    assert "No such file or directory" in errors and "--resume" not in errors
+    assert "out has been removed while the run went on. Start it again" in errors and "--resume" not in errors
 
 
 def test_title_may_be_anything_on_one_line(tmp_path, capsys):

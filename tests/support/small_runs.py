@@ -54,6 +54,33 @@ report_interval = "0.1 ms"
 seed = 5
 """.replace("MOTOR", MOTOR)
 
+AMONG_SPHERES = """
+title = "among spheres"
+[solvent]
+temperature = "298.15 K"
+viscosity = "1 mPa*s"
+[box]
+edges = ["0.4 um", "0.4 um", "0.5 um"]
+[[filament]]
+type = "F_ACTIN"
+segment_length = "100 nm"
+segments = 4
+count = 2
+[[particles]]
+name = "BIG"
+diameter = "80 nm"
+count = 3
+[[particles]]
+name = "SMALL"
+diameter = "40 nm"
+positions = [["0 nm", "0 nm", "0 nm"], ["900 nm", "100 nm", "100 nm"]]
+[simulation]
+time_step = "5 us"
+duration = "0.1 ms"
+report_interval = "50 us"
+seed = 5
+"""
+
 
 def simulated(folder, text):
     """The directory of a run of a configuration."""

@@ -6,7 +6,7 @@ import shutil
 import gsd.hoomd
 import numpy as np
 import pytest
-from openmm import Platform, app, unit
+from openmm import NonbondedForce, Platform, System, app, unit
 from PIL import Image
 
 from openmm_cylchain import (
@@ -148,7 +148,7 @@ def test_it_goes_on_from_a_checkpoint(tmp_path):
     for name in ("trajectory.dcd", "energies.csv", "description.json", "topology.cif"):
         one, other = ((path / name).read_bytes() for path in paths)
         # OpenMM writes the time at which it has begun a DCD file.
-        assert one[184:] == other[184:] and one[:100] == other[:100], name
+        assert one[260:] == other[260:] and one[:180] == other[:180], name
     one, other = map(analysis.load, paths)
     assert len(one) == len(other) == 8
     for frame in range(8):
@@ -171,6 +171,46 @@ def test_linkers_are_as_those_of_a_configuration(tmp_path):
         assert found.linkers[frame].tobytes() == expected.linkers[frame].tobytes()
     for name in ("energies.csv", "linkers.csv"):
         assert (folder / name).read_text() == (tmp_path / "python" / name).read_text()
+
+
+def test_particles_beside_filaments_have_diameters(tmp_path):
+    """Those that are given, else those of contacts, else the sigma of Lennard-Jones, else none."""
+    filaments = Filaments(602.214, 300.0)
+    filaments.add_straight(F_ACTIN, segments=2, start=(0, 0, 0), direction=(1, 0, 0))
+    filaments.add_attachment(0, arc_length=200.0)
+    topology, system = app.Topology(), System()
+    force = NonbondedForce()
+    system.addForce(force)
+    chain = topology.addChain()
+    for name in ("LJ", "NEUT", "BALL", "BALL", "NAMED"):
+        topology.addAtom("P", None, topology.addResidue(name, chain))
+        system.addParticle(1.0)
+        force.addParticle(0.0, 7.0, 0.0 if name == "NEUT" else 1e-6)
+    places = [[0.0, 500.0 * (1 + number), 0.0] for number in range(5)]
+    positions = filaments.add_to(topology, system, np.array(places))
+    system.addForce(capsule_contact_force(filaments, system, 10.0, particles=[2, 3], particle_diameter=[20.0, 30.0]))
+    integrator = filaments.create_integrator(system, 1 * unit.nanosecond, particle_friction=1e4)
+    simulation = app.Simulation(topology, system, integrator, Platform.getPlatformByName("CPU"))
+    simulation.context.setPositions(positions)
+    named = {"NAMED": 0.1 * unit.micrometer}
+    simulation.reporters.append(RunReporter(tmp_path / "run", 1, filaments, particle_diameters=named))
+    simulation.step(2)
+    run = analysis.load(tmp_path / "run")
+    assert [(own.name, own.indices.tolist(), own.diameter) for own in run.particles] == [
+        ("LJ", [0], 7.0),
+        ("NEUT", [1], 0.0),
+        ("BALL", [2], 20.0),
+        ("BALL", [3], 30.0),
+        ("NAMED", [4], 100.0),
+    ]
+    assert main(["render", str(run.path), "--size", "160x120", "--output", str(tmp_path / "picture.png")]) == 0
+    for diameters, message in (({"PRT": 5.0}, "residues are named ACT, BALL"), ({"LJ": -1.0}, "diameter of 'LJ'")):
+        with pytest.raises(InputError, match=message):
+            simulation.reporters.append(RunReporter(tmp_path / "other", 1, filaments, particle_diameters=diameters))
+            simulation.step(1)
+        simulation.reporters.pop()
+    with pytest.raises(InputError, match="by names of residues"):
+        RunReporter(tmp_path / "other", 1, filaments, particle_diameters=5.0)
 
 
 def test_what_is_refused(written, tmp_path):
