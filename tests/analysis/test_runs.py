@@ -262,11 +262,11 @@ def test_far_from_the_origin_the_trajectory_is_coarse(tmp_path):
 def test_walls_are_described():
     configuration = parse_configuration(TWO_TYPES)
     filaments = create_filaments(configuration)
-    _, system, _ = filaments.build()
+    topology, system, _ = filaments.build()
     for shape in (Sphere([1, 2, 3], 5e4), Box([-1e4] * 3, [2e4] * 3), Cylinder([0, 0, 1], [0, 0, 2], 3e4)):
         system.addForce(filament_wall_force(filaments, system, shape, 1.0))
     held = {"stiffness": 1.0, "particles": tuple(range(24)), "radii": (0.0,) * 24}
-    assert describe(configuration, filaments, system).walls == (
+    assert describe(configuration, filaments, system, topology).walls == (
         DescribedWall("sphere", (1.0, 2.0, 3.0), (0.0, 0.0, 0.0), 5e4, **held),
         DescribedWall("box", (-1e4,) * 3, (2e4,) * 3, 0.0, **held),
         DescribedWall("cylinder", (0.0, 0.0, 1.0), (0.0, 0.0, 1.0), 3e4, **held),
