@@ -91,8 +91,8 @@ print(f"farthest node from the centre: {np.linalg.norm(final[nodes], axis=1).max
 print(f"distance of cargo from its point: {np.mean(distances):.1f} nm; springs at rest {0.5 * CARGO_DIAMETER:.1f} nm")
 print(f"bending energy of a joint: {np.mean(bending[len(bending) // 2 :]):.2f} kJ/mol; {free:.2f} if free")
 
-figure = plt.figure(figsize=(7, 7))
-axes = figure.add_subplot(projection="3d")
+figure = plt.figure(figsize=(8, 8))
+axes = figure.add_subplot(projection="3d", proj_type="ortho")
 longitude, latitude = np.meshgrid(np.linspace(0, 2 * np.pi, 25), np.linspace(0, np.pi, 13))
 axes.plot_wireframe(
     RADIUS * np.sin(latitude) * np.cos(longitude),
@@ -101,13 +101,20 @@ axes.plot_wireframe(
     color="0.85",
     linewidth=0.6,
 )
-for indices in filaments.node_indices:
-    axes.plot(*final[indices].T, color="#c0392b", linewidth=2)
-axes.scatter(*final[cargo].T, s=90, color="#1f6f8b", depthshade=True)
+for number, indices in enumerate(filaments.node_indices):
+    label = f"{FILAMENTS} actin filaments of 1.2 µm" if number == 0 else None
+    axes.plot(*final[indices].T, color="#c0392b", linewidth=2, label=label)
+axes.scatter(*final[cargo].T, s=90, color="#1f6f8b", depthshade=True, label="cargo, 60 nm")
 for particle, point in zip(cargo, filaments.attachment_indices):
     axes.plot(*final[[particle, point]].T, color="#1f6f8b", linewidth=1)
-axes.set_box_aspect((1, 1, 1), zoom=1.5)
+axes.plot([-RADIUS, RADIUS], [0, 0], [-1.15 * RADIUS] * 2, color="0.3", linewidth=1.5)
+axes.text(0, 0, -1.27 * RADIUS, "1 µm, the diameter of the vesicle", ha="center", fontsize=14, color="0.3")
+limits = (-1.05 * RADIUS, 1.05 * RADIUS)
+axes.set(xlim=limits, ylim=limits, zlim=limits)
+axes.set_box_aspect((1, 1, 1), zoom=1.38)
+axes.view_init(elev=20, azim=-90)  # The bar along x is as long as it says.
 axes.set_axis_off()
-axes.set_title(f"{FILAMENTS} filaments of 1.2 µm with cargo in a vesicle of 1 µm")
-figure.savefig(folder / "vesicle.png", dpi=120, bbox_inches="tight")
+figure.subplots_adjust(left=0, right=1, bottom=0, top=1)
+figure.legend(loc="upper center", bbox_to_anchor=(0.5, 0.99), ncols=2, fontsize=14, frameon=False)
+figure.savefig(folder / "vesicle.png", dpi=110)
 print(f"Wrote vesicle.cif, vesicle.dcd and vesicle.png to {folder}.")

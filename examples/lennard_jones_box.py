@@ -150,6 +150,9 @@ for low in range(3):
 axes.set(xlim=(0, BOX), ylim=(0, BOX), zlim=(0, BOX), box_aspect=(1, 1, 1))
 axes.view_init(elev=18, azim=-62)
 axes.set_axis_off()
-figure.subplots_adjust(left=-0.1, right=1.1, bottom=-0.1, top=1.1)
+figure.subplots_adjust(left=-0.03, right=1.03, bottom=-0.05, top=0.98)
+length = SEGMENTS * DSDNA.segment_length
+figure.text(0.5, 0.965, f"DNA of {length:.0f} nm (red) among spheres of {DIAMETER:g} nm", ha="center", fontsize=16)
+figure.text(0.5, 0.93, f"in a periodic box of {BOX:g} nm", ha="center", fontsize=16)
 figure.savefig(folder / "box.png", dpi=130)
 print(f"Wrote box.cif, box.dcd and box.png to {folder}.")

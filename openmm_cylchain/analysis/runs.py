@@ -354,6 +354,8 @@ class Run:
         radii = np.zeros(len(atoms))
         for own in self.filaments:
             radii[own.nodes] = radii[own.control_points] = 5.0 * own.diameter
+        for group in self.particles:
+            radii[group.indices] = 5.0 * group.diameter
         names = [atom.name for atom in atoms]
         universe.add_TopologyAttr("names", names)
         universe.add_TopologyAttr("types", [self._type_names.get(i, name) for i, name in enumerate(names)])

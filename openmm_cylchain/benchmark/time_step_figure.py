@@ -40,7 +40,7 @@ def write_figure(results, path):
     """
     columns = min(3, len(results))
     rows = -(-len(results) // columns)
-    figure = Figure(figsize=(1.0 + 3.6 * columns, 0.8 + 2.7 * rows), layout="constrained")
+    figure = Figure(figsize=(1.0 + 3.6 * columns, 1.4 + 2.7 * rows), layout="constrained")
     FigureCanvasAgg(figure)
     panels = figure.subplots(rows, columns, squeeze=False, sharey=True).ravel()
     for panel, result in zip(panels, results):
@@ -49,7 +49,7 @@ def write_figure(results, path):
         panel.set_axis_off()
     for row in range(rows):
         panels[row * columns].set_ylabel("largest error (%)")
-    panels[0].legend(fontsize="x-small", loc="upper left")
+    figure.legend(*panels[0].get_legend_handles_labels(), fontsize="small", loc="outside lower center", ncols=columns)
     figure.savefig(Path(path), dpi=150)
 
 

@@ -102,10 +102,11 @@ def write_vmd(run: Run, path: str | Path) -> None:
     lines += [_color(first + kind, linker_color(kind)) for kind in range(len(run.spring_names))]
     particle_color = first + len(run.spring_names) + 1
     for number, (name, color) in enumerate(particle_colors(run).items()):
+        groups = [group for group in run.particles if group.name == name]
         lines.append(_color(particle_color + number, color))
-        for own in (own for own in run.particles if own.name == name):
-            selection = f"index {' '.join(map(str, own.indices))}"
-            radius = _ANGSTROM * 0.5 * visible_diameter(run, own)
+        for each in groups:
+            selection = f"index {' '.join(map(str, each.indices))}"
+            radius = _ANGSTROM * 0.5 * visible_diameter(run, each)
             lines += [
                 f"set particles [atomselect $molecule {_word(selection)}]",
                 f"$particles set radius {radius:.6g}",

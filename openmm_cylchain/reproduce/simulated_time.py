@@ -130,7 +130,9 @@ def evaluate(records, quick):
         axis.plot([], [], ":", color="gray", label=f"ours, {_COPIES[-1]} chains, each")
         values = [float(_TABLE_4[count]) for count in bonds]
         axis.plot(pairs, values, "*", color=style.PAPER, markersize=10, label="paper, Table IV")
-        style.finish(axis, "base pairs", "simulated time in an hour (ms)", xscale="log", yscale="log")
+        # Room for the legend above the lines.
+        limits = (None, 100.0 * max(speed.value for speed in speeds.values()))
+        style.finish(axis, "base pairs", "simulated time in an hour (ms)", xscale="log", yscale="log", ylim=limits)
 
     return Outcome(results, {"Simulated time in an hour, one thread": draw}, _remarks(bonds, speeds, gains, processor))
 

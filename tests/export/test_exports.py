@@ -135,6 +135,7 @@ def test_particles_are_spheres_in_every_export(among_spheres, tmp_path):
     assert particles.typeid.tolist() == [0] * 10 + [1] * 3 + [2] * 2
     np.testing.assert_allclose(particles.diameter[10:], 10.0 * np.array(diameters))
     np.testing.assert_allclose(particles.position[10:], 10.0 * (places - middle), atol=2e-3)
+    np.testing.assert_allclose(run.mdanalysis().atoms.radii[10:], 5.0 * np.array(diameters))
     calls = _calls_of_vmd(exported(among_spheres, tmp_path / "vmd", "vmd"), 2)
     for indices, diameter in (("10 11 12", 80.0), ("13 14", 40.0)):
         assert ("atomselect", "5", f"index {indices}") in calls and ("mol", "selection", f"index {indices}") in calls

@@ -2,6 +2,7 @@
 
 import concurrent.futures
 import csv
+import itertools
 import json
 import math
 import os
@@ -13,11 +14,14 @@ import time
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from openmm_cylchain import InputError
 from openmm_cylchain.cli import main
 from openmm_cylchain.scans import read_scan, scan
+from openmm_cylchain.scans.grid import written
 from openmm_cylchain.scans.one_run import LOG, Task, perform
+from openmm_cylchain.scans.scan_figure import write_scan_figure
 
 RUN = """
 [solvent]
@@ -38,6 +42,11 @@ TWO_RUNS = """
 base = "run.toml"
 replicas = 2
 gather = ["mean square end-to-end distance", "persistence length"]
+"""
+VARIED = """
+[vary]
+solvent.temperature = ["280 K", "300 K"]
+filament.segments = [4, 8, 16]
 """
 RESULTS = ("trajectory.dcd", "energies.csv", "configuration.toml")
 
@@ -97,6 +106,23 @@ def assert_that_a_changed_configuration_is_refused(path, result):
     changed.write_text(changed.read_text().replace("310 K", "600 K"))
     with pytest.raises(InputError, match="configuration.toml has been changed"):
         scan(path, result.path)
+
+
+def test_the_legend_of_the_figure_is_within_it(tmp_path):
+    scan_of_two = read_scan(files_of(tmp_path, text=TWO_RUNS + VARIED))
+    rows = [
+        {
+            **{axis.label: written(value) for axis, value in zip(scan_of_two.axes, point)},
+            **{"of": "ACT", "quantity": "persistence length", "unit": "nm", "mean": 1.0, "standard error": 0.1},
+            "theory": 1.0,
+        }
+        for point in itertools.product(*(axis.values for axis in scan_of_two.axes))
+    ]
+    write_scan_figure(tmp_path / "scan.png", scan_of_two, rows)
+    image = np.asarray(Image.open(tmp_path / "scan.png").convert("L"))
+    lowest = image[int(0.8 * len(image)) :]
+    assert np.mean(lowest < 128) > 0.005
+    assert np.all(lowest[:, :8] > 200) and np.all(lowest[:, -8:] > 200)
 
 
 def test_dry_run_and_wrong_options(tmp_path, capsys):
