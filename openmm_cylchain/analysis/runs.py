@@ -57,6 +57,8 @@ class RunFilament:
         Nodes that do not move, counted along the filament.
     control_points : (n,) int array
         Particles of the control points of nodes of beam elements; empty of straight segments.
+    clamped_tangents : tuple of int
+        Nodes of beam elements whose control points do not move either.
     """
 
     type: Any
@@ -65,6 +67,7 @@ class RunFilament:
     ring: bool
     clamped: tuple[int, ...] = ()
     control_points: IntArray = field(default_factory=lambda: np.zeros(0, dtype=int))
+    clamped_tangents: tuple[int, ...] = ()
 
     @property
     def segments(self) -> int:
@@ -208,7 +211,14 @@ class Run:
     @cached_property
     def _contact_finders(self):
         own = self._description
-        filaments = {filament.nodes: number for number, filament in enumerate(own.filaments)}
+        filaments = {filament.nodes: (number, 1) for number, filament in enumerate(own.filaments)}
+        for contacts in own.contacts:
+            for particles, *_ in contacts.chains:
+                # Beads of beam elements come behind the nodes of their filament, and before those of the next one.
+                before = [i for i, one in enumerate(own.filaments) if one.nodes[0] < particles[0]]
+                if particles not in filaments and before:
+                    number = max(before, key=lambda i: own.filaments[i].nodes[0])
+                    filaments[particles] = number, (len(particles) - 1) // (len(own.filaments[number].nodes) - 1)
         return [DescribedContactFinder(contacts, filaments, own.particles, self.box) for contacts in own.contacts]
 
     def contacts(self, frame: int) -> ContactFrame:
@@ -346,6 +356,11 @@ class Run:
         positions = self.positions(frame)
         return [positions[own.nodes] for own in self.filaments]
 
+    def control_points(self, frame: int) -> list[FloatArray]:
+        """Positions (nodes, 3) in nm of the control points of each filament in a frame; (0, 3) of straight segments."""
+        positions = self.positions(frame)
+        return [positions[own.control_points] for own in self.filaments]
+
     def curves(self, frame: int, per_element: int = PIECES_OF_ELEMENT) -> list[FloatArray]:
         """Points (points, 3) in nm along each filament in a frame.
 
@@ -412,9 +427,13 @@ class Run:
         return [total / len(frames) for total in totals]
 
     def _beam_tensions(self, own, nodes, control_points):
-        planar = bool(np.all(np.concatenate([nodes, control_points])[:, 2] == nodes[0, 2]))
-        element = own.type.beam_element(self.temperature, planar)
+        element = own.type.beam_element(self.temperature, is_planar(nodes, control_points))
         return element.modulus * (arc_lengths(nodes, control_points) / element.length - 1.0 + element.shortening)
+
+
+def is_planar(nodes: FloatArray, control_points: FloatArray) -> bool:
+    """Whether a filament of beam elements is in a plane of constant z, as one that is planar always is."""
+    return bool(np.all(np.concatenate([nodes, control_points])[:, 2] == nodes[0, 2]))
 
 
 def _of_segments(angles, ring):
@@ -442,7 +461,8 @@ def _frames_of(description):
 
 def _filament(own: DescribedFilament) -> RunFilament:
     nodes, control_points = (np.array(particles, dtype=int) for particles in (own.nodes, own.control_points))
-    return RunFilament(own.type, nodes, own.diameter, own.ring, own.clamped, control_points)
+    tangents = own.clamped_tangents
+    return RunFilament(own.type, nodes, own.diameter, own.ring, own.clamped, control_points, tangents)
 
 
 def load(path: str | Path, incomplete: bool = False) -> Run:

@@ -4,12 +4,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..filaments.beam_refusals import refuse_beams
+from ..beams.curve import element_energies
 from ..filaments.placement import joint_stiffnesses
 from ..mechanics.geometry import segment_vectors
 from ..units.quantities import thermal_energy
 from ..units.types import FloatArray, Scalar
-from .runs import Run, volume_of
+from .runs import Run, is_planar, volume_of
+
+# Of the strains whose differences of energy are the virial of beam elements; the error is of their fourth order.
+_STRAIN = 2e-5
 
 
 @dataclass(frozen=True)
@@ -22,7 +25,7 @@ class Stress:
     linkers : of springs with both hands bound
     crosslinks : of those that are on and join filaments or particles
     contacts : of segments that touch each other or spheres
-    ideal : -n k_BT/V on the diagonal, of n nodes that move freely
+    ideal : -n k_BT/V on the diagonal, of n nodes and control points that move freely
     """
 
     chains: FloatArray
@@ -42,7 +45,9 @@ def stress(run: Run, frame: int, volume: Scalar | None = None) -> Stress:
 
     r is the vector of a segment, of a spring or between the axes at a contact, and f the force with which it pulls at
     its first end; that of a segment holds stretching and bending, so that ``V sigma`` is the derivative of the energy
-    by an affine strain. It is that of the configuration at one time: its average over frames is the stress.
+    by an affine strain. It is that of the configuration at one time: its average over frames is the stress. Of a
+    filament of beam elements, r and f are those of its nodes and control points, which move it as a whole, and which are
+    all among the n that have an ideal part.
 
     What acts from outside is not in it: walls, tethers, anchors, crosslinks to fixed points, friction in a flow. In
     equilibrium within walls, the stress is what the walls hold: its trace is -3 times their mean pressure. Nor are
@@ -62,26 +67,32 @@ def stress(run: Run, frame: int, volume: Scalar | None = None) -> Stress:
     Raises
     ------
     InputError
-        Without a periodic box and a volume; for beam elements; with contacts, if the compiled engine is missing.
+        Without a periodic box and a volume; with contacts, if the compiled engine is missing.
 
     Warns
     -----
     PrecisionWarning
         If positions are far from the origin, see ``load``.
     """
-    refuse_beams(run.filaments, "the stress of a run")
     room = volume_of(run, volume)
     run.warn_of_rounding()
-    chains, free = np.zeros((3, 3)), 0
-    for own, nodes in zip(run.filaments, run.nodes(frame)):
-        chains += _virial_of_chain(own, nodes)
-        free += len(nodes) - len(own.clamped)
+    chains, free = np.zeros((3, 3)), np.zeros(3)
+    for own, nodes, controls in zip(run.filaments, run.nodes(frame), run.control_points(frame)):
+        if own.has_beam_elements:
+            planar = is_planar(nodes, controls)
+            chains += _virial_of_beam(own.type.beam_element(run.temperature, planar), nodes, controls)
+            # Control points are coordinates as well; what keeps its z does not push along it.
+            points = len(nodes) - len(own.clamped) + len(controls) - len(own.clamped_tangents)
+            free += points * np.array([1.0, 1.0, 0.0 if planar else 1.0])
+        else:
+            chains += _virial_of_chain(own, nodes)
+            free += len(nodes) - len(own.clamped)
     linkers = run.linkers[frame]
     linkers = linkers[(linkers["filaments"] >= 0).all(axis=1)]
     crosslinks = run.crosslinks(frame)
     joining = crosslinks.active & ~crosslinks.at_points
     contacts = run.contacts(frame)
-    ideal = -free * thermal_energy(run.temperature) * np.eye(3)
+    ideal = -thermal_energy(run.temperature) * np.diag(free)
     return Stress(
         chains=chains / room,
         linkers=_virial_of_springs(linkers["places"], linkers["tension"]) / room,
@@ -109,3 +120,17 @@ def _virial_of_chain(own, nodes):
     if len(stiffnesses):
         pulls -= own.type.bending_end_forces(vectors, stiffnesses, own.ring)
     return np.einsum("ni,nj->ij", vectors, pulls)
+
+
+def _virial_of_beam(element, nodes, controls):
+    # The derivative of the energy by an affine strain of all its particles: it moves the curve with them.
+    strains = np.zeros((3, 3, 4, 3, 3))
+    steps = _STRAIN * np.array([1.0, -1.0, 2.0, -2.0])
+    for i in range(3):
+        for j in range(3):
+            # The force along j at a distance along i.
+            strains[i, j, :, j, i] = steps
+    deformed = np.eye(3) + strains
+    points = [np.einsum("...xy,ny->...nx", deformed, own - nodes[0]) for own in (nodes, controls)]
+    energies = sum(part.sum(axis=-1) for part in element_energies(*points, element))
+    return energies @ (np.array([8.0, -8.0, -1.0, 1.0]) / (12.0 * _STRAIN))

@@ -33,6 +33,8 @@ class DescribedFilament:
         Nodes that do not move, counted along the filament.
     control_points : tuple of int
         Particles of the control points of nodes of beam elements.
+    clamped_tangents : tuple of int
+        Nodes of beam elements whose control points do not move either.
     """
 
     type: ChainType
@@ -40,6 +42,7 @@ class DescribedFilament:
     ring: bool = False
     clamped: tuple[int, ...] = ()
     control_points: tuple[int, ...] = ()
+    clamped_tangents: tuple[int, ...] = ()
 
     @property
     def diameter(self) -> float:
@@ -137,6 +140,7 @@ class RunDescription:
                     "ring": own.ring,
                     "clamped": own.clamped,
                     **({"control_points": own.control_points} if own.control_points else {}),
+                    **({"clamped_tangents": own.clamped_tangents} if own.clamped_tangents else {}),
                 }
                 for own in self.filaments
             ],
@@ -169,6 +173,7 @@ def read_run_description(path: Path) -> RunDescription:
                 own["ring"],
                 tuple(own["clamped"]),
                 tuple(own.get("control_points", ())),
+                tuple(own.get("clamped_tangents", ())),
             )
             for own in content["filaments"]
         )

@@ -369,7 +369,7 @@ class Filaments:
         Scheme "implicit" takes tethers at the end of the step, like the filament's own forces, so they may be as stiff
         as a segment. The explicit schemes, and other OpenMM forces in all schemes, need a step well below
         2 gamma/k, where gamma is the friction of what the spring pulls, at least a quarter of a segment's parallel
-        friction per segment that meets in the node.
+        friction per segment that meets in the node. A node of beam elements is held at its position, and can turn.
 
         Parameters
         ----------
@@ -393,7 +393,6 @@ class Filaments:
         label = f"Tether {len(self._tethers)}"
         self._refuse_if_built(label)
         filament = self._filament_number(filament, label)
-        self._refuse_beam(filament, f"{label}: tethers", "a CustomExternalForce acts on particles of node_indices")
         (node,) = named_nodes([node], len(self[filament].positions), f"{label}:")
         if (filament, node) in self._tethered_nodes:
             raise InputError(f"{label}: node {node} of filament {filament} has a tether already.")
@@ -1127,10 +1126,6 @@ class Filaments:
                 f"but is {shown(filament_type)}."
             )
         return f"Filament {len(self)} ({filament_type.name})"
-
-    def _refuse_beam(self, filament, what, instead="give its type element='straight'"):
-        if self[filament].type.has_beam_elements:
-            raise InputError(f"{what} cannot be on filament {filament}, which has beam elements, as yet: {instead}.")
 
     @staticmethod
     def _given_control_points(filament_type, positions, tangents, control_points, label):

@@ -35,12 +35,12 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import openmm
 
+from ..dynamics.beam_step import beam_time_step
 from ..dynamics.recommended_step import implicit_time_step
 from ..dynamics.schemes import check_scheme
 from ..dynamics.time_step import TimeStep, as_step
 from ..engine_choice import default_scheme
 from ..errors import InputError, InstabilityError
-from ..filaments.beam_refusals import refuse_beams
 from ..mechanics.flow import Flow
 from ..units.quantities import DIMENSIONLESS, positive, thermal_energy, whole_number
 from ..units.text import format_time
@@ -75,8 +75,8 @@ def check_time_step(
 ) -> StepCheck:
     """Run a System with a step and with half of it, and say whether the step is right.
 
-    Compared are, for each kind of filament, the mean energies of stretching (per segment) and bending (per joint), the
-    mean square end-to-end distance (of rings: the distance across), how far the three slowest bending modes and the
+    Compared are, for each kind of filament, the mean energies of stretching (per segment) and bending (per joint), of
+    beam elements both per element, the mean square end-to-end distance (of rings: the distance across), how far the three slowest bending modes and the
     middle of a filament move in ten steps, and the mean energies of tethers and of each other force of the System. The
     first quarter of the runs is left out. See ``step_check`` for errors, their standard errors, the verdicts and what
     the check cannot see.
@@ -124,7 +124,6 @@ def check_time_step(
     InputError
         At a temperature of zero, or as ``Filaments.create_integrator``.
     """
-    refuse_beams(filaments, "the check of a step")
     step = as_step(step_size)
     scheme = default_scheme(filaments.engine) if scheme is None else scheme
     check_scheme(scheme)
@@ -239,6 +238,10 @@ def _slowest_relaxation(kinds, filaments, temperature):
     # In ps.
     longest = 0.0
     for one in (kind.filament for kind in kinds):
-        bounds = implicit_time_step(one.type, filaments.viscosity, temperature, one.segments, one.closed).bounds
+        if one.type.has_beam_elements:
+            friction = one.type.segment_friction(filaments.viscosity, temperature, one.segments)
+            bounds = beam_time_step(one.type, temperature, "implicit", one.segments, None, friction).bounds
+        else:
+            bounds = implicit_time_step(one.type, filaments.viscosity, temperature, one.segments, one.closed).bounds
         longest = max(longest, bounds.get("relaxation", 0.0))
     return longest

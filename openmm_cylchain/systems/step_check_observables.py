@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import openmm
 
+from ..beams.curve import element_energies
 from ..couplings.pulling import is_constant_force
 from ..filaments.collection import FilamentCollection
 from ..filaments.filament import Filament
@@ -28,13 +29,14 @@ class Kind:
     label: str
     filament: Filament
     nodes: IntArray
+    control_points: IntArray
     joint_stiffnesses: FloatArray
 
 
 def _kinds(filaments):
     groups: dict[Any, list[int]] = {}
     for number, one in enumerate(filaments):
-        key = (one.type, one.segments, one.closed, one.planar, one.clamped, one.propulsion)
+        key = (one.type, one.segments, one.closed, one.planar, one.clamped, one.clamped_tangents, one.propulsion)
         groups.setdefault(key, []).append(number)
     kinds: list[Kind] = []
     for numbers in groups.values():
@@ -42,8 +44,10 @@ def _kinds(filaments):
         label = first.type.name if len(groups) == 1 else f"{first.type.name} x {first.segments}"
         if label in [kind.label for kind in kinds]:
             label += f" (filament {numbers[0]})"
-        nodes = np.array([filaments.node_indices[number] for number in numbers])
-        kinds.append(Kind(label, first, nodes, first.joint_stiffnesses))
+        particles = (filaments.node_indices, filaments.control_point_indices)
+        nodes, controls = (np.array([own[number] for number in numbers]) for own in particles)
+        stiffnesses = np.zeros(0) if first.type.has_beam_elements else first.joint_stiffnesses
+        kinds.append(Kind(label, first, nodes, controls, stiffnesses))
     return kinds
 
 
@@ -102,7 +106,9 @@ class Probe:
         values, after = [], []
         with np.errstate(all="ignore"):
             for index, kind in enumerate(self.kinds):
-                own, kept = self._measure_kind(kind, positions[kind.nodes], None if before is None else before[index])
+                earlier = None if before is None else before[index]
+                energies = self._energies(kind, positions)
+                own, kept = self._measure_kind(kind, positions[kind.nodes], energies, earlier)
                 values += own
                 after.append(kept)
             if self._filaments.tethers:
@@ -112,15 +118,25 @@ class Probe:
             values.append(np.array([energy / self._kT]))
         return values, after
 
-    def _measure_kind(self, kind, nodes, before):
-        filament, one = kind.filament, kind.filament.type
-        closed = filament.closed
-        vectors = np.diff(nodes, axis=1, append=nodes[:, :1]) if closed else np.diff(nodes, axis=1)
-        lengths = np.linalg.norm(vectors, axis=2)
-        tangents = vectors / lengths[..., None]
+    def _energies(self, kind, positions):
+        # Of stretching and bending per segment and joint, or per element, of each filament in kJ/mol.
+        one, nodes = kind.filament.type, positions[kind.nodes]
+        if one.has_beam_elements:
+            element = kind.filament.beam_element(self._filaments.temperature)
+            return [own.mean(axis=1) for own in element_energies(nodes, positions[kind.control_points], element)]
+        vectors = _vectors(nodes, kind.filament.closed)
         bending = np.zeros(len(nodes))
         if len(kind.joint_stiffnesses) and one.bending_rigidity > 0.0:
-            bending = one.bending_energies(vectors, kind.joint_stiffnesses, closed).mean(axis=1) / self._kT
+            bending = one.bending_energies(vectors, kind.joint_stiffnesses, kind.filament.closed).mean(axis=1)
+        lengths = np.linalg.norm(vectors, axis=2)
+        return one.stretching_energies(lengths, kind.filament.closed).mean(axis=1), bending
+
+    def _measure_kind(self, kind, nodes, energies, before):
+        filament, one = kind.filament, kind.filament.type
+        closed = filament.closed
+        vectors = _vectors(nodes, closed)
+        tangents = vectors / np.linalg.norm(vectors, axis=2)[..., None]
+        stretching, bending = (energy / self._kT for energy in energies)
         half = nodes.shape[1] // 2
         ends = nodes[:, half if closed else -1] - nodes[:, 0]
         middle = nodes[:, half]
@@ -129,7 +145,7 @@ class Probe:
         scale = math.sqrt(2.0 * one.segment_length / filament.segments)
         amplitudes = scale * np.einsum("ms,fsk->mfk", waves, tangents)
         moved = [amplitudes, middle] if before is None else [amplitudes - before[0], middle - before[1]]
-        values = [one.stretching_energies(lengths, closed).mean(axis=1) / self._kT, bending, np.sum(ends**2, axis=1)]
+        values = [stretching, bending, np.sum(ends**2, axis=1)]
         values += [*np.sum(moved[0] ** 2, axis=2), np.sum(moved[1] ** 2, axis=1)]
         return values, (amplitudes, middle)
 
@@ -139,6 +155,11 @@ class Probe:
             node = self._filaments.node_indices[tether.filament][tether.node]
             energy += 0.5 * tether.stiffness * np.sum((positions[node] - tether.point) ** 2)
         return np.array([energy / self._kT])
+
+
+def _vectors(nodes, closed):
+    # Of segments, or the chords of beam elements.
+    return np.diff(nodes, axis=1, append=nodes[:, :1]) if closed else np.diff(nodes, axis=1)
 
 
 def interacting(filaments: FilamentCollection, system: openmm.System) -> bool:
