@@ -59,6 +59,8 @@ class RunFilament:
         Particles of the control points of nodes of beam elements; empty of straight segments.
     clamped_tangents : tuple of int
         Nodes of beam elements whose control points do not move either.
+    planar : bool or None
+        Whether it moves in a plane of constant z; None if that was not written, by an earlier version.
     """
 
     type: Any
@@ -68,6 +70,7 @@ class RunFilament:
     clamped: tuple[int, ...] = ()
     control_points: IntArray = field(default_factory=lambda: np.zeros(0, dtype=int))
     clamped_tangents: tuple[int, ...] = ()
+    planar: bool | None = None
 
     @property
     def segments(self) -> int:
@@ -78,6 +81,12 @@ class RunFilament:
     def has_beam_elements(self) -> bool:
         """Whether its segments are elements that bend inside."""
         return len(self.control_points) > 0
+
+    def is_planar(self, nodes: FloatArray, control_points: FloatArray) -> bool:
+        """Whether it moves in a plane of constant z; where that was not written, whether it is in one now."""
+        if self.planar is not None:
+            return self.planar
+        return bool(np.all(np.concatenate([nodes, control_points])[:, 2] == nodes[0, 2]))
 
     @property
     def pieces(self) -> int:
@@ -427,13 +436,8 @@ class Run:
         return [total / len(frames) for total in totals]
 
     def _beam_tensions(self, own, nodes, control_points):
-        element = own.type.beam_element(self.temperature, is_planar(nodes, control_points))
+        element = own.type.beam_element(self.temperature, own.is_planar(nodes, control_points))
         return element.modulus * (arc_lengths(nodes, control_points) / element.length - 1.0 + element.shortening)
-
-
-def is_planar(nodes: FloatArray, control_points: FloatArray) -> bool:
-    """Whether a filament of beam elements is in a plane of constant z, as one that is planar always is."""
-    return bool(np.all(np.concatenate([nodes, control_points])[:, 2] == nodes[0, 2]))
 
 
 def _of_segments(angles, ring):
@@ -461,8 +465,8 @@ def _frames_of(description):
 
 def _filament(own: DescribedFilament) -> RunFilament:
     nodes, control_points = (np.array(particles, dtype=int) for particles in (own.nodes, own.control_points))
-    tangents = own.clamped_tangents
-    return RunFilament(own.type, nodes, own.diameter, own.ring, own.clamped, control_points, tangents)
+    held = own.clamped, control_points, own.clamped_tangents
+    return RunFilament(own.type, nodes, own.diameter, own.ring, *held, own.planar)
 
 
 def load(path: str | Path, incomplete: bool = False) -> Run:

@@ -9,7 +9,7 @@ from ..filaments.placement import joint_stiffnesses
 from ..mechanics.geometry import segment_vectors
 from ..units.quantities import thermal_energy
 from ..units.types import FloatArray, Scalar
-from .runs import Run, is_planar, volume_of
+from .runs import Run, volume_of
 
 # Of the strains whose differences of energy are the virial of beam elements; the error is of their fourth order.
 _STRAIN = 2e-5
@@ -46,8 +46,8 @@ def stress(run: Run, frame: int, volume: Scalar | None = None) -> Stress:
     r is the vector of a segment, of a spring or between the axes at a contact, and f the force with which it pulls at
     its first end; that of a segment holds stretching and bending, so that ``V sigma`` is the derivative of the energy
     by an affine strain. It is that of the configuration at one time: its average over frames is the stress. Of a
-    filament of beam elements, r and f are those of its nodes and control points, which move it as a whole, and which are
-    all among the n that have an ideal part.
+    filament of beam elements, r and f are those of its nodes and control points, which are all among the n that have an
+    ideal part.
 
     What acts from outside is not in it: walls, tethers, anchors, crosslinks to fixed points, friction in a flow. In
     equilibrium within walls, the stress is what the walls hold: its trace is -3 times their mean pressure. Nor are
@@ -77,9 +77,11 @@ def stress(run: Run, frame: int, volume: Scalar | None = None) -> Stress:
     room = volume_of(run, volume)
     run.warn_of_rounding()
     chains, free = np.zeros((3, 3)), np.zeros(3)
-    for own, nodes, controls in zip(run.filaments, run.nodes(frame), run.control_points(frame)):
+    control_points = run.control_points(frame) if any(own.has_beam_elements for own in run.filaments) else []
+    for number, (own, nodes) in enumerate(zip(run.filaments, run.nodes(frame))):
         if own.has_beam_elements:
-            planar = is_planar(nodes, controls)
+            controls = control_points[number]
+            planar = own.is_planar(nodes, controls)
             chains += _virial_of_beam(own.type.beam_element(run.temperature, planar), nodes, controls)
             # Control points are coordinates as well; what keeps its z does not push along it.
             points = len(nodes) - len(own.clamped) + len(controls) - len(own.clamped_tangents)
@@ -132,5 +134,6 @@ def _virial_of_beam(element, nodes, controls):
             strains[i, j, :, j, i] = steps
     deformed = np.eye(3) + strains
     points = [np.einsum("...xy,ny->...nx", deformed, own - nodes[0]) for own in (nodes, controls)]
-    energies = sum(part.sum(axis=-1) for part in element_energies(*points, element))
+    stretching, bending = element_energies(points[0], points[1], element)
+    energies = (stretching + bending).sum(axis=-1)
     return energies @ (np.array([8.0, -8.0, -1.0, 1.0]) / (12.0 * _STRAIN))

@@ -65,9 +65,9 @@ def capsule_contact_force(
     both ends of their overlap with k/2 each. What neighbouring segments see of one thing counts once, so that nothing
     is felt of joints. Forces act on the ends of segments, in proportion to where they touch.
 
-    A filament of beam elements is covered by the capsules between its neighbouring beads (``Filaments.add_beads``), which
-    are on its curve: straight pieces, n of each element. An element that bends by the angle a is up to ``h a/(8 n^2)``
-    away from them. Forces act on its nodes and control points in proportion to where they touch.
+    A filament of beam elements is covered by the capsules between its neighbouring beads (``Filaments.add_beads``),
+    which are on its curve: straight pieces, n of each element. An element that bends by the angle a is up to
+    ``h a/(8 n^2)`` away from them. Forces act on its nodes and control points as on those of the beads' places.
 
     The implicit schemes have it in their equations, and divide a step in which filaments would cross; others take it at
     the start of a step. ``Filaments.recommended_time_step(system=system)`` says which step it allows.

@@ -124,8 +124,8 @@ class Joints:
         angle = in_units_of(angle, ANGLE, "Joint: angle")
         if not (isinstance(angle, float) and 0.0 <= angle <= 0.5 * np.pi * (1.0 + 1e-12)):
             raise InputError(
-                f"The angle of a joint must be between 0 and pi/2, but is {shown(angle)}. For a larger one, exchange the "
-                "particles of a place: SegmentPlace(place.second, place.first, 1 - place.fraction) has the opposite "
+                f"The angle of a joint must be between 0 and pi/2, but is {shown(angle)}. For a larger one, exchange "
+                "the particles of a place: SegmentPlace(place.second, place.first, 1 - place.fraction) has the opposite "
                 "direction."
             )
         own = self._stiffness if stiffness is None else positive(stiffness, ENERGY, "Joint: stiffness")
@@ -190,8 +190,8 @@ class Joints:
         if len(wrong):
             number = "" if numbers is None else f" {numbers[wrong[0]]}"
             raise InputError(
-                f"{label}{number} has a place between the particles {first[wrong[0]]} and {second[wrong[0]]}, which are not "
-                "neighbouring nodes of a filament of beam elements: straight segments have no joints of this kind."
+                f"{label}{number} has a place between the particles {first[wrong[0]]} and {second[wrong[0]]}, which are "
+                "not neighbouring nodes of a filament of beam elements: straight segments have no joints of this kind."
             )
 
 

@@ -182,8 +182,8 @@ def attachment_positions(
 def distribute_beads(filament: Filament, number: int, spacing: float) -> list[Attachment]:
     """Attachments at equal distances along segments of rest length, the first and the last node of a chain included.
 
-    In a ``BeadSpringType``, whose end bonds are shorter, they are closer to each other there. On beam elements, there is
-    one at each node, so that the pieces of curve between neighbours belong to one element each.
+    In a ``BeadSpringType``, whose end bonds are shorter, they are closer to each other there. On beam elements, there
+    is one at each node, so that the pieces of curve between neighbours belong to one element each.
 
     Parameters
     ----------

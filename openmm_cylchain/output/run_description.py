@@ -35,6 +35,8 @@ class DescribedFilament:
         Particles of the control points of nodes of beam elements.
     clamped_tangents : tuple of int
         Nodes of beam elements whose control points do not move either.
+    planar : bool or None
+        Whether it moves in a plane of constant z; None if that is not known.
     """
 
     type: ChainType
@@ -43,6 +45,7 @@ class DescribedFilament:
     clamped: tuple[int, ...] = ()
     control_points: tuple[int, ...] = ()
     clamped_tangents: tuple[int, ...] = ()
+    planar: bool | None = None
 
     @property
     def diameter(self) -> float:
@@ -141,6 +144,7 @@ class RunDescription:
                     "clamped": own.clamped,
                     **({"control_points": own.control_points} if own.control_points else {}),
                     **({"clamped_tangents": own.clamped_tangents} if own.clamped_tangents else {}),
+                    **({} if own.planar is None else {"planar": own.planar}),
                 }
                 for own in self.filaments
             ],
@@ -174,6 +178,7 @@ def read_run_description(path: Path) -> RunDescription:
                 tuple(own["clamped"]),
                 tuple(own.get("control_points", ())),
                 tuple(own.get("clamped_tangents", ())),
+                own.get("planar"),
             )
             for own in content["filaments"]
         )

@@ -71,6 +71,7 @@ def describe_system(
                 tuple(own.clamped),
                 tuple(controls.tolist()),
                 tuple(own.clamped_tangents),
+                own.planar,
             )
             for own, nodes, controls in zip(filaments, filaments.node_indices, filaments.control_point_indices)
         ),

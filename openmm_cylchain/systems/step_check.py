@@ -75,11 +75,11 @@ def check_time_step(
 ) -> StepCheck:
     """Run a System with a step and with half of it, and say whether the step is right.
 
-    Compared are, for each kind of filament, the mean energies of stretching (per segment) and bending (per joint), of
-    beam elements both per element, the mean square end-to-end distance (of rings: the distance across), how far the three slowest bending modes and the
-    middle of a filament move in ten steps, and the mean energies of tethers and of each other force of the System. The
-    first quarter of the runs is left out. See ``step_check`` for errors, their standard errors, the verdicts and what
-    the check cannot see.
+    Compared are, for each kind of filament, the mean energies of stretching (per segment) and bending (per joint; of
+    beam elements, both per element), the mean square end-to-end distance (of rings: the distance across), how far the
+    three slowest bending modes and the middle of a filament move in ten steps, and the mean energies of tethers and of
+    each other force of the System. The first quarter of the runs is left out. See ``step_check`` for errors, their
+    standard errors, the verdicts and what the check cannot see.
 
     The System is copied. What is not part of it, such as crosslinks that a Crosslinks object adds and removes, stays as
     it is in the System.

@@ -16,7 +16,7 @@ struct BezierWeights {
         position2 = x*x*(1+2*y);
         control2 = -3*x*x*y;
     }
-    /** Those of the derivative of the place by x, times a factor: of the tangent, with one over the element's length. */
+    /** Those of the derivative of the place by x, times a factor: the tangent's, with one over the element's length. */
     static BezierWeights ofTangent(double x, double factor) {
         const double y = 1-x;
         BezierWeights result(x);

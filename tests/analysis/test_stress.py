@@ -39,9 +39,6 @@ class PlacedRun:
     def nodes(self, frame):
         return self._nodes
 
-    def control_points(self, frame):
-        return [np.zeros((0, 3)) for _ in self.filaments]
-
     def crosslinks(self, frame):
         places = np.reshape(np.array(self._springs, dtype=float), (-1, 2, 3))
         tensions = STIFFNESS * np.linalg.norm(places[:, 1] - places[:, 0], axis=1)

@@ -9,6 +9,7 @@ from openmm import unit
 
 from openmm_cylchain import Crosslinks, Filaments, InputError, Joints, SegmentPlace
 from openmm_cylchain.beams.curve import element_energies, element_slopes
+from openmm_cylchain.engines.compiled import CylinderChainForce
 from support.contexts import energy_of, forces_of, new_context, positions_of
 from support.linked_beams import BEAM, LENGTH, STRAIGHT
 from support.solvent import KT, TEMPERATURE, VISCOSITY
@@ -26,8 +27,12 @@ def jointed(periodic=False):
     filaments.add_equilibrium(BEAM, 2, seed=2, start=[100, 200, 0], planar=True)
     box = [[1500.0, 0, 0], [100.0, 1500.0, 0], [-60.0, 90.0, 1600.0]] * unit.nanometer
     _, system, positions = filaments.build(box if periodic else None)
+    CylinderChainForce.cast(system.getForce(0)).setUsesPeriodicBoundaryConditions(periodic)
     joints = Joints(30.0 * unit.kilojoule_per_mole)
-    one, other = filaments.segment_place(0, segment=1, fraction=0.3), filaments.segment_place(1, segment=1, fraction=1.0)
+    one, other = (
+        filaments.segment_place(0, segment=1, fraction=0.3),
+        filaments.segment_place(1, segment=1, fraction=1.0),
+    )
     joints.add(None, one, other)
     joints.add(None, one, SegmentPlace(other.second, other.first, 1.0 - other.fraction), 50.0 * unit.degree)
     joints.add(None, one, [0, 3, 4], angle=0.4, stiffness=7.0)
@@ -60,7 +65,9 @@ def test_energies_angles_and_forces(platform, periodic):
     assert energy_of(context, groups) == pytest.approx(sum(expected), rel=1e-9)
     cosines = [np.dot(a, b) / np.linalg.norm(a) / np.linalg.norm(b) for a, b, *_ in pairs]
     assert joints.angles(context) == pytest.approx(np.arccos(cosines), rel=1e-9)
-    own = 30.0 * (2 * np.sin(0.5 * np.arccos(cosines[1])) - 2 * np.sin(np.radians(25.0))) / np.cos(np.radians(25.0)) ** 2
+    own = (
+        30.0 * (2 * np.sin(0.5 * np.arccos(cosines[1])) - 2 * np.sin(np.radians(25.0))) / np.cos(np.radians(25.0)) ** 2
+    )
     assert joints.moments(context)[1] == pytest.approx(own * np.cos(0.5 * np.arccos(cosines[1])), rel=1e-9)
     # They are couples.
     assert np.sum(forces, axis=0) == pytest.approx(0.0, abs=1e-9)
@@ -90,7 +97,7 @@ def cantilever(welded, elements, angle=0.0):
     else:
         filaments.add_straight(kind, elements, [0, 0, 0], [1, 0, 0], **clamp)
     _, system, positions = filaments.build()
-    force = openmm.CustomExternalForce("-0.05*y")
+    force = openmm.CustomExternalForce("-0.003*y")
     force.addParticle(int(filaments.node_indices[-1][-1]), [])
     system.addForce(force)
     if welded:
@@ -101,9 +108,9 @@ def cantilever(welded, elements, angle=0.0):
         joints = Joints(1e7)
         joints.add(None, *ends, angle)
         joints.add_to(system)
-    integrator = filaments.create_integrator(system, 1e6, checks=False)
+    integrator = filaments.create_integrator(system, 1e10, checks=False)
     context = new_context(system, positions, integrator)
-    integrator.step(600)
+    integrator.step(200)
     return filaments, positions_of(context), context
 
 
@@ -112,7 +119,7 @@ def test_beams_that_are_welded_end_to_end_are_one_beam():
     whole, expected, _ = cantilever(False, 4)
     parts, found, _ = cantilever(True, 4)
     end = expected[whole.node_indices[0]]
-    assert end[-1, 1] > 0.3 * 4 * LENGTH
+    assert end[-1, 1] > 0.3 * 4 * LENGTH and end[-1, 0] < 0.97 * 4 * LENGTH
     joined = np.concatenate([found[parts.node_indices[0]][:-1], found[parts.node_indices[1]]])
     assert joined == pytest.approx(end, abs=1e-4 * end[-1, 1])
 
@@ -135,7 +142,7 @@ def mean_energy_and_cosine(stiffness, angle):
 
 
 @pytest.mark.parametrize(
-    ("stiffness", "angle", "welded"), [(0.5, 0.0, True), (50.0, 0.0, True), (5000.0, 0.0, True), (50.0, 1.0, False)]
+    ("stiffness", "angle", "welded"), [(100.0, 0.0, True), (100.0, 1.0, True), (1000.0, 0.0, True), (50.0, 0.0, False)]
 )
 def test_equilibrium_of_joints_at_the_recommended_step(stiffness, angle, welded):
     """The ends of two filaments: the angle has its own distribution, as directions of free chains have no other weight.
@@ -144,6 +151,10 @@ def test_equilibrium_of_joints_at_the_recommended_step(stiffness, angle, welded)
     """
     copies, samples = 300, 80
     exact, cosine, theta, weights = mean_energy_and_cosine(stiffness, angle)
+    if angle == 0.0:
+        # Strains of the two ends let the absolute values of their tangents differ, a third component.
+        ends = BEAM.stretching_modulus * LENGTH / 6.0
+        exact += 0.5 * stiffness / (stiffness + 0.5 * ends)
     filaments, generator = Filaments(VISCOSITY, TEMPERATURE, engine="compiled"), np.random.default_rng(3)
     for number in range(copies):
         first = filaments.add_equilibrium(BEAM, 2, seed=2 * number)
@@ -158,9 +169,7 @@ def test_equilibrium_of_joints_at_the_recommended_step(stiffness, angle, welded)
         start, control = drawn[0].positions[0], drawn[0].control_points[0]
         turned = turning((control - start) / np.linalg.norm(control - start), direction)
         move = filaments[first].positions[-1]
-        nodes, controls = (
-            (own - start) @ turned.T + move for own in (drawn[0].positions, drawn[0].control_points)
-        )
+        nodes, controls = ((own - start) @ turned.T + move for own in (drawn[0].positions, drawn[0].control_points))
         filaments.add_nodes(BEAM, nodes, control_points=controls)
     _, system, positions = filaments.build()
     joints, links = Joints(stiffness), Crosslinks(100.0, 0.0)
@@ -182,9 +191,11 @@ def test_equilibrium_of_joints_at_the_recommended_step(stiffness, angle, welded)
     energies, cosines, bends, stretched = [], [], [], []
     nodes, controls = (np.array(own) for own in (filaments.node_indices, filaments.control_point_indices))
     for _ in range(samples):
-        integrator.step(4)
+        integrator.step(10)
         now = positions_of(context)
-        first, second = (3.0 * (now[controls[i::2, end]] - now[nodes[i::2, end]]) / LENGTH for i, end in ((0, -1), (1, 0)))
+        first, second = (
+            3.0 * (now[controls[i::2, end]] - now[nodes[i::2, end]]) / LENGTH for i, end in ((0, -1), (1, 0))
+        )
         distance = np.linalg.norm(first - second, axis=1)
         energies.append(0.5 * stiffness * ((distance - 2 * np.sin(0.5 * angle)) / np.cos(0.5 * angle)) ** 2 / KT)
         cosines.append(1.0 - np.cos(joints.angles(context)))
@@ -193,8 +204,8 @@ def test_equilibrium_of_joints_at_the_recommended_step(stiffness, angle, welded)
         bends.append(bending.mean(axis=1).reshape(-1, 2).mean(axis=1) / KT)
         if welded:
             stretched.append(50.0 * np.sum((now[nodes[::2, -1]] - now[nodes[1::2, 0]]) ** 2, axis=1) / KT)
-    assert integrator.getNumDividedSteps() / (len(filaments) * 370) < 5e-3
-    checks = [(energies, exact, 0.01, 0.02), (cosines, 1.0 - cosine, 0.01, 0.02), (bends, BENDS, 0.01, 0.0125)]
+    assert integrator.getNumDividedSteps() / (len(filaments) * 850) < 5e-3
+    checks = [(energies, exact, 0.015, 0.0125), (cosines, 1.0 - cosine, 0.015, 0.0125), (bends, BENDS, 0.01, 0.0125)]
     for values, expected, allowed, power in [*checks, *([(stretched, 1.5, 0.01, 0.0125)] if welded else [])]:
         means = np.mean(values, axis=0)
         error = np.std(means, ddof=1) / np.sqrt(len(means))

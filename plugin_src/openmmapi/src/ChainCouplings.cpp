@@ -86,8 +86,8 @@ void ChainCouplings::refuseBeams() const {
             any |= isOfBeam[capsule.first] || (capsule.second >= 0 && isOfBeam[capsule.second]);
     if (any)
         throw OpenMMException("CylinderChainIntegrator: Chains of beam elements cannot have contacts of this plugin "
-                "between their nodes, but between virtual sites on their curves, and their System cannot have linkers as "
-                "yet: take such sites, or segments, or remove them");
+                "between their nodes, but between virtual sites on their curves, and their System cannot have linkers "
+                "as yet: take such sites, or segments, or remove them");
 }
 
 void ChainCouplings::refuseNarrowBox(const CylinderChainDescription& chains) const {

@@ -72,7 +72,8 @@ void CylinderChainContactForceImpl::findCurves(const System& system) {
     set<int> known;
     for (size_t i = 0; i < capsules.size(); i++) {
         const Capsule& capsule = capsules[i];
-        if (capsule.second < 0 || !system.isVirtualSite(capsule.first) || !system.isVirtualSite(capsule.second))
+        if (capsule.second < 0 || !system.isVirtualSite(capsule.first) ||
+                !system.isVirtualSite(capsule.second))
             continue;
         Place ends[2];
         ends[0].first = capsule.first;
@@ -103,7 +104,8 @@ void CylinderChainContactForceImpl::findCurves(const System& system) {
         }
         const double length = fabs(ends[1].fraction-ends[0].fraction), pieces = round(1/max(length, SAME_PLACE));
         const double first = ends[0].fraction*pieces;
-        if (ends[0].first != ends[1].first || fabs(length*pieces-1) > SAME_PLACE || fabs(first-round(first)) > SAME_PLACE)
+        if (ends[0].first != ends[1].first || fabs(length*pieces-1) > SAME_PLACE ||
+                fabs(first-round(first)) > SAME_PLACE)
             continue;
         onCurves.push_back({(int) i, ends[0], (int) pieces, ends[1].fraction > ends[0].fraction});
     }

@@ -57,8 +57,8 @@ void CylinderChainLinkForceImpl::check(const cylchain::LinkChange& change) const
             continue;
         for (const cylchain::Place* place : {&entry.link.first, &entry.link.second})
             if (!place->isPoint() && !places->resolveTangent(*place).isTangent())
-                throw OpenMMException("CylinderChainLinkForce: Link "+to_string(entry.link.number)+" joins tangents, but "
-                        "is not on the curve of a beam element, "+describePlaces(entry.link)+
+                throw OpenMMException("CylinderChainLinkForce: Link "+to_string(entry.link.number)+
+                        " joins tangents, but is not on the curve of a beam element, "+describePlaces(entry.link)+
                         ": take places between neighbouring nodes of chains of beam elements");
     }
 }

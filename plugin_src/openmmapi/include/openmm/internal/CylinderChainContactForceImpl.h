@@ -43,7 +43,7 @@ public:
         return *search;
     }
     /**
-     * Get the capsules that lie between two places on the curve of a beam element, and the virtual sites at these places.
+     * Get the capsules that lie between two places on the curve of a beam element, and the virtual sites there.
      */
     const std::vector<cylchain::CapsuleOnCurve>& getOnCurves() const {
         return onCurves;
