@@ -125,8 +125,8 @@ class Joints:
         if not (isinstance(angle, float) and 0.0 <= angle <= 0.5 * np.pi * (1.0 + 1e-12)):
             raise InputError(
                 f"The angle of a joint must be between 0 and pi/2, but is {shown(angle)}. For a larger one, exchange "
-                "the particles of a place: SegmentPlace(place.second, place.first, 1 - place.fraction) has the opposite "
-                "direction."
+                "the particles of a place: SegmentPlace(place.second, place.first, 1 - place.fraction) has the "
+                "opposite direction."
             )
         own = self._stiffness if stiffness is None else positive(stiffness, ENERGY, "Joint: stiffness")
         if self._curves is not None and context is not None:
@@ -189,9 +189,10 @@ class Joints:
         wrong = np.flatnonzero(~curves.on_curve(first, second))
         if len(wrong):
             number = "" if numbers is None else f" {numbers[wrong[0]]}"
+            particles = f"{first[wrong[0]]} and {second[wrong[0]]}"
             raise InputError(
-                f"{label}{number} has a place between the particles {first[wrong[0]]} and {second[wrong[0]]}, which are "
-                "not neighbouring nodes of a filament of beam elements: straight segments have no joints of this kind."
+                f"{label}{number} has a place between the particles {particles}, which are not neighbouring nodes of a "
+                "filament of beam elements: straight segments have no joints of this kind."
             )
 
 

@@ -59,7 +59,7 @@ class NativeLinks(LinkStore):
 
     @classmethod
     def of_force(cls, force: openmm.Force, order: int | None = None) -> "NativeLinks | None":
-        """Those of a force of a System; None if it is no such force, joins tangents, or its links differ in potential."""
+        """Those of a force of a System; None if it is no such force, joins tangents, or has several potentials."""
         if not is_link_force(force):
             return None
         plugin = load_plugin()

@@ -771,9 +771,10 @@ class Filaments:
         """The recommended step, and what binds: a TimeStep, which ``create_integrator`` takes.
 
         It is that of the filament that allows the least (see ``timestep``), and, if a System is given, of its forces:
-        crosslinks and capsule contacts of the compiled engine are in the equations of its implicit schemes, and bind
-        the step only as the places that they join or keep apart diffuse against each other (see ``coupled_step``). All
-        others act from the start of a step, and a spring of the stiffness k on a place of the response mu h to a force
+        crosslinks, joints and capsule contacts of the compiled engine are in the equations of its implicit schemes.
+        Joints do not bind the step; the others do only as the places that they join or keep apart diffuse against each
+        other (see ``coupled_step``). All others act from the start of a step, and a spring of the stiffness k on a
+        place of the response mu h to a force
         in a step h has a variance too large by 1/(1 - k mu h/2). mu h is that of the place on the straight filament
         (see ``mobility``), or h/gamma of a particle. The step leaves 5 % at most, with all forces at once. Known are
         HarmonicBondForce, crosslinks, walls, contacts, constant forces, tethers, and CustomBondForce and
