@@ -241,7 +241,14 @@ class Run:
     @cached_property
     def _contact_finders(self):
         own = self._description
-        filaments = {filament.nodes: number for number, filament in enumerate(own.filaments)}
+        filaments = {filament.nodes: (number, 1) for number, filament in enumerate(own.filaments)}
+        for contacts in own.contacts:
+            for particles, *_ in contacts.chains:
+                # Beads of beam elements come behind the nodes of their filament, and before those of the next one.
+                before = [i for i, one in enumerate(own.filaments) if one.nodes[0] < particles[0]]
+                if particles not in filaments and before:
+                    number = max(before, key=lambda i: own.filaments[i].nodes[0])
+                    filaments[particles] = number, (len(particles) - 1) // (len(own.filaments[number].nodes) - 1)
         return [DescribedContactFinder(contacts, filaments, own.particles, self.box) for contacts in own.contacts]
 
     def contacts(self, frame: int) -> ContactFrame:

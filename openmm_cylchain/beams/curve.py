@@ -81,6 +81,11 @@ def place_weights(places: npt.ArrayLike) -> FloatArray:
     return _hermite(np.asarray(places, dtype=float), False)
 
 
+def slope_weights(places: npt.ArrayLike) -> FloatArray:
+    """Weights, as ``place_weights``, of the derivative of a place by its parameter: (..., 4)."""
+    return _hermite(np.asarray(places, dtype=float), True)
+
+
 def particle_weights(place: float) -> tuple[float, float, float, float]:
     """Weights of the particles P and Q of the first node of an element and of the second one: their sum is 1."""
     first, control, second, other = place_weights(place).tolist()

@@ -26,6 +26,8 @@ const Scalar STRAIN_RATE = 378, SUM_RATE = 720, DIFFERENCE_RATE = 8400;
 const Scalar MIDDLE_MOBILITY = 75, END_MOBILITY = 1200;
 /** A step that does not converge is cut into at most two to this power. */
 const int LARGEST_BEAM_DIVISION = 10;
+/** How far a force at the end of an element moves it that is alone, over how far it moves all of the element. */
+const Scalar MOBILITY_OF_BEAM_END = 16;
 
 template <int W> class BeamStep {
     typedef typename Lanes<W>::Type Real;
@@ -35,12 +37,14 @@ template <int W> class BeamStep {
 public:
     struct Memory {
         Scratch elements, vectors, rows;
+        std::vector<BeamTetherState> tethers;
     };
     BeamStep(const BeamPack& pack, const StepSettings& settings, const BeamStart<W>& start, Memory& memory) :
             pack(pack), settings(settings), start(start), n(pack.nodes),
             elements(memory.elements.template reserve<BeamElementState<Real> >(n)),
             forces(memory.vectors.template reserve<Six>(3*n)), right(forces+n), change(forces+2*n),
             equations(pack.mobile, n, memory.rows.template reserve<typename Equations::Eliminated>(n)),
+            tethers(memory.tethers),
             length(of(BeamPack::Length)), perLength(1/length), parallel(of(BeamPack::Parallel)),
             perpendicular(of(BeamPack::Perpendicular)),
             shortening(1.5*of(BeamPack::Shortening)), perStep(1/settings.stepSize) {
@@ -82,6 +86,7 @@ public:
         }
         for (int e = 0; e < n; e++)
             describe(e);
+        describeTethers();
         if (settings.kT > 0) {
             const Real largest = larger<Real>(thetaOfSum, thetaOfDifference);
             BeamNoise<W> noise(pack, settings, start, elements, forces, largest-0.5);
@@ -92,6 +97,7 @@ public:
     /** Linearise the equations around y with those of couplings, or NULL, and solve them: see getChange(). */
     void eliminate(const Six* y, const BeamTerms<W>* terms) {
         int nextTerm = 0;
+        std::size_t nextTether = 0;
         typename Equations::Row rows[2];
         typename Equations::Row *here = rows, *after = rows+1;
         *here = typename Equations::Row {};
@@ -114,6 +120,9 @@ public:
             }
             if (terms != NULL)
                 terms->add(e, nextTerm, *here, *after, right);
+            addTethers(y, e, nextTether, *here);
+            if (e == n-2)
+                addTethers(y, e+1, nextTether, *after);
             equations.eliminate(e, *here, *after, false);
             std::swap(here, after);
         }
@@ -186,6 +195,7 @@ private:
     BeamElementState<Real>* const elements;
     Six *const forces, *const right, *const change;
     Equations equations;
+    std::vector<BeamTetherState>& tethers;
     const Real length, perLength, parallel, perpendicular, shortening;
     const Scalar perStep;
     Real thetaOfStrains, thetaOfSum, thetaOfDifference;
@@ -226,6 +236,46 @@ private:
         own.difference = shape.difference;
         own.middle = shape.middle;
         own.randomSum = own.randomDifference = Vec {};
+    }
+    /** Describe tethers, and draw their noise: they are coordinates like those of elements, but linear ones. */
+    void describeTethers() {
+        tethers.resize(pack.tethers.size());
+        const NoiseKey key = {(std::uint32_t) settings.seed, (std::uint32_t) settings.level, settings.step};
+        for (std::size_t number = 0; number < tethers.size(); number++) {
+            const BeamTether& tether = pack.tethers[number];
+            Real h = length, ofEnd = larger<Real>(-parallel, -perpendicular)*(-1/MOBILITY_OF_BEAM_END);
+            const double rate = settings.stepSize*tether.stiffness/(lane(h, tether.lane)*lane(ofEnd, tether.lane));
+            BeamTetherState& own = tethers[number];
+            own.theta = std::fmax(0.5, 1-1/(rate+TINY));
+            std::fill(own.random, own.random+3, 0.0);
+            if (settings.kT == 0 || tether.stiffness == 0)
+                continue;
+            const NoisePlaces<1> place = {(Word) pack.noiseChain[tether.lane], (Word) tether.number};
+            Scalar normals[4];
+            drawNormals<1, 2>(key, NoiseKind::Tether, place, normals);
+            for (int k = 0; k < (pack.planar ? 2 : 3); k++)
+                own.random[k] = normals[k]*std::sqrt(settings.kT/tether.stiffness);
+        }
+    }
+    /** Add the tethers of a node, the next ones, to its equations. */
+    void addTethers(const Six* y, int node, std::size_t& next, typename Equations::Row& row) {
+        for (; next < tethers.size() && pack.tethers[next].node == node; next++) {
+            const BeamTether& tether = pack.tethers[next];
+            const BeamTetherState& own = tethers[next];
+            const double *d = start.tethers+3*next, stiffness = tether.stiffness, random = std::sqrt(2*own.theta-1);
+            const int i = tether.lane;
+            Vec moved = y[node].position;
+            const double move[] = {lane(moved.x, i), lane(moved.y, i), lane(moved.z, i)};
+            double force[3];
+            for (int k = 0; k < 3; k++)
+                force[k] = pack.planar && k == 2 ? 0 : stiffness*(d[k]+own.theta*move[k]-random*own.random[k]);
+            Vec& onNode = right[node].position;
+            lane(onNode.x, i) -= force[0];
+            lane(onNode.y, i) -= force[1];
+            lane(onNode.z, i) -= force[2];
+            for (int k = 0; k < 3; k++)
+                lane(row.diagonal.a[k][k], i) += stiffness*own.theta;
+        }
     }
     /** Set the tension of a strain as it is, and return how it grows. */
     CYLCHAIN_INLINE Real findTension(BeamStrain<Real>& strain, Real now) const {

@@ -16,7 +16,8 @@ template <int W> void divideBeamStep(const BeamPack& pack, const BeamStart<W>& s
     SixVector<Real>* const moved = vectors.reserve<SixVector<Real> >(3*n);
     SixVector<Real>* const change = moved+n;
     Vector<Real>* const begun = reinterpret_cast<Vector<Real>*>(moved+2*n);
-    const BeamStart<W> from = {begun, begun+n};
+    std::vector<double> tethers(3*pack.tethers.size());
+    const BeamStart<W> from = {begun, begun+n, tethers.data()};
     for (int division = 1; division <= LARGEST_BEAM_DIVISION && level+division <= LARGEST_LEVEL; division++) {
         const int parts = 1<<division;
         settings.stepSize = h/parts;
@@ -30,6 +31,13 @@ template <int W> void divideBeamStep(const BeamPack& pack, const BeamStart<W>& s
                 from.control[node] = start.control[node]+moved[node].control;
                 if (node < n-1)
                     from.chord[node] = start.chord[node]+(moved[node+1].position-moved[node].position);
+            }
+            for (std::size_t number = 0; number < pack.tethers.size(); number++) {
+                const BeamTether& tether = pack.tethers[number];
+                Vector<Real> move = moved[tether.node].position;
+                const double of[] = {lane(move.x, tether.lane), lane(move.y, tether.lane), lane(move.z, tether.lane)};
+                for (int k = 0; k < 3; k++)
+                    tethers[3*number+k] = start.tethers[3*number+k]+of[k];
             }
             BeamStep<W>(pack, settings, from, memory).take(f, change, failedPart);
             hope = false;
@@ -66,7 +74,9 @@ template <int W> Instability stepBeams(const BeamPack& pack, const double* posit
     SixVector<Real>* const f = vectors.reserve<SixVector<Real> >(3*n);
     SixVector<Real>* const y = f+n;
     Vector<Real>* const begun = reinterpret_cast<Vector<Real>*>(f+2*n);
-    const BeamStart<W> start = {begun, begun+n};
+    static thread_local std::vector<double> tethers;
+    tethers.resize(3*pack.tethers.size());
+    const BeamStart<W> start = {begun, begun+n, tethers.data()};
     gatherBeams<W>(pack, positions, box, start);
     gatherBeamForces<W>(pack, forces, f);
     bool failed[W];

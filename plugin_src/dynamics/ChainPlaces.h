@@ -17,7 +17,7 @@ struct PlaceOnChain {
     int node = 0, lane = 0;
     /** The chain; of beam elements, its number behind those of segments; for a particle, behind those of all chains. */
     int chain = -1;
-    /** Of the segment; on an element, the parameter of its curve. */
+    /** Of the segment; on an element, what of it is held: see ElementPlace.h. */
     double fraction = 0;
 };
 

@@ -1,4 +1,5 @@
 #include "dynamics/ContactEquations.h"
+#include "beams/ElementPlace.h"
 #include "dynamics/RestGap.h"
 #include "dynamics/SymmetricMatrices.h"
 #include "mechanics/Prefetch.h"
@@ -54,7 +55,9 @@ const int CHUNK = 128;
 
 } // namespace
 
-void ContactEquations::setContacts(ContactSearch* newSearch, double newStiffness, const double* newBox) {
+void ContactEquations::setContacts(ContactSearch* newSearch, double newStiffness, const double* newBox,
+        const vector<CapsuleOnCurve>& newOnCurves) {
+    onCurves = &newOnCurves;
     search = newSearch;
     pairs.setSearch(search);
     stiffness = newStiffness;
@@ -90,6 +93,17 @@ void ContactEquations::begin(const CoupledStart& start, const Loop& newLoop) {
         packs[i] = found.pack;
         leastResponses[i] = found.pack < 0 ? 0 : responses.findLeast(found.chain);
     });
+    for (const CapsuleOnCurve& own : *onCurves) {
+        PlaceOnChain& found = places[own.capsule].place;
+        if (!start.places.find(own.first, found) || !start.taken[found.chain]) {
+            found = PlaceOnChain();
+            continue;
+        }
+        found.fraction = ElementPlace::onPieces(found.fraction, own.pieces);
+        places[own.capsule].direction = (own.forwards ? 1.0 : -1.0)/own.pieces;
+        packs[own.capsule] = found.pack;
+        leastResponses[own.capsule] = responses.findLeast(found.chain);
+    }
     reaches[0] = REACH*diameter;
     reaches[1] = LEAST_REACH*diameter;
     leavesBox = false;

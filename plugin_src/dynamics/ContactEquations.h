@@ -4,6 +4,7 @@
 #include "couplings/ContactSearch.h"
 #include "dynamics/CapsuleMotion.h"
 #include "dynamics/CapsulePairs.h"
+#include "dynamics/CurveSites.h"
 #include "dynamics/ImplicitCouplings.h"
 #include "dynamics/PlaceResponses.h"
 #include <cstddef>
@@ -32,8 +33,11 @@ public:
      *
      * @param stiffness  k_c
      * @param box        the periodic box, if distances are those of nearest images, or NULL
+     * @param onCurves   capsules that end at virtual sites on curves of beam elements, whose positions are among those
+     *                   of all particles
      */
-    void setContacts(ContactSearch* search, double stiffness, const double* box);
+    void setContacts(ContactSearch* search, double stiffness, const double* box,
+            const std::vector<CapsuleOnCurve>& onCurves);
     void begin(const CoupledStart& start, const Loop& loop) override;
     void beginStage(int stage, int numStages, const double* moved) override;
     void linearise(int iteration, const double* moved, std::vector<CouplingEquation>& equations) override;
@@ -89,6 +93,7 @@ private:
     const Loop* loop = nullptr;
     const PackFlags* active = nullptr;
     const double *begun = nullptr, *box = nullptr;
+    const std::vector<CapsuleOnCurve>* onCurves = nullptr;
     PlaceResponses responses;
     double kT = 0, stepSize = 0, wallDepth = 0, reach = 0, reaches[2] = {};
     std::vector<CapsulePlace> places;

