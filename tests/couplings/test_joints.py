@@ -27,7 +27,10 @@ def jointed(periodic=False):
     box = [[1500.0, 0, 0], [100.0, 1500.0, 0], [-60.0, 90.0, 1600.0]] * unit.nanometer
     _, system, positions = filaments.build(box if periodic else None)
     joints = Joints(30.0 * unit.kilojoule_per_mole)
-    one, other = filaments.segment_place(0, segment=1, fraction=0.3), filaments.segment_place(1, segment=1, fraction=1.0)
+    one, other = (
+        filaments.segment_place(0, segment=1, fraction=0.3),
+        filaments.segment_place(1, segment=1, fraction=1.0),
+    )
     joints.add(None, one, other)
     joints.add(None, one, SegmentPlace(other.second, other.first, 1.0 - other.fraction), 50.0 * unit.degree)
     joints.add(None, one, [0, 3, 4], angle=0.4, stiffness=7.0)
@@ -60,7 +63,9 @@ def test_energies_angles_and_forces(platform, periodic):
     assert energy_of(context, groups) == pytest.approx(sum(expected), rel=1e-9)
     cosines = [np.dot(a, b) / np.linalg.norm(a) / np.linalg.norm(b) for a, b, *_ in pairs]
     assert joints.angles(context) == pytest.approx(np.arccos(cosines), rel=1e-9)
-    own = 30.0 * (2 * np.sin(0.5 * np.arccos(cosines[1])) - 2 * np.sin(np.radians(25.0))) / np.cos(np.radians(25.0)) ** 2
+    own = (
+        30.0 * (2 * np.sin(0.5 * np.arccos(cosines[1])) - 2 * np.sin(np.radians(25.0))) / np.cos(np.radians(25.0)) ** 2
+    )
     assert joints.moments(context)[1] == pytest.approx(own * np.cos(0.5 * np.arccos(cosines[1])), rel=1e-9)
     # They are couples.
     assert np.sum(forces, axis=0) == pytest.approx(0.0, abs=1e-9)
@@ -158,9 +163,7 @@ def test_equilibrium_of_joints_at_the_recommended_step(stiffness, angle, welded)
         start, control = drawn[0].positions[0], drawn[0].control_points[0]
         turned = turning((control - start) / np.linalg.norm(control - start), direction)
         move = filaments[first].positions[-1]
-        nodes, controls = (
-            (own - start) @ turned.T + move for own in (drawn[0].positions, drawn[0].control_points)
-        )
+        nodes, controls = ((own - start) @ turned.T + move for own in (drawn[0].positions, drawn[0].control_points))
         filaments.add_nodes(BEAM, nodes, control_points=controls)
     _, system, positions = filaments.build()
     joints, links = Joints(stiffness), Crosslinks(100.0, 0.0)
@@ -184,7 +187,9 @@ def test_equilibrium_of_joints_at_the_recommended_step(stiffness, angle, welded)
     for _ in range(samples):
         integrator.step(4)
         now = positions_of(context)
-        first, second = (3.0 * (now[controls[i::2, end]] - now[nodes[i::2, end]]) / LENGTH for i, end in ((0, -1), (1, 0)))
+        first, second = (
+            3.0 * (now[controls[i::2, end]] - now[nodes[i::2, end]]) / LENGTH for i, end in ((0, -1), (1, 0))
+        )
         distance = np.linalg.norm(first - second, axis=1)
         energies.append(0.5 * stiffness * ((distance - 2 * np.sin(0.5 * angle)) / np.cos(0.5 * angle)) ** 2 / KT)
         cosines.append(1.0 - np.cos(joints.angles(context)))

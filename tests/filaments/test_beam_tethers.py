@@ -107,7 +107,9 @@ def test_a_clamped_beam_on_a_spring_relaxes_to_the_least_energy(linked):
     least = minimize(energy, start[:, 1:].ravel() / LENGTH, method="BFGS", options={"gtol": 1e-4}).x.reshape(2, 2, 3)
     for own, place in zip((filaments.node_indices[1], filaments.control_point_indices[1]), least):
         assert found[own][1:] == pytest.approx(place * LENGTH, abs=2e-3 * LENGTH)
-    assert np.linalg.norm(found[filaments.node_indices[1][-1]] - positions._value[filaments.node_indices[1][-1]]) > 100.0
+    assert (
+        np.linalg.norm(found[filaments.node_indices[1][-1]] - positions._value[filaments.node_indices[1][-1]]) > 100.0
+    )
 
 
 @pytest.mark.parametrize("linked", [False, True])

@@ -149,7 +149,6 @@ def test_tangents_out_of_the_plane_are_refused():
             '[[tether]]\nfilament = 0\nnode = 0\nstiffness = "1 pN/nm"\n',
             "tethers cannot be on filament 0, which has beam",
         ),
-        ('[flow]\nshear = "1 1/s"\n', "has beam elements, which a solvent that flows cannot have"),
         (
             '[[linkers]]\ntype = "ALPHA_ACTININ"\ncount = 2\nvolume = "1 um^3"\n',
             "has beam elements, which Systems with linkers cannot have",
