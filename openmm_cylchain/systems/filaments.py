@@ -910,8 +910,6 @@ class Filaments:
         flow = as_flow(flow)
         if scheme != "implicit":
             refuse_beams(self, f"scheme {scheme!r}")
-        if flow != Flow():
-            refuse_beams(self, "a solvent that flows")
         bath = self._bath(temperature)
         if checks:
             warn_of_long_step(self, system, step_size, scheme, bath, particle_friction, flow)

@@ -159,8 +159,6 @@ Instability BeamEngine::step(int pack, const double* positions, const double* fo
             const StepSettings& settings, double* displacements) const {
     if (settings.scheme != Scheme::Implicit)
         throw invalid_argument("Beam elements are for scheme \"implicit\" alone");
-    if (settings.flow.present)
-        throw invalid_argument("Beam elements are for a solvent at rest alone");
     const double length = settings.kT*implementation->softness;
     if (length > LONGEST_ELEMENT)
         throw invalid_argument("The elements of beam chain "+to_string(implementation->softest)+" are "+

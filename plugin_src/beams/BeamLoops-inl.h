@@ -9,6 +9,7 @@
 #include "beams/ElementPlace.h"
 #include "dynamics/PackStep.h"
 #include "lanes/Noise.h"
+#include "mechanics/BackgroundFlow.h"
 #include "mechanics/PeriodicBox.h"
 #include <algorithm>
 #include <cmath>
@@ -24,6 +25,7 @@ namespace CYLCHAIN_LOOPS {
 
 #include "lanes/VectorLanes-inl.h"
 #include "lanes/NoiseLanes-inl.h"
+#include "mechanics/LaneFlow-inl.h"
 #include "beams/BeamShape-inl.h"
 #include "beams/BeamEquations-inl.h"
 #include "beams/BeamElements-inl.h"
@@ -41,10 +43,10 @@ template <int W> ChainEnergy addForcesTo(const BeamPack& pack, const double* pos
     static thread_local Scratch memory;
     static thread_local std::vector<double> tethers;
     const int n = pack.nodes;
-    SixVector<Real>* f = memory.reserve<SixVector<Real> >(2*n);
+    SixVector<Real>* f = memory.reserve<SixVector<Real> >(2*n+1);
     tethers.resize(3*pack.tethers.size());
     const BeamStart<W> start = {reinterpret_cast<Vector<Real>*>(f+n), reinterpret_cast<Vector<Real>*>(f+n)+n,
-            tethers.data()};
+            tethers.data(), reinterpret_cast<Vector<Real>*>(f+2*n)};
     gatherBeams<W>(pack, positions, box, start);
     std::fill(f, f+n, SixVector<Real> {});
     ChainEnergy energy;

@@ -15,13 +15,13 @@ public:
             const bool* taken) override {
         settings = stepSettings;
         const int n = pack.nodes;
-        Six* const f = vectors.reserve<Six>(5*n);
+        Six* const f = vectors.reserve<Six>(5*n+1);
         y = f+n;
         ofPlaces = f+2*n;
         moved = f+3*n;
         Vec* const begun = reinterpret_cast<Vec*>(f+4*n);
         tethers.resize(3*pack.tethers.size());
-        start = {begun, begun+n, tethers.data()};
+        start = {begun, begun+n, tethers.data(), begun+2*n};
         gatherBeams<W>(pack, positions, box, start);
         gatherBeamForces<W>(pack, forces, f);
         for (int i = 0; i < W; i++)

@@ -45,6 +45,11 @@ template <int W> void gatherBeams(const BeamPack& pack, const double* positions,
             setLane(start.control[node], i, control);
             setLane(start.chord[node], i, chord);
         }
+    for (int i = 0; i < W; i++) {
+        const int first = pack.particles[i];
+        const double nowhere[3] = {};
+        setLane(*start.first, i, first < 0 ? nowhere : positions+3*first);
+    }
     for (std::size_t number = 0; number < pack.tethers.size(); number++)
         vectorOf(pack.tethers[number], pack, positions, box, start.tethers+3*number);
 }

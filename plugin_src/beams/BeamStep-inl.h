@@ -3,13 +3,14 @@
 /**
  * A step of chains of beam elements. It solves, for the new nodes y, with the middle m = (x+y)/2,
  *
- *     Z(m) (y-x)/h = f + f_random(x) + f_drift(x) - sum_a T_a J_a(m),
+ *     Z(m) ((y-x)/h - u(m)) = f + f_random(x) + f_drift(x) - sum_a T_a J_a(m),
  *     T_a = k (theta q_a(y) + (1-theta) q_a(x) - (2 theta-1)^(1/2) q_random),    theta = max(1/2, 1-1/z),
  *
  * where the coordinates q_a with the energies k q^2/2 are the strains of nodes and of the middles of elements, and the
  * sums and differences of bends; see BeamChain.h and, for why, ImplicitStep-inl.h, whose scheme this is. z is the step
  * over the least relaxation time that the coordinate has in a free element. All friction is in Z, which is that of the
- * curve, with the noise of the curve as it was: so its drift comes by itself. Strains have metric forces.
+ * curve, with the noise of the curve as it was: so its drift comes by itself. Strains have metric forces. u is the flow
+ * of the solvent.
  */
 
 /** The largest number of iterations, and the least: see ImplicitStep-inl.h. */
@@ -47,7 +48,8 @@ public:
             tethers(memory.tethers),
             length(of(BeamPack::Length)), perLength(1/length), parallel(of(BeamPack::Parallel)),
             perpendicular(of(BeamPack::Perpendicular)),
-            shortening(1.5*of(BeamPack::Shortening)), perStep(1/settings.stepSize) {
+            shortening(1.5*of(BeamPack::Shortening)), perStep(1/settings.stepSize),
+            flow(settings.flow, pack.planar, *start.first) {
         const Real h = splat<Real>(settings.stepSize), square = length*length;
         const Real rateOfBends = h*of(BeamPack::Bending)/(perpendicular*square*square);
         thetaOfStrains = thetaOf(h*of(BeamPack::Stretching)*STRAIN_RATE/(parallel*square));
@@ -80,8 +82,11 @@ public:
     }
     /** Describe the start of a step, and draw its noise. */
     void begin(const Six* external, Six* y) {
+        // A flow carries chains as a whole; those with fixed particles begin where they are.
+        const Real time = loaded<Real>(pack.free, 0)*settings.stepSize;
+        const Vec carried = flow.at(*start.first+flow.at(*start.first)*(0.5*time))*time;
         for (int node = 0; node < n; node++) {
-            y[node] = Six {};
+            y[node] = {carried, Vec {}};
             forces[node] = external[node];
         }
         for (int e = 0; e < n; e++)
@@ -103,6 +108,8 @@ public:
         *here = typename Equations::Row {};
         for (int node = 0; node < n; node++)
             right[node] = forces[node];
+        if (settings.flow.present)
+            addDrag(y);
         for (int e = 0; e < n-1; e++) {
             BeamElementState<Real>& own = elements[e];
             const BeamShape<Real> now(vectors(e, y, 1)), middle(vectors(e, y, 0.5));
@@ -198,6 +205,7 @@ private:
     std::vector<BeamTetherState>& tethers;
     const Real length, perLength, parallel, perpendicular, shortening;
     const Scalar perStep;
+    const LaneFlow<W> flow;
     Real thetaOfStrains, thetaOfSum, thetaOfDifference;
 
     Real of(int property) const {
@@ -309,6 +317,24 @@ private:
                     addTimes(sum, resistance[g], WEIGHTS.value[g][k]*WEIGHTS.value[g][l]);
                 m.block[pair++] = sum;
             }
+    }
+    /** Add the friction of the flow, in the middle of the step. */
+    void addDrag(const Six* y) {
+        const Real half = splat<Real>(0.5);
+        Vec first = *start.first+y[0].position*half;
+        for (int e = 0; e < n-1; e++) {
+            const Vec control1 = start.control[e]+y[e].control*half, control2 = start.control[e+1]+y[e+1].control*half;
+            const Vec chord = start.chord[e]+(y[e+1].position-y[e].position)*half;
+            const Real size = length*present(e), across = perpendicular*size, more = parallel*size-across;
+            for (int g = 0; g < GAUSS_POINTS; g++) {
+                const Scalar* const weights = WEIGHTS.value[g];
+                const Vec velocity = flow.at(first+control1*splat<Real>(weights[1])+chord*splat<Real>(weights[2])+
+                        control2*splat<Real>(weights[3]));
+                const Vec t = directionAt(g, control1, chord, control2);
+                addAt(g, (velocity*across+t*(more*t.dot(velocity)))*splat<Real>(GAUSS_WEIGHTS[g]), right[e], right[e+1]);
+            }
+            first = first+chord;
+        }
     }
     static CYLCHAIN_INLINE void addTimes(Symmetric<Real>& sum, const Symmetric<Real>& one, Scalar factor) {
         sum.xx += one.xx*factor;

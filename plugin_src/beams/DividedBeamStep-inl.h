@@ -13,11 +13,11 @@ template <int W> void divideBeamStep(const BeamPack& pack, const BeamStart<W>& s
     const double h = settings.stepSize;
     const std::uint64_t step = settings.step;
     const int level = settings.level, n = pack.nodes;
-    SixVector<Real>* const moved = vectors.reserve<SixVector<Real> >(3*n);
+    SixVector<Real>* const moved = vectors.reserve<SixVector<Real> >(3*n+1);
     SixVector<Real>* const change = moved+n;
     Vector<Real>* const begun = reinterpret_cast<Vector<Real>*>(moved+2*n);
     std::vector<double> tethers(3*pack.tethers.size());
-    const BeamStart<W> from = {begun, begun+n, tethers.data()};
+    const BeamStart<W> from = {begun, begun+n, tethers.data(), begun+2*n};
     for (int division = 1; division <= LARGEST_BEAM_DIVISION && level+division <= LARGEST_LEVEL; division++) {
         const int parts = 1<<division;
         settings.stepSize = h/parts;
@@ -27,6 +27,7 @@ template <int W> void divideBeamStep(const BeamPack& pack, const BeamStart<W>& s
         bool hope = true;
         for (int part = 0; part < parts && hope; part++) {
             settings.step = (step<<division)+part;
+            *from.first = *start.first+moved[0].position;
             for (int node = 0; node < n; node++) {
                 from.control[node] = start.control[node]+moved[node].control;
                 if (node < n-1)
@@ -71,12 +72,12 @@ template <int W> Instability stepBeams(const BeamPack& pack, const double* posit
     static thread_local typename BeamStep<W>::Memory memory;
     static thread_local Scratch vectors;
     const int n = pack.nodes;
-    SixVector<Real>* const f = vectors.reserve<SixVector<Real> >(3*n);
+    SixVector<Real>* const f = vectors.reserve<SixVector<Real> >(3*n+1);
     SixVector<Real>* const y = f+n;
     Vector<Real>* const begun = reinterpret_cast<Vector<Real>*>(f+2*n);
     static thread_local std::vector<double> tethers;
     tethers.resize(3*pack.tethers.size());
-    const BeamStart<W> start = {begun, begun+n, tethers.data()};
+    const BeamStart<W> start = {begun, begun+n, tethers.data(), begun+2*n};
     gatherBeams<W>(pack, positions, box, start);
     gatherBeamForces<W>(pack, forces, f);
     bool failed[W];

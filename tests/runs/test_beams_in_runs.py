@@ -146,7 +146,6 @@ def test_tangents_out_of_the_plane_are_refused():
 @pytest.mark.parametrize(
     ("table", "message"),
     [
-        ('[flow]\nshear = "1 1/s"\n', "has beam elements, which a solvent that flows cannot have"),
         (
             '[[linkers]]\ntype = "ALPHA_ACTININ"\ncount = 2\nvolume = "1 um^3"\n',
             "has beam elements, which Systems with linkers cannot have",
