@@ -195,6 +195,18 @@ Vec3d findNormal(const SegmentPair& pair, int side) {
 } // namespace
 
 struct ContactSearch::Implementation {
+    /** Where capsules are at both ends of a step: positions, or what setMotion() has taken note of if there are none. */
+    struct Ends {
+        const Implementation& search;
+        const double *x, *y;
+        bool moves;
+        Vec3d along(int capsule, bool atEnd) const {
+            if (y != NULL)
+                return search.along(search.system.capsules[capsule], atEnd ? y : x);
+            const double* v = atEnd ? search.moving[capsule].laterAlong : search.moving[capsule].along;
+            return {v[0], v[1], v[2]};
+        }
+    };
     CapsuleSystem system;
     bool nearestImages;
     /** The capsule of the same chain that shares the second particle, or the first one, or -1. */
@@ -216,13 +228,13 @@ struct ContactSearch::Implementation {
     /** The largest half width of a box, and by how much a center has left its cell at most, in fractions. */
     double largestHalf[3], largestExcess[3];
     /** Where each capsule is in the order of cells, and whether it is searched for again. */
-    vector<int> slots;
+    vector<int> slots, movers;
     vector<char> again;
     vector<Part> parts;
     vector<size_t> firstOf;
     /** What setMotion() has taken note of. */
     vector<MovingSegment> moving;
-    const double *motionBegins = NULL, *motionEnds = NULL;
+    bool moves = false;
 
     Implementation(const CapsuleSystem& system, bool nearestImages);
     bool isExcluded(int a, int b) const;
@@ -247,13 +259,12 @@ struct ContactSearch::Implementation {
             const double* y, Part& part) const;
     bool areNeighbors(const Capsule& first, const Capsule& second) const;
     void gather(vector<ContactPair>& pairs);
-    SegmentPair withNeighbor(const SegmentPair& segments, int neighbor, bool ofA, bool atEnd,
-            const double* positions) const;
     bool isOwned(const Contact& contact, const ContactPair& pair, const SegmentPair& start, const SegmentPair& end,
-            bool parallel, bool ofA, const double* x, const double* y) const;
+            bool parallel, bool ofA, const Ends& ends) const;
     double shareOf(const Crossing& crossing, const ContactPair& pair) const;
-    int evaluate(const ContactPair& pair, const SegmentPair& start, const SegmentPair& end, const double* x,
-            const double* y, Contact* contacts, double limit) const;
+    int evaluate(const ContactPair& pair, const SegmentPair& start, const SegmentPair& end, const Ends& ends,
+            Contact* contacts, double limit) const;
+    bool crosses(const ContactPair& pair, const SegmentPair& start, const SegmentPair& end) const;
     bool isOfNeighbor(const ContactPair& pair, int flags) const;
 };
 
@@ -726,10 +737,8 @@ void ContactSearch::Implementation::gather(vector<ContactPair>& pairs) {
     }
 }
 
-/** Replace one of two segments by its neighbor in its chain. */
-SegmentPair ContactSearch::Implementation::withNeighbor(const SegmentPair& segments, int neighbor, bool ofA, bool atEnd,
-        const double* positions) const {
-    const Vec3d beside = along(system.capsules[neighbor], positions);
+/** Replace one of two segments by its neighbor in its chain, which lies along a vector. */
+static SegmentPair withNeighbor(const SegmentPair& segments, const Vec3d& beside, bool ofA, bool atEnd) {
     if (ofA)
         return {beside, segments.q, atEnd ? segments.w+segments.p : segments.w-beside};
     return {segments.p, beside, atEnd ? segments.w-segments.q : segments.w+beside};
@@ -737,7 +746,7 @@ SegmentPair ContactSearch::Implementation::withNeighbor(const SegmentPair& segme
 
 /** Get whether a contact belongs to its pair, or to a neighbor of a, or of b, in its chain. */
 bool ContactSearch::Implementation::isOwned(const Contact& contact, const ContactPair& pair, const SegmentPair& start,
-        const SegmentPair& end, bool parallel, bool ofA, const double* x, const double* y) const {
+        const SegmentPair& end, bool parallel, bool ofA, const Ends& ends) const {
     const int own = ofA ? pair.a : pair.b, other = ofA ? pair.b : pair.a;
     const double fraction = ofA ? contact.s : contact.t, sum = radii(pair.a, pair.b);
     const double least = LEAST_DIFFERENCE*(sum+fabs(contact.gap));
@@ -747,19 +756,22 @@ bool ContactSearch::Implementation::isOwned(const Contact& contact, const Contac
         const bool atJoint = fraction == (atEnd ? 1 : 0);
         if (neighbor < 0 || (parallel && !atJoint) || isExcluded(neighbor, other))
             continue;
+        const Vec3d later = ends.along(neighbor, true);
+        auto withNeighborBefore = [&] {
+            return withNeighbor(start, ends.along(neighbor, false), ofA, atEnd);
+        };
         if (!atJoint) {
             // If the distance from the other capsule grows as one goes from the joint into the neighbor, that has no
             // place nearer than the joint, unless it has been crossed.
             const Vec3d joint = (ofA ? end.w : end.w*-1)+ownAlong*(atEnd ? 1 : 0);
             const Vec3d fromOther = joint-otherAlong*nearestFraction(otherAlong, joint*-1);
-            const Vec3d into = along(system.capsules[neighbor], y)*(atEnd ? 1 : -1);
+            const Vec3d into = later*(atEnd ? 1 : -1);
             const double distance = sqrt(fromOther.squared());
             if (fromOther.dot(into) >= 0 && distance-sum > contact.gap+2*least &&
-                    (x == y || !mayPass(withNeighbor(start, neighbor, ofA, atEnd, x),
-                    withNeighbor(end, neighbor, ofA, atEnd, y), distance, sum)))
+                    (!ends.moves || !mayPass(withNeighborBefore(), withNeighbor(end, later, ofA, atEnd), distance, sum)))
                 continue;
         }
-        const SegmentPair beside = withNeighbor(end, neighbor, ofA, atEnd, y);
+        const SegmentPair beside = withNeighbor(end, later, ofA, atEnd);
         const Places places = findPlaces(beside);
         bool endsThere = false;
         if (places.parallel)
@@ -773,7 +785,7 @@ bool ContactSearch::Implementation::isOwned(const Contact& contact, const Contac
                 return false;
             continue;
         }
-        const SegmentPair before = x == y ? beside : withNeighbor(start, neighbor, ofA, atEnd, x);
+        const SegmentPair before = ends.moves ? withNeighborBefore() : beside;
         const double gap = findGap(before, beside, radii(neighbor, other));
         // What differs by rounding is equal. Then the one that ends there counts.
         if (parallel || atEnd ? gap < contact.gap-least : !(contact.gap < gap-least))
@@ -796,10 +808,10 @@ double ContactSearch::Implementation::shareOf(const Crossing& crossing, const Co
 }
 
 int ContactSearch::Implementation::evaluate(const ContactPair& pair, const SegmentPair& start, const SegmentPair& end,
-        const double* x, const double* y, Contact* contacts, double limit) const {
+        const Ends& ends, Contact* contacts, double limit) const {
     const double sum = radii(pair.a, pair.b);
     const Places places = findPlaces(end);
-    if (x != y && mayPass(start, end, places.distance, sum)) {
+    if (ends.moves && mayPass(start, end, places.distance, sum)) {
         if (hasSphere(start)) {
             Passage passage;
             if (findPassage(start, end, sum, passage)) {
@@ -808,8 +820,8 @@ int ContactSearch::Implementation::evaluate(const ContactPair& pair, const Segme
                         passage.through};
                 if (contacts[0].gap >= limit)
                     return -1;
-                return isOwned(contacts[0], pair, start, end, false, true, x, y) &&
-                        isOwned(contacts[0], pair, start, end, false, false, x, y);
+                return isOwned(contacts[0], pair, start, end, false, true, ends) &&
+                        isOwned(contacts[0], pair, start, end, false, false, ends);
             }
         }
         else {
@@ -838,8 +850,8 @@ int ContactSearch::Implementation::evaluate(const ContactPair& pair, const Segme
             continue;
         const Vec3d n = length > 0 ? r*(1/length) : findNormal(end, pair.side);
         const Contact contact = {s, t, {n.x, n.y, n.z}, length-sum, 1.0/count, false};
-        if (isOwned(contact, pair, start, end, places.parallel, true, x, y) &&
-                isOwned(contact, pair, start, end, places.parallel, false, x, y))
+        if (isOwned(contact, pair, start, end, places.parallel, true, ends) &&
+                isOwned(contact, pair, start, end, places.parallel, false, ends))
             contacts[kept++] = contact;
     }
     return kept;
@@ -906,13 +918,18 @@ void ContactSearch::findPairsOf(const vector<int>& capsules, const double* x, co
     search.describeAgain(capsules, x, y);
     for (int i : capsules)
         search.again[i] = 1;
+    // In the order of cells, those that follow each other find the same others in the processor's caches.
+    vector<int>& inOrder = search.movers;
+    inOrder.resize(capsules.size());
+    transform(capsules.begin(), capsules.end(), inOrder.begin(), [&] (int i) {return search.slots[i];});
+    sort(inOrder.begin(), inOrder.end());
     const int count = capsules.size(), chunks = (count+FEW-1)/FEW;
     if ((int) search.parts.size() < chunks)
         search.parts.resize(chunks);
     runParts(run, chunks, [&] (int chunk) {
         search.parts[chunk].pairs.clear();
         for (int i = chunk*FEW; i < min(count, (chunk+1)*FEW); i++)
-            search.searchAround(capsules[i], x, y, search.parts[chunk]);
+            search.searchAround(search.members[inOrder[i]], x, y, search.parts[chunk]);
     });
     for (int i : capsules)
         search.again[i] = 0;
@@ -925,21 +942,20 @@ int ContactSearch::evaluate(const ContactPair& pair, const double* x, const doub
         double limit) const {
     const SegmentPair end = implementation->segments(pair.a, pair.b, pair.shift, y);
     const SegmentPair start = x == y ? end : implementation->segments(pair.a, pair.b, pair.shift, x);
-    return implementation->evaluate(pair, start, end, x, y, contacts, limit);
+    return implementation->evaluate(pair, start, end, {*implementation, x, y, x != y}, contacts, limit);
 }
 
 int ContactSearch::evaluate(const ContactPair& pair, Contact* contacts, double limit) const {
     const Implementation& search = *implementation;
     return search.evaluate(pair, search.movingSegments(pair, false), search.movingSegments(pair, true),
-            search.motionBegins, search.motionEnds, contacts, limit);
+            {search, NULL, NULL, search.moves}, contacts, limit);
 }
 
 void ContactSearch::setMotion(const double* x, const double* y, const Loop& run) {
-    const Implementation& search = *implementation;
+    Implementation& search = *implementation;
     const vector<Capsule>& capsules = search.system.capsules;
-    implementation->motionBegins = x;
-    implementation->motionEnds = y;
-    vector<MovingSegment>& moving = implementation->moving;
+    search.moves = x != y;
+    vector<MovingSegment>& moving = search.moving;
     moving.resize(capsules.size());
     const int count = capsules.size();
     runParts(run, (count+CHUNK-1)/CHUNK, [&] (int chunk) {
@@ -955,6 +971,18 @@ void ContactSearch::setMotion(const double* x, const double* y, const Loop& run)
             segment.radius = own.radius;
         }
     });
+}
+
+void ContactSearch::updateMotion(const vector<int>& numbers, const double* y) {
+    Implementation& search = *implementation;
+    for (int i : numbers) {
+        const Capsule& own = search.system.capsules[i];
+        const Vec3d along = search.along(own, y);
+        set(search.moving[i].laterFirst, position(y, own.first));
+        set(search.moving[i].laterAlong, along);
+        if (search.previous[i] >= 0)
+            set(search.moving[search.previous[i]].laterNext, along);
+    }
 }
 
 /** Whether a contact that is not parallel and has not crossed is surely not owned: see isOwned(). */
@@ -1004,6 +1032,8 @@ void ContactSearch::prefetchMotion(int a, int b) const {
     for (int capsule : {a, b}) {
         prefetch(&implementation->moving[capsule]);
         prefetch(&implementation->system.capsules[capsule]);
+        prefetch(&implementation->next[capsule]);
+        prefetch(&implementation->previous[capsule]);
     }
 }
 
@@ -1014,14 +1044,23 @@ void ContactSearch::findVector(const ContactPair& pair, double s, double t, bool
     result[2] = r.z;
 }
 
-bool ContactSearch::crosses(const ContactPair& pair, const double* x, const double* y) const {
-    const Implementation& search = *implementation;
-    const SegmentPair start = search.segments(pair.a, pair.b, pair.shift, x);
-    const SegmentPair end = search.segments(pair.a, pair.b, pair.shift, y);
+bool ContactSearch::Implementation::crosses(const ContactPair& pair, const SegmentPair& start,
+        const SegmentPair& end) const {
     if (hasSphere(start)) {
         Passage passage;
-        return findPassage(start, end, search.radii(pair.a, pair.b), passage) && passage.through;
+        return findPassage(start, end, radii(pair.a, pair.b), passage) && passage.through;
     }
     Crossing crossings[2];
     return findCrossings(start, end, crossings) > 0;
+}
+
+bool ContactSearch::crosses(const ContactPair& pair, const double* x, const double* y) const {
+    const Implementation& search = *implementation;
+    return search.crosses(pair, search.segments(pair.a, pair.b, pair.shift, x),
+            search.segments(pair.a, pair.b, pair.shift, y));
+}
+
+bool ContactSearch::crosses(const ContactPair& pair) const {
+    const Implementation& search = *implementation;
+    return search.crosses(pair, search.movingSegments(pair, false), search.movingSegments(pair, true));
 }

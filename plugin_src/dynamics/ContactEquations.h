@@ -63,7 +63,24 @@ private:
         std::vector<int> numbers;
         std::vector<PairOutlook> outlooks;
     };
-    template <class Function> bool markPairs(Function findIn);
+    /**
+     * The pairs that are looked at in an iteration: all, or those of few packs. Late iterations have few, and should
+     * take no time for others.
+     */
+    struct Selection {
+        bool all = true;
+        /** The packs all pairs of which are there. */
+        PackFlags packs;
+        std::vector<int> pairs;
+        /** Where runs of them begin, each for a thread: no two of them have pairs of the same chunk. */
+        std::vector<int> runs;
+    };
+    void select();
+    void divideSelection();
+    bool isSelected(const PackFlags& packs) const;
+    int getNumRuns(bool all) const;
+    template <class Function> void forPairs(bool all, int run, Function function) const;
+    template <class Function> bool markPairs(bool all, Function findIn);
     void mark(int pair);
     bool takesPart(int capsule) const {
         return packs[capsule] >= 0 && (*active)[packs[capsule]];
@@ -77,11 +94,11 @@ private:
     double softnessOf(const ContactPair& pair, const Contact& contact) const;
     bool isLookedFor(int pair) const;
     bool waits(int pair, const PairOutlook& outlook);
-    void look(int begin, int end, bool first, Part& part);
+    void look(int run, bool first, Part& part);
     void evaluate(int pair, bool first, const PairOutlook* outlook, Part& part);
     bool anyComeNear(const double* moved);
-    bool anyCross(const double* moved);
-    void findCrossed(int begin, int end, const double* moved, Part& part) const;
+    bool anyCross();
+    void findCrossed(bool all, int run, Part& part) const;
     int findFastest(const double* moved) const;
     PlaceOnChain placeOf(int capsule, double fraction) const;
     ContactSearch* search = nullptr;
@@ -99,6 +116,10 @@ private:
     /** Those of the last search. */
     std::vector<ContactPair> found;
     CapsuleMotion motion;
+    Selection selection;
+    /** Whether anyCross() has seen all pairs, and the packs that have moved since it was called. */
+    bool crossingsKnown = false;
+    PackFlags movedSince;
     std::vector<Part> parts;
     /** All equations of the iteration, the first of these, and which contacts they are of, as in a part. */
     const std::vector<CouplingEquation>* equations = nullptr;
