@@ -21,7 +21,7 @@ const double AT_END = 1e-9;
 /** Gaps that differ by less, relative to distances, are equal. */
 const double LEAST_DIFFERENCE = 1e-10;
 /** Capsules that are described together, those that are searched around together, and pairs looked at together. */
-const int CHUNK = 512, FEW = 8, BATCH = 512;
+const int CHUNK = 512, FEW = 32, BATCH = 512;
 /** Capsules that are far away in memory are asked for this many ahead. */
 const int AHEAD = 8;
 /** What rounding adds to distances in single precision, over the lengths that they are made of. */
@@ -100,13 +100,16 @@ struct PlacedCapsule {
     Vec3d first, along;
 };
 
-/** What one part of the search finds. */
-struct Part {
-    vector<ContactPair> pairs;
+/** Memory for candidates. All parts of the search that a thread runs share it, so that it stays in the nearest cache. */
+struct Candidates {
     vector<int> first, second, image;
     vector<float> distance, clearance;
     vector<CapsuleRow> rows;
-    CandidatePairs candidates(int from) {
+    static Candidates& ofThread() {
+        static thread_local Candidates memory;
+        return memory;
+    }
+    CandidatePairs from(int from) {
         return {first.data()+from, second.data()+from, image.data()+from, distance.data()+from, clearance.data()+from};
     }
     void makeRoom(int size) {
@@ -230,7 +233,8 @@ struct ContactSearch::Implementation {
     /** Where each capsule is in the order of cells, and whether it is searched for again. */
     vector<int> slots, movers;
     vector<char> again;
-    vector<Part> parts;
+    /** What each part of the search finds. */
+    vector<vector<ContactPair> > parts;
     vector<size_t> firstOf;
     /** What setMotion() has taken note of. */
     vector<MovingSegment> moving;
@@ -249,14 +253,15 @@ struct ContactSearch::Implementation {
             bool keepsImage = false) const;
     void describeAgain(const vector<int>& capsules, const double* x, const double* y);
     void putInOrder(int slot, int i);
-    void searchAround(int i, const double* x, const double* y, Part& part) const;
-    void keepPairs(int count, const double* x, const double* y, Part& part) const;
+    int searchAround(int i, Candidates& candidates, int count) const;
+    void keepPairs(Candidates& candidates, int count, const double* x, const double* y,
+            vector<ContactPair>& found) const;
     void checkPositions(const double* x, const double* y) const;
     void setCells();
     void searchCells(int part, const double* x, const double* y);
     int findRows(int column, int iz, CapsuleRow* rows) const;
     bool addPair(const PlacedCapsule& one, const PlacedCapsule& other, const int* images, bool sure, const double* x,
-            const double* y, Part& part) const;
+            const double* y, vector<ContactPair>& found) const;
     bool areNeighbors(const Capsule& first, const Capsule& second) const;
     void gather(vector<ContactPair>& pairs);
     bool isOwned(const Contact& contact, const ContactPair& pair, const SegmentPair& start, const SegmentPair& end,
@@ -574,11 +579,12 @@ int ContactSearch::Implementation::findRows(int column, int iz, CapsuleRow* rows
 /** Look for pairs with a capsule in one column of cells. */
 void ContactSearch::Implementation::searchCells(int column, const double* x, const double* y) {
     const CandidateKernels& kernels = candidateKernels();
-    Part& part = parts[column];
-    part.pairs.clear();
+    vector<ContactPair>& found = parts[column];
+    found.clear();
+    Candidates& candidates = Candidates::ofThread();
     int count = 0;
     auto look = [&] {
-        keepPairs(count, x, y, part);
+        keepPairs(candidates, count, x, y, found);
         count = 0;
     };
     CapsuleRow rows[32];
@@ -592,8 +598,8 @@ void ContactSearch::Implementation::searchCells(int column, const double* x, con
             most += rows[row].last-rows[row].first;
         for (int i = first; i < last; i++) {
             rows[0] = {i+1, last, SAME_IMAGE, {0, 0, 0}};
-            part.makeRoom(max(count+most, 2*BATCH)+PADDING);
-            count += kernels.findOverlaps(sweptBoxes, i, rows, numRows, part.candidates(count));
+            candidates.makeRoom(max(count+most, 2*BATCH)+PADDING);
+            count += kernels.findOverlaps(sweptBoxes, i, rows, numRows, candidates.from(count));
             if (count >= BATCH)
                 look();
         }
@@ -602,27 +608,37 @@ void ContactSearch::Implementation::searchCells(int column, const double* x, con
 }
 
 /** Add those of some pairs of boxes that are near enough. */
-void ContactSearch::Implementation::keepPairs(int count, const double* x, const double* y, Part& part) const {
-    count = candidateKernels().keepNear(sorted.data(), imageShifts, reach, margin, part.candidates(0), count);
+void ContactSearch::Implementation::keepPairs(Candidates& candidates, int count, const double* x, const double* y,
+        vector<ContactPair>& found) const {
+    count = candidateKernels().keepNear(sorted.data(), imageShifts, reach, margin, candidates.from(0), count);
     for (int i = 0; i < count; i++) {
         if (i+AHEAD < count)
-            prefetch(&sortedPlaced[part.second[i+AHEAD]]);
-        const PlacedCapsule &one = sortedPlaced[part.first[i]], &other = sortedPlaced[part.second[i]];
-        const int image = part.image[i]%SURE, images[3] = {image/9-1, image/3%3-1, image%3-1};
+            prefetch(&sortedPlaced[candidates.second[i+AHEAD]]);
+        const PlacedCapsule &one = sortedPlaced[candidates.first[i]], &other = sortedPlaced[candidates.second[i]];
+        const int image = candidates.image[i]%SURE, images[3] = {image/9-1, image/3%3-1, image%3-1};
         // Two that are both searched for again find each other twice. Others are not at y.
         const bool isAgain = again[one.number] != 0;
         if (isAgain && again[other.number] != 0 && one.number >= other.number)
             continue;
-        if (addPair(one, other, images, isAgain || part.image[i] >= SURE, x, y, part)) {
-            part.pairs.back().distance = isAgain ? 0 : part.distance[i];
-            part.pairs.back().clearance = isAgain ? 0 : part.clearance[i];
+        if (addPair(one, other, images, isAgain || candidates.image[i] >= SURE, x, y, found)) {
+            found.back().distance = isAgain ? 0 : candidates.distance[i];
+            found.back().clearance = isAgain ? 0 : candidates.clearance[i];
         }
     }
 }
 
 /** Take note of where some capsules are now. They stay in the order of cells where they are. */
 void ContactSearch::Implementation::describeAgain(const vector<int>& capsules, const double* x, const double* y) {
-    for (int i : capsules) {
+    const size_t stride = described.size()+PADDING;
+    for (size_t number = 0; number < capsules.size(); number++) {
+        if (number+AHEAD < capsules.size()) {
+            const int slot = slots[capsules[number+AHEAD]];
+            prefetch(&sorted[slot]);
+            prefetch(&sortedPlaced[slot]);
+            for (int k = 0; k < 6; k++)
+                prefetch(&boxes[k*stride+slot]);
+        }
+        const int i = capsules[number];
         Described& own = described[i];
         const int cell = own.cell, cells[3] = {cell/(frame.cells[1]*frame.cells[2]),
                 cell/frame.cells[2]%frame.cells[1], cell%frame.cells[2]};
@@ -641,8 +657,8 @@ void ContactSearch::Implementation::describeAgain(const vector<int>& capsules, c
             throw NarrowBoxError("The periodic box is too small for contacts: a capsule moves too far");
 }
 
-/** Look for pairs with one capsule, in all cells that it may reach now. */
-void ContactSearch::Implementation::searchAround(int i, const double* x, const double* y, Part& part) const {
+/** Add pairs of boxes with that of one capsule, in all cells that it may reach now; returns how many there are. */
+int ContactSearch::Implementation::searchAround(int i, Candidates& candidates, int count) const {
     const Described& own = described[i];
     int lower[3], upper[3];
     for (int k = 0; k < 3; k++) {
@@ -654,7 +670,7 @@ void ContactSearch::Implementation::searchAround(int i, const double* x, const d
         lower[k] = frame.periodic ? max(lower[k], -frame.cells[k]) : min(max(lower[k], 0), last);
         upper[k] = frame.periodic ? min(upper[k], frame.cells[k]+last) : min(max(upper[k], 0), last);
     }
-    part.rows.clear();
+    candidates.rows.clear();
     int most = 0, images[3];
     auto wrapped = [&] (int cell, int k) {
         images[k] = cell < 0 ? -1 : cell >= frame.cells[k] ? 1 : 0;
@@ -669,20 +685,20 @@ void ContactSearch::Implementation::searchAround(int i, const double* x, const d
                 const int to = min(from+upper[2]-cz, frame.cells[2]-1);
                 const int first = cellStart[column*frame.cells[2]+from], last = cellStart[column*frame.cells[2]+to+1];
                 if (first < last)
-                    part.rows.push_back({first, last, imageNumber(images), {(float) images[0], (float) images[1],
+                    candidates.rows.push_back({first, last, imageNumber(images), {(float) images[0], (float) images[1],
                             (float) images[2]}});
                 most += last-first;
                 cz += to-from+1;
             }
         }
-    part.makeRoom(most+PADDING);
-    keepPairs(candidateKernels().findOverlaps(sweptBoxes, slots[i], part.rows.data(), part.rows.size(),
-            part.candidates(0)), x, y, part);
+    candidates.makeRoom(max(count+most, 2*BATCH)+PADDING);
+    return count+candidateKernels().findOverlaps(sweptBoxes, slots[i], candidates.rows.data(), candidates.rows.size(),
+            candidates.from(count));
 }
 
 /** Add a pair if it is near enough, in double precision where there is doubt; false if it is not. */
 bool ContactSearch::Implementation::addPair(const PlacedCapsule& one, const PlacedCapsule& other, const int* images,
-        bool sure, const double* x, const double* y, Part& part) const {
+        bool sure, const double* x, const double* y, vector<ContactPair>& found) const {
     const bool inOrder = one.number < other.number;
     const PlacedCapsule &first = inOrder ? one : other, &second = inOrder ? other : one;
     const int a = first.number, b = second.number;
@@ -710,7 +726,7 @@ bool ContactSearch::Implementation::addPair(const PlacedCapsule& one, const Plac
     }
     const double volume = start.volume();
     pair.side = volume > 0 ? 1 : volume < 0 ? -1 : 0;
-    part.pairs.push_back(pair);
+    found.push_back(pair);
     return true;
 }
 
@@ -719,13 +735,13 @@ void ContactSearch::Implementation::gather(vector<ContactPair>& pairs) {
     firstOf.assign(system.capsules.size()+1, 0);
     const size_t numParts = (size_t) frame.cells[0]*frame.cells[1];
     for (size_t part = 0; part < numParts; part++)
-        for (const ContactPair& pair : parts[part].pairs)
+        for (const ContactPair& pair : parts[part])
             firstOf[pair.a+1]++;
     for (size_t i = 1; i < firstOf.size(); i++)
         firstOf[i] += firstOf[i-1];
     pairs.resize(firstOf.back());
     for (size_t part = 0; part < numParts; part++)
-        for (const ContactPair& pair : parts[part].pairs)
+        for (const ContactPair& pair : parts[part])
             pairs[firstOf[pair.a]++] = pair;
     // Each entry is now where the next one starts.
     size_t first = 0;
@@ -927,15 +943,18 @@ void ContactSearch::findPairsOf(const vector<int>& capsules, const double* x, co
     if ((int) search.parts.size() < chunks)
         search.parts.resize(chunks);
     runParts(run, chunks, [&] (int chunk) {
-        search.parts[chunk].pairs.clear();
+        search.parts[chunk].clear();
+        Candidates& candidates = Candidates::ofThread();
+        int found = 0;
         for (int i = chunk*FEW; i < min(count, (chunk+1)*FEW); i++)
-            search.searchAround(search.members[inOrder[i]], x, y, search.parts[chunk]);
+            found = search.searchAround(search.members[inOrder[i]], candidates, found);
+        search.keepPairs(candidates, found, x, y, search.parts[chunk]);
     });
     for (int i : capsules)
         search.again[i] = 0;
     pairs.clear();
     for (int chunk = 0; chunk < chunks; chunk++)
-        pairs.insert(pairs.end(), search.parts[chunk].pairs.begin(), search.parts[chunk].pairs.end());
+        pairs.insert(pairs.end(), search.parts[chunk].begin(), search.parts[chunk].end());
 }
 
 int ContactSearch::evaluate(const ContactPair& pair, const double* x, const double* y, Contact* contacts,

@@ -21,6 +21,18 @@ struct PlaceOnChain {
     double fraction = 0;
 };
 
+/** The friction that a segment or an element has against motion of a place across it, as if it were alone. */
+struct LateralFriction {
+    /** That of a node or a particle; that of all of the segment against motion, and against turning; its length. */
+    double ofNode = 0, perpendicular = 0, rotational = 0, length = 0;
+    double at(double fraction) const {
+        if (!(perpendicular > 0 && rotational > 0))
+            return ofNode;
+        const double arm = (fraction-0.5)*length;
+        return ofNode+1/(1/perpendicular+arm*arm/rotational);
+    }
+};
+
 /**
  * Finds places on chains, and at particles outside chains that are coupled to them. Chains of beam elements count as
  * further chains, and these particles as further ones behind them.
@@ -59,7 +71,11 @@ public:
      * The friction that a place has against motion across its segment, which turns and moves as if it were alone: not
      * much more than the least friction against any motion.
      */
-    double getLateralFriction(const PlaceOnChain& place) const;
+    double getLateralFriction(const PlaceOnChain& place) const {
+        return findLateralFriction(place).at(place.fraction);
+    }
+    /** The same for all places on a segment. */
+    LateralFriction findLateralFriction(const PlaceOnChain& place) const;
     /** The chains of segments, whose numbers come first. */
     const std::vector<Chain>& getChains() const {
         return chains;

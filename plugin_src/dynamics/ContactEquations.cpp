@@ -74,7 +74,6 @@ void ContactEquations::begin(const CoupledStart& start, const Loop& newLoop) {
     const vector<Capsule>& capsules = search->getSystem().capsules;
     places.resize(capsules.size());
     packs.resize(capsules.size());
-    leastResponses.resize(capsules.size());
     double diameter = 0;
     for (const Capsule& capsule : capsules)
         diameter = max(diameter, 2*capsule.radius);
@@ -90,7 +89,8 @@ void ContactEquations::begin(const CoupledStart& start, const Loop& newLoop) {
         else
             found = PlaceOnChain();
         packs[i] = found.pack;
-        leastResponses[i] = found.pack < 0 ? 0 : responses.findLeast(found.chain);
+        places[i].leastResponse = found.pack < 0 ? 0 : responses.findLeast(found.chain);
+        places[i].friction = found.pack < 0 ? LateralFriction() : start.places.findLateralFriction(found);
     });
     reaches[0] = REACH*diameter;
     reaches[1] = LEAST_REACH*diameter;
@@ -239,7 +239,7 @@ template <class Function> bool ContactEquations::markPairs(bool all, Function fi
 /** How far a unit force across a capsule moves a place on it in the step. */
 double ContactEquations::responseOf(int capsule, double fraction) const {
     const PlaceOnChain place = placeOf(capsule, fraction);
-    return place.pack < 0 ? 0 : responses.find(place);
+    return place.pack < 0 ? 0 : responses.find(place, places[capsule].friction);
 }
 
 /** a of a contact, see ContactRest. */
@@ -269,10 +269,21 @@ bool ContactEquations::waits(int number, const PairOutlook& outlook) {
     return true;
 }
 
+struct ContactEquations::Looks {
+    vector<const ContactPair*> due;
+    vector<int> numbers;
+    vector<PairOutlook> outlooks;
+    static Looks& ofThread() {
+        static thread_local Looks memory;
+        memory.due.clear();
+        memory.numbers.clear();
+        return memory;
+    }
+};
+
 /** Evaluate some pairs that may touch. */
 void ContactEquations::look(int run, bool first, Part& part) {
-    part.due.clear();
-    part.numbers.clear();
+    Looks& looks = Looks::ofThread();
     forPairs(selection.all, run, [&] (int i) {
         const CapsulePairs::Watch& watch = pairs.getWatch(i);
         motion.prefetchWay(watch.a, watch.b);
@@ -287,18 +298,16 @@ void ContactEquations::look(int run, bool first, Part& part) {
         if (pairs.hasContacts(i))
             prefetch(&pairs.getContact(i, 0));
         search->prefetchMotion(watch.a, watch.b);
-        for (int capsule : {watch.a, watch.b}) {
+        for (int capsule : {watch.a, watch.b})
             prefetch(&places[capsule]);
-            prefetch(&leastResponses[capsule]);
-        }
-        part.numbers.push_back(isDue ? i : -1-i);
+        looks.numbers.push_back(isDue ? i : -1-i);
         if (isDue)
-            part.due.push_back(&pairs.getPair(i));
+            looks.due.push_back(&pairs.getPair(i));
     });
-    part.outlooks.resize(part.due.size());
-    search->findOutlooks(part.due.data(), part.due.size(), part.outlooks.data());
-    const PairOutlook* next = part.outlooks.data();
-    for (int number : part.numbers)
+    looks.outlooks.resize(looks.due.size());
+    search->findOutlooks(looks.due.data(), looks.due.size(), looks.outlooks.data());
+    const PairOutlook* next = looks.outlooks.data();
+    for (int number : looks.numbers)
         if (number < 0)
             evaluate(-1-number, first, NULL, part);
         else if (const PairOutlook& outlook = *next++; !waits(number, outlook))
@@ -341,7 +350,7 @@ void ContactEquations::evaluate(int number, bool first, const PairOutlook* outlo
         PairContact& side = pairs.getContact(number, i);
         const Contact& contact = side.contact;
         if (!side.rest.isKnown()) {
-            double softness = stiffness*(leastResponses[pair.a]+leastResponses[pair.b]);
+            double softness = stiffness*(places[pair.a].leastResponse+places[pair.b].leastResponse);
             if (softness < 1)
                 softness = softnessOf(pair, contact);
             side.rest = ContactRest(softness, first ? max(contact.gap, -LARGEST_RETURN*diameter) : 0);
@@ -527,21 +536,20 @@ void ContactEquations::mark(int pair) {
 
 /** Find pairs that cross. */
 void ContactEquations::findCrossed(bool all, int run, Part& part) const {
-    part.due.clear();
-    part.numbers.clear();
+    Looks& looks = Looks::ofThread();
     forPairs(all, run, [&] (int i) {
         const CapsulePairs::Watch& watch = pairs.getWatch(i);
         if (motion.getWay(watch.a, watch.b) < watch.clearance)
             return;
         search->prefetchMotion(watch.a, watch.b);
-        part.numbers.push_back(i);
-        part.due.push_back(&pairs.getPair(i));
+        looks.numbers.push_back(i);
+        looks.due.push_back(&pairs.getPair(i));
     });
-    part.outlooks.resize(part.due.size());
-    search->findOutlooks(part.due.data(), part.due.size(), part.outlooks.data());
-    for (size_t i = 0; i < part.due.size(); i++)
-        if (part.outlooks[i].mayCross && search->crosses(*part.due[i]))
-            part.pairs.push_back(part.numbers[i]);
+    looks.outlooks.resize(looks.due.size());
+    search->findOutlooks(looks.due.data(), looks.due.size(), looks.outlooks.data());
+    for (size_t i = 0; i < looks.due.size(); i++)
+        if (looks.outlooks[i].mayCross && search->crosses(*looks.due[i]))
+            part.pairs.push_back(looks.numbers[i]);
 }
 
 /** Whether pairs cross elsewhere than where they were last seen to touch: they are looked at again. */

@@ -47,10 +47,14 @@ public:
     bool findCulprit(const double* moved, const CouplingEquation* equations, BrokenCoupling& culprit) const override;
     void findNeighbours(std::vector<std::pair<int, int> >& neighbours) const override;
 private:
-    /** Where a capsule is: its place at fraction 0, and by how much the fraction grows along it. */
+    /**
+     * Where a capsule is: its place at fraction 0, by how much the fraction grows along it, and what is needed to find
+     * how places on it respond to forces, with the least of these responses.
+     */
     struct CapsulePlace {
         PlaceOnChain place;
-        double direction;
+        double direction, leastResponse;
+        LateralFriction friction;
     };
     struct Part {
         std::vector<CouplingEquation> equations;
@@ -58,11 +62,9 @@ private:
         std::vector<int> contacts;
         /** Pairs that were crossed, or which were looked for. */
         std::vector<int> pairs;
-        /** Those that are looked at in lanes. */
-        std::vector<const ContactPair*> due;
-        std::vector<int> numbers;
-        std::vector<PairOutlook> outlooks;
     };
+    /** Pairs that are looked at in lanes, in memory of a thread. */
+    struct Looks;
     /**
      * The pairs that are looked at in an iteration: all, or those of few packs. Late iterations have few, and should
      * take no time for others.
@@ -109,9 +111,8 @@ private:
     PlaceResponses responses;
     double kT = 0, stepSize = 0, wallDepth = 0, reach = 0, reaches[2] = {};
     std::vector<CapsulePlace> places;
-    /** The packs of these places, and their least responses. */
+    /** The packs of these places. */
     std::vector<int> packs;
-    std::vector<double> leastResponses;
     CapsulePairs pairs;
     /** Those of the last search. */
     std::vector<ContactPair> found;
