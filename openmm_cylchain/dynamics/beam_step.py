@@ -30,8 +30,8 @@ def beam_time_step(
     With the length h of an element over the persistence length, eps = h k_B T/EI, and the friction zeta per length
     across it, that is ``dt = (zeta h^4/EI) min(0.0021/eps, 0.00002/eps^3)``: measured for chains of one and of three
     elements with eps from 0.05 to 1, see the page on beam elements. Fewer than one in a thousand steps of a chain are
-    divided at it. A step must also resolve the slowest relaxation of the filament, zeta/EI (L/4.73)^4, by 20 steps, and a
-    flow may strain the solvent by 0.03 in it.
+    divided at it. A step must also resolve the slowest relaxation of the filament, zeta/EI (L/4.73)^4, by 20 steps, and
+    a flow may strain the solvent by 0.03 in it.
 
     Parameters
     ----------

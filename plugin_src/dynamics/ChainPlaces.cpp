@@ -124,21 +124,18 @@ int ChainPlaces::getParticle(const PlaceOnChain& place) const {
     return chains[place.chain].nodes[place.node];
 }
 
-double ChainPlaces::getLateralFriction(const PlaceOnChain& place) const {
+LateralFriction ChainPlaces::findLateralFriction(const PlaceOnChain& place) const {
     if (isParticle(place.chain))
-        return particleOf(place.chain).friction;
+        return {particleOf(place.chain).friction, 0, 0, 0};
     if (isBeam(place.chain)) {
         // An element is moved as four Legendre polynomials of the place, of which the second turns it.
         const BeamChain& beam = getBeam(place.chain);
-        const double x = 2*ElementPlace::parameterOf(place.fraction)-1;
-        return beam.elementLength*beam.perpendicularFriction/(1+3*x*x);
+        const double whole = beam.elementLength*beam.perpendicularFriction;
+        return {0, whole, whole/12, 1, true};
     }
     const Chain& chain = chains[place.chain];
     const Segment& segment = chain.segments[place.node];
-    if (!(segment.perpendicular > 0 && segment.rotational > 0))
-        return chain.nodeFriction;
-    const double arm = (place.fraction-0.5)*segment.restLength;
-    return chain.nodeFriction+1/(1/segment.perpendicular+arm*arm/segment.rotational);
+    return {chain.nodeFriction, segment.perpendicular, segment.rotational, segment.restLength};
 }
 
 vector<int> ChainPlaces::getNodes(int chain) const {

@@ -47,8 +47,8 @@ void PlaceResponses::describe(double friction, double rigidity, Beam& beam) cons
     beam.least = min(beam.least, max(beam.bending, beam.whole));
 }
 
-double PlaceResponses::find(const PlaceOnChain& place) const {
-    const double alone = stepSize/places->getLateralFriction(place);
+double PlaceResponses::find(const PlaceOnChain& place, const LateralFriction& friction) const {
+    const double alone = stepSize/friction.at(place.fraction);
     if (place.chain >= (int) beams.size() || !(beams[place.chain].wave > 0))
         return alone;
     const Beam& beam = beams[place.chain];
