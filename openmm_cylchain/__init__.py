@@ -11,6 +11,7 @@ from .couplings.contact_frames import find_contacts
 from .couplings.contacts import add_exclusions, contact_force, crossing_barrier, excluded_pairs, share_exclusions
 from .couplings.crosslink_tables import CrosslinkTable
 from .couplings.crosslinks import Crosslinks
+from .couplings.joints import Joints
 from .couplings.pulling import ConstantVelocityPulling, change_constant_force, constant_force, constant_tension
 from .couplings.wall_points import random_points_on
 from .couplings.walls import Box, Cylinder, Ellipsoid, Plane, Slab, Sphere, filament_wall_force, wall_force
@@ -74,6 +75,7 @@ __all__ = [
     "FilamentReporter",
     "FilamentType",
     "Hand",
+    "Joints",
     "KINESIN_1",
     "LinkerReporter",
     "LinkerTable",

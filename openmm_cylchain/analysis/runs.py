@@ -12,7 +12,7 @@ import mdtraj
 import numpy as np
 import numpy.typing as npt
 
-from ..beams.curve import arc_lengths, curve_points
+from ..beams.curve import BeamElement, arc_lengths, curve_points
 from ..couplings.beam_curves import BeamCurves
 from ..couplings.contact_frames import ContactFrame, DescribedContactFinder, joined_contacts
 from ..couplings.crosslink_records import CROSSLINK_RECORD, CrosslinkFrame, crosslinks_at
@@ -57,6 +57,10 @@ class RunFilament:
         Nodes that do not move, counted along the filament.
     control_points : (n,) int array
         Particles of the control points of nodes of beam elements; empty of straight segments.
+    clamped_tangents : tuple of int
+        Nodes whose control points do not move.
+    planar : bool
+        Whether it stays in its plane z = const.
     """
 
     type: Any
@@ -65,6 +69,8 @@ class RunFilament:
     ring: bool
     clamped: tuple[int, ...] = ()
     control_points: IntArray = field(default_factory=lambda: np.zeros(0, dtype=int))
+    clamped_tangents: tuple[int, ...] = ()
+    planar: bool = False
 
     @property
     def segments(self) -> int:
@@ -75,6 +81,10 @@ class RunFilament:
     def has_beam_elements(self) -> bool:
         """Whether its segments are elements that bend inside."""
         return len(self.control_points) > 0
+
+    def beam_element(self, temperature: float) -> BeamElement:
+        """What its beam elements are made of at a temperature."""
+        return self.type.beam_element(temperature, self.planar)
 
     @property
     def pieces(self) -> int:
@@ -231,7 +241,14 @@ class Run:
     @cached_property
     def _contact_finders(self):
         own = self._description
-        filaments = {filament.nodes: number for number, filament in enumerate(own.filaments)}
+        filaments = {filament.nodes: (number, 1) for number, filament in enumerate(own.filaments)}
+        for contacts in own.contacts:
+            for particles, *_ in contacts.chains:
+                # Beads of beam elements come behind the nodes of their filament, and before those of the next one.
+                before = [i for i, one in enumerate(own.filaments) if one.nodes[0] < particles[0]]
+                if particles not in filaments and before:
+                    number = max(before, key=lambda i: own.filaments[i].nodes[0])
+                    filaments[particles] = number, (len(particles) - 1) // (len(own.filaments[number].nodes) - 1)
         return [DescribedContactFinder(contacts, filaments, own.particles, self.box) for contacts in own.contacts]
 
     def contacts(self, frame: int) -> ContactFrame:
@@ -437,8 +454,7 @@ class Run:
         return [total / len(frames) for total in totals]
 
     def _beam_tensions(self, own, nodes, control_points):
-        planar = bool(np.all(np.concatenate([nodes, control_points])[:, 2] == nodes[0, 2]))
-        element = own.type.beam_element(self.temperature, planar)
+        element = own.beam_element(self.temperature)
         return element.modulus * (arc_lengths(nodes, control_points) / element.length - 1.0 + element.shortening)
 
 
@@ -467,7 +483,9 @@ def _frames_of(description):
 
 def _filament(own: DescribedFilament) -> RunFilament:
     nodes, control_points = (np.array(particles, dtype=int) for particles in (own.nodes, own.control_points))
-    return RunFilament(own.type, nodes, own.diameter, own.ring, own.clamped, control_points)
+    return RunFilament(
+        own.type, nodes, own.diameter, own.ring, own.clamped, control_points, own.clamped_tangents, own.planar
+    )
 
 
 def load(path: str | Path, incomplete: bool = False) -> Run:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..filaments.beam_refusals import refuse_beams
+from ..beams.curve import beam_virial
 from ..filaments.placement import joint_stiffnesses
 from ..mechanics.geometry import segment_vectors
 from ..units.quantities import thermal_energy
@@ -22,7 +22,7 @@ class Stress:
     linkers : of springs with both hands bound
     crosslinks : of those that are on and join filaments or particles
     contacts : of segments that touch each other or spheres
-    ideal : -n k_BT/V on the diagonal, of n nodes that move freely
+    ideal : -n k_BT/V on the diagonal, of n nodes (of beam elements, and control points) that move along that axis
     """
 
     chains: FloatArray
@@ -42,7 +42,8 @@ def stress(run: Run, frame: int, volume: Scalar | None = None) -> Stress:
 
     r is the vector of a segment, of a spring or between the axes at a contact, and f the force with which it pulls at
     its first end; that of a segment holds stretching and bending, so that ``V sigma`` is the derivative of the energy
-    by an affine strain. It is that of the configuration at one time: its average over frames is the stress.
+    by an affine strain; of beam elements, by one of their nodes and control points. It is that of the configuration at
+    one time: its average over frames is the stress.
 
     What acts from outside is not in it: walls, tethers, anchors, crosslinks to fixed points, friction in a flow. In
     equilibrium within walls, the stress is what the walls hold: its trace is -3 times their mean pressure. Nor are
@@ -62,26 +63,32 @@ def stress(run: Run, frame: int, volume: Scalar | None = None) -> Stress:
     Raises
     ------
     InputError
-        Without a periodic box and a volume; for beam elements; with contacts, if the compiled engine is missing.
+        Without a periodic box and a volume; with contacts, if the compiled engine is missing.
 
     Warns
     -----
     PrecisionWarning
         If positions are far from the origin, see ``load``.
     """
-    refuse_beams(run.filaments, "the stress of a run")
     room = volume_of(run, volume)
     run.warn_of_rounding()
-    chains, free = np.zeros((3, 3)), 0
-    for own, nodes in zip(run.filaments, run.nodes(frame)):
-        chains += _virial_of_chain(own, nodes)
-        free += len(nodes) - len(own.clamped)
+    chains, free = np.zeros((3, 3)), np.zeros(3)
+    positions = run.positions(frame)
+    for own in run.filaments:
+        if own.has_beam_elements:
+            chains += beam_virial(
+                positions[own.nodes], positions[own.control_points], own.beam_element(run.temperature)
+            )
+        else:
+            chains += _virial_of_chain(own, positions[own.nodes])
+        moving = len(own.nodes) + len(own.control_points) - len(own.clamped) - len(own.clamped_tangents)
+        free += moving * np.array([1.0, 1.0, 0.0 if own.planar else 1.0])
     linkers = run.linkers[frame]
     linkers = linkers[(linkers["filaments"] >= 0).all(axis=1)]
     crosslinks = run.crosslinks(frame)
     joining = crosslinks.active & ~crosslinks.at_points
     contacts = run.contacts(frame)
-    ideal = -free * thermal_energy(run.temperature) * np.eye(3)
+    ideal = -thermal_energy(run.temperature) * np.diag(free)
     return Stress(
         chains=chains / room,
         linkers=_virial_of_springs(linkers["places"], linkers["tension"]) / room,

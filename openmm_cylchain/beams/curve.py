@@ -17,6 +17,10 @@ _GAUSS_PLACES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)
 _GAUSS_PLACES, _GAUSS_WEIGHTS = 0.5 * (1.0 + _GAUSS_PLACES), 0.5 * _GAUSS_WEIGHTS
 
 
+_STRAIN = 1e-6
+"""Of differences."""
+
+
 @dataclass(frozen=True)
 class BeamElement:
     """What an element is made of.
@@ -75,6 +79,11 @@ def _hermite(places, derivative):
 def place_weights(places: npt.ArrayLike) -> FloatArray:
     """Weights of P and Q - P of the first node of an element and of the second one at places from 0 to 1: (..., 4)."""
     return _hermite(np.asarray(places, dtype=float), False)
+
+
+def slope_weights(places: npt.ArrayLike) -> FloatArray:
+    """Weights, as ``place_weights``, of the derivative of a place by its parameter: (..., 4)."""
+    return _hermite(np.asarray(places, dtype=float), True)
 
 
 def particle_weights(place: float) -> tuple[float, float, float, float]:
@@ -146,3 +155,26 @@ def element_energies(
     inner = length - 1.0 - bow / 40.0 + turn**2 / 480.0 + 1.5 * element.shortening
     ends = (strain[..., :-1] ** 2 + strain[..., 1:] ** 2) / 6.0
     return 0.5 * element.modulus * h * (ends + 2.0 / 3.0 * inner**2), bending
+
+
+def beam_virial(nodes: FloatArray, control_points: FloatArray, element: BeamElement) -> FloatArray:
+    """The derivative of the energy of a chain by an affine strain of its nodes and control points: (3, 3) in kJ/mol.
+
+    By central differences of strains of 1e-6, in which energies are nearly quadratic; component (i, j) is the sum over
+    particles of r_i dE/dr_j.
+
+    Parameters
+    ----------
+    nodes, control_points : (nodes, 3) arrays
+        In nm.
+    element : BeamElement
+    """
+    strains = _STRAIN * np.eye(9).reshape(9, 3, 3)
+    particles = np.stack([nodes, control_points]) - nodes[0]
+
+    def energies(signed):
+        points, controls = particles[:, None] + particles[:, None] @ signed
+        stretching, bending = element_energies(points, controls, element)
+        return stretching.sum(axis=-1) + bending.sum(axis=-1)
+
+    return (energies(strains) - energies(-strains)).reshape(3, 3) / (2.0 * _STRAIN)

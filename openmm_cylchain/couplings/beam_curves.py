@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import openmm
 
-from ..beams.curve import place_weights
+from ..beams.curve import place_weights, slope_weights
 from ..engine_choice import load_plugin
 from ..mechanics.geometry import to_nearest_images
 from ..units.types import BoolArray, FloatArray, IntArray
@@ -68,9 +68,35 @@ class BeamCurves:
         box : (3, 3) array, optional
             Of which to take the nearest images of neighbouring particles.
         """
+        weights, vectors, chord, turned = self._on_elements(place_weights, first, second, fractions, positions, box)
+        moved = sum(weight[:, None] * vector for weight, vector in zip(weights.T[1:], vectors))
+        # With a box, places are near the first of the two nodes that are given.
+        return positions[first] + moved - np.where(turned[:, None], chord, 0.0)
+
+    def tangents(
+        self,
+        first: IntArray,
+        second: IntArray,
+        fractions: FloatArray,
+        positions: FloatArray,
+        box: FloatArray | None = None,
+    ) -> FloatArray:
+        """Unit vectors along curves at places, from the first node of each towards the second: (n, 3).
+
+        Parameters
+        ----------
+        first, second, fractions, positions, box
+            As for ``places``.
+        """
+        weights, vectors, _, turned = self._on_elements(slope_weights, first, second, fractions, positions, box)
+        slopes = sum(weight[:, None] * vector for weight, vector in zip(weights.T[1:], vectors))
+        return np.where(turned, -1.0, 1.0)[:, None] * slopes / np.linalg.norm(slopes, axis=1, keepdims=True)
+
+    def _on_elements(self, weights_of, first, second, fractions, positions, box):
+        # Weights (n, 4), the vectors that the last three belong to, chords, and which were given from the second node.
         turned = self._next[first] != second
         minus, plus = np.where(turned, second, first), np.where(turned, first, second)
-        weights = place_weights(np.where(turned, 1.0 - fractions, fractions))
+        weights = weights_of(np.where(turned, 1.0 - fractions, fractions))
 
         def between(start, end):
             vectors = positions[end] - positions[start]
@@ -78,6 +104,4 @@ class BeamCurves:
 
         chord = between(minus, plus)
         vectors = between(minus, self._controls[minus]), chord, between(plus, self._controls[plus])
-        moved = sum(weight[:, None] * vector for weight, vector in zip(weights.T[1:], vectors))
-        # With a box, places are near the first of the two nodes that are given.
-        return positions[first] + moved - np.where(turned[:, None], chord, 0.0)
+        return weights, vectors, chord, turned

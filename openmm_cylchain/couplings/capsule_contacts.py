@@ -9,7 +9,7 @@ import openmm
 
 from ..engine_choice import available_engines, choose_engine
 from ..errors import ContactWarning, InputError
-from ..filaments.beam_refusals import refuse_beams
+from ..filaments.chain_type import ChainType
 from ..filaments.collection import FilamentCollection
 from ..units.quantities import LENGTH, STIFFNESS, positive, thermal_energy, whole_number
 from ..units.types import Indices, Numbers, Scalar
@@ -19,6 +19,9 @@ from .planar_crossings import find_planar_crossing
 CAPSULE_BARRIER = 40.0
 """Energy of two capsules whose axes meet in k_B T, with the stiffness that ``default_capsule_stiffness`` gives."""
 
+_LEAST_PIECES = 4
+_DEEPEST_BOW = 0.1
+
 # Along the contour, in diameters. Segments that are nearer do not touch each other.
 _EXCLUDED_DIAMETERS = 2.0
 
@@ -26,6 +29,19 @@ _EXCLUDED_DIAMETERS = 2.0
 def default_capsule_stiffness(diameter: Scalar, temperature: Scalar) -> float:
     """Stiffness of a contact that two filaments cross for 40 k_B T: k = 80 k_B T/d^2, in kJ/(mol nm^2)."""
     return 2.0 * CAPSULE_BARRIER * thermal_energy(temperature) / positive(diameter, LENGTH, "diameter") ** 2
+
+
+def contact_spacing(filament_type: ChainType, diameter: Scalar, temperature: Scalar) -> float:
+    """Spacing of the beads of a filament of beam elements, in nm, with which its capsules are on its curve.
+
+    An element of length h that bends by the angle a is ``h a/(8 n^2)`` away from the n straight pieces between its
+    beads. That is a tenth of the diameter at most, for the angle of thermal fluctuations, ``(2 h k_B T/EI)^(1/2)``; at
+    least four pieces.
+    """
+    element = filament_type.beam_element(temperature)
+    angle = math.sqrt(2.0 * element.length * thermal_energy(temperature) / element.rigidity)
+    deepest = _DEEPEST_BOW * positive(diameter, LENGTH, "diameter")
+    return element.length / max(_LEAST_PIECES, math.ceil(math.sqrt(element.length * angle / (8.0 * deepest))))
 
 
 def capsule_contact_force(
@@ -49,13 +65,17 @@ def capsule_contact_force(
     both ends of their overlap with k/2 each. What neighbouring segments see of one thing counts once, so that nothing
     is felt of joints. Forces act on the ends of segments, in proportion to where they touch.
 
+    A filament of beam elements is covered by the capsules between its neighbouring beads (``Filaments.add_beads``),
+    which are on its curve: straight pieces, n of each element. An element that bends by the angle a is up to
+    ``h a/(8 n^2)`` away from them. Forces act on its nodes and control points as on those of the beads' places.
+
     The implicit schemes have it in their equations, and divide a step in which filaments would cross; others take it at
     the start of a step. ``Filaments.recommended_time_step(system=system)`` says which step it allows.
 
     Parameters
     ----------
     filaments : Filaments
-        In the System. They need no beads.
+        In the System. Those of beam elements have beads, others need none.
     system : openmm.System
         With all of its particles. The force is not added to it.
     diameter : length, or (filaments,) array of lengths
@@ -83,7 +103,8 @@ def capsule_contact_force(
     ------
     InputError
         If the compiled engine is missing, a particle does not exist or is one of the filaments', a diameter or
-        stiffness is not positive, or the box is narrower than twice a segment with its diameter.
+        stiffness is not positive, the box is narrower than twice a segment with its diameter, or a filament of beam
+        elements has no beads.
 
     Warns
     -----
@@ -99,7 +120,7 @@ def capsule_contact_force(
     sphere_diameters = particle_diameters(particles, particle_diameter)
     if not len(diameters):
         raise InputError("There are no filaments that could touch.")
-    refuse_beams(filaments, "contacts of capsules")
+    _require_beads(filaments, diameters)
     if stiffness is None:
         if filaments.temperature == 0.0:
             raise InputError("At a temperature of zero, a contact needs a stiffness.")
@@ -114,12 +135,13 @@ def capsule_contact_force(
     _warn_of_planar_crossing(filaments, _box_vectors(system) if periodic else None)
     force = plugin.CylinderChainContactForce(stiffness)
     force.setUsesPeriodicBoundaryConditions(periodic)
-    for filament, nodes, value in zip(filaments, filaments.node_indices, diameters):
+    for number, (filament, value) in enumerate(zip(filaments, diameters)):
         neighbors = excluded_neighbors
         if neighbors is None:
-            shortest = filament.type.segment_lengths(filament.segments, filament.closed).min()
+            shortest = _capsule_lengths(filaments, number).min()
             neighbors = max(1, math.ceil(_EXCLUDED_DIAMETERS * value / shortest - 1e-9))
-        force.addChain([int(node) for node in nodes], float(value), neighbors, filament.closed)
+        ends = filaments.bead_indices if filament.type.has_beam_elements else filaments.node_indices
+        force.addChain([int(end) for end in ends[number]], float(value), neighbors, filament.closed)
     for particle, value in zip(spheres, sphere_diameters):
         force.addSphere(int(particle), float(value))
     return force
@@ -136,6 +158,24 @@ def as_capsule_contact_force(force: openmm.Force) -> Any | None:
     return plugin.CylinderChainContactForce.cast(force)
 
 
+def _require_beads(filaments, diameters):
+    for number, (filament, beads) in enumerate(zip(filaments, filaments.bead_indices)):
+        if filament.type.has_beam_elements and not len(beads):
+            spacing = contact_spacing(filament.type, diameters[number], filaments.temperature)
+            raise InputError(
+                f"Filament {number} ({filament.type.name}) has beam elements, whose capsules lie between beads on its "
+                f"curve: call filaments.add_beads({number}, {spacing:g}) before the filaments are built."
+            )
+
+
+def _capsule_lengths(filaments, number):
+    filament = filaments[number]
+    lengths = filament.type.segment_lengths(filament.segments, filament.closed)
+    if not filament.type.has_beam_elements:
+        return lengths
+    return lengths * (filament.segments / (len(filaments.bead_indices[number]) - 1))
+
+
 def _box_vectors(system):
     return np.array([edge._value for edge in system.getDefaultPeriodicBoxVectors()])
 
@@ -144,7 +184,7 @@ def _check_box(system, filaments, diameter):
     a, b, c = _box_vectors(system)
     volume = abs(np.dot(a, np.cross(b, c)))
     narrowest = min(volume / np.linalg.norm(np.cross(*pair)) for pair in ((b, c), (c, a), (a, b)))
-    longest = max(float(one.type.segment_lengths(one.segments, one.closed).max()) for one in filaments)
+    longest = max(float(_capsule_lengths(filaments, number).max()) for number in range(len(filaments)))
     needed = 2.0 * (longest + diameter)
     if narrowest < needed:
         raise InputError(

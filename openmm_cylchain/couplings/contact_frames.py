@@ -103,7 +103,8 @@ class DescribedContactFinder:
     ----------
     contacts : DescribedContacts
     filaments : dict
-        Their numbers by their nodes.
+        By the particles at which the segments of their capsules end, the number of each filament, and of how many
+        capsules a segment is made: one, or several of a beam element.
     particles : int
         Of the System.
     box : (3, 3) array in nm, or None
@@ -112,7 +113,7 @@ class DescribedContactFinder:
     def __init__(
         self,
         contacts: DescribedContacts,
-        filaments: Mapping[tuple[int, ...], int],
+        filaments: Mapping[tuple[int, ...], tuple[int, int]],
         particles: int,
         box: FloatArray | None,
     ) -> None:
@@ -120,7 +121,8 @@ class DescribedContactFinder:
         from .. import plugin
 
         # Behind the last chain stands what spheres have.
-        self._filaments = np.array([*(filaments.get(nodes, -1) for nodes, *_ in contacts.chains), -1])
+        owners = [*(filaments.get(nodes, (-1, 1)) for nodes, *_ in contacts.chains), (-1, 1)]
+        self._filaments, self._pieces = np.array(owners).T
         self._force: Any = plugin.CylinderChainContactForce(contacts.stiffness)
         for nodes, diameter, neighbors, ring in contacts.chains:
             self._force.addChain(list(nodes), diameter, neighbors, ring)
@@ -145,7 +147,13 @@ class DescribedContactFinder:
         """The contacts at positions (particles, 3) in nm."""
         self._context.setPositions(positions)
         found = find_contacts(self._force, self._context)
-        return replace(found, filaments=self._filaments[found.filaments])
+        pieces = self._pieces[found.filaments]
+        return replace(
+            found,
+            filaments=self._filaments[found.filaments],
+            segments=found.segments // pieces,
+            fractions=(found.segments % pieces + found.fractions) / pieces,
+        )
 
 
 def joined_contacts(frames: list[ContactFrame]) -> ContactFrame:

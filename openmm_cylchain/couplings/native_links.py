@@ -59,11 +59,14 @@ class NativeLinks(LinkStore):
 
     @classmethod
     def of_force(cls, force: openmm.Force, order: int | None = None) -> "NativeLinks | None":
-        """Those of a force of a System, or None if it is no such force, or its links differ in their potential."""
+        """Those of a force of a System; None if it is no such force, joins tangents, or has several potentials."""
         if not is_link_force(force):
             return None
         plugin = load_plugin()
         own = plugin.CylinderChainLinkForce.cast(force)
+        if own.getJoinsTangents():
+            # They are Joints.
+            return None
         models, links = own.getStretchingModelNames(), own.getLinks()
         number, rest, stiffness, extension = (getattr(one, "_value", one) for one in own.getDefaultLinkParameters())
         if not stiffness and links[0]:

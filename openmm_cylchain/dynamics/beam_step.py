@@ -1,19 +1,18 @@
 """The recommended step of filaments of beam elements."""
 
-import numpy as np
-
 from ..errors import InputError
 from ..filaments.chain_type import ChainType
 from ..mechanics.flow import Flow
 from ..mechanics.friction import SegmentFriction
 from ..units.quantities import thermal_energy
 from ..units.types import Scalar
-from .time_step import TimeStep
+from .time_step import RECOMMENDED_STRAIN, TimeStep, strain_rate
 
 _LINEAR, _CUBIC = 0.0021, 2e-5
 _RELAXATION_STEPS = 20.0
 _REASONS = {
     "bends": "bends of beam elements, which turn as they fluctuate",
+    "flow": f"flow, which may strain the solvent by {RECOMMENDED_STRAIN:g} in a step",
     "relaxation": f"relaxation of the whole filament, which takes {_RELAXATION_STEPS:g} steps",
 }
 
@@ -31,7 +30,8 @@ def beam_time_step(
     With the length h of an element over the persistence length, eps = h k_B T/EI, and the friction zeta per length
     across it, that is ``dt = (zeta h^4/EI) min(0.0021/eps, 0.00002/eps^3)``: measured for chains of one and of three
     elements with eps from 0.05 to 1, see the page on beam elements. Fewer than one in a thousand steps of a chain are
-    divided at it. A step must also resolve the slowest relaxation of the filament, zeta/EI (L/4.73)^4, by 20 steps.
+    divided at it. A step must also resolve the slowest relaxation of the filament, zeta/EI (L/4.73)^4, by 20 steps, and
+    a flow may strain the solvent by 0.03 in it.
 
     Parameters
     ----------
@@ -48,12 +48,10 @@ def beam_time_step(
     Raises
     ------
     InputError
-        For another scheme, or a solvent that flows.
+        For another scheme.
     """
     if scheme != "implicit":
         raise InputError(f"Beam elements ({filament_type.name!r}) move with scheme 'implicit' alone, not {scheme!r}.")
-    if flow is not None and (np.any(flow.velocity) or np.any(flow.gradient)):
-        raise InputError(f"Beam elements ({filament_type.name!r}) are for a solvent at rest as yet, without flow.")
     element = filament_type.beam_element(temperature)
     h, kT = element.length, thermal_energy(temperature)
     rate = element.rigidity / (friction.perpendicular / h)
@@ -62,5 +60,8 @@ def beam_time_step(
     if kT > 0.0:
         bend = h * kT / element.rigidity
         bounds["bends"] = allowed["bends"] = h**4 / rate * min(_LINEAR / bend, _CUBIC / bend**3)
+    strain = 0.0 if flow is None else strain_rate(flow)
+    if strain > 0.0:
+        bounds["flow"] = allowed["flow"] = RECOMMENDED_STRAIN / strain
     binding = min(allowed, key=allowed.__getitem__)
     return TimeStep(allowed[binding], _REASONS[binding], bounds, allowed)

@@ -104,9 +104,11 @@ class CompiledEngine(Engine):
                 _add_beam_chain(force, filament, nodes, controls, placed.viscosity, placed.temperature)
             else:
                 _add_chain(force, filament, nodes, placed.viscosity, placed.temperature)
+        chains = _chain_numbers(placed.filaments)
         for tether in placed.tethers:
-            chain = _chain_numbers(placed.filaments)[tether.filament]
-            force.addTether(chain, tether.node, openmm.Vec3(*tether.point), tether.stiffness)
+            beam = placed.filaments[tether.filament].type.has_beam_elements
+            add = force.addBeamTether if beam else force.addTether
+            add(chains[tether.filament], tether.node, openmm.Vec3(*tether.point), tether.stiffness)
         system.addForce(force)
         if placed.linkers:
             box = None
@@ -155,10 +157,9 @@ class CompiledEngine(Engine):
         for force in context.getSystem().getForces():
             if CylinderChainForce.isinstance(force):
                 force = CylinderChainForce.cast(force)
-                chains = _chain_numbers(placed.filaments)
-                _set_tethers(force, tethers, chains)
+                _set_tethers(force, tethers, placed)
                 force.updateParametersInContext(context)
-                _set_tethers(force, {number: placed.tethers[number] for number in tethers}, chains)
+                _set_tethers(force, {number: placed.tethers[number] for number in tethers}, placed)
 
     def record_tensions(self, context):
         """See ``NativeIntegrator.setRecordsTensions``."""
@@ -195,10 +196,16 @@ def _chain_numbers(filaments):
     return numbers
 
 
-def _set_tethers(force, tethers, chains):
+def _set_tethers(force, tethers, placed):
+    chains = _chain_numbers(placed.filaments)
+    # The force has those of beam elements in a list of their own, as it has their chains.
+    of_beams = np.array([placed.filaments[one.filament].type.has_beam_elements for one in placed.tethers])
     for number, tether in tethers.items():
+        beam = of_beams[number]
+        own = int(np.sum(of_beams[:number] == beam))
+        set_parameters = force.setBeamTetherParameters if beam else force.setTetherParameters
         point = openmm.Vec3(*tether.point)
-        force.setTetherParameters(number, chains[tether.filament], tether.node, point, tether.stiffness)
+        set_parameters(own, chains[tether.filament], tether.node, point, tether.stiffness)
 
 
 def _flow_of_integrator(integrator):

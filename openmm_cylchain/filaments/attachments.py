@@ -182,7 +182,8 @@ def attachment_positions(
 def distribute_beads(filament: Filament, number: int, spacing: float) -> list[Attachment]:
     """Attachments at equal distances along segments of rest length, the first and the last node of a chain included.
 
-    In a ``BeadSpringType``, whose end bonds are shorter, they are closer to each other there.
+    In a ``BeadSpringType``, whose end bonds are shorter, they are closer to each other there. On beam elements, there
+    is one at each node, so that the pieces of curve between neighbours belong to one element each.
 
     Parameters
     ----------
@@ -197,7 +198,11 @@ def distribute_beads(filament: Filament, number: int, spacing: float) -> list[At
     list of Attachment
     """
     contour = filament.segments * filament.type.segment_length
-    intervals = max(1, math.ceil(contour / spacing * (1.0 - 1e-12)))
+    if filament.type.has_beam_elements:
+        pieces = max(1, math.ceil(filament.type.segment_length / spacing * (1.0 - 1e-12)))
+        intervals = filament.segments * pieces
+    else:
+        intervals = max(1, math.ceil(contour / spacing * (1.0 - 1e-12)))
     # In a ring, the last place would be the first once more.
     count = intervals if filament.closed else intervals + 1
     places = filament.segments * np.arange(count) / intervals

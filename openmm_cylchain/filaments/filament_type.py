@@ -114,7 +114,7 @@ class FilamentType(ChainType):
     lengths, ``extension_relaxation_time``, ``extensional_friction`` or rotational end correction: leave them out. Of a
     persistence length, EI is such that tangents of neighbouring nodes have ``<t.t'> = exp(-l0/l_p)`` in space: less
     than l_p k_B T, by 1 % where an element is a tenth of l_p long, and by 3 % where it is a quarter. The compiled
-    engine alone has them, with scheme "implicit", in a solvent at rest.
+    engine alone has them, with scheme "implicit".
 
     A type keeps the persistence length as ``bending_rigidity`` a = l_p k_B T, the rigidity of the continuous filament,
     with the ``temperature``: the two together mean the same as l_p = a/k_B T with the temperature. So

@@ -135,12 +135,15 @@ def warn_if_springs_do_not_fit(kind: Crosslinker, temperature: Scalar) -> None:
     width = math.sqrt(thermal_energy(temperature) / kind.stiffness)
     reach = max(hand.reach for hand in kind.hands if hand.binding_rate > 0.0) if _any_binds(kind) else 0.0
     if reach > LARGEST_REACH_OF_WIDTH * width:
+        shorter = (
+            f"; or, if that is what is meant, a reach of about {4.0 * width:.3g} nm with a binding_rate smaller in "
+            "proportion"
+        )
         warnings.warn(
             f"Linkers {kind.name!r}: a reach of {reach:.4g} nm is far beyond what their spring allows: with the "
             f"stiffness {kind.stiffness:.4g} kJ/(mol nm^2) and no rest length, its thermal extension is {width:.3g} "
             f"nm, so that hands bind to hardly anything farther than {3.0 * width:.3g} nm away. Give it a rest_length, "
-            "as long as the linker is, or a smaller stiffness; or, if that is what is meant, a reach of about "
-            f"{4.0 * width:.3g} nm with a binding_rate smaller in proportion.",
+            f"as long as the linker is, or a smaller stiffness{shorter if width > 0.0 else ''}.",
             LinkerWarning,
             stacklevel=3,
         )

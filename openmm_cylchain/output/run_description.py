@@ -33,6 +33,10 @@ class DescribedFilament:
         Nodes that do not move, counted along the filament.
     control_points : tuple of int
         Particles of the control points of nodes of beam elements.
+    clamped_tangents : tuple of int
+        Nodes of beam elements whose control points do not move.
+    planar : bool
+        Whether it stays in its plane z = const.
     """
 
     type: ChainType
@@ -40,6 +44,8 @@ class DescribedFilament:
     ring: bool = False
     clamped: tuple[int, ...] = ()
     control_points: tuple[int, ...] = ()
+    clamped_tangents: tuple[int, ...] = ()
+    planar: bool = False
 
     @property
     def diameter(self) -> float:
@@ -148,7 +154,12 @@ class RunDescription:
                     "nodes": own.nodes,
                     "ring": own.ring,
                     "clamped": own.clamped,
-                    **({"control_points": own.control_points} if own.control_points else {}),
+                    "planar": own.planar,
+                    **(
+                        {"control_points": own.control_points, "clamped_tangents": own.clamped_tangents}
+                        if own.control_points
+                        else {}
+                    ),
                 }
                 for own in self.filaments
             ],
@@ -182,6 +193,8 @@ def read_run_description(path: Path) -> RunDescription:
                 own["ring"],
                 tuple(own["clamped"]),
                 tuple(own.get("control_points", ())),
+                tuple(own.get("clamped_tangents", ())),
+                own.get("planar", False),
             )
             for own in content["filaments"]
         )

@@ -11,7 +11,7 @@ from openmm import app, unit
 from scipy.spatial import cKDTree
 
 from ..beams.curve import curve_points, element_points
-from ..couplings.capsule_contacts import capsule_contact_force
+from ..couplings.capsule_contacts import capsule_contact_force, contact_spacing
 from ..couplings.crosslinks import Crosslinks
 from ..couplings.pulling import constant_force, constant_tension
 from ..couplings.walls import filament_wall_force, wall_force
@@ -147,6 +147,11 @@ def place_filaments(configuration, engine, seed, linkers=True):
             number = len(filaments)
             places = np.random.default_rng([seed, number, 1])
             _add(filaments, group, *_nodes(group, index, solvent.temperature, seed, number, places, box, centers))
+    if configuration.contacts is not None:
+        for number, filament in enumerate(filaments):
+            if filament.type.has_beam_elements:
+                diameter = configuration.contacts.diameter
+                filaments.add_beads(number, contact_spacing(filament.type, diameter, solvent.temperature))
     for own in configuration.tethers:
         for number in own.filaments:
             point = filaments[number].positions[own.node] if own.point is None else own.point

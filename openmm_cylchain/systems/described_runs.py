@@ -72,7 +72,15 @@ def describe_system(
         steps_per_frame=steps_per_frame,
         particles=system.getNumParticles(),
         filaments=tuple(
-            DescribedFilament(own.type, tuple(nodes.tolist()), own.closed, tuple(own.clamped), tuple(controls.tolist()))
+            DescribedFilament(
+                own.type,
+                tuple(nodes.tolist()),
+                own.closed,
+                tuple(own.clamped),
+                tuple(controls.tolist()),
+                tuple(own.clamped_tangents),
+                own.planar,
+            )
             for own, nodes, controls in zip(filaments, filaments.node_indices, filaments.control_point_indices)
         ),
         box=None if box is None else tuple(tuple(float(edge) for edge in vector) for vector in box),

@@ -369,7 +369,7 @@ class Filaments:
         Scheme "implicit" takes tethers at the end of the step, like the filament's own forces, so they may be as stiff
         as a segment. The explicit schemes, and other OpenMM forces in all schemes, need a step well below
         2 gamma/k, where gamma is the friction of what the spring pulls, at least a quarter of a segment's parallel
-        friction per segment that meets in the node.
+        friction per segment that meets in the node. A node of beam elements is held at its position, and can turn.
 
         Parameters
         ----------
@@ -393,7 +393,6 @@ class Filaments:
         label = f"Tether {len(self._tethers)}"
         self._refuse_if_built(label)
         filament = self._filament_number(filament, label)
-        self._refuse_beam(filament, f"{label}: tethers", "a CustomExternalForce acts on particles of node_indices")
         (node,) = named_nodes([node], len(self[filament].positions), f"{label}:")
         if (filament, node) in self._tethered_nodes:
             raise InputError(f"{label}: node {node} of filament {filament} has a tether already.")
@@ -772,9 +771,10 @@ class Filaments:
         """The recommended step, and what binds: a TimeStep, which ``create_integrator`` takes.
 
         It is that of the filament that allows the least (see ``timestep``), and, if a System is given, of its forces:
-        crosslinks and capsule contacts of the compiled engine are in the equations of its implicit schemes, and bind
-        the step only as the places that they join or keep apart diffuse against each other (see ``coupled_step``). All
-        others act from the start of a step, and a spring of the stiffness k on a place of the response mu h to a force
+        crosslinks, joints and capsule contacts of the compiled engine are in the equations of its implicit schemes.
+        Joints do not bind the step; the others do only as the places that they join or keep apart diffuse against each
+        other (see ``coupled_step``). All others act from the start of a step, and a spring of the stiffness k on a
+        place of the response mu h to a force
         in a step h has a variance too large by 1/(1 - k mu h/2). mu h is that of the place on the straight filament
         (see ``mobility``), or h/gamma of a particle. The step leaves 5 % at most, with all forces at once. Known are
         HarmonicBondForce, crosslinks, walls, contacts, constant forces, tethers, and CustomBondForce and
@@ -910,8 +910,6 @@ class Filaments:
         flow = as_flow(flow)
         if scheme != "implicit":
             refuse_beams(self, f"scheme {scheme!r}")
-        if flow != Flow():
-            refuse_beams(self, "a solvent that flows")
         bath = self._bath(temperature)
         if checks:
             warn_of_long_step(self, system, step_size, scheme, bath, particle_friction, flow)
@@ -1127,10 +1125,6 @@ class Filaments:
                 f"but is {shown(filament_type)}."
             )
         return f"Filament {len(self)} ({filament_type.name})"
-
-    def _refuse_beam(self, filament, what, instead="give its type element='straight'"):
-        if self[filament].type.has_beam_elements:
-            raise InputError(f"{what} cannot be on filament {filament}, which has beam elements, as yet: {instead}.")
 
     @staticmethod
     def _given_control_points(filament_type, positions, tangents, control_points, label):

@@ -35,12 +35,11 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import openmm
 
-from ..dynamics.recommended_step import implicit_time_step
+from ..dynamics.recommended_step import recommended_time_step
 from ..dynamics.schemes import check_scheme
 from ..dynamics.time_step import TimeStep, as_step
 from ..engine_choice import default_scheme
 from ..errors import InputError, InstabilityError
-from ..filaments.beam_refusals import refuse_beams
 from ..mechanics.flow import Flow
 from ..units.quantities import DIMENSIONLESS, positive, thermal_energy, whole_number
 from ..units.text import format_time
@@ -75,11 +74,11 @@ def check_time_step(
 ) -> StepCheck:
     """Run a System with a step and with half of it, and say whether the step is right.
 
-    Compared are, for each kind of filament, the mean energies of stretching (per segment) and bending (per joint), the
-    mean square end-to-end distance (of rings: the distance across), how far the three slowest bending modes and the
-    middle of a filament move in ten steps, and the mean energies of tethers and of each other force of the System. The
-    first quarter of the runs is left out. See ``step_check`` for errors, their standard errors, the verdicts and what
-    the check cannot see.
+    Compared are, for each kind of filament, the mean energies of stretching (per segment) and bending (per joint), of
+    beams per element, the mean square end-to-end distance (of rings: the distance across), how far the three slowest
+    bending modes and the middle of a filament move in ten steps, and the mean energies of tethers and of each other
+    force of the System. The first quarter of the runs is left out. See ``step_check`` for errors, their standard
+    errors, the verdicts and what the check cannot see.
 
     The System is copied. What is not part of it, such as crosslinks that a Crosslinks object adds and removes, stays as
     it is in the System.
@@ -124,13 +123,11 @@ def check_time_step(
     InputError
         At a temperature of zero, or as ``Filaments.create_integrator``.
     """
-    refuse_beams(filaments, "the check of a step")
     step = as_step(step_size)
     scheme = default_scheme(filaments.engine) if scheme is None else scheme
     check_scheme(scheme)
     bath = filaments.temperature if temperature is None else temperature
-    kT = thermal_energy(bath)
-    if kT == 0.0:
+    if thermal_energy(bath) == 0.0:
         raise InputError("At a temperature of zero there are no averages to compare: check a warmer System.")
     if levels not in WEIGHTS:
         raise InputError(f"levels must be 2 or 3, but is {levels!r}.")
@@ -140,7 +137,7 @@ def check_time_step(
     else:
         frames = whole_number(frames, 2, "frames")
     settings = {"scheme": scheme, "temperature": temperature, "particle_friction": particle_friction, "flow": flow}
-    probe = Probe(filaments, system, kT)
+    probe = Probe(filaments, system, bath)
     paired = filaments.engine == "compiled"
     runs = [
         _Run(filaments, probe, positions, step, level, random_seed, paired, settings, platform, properties)
@@ -239,6 +236,8 @@ def _slowest_relaxation(kinds, filaments, temperature):
     # In ps.
     longest = 0.0
     for one in (kind.filament for kind in kinds):
-        bounds = implicit_time_step(one.type, filaments.viscosity, temperature, one.segments, one.closed).bounds
+        bounds = recommended_time_step(
+            one.type, filaments.viscosity, temperature, "implicit", one.segments, one.closed
+        ).bounds
         longest = max(longest, bounds.get("relaxation", 0.0))
     return longest

@@ -16,6 +16,7 @@ from ..theory import (
     chain_mean_square_end_to_end,
     stretching_energy_mean,
 )
+from ..theory.beam_elements import beam_averages, beam_mean_square_end_to_end, beam_stretching_energy_mean
 from ..units.quantities import thermal_energy
 from ..units.types import FloatArray
 from .step_check_observables import Kind, Probe, interacting
@@ -121,6 +122,8 @@ class ExactAverages:
         one = kind.filament
         if one.closed or one.clamped or one.propulsion:
             return None
+        if one.type.has_beam_elements:
+            return None if one.planar else self._average_of_beams(one, what)
         arguments = self._temperature, one.planar
         if what == "distance":
             return chain_mean_square_end_to_end(one.type, one.segments, *arguments)
@@ -132,3 +135,10 @@ class ExactAverages:
             return energies.mean() if len(energies) else 0.0
         mean = stretching_energy_mean if what == "stretching" else bending_energy_mean
         return mean(one.type, *arguments) / self._kT
+
+    def _average_of_beams(self, one, what):
+        if what == "distance":
+            return beam_mean_square_end_to_end(one.type, one.segments, self._temperature)
+        if what == "stretching":
+            return beam_stretching_energy_mean(one.type, one.segments, self._temperature) / self._kT
+        return beam_averages(one.type, self._temperature).bending if what == "bending" else None

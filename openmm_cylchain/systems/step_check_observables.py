@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 import openmm
 
+from ..beams.curve import BeamElement, element_energies
 from ..couplings.pulling import is_constant_force
 from ..filaments.collection import FilamentCollection
 from ..filaments.filament import Filament
-from ..units.types import FloatArray, IntArray
+from ..units.quantities import thermal_energy
+from ..units.types import FloatArray, IntArray, Scalar
 
 STEPS_PER_FRAME = 10
 """Steps h between two looks at both runs."""
@@ -28,13 +30,15 @@ class Kind:
     label: str
     filament: Filament
     nodes: IntArray
-    joint_stiffnesses: FloatArray
+    control_points: IntArray
+    """Of beam elements."""
+    element: BeamElement | None
 
 
-def _kinds(filaments):
+def _kinds(filaments, temperature):
     groups: dict[Any, list[int]] = {}
     for number, one in enumerate(filaments):
-        key = (one.type, one.segments, one.closed, one.planar, one.clamped, one.propulsion)
+        key = (one.type, one.segments, one.closed, one.planar, one.clamped, one.clamped_tangents, one.propulsion)
         groups.setdefault(key, []).append(number)
     kinds: list[Kind] = []
     for numbers in groups.values():
@@ -42,18 +46,22 @@ def _kinds(filaments):
         label = first.type.name if len(groups) == 1 else f"{first.type.name} x {first.segments}"
         if label in [kind.label for kind in kinds]:
             label += f" (filament {numbers[0]})"
-        nodes = np.array([filaments.node_indices[number] for number in numbers])
-        kinds.append(Kind(label, first, nodes, first.joint_stiffnesses))
+        nodes, control_points = (
+            np.array([own[number] for number in numbers])
+            for own in (filaments.node_indices, filaments.control_point_indices)
+        )
+        element = first.type.beam_element(temperature, first.planar) if first.type.has_beam_elements else None
+        kinds.append(Kind(label, first, nodes, control_points, element))
     return kinds
 
 
 class Probe:
     """What is looked at in a Context: names, units, and values of one frame."""
 
-    def __init__(self, filaments: FilamentCollection, system: openmm.System, kT: float) -> None:
-        self._kT = kT
+    def __init__(self, filaments: FilamentCollection, system: openmm.System, temperature: Scalar) -> None:
+        self._kT = thermal_energy(temperature)
         self._filaments = filaments
-        self.kinds = _kinds(filaments)
+        self.kinds = _kinds(filaments, temperature)
         self._system = system
         self._groups: dict[int, tuple[str, list[int]]] = {}
         for count, (index, force) in enumerate(
@@ -102,7 +110,7 @@ class Probe:
         values, after = [], []
         with np.errstate(all="ignore"):
             for index, kind in enumerate(self.kinds):
-                own, kept = self._measure_kind(kind, positions[kind.nodes], None if before is None else before[index])
+                own, kept = self._measure_kind(kind, positions, None if before is None else before[index])
                 values += own
                 after.append(kept)
             if self._filaments.tethers:
@@ -112,15 +120,11 @@ class Probe:
             values.append(np.array([energy / self._kT]))
         return values, after
 
-    def _measure_kind(self, kind, nodes, before):
-        filament, one = kind.filament, kind.filament.type
+    def _measure_kind(self, kind, positions, before):
+        filament, one, nodes = kind.filament, kind.filament.type, positions[kind.nodes]
         closed = filament.closed
         vectors = np.diff(nodes, axis=1, append=nodes[:, :1]) if closed else np.diff(nodes, axis=1)
-        lengths = np.linalg.norm(vectors, axis=2)
-        tangents = vectors / lengths[..., None]
-        bending = np.zeros(len(nodes))
-        if len(kind.joint_stiffnesses) and one.bending_rigidity > 0.0:
-            bending = one.bending_energies(vectors, kind.joint_stiffnesses, closed).mean(axis=1) / self._kT
+        tangents = vectors / np.linalg.norm(vectors, axis=2)[..., None]
         half = nodes.shape[1] // 2
         ends = nodes[:, half if closed else -1] - nodes[:, 0]
         middle = nodes[:, half]
@@ -129,9 +133,26 @@ class Probe:
         scale = math.sqrt(2.0 * one.segment_length / filament.segments)
         amplitudes = scale * np.einsum("ms,fsk->mfk", waves, tangents)
         moved = [amplitudes, middle] if before is None else [amplitudes - before[0], middle - before[1]]
-        values = [one.stretching_energies(lengths, closed).mean(axis=1) / self._kT, bending, np.sum(ends**2, axis=1)]
+        energies = self._beam_energies if kind.element is not None else self._chain_energies
+        values = [*energies(kind, positions), np.sum(ends**2, axis=1)]
         values += [*np.sum(moved[0] ** 2, axis=2), np.sum(moved[1] ** 2, axis=1)]
         return values, (amplitudes, middle)
+
+    def _chain_energies(self, kind, positions):
+        # Mean energies of a segment and of a joint, in k_BT.
+        nodes, one, closed = positions[kind.nodes], kind.filament.type, kind.filament.closed
+        vectors = np.diff(nodes, axis=1, append=nodes[:, :1]) if closed else np.diff(nodes, axis=1)
+        stretching = one.stretching_energies(np.linalg.norm(vectors, axis=2), closed).mean(axis=1) / self._kT
+        bending = np.zeros(len(nodes))
+        stiffnesses = kind.filament.joint_stiffnesses
+        if len(stiffnesses) and one.bending_rigidity > 0.0:
+            bending = one.bending_energies(vectors, stiffnesses, closed).mean(axis=1) / self._kT
+        return stretching, bending
+
+    def _beam_energies(self, kind, positions):
+        # Mean energies of an element, in k_BT.
+        energies = element_energies(positions[kind.nodes], positions[kind.control_points], kind.element)
+        return [own.mean(axis=1) / self._kT for own in energies]
 
     def _tether_energy(self, positions):
         energy = 0.0

@@ -1,6 +1,7 @@
 #ifndef CYLCHAIN_BEAM_CHAIN_H_
 #define CYLCHAIN_BEAM_CHAIN_H_
 
+#include "mechanics/Chain.h"
 #include <vector>
 
 namespace cylchain {
@@ -45,6 +46,8 @@ struct BeamChain {
     std::vector<bool> fixed;
     /** Whether particles keep their z, which must be the same for all of them. */
     bool planar = false;
+    /** Springs between the positions of nodes and points. */
+    std::vector<Tether> tethers;
     int numNodes() const {
         return particles.size()/2;
     }

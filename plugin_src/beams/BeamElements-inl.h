@@ -7,6 +7,15 @@
 /** What a step begins with. */
 template <int W> struct BeamStart {
     Vector<typename Lanes<W>::Type> *control, *chord;
+    /** From the points of tethers to their nodes: three numbers for each. */
+    double* tethers;
+    /** The first nodes of chains, where a flow drags them along. */
+    Vector<typename Lanes<W>::Type>* first;
+};
+
+/** What a step keeps of a tether, which is a coordinate of three components. */
+struct BeamTetherState {
+    double theta, random[3];
 };
 
 /** A coordinate that is a strain: its start and noise, and what the last iteration had for its tension. */

@@ -40,6 +40,9 @@ static void check(const BeamChain& chain, int index) {
         if (chain.fixed[i+1] && !chain.fixed[i])
             throw invalid_argument(name+": the control point of node "+to_string(i/2)+
                     " is fixed, but its position is not");
+    for (const Tether& tether : chain.tethers)
+        if (tether.node < 0 || tether.node >= chain.numNodes())
+            throw invalid_argument(name+" has a tether at node "+to_string(tether.node)+", which it has not");
 }
 
 static void fillLane(BeamPack& pack, int lane, const BeamChain& chain, int index, int firstNoise) {
@@ -59,6 +62,8 @@ static void fillLane(BeamPack& pack, int lane, const BeamChain& chain, int index
         pack.present[element*lanes+lane] = 1;
     pack.free[lane] = any_of(chain.fixed.begin(), chain.fixed.end(), [] (bool fixed) {return fixed;}) ? 0 : 1;
     pack.particlesOfChains.insert(pack.particlesOfChains.end(), chain.particles.begin(), chain.particles.end());
+    for (size_t number = 0; number < chain.tethers.size(); number++)
+        pack.tethers.push_back({chain.tethers[number], lane, (int) number});
 }
 
 static BeamPack packed(const vector<BeamChain>& chains, const int* members, int lanes, int firstNoise) {
@@ -77,6 +82,9 @@ static BeamPack packed(const vector<BeamChain>& chains, const int* members, int 
     pack.present.resize((size_t) pack.nodes*lanes, 0.0);
     for (int lane = 0; lane < lanes; lane++)
         fillLane(pack, lane, chains[members[lane]], members[lane], firstNoise);
+    stable_sort(pack.tethers.begin(), pack.tethers.end(), [] (const BeamTether& a, const BeamTether& b) {
+        return a.node < b.node;
+    });
     return pack;
 }
 
@@ -151,8 +159,6 @@ Instability BeamEngine::step(int pack, const double* positions, const double* fo
             const StepSettings& settings, double* displacements) const {
     if (settings.scheme != Scheme::Implicit)
         throw invalid_argument("Beam elements are for scheme \"implicit\" alone");
-    if (settings.flow.present)
-        throw invalid_argument("Beam elements are for a solvent at rest alone");
     const double length = settings.kT*implementation->softness;
     if (length > LONGEST_ELEMENT)
         throw invalid_argument("The elements of beam chain "+to_string(implementation->softest)+" are "+

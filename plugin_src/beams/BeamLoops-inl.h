@@ -6,9 +6,10 @@
  */
 
 #include "beams/BeamPack.h"
-#include "beams/BezierWeights.h"
+#include "beams/ElementPlace.h"
 #include "dynamics/PackStep.h"
 #include "lanes/Noise.h"
+#include "mechanics/BackgroundFlow.h"
 #include "mechanics/PeriodicBox.h"
 #include <algorithm>
 #include <cmath>
@@ -24,6 +25,7 @@ namespace CYLCHAIN_LOOPS {
 
 #include "lanes/VectorLanes-inl.h"
 #include "lanes/NoiseLanes-inl.h"
+#include "mechanics/LaneFlow-inl.h"
 #include "beams/BeamShape-inl.h"
 #include "beams/BeamEquations-inl.h"
 #include "beams/BeamElements-inl.h"
@@ -39,9 +41,12 @@ template <int W> ChainEnergy addForcesTo(const BeamPack& pack, const double* pos
             const double* box, bool includeEnergy) {
     typedef typename Lanes<W>::Type Real;
     static thread_local Scratch memory;
+    static thread_local std::vector<double> tethers;
     const int n = pack.nodes;
-    SixVector<Real>* f = memory.reserve<SixVector<Real> >(2*n);
-    const BeamStart<W> start = {reinterpret_cast<Vector<Real>*>(f+n), reinterpret_cast<Vector<Real>*>(f+n)+n};
+    SixVector<Real>* f = memory.reserve<SixVector<Real> >(2*n+1);
+    tethers.resize(3*pack.tethers.size());
+    const BeamStart<W> start = {reinterpret_cast<Vector<Real>*>(f+n), reinterpret_cast<Vector<Real>*>(f+n)+n,
+            tethers.data(), reinterpret_cast<Vector<Real>*>(f+2*n)};
     gatherBeams<W>(pack, positions, box, start);
     std::fill(f, f+n, SixVector<Real> {});
     ChainEnergy energy;
@@ -72,6 +77,15 @@ template <int W> ChainEnergy addForcesTo(const BeamPack& pack, const double* pos
                 energy.stretching += lane(stretched, i);
                 energy.bending += lane(bent, i);
             }
+    }
+    for (std::size_t number = 0; number < pack.tethers.size(); number++) {
+        const BeamTether& tether = pack.tethers[number];
+        const double *d = &tethers[3*number], stiffness = tether.stiffness;
+        Vector<Real>& force = f[tether.node].position;
+        lane(force.x, tether.lane) -= stiffness*d[0];
+        lane(force.y, tether.lane) -= stiffness*d[1];
+        lane(force.z, tether.lane) -= stiffness*d[2];
+        energy.tethers += 0.5*stiffness*(d[0]*d[0]+d[1]*d[1]+d[2]*d[2]);
     }
     addToParticles<W>(pack, f, forces);
     return energy;

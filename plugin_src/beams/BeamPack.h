@@ -1,11 +1,17 @@
 #ifndef CYLCHAIN_BEAM_PACK_H_
 #define CYLCHAIN_BEAM_PACK_H_
 
+#include "beams/BeamChain.h"
 #include "dynamics/ChainEngine.h"
 #include "dynamics/PackStep.h"
 #include <vector>
 
 namespace cylchain {
+
+/** A tether of the chain in a lane, and its number among those of the chain. */
+struct BeamTether : Tether {
+    int lane, number;
+};
 
 /**
  * Chains of beam elements side by side: the numbers of all chains for one node lie next to each other, one in each
@@ -31,6 +37,8 @@ struct BeamPack {
     std::vector<double> mobile;
     /** One for each lane whose chain has no particle that is fixed; zero for others. */
     std::vector<double> free;
+    /** The tethers of all lanes, by their nodes. */
+    std::vector<BeamTether> tethers;
 };
 
 /** The loops over a pack, compiled for one instruction set. */

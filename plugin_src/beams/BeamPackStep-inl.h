@@ -9,18 +9,19 @@ template <int W> class BeamPackStep : public PackStep {
     typedef Vector<Real> Vec;
     typedef SixVector<Real> Six;
 public:
-    explicit BeamPackStep(const BeamPack& pack) : pack(pack), terms(pack.planar) {
+    explicit BeamPackStep(const BeamPack& pack) : pack(pack), terms(pack) {
     }
     void begin(const double* positions, const double* forces, const double* box, const StepSettings& stepSettings,
             const bool* taken) override {
         settings = stepSettings;
         const int n = pack.nodes;
-        Six* const f = vectors.reserve<Six>(5*n);
+        Six* const f = vectors.reserve<Six>(5*n+1);
         y = f+n;
         ofPlaces = f+2*n;
         moved = f+3*n;
         Vec* const begun = reinterpret_cast<Vec*>(f+4*n);
-        start = {begun, begun+n};
+        tethers.resize(3*pack.tethers.size());
+        start = {begun, begun+n, tethers.data(), begun+2*n};
         gatherBeams<W>(pack, positions, box, start);
         gatherBeamForces<W>(pack, forces, f);
         for (int i = 0; i < W; i++)
@@ -97,6 +98,7 @@ private:
     StepSettings settings;
     Scratch vectors;
     BeamStart<W> start;
+    std::vector<double> tethers;
     BeamTerms<W> terms;
     Six *y, *ofPlaces, *moved;
     Real active;

@@ -20,6 +20,16 @@ template <class Real> CYLCHAIN_INLINE void setLane(Vector<Real>& vector, int i, 
     lane(vector.z, i) = values[2];
 }
 
+/** The vector from the point of a tether to its node, or the shortest image of it. */
+inline void vectorOf(const BeamTether& tether, const BeamPack& pack, const double* positions, const double* box,
+            double* d) {
+    const double* const node = positions+3*pack.particles[2*tether.node*pack.lanes+tether.lane];
+    for (int k = 0; k < 3; k++)
+        d[k] = node[k]-tether.point[k];
+    if (box != NULL)
+        takeToNearestImage(d, box);
+}
+
 /** Bring what a step begins with into lanes. Elements that only fill up are straight. */
 template <int W> void gatherBeams(const BeamPack& pack, const double* positions, const double* box,
             const BeamStart<W>& start) {
@@ -35,6 +45,13 @@ template <int W> void gatherBeams(const BeamPack& pack, const double* positions,
             setLane(start.control[node], i, control);
             setLane(start.chord[node], i, chord);
         }
+    for (int i = 0; i < W; i++) {
+        const int first = pack.particles[i];
+        const double nowhere[3] = {};
+        setLane(*start.first, i, first < 0 ? nowhere : positions+3*first);
+    }
+    for (std::size_t number = 0; number < pack.tethers.size(); number++)
+        vectorOf(pack.tethers[number], pack, positions, box, start.tethers+3*number);
 }
 
 /** Bring the forces that do work on positions and control vectors into lanes. */

@@ -3,13 +3,14 @@
 /**
  * A step of chains of beam elements. It solves, for the new nodes y, with the middle m = (x+y)/2,
  *
- *     Z(m) (y-x)/h = f + f_random(x) + f_drift(x) - sum_a T_a J_a(m),
+ *     Z(m) ((y-x)/h - u(m)) = f + f_random(x) + f_drift(x) - sum_a T_a J_a(m),
  *     T_a = k (theta q_a(y) + (1-theta) q_a(x) - (2 theta-1)^(1/2) q_random),    theta = max(1/2, 1-1/z),
  *
  * where the coordinates q_a with the energies k q^2/2 are the strains of nodes and of the middles of elements, and the
  * sums and differences of bends; see BeamChain.h and, for why, ImplicitStep-inl.h, whose scheme this is. z is the step
  * over the least relaxation time that the coordinate has in a free element. All friction is in Z, which is that of the
- * curve, with the noise of the curve as it was: so its drift comes by itself. Strains have metric forces.
+ * curve, with the noise of the curve as it was: so its drift comes by itself. Strains have metric forces. u is the flow
+ * of the solvent.
  */
 
 /** The largest number of iterations, and the least: see ImplicitStep-inl.h. */
@@ -26,6 +27,8 @@ const Scalar STRAIN_RATE = 378, SUM_RATE = 720, DIFFERENCE_RATE = 8400;
 const Scalar MIDDLE_MOBILITY = 75, END_MOBILITY = 1200;
 /** A step that does not converge is cut into at most two to this power. */
 const int LARGEST_BEAM_DIVISION = 10;
+/** How far a force at the end of an element moves it that is alone, over how far it moves all of the element. */
+const Scalar MOBILITY_OF_BEAM_END = 16;
 
 template <int W> class BeamStep {
     typedef typename Lanes<W>::Type Real;
@@ -35,15 +38,18 @@ template <int W> class BeamStep {
 public:
     struct Memory {
         Scratch elements, vectors, rows;
+        std::vector<BeamTetherState> tethers;
     };
     BeamStep(const BeamPack& pack, const StepSettings& settings, const BeamStart<W>& start, Memory& memory) :
             pack(pack), settings(settings), start(start), n(pack.nodes),
             elements(memory.elements.template reserve<BeamElementState<Real> >(n)),
             forces(memory.vectors.template reserve<Six>(3*n)), right(forces+n), change(forces+2*n),
             equations(pack.mobile, n, memory.rows.template reserve<typename Equations::Eliminated>(n)),
+            tethers(memory.tethers),
             length(of(BeamPack::Length)), perLength(1/length), parallel(of(BeamPack::Parallel)),
             perpendicular(of(BeamPack::Perpendicular)),
-            shortening(1.5*of(BeamPack::Shortening)), perStep(1/settings.stepSize) {
+            shortening(1.5*of(BeamPack::Shortening)), perStep(1/settings.stepSize),
+            flow(settings.flow, pack.planar, *start.first) {
         const Real h = splat<Real>(settings.stepSize), square = length*length;
         const Real rateOfBends = h*of(BeamPack::Bending)/(perpendicular*square*square);
         thetaOfStrains = thetaOf(h*of(BeamPack::Stretching)*STRAIN_RATE/(parallel*square));
@@ -76,12 +82,16 @@ public:
     }
     /** Describe the start of a step, and draw its noise. */
     void begin(const Six* external, Six* y) {
+        // A flow carries chains as a whole; those with fixed particles begin where they are.
+        const Real time = loaded<Real>(pack.free, 0)*settings.stepSize;
+        const Vec carried = flow.at(*start.first+flow.at(*start.first)*(0.5*time))*time;
         for (int node = 0; node < n; node++) {
-            y[node] = Six {};
+            y[node] = {carried, Vec {}};
             forces[node] = external[node];
         }
         for (int e = 0; e < n; e++)
             describe(e);
+        describeTethers();
         if (settings.kT > 0) {
             const Real largest = larger<Real>(thetaOfSum, thetaOfDifference);
             BeamNoise<W> noise(pack, settings, start, elements, forces, largest-0.5);
@@ -92,11 +102,14 @@ public:
     /** Linearise the equations around y with those of couplings, or NULL, and solve them: see getChange(). */
     void eliminate(const Six* y, const BeamTerms<W>* terms) {
         int nextTerm = 0;
+        std::size_t nextTether = 0;
         typename Equations::Row rows[2];
         typename Equations::Row *here = rows, *after = rows+1;
         *here = typename Equations::Row {};
         for (int node = 0; node < n; node++)
             right[node] = forces[node];
+        if (settings.flow.present)
+            addDrag(y);
         for (int e = 0; e < n-1; e++) {
             BeamElementState<Real>& own = elements[e];
             const BeamShape<Real> now(vectors(e, y, 1)), middle(vectors(e, y, 0.5));
@@ -114,6 +127,9 @@ public:
             }
             if (terms != NULL)
                 terms->add(e, nextTerm, *here, *after, right);
+            addTethers(y, e, nextTether, *here);
+            if (e == n-2)
+                addTethers(y, e+1, nextTether, *after);
             equations.eliminate(e, *here, *after, false);
             std::swap(here, after);
         }
@@ -186,8 +202,10 @@ private:
     BeamElementState<Real>* const elements;
     Six *const forces, *const right, *const change;
     Equations equations;
+    std::vector<BeamTetherState>& tethers;
     const Real length, perLength, parallel, perpendicular, shortening;
     const Scalar perStep;
+    const LaneFlow<W> flow;
     Real thetaOfStrains, thetaOfSum, thetaOfDifference;
 
     Real of(int property) const {
@@ -227,6 +245,46 @@ private:
         own.middle = shape.middle;
         own.randomSum = own.randomDifference = Vec {};
     }
+    /** Describe tethers, and draw their noise: they are coordinates like those of elements, but linear ones. */
+    void describeTethers() {
+        tethers.resize(pack.tethers.size());
+        const NoiseKey key = {(std::uint32_t) settings.seed, (std::uint32_t) settings.level, settings.step};
+        for (std::size_t number = 0; number < tethers.size(); number++) {
+            const BeamTether& tether = pack.tethers[number];
+            Real h = length, ofEnd = larger<Real>(-parallel, -perpendicular)*(-1/MOBILITY_OF_BEAM_END);
+            const double rate = settings.stepSize*tether.stiffness/(lane(h, tether.lane)*lane(ofEnd, tether.lane));
+            BeamTetherState& own = tethers[number];
+            own.theta = std::fmax(0.5, 1-1/(rate+TINY));
+            std::fill(own.random, own.random+3, 0.0);
+            if (settings.kT == 0 || tether.stiffness == 0)
+                continue;
+            const NoisePlaces<1> place = {(Word) pack.noiseChain[tether.lane], (Word) tether.number};
+            Scalar normals[4];
+            drawNormals<1, 2>(key, NoiseKind::Tether, place, normals);
+            for (int k = 0; k < (pack.planar ? 2 : 3); k++)
+                own.random[k] = normals[k]*std::sqrt(settings.kT/tether.stiffness);
+        }
+    }
+    /** Add the tethers of a node, the next ones, to its equations. */
+    void addTethers(const Six* y, int node, std::size_t& next, typename Equations::Row& row) {
+        for (; next < tethers.size() && pack.tethers[next].node == node; next++) {
+            const BeamTether& tether = pack.tethers[next];
+            const BeamTetherState& own = tethers[next];
+            const double *d = start.tethers+3*next, stiffness = tether.stiffness, random = std::sqrt(2*own.theta-1);
+            const int i = tether.lane;
+            Vec moved = y[node].position;
+            const double move[] = {lane(moved.x, i), lane(moved.y, i), lane(moved.z, i)};
+            double force[3];
+            for (int k = 0; k < 3; k++)
+                force[k] = pack.planar && k == 2 ? 0 : stiffness*(d[k]+own.theta*move[k]-random*own.random[k]);
+            Vec& onNode = right[node].position;
+            lane(onNode.x, i) -= force[0];
+            lane(onNode.y, i) -= force[1];
+            lane(onNode.z, i) -= force[2];
+            for (int k = 0; k < 3; k++)
+                lane(row.diagonal.a[k][k], i) += stiffness*own.theta;
+        }
+    }
     /** Set the tension of a strain as it is, and return how it grows. */
     CYLCHAIN_INLINE Real findTension(BeamStrain<Real>& strain, Real now) const {
         const Real theta = thetaOfStrains;
@@ -259,6 +317,24 @@ private:
                     addTimes(sum, resistance[g], WEIGHTS.value[g][k]*WEIGHTS.value[g][l]);
                 m.block[pair++] = sum;
             }
+    }
+    /** Add the friction of the flow, in the middle of the step. */
+    void addDrag(const Six* y) {
+        const Real half = splat<Real>(0.5);
+        Vec first = *start.first+y[0].position*half;
+        for (int e = 0; e < n-1; e++) {
+            const Vec control1 = start.control[e]+y[e].control*half, control2 = start.control[e+1]+y[e+1].control*half;
+            const Vec chord = start.chord[e]+(y[e+1].position-y[e].position)*half;
+            const Real size = length*present(e), across = perpendicular*size, more = parallel*size-across;
+            for (int g = 0; g < GAUSS_POINTS; g++) {
+                const Scalar* const weights = WEIGHTS.value[g];
+                const Vec velocity = flow.at(first+control1*splat<Real>(weights[1])+chord*splat<Real>(weights[2])+
+                        control2*splat<Real>(weights[3]));
+                const Vec t = directionAt(g, control1, chord, control2);
+                addAt(g, (velocity*across+t*(more*t.dot(velocity)))*splat<Real>(GAUSS_WEIGHTS[g]), right[e], right[e+1]);
+            }
+            first = first+chord;
+        }
     }
     static CYLCHAIN_INLINE void addTimes(Symmetric<Real>& sum, const Symmetric<Real>& one, Scalar factor) {
         sum.xx += one.xx*factor;

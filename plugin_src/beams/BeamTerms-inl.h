@@ -11,14 +11,15 @@ template <int W> class BeamTerms {
     typedef SixVector<Real> Six;
     typedef typename BeamEquations<W>::Row Row;
 public:
-    explicit BeamTerms(bool planar) : planar(planar) {
+    explicit BeamTerms(const BeamPack& pack) : pack(pack), planar(pack.planar) {
     }
     void set(const CouplingTerm* newTerms, int count) {
         terms = newTerms;
         numTerms = count;
         weights.clear();
         for (int i = 0; i < count; i++) {
-            const BezierWeights own(terms[i].fraction);
+            const double length = pack.properties[BeamPack::Length*W+terms[i].lane];
+            const BezierWeights own = ElementPlace::weightsOf(terms[i].fraction, length);
             weights.push_back({{own.position1, own.control1, own.position2, own.control2}});
         }
     }
@@ -76,6 +77,7 @@ private:
     struct Weights {
         double of[4];
     };
+    const BeamPack& pack;
     const bool planar;
     const CouplingTerm* terms = NULL;
     int numTerms = 0;

@@ -85,6 +85,43 @@ template <int Size> CYLCHAIN_INLINE Floats gather(const float* base, Ints indice
 #endif
 }
 
+#if defined(__AVX512F__) && CYLCHAIN_LANES == 16
+/** Two blocks of four numbers of each of two registers. The intrinsics without masks make GCC warn. */
+template <int Which> CYLCHAIN_INLINE __m512 blocks(__m512 one, __m512 other) {
+    return _mm512_maskz_shuffle_f32x4(0xffff, one, other, Which);
+}
+
+/**
+ * The numbers of sixteen records of sixteen numbers, each of them in all lanes: the records are loaded as they are and
+ * transposed, which takes less time than to gather number after number.
+ */
+CYLCHAIN_INLINE void transposeRecords(const float* base, Ints indices, Floats* numbers) {
+    __m512 a[16], b[16];
+    for (int i = 0; i < 16; i++)
+        a[i] = _mm512_loadu_ps(base+16*(std::size_t) indices[i]);
+    for (int i = 0; i < 16; i += 2) {
+        b[i] = _mm512_maskz_unpacklo_ps(0xffff, a[i], a[i+1]);
+        b[i+1] = _mm512_maskz_unpackhi_ps(0xffff, a[i], a[i+1]);
+    }
+    // Now in each block of four, number 4 block+k of records i to i+3.
+    for (int i = 0; i < 16; i += 4) {
+        a[i] = _mm512_maskz_shuffle_ps(0xffff, b[i], b[i+2], 0x44);
+        a[i+1] = _mm512_maskz_shuffle_ps(0xffff, b[i], b[i+2], 0xee);
+        a[i+2] = _mm512_maskz_shuffle_ps(0xffff, b[i+1], b[i+3], 0x44);
+        a[i+3] = _mm512_maskz_shuffle_ps(0xffff, b[i+1], b[i+3], 0xee);
+    }
+    const int even = 0x88, odd = 0xdd;
+    for (int k = 0; k < 4; k++) {
+        const __m512 even1 = blocks<even>(a[k], a[4+k]), even2 = blocks<even>(a[8+k], a[12+k]);
+        const __m512 odd1 = blocks<odd>(a[k], a[4+k]), odd2 = blocks<odd>(a[8+k], a[12+k]);
+        numbers[k] = (Floats) blocks<even>(even1, even2);
+        numbers[8+k] = (Floats) blocks<odd>(even1, even2);
+        numbers[4+k] = (Floats) blocks<even>(odd1, odd2);
+        numbers[12+k] = (Floats) blocks<odd>(odd1, odd2);
+    }
+}
+#endif
+
 template <int Size> CYLCHAIN_INLINE LaneVector gatherVector(const float* base, Ints indices) {
     return {gather<Size>(base, indices), gather<Size>(base+1, indices), gather<Size>(base+2, indices)};
 }
@@ -96,12 +133,26 @@ struct LaneCapsules {
     CYLCHAIN_INLINE LaneCapsules(const CoarseCapsule* capsules, Ints indices) {
         static_assert(sizeof(CoarseCapsule) == 16*sizeof(float), "A capsule is sixteen numbers");
         const float* base = capsules[0].center;
+#if defined(__AVX512F__) && CYLCHAIN_LANES == 16
+        Floats numbers[16];
+        transposeRecords(base, indices, numbers);
+        auto vector = [&] (int first) {
+            return LaneVector {numbers[first], numbers[first+1], numbers[first+2]};
+        };
+        center = vector(0);
+        middle = vector(3);
+        half = vector(6);
+        laterMiddle = vector(9);
+        laterHalf = vector(12);
+        radius = numbers[15];
+#else
         center = gatherVector<16>(base, indices);
         middle = gatherVector<16>(base+3, indices);
         half = gatherVector<16>(base+6, indices);
         laterMiddle = gatherVector<16>(base+9, indices);
         laterHalf = gatherVector<16>(base+12, indices);
         radius = gather<16>(base+15, indices);
+#endif
     }
 };
 
@@ -205,19 +256,67 @@ struct DoubleVector {
 
 CYLCHAIN_INLINE Doubles gatherOf(const double* base, Numbers records) {
     static_assert(sizeof(MovingSegment) == 16*sizeof(double), "A segment is sixteen numbers");
-#if defined(__AVX512F__) && CYLCHAIN_LANES == 16
-    return (Doubles) _mm512_mask_i32gather_pd(_mm512_setzero_pd(), 0xff, (__m256i) (records*16), base, 8);
-#else
     Doubles result;
     for (int i = 0; i < DOUBLES; i++)
         result[i] = base[16*(std::size_t) records[i]];
     return result;
-#endif
 }
 
 CYLCHAIN_INLINE DoubleVector gatherVectorOf(const double* base, Numbers records) {
     return {gatherOf(base, records), gatherOf(base+1, records), gatherOf(base+2, records)};
 }
+
+/** Some segments in lanes. */
+struct LaneSegments {
+    DoubleVector first, along, laterFirst, laterAlong, laterNext;
+#if defined(__AVX512F__) && CYLCHAIN_LANES == 16
+    CYLCHAIN_INLINE LaneSegments(const MovingSegment* segments, Numbers records) {
+        Doubles numbers[16];
+        for (int half = 0; half < 2; half++)
+            transposeHalves(segments[0].first+8*half, records, numbers+8*half);
+        auto vector = [&] (int begin) {
+            return DoubleVector {numbers[begin], numbers[begin+1], numbers[begin+2]};
+        };
+        first = vector(0);
+        along = vector(3);
+        laterFirst = vector(6);
+        laterAlong = vector(9);
+        laterNext = vector(12);
+    }
+private:
+    template <int Which> static CYLCHAIN_INLINE __m512d blocksOf(__m512d one, __m512d other) {
+        return _mm512_maskz_shuffle_f64x2(0xff, one, other, Which);
+    }
+    /** Eight numbers of each of eight records, as transposeRecords() does. */
+    static CYLCHAIN_INLINE void transposeHalves(const double* base, Numbers records, Doubles* numbers) {
+        __m512d a[8], b[8];
+        for (int i = 0; i < 8; i++)
+            a[i] = _mm512_loadu_pd(base+16*(std::size_t) records[i]);
+        for (int i = 0; i < 8; i += 2) {
+            b[i] = _mm512_maskz_unpacklo_pd(0xff, a[i], a[i+1]);
+            b[i+1] = _mm512_maskz_unpackhi_pd(0xff, a[i], a[i+1]);
+        }
+        const int even = 0x88, odd = 0xdd;
+        for (int k = 0; k < 2; k++) {
+            const __m512d even1 = blocksOf<even>(b[k], b[2+k]), even2 = blocksOf<even>(b[4+k], b[6+k]);
+            const __m512d odd1 = blocksOf<odd>(b[k], b[2+k]), odd2 = blocksOf<odd>(b[4+k], b[6+k]);
+            numbers[k] = (Doubles) blocksOf<even>(even1, even2);
+            numbers[4+k] = (Doubles) blocksOf<odd>(even1, even2);
+            numbers[2+k] = (Doubles) blocksOf<even>(odd1, odd2);
+            numbers[6+k] = (Doubles) blocksOf<odd>(odd1, odd2);
+        }
+    }
+#else
+    CYLCHAIN_INLINE LaneSegments(const MovingSegment* segments, Numbers records) {
+        const double* base = segments[0].first;
+        first = gatherVectorOf(base, records);
+        along = gatherVectorOf(base+3, records);
+        laterFirst = gatherVectorOf(base+6, records);
+        laterAlong = gatherVectorOf(base+9, records);
+        laterNext = gatherVectorOf(base+12, records);
+    }
+#endif
+};
 
 template <class Values> CYLCHAIN_INLINE Values loadOf(const void* values) {
     Values result;
@@ -244,15 +343,13 @@ static void outlook(const MovingSegment* segments, double parallel, double atEnd
     // Rounding may not let it seem that nothing crosses, or that a distance decreases. Segments that stay in one plane
     // (areInOnePlane() in Crossings.h) may cross there: no volume of theirs is more than this.
     const double ofVolumes = 2e-7, ofMotion = 1+1e-9, ofSlope = 1e-12, tiny = 1e-30;
-    const double* base = segments[0].first;
     for (int start = 0; start < count; start += DOUBLES) {
         const Numbers first = loadOf<Numbers>(pairs.first+start), second = loadOf<Numbers>(pairs.second+start);
         const DoubleVector shift = {loadOf<Doubles>(pairs.shift[0]+start), loadOf<Doubles>(pairs.shift[1]+start),
                 loadOf<Doubles>(pairs.shift[2]+start)};
-        const DoubleVector w0 = gatherVectorOf(base, first)-gatherVectorOf(base, second)+shift;
-        const DoubleVector p0 = gatherVectorOf(base+3, first), q0 = gatherVectorOf(base+3, second);
-        const DoubleVector w = gatherVectorOf(base+6, first)-gatherVectorOf(base+6, second)+shift;
-        const DoubleVector p = gatherVectorOf(base+9, first), q = gatherVectorOf(base+9, second);
+        const LaneSegments one(segments, first), other(segments, second);
+        const DoubleVector w0 = one.first-other.first+shift, p0 = one.along, q0 = other.along;
+        const DoubleVector w = one.laterFirst-other.laterFirst+shift, p = one.laterAlong, q = other.laterAlong;
 
         const Doubles a = p.dot(p)+tiny, b = p.dot(q), e = q.dot(q)+tiny, c = p.dot(w), f = q.dot(w);
         const Doubles determinant = a*e-b*b;
@@ -279,7 +376,7 @@ static void outlook(const MovingSegment* segments, double parallel, double atEnd
                 greater(ends[2].dot(ends[2]), ends[3].dot(ends[3])));
         const Masks mayCross = ~(oneSign | (squared > motion*ofMotion));
 
-        const DoubleVector p1 = gatherVectorOf(base+12, first), q1 = gatherVectorOf(base+12, second);
+        const DoubleVector p1 = one.laterNext, q1 = other.laterNext;
         const Doubles along = r.dot(p1), against = r.dot(q1);
         const Masks firstNearer = (s > 1-atEnd) & (along < 0.0) & (along*along > ofSlope*squared*p1.dot(p1));
         const Masks secondNearer = (t > 1-atEnd) & (against > 0.0) & (against*against > ofSlope*squared*q1.dot(q1));

@@ -21,7 +21,7 @@ const double AT_END = 1e-9;
 /** Gaps that differ by less, relative to distances, are equal. */
 const double LEAST_DIFFERENCE = 1e-10;
 /** Capsules that are described together, those that are searched around together, and pairs looked at together. */
-const int CHUNK = 512, FEW = 8, BATCH = 512;
+const int CHUNK = 512, FEW = 32, BATCH = 512;
 /** Capsules that are far away in memory are asked for this many ahead. */
 const int AHEAD = 8;
 /** What rounding adds to distances in single precision, over the lengths that they are made of. */
@@ -100,13 +100,16 @@ struct PlacedCapsule {
     Vec3d first, along;
 };
 
-/** What one part of the search finds. */
-struct Part {
-    vector<ContactPair> pairs;
+/** Memory for candidates. All parts of the search that a thread runs share it, so that it stays in the nearest cache. */
+struct Candidates {
     vector<int> first, second, image;
     vector<float> distance, clearance;
     vector<CapsuleRow> rows;
-    CandidatePairs candidates(int from) {
+    static Candidates& ofThread() {
+        static thread_local Candidates memory;
+        return memory;
+    }
+    CandidatePairs from(int from) {
         return {first.data()+from, second.data()+from, image.data()+from, distance.data()+from, clearance.data()+from};
     }
     void makeRoom(int size) {
@@ -195,6 +198,18 @@ Vec3d findNormal(const SegmentPair& pair, int side) {
 } // namespace
 
 struct ContactSearch::Implementation {
+    /** Where capsules are at both ends of a step: positions, or what setMotion() has taken note of if there are none. */
+    struct Ends {
+        const Implementation& search;
+        const double *x, *y;
+        bool moves;
+        Vec3d along(int capsule, bool atEnd) const {
+            if (y != NULL)
+                return search.along(search.system.capsules[capsule], atEnd ? y : x);
+            const double* v = atEnd ? search.moving[capsule].laterAlong : search.moving[capsule].along;
+            return {v[0], v[1], v[2]};
+        }
+    };
     CapsuleSystem system;
     bool nearestImages;
     /** The capsule of the same chain that shares the second particle, or the first one, or -1. */
@@ -216,13 +231,14 @@ struct ContactSearch::Implementation {
     /** The largest half width of a box, and by how much a center has left its cell at most, in fractions. */
     double largestHalf[3], largestExcess[3];
     /** Where each capsule is in the order of cells, and whether it is searched for again. */
-    vector<int> slots;
+    vector<int> slots, movers;
     vector<char> again;
-    vector<Part> parts;
+    /** What each part of the search finds. */
+    vector<vector<ContactPair> > parts;
     vector<size_t> firstOf;
     /** What setMotion() has taken note of. */
     vector<MovingSegment> moving;
-    const double *motionBegins = NULL, *motionEnds = NULL;
+    bool moves = false;
 
     Implementation(const CapsuleSystem& system, bool nearestImages);
     bool isExcluded(int a, int b) const;
@@ -237,23 +253,23 @@ struct ContactSearch::Implementation {
             bool keepsImage = false) const;
     void describeAgain(const vector<int>& capsules, const double* x, const double* y);
     void putInOrder(int slot, int i);
-    void searchAround(int i, const double* x, const double* y, Part& part) const;
-    void keepPairs(int count, const double* x, const double* y, Part& part) const;
+    int searchAround(int i, Candidates& candidates, int count) const;
+    void keepPairs(Candidates& candidates, int count, const double* x, const double* y,
+            vector<ContactPair>& found) const;
     void checkPositions(const double* x, const double* y) const;
     void setCells();
     void searchCells(int part, const double* x, const double* y);
     int findRows(int column, int iz, CapsuleRow* rows) const;
     bool addPair(const PlacedCapsule& one, const PlacedCapsule& other, const int* images, bool sure, const double* x,
-            const double* y, Part& part) const;
+            const double* y, vector<ContactPair>& found) const;
     bool areNeighbors(const Capsule& first, const Capsule& second) const;
     void gather(vector<ContactPair>& pairs);
-    SegmentPair withNeighbor(const SegmentPair& segments, int neighbor, bool ofA, bool atEnd,
-            const double* positions) const;
     bool isOwned(const Contact& contact, const ContactPair& pair, const SegmentPair& start, const SegmentPair& end,
-            bool parallel, bool ofA, const double* x, const double* y) const;
+            bool parallel, bool ofA, const Ends& ends) const;
     double shareOf(const Crossing& crossing, const ContactPair& pair) const;
-    int evaluate(const ContactPair& pair, const SegmentPair& start, const SegmentPair& end, const double* x,
-            const double* y, Contact* contacts, double limit) const;
+    int evaluate(const ContactPair& pair, const SegmentPair& start, const SegmentPair& end, const Ends& ends,
+            Contact* contacts, double limit) const;
+    bool crosses(const ContactPair& pair, const SegmentPair& start, const SegmentPair& end) const;
     bool isOfNeighbor(const ContactPair& pair, int flags) const;
 };
 
@@ -563,11 +579,12 @@ int ContactSearch::Implementation::findRows(int column, int iz, CapsuleRow* rows
 /** Look for pairs with a capsule in one column of cells. */
 void ContactSearch::Implementation::searchCells(int column, const double* x, const double* y) {
     const CandidateKernels& kernels = candidateKernels();
-    Part& part = parts[column];
-    part.pairs.clear();
+    vector<ContactPair>& found = parts[column];
+    found.clear();
+    Candidates& candidates = Candidates::ofThread();
     int count = 0;
     auto look = [&] {
-        keepPairs(count, x, y, part);
+        keepPairs(candidates, count, x, y, found);
         count = 0;
     };
     CapsuleRow rows[32];
@@ -581,8 +598,8 @@ void ContactSearch::Implementation::searchCells(int column, const double* x, con
             most += rows[row].last-rows[row].first;
         for (int i = first; i < last; i++) {
             rows[0] = {i+1, last, SAME_IMAGE, {0, 0, 0}};
-            part.makeRoom(max(count+most, 2*BATCH)+PADDING);
-            count += kernels.findOverlaps(sweptBoxes, i, rows, numRows, part.candidates(count));
+            candidates.makeRoom(max(count+most, 2*BATCH)+PADDING);
+            count += kernels.findOverlaps(sweptBoxes, i, rows, numRows, candidates.from(count));
             if (count >= BATCH)
                 look();
         }
@@ -591,27 +608,37 @@ void ContactSearch::Implementation::searchCells(int column, const double* x, con
 }
 
 /** Add those of some pairs of boxes that are near enough. */
-void ContactSearch::Implementation::keepPairs(int count, const double* x, const double* y, Part& part) const {
-    count = candidateKernels().keepNear(sorted.data(), imageShifts, reach, margin, part.candidates(0), count);
+void ContactSearch::Implementation::keepPairs(Candidates& candidates, int count, const double* x, const double* y,
+        vector<ContactPair>& found) const {
+    count = candidateKernels().keepNear(sorted.data(), imageShifts, reach, margin, candidates.from(0), count);
     for (int i = 0; i < count; i++) {
         if (i+AHEAD < count)
-            prefetch(&sortedPlaced[part.second[i+AHEAD]]);
-        const PlacedCapsule &one = sortedPlaced[part.first[i]], &other = sortedPlaced[part.second[i]];
-        const int image = part.image[i]%SURE, images[3] = {image/9-1, image/3%3-1, image%3-1};
+            prefetch(&sortedPlaced[candidates.second[i+AHEAD]]);
+        const PlacedCapsule &one = sortedPlaced[candidates.first[i]], &other = sortedPlaced[candidates.second[i]];
+        const int image = candidates.image[i]%SURE, images[3] = {image/9-1, image/3%3-1, image%3-1};
         // Two that are both searched for again find each other twice. Others are not at y.
         const bool isAgain = again[one.number] != 0;
         if (isAgain && again[other.number] != 0 && one.number >= other.number)
             continue;
-        if (addPair(one, other, images, isAgain || part.image[i] >= SURE, x, y, part)) {
-            part.pairs.back().distance = isAgain ? 0 : part.distance[i];
-            part.pairs.back().clearance = isAgain ? 0 : part.clearance[i];
+        if (addPair(one, other, images, isAgain || candidates.image[i] >= SURE, x, y, found)) {
+            found.back().distance = isAgain ? 0 : candidates.distance[i];
+            found.back().clearance = isAgain ? 0 : candidates.clearance[i];
         }
     }
 }
 
 /** Take note of where some capsules are now. They stay in the order of cells where they are. */
 void ContactSearch::Implementation::describeAgain(const vector<int>& capsules, const double* x, const double* y) {
-    for (int i : capsules) {
+    const size_t stride = described.size()+PADDING;
+    for (size_t number = 0; number < capsules.size(); number++) {
+        if (number+AHEAD < capsules.size()) {
+            const int slot = slots[capsules[number+AHEAD]];
+            prefetch(&sorted[slot]);
+            prefetch(&sortedPlaced[slot]);
+            for (int k = 0; k < 6; k++)
+                prefetch(&boxes[k*stride+slot]);
+        }
+        const int i = capsules[number];
         Described& own = described[i];
         const int cell = own.cell, cells[3] = {cell/(frame.cells[1]*frame.cells[2]),
                 cell/frame.cells[2]%frame.cells[1], cell%frame.cells[2]};
@@ -630,8 +657,8 @@ void ContactSearch::Implementation::describeAgain(const vector<int>& capsules, c
             throw NarrowBoxError("The periodic box is too small for contacts: a capsule moves too far");
 }
 
-/** Look for pairs with one capsule, in all cells that it may reach now. */
-void ContactSearch::Implementation::searchAround(int i, const double* x, const double* y, Part& part) const {
+/** Add pairs of boxes with that of one capsule, in all cells that it may reach now; returns how many there are. */
+int ContactSearch::Implementation::searchAround(int i, Candidates& candidates, int count) const {
     const Described& own = described[i];
     int lower[3], upper[3];
     for (int k = 0; k < 3; k++) {
@@ -643,7 +670,7 @@ void ContactSearch::Implementation::searchAround(int i, const double* x, const d
         lower[k] = frame.periodic ? max(lower[k], -frame.cells[k]) : min(max(lower[k], 0), last);
         upper[k] = frame.periodic ? min(upper[k], frame.cells[k]+last) : min(max(upper[k], 0), last);
     }
-    part.rows.clear();
+    candidates.rows.clear();
     int most = 0, images[3];
     auto wrapped = [&] (int cell, int k) {
         images[k] = cell < 0 ? -1 : cell >= frame.cells[k] ? 1 : 0;
@@ -658,20 +685,20 @@ void ContactSearch::Implementation::searchAround(int i, const double* x, const d
                 const int to = min(from+upper[2]-cz, frame.cells[2]-1);
                 const int first = cellStart[column*frame.cells[2]+from], last = cellStart[column*frame.cells[2]+to+1];
                 if (first < last)
-                    part.rows.push_back({first, last, imageNumber(images), {(float) images[0], (float) images[1],
+                    candidates.rows.push_back({first, last, imageNumber(images), {(float) images[0], (float) images[1],
                             (float) images[2]}});
                 most += last-first;
                 cz += to-from+1;
             }
         }
-    part.makeRoom(most+PADDING);
-    keepPairs(candidateKernels().findOverlaps(sweptBoxes, slots[i], part.rows.data(), part.rows.size(),
-            part.candidates(0)), x, y, part);
+    candidates.makeRoom(max(count+most, 2*BATCH)+PADDING);
+    return count+candidateKernels().findOverlaps(sweptBoxes, slots[i], candidates.rows.data(), candidates.rows.size(),
+            candidates.from(count));
 }
 
 /** Add a pair if it is near enough, in double precision where there is doubt; false if it is not. */
 bool ContactSearch::Implementation::addPair(const PlacedCapsule& one, const PlacedCapsule& other, const int* images,
-        bool sure, const double* x, const double* y, Part& part) const {
+        bool sure, const double* x, const double* y, vector<ContactPair>& found) const {
     const bool inOrder = one.number < other.number;
     const PlacedCapsule &first = inOrder ? one : other, &second = inOrder ? other : one;
     const int a = first.number, b = second.number;
@@ -699,7 +726,7 @@ bool ContactSearch::Implementation::addPair(const PlacedCapsule& one, const Plac
     }
     const double volume = start.volume();
     pair.side = volume > 0 ? 1 : volume < 0 ? -1 : 0;
-    part.pairs.push_back(pair);
+    found.push_back(pair);
     return true;
 }
 
@@ -708,13 +735,13 @@ void ContactSearch::Implementation::gather(vector<ContactPair>& pairs) {
     firstOf.assign(system.capsules.size()+1, 0);
     const size_t numParts = (size_t) frame.cells[0]*frame.cells[1];
     for (size_t part = 0; part < numParts; part++)
-        for (const ContactPair& pair : parts[part].pairs)
+        for (const ContactPair& pair : parts[part])
             firstOf[pair.a+1]++;
     for (size_t i = 1; i < firstOf.size(); i++)
         firstOf[i] += firstOf[i-1];
     pairs.resize(firstOf.back());
     for (size_t part = 0; part < numParts; part++)
-        for (const ContactPair& pair : parts[part].pairs)
+        for (const ContactPair& pair : parts[part])
             pairs[firstOf[pair.a]++] = pair;
     // Each entry is now where the next one starts.
     size_t first = 0;
@@ -726,10 +753,8 @@ void ContactSearch::Implementation::gather(vector<ContactPair>& pairs) {
     }
 }
 
-/** Replace one of two segments by its neighbor in its chain. */
-SegmentPair ContactSearch::Implementation::withNeighbor(const SegmentPair& segments, int neighbor, bool ofA, bool atEnd,
-        const double* positions) const {
-    const Vec3d beside = along(system.capsules[neighbor], positions);
+/** Replace one of two segments by its neighbor in its chain, which lies along a vector. */
+static SegmentPair withNeighbor(const SegmentPair& segments, const Vec3d& beside, bool ofA, bool atEnd) {
     if (ofA)
         return {beside, segments.q, atEnd ? segments.w+segments.p : segments.w-beside};
     return {segments.p, beside, atEnd ? segments.w-segments.q : segments.w+beside};
@@ -737,7 +762,7 @@ SegmentPair ContactSearch::Implementation::withNeighbor(const SegmentPair& segme
 
 /** Get whether a contact belongs to its pair, or to a neighbor of a, or of b, in its chain. */
 bool ContactSearch::Implementation::isOwned(const Contact& contact, const ContactPair& pair, const SegmentPair& start,
-        const SegmentPair& end, bool parallel, bool ofA, const double* x, const double* y) const {
+        const SegmentPair& end, bool parallel, bool ofA, const Ends& ends) const {
     const int own = ofA ? pair.a : pair.b, other = ofA ? pair.b : pair.a;
     const double fraction = ofA ? contact.s : contact.t, sum = radii(pair.a, pair.b);
     const double least = LEAST_DIFFERENCE*(sum+fabs(contact.gap));
@@ -747,19 +772,22 @@ bool ContactSearch::Implementation::isOwned(const Contact& contact, const Contac
         const bool atJoint = fraction == (atEnd ? 1 : 0);
         if (neighbor < 0 || (parallel && !atJoint) || isExcluded(neighbor, other))
             continue;
+        const Vec3d later = ends.along(neighbor, true);
+        auto withNeighborBefore = [&] {
+            return withNeighbor(start, ends.along(neighbor, false), ofA, atEnd);
+        };
         if (!atJoint) {
             // If the distance from the other capsule grows as one goes from the joint into the neighbor, that has no
             // place nearer than the joint, unless it has been crossed.
             const Vec3d joint = (ofA ? end.w : end.w*-1)+ownAlong*(atEnd ? 1 : 0);
             const Vec3d fromOther = joint-otherAlong*nearestFraction(otherAlong, joint*-1);
-            const Vec3d into = along(system.capsules[neighbor], y)*(atEnd ? 1 : -1);
+            const Vec3d into = later*(atEnd ? 1 : -1);
             const double distance = sqrt(fromOther.squared());
             if (fromOther.dot(into) >= 0 && distance-sum > contact.gap+2*least &&
-                    (x == y || !mayPass(withNeighbor(start, neighbor, ofA, atEnd, x),
-                    withNeighbor(end, neighbor, ofA, atEnd, y), distance, sum)))
+                    (!ends.moves || !mayPass(withNeighborBefore(), withNeighbor(end, later, ofA, atEnd), distance, sum)))
                 continue;
         }
-        const SegmentPair beside = withNeighbor(end, neighbor, ofA, atEnd, y);
+        const SegmentPair beside = withNeighbor(end, later, ofA, atEnd);
         const Places places = findPlaces(beside);
         bool endsThere = false;
         if (places.parallel)
@@ -773,7 +801,7 @@ bool ContactSearch::Implementation::isOwned(const Contact& contact, const Contac
                 return false;
             continue;
         }
-        const SegmentPair before = x == y ? beside : withNeighbor(start, neighbor, ofA, atEnd, x);
+        const SegmentPair before = ends.moves ? withNeighborBefore() : beside;
         const double gap = findGap(before, beside, radii(neighbor, other));
         // What differs by rounding is equal. Then the one that ends there counts.
         if (parallel || atEnd ? gap < contact.gap-least : !(contact.gap < gap-least))
@@ -796,10 +824,10 @@ double ContactSearch::Implementation::shareOf(const Crossing& crossing, const Co
 }
 
 int ContactSearch::Implementation::evaluate(const ContactPair& pair, const SegmentPair& start, const SegmentPair& end,
-        const double* x, const double* y, Contact* contacts, double limit) const {
+        const Ends& ends, Contact* contacts, double limit) const {
     const double sum = radii(pair.a, pair.b);
     const Places places = findPlaces(end);
-    if (x != y && mayPass(start, end, places.distance, sum)) {
+    if (ends.moves && mayPass(start, end, places.distance, sum)) {
         if (hasSphere(start)) {
             Passage passage;
             if (findPassage(start, end, sum, passage)) {
@@ -808,8 +836,8 @@ int ContactSearch::Implementation::evaluate(const ContactPair& pair, const Segme
                         passage.through};
                 if (contacts[0].gap >= limit)
                     return -1;
-                return isOwned(contacts[0], pair, start, end, false, true, x, y) &&
-                        isOwned(contacts[0], pair, start, end, false, false, x, y);
+                return isOwned(contacts[0], pair, start, end, false, true, ends) &&
+                        isOwned(contacts[0], pair, start, end, false, false, ends);
             }
         }
         else {
@@ -838,8 +866,8 @@ int ContactSearch::Implementation::evaluate(const ContactPair& pair, const Segme
             continue;
         const Vec3d n = length > 0 ? r*(1/length) : findNormal(end, pair.side);
         const Contact contact = {s, t, {n.x, n.y, n.z}, length-sum, 1.0/count, false};
-        if (isOwned(contact, pair, start, end, places.parallel, true, x, y) &&
-                isOwned(contact, pair, start, end, places.parallel, false, x, y))
+        if (isOwned(contact, pair, start, end, places.parallel, true, ends) &&
+                isOwned(contact, pair, start, end, places.parallel, false, ends))
             contacts[kept++] = contact;
     }
     return kept;
@@ -906,40 +934,47 @@ void ContactSearch::findPairsOf(const vector<int>& capsules, const double* x, co
     search.describeAgain(capsules, x, y);
     for (int i : capsules)
         search.again[i] = 1;
+    // In the order of cells, those that follow each other find the same others in the processor's caches.
+    vector<int>& inOrder = search.movers;
+    inOrder.resize(capsules.size());
+    transform(capsules.begin(), capsules.end(), inOrder.begin(), [&] (int i) {return search.slots[i];});
+    sort(inOrder.begin(), inOrder.end());
     const int count = capsules.size(), chunks = (count+FEW-1)/FEW;
     if ((int) search.parts.size() < chunks)
         search.parts.resize(chunks);
     runParts(run, chunks, [&] (int chunk) {
-        search.parts[chunk].pairs.clear();
+        search.parts[chunk].clear();
+        Candidates& candidates = Candidates::ofThread();
+        int found = 0;
         for (int i = chunk*FEW; i < min(count, (chunk+1)*FEW); i++)
-            search.searchAround(capsules[i], x, y, search.parts[chunk]);
+            found = search.searchAround(search.members[inOrder[i]], candidates, found);
+        search.keepPairs(candidates, found, x, y, search.parts[chunk]);
     });
     for (int i : capsules)
         search.again[i] = 0;
     pairs.clear();
     for (int chunk = 0; chunk < chunks; chunk++)
-        pairs.insert(pairs.end(), search.parts[chunk].pairs.begin(), search.parts[chunk].pairs.end());
+        pairs.insert(pairs.end(), search.parts[chunk].begin(), search.parts[chunk].end());
 }
 
 int ContactSearch::evaluate(const ContactPair& pair, const double* x, const double* y, Contact* contacts,
         double limit) const {
     const SegmentPair end = implementation->segments(pair.a, pair.b, pair.shift, y);
     const SegmentPair start = x == y ? end : implementation->segments(pair.a, pair.b, pair.shift, x);
-    return implementation->evaluate(pair, start, end, x, y, contacts, limit);
+    return implementation->evaluate(pair, start, end, {*implementation, x, y, x != y}, contacts, limit);
 }
 
 int ContactSearch::evaluate(const ContactPair& pair, Contact* contacts, double limit) const {
     const Implementation& search = *implementation;
     return search.evaluate(pair, search.movingSegments(pair, false), search.movingSegments(pair, true),
-            search.motionBegins, search.motionEnds, contacts, limit);
+            {search, NULL, NULL, search.moves}, contacts, limit);
 }
 
 void ContactSearch::setMotion(const double* x, const double* y, const Loop& run) {
-    const Implementation& search = *implementation;
+    Implementation& search = *implementation;
     const vector<Capsule>& capsules = search.system.capsules;
-    implementation->motionBegins = x;
-    implementation->motionEnds = y;
-    vector<MovingSegment>& moving = implementation->moving;
+    search.moves = x != y;
+    vector<MovingSegment>& moving = search.moving;
     moving.resize(capsules.size());
     const int count = capsules.size();
     runParts(run, (count+CHUNK-1)/CHUNK, [&] (int chunk) {
@@ -955,6 +990,18 @@ void ContactSearch::setMotion(const double* x, const double* y, const Loop& run)
             segment.radius = own.radius;
         }
     });
+}
+
+void ContactSearch::updateMotion(const vector<int>& numbers, const double* y) {
+    Implementation& search = *implementation;
+    for (int i : numbers) {
+        const Capsule& own = search.system.capsules[i];
+        const Vec3d along = search.along(own, y);
+        set(search.moving[i].laterFirst, position(y, own.first));
+        set(search.moving[i].laterAlong, along);
+        if (search.previous[i] >= 0)
+            set(search.moving[search.previous[i]].laterNext, along);
+    }
 }
 
 /** Whether a contact that is not parallel and has not crossed is surely not owned: see isOwned(). */
@@ -1004,6 +1051,8 @@ void ContactSearch::prefetchMotion(int a, int b) const {
     for (int capsule : {a, b}) {
         prefetch(&implementation->moving[capsule]);
         prefetch(&implementation->system.capsules[capsule]);
+        prefetch(&implementation->next[capsule]);
+        prefetch(&implementation->previous[capsule]);
     }
 }
 
@@ -1014,14 +1063,23 @@ void ContactSearch::findVector(const ContactPair& pair, double s, double t, bool
     result[2] = r.z;
 }
 
-bool ContactSearch::crosses(const ContactPair& pair, const double* x, const double* y) const {
-    const Implementation& search = *implementation;
-    const SegmentPair start = search.segments(pair.a, pair.b, pair.shift, x);
-    const SegmentPair end = search.segments(pair.a, pair.b, pair.shift, y);
+bool ContactSearch::Implementation::crosses(const ContactPair& pair, const SegmentPair& start,
+        const SegmentPair& end) const {
     if (hasSphere(start)) {
         Passage passage;
-        return findPassage(start, end, search.radii(pair.a, pair.b), passage) && passage.through;
+        return findPassage(start, end, radii(pair.a, pair.b), passage) && passage.through;
     }
     Crossing crossings[2];
     return findCrossings(start, end, crossings) > 0;
+}
+
+bool ContactSearch::crosses(const ContactPair& pair, const double* x, const double* y) const {
+    const Implementation& search = *implementation;
+    return search.crosses(pair, search.segments(pair.a, pair.b, pair.shift, x),
+            search.segments(pair.a, pair.b, pair.shift, y));
+}
+
+bool ContactSearch::crosses(const ContactPair& pair) const {
+    const Implementation& search = *implementation;
+    return search.crosses(pair, search.movingSegments(pair, false), search.movingSegments(pair, true));
 }

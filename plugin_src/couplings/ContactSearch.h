@@ -105,6 +105,10 @@ public:
             double limit = std::numeric_limits<double>::infinity()) const;
     /** Take note of x and y, for the functions below. */
     void setMotion(const double* x, const double* y, const Loop& run);
+    /**
+     * Take note of where some capsules are now. Several threads may do so at the same time, each with its own capsules.
+     */
+    void updateMotion(const std::vector<int>& capsules, const double* y);
     /** Ask for what is known of two capsules, which is needed soon. */
     void prefetchMotion(int a, int b) const;
     /**
@@ -128,6 +132,8 @@ public:
      * Spheres do if they come nearer to an axis than 0.7 of the sum of radii, and end on the other side of it.
      */
     bool crosses(const ContactPair& pair, const double* x, const double* y) const;
+    /** The same from what setMotion() and updateMotion() have taken note of. */
+    bool crosses(const ContactPair& pair) const;
 private:
     struct Implementation;
     std::unique_ptr<Implementation> implementation;

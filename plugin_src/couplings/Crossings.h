@@ -92,6 +92,17 @@ template <class Function> void forEachSignChange(const Cubic& f, Function functi
     }
 }
 
+/**
+ * Get whether a cubic surely has one sign between 0 and 1: whether its Bernstein coefficients have, by more than what
+ * rounding does to its values.
+ */
+inline bool hasOneSign(const Cubic& f) {
+    const double f0 = f.c[0], f1 = f0+f.c[1]/3, f2 = f1+(f.c[1]+f.c[2])/3, f3 = f0+f.c[1]+f.c[2]+f.c[3];
+    const double rounding = 1e-13*(std::fabs(f.c[0])+std::fabs(f.c[1])+std::fabs(f.c[2])+std::fabs(f.c[3]));
+    return std::min(std::min(f0, f1), std::min(f2, f3)) > rounding ||
+            std::max(std::max(f0, f1), std::max(f2, f3)) < -rounding;
+}
+
 /** Nothing may slip through a joint by rounding: so far beyond their ends, segments still meet. */
 const double BEYOND_END = 1e-9;
 
@@ -208,6 +219,9 @@ inline int findCrossings(const SegmentPair& start, const SegmentPair& end, Cross
     Vec3d planeNormal;
     if (areInOnePlane(start, end, f, planeNormal))
         return findPlanarCrossings(start, end, planeNormal, crossings);
+    // Most pairs are done with here.
+    if (hasOneSign(f))
+        return 0;
     int count = 0;
     forEachSignChange(f, [&] (double u, bool negative) {
         const SegmentPair pair = interpolate(start, end, u);

@@ -31,8 +31,12 @@ bool cylchain::areSame(const Place& a, const Place& b) {
     return one.first == other.first && one.second == other.second && fabs(one.fraction-other.fraction) < SAME_PLACE;
 }
 
+static BezierWeights weightsOf(const Place& place) {
+    return place.isTangent() ? BezierWeights::ofTangent(place.fraction, place.tangent) : BezierWeights(place.fraction);
+}
+
 void cylchain::locateOnCurve(const Place& place, const double* positions, const double* box, double* result) {
-    const BezierWeights weights(place.fraction);
+    const BezierWeights weights = weightsOf(place);
     double chord[3], controls[2][3];
     const int nodes[] = {place.first, place.second};
     auto vectorBetween = [&] (int from, int to, double* vector) {
@@ -45,12 +49,12 @@ void cylchain::locateOnCurve(const Place& place, const double* positions, const 
     for (int side = 0; side < 2; side++)
         vectorBetween(nodes[side], place.controls[side], controls[side]);
     for (int k = 0; k < 3; k++)
-        result[k] = positions[3*place.first+k]+weights.control1*controls[0][k]+weights.position2*chord[k]+
-                weights.control2*controls[1][k];
+        result[k] = (place.isTangent() ? 0 : positions[3*place.first+k])+weights.control1*controls[0][k]+
+                weights.position2*chord[k]+weights.control2*controls[1][k];
 }
 
 void cylchain::addForceOnCurve(const Place& place, const double* force, double factor, double* forces) {
-    const BezierWeights weights(place.fraction);
+    const BezierWeights weights = weightsOf(place);
     for (int k = 0; k < 3; k++) {
         const double own = factor*force[k];
         forces[3*place.first+k] += (weights.position1-weights.control1)*own;

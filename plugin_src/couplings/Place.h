@@ -21,6 +21,11 @@ struct Place {
     double point[3] = {};
     /** On a curve, the control points of the first and of the second particle, which are its nodes; -1 elsewhere. */
     int controls[2] = {-1, -1};
+    /**
+     * On a curve, zero, or one over the length of the element if its tangent there is meant, dr/ds, in place of the
+     * place; minus that for the opposite of it.
+     */
+    double tangent = 0;
     bool isPoint() const {
         return first < 0;
     }
@@ -31,12 +36,15 @@ struct Place {
     bool isOnCurve() const {
         return controls[0] >= 0;
     }
+    bool isTangent() const {
+        return tangent != 0;
+    }
 };
 
 /** Whether two places are one, wherever particles are, but for rounding of their fractions. */
 bool areSame(const Place& a, const Place& b);
 
-/** Find where a place on a curve is, see locate(). */
+/** Find where a place on a curve is, or what its tangent is, see locate(). */
 void locateOnCurve(const Place& place, const double* positions, const double* box, double* result);
 
 /** Add a force on a place on a curve, times a factor, to those on its four particles. */

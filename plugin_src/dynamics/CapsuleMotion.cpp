@@ -70,17 +70,24 @@ double CapsuleMotion::followOne(int number, const double* moved) {
     return motion[number] = sqrt(inAll);
 }
 
-void CapsuleMotion::follow(const function<bool(int)>& takesPart, const double* moved, double reach, const Loop& loop) {
+void CapsuleMotion::follow(const function<bool(int)>& takesPart, const double* moved, double reach, const Loop& loop,
+        const function<void(const vector<int>&)>& use) {
     const int count = capsules->size(), chunks = (count+CHUNK-1)/CHUNK;
     parts.resize(chunks);
     loop(chunks, [&] (int chunk) {
         Largest& part = parts[chunk];
-        part = Largest();
+        part.first = part.second = 0;
+        part.movers.clear();
+        part.taken.clear();
         for (int i = chunk*CHUNK; i < min(count, (chunk+1)*CHUNK); i++) {
-            if (takesPart(i) && 2*followOne(i, moved) > reach)
-                part.movers.push_back(i);
+            if (takesPart(i)) {
+                part.taken.push_back(i);
+                if (2*followOne(i, moved) > reach)
+                    part.movers.push_back(i);
+            }
             part.include(motion[i]);
         }
+        use(part.taken);
     });
     Largest all;
     movers.clear();

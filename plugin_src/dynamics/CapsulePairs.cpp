@@ -18,7 +18,8 @@ void CapsulePairs::clear() {
     watches.clear();
     slots.clear();
     contacts.clear();
-    added.clear();
+    lastAdded.clear();
+    addedBefore.clear();
 }
 
 void CapsulePairs::begin(const vector<ContactPair>& found, int numCapsules) {
@@ -35,20 +36,27 @@ void CapsulePairs::begin(const vector<ContactPair>& found, int numCapsules) {
     contacts.resize(getNumChunks());
     for (vector<Contacts>& ofChunk : contacts)
         ofChunk.clear();
-    added.assign(numCapsules, {});
+    lastAdded.assign(numCapsules, -1);
+    addedBefore.clear();
 }
 
 bool CapsulePairs::isKnown(const ContactPair& pair) const {
     const auto first = watches.begin()+firstPairs[pair.a], last = watches.begin()+firstPairs[pair.a+1];
     const auto found = lower_bound(first, last, pair.b, [] (const Watch& one, int other) {return one.b < other;});
-    const vector<int>& others = added[pair.a];
-    return (found != last && found->b == pair.b) || find(others.begin(), others.end(), pair.b) != others.end();
+    if (found != last && found->b == pair.b)
+        return true;
+    const int numFirst = firstPairs.back();
+    for (int i = lastAdded[pair.a]; i >= 0; i = addedBefore[i-numFirst])
+        if (watches[i].b == pair.b)
+            return true;
+    return false;
 }
 
 bool CapsulePairs::add(const ContactPair& pair) {
     if (isKnown(pair))
         return false;
-    added[pair.a].push_back(pair.b);
+    addedBefore.push_back(lastAdded[pair.a]);
+    lastAdded[pair.a] = pairs.size();
     pairs.push_back(pair);
     watches.push_back({pair.a, pair.b, -HUGE_VAL, 0, -1, pair.clearance});
     slots.push_back(-1);

@@ -86,14 +86,14 @@ private:
         PairContact of[2];
     };
     bool isKnown(const ContactPair& pair) const;
-    void append(const ContactPair& pair);
     const ContactSearch* search = nullptr;
     /** Those of the first search in its order, and behind them those that others have found. */
     std::vector<ContactPair> pairs;
     std::vector<Watch> watches;
-    /** Where those of the first search begin for each first capsule, and the second capsules of others. */
+    /** Where those of the first search begin for each first capsule. */
     std::vector<int> firstPairs;
-    std::vector<std::vector<int> > added;
+    /** The last pair of each first capsule that another search has found, or -1, and the one before each of these. */
+    std::vector<int> lastAdded, addedBefore;
     /** Where the contacts of each pair are among those of its chunk, or -1: most pairs never come near. */
     std::vector<int> slots;
     std::vector<std::vector<Contacts> > contacts;

@@ -1,4 +1,5 @@
 #include "dynamics/ChainPlaces.h"
+#include "beams/ElementPlace.h"
 #include <algorithm>
 #include <cstddef>
 
@@ -7,6 +8,8 @@ using namespace std;
 
 /** How far a force at the end of an element moves it that is alone, over how far it moves all of the element. */
 static const double MOBILITY_OF_END = 16;
+/** How far a moment turns the tangent at the end of an element that is alone, times the cube of its length. */
+static const double MOBILITY_OF_TANGENT = 1200;
 
 ChainPlaces::ChainPlaces(const vector<Chain>& chains, const vector<BeamChain>& beams, int particles) : chains(chains),
         beams(beams), chainOfParticle(particles, -1), nodeOfParticle(particles, -1),
@@ -94,7 +97,7 @@ bool ChainPlaces::find(const Place& place, PlaceOnChain& result) const {
         fraction = 1;
     }
     result.node = node;
-    result.fraction = fraction;
+    result.fraction = place.isTangent() ? ElementPlace::ofTangent(fraction, place.tangent > 0) : fraction;
     return true;
 }
 
@@ -103,7 +106,10 @@ double ChainPlaces::getFriction(const PlaceOnChain& place) const {
         return particleOf(place.chain).friction;
     if (isBeam(place.chain)) {
         const BeamChain& beam = getBeam(place.chain);
-        return beam.elementLength*min(beam.parallelFriction, beam.perpendicularFriction)/MOBILITY_OF_END;
+        const double friction = beam.elementLength*min(beam.parallelFriction, beam.perpendicularFriction);
+        if (ElementPlace::isTangent(place.fraction))
+            return friction*beam.elementLength*beam.elementLength/MOBILITY_OF_TANGENT;
+        return friction/MOBILITY_OF_END;
     }
     const Chain& chain = chains[place.chain];
     const Segment& segment = chain.segments[place.node];
@@ -118,21 +124,18 @@ int ChainPlaces::getParticle(const PlaceOnChain& place) const {
     return chains[place.chain].nodes[place.node];
 }
 
-double ChainPlaces::getLateralFriction(const PlaceOnChain& place) const {
+LateralFriction ChainPlaces::findLateralFriction(const PlaceOnChain& place) const {
     if (isParticle(place.chain))
-        return particleOf(place.chain).friction;
+        return {particleOf(place.chain).friction, 0, 0, 0};
     if (isBeam(place.chain)) {
         // An element is moved as four Legendre polynomials of the place, of which the second turns it.
         const BeamChain& beam = getBeam(place.chain);
-        const double x = 2*place.fraction-1;
-        return beam.elementLength*beam.perpendicularFriction/(1+3*x*x);
+        const double whole = beam.elementLength*beam.perpendicularFriction;
+        return {0, whole, whole/12, 1, true};
     }
     const Chain& chain = chains[place.chain];
     const Segment& segment = chain.segments[place.node];
-    if (!(segment.perpendicular > 0 && segment.rotational > 0))
-        return chain.nodeFriction;
-    const double arm = (place.fraction-0.5)*segment.restLength;
-    return chain.nodeFriction+1/(1/segment.perpendicular+arm*arm/segment.rotational);
+    return {chain.nodeFriction, segment.perpendicular, segment.rotational, segment.restLength};
 }
 
 vector<int> ChainPlaces::getNodes(int chain) const {

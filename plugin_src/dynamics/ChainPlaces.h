@@ -2,6 +2,7 @@
 #define CYLCHAIN_CHAIN_PLACES_H_
 
 #include "beams/BeamChain.h"
+#include "beams/ElementPlace.h"
 #include "couplings/Place.h"
 #include "dynamics/ParticleStep.h"
 #include "mechanics/Chain.h"
@@ -17,8 +18,21 @@ struct PlaceOnChain {
     int node = 0, lane = 0;
     /** The chain; of beam elements, its number behind those of segments; for a particle, behind those of all chains. */
     int chain = -1;
-    /** Of the segment; on an element, the parameter of its curve. */
+    /** Of the segment; on an element, what of it is held: see ElementPlace.h. */
     double fraction = 0;
+};
+
+/** The friction that a segment or an element has against motion of a place across it, as if it were alone. */
+struct LateralFriction {
+    /** That of a node or a particle; that of all of the segment against motion, and against turning; its length. */
+    double ofNode = 0, perpendicular = 0, rotational = 0, length = 0;
+    bool isOfElement = false;
+    double at(double fraction) const {
+        if (!(perpendicular > 0 && rotational > 0))
+            return ofNode;
+        const double arm = ((isOfElement ? ElementPlace::parameterOf(fraction) : fraction)-0.5)*length;
+        return ofNode+1/(1/perpendicular+arm*arm/rotational);
+    }
 };
 
 /**
@@ -59,7 +73,11 @@ public:
      * The friction that a place has against motion across its segment, which turns and moves as if it were alone: not
      * much more than the least friction against any motion.
      */
-    double getLateralFriction(const PlaceOnChain& place) const;
+    double getLateralFriction(const PlaceOnChain& place) const {
+        return findLateralFriction(place).at(place.fraction);
+    }
+    /** The same for all places on a segment. */
+    LateralFriction findLateralFriction(const PlaceOnChain& place) const;
     /** The chains of segments, whose numbers come first. */
     const std::vector<Chain>& getChains() const {
         return chains;

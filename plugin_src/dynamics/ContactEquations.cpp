@@ -1,4 +1,5 @@
 #include "dynamics/ContactEquations.h"
+#include "beams/ElementPlace.h"
 #include "dynamics/RestGap.h"
 #include "dynamics/SymmetricMatrices.h"
 #include "mechanics/Prefetch.h"
@@ -49,12 +50,16 @@ const int PASSING_ITERATIONS = 3;
 const int HOLDING_ITERATIONS = 9;
 /** Where more capsules than this share have moved, all are searched for again, which takes less time for each. */
 const double SHARE_OF_MOVERS = 0.4;
+/** Up to this share of packs are few: what concerns them alone is looked at. */
+const double SHARE_OF_FEW = 0.25;
 /** Capsules that a thread looks at together. */
 const int CHUNK = 128;
 
 } // namespace
 
-void ContactEquations::setContacts(ContactSearch* newSearch, double newStiffness, const double* newBox) {
+void ContactEquations::setContacts(ContactSearch* newSearch, double newStiffness, const double* newBox,
+        const vector<CapsuleOnCurve>& newOnCurves) {
+    onCurves = &newOnCurves;
     search = newSearch;
     pairs.setSearch(search);
     stiffness = newStiffness;
@@ -72,7 +77,6 @@ void ContactEquations::begin(const CoupledStart& start, const Loop& newLoop) {
     const vector<Capsule>& capsules = search->getSystem().capsules;
     places.resize(capsules.size());
     packs.resize(capsules.size());
-    leastResponses.resize(capsules.size());
     double diameter = 0;
     for (const Capsule& capsule : capsules)
         diameter = max(diameter, 2*capsule.radius);
@@ -88,13 +92,28 @@ void ContactEquations::begin(const CoupledStart& start, const Loop& newLoop) {
         else
             found = PlaceOnChain();
         packs[i] = found.pack;
-        leastResponses[i] = found.pack < 0 ? 0 : responses.findLeast(found.chain);
+        places[i].leastResponse = found.pack < 0 ? 0 : responses.findLeast(found.chain);
+        places[i].friction = found.pack < 0 ? LateralFriction() : start.places.findLateralFriction(found);
     });
+    for (const CapsuleOnCurve& own : *onCurves) {
+        PlaceOnChain& found = places[own.capsule].place;
+        if (!start.places.find(own.first, found) || !start.taken[found.chain]) {
+            found = PlaceOnChain();
+            continue;
+        }
+        found.fraction = ElementPlace::onPieces(found.fraction, own.pieces);
+        places[own.capsule].direction = (own.forwards ? 1.0 : -1.0)/own.pieces;
+        packs[own.capsule] = found.pack;
+        places[own.capsule].leastResponse = responses.findLeast(found.chain);
+        places[own.capsule].friction = start.places.findLateralFriction(found);
+    }
     reaches[0] = REACH*diameter;
     reaches[1] = LEAST_REACH*diameter;
     leavesBox = false;
     pairs.clear();
     motion.clear();
+    selection.all = true;
+    crossingsKnown = false;
 }
 
 double ContactEquations::getRelativeTolerance() const {
@@ -131,6 +150,7 @@ void ContactEquations::findPairs(const double* moved) {
         if (pair.clearance > 0 && pair.distance-radii >= LARGEST_GAP*radii)
             pairs.getWatch(i).due = pair.distance-radii;
     });
+    search->setMotion(begun, moved, *loop);
 }
 
 /** Look for pairs of capsules that have moved far, which no search has seen; false if none are new. */
@@ -154,21 +174,77 @@ bool ContactEquations::findNewPairs(const double* moved) {
     for (const ContactPair& pair : found)
         if (pairs.add(pair)) {
             mark(pairs.getNumPairs()-1);
+            if (!selection.all)
+                selection.pairs.push_back(pairs.getNumPairs()-1);
             any = true;
         }
+    if (any && !selection.all)
+        divideSelection();
     return any;
 }
 
-/** Mark the packs of the pairs that a function finds in each chunk of them; false if there are none. */
-template <class Function> bool ContactEquations::markPairs(Function findIn) {
-    const int count = pairs.getNumPairs(), chunks = pairs.getNumChunks();
-    (*loop)(chunks, [&] (int chunk) {
-        parts[chunk].pairs.clear();
-        findIn(chunk*CapsulePairs::CHUNK, min(count, (chunk+1)*CapsulePairs::CHUNK), parts[chunk]);
+/** Select pairs for an iteration: those of the packs that take part, if these are few. */
+void ContactEquations::select() {
+    const size_t numActive = count(active->begin(), active->end(), 1);
+    if (numActive > SHARE_OF_FEW*active->size())
+        selection.all = true;
+    if (numActive > SHARE_OF_FEW*active->size() || (!selection.all && isSelected(*active)))
+        return;
+    selection.all = false;
+    selection.packs = *active;
+    selection.pairs.clear();
+    for (int i = 0; i < pairs.getNumPairs(); i++)
+        if (takesPart(pairs.getWatch(i).a) || takesPart(pairs.getWatch(i).b))
+            selection.pairs.push_back(i);
+    divideSelection();
+}
+
+void ContactEquations::divideSelection() {
+    selection.runs.assign(1, 0);
+    int chunk = -1;
+    for (int i = 0; i < (int) selection.pairs.size(); i++) {
+        const int own = selection.pairs[i]/CapsulePairs::CHUNK;
+        if (own != chunk && i-selection.runs.back() >= CapsulePairs::CHUNK)
+            selection.runs.push_back(i);
+        chunk = own;
+    }
+    selection.runs.push_back(selection.pairs.size());
+}
+
+/** Whether all pairs of some packs are selected. */
+bool ContactEquations::isSelected(const PackFlags& some) const {
+    return selection.all || equal(some.begin(), some.end(), selection.packs.begin(), [] (char one, char known) {
+        return !one || known;
+    });
+}
+
+/** The parts that pairs are looked at in: all of them, or those that are selected. */
+int ContactEquations::getNumRuns(bool all) const {
+    return all ? pairs.getNumChunks() : selection.runs.size()-1;
+}
+
+/** Call a function with the number of each pair of a part. */
+template <class Function> void ContactEquations::forPairs(bool all, int run, Function function) const {
+    if (all)
+        for (int i = run*CapsulePairs::CHUNK; i < min(pairs.getNumPairs(), (run+1)*CapsulePairs::CHUNK); i++)
+            function(i);
+    else
+        for (int i = selection.runs[run]; i < selection.runs[run+1]; i++)
+            function(selection.pairs[i]);
+}
+
+/** Mark the packs of the pairs that a function finds among all or those that are selected; false if there are none. */
+template <class Function> bool ContactEquations::markPairs(bool all, Function findIn) {
+    const int runs = getNumRuns(all);
+    if ((int) parts.size() < runs)
+        parts.resize(runs);
+    (*loop)(runs, [&] (int run) {
+        parts[run].pairs.clear();
+        findIn(run, parts[run]);
     });
     bool any = false;
-    for (int chunk = 0; chunk < chunks; chunk++)
-        for (int pair : parts[chunk].pairs) {
+    for (int run = 0; run < runs; run++)
+        for (int pair : parts[run].pairs) {
             mark(pair);
             any = true;
         }
@@ -178,7 +254,7 @@ template <class Function> bool ContactEquations::markPairs(Function findIn) {
 /** How far a unit force across a capsule moves a place on it in the step. */
 double ContactEquations::responseOf(int capsule, double fraction) const {
     const PlaceOnChain place = placeOf(capsule, fraction);
-    return place.pack < 0 ? 0 : responses.find(place);
+    return place.pack < 0 ? 0 : responses.find(place, places[capsule].friction);
 }
 
 /** a of a contact, see ContactRest. */
@@ -208,27 +284,45 @@ bool ContactEquations::waits(int number, const PairOutlook& outlook) {
     return true;
 }
 
+struct ContactEquations::Looks {
+    vector<const ContactPair*> due;
+    vector<int> numbers;
+    vector<PairOutlook> outlooks;
+    static Looks& ofThread() {
+        static thread_local Looks memory;
+        memory.due.clear();
+        memory.numbers.clear();
+        return memory;
+    }
+};
+
 /** Evaluate some pairs that may touch. */
-void ContactEquations::look(int begin, int end, bool first, Part& part) {
-    part.due.clear();
-    part.numbers.clear();
-    for (int i = begin; i < end; i++) {
+void ContactEquations::look(int run, bool first, Part& part) {
+    Looks& looks = Looks::ofThread();
+    forPairs(selection.all, run, [&] (int i) {
+        const CapsulePairs::Watch& watch = pairs.getWatch(i);
+        motion.prefetchWay(watch.a, watch.b);
+        prefetch(&packs[watch.b]);
+    });
+    forPairs(selection.all, run, [&] (int i) {
         const CapsulePairs::Watch& watch = pairs.getWatch(i);
         if (motion.getWay(watch.a, watch.b) < watch.due)
-            continue;
+            return;
         const bool isDue = isLookedFor(i);
         prefetch(&pairs.getPair(i));
         if (pairs.hasContacts(i))
             prefetch(&pairs.getContact(i, 0));
         search->prefetchMotion(watch.a, watch.b);
-        part.numbers.push_back(isDue ? i : -1-i);
+        for (int capsule : {watch.a, watch.b})
+            prefetch(&places[capsule]);
+        looks.numbers.push_back(isDue ? i : -1-i);
         if (isDue)
-            part.due.push_back(&pairs.getPair(i));
-    }
-    part.outlooks.resize(part.due.size());
-    search->findOutlooks(part.due.data(), part.due.size(), part.outlooks.data());
-    const PairOutlook* next = part.outlooks.data();
-    for (int number : part.numbers)
+            looks.due.push_back(&pairs.getPair(i));
+    });
+    looks.outlooks.resize(looks.due.size());
+    search->findOutlooks(looks.due.data(), looks.due.size(), looks.outlooks.data());
+    const PairOutlook* next = looks.outlooks.data();
+    for (int number : looks.numbers)
         if (number < 0)
             evaluate(-1-number, first, NULL, part);
         else if (const PairOutlook& outlook = *next++; !waits(number, outlook))
@@ -271,7 +365,7 @@ void ContactEquations::evaluate(int number, bool first, const PairOutlook* outlo
         PairContact& side = pairs.getContact(number, i);
         const Contact& contact = side.contact;
         if (!side.rest.isKnown()) {
-            double softness = stiffness*(leastResponses[pair.a]+leastResponses[pair.b]);
+            double softness = stiffness*(places[pair.a].leastResponse+places[pair.b].leastResponse);
             if (softness < 1)
                 softness = softnessOf(pair, contact);
             side.rest = ContactRest(softness, first ? max(contact.gap, -LARGEST_RETURN*diameter) : 0);
@@ -342,19 +436,19 @@ void ContactEquations::linearise(int iteration, const double* moved, vector<Coup
         return;
     if (first)
         findPairs(moved);
-    search->setMotion(begun, moved, *loop);
-    const int count = pairs.getNumPairs(), chunks = pairs.getNumChunks();
-    if ((int) parts.size() < chunks)
-        parts.resize(chunks);
-    (*loop)(chunks, [&] (int chunk) {
-        Part& part = parts[chunk];
+    select();
+    const int runs = getNumRuns(selection.all);
+    if ((int) parts.size() < runs)
+        parts.resize(runs);
+    (*loop)(runs, [&] (int run) {
+        Part& part = parts[run];
         part.equations.clear();
         part.contacts.clear();
         part.pairs.clear();
-        look(chunk*CapsulePairs::CHUNK, min(count, (chunk+1)*CapsulePairs::CHUNK), first, part);
+        look(run, first, part);
     });
-    for (int chunk = 0; chunk < chunks; chunk++) {
-        const Part& part = parts[chunk];
+    for (int run = 0; run < runs; run++) {
+        const Part& part = parts[run];
         crossed.insert(crossed.end(), part.pairs.begin(), part.pairs.end());
         all.insert(all.end(), part.equations.begin(), part.equations.end());
         contactsOfEquations.insert(contactsOfEquations.end(), part.contacts.begin(), part.contacts.end());
@@ -365,18 +459,23 @@ void ContactEquations::linearise(int iteration, const double* moved, vector<Coup
 bool ContactEquations::anyComeNear(const double* moved) {
     motion.follow([&] (int capsule) {
         return takesPart(capsule);
-    }, moved, reach, *loop);
-    if ((int) parts.size() < pairs.getNumChunks())
-        parts.resize(pairs.getNumChunks());
+    }, moved, reach, *loop, [&] (const vector<int>& capsules) {
+        search->updateMotion(capsules, moved);
+    });
+    if (crossingsKnown)
+        transform(active->begin(), active->end(), movedSince.begin(), movedSince.begin(), [] (char one, char other) {
+            return (char) (one | other);
+        });
     if (iterations < 2)
         return true;
     const double tolerance = TOLERANCE*sqrt(kT/stiffness)+LEAST_CHANGE*reach;
-    bool any = markPairs([&] (int begin, int end, Part& part) {
-        for (int i = begin; i < end; i++) {
+    // Those that are not selected have not moved.
+    bool any = markPairs(selection.all, [&] (int run, Part& part) {
+        forPairs(selection.all, run, [&] (int i) {
             const CapsulePairs::Watch& watch = pairs.getWatch(i);
             if (watch.due > 0 && motion.getWay(watch.a, watch.b) > watch.due+tolerance)
                 part.pairs.push_back(i);
-        }
+        });
     });
     // Pairs that no search has seen were out of reach: one of the two has moved by more than half of it.
     if (motion.exceedsReach())
@@ -433,7 +532,7 @@ bool ContactEquations::finishIteration(const double* moves, const double* moved)
         }
     if (any)
         return true;
-    clear = !anyCross(moved);
+    clear = !anyCross();
     return !clear;
 }
 
@@ -451,28 +550,31 @@ void ContactEquations::mark(int pair) {
 }
 
 /** Find pairs that cross. */
-void ContactEquations::findCrossed(int begin, int end, const double* moved, Part& part) const {
-    part.due.clear();
-    part.numbers.clear();
-    for (int i = begin; i < end; i++) {
+void ContactEquations::findCrossed(bool all, int run, Part& part) const {
+    Looks& looks = Looks::ofThread();
+    forPairs(all, run, [&] (int i) {
         const CapsulePairs::Watch& watch = pairs.getWatch(i);
         if (motion.getWay(watch.a, watch.b) < watch.clearance)
-            continue;
-        part.numbers.push_back(i);
-        part.due.push_back(&pairs.getPair(i));
-    }
-    part.outlooks.resize(part.due.size());
-    search->findOutlooks(part.due.data(), part.due.size(), part.outlooks.data());
-    for (size_t i = 0; i < part.due.size(); i++)
-        if (part.outlooks[i].mayCross && search->crosses(*part.due[i], begun, moved))
-            part.pairs.push_back(part.numbers[i]);
+            return;
+        search->prefetchMotion(watch.a, watch.b);
+        looks.numbers.push_back(i);
+        looks.due.push_back(&pairs.getPair(i));
+    });
+    looks.outlooks.resize(looks.due.size());
+    search->findOutlooks(looks.due.data(), looks.due.size(), looks.outlooks.data());
+    for (size_t i = 0; i < looks.due.size(); i++)
+        if (looks.outlooks[i].mayCross && search->crosses(*looks.due[i]))
+            part.pairs.push_back(looks.numbers[i]);
 }
 
 /** Whether pairs cross elsewhere than where they were last seen to touch: they are looked at again. */
-bool ContactEquations::anyCross(const double* moved) {
-    search->setMotion(begun, moved, *loop);
-    return markPairs([&] (int begin, int end, Part& part) {
-        findCrossed(begin, end, moved, part);
+bool ContactEquations::anyCross() {
+    // Pairs that have not moved since they were seen do not cross.
+    const bool all = selection.all || !crossingsKnown || !isSelected(movedSince);
+    crossingsKnown = true;
+    movedSince.assign(active->size(), 0);
+    return markPairs(all, [&] (int run, Part& part) {
+        findCrossed(all, run, part);
         for (int pair : part.pairs) {
             pairs.getWatch(pair).count = -1;
             pairs.getWatch(pair).due = -HUGE_VAL;

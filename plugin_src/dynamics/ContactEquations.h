@@ -4,6 +4,7 @@
 #include "couplings/ContactSearch.h"
 #include "dynamics/CapsuleMotion.h"
 #include "dynamics/CapsulePairs.h"
+#include "dynamics/CurveSites.h"
 #include "dynamics/ImplicitCouplings.h"
 #include "dynamics/PlaceResponses.h"
 #include <cstddef>
@@ -32,8 +33,11 @@ public:
      *
      * @param stiffness  k_c
      * @param box        the periodic box, if distances are those of nearest images, or NULL
+     * @param onCurves   capsules that end at virtual sites on curves of beam elements, whose positions are among those
+     *                   of all particles
      */
-    void setContacts(ContactSearch* search, double stiffness, const double* box);
+    void setContacts(ContactSearch* search, double stiffness, const double* box,
+            const std::vector<CapsuleOnCurve>& onCurves);
     void begin(const CoupledStart& start, const Loop& loop) override;
     void beginStage(int stage, int numStages, const double* moved) override;
     void linearise(int iteration, const double* moved, std::vector<CouplingEquation>& equations) override;
@@ -47,10 +51,14 @@ public:
     bool findCulprit(const double* moved, const CouplingEquation* equations, BrokenCoupling& culprit) const override;
     void findNeighbours(std::vector<std::pair<int, int> >& neighbours) const override;
 private:
-    /** Where a capsule is: its place at fraction 0, and by how much the fraction grows along it. */
+    /**
+     * Where a capsule is: its place at fraction 0, by how much the fraction grows along it, and what is needed to find
+     * how places on it respond to forces, with the least of these responses.
+     */
     struct CapsulePlace {
         PlaceOnChain place;
-        double direction;
+        double direction, leastResponse;
+        LateralFriction friction;
     };
     struct Part {
         std::vector<CouplingEquation> equations;
@@ -58,12 +66,27 @@ private:
         std::vector<int> contacts;
         /** Pairs that were crossed, or which were looked for. */
         std::vector<int> pairs;
-        /** Those that are looked at in lanes. */
-        std::vector<const ContactPair*> due;
-        std::vector<int> numbers;
-        std::vector<PairOutlook> outlooks;
     };
-    template <class Function> bool markPairs(Function findIn);
+    /** Pairs that are looked at in lanes, in memory of a thread. */
+    struct Looks;
+    /**
+     * The pairs that are looked at in an iteration: all, or those of few packs. Late iterations have few, and should
+     * take no time for others.
+     */
+    struct Selection {
+        bool all = true;
+        /** The packs all pairs of which are there. */
+        PackFlags packs;
+        std::vector<int> pairs;
+        /** Where runs of them begin, each for a thread: no two of them have pairs of the same chunk. */
+        std::vector<int> runs;
+    };
+    void select();
+    void divideSelection();
+    bool isSelected(const PackFlags& packs) const;
+    int getNumRuns(bool all) const;
+    template <class Function> void forPairs(bool all, int run, Function function) const;
+    template <class Function> bool markPairs(bool all, Function findIn);
     void mark(int pair);
     bool takesPart(int capsule) const {
         return packs[capsule] >= 0 && (*active)[packs[capsule]];
@@ -77,11 +100,11 @@ private:
     double softnessOf(const ContactPair& pair, const Contact& contact) const;
     bool isLookedFor(int pair) const;
     bool waits(int pair, const PairOutlook& outlook);
-    void look(int begin, int end, bool first, Part& part);
+    void look(int run, bool first, Part& part);
     void evaluate(int pair, bool first, const PairOutlook* outlook, Part& part);
     bool anyComeNear(const double* moved);
-    bool anyCross(const double* moved);
-    void findCrossed(int begin, int end, const double* moved, Part& part) const;
+    bool anyCross();
+    void findCrossed(bool all, int run, Part& part) const;
     int findFastest(const double* moved) const;
     PlaceOnChain placeOf(int capsule, double fraction) const;
     ContactSearch* search = nullptr;
@@ -89,16 +112,20 @@ private:
     const Loop* loop = nullptr;
     const PackFlags* active = nullptr;
     const double *begun = nullptr, *box = nullptr;
+    const std::vector<CapsuleOnCurve>* onCurves = nullptr;
     PlaceResponses responses;
     double kT = 0, stepSize = 0, wallDepth = 0, reach = 0, reaches[2] = {};
     std::vector<CapsulePlace> places;
-    /** The packs of these places, and their least responses. */
+    /** The packs of these places. */
     std::vector<int> packs;
-    std::vector<double> leastResponses;
     CapsulePairs pairs;
     /** Those of the last search. */
     std::vector<ContactPair> found;
     CapsuleMotion motion;
+    Selection selection;
+    /** Whether anyCross() has seen all pairs, and the packs that have moved since it was called. */
+    bool crossingsKnown = false;
+    PackFlags movedSince;
     std::vector<Part> parts;
     /** All equations of the iteration, the first of these, and which contacts they are of, as in a part. */
     const std::vector<CouplingEquation>* equations = nullptr;

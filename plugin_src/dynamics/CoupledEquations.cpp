@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
+#include <cstring>
 #include <numeric>
 
 using namespace cylchain;
@@ -29,6 +30,16 @@ const int LARGEST_NUMBER_OF_ITERATIONS = 1000;
 const int CHUNK = 256;
 /** What a term far from the processor's caches shows is asked for this many terms ahead. */
 const int AHEAD = 16;
+
+/** Vectors in registers: the fourth number is none of theirs. */
+template <class Real> struct Four {
+    typedef Real Type __attribute__((vector_size(4*sizeof(Real))));
+    static Type load(const Real* values) {
+        Type result;
+        memcpy(&result, values, sizeof(result));
+        return result;
+    }
+};
 
 /** In lanes, as compilers may not add in another order. */
 template <class Real> double sumOfProducts(const Real* a, const Real* b, int first, int last) {
@@ -178,11 +189,16 @@ template <class Real> void CoupledEquations::iterate(const vector<PackStep*>& pa
             {&vectors.residual, &vectors.response, &vectors.force, &vectors.direction, &vectors.image})
         values->resize(3*count);
     vectors.exchanged.resize(count);
-    vectors.stiffness.resize(6*count);
+    vectors.stiffness.resize(count);
     Real *const residual = vectors.residual.data(), *const response = vectors.response.data();
     Real *const force = vectors.force.data(), *const direction = vectors.direction.data();
-    Real *const image = vectors.image.data(), *const stiffness = vectors.stiffness.data();
+    Real* const image = vectors.image.data();
+    auto* const stiffness = vectors.stiffness.data();
     auto* const exchanged = vectors.exchanged.data();
+    typedef typename Four<Real>::Type Vector;
+    auto load = [] (const Real* values) {
+        return Four<Real>::load(values);
+    };
     auto forCoupled = [&] (auto function) {
         loop(packs.size(), [&] (int pack) {
             if (coupled[pack])
@@ -202,12 +218,15 @@ template <class Real> void CoupledEquations::iterate(const vector<PackStep*>& pa
             double pull[3] = {};
             if (partners[i] >= 0)
                 multiply(terms[i].stiffness, &change[3*partners[i]], pull);
-            for (int k = 0; k < 6; k++)
-                stiffness[6*i+k] = terms[i].stiffness[k];
+            const double* const s = terms[i].stiffness;
+            const double columns[3][4] = {{s[0], s[1], s[2], 0}, {s[1], s[3], s[4], 0}, {s[2], s[4], s[5], 0}};
+            for (int column = 0; column < 3; column++)
+                for (int k = 0; k < 4; k++)
+                    stiffness[i].of[column][k] = columns[column][k];
+            exchanged[i] = {};
             for (int k = 0; k < 3; k++) {
                 residual[3*i+k] = pull[k];
                 force[3*i+k] = direction[3*i+k] = 0;
-                exchanged[i].direction[k] = 0;
             }
         }
         respond(pack, first, last);
@@ -221,13 +240,12 @@ template <class Real> void CoupledEquations::iterate(const vector<PackStep*>& pa
             for (int i = first; i < last; i++) {
                 if (i+AHEAD < last && partners[i+AHEAD] >= 0)
                     __builtin_prefetch(&exchanged[partners[i+AHEAD]]);
-                Real pull[3] = {};
+                Vector pull = {};
                 if (partners[i] >= 0) {
                     const auto& partner = exchanged[partners[i]];
-                    Real ofPartner[3];
-                    for (int k = 0; k < 3; k++)
-                        ofPartner[k] = partner.response[k]+ratio*partner.direction[k];
-                    multiply(stiffness+6*i, ofPartner, pull);
+                    const Vector ofPartner = load(partner.response)+load(partner.direction)*ratio;
+                    const auto& columns = stiffness[i].of;
+                    pull = load(columns[0])*ofPartner[0]+load(columns[1])*ofPartner[1]+load(columns[2])*ofPartner[2];
                 }
                 for (int k = 0; k < 3; k++)
                     image[3*i+k] = pull[k];

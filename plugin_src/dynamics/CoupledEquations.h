@@ -83,12 +83,15 @@ private:
     template <class Real> struct Vectors {
         /** What a term shows its partner, in one place: its response, and its last direction. */
         struct Exchanged {
-            Real response[3], direction[3];
+            Real response[4], direction[4];
         };
         std::vector<Real> residual, response, force, direction, image;
         std::vector<Exchanged> exchanged;
-        /** Six numbers for each term. */
-        std::vector<Real> stiffness;
+        /** The columns of the matrix of each term, for vector registers. */
+        struct Columns {
+            Real of[3][4];
+        };
+        std::vector<Columns> stiffness;
     };
     bool hasSamePlaces(const std::vector<CouplingEquation>& equations, const PackFlags& active, const Loop& loop);
     void sortPlaces(const std::vector<CouplingEquation>& equations, const PackFlags& active);

@@ -4,6 +4,7 @@
 #include "couplings/ContactSearch.h"
 #include "couplings/Links.h"
 #include "couplings/Walls.h"
+#include "dynamics/CurveSites.h"
 #include "dynamics/ParticleStep.h"
 #include <vector>
 
@@ -20,10 +21,14 @@ struct CoupledForces {
         ContactSearch* search;
         double stiffness;
         bool periodic;
+        /** Where capsules between places on curves of beam elements are. */
+        const std::vector<CapsuleOnCurve>* onCurves;
     };
     std::vector<Links> links;
     std::vector<Contacts> contacts;
     std::vector<const WallSystem*> walls;
+    /** The virtual sites on curves that move with them, at which capsules end. */
+    std::vector<CurveSite> sites;
     /** The particles outside chains that these forces act on, in ascending order. */
     std::vector<CoupledParticle> particles;
     bool empty() const {

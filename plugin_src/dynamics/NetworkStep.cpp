@@ -40,6 +40,7 @@ NetworkStep::~NetworkStep() {
 
 void NetworkStep::setForces(const CoupledForces& forces, const double* box) {
     setParticles(forces.particles);
+    sites = &forces.sites;
     couplings.clear();
     links.resize(max(links.size(), forces.links.size()));
     for (size_t i = 0; i < forces.links.size(); i++) {
@@ -57,7 +58,7 @@ void NetworkStep::setForces(const CoupledForces& forces, const double* box) {
         const CoupledForces::Contacts& own = forces.contacts[i];
         if (!contacts[i])
             contacts[i].reset(new ContactEquations());
-        contacts[i]->setContacts(own.search, own.stiffness, own.periodic ? box : NULL);
+        contacts[i]->setContacts(own.search, own.stiffness, own.periodic ? box : NULL, *own.onCurves);
         couplings.push_back(contacts[i].get());
     }
     walls.resize(max(walls.size(), forces.walls.size()));
@@ -229,10 +230,17 @@ bool NetworkStep::iterate(const Attempt& attempt, int stage) {
             if (active[pack])
                 steps[pack]->getPositions(attempt.positions, moved.data());
         });
+        placeSites(moved.data());
         if (!finishIteration(first))
             return true;
     }
     return false;
+}
+
+/** Let virtual sites on curves follow them. */
+void NetworkStep::placeSites(double* positions) const {
+    for (const CurveSite& site : *sites)
+        locate(site.place, positions, NULL, positions+3*site.particle);
 }
 
 /** Find the packs that need another iteration; false if there are none. */
@@ -293,6 +301,7 @@ bool NetworkStep::divide(const Attempt& whole, int division, double* displacemen
             start[k] += part[k];
             total[k] += part[k];
         });
+        placeSites(start.data());
         for (size_t chain = 0; recorded != NULL && chain < recorded->size(); chain++)
             for (size_t s = 0; whole.taken[chain] && s < ofHalf[chain].size(); s++) {
                 SegmentForces& mean = (*recorded)[chain][s];

@@ -57,6 +57,7 @@ private:
     bool attempt(const Attempt& attempt, double* displacements, std::vector<bool>& failed);
     bool iterate(const Attempt& attempt, int stage);
     bool finishIteration(const std::vector<std::size_t>& first);
+    void placeSites(double* positions) const;
     bool divide(const Attempt& whole, int division, double* displacements, std::vector<bool>& failed);
     BrokenCoupling findCulprit() const;
     std::vector<bool> findComponents(const std::vector<bool>& failed) const;
@@ -68,6 +69,7 @@ private:
     std::vector<std::unique_ptr<ContactEquations> > contacts;
     std::vector<std::unique_ptr<WallEquations> > walls;
     std::vector<ImplicitCouplings*> couplings;
+    const std::vector<CurveSite>* sites = nullptr;
     std::vector<CoupledParticle> particles;
     std::vector<int> packs;
     std::vector<std::vector<int> > chainsOfLanes;

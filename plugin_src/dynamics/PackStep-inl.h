@@ -14,11 +14,9 @@ public:
             const bool* taken) override {
         settings = stepSettings;
         const int n = pack.nodes;
-        Vec* f = vectors.reserve<Vec>(6*n);
+        Vec* f = vectors.reserve<Vec>(4*n);
         y = f+n;
         start = {y+n, y+2*n, tethers.reserve<TetherVector>(pack.tethers.size())};
-        forcesOnNodes = y+3*n;
-        movesOfNodes = y+4*n;
         gatherStepStart<W>(pack, positions, box, settings.flow.present, start);
         gatherForces<W>(pack, forces, f);
         for (int i = 0; i < W; i++)
@@ -55,6 +53,7 @@ public:
         step->getEquations().findResponses(UseOfResponses<W, CLOSED, true>(terms, numTerms, compliances));
     }
     void advance(const double* forces, double share, bool* unfinished) override {
+        takeWorkspace();
         spreadForces(forces);
         step->getEquations().setForcesOfOthers(forcesOnNodes);
         step->getEquations().addForcesOfOthers();
@@ -111,7 +110,14 @@ private:
             }
         });
     }
+    /** Use memory that the packs of a thread share: it stays in the nearest cache. */
+    void takeWorkspace() {
+        static thread_local Scratch memory;
+        forcesOnNodes = memory.reserve<Vec>(2*pack.nodes);
+        movesOfNodes = forcesOnNodes+pack.nodes;
+    }
     template <class Number> void respondAs(const Number* forces, Number* moves) {
+        takeWorkspace();
         spreadForces(forces);
         step->getEquations().respond(forcesOnNodes, movesOfNodes);
         gatherMoves(movesOfNodes, moves);

@@ -12,6 +12,7 @@ namespace cylchain {
 struct CouplingTerm {
     /** The segment is the one between this node and the next. */
     int node, lane;
+    /** Of the segment; of a beam element, see ElementPlace.h. */
     double fraction;
     double force[3], stiffness[6];
 };

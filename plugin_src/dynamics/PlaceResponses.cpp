@@ -1,4 +1,5 @@
 #include "dynamics/PlaceResponses.h"
+#include "beams/ElementPlace.h"
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -46,15 +47,17 @@ void PlaceResponses::describe(double friction, double rigidity, Beam& beam) cons
     beam.least = min(beam.least, max(beam.bending, beam.whole));
 }
 
-double PlaceResponses::find(const PlaceOnChain& place) const {
-    const double alone = stepSize/places->getLateralFriction(place);
+double PlaceResponses::find(const PlaceOnChain& place, const LateralFriction& friction) const {
+    const double alone = stepSize/friction.at(place.fraction);
     if (place.chain >= (int) beams.size() || !(beams[place.chain].wave > 0))
         return alone;
     const Beam& beam = beams[place.chain];
     // A ring turns, too, but about axes in its plane alone: 3/2 on the average over directions.
     double bending = beam.bending, whole = 1.5*beam.whole;
     if (!beam.closed) {
-        const double at = (place.node+place.fraction)*beam.length/beam.segments;
+        const double fraction = places->isBeam(place.chain) ? ElementPlace::parameterOf(place.fraction) :
+                place.fraction;
+        const double at = (place.node+fraction)*beam.length/beam.segments;
         const double x = min(at, beam.length-at)/beam.wave, off = at/beam.length-0.5;
         if (x < LENGTHS_OF_END)
             bending *= 1+exp(-2*x)*(1+2*cos(x)*(cos(x)-sin(x)));

@@ -21,7 +21,11 @@ class PlaceResponses {
 public:
     /** Set chains, which must exist while responses are found, and the length of the step. */
     void begin(const ChainPlaces& places, double stepSize);
-    double find(const PlaceOnChain& place) const;
+    double find(const PlaceOnChain& place) const {
+        return find(place, places->findLateralFriction(place));
+    }
+    /** The same where the friction of the segment is at hand: see ChainPlaces::findLateralFriction(). */
+    double find(const PlaceOnChain& place, const LateralFriction& friction) const;
     /** Find what no place of a chain, or a particle, responds less than. It takes less time. */
     double findLeast(int chain) const;
     /**

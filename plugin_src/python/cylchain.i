@@ -292,6 +292,10 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
     val[2] = unit.Quantity(val[2], _LENGTH)
     val[3] = unit.Quantity(val[3], _STIFFNESS)
 %}
+%pythonappend OpenMM::CylinderChainForce::getBeamTetherParameters(int, int&, int&, Vec3&, double&) const %{
+    val[2] = unit.Quantity(val[2], _LENGTH)
+    val[3] = unit.Quantity(val[3], _STIFFNESS)
+%}
 %pythonappend OpenMM::CylinderChainForce::getBeamChainParameters(int, double&, double&, double&, double&, double&,
         double&) const %{
     friction = _FRICTION/_LENGTH

@@ -32,8 +32,8 @@ class Dumbbells:
     def __len__(self):
         return len(self.times)
 
-    def nodes(self, frame):
-        return []
+    def positions(self, frame):
+        return np.zeros((0, 3))
 
     def crosslinks(self, frame):
         vectors = self._vectors[frame]

@@ -8,6 +8,8 @@ import pytest
 from openmm_cylchain import DSDNA_BASE_PAIRS, F_ACTIN, MICROTUBULE, InputError, analysis
 from openmm_cylchain.analysis import CrosslinkFrame
 from openmm_cylchain.analysis.runs import RunFilament
+from openmm_cylchain.beams.curve import BeamElement, beam_virial
+from openmm_cylchain.beams.equilibrium import draw_beam
 from openmm_cylchain.couplings.contact_frames import joined_contacts
 from openmm_cylchain.filaments.placement import joint_stiffnesses
 from openmm_cylchain.output.linker_records import LINKER_RECORD
@@ -24,9 +26,10 @@ class PlacedRun:
     def __init__(self, chains, springs=(), box=None, crosslinks=((), (), ())):
         self.box = None if box is None else np.diag(np.array(box, dtype=float))
         self._nodes = [np.array(nodes, dtype=float) for _, nodes, *_ in chains]
+        firsts = np.cumsum([0, *(len(own) for own in self._nodes)])
         self.filaments = [
-            RunFilament(kind, np.arange(len(nodes)), kind.diameter, ring, clamped)
-            for kind, nodes, ring, clamped in chains
+            RunFilament(kind, first + np.arange(len(nodes)), kind.diameter, ring, clamped, planar=bool(planar))
+            for first, (kind, nodes, ring, clamped, *planar) in zip(firsts, chains)
         ]
         records = np.zeros(len(springs), LINKER_RECORD)
         if len(springs):
@@ -36,8 +39,8 @@ class PlacedRun:
         self.linkers = [records]
         self._springs, self._on, self._at_points = crosslinks
 
-    def nodes(self, frame):
-        return self._nodes
+    def positions(self, frame):
+        return np.concatenate(self._nodes)
 
     def crosslinks(self, frame):
         places = np.reshape(np.array(self._springs, dtype=float), (-1, 2, 3))
@@ -123,6 +126,17 @@ def test_stress_is_the_change_of_energy_by_strain(kind, ring):
     np.testing.assert_allclose(7.0 * found, expected, atol=1e-6 * scale)
     # No torque: the tensor is symmetric.
     np.testing.assert_allclose(found, found.T, atol=1e-9 * np.abs(found).max())
+
+
+def test_free_beams_in_equilibrium_press_as_ideal_gas():
+    """Elements drawn from equilibrium: their virial takes up the ideal part of their four particles but one."""
+    kT, generator = thermal_energy(TEMPERATURE), np.random.default_rng(5)
+    element = BeamElement(length=100.0, rigidity=5000.0 * kT, modulus=kT)
+    drawn = [draw_beam(element, 1, kT, generator, np.zeros(3), None, planar=False) for _ in range(3000)]
+    virials = [np.trace(beam_virial(*own, element)) / (3.0 * kT) for own in drawn]
+    error = np.std(virials) / np.sqrt(len(virials))
+    assert error < 0.075
+    assert np.mean(virials) == pytest.approx(4 - 1, abs=4 * error)
 
 
 def test_without_a_volume():

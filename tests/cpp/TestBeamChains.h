@@ -31,7 +31,7 @@ inline double energyOf(const BeamEngine& engine, const Array& x, const double* b
     double energy = 0;
     for (int pack = 0; pack < engine.getNumPacks(); pack++) {
         const ChainEnergy one = engine.addForces(pack, x.data(), unused.data(), box, true);
-        energy += one.stretching+one.bending;
+        energy += one.stretching+one.bending+one.tethers;
     }
     return energy;
 }

@@ -4,6 +4,7 @@
  */
 
 #include "TestBeamChains.h"
+#include "beams/ElementPlace.h"
 #include <algorithm>
 
 static void testForces() {
@@ -16,6 +17,9 @@ static void testForces() {
                 chains.push_back(beam(elements, 2+0.1*elements, 50, 7, x));
                 chains.back().planar = planar;
                 chains.back().shortening = shortening;
+                const double* const last = &x[3*chains.back().particles[2*elements]];
+                chains.back().tethers = {{elements, {last[0]+1, last[1]-0.5, planar ? last[2] : 0.7}, 0.9},
+                        {0, {0.2, last[1], last[2]}, 0.4}};
             }
             const Array scatter = normalNumbers(x.size());
             for (size_t i = 0; i < x.size(); i++)
@@ -26,7 +30,7 @@ static void testForces() {
             double sum = 0;
             for (int pack = 0; pack < engine.getNumPacks(); pack++) {
                 const ChainEnergy energy = engine.addForces(pack, x.data(), f.data(), NULL, true);
-                sum += energy.stretching+energy.bending;
+                sum += energy.stretching+energy.bending+energy.tethers;
             }
             checkClose(energyOf(engine, x), sum, sum, 1e-12, "energy");
             for (size_t i = 0; i < x.size(); i++) {
@@ -46,6 +50,67 @@ static void testForces() {
                     wrapped[3*i+k] += (int) (i%3-1)*box[3*(i%2)+k];
             checkClose(sum, energyOf(engine, wrapped, box), sum, 1e-10, "energy in a box");
         }
+}
+
+/**
+ * Stiff springs that hold two nodes further apart than the chain is long, in long steps without noise: the tension of
+ * the chain is that of the springs, in a pack of several lanes, and the same where steps are divided.
+ */
+static void testTethers() {
+    Array x;
+    vector<BeamChain> chains;
+    for (int elements : {3, 3, 2}) {
+        chains.push_back(beam(elements, 2, 50, 7, x));
+        const double* const first = &x[3*chains.back().particles[0]];
+        const double end = 2*elements+1, stiffness = 10*(1+chains.size());
+        chains.back().tethers = {{elements, {end, first[1], 3}, stiffness}, {0, {first[0]-1, first[1], 3}, stiffness}};
+    }
+    const BeamEngine engine(chains);
+    StepSettings settings;
+    settings.scheme = Scheme::Implicit;
+    settings.stepSize = 1e4;
+    settings.kT = 0;
+    const Array f(x.size());
+    for (int i = 0; i < 60; i++)
+        advance(engine, x, f, settings);
+    for (const BeamChain& chain : chains) {
+        const int elements = chain.numNodes()-1;
+        const double stiffness = chain.tethers[0].stiffness;
+        const double *first = &x[3*chain.particles[0]], *last = &x[3*chain.particles[2*elements]];
+        // Each of two springs is longer by T/k, and the chain by T L/K: all of it is the room of 2.
+        const double tension = 2/(2/stiffness+2.0*elements/chain.stretchingModulus);
+        checkClose(2*elements*(1+tension/chain.stretchingModulus), last[0]-first[0], 1, 1e-6, "length under tension");
+        checkClose(chain.tethers[0].point[0]-tension/stiffness, last[0], 1, 1e-6, "the end of a spring");
+        checkClose(3, first[2], 1, 1e-6, "height of the first node");
+    }
+}
+
+/** What couplings hold of an element: places, pieces of the curve, and tangents, which are derivatives of places. */
+static void testPlacesOfElements() {
+    auto at = [] (const BezierWeights& weights) {
+        return Array {weights.position1, weights.control1, weights.position2, weights.control2};
+    };
+    const double length = 2.5;
+    for (double x : {0.0, 0.1, 0.37, 0.5, 0.92, 1.0}) {
+        const Array place = at(BezierWeights(x)), plus = at(BezierWeights(x+1e-6)), minus = at(BezierWeights(x-1e-6));
+        const Array same = at(ElementPlace::weightsOf(x, length));
+        const Array tangent = at(ElementPlace::weightsOf(ElementPlace::ofTangent(x, true), length));
+        const Array back = at(ElementPlace::weightsOf(ElementPlace::ofTangent(x, false), length));
+        const int pieces = 4;
+        const Array piece = at(ElementPlace::weightsOf(ElementPlace::onPieces(x, pieces), length));
+        const int left = min(pieces-1, (int) (x*pieces));
+        const double share = x*pieces-left;
+        const Array one = at(BezierWeights(left/4.0)), other = at(BezierWeights((left+1)/4.0));
+        for (int i = 0; i < 4; i++) {
+            checkClose(place[i], same[i], 1, 0, "weight of a place");
+            checkClose((plus[i]-minus[i])/2e-6/length, tangent[i], 1, 1e-8, "weight of a tangent");
+            checkClose(-tangent[i], back[i], 1, 1e-15, "weight of the opposite of a tangent");
+            checkClose((1-share)*one[i]+share*other[i], piece[i], 1, 1e-14, "weight of a place on a piece");
+        }
+        for (double number : {x, ElementPlace::ofTangent(x, true), ElementPlace::ofTangent(x, false),
+                ElementPlace::onPieces(x, pieces)})
+            checkClose(x, ElementPlace::parameterOf(number), 1, 1e-14, "parameter");
+    }
 }
 
 /** The energy of a planar arc, of which the angle is linear, and of an angle that is quadratic along an element. */
@@ -476,6 +541,7 @@ static void testFailures() {
 }
 
 int main() {
-    return runTests({testForces, testEnergyOfShapes, testCantilevers, testCouple, testBuckling, testFriction,
-            testMobility, testNoise, testRods, testNeighbours, testPlaneAndParts, testFailures});
+    return runTests({testForces, testTethers, testPlacesOfElements, testEnergyOfShapes, testCantilevers, testCouple,
+            testBuckling, testFriction, testMobility, testNoise, testRods, testNeighbours, testPlaneAndParts,
+            testFailures});
 }

@@ -185,21 +185,17 @@ def test_beams_that_were_wrapped_into_a_box_are_refused_unless_they_are_periodic
     assert np.abs(ends[0]).max() > 1e-3
 
 
-def refused_step(system, positions, message, scheme=None, temperature=TEMPERATURE, flow=False):
+def refused_step(system, positions, message, scheme=None, temperature=TEMPERATURE):
     with pytest.raises(openmm.OpenMMException, match=message):
         context = context_of(system, positions, 0.01, temperature)
         if scheme is not None:
             context.getIntegrator().setScheme(scheme)
-        if flow:
-            vectors = [openmm.Vec3(1, 0, 0)] + [openmm.Vec3(0, 0, 0)] * 4
-            context.getIntegrator().setFlow(*vectors)
         context.getIntegrator().step(1)
 
 
 def test_what_beams_cannot_have_is_refused():
     system, force, positions = beam_system(1, 2, 1.0, 20.0, 1e3)
     refused_step(system, positions, "scheme Implicit alone", scheme=CylinderChainIntegrator.Midpoint)
-    refused_step(system, positions, "solvent at rest", flow=True)
     refused_step(system, positions, "8.* persistence lengths long.*divide it into more", temperature=20.0 / KT * 2400)
     with pytest.raises(openmm.OpenMMException, match="two particles for each of at least two nodes"):
         force.addBeamChain([0, 1, 2], 1.0, 1e3, 20.0, 0.0, 1.0, 2.0)

@@ -296,8 +296,6 @@ def test_what_filaments_of_beam_elements_cannot_have():
         with pytest.raises(InputError, match=message):
             add()
     filaments.add_straight(KIND, 3, [0, 0, 0], [1, 0, 0])
-    with pytest.raises(InputError, match="filament 0, which has beam elements, as yet"):
-        filaments.add_tether(0, 0, [0, 0, 0], 1.0)
     topology, system, positions = filaments.build()
     for scheme in ("midpoint", "implicit-second-order"):
         with pytest.raises(InputError, match="Filament 0 .BEAM. has beam elements"):

@@ -171,6 +171,13 @@ def test_springs_much_shorter_than_the_reach_are_warned_of(rest_length, stiffnes
     assert all(one.filename == __file__ for one in caught)
 
 
+def test_in_the_cold_no_reach_is_advised():
+    filaments = Filaments(VISCOSITY, 0.0, engine="compiled")
+    with pytest.warns(LinkerWarning, match="farther than 0 nm away") as caught:
+        filaments.add_linkers(Crosslinker(hands=HAND, stiffness=0.06, rest_length=0.0), count=1)
+    assert str(caught[0].message).endswith("or a smaller stiffness.")
+
+
 @pytest.mark.parametrize(("energy", "share", "warned"), [(3.1, 0.0, True), (2.9, 0.0, False), (3.1, 0.1, False)])
 def test_springs_much_longer_than_the_reach_are_warned_of(energy, share, warned):
     """Energies of a spring that is compressed by 40 nm within all of the reach, in k_BT."""

@@ -22,6 +22,7 @@ from openmm_cylchain import (
 )
 from openmm_cylchain.beams.curve import curve_points, element_energies, element_points
 from openmm_cylchain.cli import main
+from openmm_cylchain.couplings.capsule_contacts import contact_spacing
 from openmm_cylchain.runs.configuration import parse_configuration, read_configuration
 from openmm_cylchain.runs.initial_state import build_system
 from openmm_cylchain.runs.run_directory import RunDirectory, read_energies
@@ -146,11 +147,6 @@ def test_tangents_out_of_the_plane_are_refused():
     ("table", "message"),
     [
         (
-            '[[tether]]\nfilament = 0\nnode = 0\nstiffness = "1 pN/nm"\n',
-            "tethers cannot be on filament 0, which has beam",
-        ),
-        ('[flow]\nshear = "1 1/s"\n', "has beam elements, which a solvent that flows cannot have"),
-        (
             '[[linkers]]\ntype = "ALPHA_ACTININ"\ncount = 2\nvolume = "1 um^3"\n',
             "has beam elements, which Systems with linkers cannot have",
         ),
@@ -176,8 +172,6 @@ def test_timestep_explains_that_of_beam_elements(tmp_path, capsys):
     text = capsys.readouterr().out
     assert "BEAM, 3 beam elements of 1000 nm" in text and "ACT, 2 segments of 360 nm" in text
     assert text.count("recommended  ") == 5 + 1 and text.count("stability of explicit schemes") == 1
-    assert main(["timestep", str(tmp_path / "input.toml"), "--check"]) == 2
-    assert "has beam elements, which the check of a step cannot have as yet" in capsys.readouterr().err
 
 
 def test_energies_are_those_of_the_curve(unbroken):
@@ -347,7 +341,7 @@ def test_bends_and_tensions_are_those_of_elements(bent):
     (tension,) = run.segment_tensions(0)
     fine = curve_points(nodes, run.positions(0)[run.filaments[0].control_points], 1000)
     length = np.linalg.norm(np.diff(fine, axis=0), axis=1).sum()
-    element = run.filaments[0].type.beam_element(310.0, planar=True)
+    element = run.filaments[0].type.beam_element(310.0)
     assert tension == pytest.approx([6022.14076 * (length / 1000.0 - 1.0 + element.shortening)], rel=1e-4)
 
 
@@ -398,8 +392,9 @@ def test_a_run_reporter_writes_what_is_loaded_and_drawn_alike(tmp_path):
     expected = curve_points(now[filaments.node_indices[0]], now[filaments.control_point_indices[0]], 8)
     np.testing.assert_allclose(run.curves(-1)[0], expected, atol=1e-3)
     assert analysis.filament_distances(run, -1, 5000.0)[0, 1] < 5000.0
-    with pytest.raises(InputError, match=r"Filament 0 \(BEAM\) has beam elements, which the stress"):
-        analysis.stress(run, -1, 1e9)
+    assert np.trace(analysis.stress(run, -1, 1e9).ideal) == pytest.approx(
+        -3 * (2 * 3 + 4) * 8.314462618e-3 * 300.0 / 1e9
+    )
 
 
 @pytest.mark.parametrize("particle", ["node", "control point"])
@@ -434,3 +429,61 @@ def test_control_points_that_are_none_are_refused():
         filaments.add_nodes(kind, nodes, control_points=controls[:1])
     with pytest.raises(InputError, match="the control point of node 0 is at the node"):
         filaments.add_nodes(kind, nodes, control_points=[[0, 0, 0], [1333, 0, 0]])
+
+
+WITH_CONTACTS = """
+[solvent]
+temperature = "310 K"
+viscosity = "1.71 mPa*s"
+
+[box]
+edges = ["4 um", "4 um", "4 um"]
+
+[[filament]]
+type = "F_ACTIN"
+element = "beam"
+segments = 3
+count = 6
+
+[[filament]]
+type = "F_ACTIN"
+segments = 3
+count = 2
+
+[contacts]
+diameter = "30 nm"
+
+[[tether]]
+filament = [0, 1]
+node = -1
+stiffness = "0.01 pN/nm"
+velocity = ["1 um/s", "0 um/s", "0 um/s"]
+
+[[pull]]
+filament = 2
+node = 0
+force = ["0.1 pN", "0 pN", "0 pN"]
+
+[simulation]
+time_step = "recommended"
+duration = "20 ms"
+report_interval = "1 ms"
+seed = 4
+"""
+
+
+def test_contacts_tethers_and_pulls_of_beams_in_files(tmp_path):
+    """Beads cover the curves as finely as the diameter needs, and contacts that are found belong to filaments."""
+    built = build_system(parse_configuration(WITH_CONTACTS), None, 4)
+    spacing = contact_spacing(built.filaments[0].type, 30.0, 310.0)
+    assert [len(beads) for beads in built.filaments.bead_indices] == [3 * round(360.0 / spacing) + 1] * 6 + [0, 0]
+    (tmp_path / "input.toml").write_text(WITH_CONTACTS)
+    assert main(["run", str(tmp_path / "input.toml"), "--output", str(tmp_path / "run")]) == 0
+    run = analysis.load(tmp_path / "run")
+    assert len(run) == 21
+    owners = {run.contacts(frame).filaments.max(initial=-1) for frame in range(len(run))}
+    assert max(owners) < 8
+    nodes = run.nodes(-1)
+    for number in (0, 1):
+        assert np.linalg.norm(nodes[number] - run.nodes(0)[number], axis=1).max() > 1.0
+    assert np.isfinite(analysis.stress(run, -1).total).all()

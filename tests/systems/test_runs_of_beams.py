@@ -6,12 +6,12 @@ import pytest
 from openmm import app
 from PIL import Image
 
-from openmm_cylchain import Crosslinks, Filaments, InputError, RunReporter, analysis
+from openmm_cylchain import Crosslinks, Filaments, RunReporter, analysis, capsule_contact_force
 from openmm_cylchain.beams.curve import curve_points
 from openmm_cylchain.cli import main
-from support.contexts import close_reporters, energy_of, positions_of
+from support.contexts import close_reporters, energy_of, forces_of, new_context, positions_of
 from support.linked_beams import BEAM, STRAIGHT
-from support.solvent import TEMPERATURE, VISCOSITY
+from support.solvent import KT, TEMPERATURE, VISCOSITY
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +63,91 @@ def test_pictures_show_the_curve(simulated, tmp_path, color):
     assert main(["export", str(path), "--format", "simularium", "--output", str(tmp_path / "run.simularium")]) == 0
 
 
-def test_runs_of_beams_have_no_stress(simulated):
-    run = analysis.load(simulated[0])
-    with pytest.raises(InputError, match="Filament 1 .BEAM. has beam elements, which the stress of a run cannot have"):
-        analysis.stress(run, 0, 1e9)
+def virial_of(filaments, numbers, context):
+    """Of the forces of chains on all particles of some filaments: the sum of -x F, in kJ/mol."""
+    positions, forces = positions_of(context), forces_of(context, 1)
+    particles = np.concatenate(
+        [own[number] for number in numbers for own in (filaments.node_indices, filaments.control_point_indices)]
+    )
+    return -np.einsum("ni,nj->ij", positions[particles], forces[particles])
+
+
+def test_the_stress_of_beams_is_the_virial_of_the_forces_of_the_engine(simulated):
+    path, filaments, _ = simulated
+    run, volume = analysis.load(path), 1e8
+    found = analysis.stress(run, -1, volume)
+    _, system, _ = rebuilt(filaments)
+    context = new_context(system, run.positions(-1))
+    expected = virial_of(filaments, range(3), context)
+    # Some strains are rounded in the trajectory, but both have the same.
+    assert volume * found.chains == pytest.approx(expected, abs=1e-4 * np.abs(expected).max())
+    assert found.chains == pytest.approx(found.chains.T, abs=1e-6 * np.abs(found.chains).max())
+    # Seven nodes of straight segments; five of a beam, and four in a plane, with their control points.
+    points = np.array([7 + 2 * 5 + 2 * 4] * 2 + [7 + 2 * 5])
+    assert found.ideal == pytest.approx(-np.diag(points) * KT / volume)
+    link = run.crosslinks(-1)
+    vector = link.places[0, 1] - link.places[0, 0]
+    pull = link.tensions[0] / np.linalg.norm(vector)
+    assert volume * found.crosslinks == pytest.approx(pull * np.outer(vector, vector), rel=1e-6)
+
+
+def rebuilt(filaments):
+    """The same filaments in a System without anything else."""
+    again = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
+    for own in filaments:
+        again.add_nodes(own.type, own.positions, planar=own.planar, control_points=own.control_points)
+    return again.build()
+
+
+def test_a_beam_under_tension_between_two_planes(tmp_path):
+    """Straight, stretched by 1 %: the force per area, without noise, and the ideal part of what is free."""
+    filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
+    ends = np.outer(1.01 * 250.0 * np.arange(4), [1.0, 0, 0])
+    filaments.add_nodes(
+        BEAM, ends, control_points=ends + [1.01 * 250.0 / 3.0, 0, 0], clamped=[0, -1], clamped_tangents=0
+    )
+    topology, system, positions = filaments.build()
+    integrator = filaments.create_integrator(system, 1.0, random_seed=1)
+    simulation = app.Simulation(topology, system, integrator, openmm.Platform.getPlatform("Reference"))
+    simulation.context.setPositions(positions)
+    simulation.reporters.append(RunReporter(tmp_path / "run", 1, filaments, "tension"))
+    simulation.step(1)
+    close_reporters(simulation)
+    run = analysis.load(tmp_path / "run")
+    assert run.filaments[0].clamped_tangents == (0,)
+    length, area = ends[-1, 0], 3e4
+    found = analysis.stress(run, 0, length * area)
+    # The mean strain is less for bends that fluctuate inside of elements.
+    element = BEAM.beam_element(TEMPERATURE)
+    force = element.modulus * (0.01 + element.shortening)
+    assert found.chains[0, 0] == pytest.approx(force / area, rel=1e-3)
+    assert np.abs(found.chains).sum() == pytest.approx(found.chains[0, 0], rel=1e-3)
+    # Two nodes and three control points.
+    assert found.ideal == pytest.approx(-5 * KT / (length * area) * np.eye(3))
+
+
+def test_contacts_of_runs_are_those_of_elements(tmp_path):
+    """Of a run with beads: which elements touch, where on them, and their part of the stress."""
+    filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
+    filaments.add_straight(BEAM, 3, [0, 0, 0], [1, 0, 0])
+    filaments.add_straight(STRAIGHT, 3, [300, -50, 25], [0, 1, 0])
+    filaments.add_straight(BEAM, 2, [600, -100, 26], [0, 1, 0])
+    for number in (0, 2):
+        filaments.add_beads(number, 62.5)
+    topology, system, positions = filaments.build()
+    system.addForce(capsule_contact_force(filaments, system, 30.0, 0.5))
+    integrator = filaments.create_integrator(system, 1.0, random_seed=1)
+    simulation = app.Simulation(topology, system, integrator, openmm.Platform.getPlatform("Reference"))
+    simulation.context.setPositions(positions)
+    simulation.reporters.append(RunReporter(tmp_path / "run", 1, filaments, "contacts"))
+    simulation.step(1)
+    close_reporters(simulation)
+    run = analysis.load(tmp_path / "run")
+    found = run.contacts(0)
+    order = np.argsort(found.distances)
+    assert found.filaments[order].tolist() == [[0, 1], [0, 2]]
+    assert found.segments[order].tolist() == [[1, 0], [2, 0]]
+    assert found.fractions[order] == pytest.approx(np.array([[0.2, 0.4], [0.4, 0.4]]), abs=1e-3)
+    assert found.forces[order] == pytest.approx([2.5, 2.0], abs=1e-3)
+    stress = analysis.stress(run, 0, 1e6)
+    assert 1e6 * stress.contacts == pytest.approx(np.diag([0, 0, -(2.5 * 25 + 2.0 * 26)]), abs=0.1)

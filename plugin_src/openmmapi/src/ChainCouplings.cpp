@@ -65,12 +65,16 @@ ChainCouplings::ChainCouplings(ContextImpl& context, const CylinderChainDescript
         if (ofContacts == NULL)
             continue;
         const vector<Capsule>& capsules = ofContacts->getSearch().getSystem().capsules;
-        const bool taken = all_of(capsules.begin(), capsules.end(), [&] (const Capsule& capsule) {
+        vector<bool> isOnCurve(capsules.size(), false);
+        for (const CapsuleOnCurve& own : ofContacts->getOnCurves())
+            isOnCurve[own.capsule] = true;
+        bool taken = true;
+        for (size_t i = 0; i < capsules.size(); i++) {
             Place place;
-            place.first = capsule.first;
-            place.second = capsule.second;
-            return canTake(place);
-        });
+            place.first = capsules[i].first;
+            place.second = capsules[i].second;
+            taken = taken && (isOnCurve[i] || canTake(place));
+        }
         contacts.push_back({ofContacts, taken});
     }
 }
@@ -81,8 +85,9 @@ void ChainCouplings::refuseBeams() const {
         for (const Capsule& capsule : own.force->getSearch().getSystem().capsules)
             any |= isOfBeam[capsule.first] || (capsule.second >= 0 && isOfBeam[capsule.second]);
     if (any)
-        throw OpenMMException("CylinderChainIntegrator: Chains of beam elements cannot have contacts of this plugin, "
-                "and their System no linkers, as yet: take segments, or remove them");
+        throw OpenMMException("CylinderChainIntegrator: Chains of beam elements cannot have contacts of this plugin "
+                "between their nodes, but between virtual sites on their curves, and their System cannot have linkers "
+                "as yet: take such sites, or segments, or remove them");
 }
 
 void ChainCouplings::refuseNarrowBox(const CylinderChainDescription& chains) const {
@@ -90,6 +95,10 @@ void ChainCouplings::refuseNarrowBox(const CylinderChainDescription& chains) con
     for (const Chain& chain : chains.getChains())
         for (const Segment& segment : chain.segments)
             longest = max(longest, segment.restLength);
+    for (const BeamChain& beam : chains.getBeams())
+        for (const Contacts& own : contacts)
+            for (const CapsuleOnCurve& capsule : own.force->getOnCurves())
+                longest = max(longest, beam.elementLength/capsule.pieces);
     Vec3 a, b, c;
     context.getPeriodicBoxVectors(a, b, c);
     const Vec3 faces[] = {b.cross(c), c.cross(a), a.cross(b)};
@@ -165,6 +174,7 @@ const CoupledForces& ChainCouplings::describe(int groups, double friction) {
     forces.links.clear();
     forces.contacts.clear();
     forces.walls.clear();
+    forces.sites.clear();
     forces.particles.clear();
     owners.clear();
     vector<int> particles;
@@ -194,7 +204,8 @@ const CoupledForces& ChainCouplings::describe(int groups, double friction) {
         if (!own.isTaken(groups) || capsules.empty() || own.force->getStiffness() == 0)
             continue;
         forces.contacts.push_back({&own.force->getSearch(), own.force->getStiffness(),
-                own.force->usesPeriodicBoundaryConditions()});
+                own.force->usesPeriodicBoundaryConditions(), &own.force->getOnCurves()});
+        forces.sites.insert(forces.sites.end(), own.force->getSites().begin(), own.force->getSites().end());
         owners.push_back(&own.force->getOwner());
         for (const Capsule& capsule : capsules) {
             Place place;

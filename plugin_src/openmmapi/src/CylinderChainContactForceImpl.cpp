@@ -3,10 +3,16 @@
 #include "openmm/OpenMMException.h"
 #include "openmm/System.h"
 #include "openmm/internal/ContextImpl.h"
+#include "openmm/internal/PlaceResolver.h"
+#include <cmath>
+#include <set>
 
 using namespace OpenMM;
 using namespace cylchain;
 using namespace std;
+
+/** Parameters of curves that differ by less are the same. */
+static const double SAME_PLACE = 1e-9;
 
 CylinderChainContactForceImpl::CylinderChainContactForceImpl(const CylinderChainContactForce& owner) :
         StepForceImpl(owner), owner(owner), stiffness(owner.getStiffness()),
@@ -51,8 +57,58 @@ void CylinderChainContactForceImpl::initialize(ContextImpl& context) {
         capsules.exclusions.push_back({first, second});
     }
     search.reset(new ContactSearch(capsules));
+    findCurves(context.getSystem());
     kernel = context.getPlatform().createKernel(CalcCylinderChainContactForceKernel::Name(), context);
     kernel.getAs<CalcCylinderChainContactForceKernel>().initialize(context.getSystem(), *search, stiffness, periodic);
+}
+
+/**
+ * Find capsules that are straight pieces of beam elements: between virtual sites at neighbouring ones of places at equal
+ * distances along the curve of an element, its nodes among them.
+ */
+void CylinderChainContactForceImpl::findCurves(const System& system) {
+    const PlaceResolver places(system);
+    const vector<Capsule>& capsules = search->getSystem().capsules;
+    set<int> known;
+    for (size_t i = 0; i < capsules.size(); i++) {
+        const Capsule& capsule = capsules[i];
+        if (capsule.second < 0 || !system.isVirtualSite(capsule.first) ||
+                !system.isVirtualSite(capsule.second))
+            continue;
+        Place ends[2];
+        ends[0].first = capsule.first;
+        ends[1].first = capsule.second;
+        for (Place& end : ends)
+            end = places.resolve(end);
+        if (!ends[0].isOnCurve() || !ends[1].isOnCurve())
+            continue;
+        for (int side = 0; side < 2; side++) {
+            const int particle = side == 0 ? capsule.first : capsule.second;
+            if (known.insert(particle).second)
+                sites.push_back({particle, ends[side]});
+        }
+        // A site at a node is on both of its elements.
+
+        for (int side = 0; side < 2; side++) {
+            Place &one = ends[side], &other = ends[1-side];
+            if (one.first == other.first)
+                continue;
+            if (one.second == other.first && fabs(one.fraction-1) < SAME_PLACE) {
+                one = other;
+                one.fraction = 0;
+            }
+            else if (one.first == other.second && fabs(one.fraction) < SAME_PLACE) {
+                one = other;
+                one.fraction = 1;
+            }
+        }
+        const double length = fabs(ends[1].fraction-ends[0].fraction), pieces = round(1/max(length, SAME_PLACE));
+        const double first = ends[0].fraction*pieces;
+        if (ends[0].first != ends[1].first || fabs(length*pieces-1) > SAME_PLACE ||
+                fabs(first-round(first)) > SAME_PLACE)
+            continue;
+        onCurves.push_back({(int) i, ends[0], (int) pieces, ends[1].fraction > ends[0].fraction});
+    }
 }
 
 double CylinderChainContactForceImpl::calcForcesAndEnergy(ContextImpl& context, bool includeForces,

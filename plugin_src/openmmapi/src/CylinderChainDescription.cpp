@@ -62,6 +62,18 @@ static void copyTethers(const CylinderChainForce& force, vector<cylchain::Chain>
     }
 }
 
+static void copyBeamTethers(const CylinderChainForce& force, vector<cylchain::BeamChain>& beams) {
+    for (int i = 0; i < force.getNumBeamTethers(); i++) {
+        int chain;
+        cylchain::Tether tether;
+        Vec3 point;
+        force.getBeamTetherParameters(i, chain, tether.node, point, tether.stiffness);
+        for (int k = 0; k < 3; k++)
+            tether.point[k] = point[k];
+        beams[chain].tethers.push_back(tether);
+    }
+}
+
 static cylchain::BeamChain describeBeam(const CylinderChainForce& force, int index) {
     cylchain::BeamChain beam;
     beam.particles = force.getBeamChainParticles(index);
@@ -87,6 +99,7 @@ CylinderChainDescription::CylinderChainDescription(const System& system, const C
         beams.push_back(beam);
     }
     copyTethers(force, chains);
+    copyBeamTethers(force, beams);
     lookForModes();
 }
 
@@ -109,6 +122,7 @@ void CylinderChainDescription::update(const CylinderChainForce& force) {
         beams[i] = beam;
     }
     copyTethers(force, chains);
+    copyBeamTethers(force, beams);
     lookForModes();
 }
 

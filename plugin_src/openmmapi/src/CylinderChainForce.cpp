@@ -256,22 +256,43 @@ void CylinderChainForce::setJointParameters(int chain, int joint, double stiffne
     joints[joint] = stiffness;
 }
 
-void CylinderChainForce::checkTether(int chain, int node, const Vec3& point, double stiffness) const {
-    const vector<int>& particles = getChain(chain).particles;
-    ASSERT_VALID_INDEX(node, particles);
+void CylinderChainForce::checkTether(const TetherInfo& tether, int numNodes) const {
+    if (tether.node < 0 || tether.node >= numNodes)
+        throw OpenMMException("CylinderChainForce: Index out of range: there is no node "+to_string(tether.node)+
+                " in chain "+to_string(tether.chain));
     for (int i = 0; i < 3; i++)
-        if (!isfinite(point[i]))
+        if (!isfinite(tether.point[i]))
             throw OpenMMException("CylinderChainForce: The point of a tether must be finite");
-    if (!(stiffness >= 0 && isfinite(stiffness)))
+    if (!(tether.stiffness >= 0 && isfinite(tether.stiffness)))
         throw OpenMMException("CylinderChainForce: The stiffness of a tether cannot be negative and must be finite");
 }
 
-int CylinderChainForce::addTether(int chain, int node, const Vec3& point, double stiffness) {
-    checkTether(chain, node, point, stiffness);
-    if (!tetheredNodes.insert({chain, node}).second)
-        throw OpenMMException(twoTethers(chain, node));
-    tethers.push_back({chain, node, point, stiffness});
+int CylinderChainForce::numNodesOfBeam(int chain) const {
+    return getBeamChainParticles(chain).size()/2;
+}
+
+/** Add a tether that has been checked to a list. */
+template <class Info> static int addTetherTo(vector<Info>& tethers, set<pair<int, int> >& nodes, const Info& tether) {
+    if (!nodes.insert({tether.chain, tether.node}).second)
+        throw OpenMMException(twoTethers(tether.chain, tether.node));
+    tethers.push_back(tether);
     return tethers.size()-1;
+}
+
+/** Replace a tether of a list by one that has been checked. */
+template <class Info> static void replaceTether(Info& old, set<pair<int, int> >& nodes, const Info& tether) {
+    if (old.chain != tether.chain || old.node != tether.node) {
+        if (!nodes.insert({tether.chain, tether.node}).second)
+            throw OpenMMException(twoTethers(tether.chain, tether.node));
+        nodes.erase({old.chain, old.node});
+    }
+    old = tether;
+}
+
+int CylinderChainForce::addTether(int chain, int node, const Vec3& point, double stiffness) {
+    const TetherInfo tether = {chain, node, point, stiffness};
+    checkTether(tether, getChain(chain).particles.size());
+    return addTetherTo(tethers, tetheredNodes, tether);
 }
 
 void CylinderChainForce::getTetherParameters(int index, int& chain, int& node, Vec3& point, double& stiffness) const {
@@ -284,14 +305,31 @@ void CylinderChainForce::getTetherParameters(int index, int& chain, int& node, V
 
 void CylinderChainForce::setTetherParameters(int index, int chain, int node, const Vec3& point, double stiffness) {
     ASSERT_VALID_INDEX(index, tethers);
-    checkTether(chain, node, point, stiffness);
-    TetherInfo& tether = tethers[index];
-    if (tether.chain != chain || tether.node != node) {
-        if (!tetheredNodes.insert({chain, node}).second)
-            throw OpenMMException(twoTethers(chain, node));
-        tetheredNodes.erase({tether.chain, tether.node});
-    }
-    tether = {chain, node, point, stiffness};
+    const TetherInfo tether = {chain, node, point, stiffness};
+    checkTether(tether, getChain(chain).particles.size());
+    replaceTether(tethers[index], tetheredNodes, tether);
+}
+
+int CylinderChainForce::addBeamTether(int chain, int node, const Vec3& point, double stiffness) {
+    const TetherInfo tether = {chain, node, point, stiffness};
+    checkTether(tether, numNodesOfBeam(chain));
+    return addTetherTo(beamTethers, tetheredNodesOfBeams, tether);
+}
+
+void CylinderChainForce::getBeamTetherParameters(int index, int& chain, int& node, Vec3& point,
+        double& stiffness) const {
+    ASSERT_VALID_INDEX(index, beamTethers);
+    chain = beamTethers[index].chain;
+    node = beamTethers[index].node;
+    point = beamTethers[index].point;
+    stiffness = beamTethers[index].stiffness;
+}
+
+void CylinderChainForce::setBeamTetherParameters(int index, int chain, int node, const Vec3& point, double stiffness) {
+    ASSERT_VALID_INDEX(index, beamTethers);
+    const TetherInfo tether = {chain, node, point, stiffness};
+    checkTether(tether, numNodesOfBeam(chain));
+    replaceTether(beamTethers[index], tetheredNodesOfBeams, tether);
 }
 
 void CylinderChainForce::updateParametersInContext(Context& context) {

@@ -36,7 +36,7 @@ static void giveColumns(const cylchain::LinkTable& table, vector<int>& numbers, 
     parameters.swap(columns.parameters);
 }
 
-CylinderChainLinkForce::CylinderChainLinkForce() : usePeriodic(false) {
+CylinderChainLinkForce::CylinderChainLinkForce() : usePeriodic(false), joinsTangents(false) {
 }
 
 vector<string> CylinderChainLinkForce::getStretchingModelNames() {
@@ -244,7 +244,9 @@ void CylinderChainLinkForce::setUsesPeriodicBoundaryConditions(bool periodic) {
 }
 
 bool CylinderChainLinkForce::usesPeriodicBoundaryConditions() const {
-    return usePeriodic;
+    // Differences of tangents have no images.
+
+    return usePeriodic && !joinsTangents;
 }
 
 ForceImpl* CylinderChainLinkForce::createImpl() const {

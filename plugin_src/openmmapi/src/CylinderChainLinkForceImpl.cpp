@@ -51,8 +51,16 @@ vector<string> CylinderChainLinkForceImpl::getKernelNames() {
 }
 
 void CylinderChainLinkForceImpl::check(const cylchain::LinkChange& change) const {
-    for (const cylchain::LinkEntry& entry : change.put)
+    for (const cylchain::LinkEntry& entry : change.put) {
         checkLink(entry.link, *places);
+        if (!owner.getJoinsTangents())
+            continue;
+        for (const cylchain::Place* place : {&entry.link.first, &entry.link.second})
+            if (!place->isPoint() && !places->resolveTangent(*place).isTangent())
+                throw OpenMMException("CylinderChainLinkForce: Link "+to_string(entry.link.number)+
+                        " joins tangents, but is not on the curve of a beam element, "+describePlaces(entry.link)+
+                        ": take places between neighbouring nodes of chains of beam elements");
+    }
 }
 
 void CylinderChainLinkForceImpl::follow() {
@@ -84,6 +92,10 @@ void CylinderChainLinkForceImpl::accept(const cylchain::LinkChange& change) {
     context->setParameter(parameter, (double) history.getTable().getDigest());
 }
 
+cylchain::Place CylinderChainLinkForceImpl::resolve(const cylchain::Place& place) const {
+    return owner.getJoinsTangents() ? places->resolveTangent(place) : places->resolve(place);
+}
+
 const cylchain::LinkTable& CylinderChainLinkForceImpl::getTable() {
     follow();
     return history.getTable();
@@ -110,8 +122,8 @@ const vector<cylchain::Link>& CylinderChainLinkForceImpl::getLinks() {
         for (const cylchain::LinkEntry& entry : history.getTable().getEntries())
             if (entry.active) {
                 links.push_back(entry.link);
-                links.back().first = places->resolve(entry.link.first);
-                links.back().second = places->resolve(entry.link.second);
+                links.back().first = resolve(entry.link.first);
+                links.back().second = resolve(entry.link.second);
             }
         upToDate = true;
     }

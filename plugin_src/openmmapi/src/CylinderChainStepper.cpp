@@ -112,9 +112,6 @@ StepSettings CylinderChainStepper::describeStep(uint64_t seed, int level, uint64
     settings.step = step;
     settings.flow = describeFlow();
     settings.precision = static_cast<Precision>(integrator.getPrecision());
-    if (settings.flow.present && !chains.getBeams().empty())
-        throw OpenMMException("CylinderChainIntegrator: Chains of beam elements are for a solvent at rest: take "
-                "segments, or no flow");
     return settings;
 }
 

@@ -20,10 +20,14 @@ PlaceResolver::PlaceResolver(const System& system) : system(system) {
         controls.resize(system.getNumParticles(), -1);
         next.resize(system.getNumParticles(), -1);
         isControl.resize(system.getNumParticles(), false);
+        elementLengths.resize(system.getNumParticles(), 0);
         for (int chain = 0; chain < force->getNumBeamChains(); chain++) {
             const vector<int>& particles = force->getBeamChainParticles(chain);
+            double length, modulus, rigidity, shortening, parallel, perpendicular;
+            force->getBeamChainParameters(chain, length, modulus, rigidity, shortening, parallel, perpendicular);
             for (size_t node = 0; node+1 < particles.size(); node += 2) {
                 controls[particles[node]] = particles[node+1];
+                elementLengths[particles[node]] = length;
                 isControl[particles[node+1]] = true;
                 if (node+2 < particles.size())
                     next[particles[node]] = particles[node+2];
@@ -72,6 +76,15 @@ Place PlaceResolver::resolve(const Place& place) const {
     if (!between || first == second || system.isVirtualSite(first) || system.isVirtualSite(second))
         return place;
     return placeBetween(first, second, fraction);
+}
+
+Place PlaceResolver::resolveTangent(const Place& place) const {
+    Place result = resolve(place);
+    if (result.isOnCurve()) {
+        const bool backwards = place.isOnSegment() && result.first != place.first;
+        result.tangent = (backwards ? -1 : 1)/elementLengths[result.first];
+    }
+    return result;
 }
 
 /** Find where a site of two nodes and their control points is, if their weights are those of their curve. */

@@ -35,9 +35,19 @@ static void addBeam(CylinderChainForce& force, const SerializationNode& node) {
             node.getDoubleProperty("perpendicular"), node.getBoolProperty("planar"));
 }
 
+static void writeTether(SerializationNode& node, int chain, int tethered, const Vec3& point, double stiffness) {
+    node.createChildNode("Tether").setIntProperty("chain", chain).setIntProperty("node", tethered)
+            .setDoubleProperty("x", point[0]).setDoubleProperty("y", point[1]).setDoubleProperty("z", point[2])
+            .setDoubleProperty("stiffness", stiffness);
+}
+
+static Vec3 pointOf(const SerializationNode& tether) {
+    return Vec3(tether.getDoubleProperty("x"), tether.getDoubleProperty("y"), tether.getDoubleProperty("z"));
+}
+
 void CylinderChainForceProxy::serialize(const void* object, SerializationNode& node) const {
     const CylinderChainForce& force = *reinterpret_cast<const CylinderChainForce*>(object);
-    node.setIntProperty("version", force.getNumBeamChains() > 0 ? 5 : 4);
+    node.setIntProperty("version", force.getNumBeamTethers() > 0 ? 6 : force.getNumBeamChains() > 0 ? 5 : 4);
     node.setIntProperty("forceGroup", force.getForceGroup());
     node.setStringProperty("name", force.getName());
     node.setBoolProperty("usesPeriodic", force.usesPeriodicBoundaryConditions());
@@ -77,15 +87,22 @@ void CylinderChainForceProxy::serialize(const void* object, SerializationNode& n
 
     if (force.getNumBeamChains() > 0)
         serializeBeams(force, node.createChildNode("Beams"));
+    int chain, tethered;
+    Vec3 point;
+    double stiffness;
     SerializationNode& tethers = node.createChildNode("Tethers");
     for (int i = 0; i < force.getNumTethers(); i++) {
-        int chain, tethered;
-        Vec3 point;
-        double stiffness;
         force.getTetherParameters(i, chain, tethered, point, stiffness);
-        tethers.createChildNode("Tether").setIntProperty("chain", chain).setIntProperty("node", tethered)
-                .setDoubleProperty("x", point[0]).setDoubleProperty("y", point[1]).setDoubleProperty("z", point[2])
-                .setDoubleProperty("stiffness", stiffness);
+        writeTether(tethers, chain, tethered, point, stiffness);
+    }
+    // Versions before 6 have none.
+
+    if (force.getNumBeamTethers() == 0)
+        return;
+    SerializationNode& ofBeams = node.createChildNode("BeamTethers");
+    for (int i = 0; i < force.getNumBeamTethers(); i++) {
+        force.getBeamTetherParameters(i, chain, tethered, point, stiffness);
+        writeTether(ofBeams, chain, tethered, point, stiffness);
     }
 }
 
@@ -137,7 +154,7 @@ static void addChain(CylinderChainForce& force, const SerializationNode& node, i
 
 void* CylinderChainForceProxy::deserialize(const SerializationNode& node) const {
     const int version = node.getIntProperty("version");
-    if (version < 1 || version > 5)
+    if (version < 1 || version > 6)
         throw OpenMMException("Unsupported version number");
     unique_ptr<CylinderChainForce> force(new CylinderChainForce());
     force->setForceGroup(node.getIntProperty("forceGroup"));
@@ -147,11 +164,14 @@ void* CylinderChainForceProxy::deserialize(const SerializationNode& node) const 
         addChain(*force, chain, version);
     if (version > 1)
         for (auto& tether : node.getChildNode("Tethers").getChildren())
-            force->addTether(tether.getIntProperty("chain"), tether.getIntProperty("node"),
-                    Vec3(tether.getDoubleProperty("x"), tether.getDoubleProperty("y"), tether.getDoubleProperty("z")),
+            force->addTether(tether.getIntProperty("chain"), tether.getIntProperty("node"), pointOf(tether),
                     tether.getDoubleProperty("stiffness"));
     if (version > 4)
         for (auto& beam : node.getChildNode("Beams").getChildren())
             addBeam(*force, beam);
+    if (version > 5)
+        for (auto& tether : node.getChildNode("BeamTethers").getChildren())
+            force->addBeamTether(tether.getIntProperty("chain"), tether.getIntProperty("node"), pointOf(tether),
+                    tether.getDoubleProperty("stiffness"));
     return force.release();
 }

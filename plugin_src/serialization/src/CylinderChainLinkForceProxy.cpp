@@ -12,8 +12,10 @@ CylinderChainLinkForceProxy::CylinderChainLinkForceProxy() : SerializationProxy(
 }
 
 void CylinderChainLinkForceProxy::serialize(const void* object, SerializationNode& node) const {
-    node.setIntProperty("version", 1);
     const CylinderChainLinkForce& force = *reinterpret_cast<const CylinderChainLinkForce*>(object);
+    // Version 2 is that of links between tangents.
+
+    node.setIntProperty("version", force.getJoinsTangents() ? 2 : 1);
     node.setIntProperty("forceGroup", force.getForceGroup());
     node.setStringProperty("name", force.getName());
     node.setBoolProperty("usesPeriodic", force.usesPeriodicBoundaryConditions());
@@ -27,9 +29,11 @@ void CylinderChainLinkForceProxy::serialize(const void* object, SerializationNod
 }
 
 void* CylinderChainLinkForceProxy::deserialize(const SerializationNode& node) const {
-    if (node.getIntProperty("version") != 1)
+    const int version = node.getIntProperty("version");
+    if (version != 1 && version != 2)
         throw OpenMMException("Unsupported version number");
     unique_ptr<CylinderChainLinkForce> force(new CylinderChainLinkForce());
+    force->setJoinsTangents(version == 2);
     force->setForceGroup(node.getIntProperty("forceGroup"));
     force->setName(node.getStringProperty("name"));
     force->setUsesPeriodicBoundaryConditions(node.getBoolProperty("usesPeriodic"));

@@ -222,8 +222,8 @@ public:
     void setJointParameters(int chain, int joint, double stiffness);
     /**
      * Add a chain of beam elements, which bend inside; beams/BeamChain.h says what they are.  Only scheme "implicit"
-     * moves them, on the Reference and CPU platforms, in a solvent at rest, and in a System that has neither links,
-     * contacts, walls nor linkers of this plugin.  Any other Force may act on their particles.
+     * moves them, on the Reference and CPU platforms, and in a System that has no linkers of this
+     * plugin.  Any other Force may act on their particles.
      *
      * @param particles             two for each node, its position and its control point, for at least two nodes, and
      *                              none of them twice
@@ -304,6 +304,42 @@ public:
      */
     void setTetherParameters(int index, int chain, int node, const Vec3& point, double stiffness);
     /**
+     * Get the number of tethers of chains of beam elements.
+     */
+    int getNumBeamTethers() const {
+        return beamTethers.size();
+    }
+    /**
+     * Tether a node of a chain of beam elements to a point: see addTether().
+     *
+     * @param chain      the index of the chain among those of beam elements
+     * @param node       the index of the node in the chain
+     * @param point      the point, measured in nm
+     * @param stiffness  the stiffness k of the spring, measured in kJ/mol/nm^2
+     * @return the index of the tether among those of chains of beam elements
+     */
+    int addBeamTether(int chain, int node, const Vec3& point, double stiffness);
+    /**
+     * Get the parameters of a tether of a chain of beam elements.
+     *
+     * @param index           the index of the tether among those of chains of beam elements
+     * @param[out] chain      the index of the chain among those of beam elements
+     * @param[out] node       the index of the node in the chain
+     * @param[out] point      the point, measured in nm
+     * @param[out] stiffness  the stiffness k of the spring, measured in kJ/mol/nm^2
+     */
+    void getBeamTetherParameters(int index, int& chain, int& node, Vec3& point, double& stiffness) const;
+    /**
+     * Set the parameters of a tether of a chain of beam elements.
+     *
+     * @param index      the index of the tether among those of chains of beam elements
+     * @param chain      the index of the chain among those of beam elements
+     * @param node       the index of the node in the chain
+     * @param point      the point, measured in nm
+     * @param stiffness  the stiffness k of the spring, measured in kJ/mol/nm^2
+     */
+    void setBeamTetherParameters(int index, int chain, int node, const Vec3& point, double stiffness);
+    /**
      * Copy the parameters of segments, joints and tethers to a Context, so that changes made by setSegmentParameters(),
      * setSegmentPropulsion(), setJointParameters(), setTetherParameters() and setChainPlanar() take effect in it.
      * Models and particles cannot be changed in this way, and neither can chains be added; tethers can.
@@ -335,11 +371,12 @@ private:
     class BeamInfo;
     const ChainInfo& getChain(int chain) const;
     ChainInfo& getChain(int chain);
-    void checkTether(int chain, int node, const Vec3& point, double stiffness) const;
+    void checkTether(const TetherInfo& tether, int numNodes) const;
+    int numNodesOfBeam(int chain) const;
     std::vector<ChainInfo> chains;
-    std::vector<TetherInfo> tethers;
+    std::vector<TetherInfo> tethers, beamTethers;
     std::vector<BeamInfo> beams;
-    std::set<std::pair<int, int> > tetheredNodes;
+    std::set<std::pair<int, int> > tetheredNodes, tetheredNodesOfBeams;
     bool usePeriodic;
 };
 

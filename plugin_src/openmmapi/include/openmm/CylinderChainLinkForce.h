@@ -37,6 +37,9 @@ class CylinderChainLinkForceImpl;
  * parameters of the Integrator: these restore them in any Context and any process.  With other Integrators, save what
  * getLinksInContext() returns beside the State, and give it to setLinksInContext().
  *
+ * Instead of places, all links of an object may join the tangents of the curves of beam elements there, dr/ds, which
+ * are nearly unit vectors, and points that stand for directions: see setJoinsTangents().
+ *
  * Links do not make molecules: a barostat scales the centers of what they join separately.
  */
 class CylinderChainLinkForce : public Force {
@@ -57,6 +60,22 @@ public:
      * Create a CylinderChainLinkForce.
      */
     CylinderChainLinkForce();
+    /**
+     * Set whether links join tangents of beam elements in place of places, before a Context is created.  By default
+     * they do not.  Each place must then be between two neighbouring nodes of a chain of beam elements, or at a virtual
+     * site there, or a point, which is taken for a vector.  The tangent points from the first of two nodes that are
+     * given to the second; that at a virtual site in the order of the chain's nodes.  d is the absolute value of the
+     * difference of the two, which is never taken to its nearest image; lengths are numbers, and stiffnesses in kJ/mol.
+     */
+    void setJoinsTangents(bool tangents) {
+        joinsTangents = tangents;
+    }
+    /**
+     * Get whether links join tangents.
+     */
+    bool getJoinsTangents() const {
+        return joinsTangents;
+    }
     /**
      * Get the number of links.
      */
@@ -330,7 +349,7 @@ private:
     void replaceEntry(const cylchain::LinkEntry& entry);
     cylchain::LinkTable table;
     cylchain::Link defaults;
-    bool usePeriodic;
+    bool usePeriodic, joinsTangents;
 };
 
 } // namespace OpenMM

@@ -2,6 +2,7 @@
 #define OPENMM_CYLINDERCHAINCONTACTFORCEIMPL_H_
 
 #include "couplings/ContactSearch.h"
+#include "dynamics/CurveSites.h"
 #include "openmm/CylinderChainContactForce.h"
 #include "openmm/Kernel.h"
 #include "openmm/internal/StepForceImpl.h"
@@ -11,6 +12,8 @@
 #include <vector>
 
 namespace OpenMM {
+
+class System;
 
 /**
  * This is the internal implementation of CylinderChainContactForce.
@@ -40,6 +43,15 @@ public:
         return *search;
     }
     /**
+     * Get the capsules that lie between two places on the curve of a beam element, and the virtual sites there.
+     */
+    const std::vector<cylchain::CapsuleOnCurve>& getOnCurves() const {
+        return onCurves;
+    }
+    const std::vector<cylchain::CurveSite>& getSites() const {
+        return sites;
+    }
+    /**
      * Get the stiffness in the Context.
      */
     double getStiffness() const {
@@ -54,7 +66,10 @@ public:
 private:
     int getNumSegments(int chain) const;
     const CylinderChainContactForce& owner;
+    void findCurves(const System& system);
     std::unique_ptr<cylchain::ContactSearch> search;
+    std::vector<cylchain::CapsuleOnCurve> onCurves;
+    std::vector<cylchain::CurveSite> sites;
     double stiffness;
     bool periodic;
     Kernel kernel;

@@ -65,6 +65,7 @@ public:
     }
 private:
     void check(const cylchain::LinkChange& change) const;
+    cylchain::Place resolve(const cylchain::Place& place) const;
     void follow();
     void accept(const cylchain::LinkChange& change);
     void reportLink(int index);

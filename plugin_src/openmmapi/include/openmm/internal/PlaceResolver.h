@@ -19,6 +19,11 @@ public:
      * Find the place between the parents of a virtual site, or on a curve; any other place is returned unchanged.
      */
     cylchain::Place resolve(const cylchain::Place& place) const;
+    /**
+     * Find what is meant by a place of links that join tangents: the tangent at a place on a curve, or a point, which
+     * is returned unchanged.  Any other place is no tangent then.
+     */
+    cylchain::Place resolveTangent(const cylchain::Place& place) const;
     const System& getSystem() const {
         return system;
     }
@@ -34,9 +39,11 @@ private:
         return controls[node] >= 0 && controls[node] == particle;
     }
     const System& system;
-    // The control point of each node of beam elements, and the next node, or -1. Empty without any.
+    // The control point of each node of beam elements, the next node, or -1, and the length of its elements. Empty
+    // without any.
 
     std::vector<int> controls, next;
+    std::vector<double> elementLengths;
     std::vector<bool> isControl;
 };
 
