@@ -293,7 +293,7 @@ def test_xml_and_copies():
         assert other.usesPeriodicBoundaryConditions()
         assert other.getDefaultLinkParameters() == force.getDefaultLinkParameters()
     for bad, message in (
-        (xml.replace('version="1"', 'version="2"', 2), "Unsupported version number"),
+        (xml.replace('version="1"', 'version="3"', 2), "Unsupported version number"),
         (xml.replace('"fene"', '"other"'), "no stretching model other"),
         (xml.replace('nextNumber="10"', 'nextNumber="8"'), "next number must be above"),
     ):
