@@ -3,7 +3,7 @@
  * the start and of the end, and couplings/CapsuleGeometry.h.
  */
 
-/** Those of couplings/ContactSearch.cpp. */
+/** Those of couplings/ContactPlaces.cpp. */
 #define LARGEST_PARALLEL 1e-3
 #define AT_END 1e-9
 #define LEAST_DIFFERENCE 1e-10
