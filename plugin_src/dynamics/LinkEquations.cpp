@@ -25,7 +25,7 @@ const double TOLERANCE_OF_TURNS = 0.1;
 const double TOLERANCE_OF_ONE_SIDE = 0.05;
 /** What counts as no change: over the change of the whole step, and over the length. */
 const double OF_CHANGE = 1e-3, OF_CHANGE_WITH_NOISE = 1e-5, OF_LENGTH = 1e-7;
-/** What rounding of positions may leave of a change, over the largest coordinate; without noise, nothing else is left. */
+/** What rounding may leave of a change, over the largest coordinate; without noise, nothing else is left. */
 const double OF_ROUNDING = 1e-11;
 /** The least length for metric forces, over the rest length. */
 const double LEAST_LENGTH = 0.05;

@@ -63,8 +63,8 @@ void CylinderChainContactForceImpl::initialize(ContextImpl& context) {
 }
 
 /**
- * Find capsules that are straight pieces of beam elements: between virtual sites at neighbouring ones of places at equal
- * distances along the curve of an element, its nodes among them.
+ * Find capsules that are straight pieces of beam elements: between virtual sites at neighbouring ones of places at
+ * equal distances along the curve of an element, its nodes among them.
  */
 void CylinderChainContactForceImpl::findCurves(const System& system) {
     const PlaceResolver places(system);
