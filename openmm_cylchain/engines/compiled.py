@@ -104,7 +104,7 @@ class CompiledEngine(Engine):
                 _add_beam_chain(force, filament, nodes, controls, placed.viscosity, placed.temperature)
             else:
                 _add_chain(force, filament, nodes, placed.viscosity, placed.temperature)
-        chains = _chain_numbers(placed.filaments)
+        chains = _numbers_in_lists(placed.filaments)
         for tether in placed.tethers:
             beam = placed.filaments[tether.filament].type.has_beam_elements
             add = force.addBeamTether if beam else force.addTether
@@ -186,8 +186,9 @@ class CompiledEngine(Engine):
 ENGINE = CompiledEngine()
 
 
-def _chain_numbers(filaments):
-    # Of chains in the force, which has those of straight segments and those of beam elements in lists of their own.
+def _numbers_in_lists(filaments):
+    # Of chains in the force, which has those of straight segments and those of beam elements in lists of their own; or
+    # of tethers, given the filament of each.
     numbers, counts = [], [0, 0]
     for filament in filaments:
         beam = filament.type.has_beam_elements
@@ -197,15 +198,13 @@ def _chain_numbers(filaments):
 
 
 def _set_tethers(force, tethers, placed):
-    chains = _chain_numbers(placed.filaments)
-    # The force has those of beam elements in a list of their own, as it has their chains.
-    of_beams = np.array([placed.filaments[one.filament].type.has_beam_elements for one in placed.tethers])
+    chains = _numbers_in_lists(placed.filaments)
+    numbers = _numbers_in_lists([placed.filaments[one.filament] for one in placed.tethers])
     for number, tether in tethers.items():
-        beam = of_beams[number]
-        own = int(np.sum(of_beams[:number] == beam))
+        beam = placed.filaments[tether.filament].type.has_beam_elements
         set_parameters = force.setBeamTetherParameters if beam else force.setTetherParameters
         point = openmm.Vec3(*tether.point)
-        set_parameters(own, chains[tether.filament], tether.node, point, tether.stiffness)
+        set_parameters(numbers[number], chains[tether.filament], tether.node, point, tether.stiffness)
 
 
 def _flow_of_integrator(integrator):

@@ -31,8 +31,10 @@ class Kind:
     filament: Filament
     nodes: IntArray
     control_points: IntArray
-    """Of beam elements."""
+    joint_stiffnesses: FloatArray
+    """Empty for beam elements."""
     element: BeamElement | None
+    """None for straight segments."""
 
 
 def _kinds(filaments, temperature):
@@ -50,8 +52,12 @@ def _kinds(filaments, temperature):
             np.array([own[number] for number in numbers])
             for own in (filaments.node_indices, filaments.control_point_indices)
         )
-        element = first.type.beam_element(temperature, first.planar) if first.type.has_beam_elements else None
-        kinds.append(Kind(label, first, nodes, control_points, element))
+        element, stiffnesses = None, np.zeros(0)
+        if first.type.has_beam_elements:
+            element = first.type.beam_element(temperature, first.planar)
+        else:
+            stiffnesses = first.joint_stiffnesses
+        kinds.append(Kind(label, first, nodes, control_points, stiffnesses, element))
     return kinds
 
 
@@ -124,7 +130,8 @@ class Probe:
         filament, one, nodes = kind.filament, kind.filament.type, positions[kind.nodes]
         closed = filament.closed
         vectors = np.diff(nodes, axis=1, append=nodes[:, :1]) if closed else np.diff(nodes, axis=1)
-        tangents = vectors / np.linalg.norm(vectors, axis=2)[..., None]
+        lengths = np.linalg.norm(vectors, axis=2)
+        tangents = vectors / lengths[..., None]
         half = nodes.shape[1] // 2
         ends = nodes[:, half if closed else -1] - nodes[:, 0]
         middle = nodes[:, half]
@@ -133,26 +140,21 @@ class Probe:
         scale = math.sqrt(2.0 * one.segment_length / filament.segments)
         amplitudes = scale * np.einsum("ms,fsk->mfk", waves, tangents)
         moved = [amplitudes, middle] if before is None else [amplitudes - before[0], middle - before[1]]
-        energies = self._beam_energies if kind.element is not None else self._chain_energies
-        values = [*energies(kind, positions), np.sum(ends**2, axis=1)]
+        if kind.element is not None:
+            energies = element_energies(nodes, positions[kind.control_points], kind.element)
+        else:
+            energies = one.stretching_energies(lengths, closed), self._bending_energies(kind, vectors)
+        values = [*(own.mean(axis=1) / self._kT for own in energies), np.sum(ends**2, axis=1)]
         values += [*np.sum(moved[0] ** 2, axis=2), np.sum(moved[1] ** 2, axis=1)]
         return values, (amplitudes, middle)
 
-    def _chain_energies(self, kind, positions):
-        # Mean energies of a segment and of a joint, in k_BT.
-        nodes, one, closed = positions[kind.nodes], kind.filament.type, kind.filament.closed
-        vectors = np.diff(nodes, axis=1, append=nodes[:, :1]) if closed else np.diff(nodes, axis=1)
-        stretching = one.stretching_energies(np.linalg.norm(vectors, axis=2), closed).mean(axis=1) / self._kT
-        bending = np.zeros(len(nodes))
-        stiffnesses = kind.filament.joint_stiffnesses
-        if len(stiffnesses) and one.bending_rigidity > 0.0:
-            bending = one.bending_energies(vectors, stiffnesses, closed).mean(axis=1) / self._kT
-        return stretching, bending
-
-    def _beam_energies(self, kind, positions):
-        # Mean energies of an element, in k_BT.
-        energies = element_energies(positions[kind.nodes], positions[kind.control_points], kind.element)
-        return [own.mean(axis=1) / self._kT for own in energies]
+    @staticmethod
+    def _bending_energies(kind, vectors):
+        # Of the joints of each filament, in kJ/mol; one zero if there are none.
+        one = kind.filament.type
+        if not len(kind.joint_stiffnesses) or one.bending_rigidity == 0.0:
+            return np.zeros((len(vectors), 1))
+        return one.bending_energies(vectors, kind.joint_stiffnesses, kind.filament.closed)
 
     def _tether_energy(self, positions):
         energy = 0.0

@@ -6,6 +6,11 @@
 
 namespace cylchain {
 
+/** How far a force at the end of an element moves it that is alone, over how far it moves all of the element. */
+const double MOBILITY_OF_BEAM_END = 16;
+/** How far a moment turns the tangent at the end of an element that is alone, times the cube of its length. */
+const double MOBILITY_OF_BEAM_TANGENT = 1200;
+
 /**
  * A filament made of beam elements of the same length h that are continuous in position and tangent, with nothing of
  * OpenMM in it. Any consistent set of units will do.

@@ -13,6 +13,18 @@ template <int W> struct BeamStart {
     Vector<typename Lanes<W>::Type>* first;
 };
 
+/** The memory for what a step begins with. */
+template <int W> struct BeamStartMemory {
+    Scratch vectors;
+    std::vector<double> tethers;
+    BeamStart<W> reserve(const BeamPack& pack) {
+        typedef Vector<typename Lanes<W>::Type> Vec;
+        Vec* const begun = vectors.template reserve<Vec>(2*pack.nodes+1);
+        tethers.resize(3*pack.tethers.size());
+        return {begun, begun+pack.nodes, tethers.data(), begun+2*pack.nodes};
+    }
+};
+
 /** What a step keeps of a tether, which is a coordinate of three components. */
 struct BeamTetherState {
     double theta, random[3];

@@ -41,12 +41,10 @@ template <int W> ChainEnergy addForcesTo(const BeamPack& pack, const double* pos
             const double* box, bool includeEnergy) {
     typedef typename Lanes<W>::Type Real;
     static thread_local Scratch memory;
-    static thread_local std::vector<double> tethers;
+    static thread_local BeamStartMemory<W> startMemory;
     const int n = pack.nodes;
-    SixVector<Real>* f = memory.reserve<SixVector<Real> >(2*n+1);
-    tethers.resize(3*pack.tethers.size());
-    const BeamStart<W> start = {reinterpret_cast<Vector<Real>*>(f+n), reinterpret_cast<Vector<Real>*>(f+n)+n,
-            tethers.data(), reinterpret_cast<Vector<Real>*>(f+2*n)};
+    SixVector<Real>* f = memory.reserve<SixVector<Real> >(n);
+    const BeamStart<W> start = startMemory.reserve(pack);
     gatherBeams<W>(pack, positions, box, start);
     std::fill(f, f+n, SixVector<Real> {});
     ChainEnergy energy;
@@ -80,7 +78,7 @@ template <int W> ChainEnergy addForcesTo(const BeamPack& pack, const double* pos
     }
     for (std::size_t number = 0; number < pack.tethers.size(); number++) {
         const BeamTether& tether = pack.tethers[number];
-        const double *d = &tethers[3*number], stiffness = tether.stiffness;
+        const double *d = start.tethers+3*number, stiffness = tether.stiffness;
         Vector<Real>& force = f[tether.node].position;
         lane(force.x, tether.lane) -= stiffness*d[0];
         lane(force.y, tether.lane) -= stiffness*d[1];

@@ -15,13 +15,11 @@ public:
             const bool* taken) override {
         settings = stepSettings;
         const int n = pack.nodes;
-        Six* const f = vectors.reserve<Six>(5*n+1);
+        Six* const f = vectors.reserve<Six>(4*n);
         y = f+n;
         ofPlaces = f+2*n;
         moved = f+3*n;
-        Vec* const begun = reinterpret_cast<Vec*>(f+4*n);
-        tethers.resize(3*pack.tethers.size());
-        start = {begun, begun+n, tethers.data(), begun+2*n};
+        start = startMemory.reserve(pack);
         gatherBeams<W>(pack, positions, box, start);
         gatherBeamForces<W>(pack, forces, f);
         for (int i = 0; i < W; i++)
@@ -97,8 +95,8 @@ private:
     const BeamPack& pack;
     StepSettings settings;
     Scratch vectors;
+    BeamStartMemory<W> startMemory;
     BeamStart<W> start;
-    std::vector<double> tethers;
     BeamTerms<W> terms;
     Six *y, *ofPlaces, *moved;
     Real active;

@@ -23,12 +23,10 @@ const Scalar STRAIN_TOLERANCE = 0.07;
 const Scalar BEAM_COMPRESSION = 0.3;
 /** Rates of relaxation of a free element: of strains in K/(zeta h^2), and of the bends in EI/(zeta h^4). */
 const Scalar STRAIN_RATE = 378, SUM_RATE = 720, DIFFERENCE_RATE = 8400;
-/** How far a force on the vector in the middle moves it, or one on that at an end, by h^3 zeta. */
-const Scalar MIDDLE_MOBILITY = 75, END_MOBILITY = 1200;
+/** How far a force on the vector in the middle moves it, by h^3 zeta; that at an end: see MOBILITY_OF_BEAM_TANGENT. */
+const Scalar MIDDLE_MOBILITY = 75;
 /** A step that does not converge is cut into at most two to this power. */
 const int LARGEST_BEAM_DIVISION = 10;
-/** How far a force at the end of an element moves it that is alone, over how far it moves all of the element. */
-const Scalar MOBILITY_OF_BEAM_END = 16;
 
 template <int W> class BeamStep {
     typedef typename Lanes<W>::Type Real;
@@ -251,8 +249,12 @@ private:
         const NoiseKey key = {(std::uint32_t) settings.seed, (std::uint32_t) settings.level, settings.step};
         for (std::size_t number = 0; number < tethers.size(); number++) {
             const BeamTether& tether = pack.tethers[number];
-            Real h = length, ofEnd = larger<Real>(-parallel, -perpendicular)*(-1/MOBILITY_OF_BEAM_END);
-            const double rate = settings.stepSize*tether.stiffness/(lane(h, tether.lane)*lane(ofEnd, tether.lane));
+            auto property = [&] (int which) {
+                return pack.properties[which*W+tether.lane];
+            };
+            const double least = std::fmin(property(BeamPack::Parallel), property(BeamPack::Perpendicular));
+            const double friction = property(BeamPack::Length)*(least/MOBILITY_OF_BEAM_END);
+            const double rate = settings.stepSize*tether.stiffness/friction;
             BeamTetherState& own = tethers[number];
             own.theta = std::fmax(0.5, 1-1/(rate+TINY));
             std::fill(own.random, own.random+3, 0.0);
@@ -331,7 +333,8 @@ private:
                 const Vec velocity = flow.at(first+control1*splat<Real>(weights[1])+chord*splat<Real>(weights[2])+
                         control2*splat<Real>(weights[3]));
                 const Vec t = directionAt(g, control1, chord, control2);
-                addAt(g, (velocity*across+t*(more*t.dot(velocity)))*splat<Real>(GAUSS_WEIGHTS[g]), right[e], right[e+1]);
+                const Vec drag = (velocity*across+t*(more*t.dot(velocity)))*splat<Real>(GAUSS_WEIGHTS[g]);
+                addAt(g, drag, right[e], right[e+1]);
             }
             first = first+chord;
         }
@@ -420,7 +423,7 @@ private:
         own.nodeLacking = middle-direction;
         const Vec force = direction*own.ofNode.tension+own.nodeLacking*own.ofNode.multiplier;
         right[node].control = right[node].control-force*(3*perLength);
-        const Real least = perpendicular*length*length*length*(-BEAM_COMPRESSION/END_MOBILITY*perStep);
+        const Real least = perpendicular*length*length*length*(-BEAM_COMPRESSION/MOBILITY_OF_BEAM_TANGENT*perStep);
         const Real there = own.ofNode.stiffness > 0 ? splat<Real>(1) : Real{};
         const Real taut = 0.5*there*larger<Real>(own.ofNode.multiplier/(1+strain), least);
         const Real square = 9*perLength*perLength;

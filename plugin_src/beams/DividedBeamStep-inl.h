@@ -13,11 +13,10 @@ template <int W> void divideBeamStep(const BeamPack& pack, const BeamStart<W>& s
     const double h = settings.stepSize;
     const std::uint64_t step = settings.step;
     const int level = settings.level, n = pack.nodes;
-    SixVector<Real>* const moved = vectors.reserve<SixVector<Real> >(3*n+1);
+    static thread_local BeamStartMemory<W> startMemory;
+    SixVector<Real>* const moved = vectors.reserve<SixVector<Real> >(2*n);
     SixVector<Real>* const change = moved+n;
-    Vector<Real>* const begun = reinterpret_cast<Vector<Real>*>(moved+2*n);
-    std::vector<double> tethers(3*pack.tethers.size());
-    const BeamStart<W> from = {begun, begun+n, tethers.data(), begun+2*n};
+    const BeamStart<W> from = startMemory.reserve(pack);
     for (int division = 1; division <= LARGEST_BEAM_DIVISION && level+division <= LARGEST_LEVEL; division++) {
         const int parts = 1<<division;
         settings.stepSize = h/parts;
@@ -38,7 +37,7 @@ template <int W> void divideBeamStep(const BeamPack& pack, const BeamStart<W>& s
                 Vector<Real> move = moved[tether.node].position;
                 const double of[] = {lane(move.x, tether.lane), lane(move.y, tether.lane), lane(move.z, tether.lane)};
                 for (int k = 0; k < 3; k++)
-                    tethers[3*number+k] = start.tethers[3*number+k]+of[k];
+                    from.tethers[3*number+k] = start.tethers[3*number+k]+of[k];
             }
             BeamStep<W>(pack, settings, from, memory).take(f, change, failedPart);
             hope = false;
@@ -72,12 +71,10 @@ template <int W> Instability stepBeams(const BeamPack& pack, const double* posit
     static thread_local typename BeamStep<W>::Memory memory;
     static thread_local Scratch vectors;
     const int n = pack.nodes;
-    SixVector<Real>* const f = vectors.reserve<SixVector<Real> >(3*n+1);
+    static thread_local BeamStartMemory<W> startMemory;
+    SixVector<Real>* const f = vectors.reserve<SixVector<Real> >(2*n);
     SixVector<Real>* const y = f+n;
-    Vector<Real>* const begun = reinterpret_cast<Vector<Real>*>(f+2*n);
-    static thread_local std::vector<double> tethers;
-    tethers.resize(3*pack.tethers.size());
-    const BeamStart<W> start = {begun, begun+n, tethers.data(), begun+2*n};
+    const BeamStart<W> start = startMemory.reserve(pack);
     gatherBeams<W>(pack, positions, box, start);
     gatherBeamForces<W>(pack, forces, f);
     bool failed[W];

@@ -1,15 +1,9 @@
 #include "dynamics/ChainPlaces.h"
-#include "beams/ElementPlace.h"
 #include <algorithm>
 #include <cstddef>
 
 using namespace cylchain;
 using namespace std;
-
-/** How far a force at the end of an element moves it that is alone, over how far it moves all of the element. */
-static const double MOBILITY_OF_END = 16;
-/** How far a moment turns the tangent at the end of an element that is alone, times the cube of its length. */
-static const double MOBILITY_OF_TANGENT = 1200;
 
 ChainPlaces::ChainPlaces(const vector<Chain>& chains, const vector<BeamChain>& beams, int particles) : chains(chains),
         beams(beams), chainOfParticle(particles, -1), nodeOfParticle(particles, -1),
@@ -108,8 +102,8 @@ double ChainPlaces::getFriction(const PlaceOnChain& place) const {
         const BeamChain& beam = getBeam(place.chain);
         const double friction = beam.elementLength*min(beam.parallelFriction, beam.perpendicularFriction);
         if (ElementPlace::isTangent(place.fraction))
-            return friction*beam.elementLength*beam.elementLength/MOBILITY_OF_TANGENT;
-        return friction/MOBILITY_OF_END;
+            return friction*beam.elementLength*beam.elementLength/MOBILITY_OF_BEAM_TANGENT;
+        return friction/MOBILITY_OF_BEAM_END;
     }
     const Chain& chain = chains[place.chain];
     const Segment& segment = chain.segments[place.node];

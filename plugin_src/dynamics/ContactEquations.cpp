@@ -80,6 +80,12 @@ void ContactEquations::begin(const CoupledStart& start, const Loop& newLoop) {
     double diameter = 0;
     for (const Capsule& capsule : capsules)
         diameter = max(diameter, 2*capsule.radius);
+    auto note = [&] (int i) {
+        const PlaceOnChain& place = places[i].place;
+        packs[i] = place.pack;
+        places[i].leastResponse = place.pack < 0 ? 0 : responses.findLeast(place.chain);
+        places[i].friction = place.pack < 0 ? LateralFriction() : start.places.findLateralFriction(place);
+    };
     runInChunks(*loop, capsules.size(), CHUNK, [&] (int i) {
         const Capsule& capsule = capsules[i];
         Place place;
@@ -91,21 +97,17 @@ void ContactEquations::begin(const CoupledStart& start, const Loop& newLoop) {
             places[i].direction = capsule.second < 0 ? 0 : found.fraction == 0 ? 1 : -1;
         else
             found = PlaceOnChain();
-        packs[i] = found.pack;
-        places[i].leastResponse = found.pack < 0 ? 0 : responses.findLeast(found.chain);
-        places[i].friction = found.pack < 0 ? LateralFriction() : start.places.findLateralFriction(found);
+        note(i);
     });
     for (const CapsuleOnCurve& own : *onCurves) {
         PlaceOnChain& found = places[own.capsule].place;
-        if (!start.places.find(own.first, found) || !start.taken[found.chain]) {
-            found = PlaceOnChain();
-            continue;
+        if (start.places.find(own.first, found) && start.taken[found.chain]) {
+            found.fraction = ElementPlace::onPieces(found.fraction, own.pieces);
+            places[own.capsule].direction = (own.forwards ? 1.0 : -1.0)/own.pieces;
         }
-        found.fraction = ElementPlace::onPieces(found.fraction, own.pieces);
-        places[own.capsule].direction = (own.forwards ? 1.0 : -1.0)/own.pieces;
-        packs[own.capsule] = found.pack;
-        places[own.capsule].leastResponse = responses.findLeast(found.chain);
-        places[own.capsule].friction = start.places.findLateralFriction(found);
+        else
+            found = PlaceOnChain();
+        note(own.capsule);
     }
     reaches[0] = REACH*diameter;
     reaches[1] = LEAST_REACH*diameter;

@@ -13,7 +13,7 @@ from openmm_cylchain import Filaments, InputError, capsule_contact_force, find_c
 from openmm_cylchain.beams.curve import curve_points, element_energies, element_points
 from openmm_cylchain.beams.equilibrium import draw_beam
 from openmm_cylchain.couplings.capsule_contacts import contact_spacing
-from support.contexts import energy_of, forces_of, new_context, positions_of
+from support.contexts import energy_of, forces_of, new_context, positions_of, slopes_of
 from support.linked_beams import BEAM, LENGTH, STRAIGHT
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 
@@ -73,18 +73,8 @@ def test_energies_and_forces_are_those_of_pieces_of_the_curve(platform):
     sites = {int(site) for own in filaments.bead_indices for site in own}
     moving = sorted(set(range(len(positions))) - sites)
     assert np.sum(forces[moving], axis=0) == pytest.approx(0.0, abs=1e-9)
-    for particle in moving:
-        slopes = []
-        for axis in range(3):
-            energies = []
-            for sign in (1.0, -1.0):
-                moved = positions.copy()
-                moved[particle, axis] += sign * 1e-3
-                context.setPositions(moved)
-                context.computeVirtualSites()
-                energies.append(energy_of(context, groups))
-            slopes.append((energies[0] - energies[1]) / 2e-3)
-        assert forces[particle] == pytest.approx(-np.array(slopes), abs=1e-5)
+    slopes = slopes_of(context, positions, moving, groups, distance=1e-3)
+    assert forces[moving] == pytest.approx(-slopes, abs=1e-5)
     assert np.any(forces[filaments.control_point_indices[0]]) and np.any(forces[filaments.control_point_indices[1]])
     context.setPositions(positions)
     context.computeVirtualSites()

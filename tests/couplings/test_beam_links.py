@@ -10,7 +10,7 @@ from openmm_cylchain import Crosslinks, Filaments, InputError, InstabilityError,
 from openmm_cylchain.beams.curve import element_energies, element_points
 from openmm_cylchain.beams.equilibrium import draw_beam
 from openmm_cylchain.engines.compiled import CylinderChainForce, CylinderChainIntegrator, plugin
-from support.contexts import energy_of, forces_of, new_context, positions_of
+from support.contexts import energy_of, forces_of, new_context, positions_of, slopes_of
 from support.linked_beams import BEAM, STRAIGHT, linked_pairs, mean_energy
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 
@@ -58,17 +58,8 @@ def test_forces_are_differences_of_the_energy(platform, periodic):
     energy = energy_of(context, groups)
     assert energy == pytest.approx(0.01 * np.sum(links.extensions(context) ** 2), rel=1e-12)
     assert np.sum(forces, axis=0) == pytest.approx(-0.02 * pull_of_point(links, context, positions), abs=1e-9)
-    for particle in range(len(positions)):
-        slopes = []
-        for axis in range(3):
-            energies = []
-            for sign in (1.0, -1.0):
-                moved = positions.copy()
-                moved[particle, axis] += sign * 1e-2
-                context.setPositions(moved)
-                energies.append(energy_of(context, groups))
-            slopes.append((energies[0] - energies[1]) / 2e-2)
-        assert forces[particle] == pytest.approx(-np.array(slopes), abs=1e-5)
+    slopes = slopes_of(context, positions, range(len(positions)), groups)
+    assert forces == pytest.approx(-slopes, abs=1e-5)
     moved = {int(node) for own in (*filaments.node_indices, *filaments.control_point_indices) for node in own}
     assert np.any(forces[sorted(moved)])
 

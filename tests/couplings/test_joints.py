@@ -10,7 +10,7 @@ from openmm import unit
 from openmm_cylchain import Crosslinks, Filaments, InputError, Joints, SegmentPlace
 from openmm_cylchain.beams.curve import element_energies, element_slopes
 from openmm_cylchain.engines.compiled import CylinderChainForce
-from support.contexts import energy_of, forces_of, new_context, positions_of
+from support.contexts import energy_of, forces_of, new_context, positions_of, slopes_of
 from support.linked_beams import BEAM, LENGTH, STRAIGHT
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 
@@ -71,17 +71,8 @@ def test_energies_angles_and_forces(platform, periodic):
     assert joints.moments(context)[1] == pytest.approx(own * np.cos(0.5 * np.arccos(cosines[1])), rel=1e-9)
     # They are couples.
     assert np.sum(forces, axis=0) == pytest.approx(0.0, abs=1e-9)
-    for particle in range(len(positions)):
-        slopes = []
-        for axis in range(3):
-            energies = []
-            for sign in (1.0, -1.0):
-                moved = positions.copy()
-                moved[particle, axis] += sign * 1e-2
-                context.setPositions(moved)
-                energies.append(energy_of(context, groups))
-            slopes.append((energies[0] - energies[1]) / 2e-2)
-        assert forces[particle] == pytest.approx(-np.array(slopes), abs=1e-6)
+    slopes = slopes_of(context, positions, range(len(positions)), groups)
+    assert forces == pytest.approx(-slopes, abs=1e-6)
     assert np.abs(forces).max() > 1e-3
 
 

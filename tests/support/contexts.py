@@ -1,5 +1,6 @@
 """Contexts and Simulations of OpenMM, and what is in them, in OpenMM's units."""
 
+import numpy as np
 import openmm
 from openmm import app
 
@@ -43,6 +44,20 @@ def forces_of(context, groups=-1):
 def energy_of(context, groups=-1):
     """The potential energy in kJ/mol."""
     return context.getState(energy=True, groups=groups).getPotentialEnergy()._value
+
+
+def slopes_of(context, positions, particles, groups=-1, distance=1e-2):
+    """By how much the energy grows with the places of some particles: (particles, 3) in kJ/(mol nm), by differences."""
+    slopes = np.zeros((len(particles), 3))
+    for row, particle in enumerate(particles):
+        for axis in range(3):
+            for sign in (1.0, -1.0):
+                moved = positions.copy()
+                moved[particle, axis] += sign * distance
+                context.setPositions(moved)
+                context.computeVirtualSites()
+                slopes[row, axis] += sign * energy_of(context, groups)
+    return slopes / (2.0 * distance)
 
 
 def close_reporters(simulation):

@@ -95,10 +95,12 @@ void ChainCouplings::refuseNarrowBox(const CylinderChainDescription& chains) con
     for (const Chain& chain : chains.getChains())
         for (const Segment& segment : chain.segments)
             longest = max(longest, segment.restLength);
+    double longestElement = 0;
     for (const BeamChain& beam : chains.getBeams())
-        for (const Contacts& own : contacts)
-            for (const CapsuleOnCurve& capsule : own.force->getOnCurves())
-                longest = max(longest, beam.elementLength/capsule.pieces);
+        longestElement = max(longestElement, beam.elementLength);
+    for (const Contacts& own : contacts)
+        for (const CapsuleOnCurve& capsule : own.force->getOnCurves())
+            longest = max(longest, longestElement/capsule.pieces);
     Vec3 a, b, c;
     context.getPeriodicBoxVectors(a, b, c);
     const Vec3 faces[] = {b.cross(c), c.cross(a), a.cross(b)};

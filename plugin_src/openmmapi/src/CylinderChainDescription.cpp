@@ -48,30 +48,30 @@ static cylchain::Chain describeTopology(const CylinderChainForce& force, int ind
     return chain;
 }
 
-static void copyTethers(const CylinderChainForce& force, vector<cylchain::Chain>& chains) {
-    for (cylchain::Chain& chain : chains)
+/** Copy tethers to their chains, given how many there are and what gives the parameters of one. */
+template <class OwnChain, class Getter> static void copyTethers(int count, Getter getParameters,
+        vector<OwnChain>& chains) {
+    for (OwnChain& chain : chains)
         chain.tethers.clear();
-    for (int i = 0; i < force.getNumTethers(); i++) {
+    for (int i = 0; i < count; i++) {
         int chain;
         cylchain::Tether tether;
         Vec3 point;
-        force.getTetherParameters(i, chain, tether.node, point, tether.stiffness);
+        getParameters(i, chain, tether.node, point, tether.stiffness);
         for (int k = 0; k < 3; k++)
             tether.point[k] = point[k];
         chains[chain].tethers.push_back(tether);
     }
 }
 
-static void copyBeamTethers(const CylinderChainForce& force, vector<cylchain::BeamChain>& beams) {
-    for (int i = 0; i < force.getNumBeamTethers(); i++) {
-        int chain;
-        cylchain::Tether tether;
-        Vec3 point;
-        force.getBeamTetherParameters(i, chain, tether.node, point, tether.stiffness);
-        for (int k = 0; k < 3; k++)
-            tether.point[k] = point[k];
-        beams[chain].tethers.push_back(tether);
-    }
+static void copyTethers(const CylinderChainForce& force, vector<cylchain::Chain>& chains,
+        vector<cylchain::BeamChain>& beams) {
+    copyTethers(force.getNumTethers(), [&] (int i, int& chain, int& node, Vec3& point, double& stiffness) {
+        force.getTetherParameters(i, chain, node, point, stiffness);
+    }, chains);
+    copyTethers(force.getNumBeamTethers(), [&] (int i, int& chain, int& node, Vec3& point, double& stiffness) {
+        force.getBeamTetherParameters(i, chain, node, point, stiffness);
+    }, beams);
 }
 
 static cylchain::BeamChain describeBeam(const CylinderChainForce& force, int index) {
@@ -98,8 +98,7 @@ CylinderChainDescription::CylinderChainDescription(const System& system, const C
             beam.fixed.push_back(system.getParticleMass(particle) == 0.0);
         beams.push_back(beam);
     }
-    copyTethers(force, chains);
-    copyBeamTethers(force, beams);
+    copyTethers(force, chains, beams);
     lookForModes();
 }
 
@@ -121,8 +120,7 @@ void CylinderChainDescription::update(const CylinderChainForce& force) {
         beam.fixed = beams[i].fixed;
         beams[i] = beam;
     }
-    copyTethers(force, chains);
-    copyBeamTethers(force, beams);
+    copyTethers(force, chains, beams);
     lookForModes();
 }
 

@@ -289,6 +289,16 @@ template <class Info> static void replaceTether(Info& old, set<pair<int, int> >&
     old = tether;
 }
 
+/** Give the parameters of a tether of a list. */
+template <class Info> static void giveTether(const vector<Info>& tethers, int index, int& chain, int& node, Vec3& point,
+        double& stiffness) {
+    ASSERT_VALID_INDEX(index, tethers);
+    chain = tethers[index].chain;
+    node = tethers[index].node;
+    point = tethers[index].point;
+    stiffness = tethers[index].stiffness;
+}
+
 int CylinderChainForce::addTether(int chain, int node, const Vec3& point, double stiffness) {
     const TetherInfo tether = {chain, node, point, stiffness};
     checkTether(tether, getChain(chain).particles.size());
@@ -296,11 +306,7 @@ int CylinderChainForce::addTether(int chain, int node, const Vec3& point, double
 }
 
 void CylinderChainForce::getTetherParameters(int index, int& chain, int& node, Vec3& point, double& stiffness) const {
-    ASSERT_VALID_INDEX(index, tethers);
-    chain = tethers[index].chain;
-    node = tethers[index].node;
-    point = tethers[index].point;
-    stiffness = tethers[index].stiffness;
+    giveTether(tethers, index, chain, node, point, stiffness);
 }
 
 void CylinderChainForce::setTetherParameters(int index, int chain, int node, const Vec3& point, double stiffness) {
@@ -318,11 +324,7 @@ int CylinderChainForce::addBeamTether(int chain, int node, const Vec3& point, do
 
 void CylinderChainForce::getBeamTetherParameters(int index, int& chain, int& node, Vec3& point,
         double& stiffness) const {
-    ASSERT_VALID_INDEX(index, beamTethers);
-    chain = beamTethers[index].chain;
-    node = beamTethers[index].node;
-    point = beamTethers[index].point;
-    stiffness = beamTethers[index].stiffness;
+    giveTether(beamTethers, index, chain, node, point, stiffness);
 }
 
 void CylinderChainForce::setBeamTetherParameters(int index, int chain, int node, const Vec3& point, double stiffness) {

@@ -26,6 +26,10 @@ public:
     CommonCylinderChains(ComputeContext& cc, const CylinderChainDescription& description);
     ~CommonCylinderChains();
     /**
+     * Throw what says that filaments of some kind take explicit steps on a platform.
+     */
+    [[noreturn]] static void refuseImplicitSteps(const std::string& platform, const std::string& filaments);
+    /**
      * Take over the parameters of the chains, which have changed.
      */
     void update();

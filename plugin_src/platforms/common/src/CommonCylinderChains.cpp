@@ -100,6 +100,12 @@ CommonCylinderChains::CommonCylinderChains(ComputeContext& cc, const CylinderCha
 CommonCylinderChains::~CommonCylinderChains() {
 }
 
+void CommonCylinderChains::refuseImplicitSteps(const string& platform, const string& filaments) {
+    throw OpenMMException("On the "+platform+" platform, "+filaments+" take explicit steps. Use scheme \"euler\" or "
+            "\"midpoint\", with a step of at most filaments.recommended_time_step(\"midpoint\", system=system), or the "
+            "CPU platform");
+}
+
 ComputeProgram CommonCylinderChains::compile(ComputeContext& cc, const string& source) {
     typedef CommonCylinderChainKernelSources Sources;
     return cc.compileProgram(string(Sources::layout)+Sources::constants+Sources::vectors+Sources::noise+source);

@@ -105,9 +105,7 @@ Instability CommonIntegrateCylinderChainStepKernel::displaceChains(ContextImpl&,
 
 Instability CommonIntegrateCylinderChainStepKernel::displaceCoupledChains(ContextImpl&, const StepSettings&,
         const CoupledForces&) {
-    throw OpenMMException("On the "+getPlatform().getName()+" platform, filaments with links, contacts or walls "
-            "take explicit steps. Use scheme \"euler\" or \"midpoint\", with a step of at most "
-            "filaments.recommended_time_step(\"midpoint\", system=system), or the CPU platform");
+    CommonCylinderChains::refuseImplicitSteps(getPlatform().getName(), "filaments with links, contacts or walls");
 }
 
 int CommonIntegrateCylinderChainStepKernel::displaceOthers(ContextImpl&, const StepSettings& settings,

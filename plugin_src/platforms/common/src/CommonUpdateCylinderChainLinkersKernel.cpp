@@ -1,7 +1,7 @@
 #include "CommonUpdateCylinderChainLinkersKernel.h"
+#include "CommonCylinderChains.h"
 #include "dynamics/ChainEngine.h"
 #include "openmm/CylinderChainIntegrator.h"
-#include "openmm/OpenMMException.h"
 #include "openmm/common/ContextSelector.h"
 #include "openmm/internal/ContextImpl.h"
 #include <functional>
@@ -33,9 +33,7 @@ void CommonUpdateCylinderChainLinkersKernel::refuseImplicitSteps(ContextImpl& co
     const CylinderChainIntegrator* integrator = dynamic_cast<const CylinderChainIntegrator*>(
             &context.getIntegrator());
     if (integrator != NULL && isImplicit(static_cast<Scheme>(integrator->getScheme())))
-        throw OpenMMException("On the "+getPlatform().getName()+" platform, filaments with linkers take explicit "
-                "steps. Use scheme \"euler\" or \"midpoint\", with a step of at most "
-                "filaments.recommended_time_step(\"midpoint\", system=system), or the CPU platform");
+        CommonCylinderChains::refuseImplicitSteps(getPlatform().getName(), "filaments with linkers");
 }
 
 long long CommonUpdateCylinderChainLinkersKernel::execute(ContextImpl& context, LinkerState& state, double kT,
