@@ -1,8 +1,9 @@
 """Tables of configurations beyond filaments and linkers: what is built is what Python builds, and what is refused."""
 
+import itertools
 import re
-import subprocess
 import sys
+from types import SimpleNamespace
 
 import mdtraj
 import numpy as np
@@ -323,31 +324,28 @@ def test_filaments_come_apart_in_short_steps_where_those_of_the_run_are_far_too_
     assert before > 1200 > 1000 > after
 
 
-@pytest.mark.slow
-def test_a_start_that_takes_long_says_how_far_it_is(tmp_path):
-    # 15 000 segments: about ten seconds.
-    (tmp_path / "run.toml").write_text(OVERLAPPING.replace('"1 um"', '"3 um"').replace("count = 60", "count = 1500"))
-    command = [sys.executable, "-m", "openmm_cylchain.cli", "run", "run.toml", "--output", "out"]
-    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
-        lines = [process.stderr.readline() for _ in range(2)]
-        process.kill()
-    said = [
-        re.search(r"([0-9.]+) s  filaments that overlap come apart .*: (\d+) of 140 steps$", line) for line in lines
-    ]
-    assert all(said), lines
-    first, second = [(float(found[1]), int(found[2])) for found in said]
-    assert first[0] < second[0] and 0 < first[1] < second[1] < 140
+TWO_IN_A_SPHERE = FILAMENT + 'count = 2\ninside = { shape = "sphere", radius = "400 nm" }\n'
 
 
-def test_messages_of_a_start(monkeypatch, capsys):
-    monkeypatch.setattr("openmm_cylchain.runs.relaxation._SECONDS_BETWEEN_MESSAGES", 0.0)
-    configuration = parse(CONTACTS, filament=FILAMENT + 'count = 2\ninside = { shape = "sphere", radius = "400 nm" }\n')
+def test_a_start_that_takes_long_says_how_far_it_is(monkeypatch, capsys):
+    # Of 140 steps each takes an eighth of a second here, so that lines come after 2, 4, 6, 9 and 13.5 s.
+    clock = SimpleNamespace(monotonic=itertools.count(0.0, 0.125).__next__)
+    monkeypatch.setattr("openmm_cylchain.runs.relaxation.time", clock)
+    configuration = parse(CONTACTS, filament=TWO_IN_A_SPHERE)
     one, messages = build_system(configuration, None, 3), []
     relaxed_positions(configuration, one, messages.append)
-    assert messages and all("filaments that overlap come apart" in message for message in messages)
+    line = "filaments that overlap come apart before the first step: {} of 140 steps"
+    assert messages == [line.format(steps) for steps in (16, 32, 48, 72, 108)]
     assert capsys.readouterr() == ("", "")
     relaxed_positions(configuration, one)
-    assert " of 140 steps\n" in capsys.readouterr().err
+    said = capsys.readouterr().err.splitlines()
+    assert [text.split(" s  ")[1] for text in said] == messages
+
+
+def test_a_start_that_is_soon_done_says_nothing(capsys):
+    configuration = parse(CONTACTS, filament=TWO_IN_A_SPHERE)
+    relaxed_positions(configuration, build_system(configuration, None, 3))
+    assert capsys.readouterr() == ("", "")
 
 
 @pytest.mark.parametrize("suffix", ["npy", "npz", "cif", "dcd"])
