@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from ..filaments.filament import Filament
 from ..units.types import IntArray
@@ -23,11 +24,11 @@ class ChainNumbers:
         self._filaments = np.append(np.argsort(beams, kind="stable"), -1)
         self._chains = np.append(np.argsort(self._filaments[:-1]), -1)
 
-    def chains(self, filaments: IntArray) -> IntArray:
+    def chains(self, filaments: npt.ArrayLike) -> IntArray:
         """Numbers of chains, in the shape of those of filaments. Those that do not exist stay what they are."""
         return self._taken(self._chains, filaments)
 
-    def filaments(self, chains: IntArray) -> IntArray:
+    def filaments(self, chains: npt.ArrayLike) -> IntArray:
         """Numbers of filaments, in the shape of those of chains."""
         return self._taken(self._filaments, chains)
 

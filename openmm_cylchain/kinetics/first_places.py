@@ -154,7 +154,7 @@ class FirstPlaces:
             if not hand.binds(filament.type):
                 continue
             nodes, bows = self._nodes(number), np.zeros(filament.segments)
-            if filament.type.has_beam_elements:
+            if filament.control_points is not None:
                 bows = np.repeat(_largest_bows(nodes, filament.control_points), _PIECES)
                 nodes = curve_points(nodes, filament.control_points, _PIECES)
                 contour = np.linspace(0.0, contour[-1], len(nodes))
@@ -171,7 +171,7 @@ class FirstPlaces:
         found = np.empty((len(chains), 3))
         for chain in np.unique(chains):
             own, nodes = chains == chain, self._nodes(chain)
-            if self._filaments[chain].type.has_beam_elements:
+            if self._filaments[chain].control_points is not None:
                 found[own] = _on_curve(self._filaments[chain], self._contours[chain], along[own])
                 continue
             found[own] = np.column_stack([np.interp(along[own], self._contours[chain], x) for x in nodes.T])

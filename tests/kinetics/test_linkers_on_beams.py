@@ -8,8 +8,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from openmm_cylchain import F_ACTIN, Crosslinker, Filaments, FilamentType, Hand, InputError
-from openmm_cylchain.beams.equilibrium import draw_beam
 from openmm_cylchain.beams.curve import arc_lengths, control_points_of, element_points
+from openmm_cylchain.beams.equilibrium import draw_beam
 from support.contexts import energy_of, forces_of, new_context, positions_of, slopes_of
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 
@@ -111,7 +111,7 @@ def test_binding_and_bending_are_in_equilibrium_together(rest_length, step):
 
 
 def network(linkers, step=2e7, **options):
-    """Beams and straight filaments in turn, which cross each other in a small periodic box, with linkers in a Context."""
+    """Beams and straight filaments that cross each other in a small periodic box, with linkers in a Context."""
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
     generator = np.random.default_rng(1)
     for number in range(24):
@@ -289,7 +289,8 @@ def test_anchored_linkers_begin_in_the_equilibrium_of_their_springs(shift):
     an_arc(filaments)
     kind = Crosslinker(hands=replace(HAND, reach=90.0), stiffness=0.02, rest_length=5.0)
     point = np.array([400.0 * np.cos(0.6), 400.0 * np.sin(0.6), 12.0]) * 0.97
-    filaments.add_linkers(kind, anchors=np.tile(point + shift * np.array([1500.0, 0.0, -1500.0]), (3000, 1)), bound=3000)
+    image = point + shift * np.array([1500.0, 0.0, -1500.0])
+    filaments.add_linkers(kind, anchors=np.tile(image, (3000, 1)), bound=3000)
     _, system, positions = filaments.build(box_vectors=1500.0 * np.eye(3))
     context = new_context(system, positions)
     table, pulls = filaments.linkers_in(context), filaments.linker_pulls(context)
