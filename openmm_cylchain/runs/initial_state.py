@@ -113,7 +113,7 @@ def recommended_step(configuration, scheme, engine, seed):
         # The same without building thousands of filaments.
         solvent = configuration.solvent.viscosity, configuration.solvent.temperature
         steps = (
-            recommended_time_step(own.type, *solvent, scheme, own.segments, own.closed)
+            recommended_time_step(own.type, *solvent, scheme, own.segments, own.closed, propulsion=own.propulsion)
             for own in configuration.filaments
         )
         return min(steps, key=lambda step: step.step)

@@ -210,8 +210,8 @@ class Filaments:
             noise acts along z.
         propulsion : force
             F0 of self-propelled filaments: a force F0 t acts on every segment, half on either end, where t is its
-            tangent, away from the first node. With a negative F0 the filament moves with its first node in front. It is
-            not conservative and has no energy.
+            tangent, away from the first node; on beam elements, along their curves. With a negative F0 the filament
+            moves with its first node in front. It is not conservative and has no energy.
         clamped_tangents : sequence of int
             Of beam elements: clamped nodes whose tangents do not turn either. The filament is clamped exactly there; a
             clamped node alone is a hinge.

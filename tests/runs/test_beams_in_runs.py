@@ -108,7 +108,7 @@ def changed(old, new):
             'clamped_tangents belongs to element = "beam"',
         ),
         ("segments = 3\n", "segments = 3\nclosed = true\n", "closed cannot be with element"),
-        ("segments = 3\n", 'segments = 3\npropulsion = "1 pN"\n', "propulsion cannot be with element"),
+        ("segments = 3\n", 'segments = 3\npropulsion = "1 pN"\n', None),
         ("segments = 3\n", "segments = 3\ntangents = [[1, 0, 0], [1, 0, 0]]\n", "tangents belongs to nodes"),
         (
             "segments = 3\n",
