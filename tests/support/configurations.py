@@ -143,4 +143,4 @@ report_interval = "40 us"
 checkpoint_interval = "120 us"
 seed = 5
 """
-"""Filaments of beam elements, beside one of straight segments: clamped, linked, joined, planar, in a region, of given nodes."""
+"""Filaments of beam elements, beside one of straight segments: clamped, linked, joined, planar, of given nodes."""
