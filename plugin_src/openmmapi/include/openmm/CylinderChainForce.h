@@ -351,8 +351,8 @@ public:
     void setBeamTetherParameters(int index, int chain, int node, const Vec3& point, double stiffness);
     /**
      * Copy the parameters of segments, joints and tethers to a Context, so that changes made by setSegmentParameters(),
-     * setSegmentPropulsion(), setJointParameters(), setTetherParameters() and setChainPlanar() take effect in it, and so
-     * does what is set of chains of beam elements.
+     * setSegmentPropulsion(), setJointParameters(), setTetherParameters() and setChainPlanar() take effect in it, and
+     * so does what is set of chains of beam elements.
      * Models and particles cannot be changed in this way, and neither can chains be added; tethers can.
      */
     void updateParametersInContext(Context& context);
