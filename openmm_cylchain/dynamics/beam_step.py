@@ -10,9 +10,11 @@ from .time_step import RECOMMENDED_STRAIN, TimeStep, strain_rate
 
 _LINEAR, _CUBIC = 0.0021, 2e-5
 _RELAXATION_STEPS = 20.0
+_ADVANCE = 0.1
 _REASONS = {
     "bends": "bends of beam elements, which turn as they fluctuate",
     "flow": f"flow, which may strain the solvent by {RECOMMENDED_STRAIN:g} in a step",
+    "propulsion": f"propulsion, which may take an element by {_ADVANCE:g} of its length in a step",
     "relaxation": f"relaxation of the whole filament, which takes {_RELAXATION_STEPS:g} steps",
 }
 
@@ -24,6 +26,7 @@ def beam_time_step(
     elements: int,
     flow: Flow | None,
     friction: SegmentFriction,
+    propulsion: float = 0.0,
 ) -> TimeStep:
     """The step at which averages of a free chain of beam elements are good to 1 %.
 
@@ -31,7 +34,8 @@ def beam_time_step(
     across it, that is ``dt = (zeta h^4/EI) min(0.0021/eps, 0.00002/eps^3)``: measured for chains of one and of three
     elements with eps from 0.05 to 1, see the page on beam elements. Fewer than one in a thousand steps of a chain are
     divided at it. A step must also resolve the slowest relaxation of the filament, zeta/EI (L/4.73)^4, by 20 steps, and
-    a flow may strain the solvent by 0.03 in it.
+    a flow may strain the solvent by 0.03 in it. Propulsion may take an element by a tenth of its length: with that,
+    bends of self-propelled chains of four elements have up to 2 % too much energy, with a fifth of it 5 to 10 %.
 
     Parameters
     ----------
@@ -44,6 +48,8 @@ def beam_time_step(
     flow : Flow or None
     friction : SegmentFriction
         Of an element.
+    propulsion : float
+        F0 on each element, in kJ/(mol nm).
 
     Raises
     ------
@@ -63,5 +69,8 @@ def beam_time_step(
     strain = 0.0 if flow is None else strain_rate(flow)
     if strain > 0.0:
         bounds["flow"] = allowed["flow"] = RECOMMENDED_STRAIN / strain
+    if propulsion != 0.0:
+        bounds["propulsion"] = h * friction.parallel / abs(propulsion)
+        allowed["propulsion"] = _ADVANCE * bounds["propulsion"]
     binding = min(allowed, key=allowed.__getitem__)
     return TimeStep(allowed[binding], _REASONS[binding], bounds, allowed)

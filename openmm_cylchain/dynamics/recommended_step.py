@@ -60,6 +60,7 @@ def recommended_time_step(
     closed: bool = False,
     flow: Flow | None = None,
     friction: SegmentFriction | None = None,
+    propulsion: float = 0.0,
 ) -> TimeStep:
     """The step at which equilibrium energies of a chain are good to about 5 %.
 
@@ -91,6 +92,8 @@ def recommended_time_step(
         Of the solvent.
     friction : SegmentFriction, optional
         Of a segment; that at the given temperature if not given.
+    propulsion : float
+        F0 of self-propelled filaments, in kJ/(mol nm); matters only to beam elements.
 
     Returns
     -------
@@ -105,7 +108,7 @@ def recommended_time_step(
     if friction is None:
         friction = filament_type.segment_friction(viscosity, temperature, segments)
     if filament_type.has_beam_elements:
-        return beam_time_step(filament_type, temperature, scheme, segments, flow, friction)
+        return beam_time_step(filament_type, temperature, scheme, segments, flow, friction, propulsion)
     if scheme in IMPLICIT_SCHEMES:
         return implicit_time_step(filament_type, viscosity, temperature, segments, closed, flow, friction, scheme)
     bounds = bounds_of_chain(filament_type, friction, segments)

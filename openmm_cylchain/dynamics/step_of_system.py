@@ -63,8 +63,11 @@ def _steps_of_types(filaments, scheme, temperature, flow):
             closed,
             flow,
             kind.segment_friction(*solvent, segments),
+            propulsion,
         )
-        for kind, segments, closed in dict.fromkeys((f.type, f.segments, f.closed) for f in filaments)
+        for kind, segments, closed, propulsion in dict.fromkeys(
+            (f.type, f.segments, f.closed, f.propulsion) for f in filaments
+        )
     ]
 
 

@@ -262,7 +262,7 @@ def _add_chain(force, filament, nodes, viscosity, temperature):
 def _add_beam_chain(force, filament, nodes, control_points, viscosity, temperature):
     element = filament.beam_element(temperature)
     friction = friction_of_segments(filament, viscosity, temperature)
-    force.addBeamChain(
+    chain = force.addBeamChain(
         [int(particle) for pair in zip(nodes, control_points) for particle in pair],
         element.length,
         element.modulus,
@@ -272,6 +272,7 @@ def _add_beam_chain(force, filament, nodes, control_points, viscosity, temperatu
         friction.perpendicular / element.length,
         filament.planar,
     )
+    force.setBeamChainPropulsion(chain, filament.propulsion)
 
 
 _OF_BEAM_CHAIN = re.compile(r"(?:CylinderChainIntegrator: )?(The elements of )?[Bb]eam chain (\d+)")

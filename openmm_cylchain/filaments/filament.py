@@ -33,7 +33,8 @@ class Filament:
     planar : bool
         The nodes keep their z.
     propulsion : float
-        F0 in kJ/(mol nm): the force F0 t on every segment, half on either end, with its tangent t.
+        F0 in kJ/(mol nm): the force F0 t on every segment, half on either end, with its tangent t. On a beam element,
+        it is spread evenly along its curve.
     control_points : (n, 3) array or None
         Of beam elements: P + h r'/3 in nm for a node at P, with the tangent r' there.
     clamped_tangents : tuple of int

@@ -167,15 +167,14 @@ def new_filament(
         if np.size(np.asarray(clamped_tangents, dtype=object)):
             raise InputError(f"{label}: clamped_tangents are those of beam elements; clamp two neighbouring nodes.")
         return Filament(filament_type, positions, clamped, closed, planar, propulsion)
-    if closed or propulsion:
+    if closed:
         raise InputError(
-            f"{label} has beam elements, of which there are no {'rings' if closed else 'propelled filaments'} as yet: "
-            "give its type element='straight'."
+            f"{label} has beam elements, of which there are no rings as yet: give its type element='straight'."
         )
     if planar:
         control_points = _in_plane_of_nodes(control_points, positions, filament_type.segment_length, label)
     held, held_tangents = clamped_beam(clamped, clamped_tangents, len(positions), label)
-    return Filament(filament_type, positions, held, False, planar, 0.0, control_points, held_tangents)
+    return Filament(filament_type, positions, held, False, planar, propulsion, control_points, held_tangents)
 
 
 def clamped_beam(

@@ -1,5 +1,6 @@
 """The CylinderChainBindingForce of a System: linkers of the compiled engine."""
 
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -7,18 +8,23 @@ from typing import Any
 import numpy as np
 import openmm
 
+from ..couplings.beam_curves import BeamCurves
 from ..engine_choice import load_plugin
 from ..errors import InputError
 from ..filaments.filament import Filament
 from ..mechanics.geometry import to_nearest_images
 from ..units.quantities import thermal_energy
 from ..units.types import FloatArray, IntArray
+from .chain_numbers import ChainNumbers
 from .first_places import FirstPlaces, contour_of
 from .hand import Hand
 from .linker_table import LinkerTable
 from .linkers import LinkerPulls, Linkers
 
 BINDING_FORCE_NAME = "Linkers"
+
+_CHAIN = re.compile(r"\bchain (\d+)")
+"""What the plugin calls a filament."""
 
 
 def is_binding_force(force: openmm.Force) -> bool:
@@ -42,7 +48,7 @@ def make_binding_force(
     positions: FloatArray,
     box: FloatArray | None,
 ) -> openmm.Force:
-    """The force of linkers that bind to filaments, which are the chains of a System in their order.
+    """The force of linkers that bind to the filaments of a System.
 
     Parameters
     ----------
@@ -64,6 +70,7 @@ def make_binding_force(
     force = load_plugin().CylinderChainBindingForce(temperature)
     force.setName(BINDING_FORCE_NAME)
     force.setUsesPeriodicBoundaryConditions(box is not None)
+    numbers_of = ChainNumbers(filaments)
     hands: dict[Hand, int] = {}
     columns: list[Any] = [[], [], [], []]
     first_places = FirstPlaces(filaments, thermal_energy(temperature), box)
@@ -71,7 +78,8 @@ def make_binding_force(
         numbers = []
         for hand in own.kind.hands:
             if hand not in hands:
-                hands[hand] = _add_hand(force, hand, filaments, own.kind.name)
+                bound_to = [i for i, filament in enumerate(filaments) if hand.binds(filament.type)]
+                hands[hand] = _add_hand(force, hand, numbers_of.chains(bound_to).tolist(), own.kind.name)
             numbers.append(hands[hand])
         first = -1 if own.anchors is not None else numbers[0]
         number = force.addLinkerType(
@@ -90,7 +98,7 @@ def make_binding_force(
         elif own.bound:
             which, where = first_places.near(_anchor_points(own, positions), own.kind, own.bound, generator)
             chains[which, 1], places[which, 1] = where
-        for column, values in zip(columns, (np.full(own.count, number), anchors, chains, places)):
+        for column, values in zip(columns, (np.full(own.count, number), anchors, numbers_of.chains(chains), places)):
             column.append(values)
     rows: list[list[Any]] = [np.concatenate(column).ravel().tolist() for column in columns]
     count = len(rows[0])
@@ -98,8 +106,7 @@ def make_binding_force(
     return force
 
 
-def _add_hand(force, hand, filaments, name):
-    chains = [number for number, filament in enumerate(filaments) if hand.binds(filament.type)]
+def _add_hand(force, hand, chains, name):
     if not chains:
         raise InputError(
             f"Linkers {name!r}: a hand binds to filaments of the type {' or '.join(hand.binds_to)}, of which there are "
@@ -141,7 +148,7 @@ def naming_unknown_linkers() -> Iterator[None]:
         raise InputError(str(error)) from None
 
 
-def table_of(force: Any, context: openmm.Context) -> LinkerTable:
+def table_of(force: Any, context: openmm.Context, filaments: Sequence[Filament]) -> LinkerTable:
     """The linkers of a Context; InputError if it is not known where they are."""
     with naming_unknown_linkers():
         columns = force.getLinkersInContext(context)
@@ -150,13 +157,13 @@ def table_of(force: Any, context: openmm.Context) -> LinkerTable:
         numbers.astype(int),
         types.astype(int),
         anchors.astype(int),
-        chains.astype(int).reshape(-1, 2),
+        ChainNumbers(filaments).filaments(chains.reshape(-1, 2)),
         places.astype(float).reshape(-1, 2),
         columns[5],
     )
 
 
-def set_table(force: Any, context: openmm.Context, table: LinkerTable) -> None:
+def set_table(force: Any, context: openmm.Context, table: LinkerTable, filaments: Sequence[Filament]) -> None:
     """Give a Context the linkers of a table.
 
     Raises
@@ -164,13 +171,15 @@ def set_table(force: Any, context: openmm.Context, table: LinkerTable) -> None:
     InputError
         For linkers that do not fit their types, the anchors or the filaments.
     """
+    numbers = ChainNumbers(filaments)
     columns = [np.asarray(column).ravel().tolist() for column in (
-        table.numbers, table.types, table.anchors, table.filaments, table.arc_lengths
+        table.numbers, table.types, table.anchors, numbers.chains(table.filaments), table.arc_lengths
     )]  # fmt: skip
     try:
         force.setLinkersInContext(context, *columns, int(table.next_number))
     except openmm.OpenMMException as error:
-        raise InputError(str(error).removeprefix("CylinderChainBindingForce: ")) from None
+        message = str(error).removeprefix("CylinderChainBindingForce: ")
+        raise InputError(_CHAIN.sub(lambda found: f"filament {numbers.filaments(int(found[1]))}", message)) from None
 
 
 def pulls_of(
@@ -180,10 +189,11 @@ def pulls_of(
     nodes: Sequence[IntArray],
     positions: FloatArray,
     box: FloatArray | None,
+    curves: BeamCurves | None = None,
 ) -> LinkerPulls:
     """What the springs of linkers do; arguments are those of ``places_of``."""
     pulling = table.held == 2
-    places = places_of(force, table, filaments, nodes, positions, box)[pulling]
+    places = places_of(force, table, filaments, nodes, positions, box, curves)[pulling]
     vectors = places[:, 1] - places[:, 0]
     distance = np.linalg.norm(vectors, axis=1)
     parameters = np.array([force.getLinkerTypeParameters(i)[2:4] for i in range(force.getNumLinkerTypes())])
@@ -201,6 +211,7 @@ def places_of(
     nodes: Sequence[IntArray],
     positions: FloatArray,
     box: FloatArray | None,
+    curves: BeamCurves | None = None,
 ) -> FloatArray:
     """Where the two ends of linkers hold something: (n, 2, 3) in nm, NaN where they do not.
 
@@ -215,6 +226,8 @@ def places_of(
         In nm.
     box : (3, 3) array or None
         Periodic box vectors if distances are those of nearest images: then a second end is at that of its first one.
+    curves : BeamCurves or None
+        Those of beam elements, if there are any.
     """
     places = np.full((len(table), 2, 3), np.nan)
     chains, along = np.asarray(table.filaments), np.asarray(table.arc_lengths)
@@ -233,7 +246,12 @@ def places_of(
         segment = np.clip(np.searchsorted(starts, position, side="right") - 1, first[chain], first[chain + 1] - 1)
         between = _nearest(positions[plus[segment]] - positions[minus[segment]], box)
         fraction = (position - starts[segment]) / sizes[segment]
-        places[on, side] = positions[minus[segment]] + fraction[:, None] * between
+        own = positions[minus[segment]] + fraction[:, None] * between
+        if curves is not None:
+            rows = np.flatnonzero(curves.on_curve(minus[segment], plus[segment]))
+            ends = minus[segment[rows]], plus[segment[rows]]
+            own[rows] = curves.places(*ends, fraction[rows], positions, box)
+        places[on, side] = own
     for row in np.flatnonzero(np.asarray(table.anchors) >= 0):
         particle, point = force.getAnchor(int(table.anchors[row]))
         places[row, 0] = positions[particle] if particle >= 0 else getattr(point, "_value", point)

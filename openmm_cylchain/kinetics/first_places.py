@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..beams.curve import curve_points, place_weights
 from ..errors import InputError
 from ..filaments.filament import Filament
 from ..mechanics.geometry import to_nearest_images
@@ -16,6 +17,9 @@ _MOST_SITES = 1e9
 
 _CANDIDATES = 200
 """Places of which that of an anchored linker is drawn."""
+
+_PIECES = 16
+"""Straight ones, in place of the curve of a beam element where what is within reach is looked for."""
 
 Places = tuple[IntArray, FloatArray]
 """Numbers of filaments, and lengths along them."""
@@ -85,10 +89,12 @@ class FirstPlaces:
         """
         hand = kind.hands[1]
         found: list[tuple[int, int, float]] = []
-        starts, vectors, chains, begins, lengths = self._segments(hand)
+        starts, vectors, chains, begins, lengths, bows = self._segments(hand)
         squares = np.sum(vectors**2, axis=1)
         halves = 0.5 * vectors
-        farthest = hand.reach + 0.5 * np.sqrt(squares.max())
+        # Places on a curve that are within reach are at most this far from a piece's.
+        reaches = hand.reach + bows
+        farthest = reaches.max() + 0.5 * np.sqrt(squares.max())
         for anchor, point in enumerate(points):
             if len(found) == count:
                 break
@@ -98,7 +104,7 @@ class FirstPlaces:
             # Fractions of segments: the nearest one, and those at which they come within reach and leave it.
             nearest = -np.sum(relative * vectors[around], axis=1) / squares[around]
             apart = np.sum((relative + nearest[:, None] * vectors[around]) ** 2, axis=1)
-            half = np.sqrt(np.maximum(hand.reach**2 - apart, 0.0) / squares[around])
+            half = np.sqrt(np.maximum(reaches[around] ** 2 - apart, 0.0) / squares[around])
             first, last = np.clip(nearest - half, 0.0, 1.0), np.clip(nearest + half, 0.0, 1.0)
             within = lengths[around] * (last - first)
             if not np.any(within > 0.0):
@@ -141,14 +147,19 @@ class FirstPlaces:
         return chains[chosen], along[chosen]
 
     def _segments(self, hand):
-        # Of all filaments to which it binds: where they begin, their vectors, filaments, and lengths along them.
-        columns: list[list[FloatArray]] = [[], [], [], [], []]
+        # Of all filaments to which it binds, segments or pieces of curves: where they begin, their vectors, filaments,
+        # lengths along these, and how far a curve is from them.
+        columns: list[list[FloatArray]] = [[], [], [], [], [], []]
         for number, (filament, contour) in enumerate(zip(self._filaments, self._contours)):
             if not hand.binds(filament.type):
                 continue
-            nodes = self._nodes(number)
-            own = (nodes[:-1], np.diff(nodes, axis=0), np.full(filament.segments, number), contour[:-1])
-            for column, values in zip(columns, (*own, np.diff(contour))):
+            nodes, bows = self._nodes(number), np.zeros(filament.segments)
+            if filament.control_points is not None:
+                bows = np.repeat(_largest_bows(nodes, filament.control_points), _PIECES)
+                nodes = curve_points(nodes, filament.control_points, _PIECES)
+                contour = np.linspace(0.0, contour[-1], len(nodes))
+            own = (nodes[:-1], np.diff(nodes, axis=0), np.full(len(bows), number), contour[:-1])
+            for column, values in zip(columns, (*own, np.diff(contour), bows)):
                 column.append(values)
         return [np.concatenate(column) for column in columns]
 
@@ -160,6 +171,9 @@ class FirstPlaces:
         found = np.empty((len(chains), 3))
         for chain in np.unique(chains):
             own, nodes = chains == chain, self._nodes(chain)
+            if self._filaments[chain].control_points is not None:
+                found[own] = _on_curve(self._filaments[chain], self._contours[chain], along[own])
+                continue
             found[own] = np.column_stack([np.interp(along[own], self._contours[chain], x) for x in nodes.T])
         return found
 
@@ -179,3 +193,20 @@ class FirstPlaces:
         own = np.column_stack([chains, numbers])
         self._taken[spacing] = np.concatenate([self._taken_sites(spacing), own])
         return chains, (numbers + 0.5) * spacing
+
+
+def _largest_bows(nodes, control_points):
+    # Of each element, how far its curve can be from the line between the ends of a piece, at the same fraction: no more
+    # than an eighth of the second derivative, which is largest at one of the two ends.
+    first, last = control_points[:-1], 2.0 * nodes[1:] - control_points[1:]
+    seconds = 6.0 * np.stack([nodes[:-1] - 2.0 * first + last, first - 2.0 * last + nodes[1:]])
+    return np.linalg.norm(seconds, axis=-1).max(axis=0) / (8.0 * _PIECES**2)
+
+
+def _on_curve(filament, contour, along):
+    # Places on a filament of beam elements, at lengths along it.
+    element = np.clip(np.searchsorted(contour, along, side="right") - 1, 0, filament.segments - 1)
+    weights = place_weights((along - contour[element]) / np.diff(contour)[element])
+    nodes, vectors = filament.positions, filament.control_points - filament.positions
+    ends = np.stack([nodes[element], vectors[element], nodes[element + 1], vectors[element + 1]], axis=1)
+    return np.einsum("nw,nwx->nx", weights, ends)

@@ -34,6 +34,7 @@ from .tables.couplings import (
 )
 from .tables.filament import FILAMENT, MOST_NODES, read_filaments
 from .tables.filament_types import PRESETS as PRESETS
+from .tables.joints import JOINT, read_joint
 from .tables.linkers import HAND, LINKERS, binds_to, read_linkers
 from .tables.particles import PARTICLES, read_particles
 from .tables.simulation import SIMULATION, SimulationSettings, read_seed, read_simulation
@@ -45,11 +46,26 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-TABLES = (SOLVENT, BOX, FLOW, FILAMENT, PARTICLES, LINKERS, LINK, TETHER, PULL, CONTACTS, WALL, SIMULATION)
+TABLES = (SOLVENT, BOX, FLOW, FILAMENT, PARTICLES, LINKERS, LINK, JOINT, TETHER, PULL, CONTACTS, WALL, SIMULATION)
 """All kinds of tables, in the order of the reference."""
 
 # Where a key that a table lacks may belong to, in this order.
-_OWNERS = (SOLVENT, SIMULATION, FILAMENT, LINKERS, HAND, BOX, FLOW, PARTICLES, LINK, TETHER, PULL, CONTACTS, WALL)
+_OWNERS = (
+    SOLVENT,
+    SIMULATION,
+    FILAMENT,
+    LINKERS,
+    HAND,
+    BOX,
+    FLOW,
+    PARTICLES,
+    LINK,
+    JOINT,
+    TETHER,
+    PULL,
+    CONTACTS,
+    WALL,
+)
 
 
 @dataclass(frozen=True)
@@ -75,6 +91,7 @@ class Configuration:
     tethers: tuple = ()
     pulls: tuple = ()
     links: tuple = ()
+    joints: tuple = ()
     tables: dict = dataclasses.field(default_factory=dict, compare=False, repr=False)
     start_files: dict = dataclasses.field(default_factory=dict, compare=False)
     lines: dict = dataclasses.field(default_factory=dict, compare=False, repr=False)
@@ -174,6 +191,7 @@ def _configuration(raw, text, folder, lines):
         tuple(read_tether(own, groups) for own in tables["tether"]),
         tuple(read_pull(own, groups) for own in tables["pull"]),
         tuple(read_link(own, groups) for own in tables["link"]),
+        tuple(read_joint(own, groups) for own in tables["joint"]),
         tables,
         dict(_start_files(tables["filament"], folder)),
         lines,
@@ -260,6 +278,7 @@ def _disturbed(configuration):
     moving = {number for tether in configuration.tethers if tether.velocity for number in tether.filaments}
     pulled = {number for pull in configuration.pulls for number in pull.filaments}
     linked = {place["filament"] for link in configuration.links for place in link.between or ()}
+    joined = {place["filament"] for joint in configuration.joints for place in joint.between}
     groups, first = [], 0
     for group in configuration.filaments:
         numbers = set(range(first, first + group.count))
@@ -267,6 +286,7 @@ def _disturbed(configuration):
         reasons = {
             "linkers": binds_to(group, configuration.linkers),
             "links": bool(linked & numbers) or any(link.between is None for link in configuration.links),
+            "joints": bool(joined & numbers),
             "contacts": configuration.contacts is not None,
             "walls": bool(configuration.walls),
             "forces": bool(pulled & numbers),

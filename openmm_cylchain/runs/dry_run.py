@@ -48,6 +48,8 @@ def _what_is_built(configuration, built):
         yield f"    {'linkers at a concentration' if count is None else f'{count} linkers'}: {label}"
     if built.links:
         yield f"    {built.links} links"
+    if configuration.joints:
+        yield f"    {len(configuration.joints)} joints"
     if configuration.box is not None:
         yield f"  box of {' × '.join(f'{edge:g}' for edge in configuration.box)} nm"
     yield f"  forces: {', '.join(force.getName() for force in system.getForces())}"

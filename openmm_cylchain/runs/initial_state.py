@@ -10,14 +10,16 @@ import openmm
 from openmm import app, unit
 from scipy.spatial import cKDTree
 
-from ..beams.curve import curve_points, element_points
+from ..beams.curve import curve_points, element_points, element_slopes
 from ..couplings.capsule_contacts import capsule_contact_force, contact_spacing
 from ..couplings.crosslinks import Crosslinks
+from ..couplings.joints import Joints
 from ..couplings.pulling import constant_force, constant_tension
 from ..couplings.walls import filament_wall_force, wall_force
 from ..dynamics.recommended_step import recommended_time_step
 from ..errors import InputError
 from ..filaments import shapes
+from ..filaments.segment_place import SegmentPlace
 from ..systems.filaments import Filaments
 from ..theory import chain_mean_square_end_to_end
 from ..theory.beam_elements import beam_mean_square_end_to_end
@@ -73,6 +75,7 @@ def _built(configuration, engine, seed, linkers):
     topology, system, positions = filaments.build(box_vectors(configuration.box))
     positions, spheres, radii, friction = _add_particles(configuration, seed, topology, system, positions)
     count = _add_links(configuration, filaments, system, seed)
+    _add_joints(configuration, filaments, system)
     if configuration.contacts is not None:
         own = configuration.contacts
         force = capsule_contact_force(
@@ -98,6 +101,7 @@ def stands_alone(configuration):
     return not (
         configuration.linkers
         or configuration.links
+        or configuration.joints
         or configuration.contacts
         or configuration.walls
         or configuration.pulls
@@ -113,7 +117,7 @@ def recommended_step(configuration, scheme, engine, seed):
         # The same without building thousands of filaments.
         solvent = configuration.solvent.viscosity, configuration.solvent.temperature
         steps = (
-            recommended_time_step(own.type, *solvent, scheme, own.segments, own.closed)
+            recommended_time_step(own.type, *solvent, scheme, own.segments, own.closed, propulsion=own.propulsion)
             for own in configuration.filaments
         )
         return min(steps, key=lambda step: step.step)
@@ -336,6 +340,51 @@ def _add_links(configuration, filaments, system, seed):
             count += len(pairs)
         links.add_to(system, periodic=configuration.box is not None)
     return count
+
+
+def _add_joints(configuration, filaments, system):
+    if not configuration.joints:
+        return
+    joints = Joints(configuration.joints[0].stiffness)
+    for own in configuration.joints:
+        # The filament comes first, and a direction second.
+        places, vectors = zip(
+            *sorted((_tangent(entries, filaments) for entries in own.between), key=lambda one: one[0] is None)
+        )
+        second = vectors[1] if places[1] is None else places[1]
+        cosine = vectors[0] @ vectors[1] / np.prod(np.linalg.norm(vectors, axis=1))
+        angle = float(np.arccos(np.clip(cosine, -1.0, 1.0))) if own.angle is None else min(own.angle, np.pi)
+        if angle > 0.5 * np.pi * (1.0 + 1e-12):
+            # The same as the rest of a straight angle with the opposite of one of the two.
+            second = _opposite(second)
+            angle = np.pi - angle
+        joints.add(None, places[0], second, angle, own.stiffness)
+    joints.add_to(system)
+
+
+def _tangent(entries, filaments):
+    # The place of a tangent and the vector there; None and the vector for a direction.
+    if entries["direction"] is not None:
+        return None, np.array(entries["direction"])
+    number, segments = entries["filament"], filaments[entries["filament"]].segments
+    if entries["node"] is not None:
+        node = entries["node"] % (segments + 1)
+        place = filaments.segment_place(number, segment=max(node - 1, 0), fraction=float(node > 0))
+    else:
+        place = filaments.segment_place(number, entries["arc_length"], entries["segment"], entries["fraction"])
+    return place, _tangent_at(place, filaments, number)
+
+
+def _tangent_at(place, filaments, number):
+    own = filaments[number]
+    element = slice(*(place.first - filaments.node_indices[number][0] + np.array([0, 2])))
+    return element_slopes(own.positions[element], own.control_points[element], [place.fraction], 1.0)[0, 0]
+
+
+def _opposite(tangent):
+    if isinstance(tangent, SegmentPlace):
+        return SegmentPlace(tangent.second, tangent.first, 1.0 - tangent.fraction)
+    return -tangent
 
 
 def _pairs(own, filaments, box, generator):

@@ -35,6 +35,8 @@ _RANGES = {
     units.VELOCITY: (1e-24, 1e6),
     units.VOLUME: (1e-18, 1e27),
     units.NUMBER_DENSITY: (1e-27, 1e6),
+    units.ENERGY: (1e-9, 1e12),
+    units.ANGLE: (1e-9, 1e3),
 }
 
 _UNSIGNED = r"\+?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*(\s1\s*/|[(°A-Za-zµμÅ]).*"

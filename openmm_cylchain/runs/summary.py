@@ -487,6 +487,7 @@ def write_summary(configuration, directory, groups, linkers=()):
 _DISTURBANCES = {
     "linkers": "linkers bind to these filaments",
     "links": "links join them",
+    "joints": "joints hold their directions",
     "contacts": "contacts keep them apart",
     "walls": "walls confine them",
     "forces": "constant forces pull at them",

@@ -10,6 +10,7 @@ import numpy as np
 import openmm
 from openmm import app, unit
 
+from ..couplings.beam_curves import BeamCurves
 from ..dynamics.bead_spring_step import refuse_modes
 from ..dynamics.precision import check_precision
 from ..dynamics.schemes import MODES, check_scheme
@@ -209,8 +210,8 @@ class Filaments:
             noise acts along z.
         propulsion : force
             F0 of self-propelled filaments: a force F0 t acts on every segment, half on either end, where t is its
-            tangent, away from the first node. With a negative F0 the filament moves with its first node in front. It is
-            not conservative and has no energy.
+            tangent, away from the first node; on beam elements, along their curves. With a negative F0 the filament
+            moves with its first node in front. It is not conservative and has no energy.
         clamped_tangents : sequence of int
             Of beam elements: clamped nodes whose tangents do not turn either. The filament is clamped exactly there; a
             clamped node alone is a hinge.
@@ -577,7 +578,7 @@ class Filaments:
         InputError
             If there are none, or the Context has got a State that does not say where linkers are.
         """
-        return table_of(self._binding_force(context), context)
+        return table_of(self._binding_force(context), context, self._filaments)
 
     def set_linkers(self, context: openmm.Context, table: LinkerTable) -> None:
         """Give a Context other linkers.
@@ -587,7 +588,7 @@ class Filaments:
         InputError
             For linkers that do not fit their types, the anchors or the filaments.
         """
-        set_table(self._binding_force(context), context, table)
+        set_table(self._binding_force(context), context, table, self._filaments)
 
     def linker_pulls(self, context: openmm.Context) -> LinkerPulls:
         """What the springs of linkers do that join two places in a Context: a LinkerPulls."""
@@ -629,7 +630,8 @@ class Filaments:
         force, state = self._binding_force(context), context.getState(positions=True)
         positions = state.getPositions(asNumpy=True)._value
         box = state.getPeriodicBoxVectors(asNumpy=True)._value if force.usesPeriodicBoundaryConditions() else None
-        return force, table_of(force, context), self._filaments, self.node_indices, positions, box
+        table, curves = self.linkers_in(context), BeamCurves.of_system(context.getSystem())
+        return force, table, self._filaments, self.node_indices, positions, box, curves
 
     def _binding_force(self, context):
         force = find_binding_force(context.getSystem())
@@ -706,8 +708,6 @@ class Filaments:
             raise InputError("There are no filaments to add: call add_straight, add_nodes or add_equilibrium first.")
         if self._nodes is not None:
             raise InputError("These filaments are already in a System; make another Filaments for another System.")
-        if self._linkers:
-            refuse_beams(self, "Systems with linkers")
         positions = check_target(topology, system, positions)
         check_force_groups(stretching_force_group, bending_force_group)
         self._nodes, self._control_points = [], []

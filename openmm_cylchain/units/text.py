@@ -8,9 +8,11 @@ from openmm import unit
 
 from ..errors import InputError
 from .quantities import (
+    ANGLE,
     AVOGADRO,
     BENDING_RIGIDITY,
     DIFFUSION,
+    ENERGY,
     FORCE,
     FRICTION,
     LENGTH,
@@ -44,6 +46,8 @@ _EXAMPLES = {
     VELOCITY: ("velocity", "0.5 um/s"),
     VOLUME: ("volume", "1 um^3"),
     NUMBER_DENSITY: ("concentration", "1 uM"),
+    ENERGY: ("energy", "20 kJ/mol"),
+    ANGLE: ("angle", "60 deg"),
 }
 """What to call a quantity with such a unit, and how people write one."""
 

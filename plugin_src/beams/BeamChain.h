@@ -47,6 +47,11 @@ struct BeamChain {
     double shortening = 0;
     /** Friction per length against motion along and across the curve. */
     double parallelFriction, perpendicularFriction;
+    /**
+     * A force F0 on each element along its curve, towards its second node, that belongs to no energy: F0 t dx on each
+     * part dx, with the unit tangent t there.
+     */
+    double propulsion = 0;
     /** Particles that do not move: a position alone is a hinge, both particles of a node are a clamp. */
     std::vector<bool> fixed;
     /** Whether particles keep their z, which must be the same for all of them. */

@@ -76,6 +76,14 @@ template <class Real> CYLCHAIN_INLINE void addAt(int g, const Vector<Real>& forc
     second.control = second.control+force*splat<Real>(WEIGHTS.value[g][3]);
 }
 
+/** Let the propulsion of an element act on its nodes. */
+template <class Real> CYLCHAIN_INLINE void addPropulsionOf(Real propulsion, const Vector<Real>& control1,
+            const Vector<Real>& chord, const Vector<Real>& control2, SixVector<Real>& first,
+            SixVector<Real>& second) {
+    for (int g = 0; g < GAUSS_POINTS; g++)
+        addAt(g, directionAt(g, control1, chord, control2)*(propulsion*GAUSS_WEIGHTS[g]), first, second);
+}
+
 /** How far a Gauss point moves with the nodes. */
 template <class Real> CYLCHAIN_INLINE Vector<Real> velocityAt(int g, const SixVector<Real>& first,
             const SixVector<Real>& second) {

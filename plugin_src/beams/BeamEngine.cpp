@@ -51,7 +51,8 @@ static void fillLane(BeamPack& pack, int lane, const BeamChain& chain, int index
     pack.noiseChain[lane] = firstNoise+index;
     pack.nodesOfLane[lane] = chain.numNodes();
     const double properties[] = {chain.elementLength, chain.stretchingModulus, chain.bendingRigidity,
-            chain.shortening, chain.parallelFriction, chain.perpendicularFriction};
+            chain.shortening, chain.parallelFriction, chain.perpendicularFriction, chain.propulsion};
+    pack.propelled |= chain.propulsion != 0;
     for (int property = 0; property < BeamPack::NumProperties; property++)
         pack.properties[property*lanes+lane] = properties[property];
     for (size_t i = 0; i < chain.particles.size(); i++) {

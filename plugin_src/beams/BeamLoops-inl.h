@@ -68,6 +68,9 @@ template <int W> ChainEnergy addForcesTo(const BeamPack& pack, const double* pos
         f[e].control = f[e].control+force.first*(3*perLength)-control;
         f[e+1].position = f[e+1].position+chord;
         f[e+1].control = f[e+1].control+force.last*(3*perLength)-control;
+        if (pack.propelled)
+            addPropulsionOf(loaded<Real>(pack.properties, BeamPack::Propulsion)*present, start.control[e],
+                    start.chord[e], start.control[e+1], f[e], f[e+1]);
         Real stretched = 0.5*end*(shape.strain*shape.strain+4*middleStrain*middleStrain+last*last);
         Real bent = 0.5*(sum*shape.sum.dot(shape.sum)+difference*shape.difference.dot(shape.difference));
         for (int i = 0; i < W && includeEnergy; i++)

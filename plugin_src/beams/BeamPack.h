@@ -20,9 +20,11 @@ struct BeamTether : Tether {
  */
 struct BeamPack {
     /** The properties of the elements of a lane. */
-    enum Property {Length, Stretching, Bending, Shortening, Parallel, Perpendicular, NumProperties};
+    enum Property {Length, Stretching, Bending, Shortening, Parallel, Perpendicular, Propulsion, NumProperties};
     int lanes, nodes;
     bool planar;
+    /** Whether any chain has a propulsion. */
+    bool propelled = false;
     /** The number of each lane's chain, that by which its noise is known, and that of its nodes. */
     std::vector<int> chain, noiseChain, nodesOfLane;
     /** Particle of each position and control point, [2*node, 2*node+1][lane]; -1 for one that only fills up. */

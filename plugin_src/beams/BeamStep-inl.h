@@ -3,7 +3,7 @@
 /**
  * A step of chains of beam elements. It solves, for the new nodes y, with the middle m = (x+y)/2,
  *
- *     Z(m) ((y-x)/h - u(m)) = f + f_random(x) + f_drift(x) - sum_a T_a J_a(m),
+ *     Z(m) ((y-x)/h - u(m)) = f + f_random(x) + f_drift(x) + f_propulsion(m) - sum_a T_a J_a(m),
  *     T_a = k (theta q_a(y) + (1-theta) q_a(x) - (2 theta-1)^(1/2) q_random),    theta = max(1/2, 1-1/z),
  *
  * where the coordinates q_a with the energies k q^2/2 are the strains of nodes and of the middles of elements, and the
@@ -115,6 +115,8 @@ public:
             // The strain in the middle, and one or two components of two bends.
             m.planar = pack.planar;
             addFriction(y, e, m);
+            if (pack.propelled)
+                addPropulsion(y, e);
             addBends(now, middle, own, e, m);
             addMiddleStrain(now, middle, own, e, m);
             Equations::addElement(m, *here, *after);
@@ -319,6 +321,13 @@ private:
                     addTimes(sum, resistance[g], WEIGHTS.value[g][k]*WEIGHTS.value[g][l]);
                 m.block[pair++] = sum;
             }
+    }
+    /** Add the propulsion of an element, along its curve in the middle of the step. */
+    void addPropulsion(const Six* y, int e) {
+        const Real half = splat<Real>(0.5);
+        addPropulsionOf(of(BeamPack::Propulsion)*present(e), start.control[e]+y[e].control*half,
+                start.chord[e]+(y[e+1].position-y[e].position)*half, start.control[e+1]+y[e+1].control*half, right[e],
+                right[e+1]);
     }
     /** Add the friction of the flow, in the middle of the step. */
     void addDrag(const Six* y) {

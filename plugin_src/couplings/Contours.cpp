@@ -4,20 +4,27 @@
 using namespace cylchain;
 using namespace std;
 
-Contours::Contours(const vector<Chain>& ofChains) {
-    for (size_t chain = 0; chain < ofChains.size(); chain++) {
-        const Chain& own = ofChains[chain];
+Contours::Contours(const vector<Chain>& ofChains, const vector<BeamChain>& beams) {
+    for (const Chain& own : ofChains) {
         Contour contour = {static_cast<int>(segments.size()), static_cast<int>(own.segments.size()), 0, 0, own.closed};
         bool same = true;
         for (size_t s = 0; s < own.segments.size(); s++) {
             const double length = own.segments[s].restLength;
-            segments.push_back({static_cast<int>(chain), own.nodes[s], own.nodes[(s+1)%own.nodes.size()],
-                    contour.length, length});
+            segments.push_back({getNumChains(), own.nodes[s], own.nodes[(s+1)%own.nodes.size()], contour.length, length,
+                    {-1, -1}});
             contour.length += length;
             same = same && length == own.segments[0].restLength;
         }
         contour.ofSegments = same ? own.segments[0].restLength : 0;
         chains.push_back(contour);
+    }
+    for (const BeamChain& own : beams) {
+        const int elements = own.numNodes()-1;
+        const double length = own.elementLength;
+        for (int i = 0; i < elements; i++)
+            segments.push_back({getNumChains(), own.particles[2*i], own.particles[2*i+2], i*length, length,
+                    {own.particles[2*i+1], own.particles[2*i+3]}});
+        chains.push_back({static_cast<int>(segments.size())-elements, elements, elements*length, length, false});
     }
 }
 
@@ -34,11 +41,30 @@ int Contours::findSegment(int chain, double position) const {
     return contour.firstSegment+min(max(number, 0), contour.numSegments-1);
 }
 
-Place Contours::findPlace(int chain, double position) const {
-    const ContourSegment& segment = segments[findSegment(chain, position)];
+Place Contours::placeOn(int number, double fraction) const {
+    const ContourSegment& segment = segments[number];
     Place place;
     place.first = segment.first;
     place.second = segment.second;
-    place.fraction = min(1.0, max(0.0, (position-segment.start)/segment.length));
+    place.fraction = min(1.0, max(0.0, fraction));
+    copy(segment.controls, segment.controls+2, place.controls);
     return place;
+}
+
+void Contours::findTangent(int chain, double position, const double* positions, const double* box,
+        double* tangent) const {
+    const int number = findSegment(chain, position);
+    const ContourSegment& segment = segments[number];
+    if (isOnCurve(number)) {
+        Place place = placeOn(number, (position-segment.start)/segment.length);
+        place.tangent = 1/segment.length;
+        locate(place, positions, box, tangent);
+        return;
+    }
+    for (int k = 0; k < 3; k++)
+        tangent[k] = positions[3*segment.second+k]-positions[3*segment.first+k];
+    if (box != nullptr)
+        takeToNearestImage(tangent, box);
+    for (int k = 0; k < 3; k++)
+        tangent[k] /= segment.length;
 }

@@ -1,6 +1,7 @@
 #ifndef CYLCHAIN_CONTOURS_H_
 #define CYLCHAIN_CONTOURS_H_
 
+#include "beams/BeamChain.h"
 #include "couplings/Place.h"
 #include "mechanics/Chain.h"
 #include <cstddef>
@@ -11,11 +12,12 @@ namespace cylchain {
 /**
  * Lengths along chains, from their minus ends, with segments at rest; and where such lengths are.
  *
- * Segments of all chains are numbered in the order of chains.
+ * Segments of all chains are numbered in the order of chains. Chains of beam elements have their numbers behind all
+ * others; their segments are the elements, on the curves of which lengths are.
  */
 class Contours {
 public:
-    explicit Contours(const std::vector<Chain>& chains);
+    explicit Contours(const std::vector<Chain>& chains, const std::vector<BeamChain>& beams = {});
     int getNumChains() const {
         return chains.size();
     }
@@ -47,10 +49,30 @@ public:
     int getSecond(int segment) const {
         return segments[segment].second;
     }
+    /** Whether a segment is the curve of a beam element. */
+    bool isOnCurve(int segment) const {
+        return segments[segment].controls[0] >= 0;
+    }
+    /** The control point at the first (0) or second (1) end of a segment that is a curve. */
+    int getControl(int segment, int end) const {
+        return segments[segment].controls[end];
+    }
     /** Find the segment of a chain that has a position; positions beyond an end belong to the segment there. */
     int findSegment(int chain, double position) const;
     /** Find the place at a position. */
-    Place findPlace(int chain, double position) const;
+    Place findPlace(int chain, double position) const {
+        const int segment = findSegment(chain, position);
+        return placeOn(segment, (position-segments[segment].start)/segments[segment].length);
+    }
+    /** The place at a fraction of a segment. */
+    Place placeOn(int segment, double fraction) const;
+    /**
+     * Find how far one gets along a chain for each length of it at rest: a vector along its segment, or along the
+     * tangent of its curve.
+     *
+     * @param box  nine numbers if particles of a segment are the images nearest to the first one, or NULL
+     */
+    void findTangent(int chain, double position, const double* positions, const double* box, double* tangent) const;
 private:
     struct Contour {
         int firstSegment, numSegments;
@@ -62,6 +84,8 @@ private:
     struct ContourSegment {
         int chain, first, second;
         double start, length;
+        /** The control points of both ends on a curve, or -1. */
+        int controls[2];
     };
     std::vector<Contour> chains;
     std::vector<ContourSegment> segments;

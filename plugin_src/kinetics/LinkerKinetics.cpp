@@ -25,12 +25,12 @@ uint64_t drawNumber() {
 
 } // namespace
 
-LinkerKinetics::LinkerKinetics(const LinkerSystem& ofSystem, const vector<Chain>& chains) : system(ofSystem),
-        contours(chains), ownNumber(drawNumber()) {
+LinkerKinetics::LinkerKinetics(const LinkerSystem& ofSystem, const vector<Chain>& chains,
+        const vector<BeamChain>& beams) : system(ofSystem), contours(chains, beams), ownNumber(drawNumber()) {
     vector<double> different;
     double largestSpacing = 0;
     for (const Hand& hand : system.hands) {
-        vector<char> own(chains.size(), 0);
+        vector<char> own(contours.getNumChains(), 0);
         vector<double> sum;
         double total = 0;
         for (int chain : hand.chains) {

@@ -89,15 +89,8 @@ double LinkerKinetics::pull(const Linker& linker, int side, const Spring& spring
         double& stiffness) const {
     const LinkerType& type = system.types[linker.type];
     const HandPlace& place = linker.hands[side];
-    const int segment = contours.findSegment(place.chain, place.position);
     double tangent[3];
-    for (int k = 0; k < 3; k++)
-        tangent[k] = step.positions[3*contours.getSecond(segment)+k]-step.positions[3*contours.getFirst(segment)+k];
-    if (step.boxes.segments != nullptr)
-        takeToNearestImage(tangent, step.boxes.segments);
-    // How far it gets for each length of the segment at rest.
-    for (double& component : tangent)
-        component /= contours.getSegmentLength(segment);
+    contours.findTangent(place.chain, place.position, step.positions, step.boxes.segments, tangent);
     const double square = dot(tangent, tangent);
     stiffness = type.stiffness*square;
     if (!(spring.distance > 0))

@@ -187,24 +187,41 @@ void SegmentCells::clear() {
     cells.clear();
 }
 
+/** Find the vectors of segments; return the square of a length that no piece exceeds. */
+double SegmentCells::findVectors(const Contours& contours, const double* positions, const double* segmentBox) {
+    double stretched = 0;
+    for (int segment = 0; segment < contours.getNumSegments(); segment++) {
+        auto between = [&] (int first, int second, double* vector) {
+            for (int k = 0; k < 3; k++)
+                vector[k] = positions[3*second+k]-positions[3*first+k];
+            if (segmentBox != nullptr)
+                takeToNearestImage(vector, segmentBox);
+        };
+        double* const vector = &vectors[3*segment];
+        between(contours.getFirst(segment), contours.getSecond(segment), vector);
+        double square = vector[0]*vector[0]+vector[1]*vector[1]+vector[2]*vector[2];
+        if (contours.isOnCurve(segment)) {
+            // The derivative of a cubic is a mean of three times the vectors between its Bezier points.
+            double first[3], last[3], middle[3];
+            between(contours.getFirst(segment), contours.getControl(segment, 0), first);
+            between(contours.getSecond(segment), contours.getControl(segment, 1), last);
+            for (int k = 0; k < 3; k++)
+                middle[k] = vector[k]-first[k]-last[k];
+            for (const double* part : {first, middle, last})
+                square = max(square, 9*(part[0]*part[0]+part[1]*part[1]+part[2]*part[2]));
+        }
+        const double parts = firstOfSegment[segment+1]-firstOfSegment[segment];
+        stretched = max(stretched, square/(parts*parts));
+    }
+    return stretched;
+}
+
 void SegmentCells::build(const Contours& contours, const double* positions, double reach, const double* box,
             const double* segmentBox, bool forPoints) {
     if (reach != reachOfPieces)
         cut(contours, reach);
     const int segments = contours.getNumSegments();
-    double stretched = 0;
-    for (int segment = 0; segment < segments; segment++) {
-        const double* first = positions+3*contours.getFirst(segment);
-        const double* second = positions+3*contours.getSecond(segment);
-        double* const vector = &vectors[3*segment];
-        for (int k = 0; k < 3; k++)
-            vector[k] = second[k]-first[k];
-        if (segmentBox != nullptr)
-            takeToNearestImage(vector, segmentBox);
-        const double parts = firstOfSegment[segment+1]-firstOfSegment[segment];
-        const double square = (vector[0]*vector[0]+vector[1]*vector[1]+vector[2]*vector[2])/(parts*parts);
-        stretched = max(stretched, square);
-    }
+    const double stretched = findVectors(contours, positions, segmentBox);
     // From any place of a piece to the middle of another one.
     double size = reach+GROWTH*longest;
     while (size < reach+sqrt(stretched) && size < LARGEST_COORDINATE)
@@ -216,11 +233,15 @@ void SegmentCells::build(const Contours& contours, const double* positions, doub
         const double* first = positions+3*contours.getFirst(segment);
         const double* vector = &vectors[3*segment];
         const int begin = firstOfSegment[segment], end = firstOfSegment[segment+1], chain = contours.getChain(segment);
+        const bool onCurve = contours.isOnCurve(segment);
         for (int i = begin; i < end; i++) {
             const double fraction = (i-begin+0.5)/(end-begin);
             double middle[3];
-            for (int k = 0; k < 3; k++)
-                middle[k] = first[k]+fraction*vector[k];
+            if (onCurve)
+                locate(contours.placeOn(segment, fraction), positions, segmentBox, middle);
+            else
+                for (int k = 0; k < 3; k++)
+                    middle[k] = first[k]+fraction*vector[k];
             int coordinates[3];
             findCoordinates(middle, coordinates);
             if (cell < 0 || !equal(coordinates, coordinates+3, last)) {

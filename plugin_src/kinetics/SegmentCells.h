@@ -15,7 +15,8 @@ struct SegmentPiece {
 };
 
 /**
- * Pieces of segments in cells by their middles, so that one of those near a piece or a point can be drawn.
+ * Pieces of segments, and of the curves of beam elements, in cells by their middles, so that one of those near a piece
+ * or a point can be drawn.
  *
  * Only cells that hold something are kept, in a table by their coordinates: what this costs does not depend on how much
  * room there is between chains. What is found follows from the positions alone, not from earlier ones.
@@ -28,8 +29,8 @@ public:
         int numCells = 0, numPieces = 0;
     };
     /**
-     * Cut segments into pieces that are no longer than the reach, or a thousandth of the segment, and sort these into
-     * cells.
+     * Cut segments and curves into pieces that are no longer than the reach, or a thousandth of the segment, and sort
+     * these into cells.
      *
      * @param reach       pieces that come this near to a point, or to any place of a piece, are among those around it
      * @param box         the periodic box if distances are those of nearest images, or NULL
@@ -86,6 +87,7 @@ private:
         int around;
         bool several;
     };
+    double findVectors(const Contours& contours, const double* positions, const double* segmentBox);
     void cut(const Contours& contours, double reach);
     void setGrid(double size, const double* box);
     void findCoordinates(const double* point, int* coordinates) const;

@@ -281,6 +281,9 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %pythonappend OpenMM::CylinderChainForce::getSegmentPropulsion(int, int, double&) const %{
     val = unit.Quantity(val, _FORCE)
 %}
+%pythonappend OpenMM::CylinderChainForce::getBeamChainPropulsion(int, double&) const %{
+    val = unit.Quantity(val, _FORCE)
+%}
 %pythonappend OpenMM::CylinderChainForce::getChainNodeFriction(int) const %{
     val = unit.Quantity(val, _FRICTION)
 %}

@@ -274,7 +274,7 @@ def test_what_filaments_of_beam_elements_cannot_have():
     for add, message in (
         (lambda: filaments.add_ring(KIND, 6, [0, 0, 0]), "no rings as yet"),
         (lambda: filaments.add_nodes(KIND, nodes, closed=True), "no rings as yet"),
-        (lambda: filaments.add_straight(KIND, 3, [0, 0, 0], [1, 0, 0], propulsion=1.0), "no propelled filaments"),
+        (lambda: filaments.add_straight(KIND, 3, [0, 0, 0], [1, 0, 0], propulsion=np.nan), "must be finite"),
         (
             lambda: filaments.add_straight(KIND, 3, [0, 0, 0], [1, 0, 0], clamped_tangents=1),
             "the node is not: clamp it",

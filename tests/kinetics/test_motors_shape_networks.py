@@ -40,9 +40,12 @@ def test_motors_shorten_a_bundle_and_crosslinkers_alone_do_not():
     assert abs(with_motors.mean() - in_short_steps.mean()) < 3 * error
 
 
-def _disc(at_end):
+BEAM = replace(MICROTUBULE, segment_length=1000.0, extension_relaxation_time=None, element="beam")
+
+
+def _disc(at_end, kind, segments, seed):
     """Microtubules at random in a disc, and motors that walk to their plus ends."""
-    count, segments, length, radius = 30, 4, 500.0, 2200.0
+    count, length, radius = 30, kind.segment_length, 2200.0
     generator = np.random.default_rng(3)
     filaments = Filaments(0.05 * unit.pascal * unit.second, 310.0)
     for number in range(count):
@@ -50,7 +53,6 @@ def _disc(at_end):
         middle = 0.7 * radius * np.sqrt(generator.uniform()) * np.array([np.cos(angle), np.sin(angle), 0])
         direction = np.array([np.cos(turn), np.sin(turn), 0])
         start = middle - 0.5 * segments * length * direction
-        kind = MICROTUBULE.with_segment_length(length)
         filaments.add_equilibrium(kind, segments, number, start, direction, planar=True)
     head = Hand(
         binding_rate=10 / unit.second,
@@ -65,7 +67,7 @@ def _disc(at_end):
     _, system, positions = filaments.build()
     wall = Cylinder([0, 0, 0], [0, 0, 1], radius)
     system.addForce(filament_wall_force(filaments, system, wall, 0.1 * unit.piconewton / unit.nanometer))
-    integrator = filaments.create_integrator(system, 4 * unit.millisecond, random_seed=1, checks=False)
+    integrator = filaments.create_integrator(system, 4 * unit.millisecond, random_seed=seed, checks=False)
     return filaments, new_context(system, positions, integrator, "CPU", {"Threads": "1"})
 
 
@@ -74,16 +76,24 @@ def _neighbours(ends):
     return 2 * len(cKDTree(ends).query_pairs(300.0)) / len(ends)
 
 
-def test_motors_that_hold_at_ends_make_an_aster():
+@pytest.mark.parametrize(
+    ("kind", "segments"),
+    [(MICROTUBULE.with_segment_length(500.0), 4), (BEAM, 2)],
+    ids=["straight", "beam"],
+)
+def test_motors_that_hold_at_ends_make_an_aster(kind, segments):
     """The plus ends of filaments at random come together; minus ends do not, nor do plus ends that motors leave."""
     found = {}
     for at_end in ("hold", "release"):
-        filaments, context = _disc(at_end)
-        nodes = np.array(filaments.node_indices)
-        first = positions_of(context)[nodes]
-        context.getIntegrator().step(1000)
-        last = positions_of(context)[nodes]
-        found[at_end] = [_neighbours(shape[:, end]) for shape in (first, last) for end in (-1, 0)]
+        counts = []
+        for seed in (1, 2, 3):
+            filaments, context = _disc(at_end, kind, segments, seed)
+            nodes = np.array(filaments.node_indices)
+            first = positions_of(context)[nodes]
+            context.getIntegrator().step(1000)
+            last = positions_of(context)[nodes]
+            counts.append([_neighbours(shape[:, end]) for shape in (first, last) for end in (-1, 0)])
+        found[at_end] = np.mean(counts, axis=0)
     plus_before, minus_before, plus, minus = found["hold"]
     assert plus > 8.0 > 1.0 > max(plus_before, minus_before)
     assert plus > 4.0 * max(minus, found["release"][2])

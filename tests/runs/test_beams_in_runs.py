@@ -108,7 +108,7 @@ def changed(old, new):
             'clamped_tangents belongs to element = "beam"',
         ),
         ("segments = 3\n", "segments = 3\nclosed = true\n", "closed cannot be with element"),
-        ("segments = 3\n", 'segments = 3\npropulsion = "1 pN"\n', "propulsion cannot be with element"),
+        ("segments = 3\n", 'segments = 3\npropulsion = "1 pN"\n', None),
         ("segments = 3\n", "segments = 3\ntangents = [[1, 0, 0], [1, 0, 0]]\n", "tangents belongs to nodes"),
         (
             "segments = 3\n",
@@ -143,19 +143,36 @@ def test_tangents_out_of_the_plane_are_refused():
         parse_configuration(text)
 
 
-@pytest.mark.parametrize(
-    ("table", "message"),
-    [
-        (
-            '[[linkers]]\ntype = "ALPHA_ACTININ"\ncount = 2\nvolume = "1 um^3"\n',
-            "has beam elements, which Systems with linkers cannot have",
-        ),
-    ],
-)
-def test_what_else_there_is_not_is_refused_by_a_dry_run(tmp_path, capsys, table, message):
-    (tmp_path / "input.toml").write_text(BEAMS.replace("[simulation]", f"{table}[simulation]"))
-    assert main(["run", str(tmp_path / "input.toml"), "--dry-run"]) == 2
-    assert message in capsys.readouterr().err
+LINKERS = """
+[[linkers]]
+name = "motor"
+count = 40
+bound = 40
+volume = "1 um^3"
+hand = { binding_rate = "1e5 1/s", reach = "500 nm", unbinding_rate = "1 1/s", speed = "80 um/s", stall_force = "4 pN" }
+stiffness = "0.0001 pN/nm"
+"""
+
+
+def test_linkers_of_runs_are_on_the_curves(tmp_path):
+    out = simulated(tmp_path, BEAMS.replace("[simulation]", f"{LINKERS}[simulation]"))
+    run = analysis.load(out)
+    on_curves = 0
+    for frame in (0, 30, -1):
+        positions, records = run.positions(frame), run.linkers[frame]
+        for filament, along, place in zip(
+            records["filaments"].ravel(), records["arc_lengths"].ravel(), records["places"].reshape(-1, 3)
+        ):
+            if filament < 0 or not run.filaments[filament].has_beam_elements:
+                continue
+            own = run.filaments[filament]
+            element = min(int(along // own.type.segment_length), own.segments - 1)
+            fraction = along / own.type.segment_length - element
+            points = element_points(positions[own.nodes], positions[own.control_points], [fraction])
+            np.testing.assert_allclose(place, points[element, 0], atol=0.02)
+            on_curves += 1
+    assert on_curves > 60
+    assert run.linker_table["one hand bound"][-1].sum() > 20
 
 
 def test_dry_run_names_beam_elements(tmp_path, capsys):

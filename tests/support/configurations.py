@@ -132,6 +132,10 @@ inside = { shape = "sphere", radius = "3 um" }
 [[link]]
 between = [{ filament = 0, arc_length = "1.25 um" }, { filament = 1, node = -1 }]
 stiffness = "0.001 pN/nm"
+[[joint]]
+between = [{ filament = 0, node = 1 }, { direction = [0, 1, 0] }]
+stiffness = "1 kJ/mol"
+angle = "120 deg"
 [simulation]
 time_step = "20 us"
 duration = "2.4 ms"
@@ -139,4 +143,4 @@ report_interval = "40 us"
 checkpoint_interval = "120 us"
 seed = 5
 """
-"""Filaments of beam elements, beside one of straight segments: clamped, linked, planar, in a region, of given nodes."""
+"""Filaments of beam elements, beside one of straight segments: clamped, linked, joined, planar, of given nodes."""

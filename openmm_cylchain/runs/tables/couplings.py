@@ -107,18 +107,15 @@ PULL = TableKind(
     repeated=True,
 )
 
-_PLACE = TableKind(
-    "place",
-    (
-        Key("filament", Whole(0, None, "0"), None, "Number of a filament."),
-        Key("arc_length", Quantity(units.LENGTH, "zero"), None, "Distance from its first node along it."),
-        Key("segment", Whole(-(10**9), 10**9, "0"), None, "Number of its segment, in place of an arc_length."),
-        Key("fraction", Number("0.5"), None, "Place on that segment, 0 to 1."),
-        Key("node", Whole(-(10**9), 10**9, "0"), None, "Number of its node, in place of a segment."),
-        Key("point", point(), None, "A fixed point, in place of a filament."),
-    ),
-    "A place on a filament, or a point.",
+PLACE_KEYS = (
+    Key("filament", Whole(0, None, "0"), None, "Number of a filament."),
+    Key("arc_length", Quantity(units.LENGTH, "zero"), None, "Distance from its first node along it."),
+    Key("segment", Whole(-(10**9), 10**9, "0"), None, "Number of its segment, in place of an arc_length."),
+    Key("fraction", Number("0.5"), None, "Place on that segment, 0 to 1."),
+    Key("node", Whole(-(10**9), 10**9, "0"), None, "Number of its node, in place of a segment."),
+    Key("point", point(), None, "A fixed point, in place of a filament."),
 )
+_PLACE = TableKind("place", PLACE_KEYS, "A place on a filament, or a point.")
 _PLACES = '[{ filament = 0, arc_length = "1 um" }, { filament = 1, node = 0 }]'
 
 LINK = TableKind(
@@ -251,7 +248,7 @@ def read_link(entries, groups):
     if "between" in entries:
         entries.refuse(("count", "spacing"), "belongs to random links, within a distance.")
         for place in entries["between"]:
-            _check_place(place, groups)
+            check_place(place, groups)
         if all("point" in place for place in entries["between"]):
             raise entries.at("between").error("must have a filament: two points cannot be joined.")
     elif "within" not in entries:
@@ -289,7 +286,8 @@ def _check_filament(entries, number, groups):
         raise entries.at("filament").error(f"{number} does not exist; there are {count}, counted from 0.")
 
 
-def _group_of(number, groups):
+def group_of(number, groups):
+    """The group of a filament, by its number in the file."""
     for group in groups:
         if number < group.count:
             return group
@@ -299,14 +297,15 @@ def _group_of(number, groups):
 
 def _check_node(entries, numbers, groups):
     for number in numbers:
-        nodes = _group_of(number, groups).nodes
+        nodes = group_of(number, groups).nodes
         if not -nodes <= entries["node"] < nodes:
             raise entries.at("node").error(
                 f"{entries['node']} does not exist in filament {number}; there are {nodes}, counted from 0."
             )
 
 
-def _check_place(place, groups):
+def check_place(place, groups):
+    """Raise ConfigurationError unless a table is a place on a filament of the groups, or a point."""
     if "point" in place:
         place.refuse(("filament", "arc_length", "segment", "fraction", "node"), "cannot be with a point.")
         return
@@ -321,7 +320,7 @@ def _check_place(place, groups):
             raise place.at("fraction").error(f"must be between 0 and 1, but is {place['fraction']:g}.")
     if "node" in place:
         _check_node(place, (place["filament"],), groups)
-    group = _group_of(place["filament"], groups)
+    group = group_of(place["filament"], groups)
     if "segment" in place and not -group.segments <= place["segment"] < group.segments:
         raise place.at("segment").error(f"{place['segment']} does not exist; there are {group.segments}.")
     length = float(group.type.segment_lengths(group.segments, group.closed).sum())

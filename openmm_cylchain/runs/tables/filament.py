@@ -90,7 +90,7 @@ FILAMENT = TableKind(
             "propulsion",
             Quantity(units.FORCE, "any"),
             0.0,
-            "Of self-propelled filaments, on each segment along its tangent.",
+            "Of self-propelled filaments, on each segment along its tangent, or on each element along its curve.",
         ),
         Key("file", Text('"start.npz"'), None, "Start from a file: see below."),
         Key("topology", Text('"topology.cif"'), None, "Of a file that is a trajectory."),
@@ -201,8 +201,6 @@ def _check_element(entries, kind):
         return
     if entries["closed"]:
         raise entries.at("closed").error('cannot be with element = "beam", of which there are no rings as yet.')
-    if entries["propulsion"]:
-        raise entries.at("propulsion").error('cannot be with element = "beam" as yet: take straight segments.')
 
 
 def _from_nodes(entries, kind):

@@ -80,14 +80,13 @@ ChainCouplings::ChainCouplings(ContextImpl& context, const CylinderChainDescript
 }
 
 void ChainCouplings::refuseBeams() const {
-    bool any = !linkers.empty();
+    bool any = false;
     for (const Contacts& own : contacts)
         for (const Capsule& capsule : own.force->getSearch().getSystem().capsules)
             any |= isOfBeam[capsule.first] || (capsule.second >= 0 && isOfBeam[capsule.second]);
     if (any)
         throw OpenMMException("CylinderChainIntegrator: Chains of beam elements cannot have contacts of this plugin "
-                "between their nodes, but between virtual sites on their curves, and their System cannot have linkers "
-                "as yet: take such sites, or segments, or remove them");
+                "between their nodes, but between virtual sites on their curves: take such sites, or segments");
 }
 
 void ChainCouplings::refuseNarrowBox(const CylinderChainDescription& chains) const {

@@ -80,7 +80,7 @@ void CylinderChainBindingForceImpl::initialize(ContextImpl& context) {
     parameter = "CylinderChainLinkers"+to_string(number);
     nearestParticles = chains->usesPeriodicBoundaryConditions();
     const CylinderChainDescription description(ofContext, *chains);
-    const cylchain::Contours contours(description.getChains());
+    const cylchain::Contours contours(description.getChains(), description.getBeams());
     lengths.clear();
     for (int chain = 0; chain < contours.getNumChains(); chain++)
         lengths.push_back(contours.getLength(chain));
@@ -126,7 +126,7 @@ void CylinderChainBindingForceImpl::initialize(ContextImpl& context) {
         seed = (uint32_t) osrngseed();
     linkerKernel = context.getPlatform().createKernel(UpdateCylinderChainLinkersKernel::Name(), context);
     linkerKernel.getAs<UpdateCylinderChainLinkersKernel>().initialize(system, description.getChains(),
-            owner.usesPeriodicBoundaryConditions(), nearestParticles);
+            description.getBeams(), owner.usesPeriodicBoundaryConditions(), nearestParticles);
     linkKernel = context.getPlatform().createKernel(CalcCylinderChainLinkForceKernel::Name(), context);
     linkKernel.getAs<CalcCylinderChainLinkForceKernel>().initialize(ofContext, owner.usesPeriodicBoundaryConditions(),
             nearestParticles);

@@ -95,7 +95,7 @@ int CylinderChainForce::addBeamChain(const vector<int>& particles, double elemen
         throw OpenMMException("CylinderChainForce: A chain of beam elements must have two particles for each of at "
                 "least two nodes");
     refuseParticles(particles);
-    beams.push_back({particles, 0, 0, 0, 0, 0, 0, planar});
+    beams.push_back({particles, 0, 0, 0, 0, 0, 0, planar, 0});
     const int index = beams.size()-1;
     try {
         setBeamChainParameters(index, elementLength, stretchingModulus, bendingRigidity, shortening, parallelFriction,
@@ -116,6 +116,18 @@ const vector<int>& CylinderChainForce::getBeamChainParticles(int chain) const {
 bool CylinderChainForce::isBeamChainPlanar(int chain) const {
     ASSERT_VALID_INDEX(chain, beams);
     return beams[chain].planar;
+}
+
+void CylinderChainForce::getBeamChainPropulsion(int chain, double& propulsion) const {
+    ASSERT_VALID_INDEX(chain, beams);
+    propulsion = beams[chain].propulsion;
+}
+
+void CylinderChainForce::setBeamChainPropulsion(int chain, double propulsion) {
+    ASSERT_VALID_INDEX(chain, beams);
+    if (!isfinite(propulsion))
+        throw OpenMMException("CylinderChainForce: The propulsion of a chain of beam elements must be finite");
+    beams[chain].propulsion = propulsion;
 }
 
 void CylinderChainForce::getBeamChainParameters(int chain, double& elementLength, double& stretchingModulus,

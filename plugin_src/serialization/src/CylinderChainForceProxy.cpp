@@ -10,6 +10,12 @@ using namespace std;
 CylinderChainForceProxy::CylinderChainForceProxy() : SerializationProxy("CylinderChainForce") {
 }
 
+static double propulsionOf(const CylinderChainForce& force, int beam) {
+    double propulsion;
+    force.getBeamChainPropulsion(beam, propulsion);
+    return propulsion;
+}
+
 static void serializeBeams(const CylinderChainForce& force, SerializationNode& node) {
     for (int i = 0; i < force.getNumBeamChains(); i++) {
         double length, modulus, rigidity, shortening, parallel, perpendicular;
@@ -19,6 +25,8 @@ static void serializeBeams(const CylinderChainForce& force, SerializationNode& n
                 .setDoubleProperty("bendingRigidity", rigidity).setDoubleProperty("shortening", shortening)
                 .setDoubleProperty("parallel", parallel).setDoubleProperty("perpendicular", perpendicular)
                 .setBoolProperty("planar", force.isBeamChainPlanar(i));
+        if (propulsionOf(force, i) != 0)
+            beam.setDoubleProperty("propulsion", propulsionOf(force, i));
         SerializationNode& particles = beam.createChildNode("Particles");
         for (int particle : force.getBeamChainParticles(i))
             particles.createChildNode("Particle").setIntProperty("index", particle);
@@ -29,10 +37,11 @@ static void addBeam(CylinderChainForce& force, const SerializationNode& node) {
     vector<int> particles;
     for (auto& particle : node.getChildNode("Particles").getChildren())
         particles.push_back(particle.getIntProperty("index"));
-    force.addBeamChain(particles, node.getDoubleProperty("elementLength"),
+    const int chain = force.addBeamChain(particles, node.getDoubleProperty("elementLength"),
             node.getDoubleProperty("stretchingModulus"), node.getDoubleProperty("bendingRigidity"),
             node.getDoubleProperty("shortening"), node.getDoubleProperty("parallel"),
             node.getDoubleProperty("perpendicular"), node.getBoolProperty("planar"));
+    force.setBeamChainPropulsion(chain, node.getDoubleProperty("propulsion", 0));
 }
 
 static void writeTether(SerializationNode& node, int chain, int tethered, const Vec3& point, double stiffness) {
@@ -45,9 +54,17 @@ static Vec3 pointOf(const SerializationNode& tether) {
     return Vec3(tether.getDoubleProperty("x"), tether.getDoubleProperty("y"), tether.getDoubleProperty("z"));
 }
 
+/** The first one that knows what a Force has. */
+static int versionOf(const CylinderChainForce& force) {
+    for (int i = 0; i < force.getNumBeamChains(); i++)
+        if (propulsionOf(force, i) != 0)
+            return 7;
+    return force.getNumBeamTethers() > 0 ? 6 : force.getNumBeamChains() > 0 ? 5 : 4;
+}
+
 void CylinderChainForceProxy::serialize(const void* object, SerializationNode& node) const {
     const CylinderChainForce& force = *reinterpret_cast<const CylinderChainForce*>(object);
-    node.setIntProperty("version", force.getNumBeamTethers() > 0 ? 6 : force.getNumBeamChains() > 0 ? 5 : 4);
+    node.setIntProperty("version", versionOf(force));
     node.setIntProperty("forceGroup", force.getForceGroup());
     node.setStringProperty("name", force.getName());
     node.setBoolProperty("usesPeriodic", force.usesPeriodicBoundaryConditions());
@@ -97,7 +114,7 @@ void CylinderChainForceProxy::serialize(const void* object, SerializationNode& n
     }
     // Versions before 6 have none.
 
-    if (force.getNumBeamTethers() == 0)
+    if (versionOf(force) < 6)
         return;
     SerializationNode& ofBeams = node.createChildNode("BeamTethers");
     for (int i = 0; i < force.getNumBeamTethers(); i++) {
@@ -154,7 +171,7 @@ static void addChain(CylinderChainForce& force, const SerializationNode& node, i
 
 void* CylinderChainForceProxy::deserialize(const SerializationNode& node) const {
     const int version = node.getIntProperty("version");
-    if (version < 1 || version > 6)
+    if (version < 1 || version > 7)
         throw OpenMMException("Unsupported version number");
     unique_ptr<CylinderChainForce> force(new CylinderChainForce());
     force->setForceGroup(node.getIntProperty("forceGroup"));

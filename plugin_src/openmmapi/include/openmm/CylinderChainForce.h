@@ -222,8 +222,7 @@ public:
     void setJointParameters(int chain, int joint, double stiffness);
     /**
      * Add a chain of beam elements, which bend inside; beams/BeamChain.h says what they are.  Only scheme "implicit"
-     * moves them, on the Reference and CPU platforms, and in a System that has no linkers of this plugin.  Any other
-     * Force may act on their particles.
+     * moves them, on the Reference and CPU platforms.  Any other Force may act on their particles.
      *
      * @param particles             two for each node, its position and its control point, for at least two nodes, and
      *                              none of them twice
@@ -263,6 +262,17 @@ public:
      * Get whether the particles of a chain of beam elements keep their z.
      */
     bool isBeamChainPlanar(int chain) const;
+    /**
+     * Get the propulsion of a chain of beam elements.
+     *
+     * @param[out] propulsion  the force on each element along its curve, measured in kJ/mol/nm
+     */
+    void getBeamChainPropulsion(int chain, double& propulsion) const;
+    /**
+     * Set the propulsion of a chain of beam elements: a force on each element, spread evenly along its curve in the
+     * direction of the tangent, towards its second node.  It belongs to no energy.
+     */
+    void setBeamChainPropulsion(int chain, double propulsion);
     /**
      * Get the number of tethers.
      */
@@ -341,7 +351,8 @@ public:
     void setBeamTetherParameters(int index, int chain, int node, const Vec3& point, double stiffness);
     /**
      * Copy the parameters of segments, joints and tethers to a Context, so that changes made by setSegmentParameters(),
-     * setSegmentPropulsion(), setJointParameters(), setTetherParameters() and setChainPlanar() take effect in it.
+     * setSegmentPropulsion(), setJointParameters(), setTetherParameters() and setChainPlanar() take effect in it, and
+     * so does what is set of chains of beam elements.
      * Models and particles cannot be changed in this way, and neither can chains be added; tethers can.
      */
     void updateParametersInContext(Context& context);
@@ -423,6 +434,7 @@ public:
     std::vector<int> particles;
     double elementLength, stretchingModulus, bendingRigidity, shortening, parallelFriction, perpendicularFriction;
     bool planar;
+    double propulsion;
 };
 
 } // namespace OpenMM

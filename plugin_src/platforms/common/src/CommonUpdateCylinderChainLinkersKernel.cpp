@@ -16,12 +16,14 @@ CommonUpdateCylinderChainLinkersKernel::CommonUpdateCylinderChainLinkersKernel(s
 }
 
 void CommonUpdateCylinderChainLinkersKernel::initialize(const LinkerSystem& system, const vector<Chain>& chains,
-        bool periodic, bool nearestParticles) {
-    kinetics.reset(new LinkerKinetics(system, chains));
+        const vector<BeamChain>& beams, bool periodic, bool nearestParticles) {
+    kinetics.reset(new LinkerKinetics(system, chains, beams));
     this->periodic = periodic;
     this->nearestParticles = nearestParticles;
     for (const Chain& chain : chains)
         particles.insert(particles.end(), chain.nodes.begin(), chain.nodes.end());
+    for (const BeamChain& beam : beams)
+        particles.insert(particles.end(), beam.particles.begin(), beam.particles.end());
     for (const Place& anchor : system.anchors)
         if (!anchor.isPoint())
             particles.push_back(anchor.first);

@@ -11,8 +11,8 @@ ReferenceUpdateCylinderChainLinkersKernel::ReferenceUpdateCylinderChainLinkersKe
 }
 
 void ReferenceUpdateCylinderChainLinkersKernel::initialize(const LinkerSystem& system, const vector<Chain>& chains,
-        bool periodic, bool nearestParticles) {
-    kinetics.reset(new LinkerKinetics(system, chains));
+        const vector<BeamChain>& beams, bool periodic, bool nearestParticles) {
+    kinetics.reset(new LinkerKinetics(system, chains, beams));
     this->periodic = periodic;
     this->nearestParticles = nearestParticles;
 }
