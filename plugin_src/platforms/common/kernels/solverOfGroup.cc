@@ -79,7 +79,7 @@ inline DEVICE void addToUpper(const Step* step, int node, Matrix upper) {
 }
 
 /** Linearise the equations around the nodes. What segments and joints add to a node comes in an order of its own. */
-inline DEVICE void gatherRows(const Step* step, bool compressed) {
+CALLED DEVICE void gatherRows(const Step* step, bool compressed) {
     EACH(node, step->nodes) {
         Row row = emptyRow();
         if (node == 0 || node > step->segments)
@@ -213,7 +213,7 @@ inline DEVICE void addSegmentLeft(const Step* step, LOCAL_ARG double* left, int 
 }
 
 /** Eliminate nodes from an end to the middle, and add what is arrived at to what is left. */
-inline DEVICE void eliminateFromEnd(const Step* step, int end) {
+CALLED DEVICE void eliminateFromEnd(const Step* step, int end) {
     const int count = countOfEnd(step, end), near = end, far = 1-end, tension = TENSION_OF_END+end;
     LOCAL_ARG double* left = LEFT_OF_END(end);
     Link link = firstLink();
@@ -450,7 +450,7 @@ inline DEVICE void keepResponse(const Step* step, int end, int s, Vector respons
 }
 
 /** Add the metric forces of lengths, if wanted. */
-DEVICE void addMetricForces(const Step* step, bool wanted) {
+CALLED DEVICE void addMetricForces(const Step* step, bool wanted) {
     if (wanted && LOCAL_ID < 2) {
         LOCAL_ARG const double* left = LEFT_OF_END(0);
         const int end = LOCAL_ID, near = end, far = 1-end, tension = TENSION_OF_END+end;

@@ -67,7 +67,7 @@ inline DEVICE void describeTethers(const Step* step, int node, bool divided) {
 }
 
 /** Describe the start of a step without noise, and its forces from outside. */
-DEVICE void describeStart(const Step* step, GLOBAL const double* forces, bool divided) {
+CALLED DEVICE void describeStart(const Step* step, GLOBAL const double* forces, bool divided) {
     EACH(node, step->nodes) {
         storeVector(step, NODE, node, zeroVector());
         storeVector(step, RANDOM, node, zeroVector());
@@ -220,7 +220,7 @@ inline DEVICE void drawTethers(const Step* step, int node) {
 }
 
 /** Draw the noise of a step, if there is any. */
-DEVICE void drawNoise(const Step* step) {
+CALLED DEVICE void drawNoise(const Step* step) {
     const int nodes = step->kT > 0 ? step->nodes : 0;
     double amplitude = sqrt(2*step->kT/step->h);
     int turn = 0;
