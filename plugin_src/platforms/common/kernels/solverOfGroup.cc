@@ -151,15 +151,15 @@ inline DEVICE Row rowOfEnd(const Step* step, int end, int number, int count) {
             row.second = transposed(row.second);
     }
 #ifdef CLOSED
+    // An array whose index is not known when this is compiled would be in memory.
     if (number == 0) {
-        row.border[end == 0 ? 1 : 0] = end == 0 ? transposed(loadMatrix(step, ROW_UPPER, 1)) :
-                loadMatrix(step, ROW_UPPER, node);
-        row.border[end == 0 ? 0 : 1] = end == 0 ? transposed(loadMatrix(step, ROW_SECOND, 0)) :
-                loadMatrix(step, ROW_SECOND, node);
+        row.border[0] = end == 0 ? transposed(loadMatrix(step, ROW_SECOND, 0)) : loadMatrix(step, ROW_UPPER, node);
+        row.border[1] = end == 0 ? transposed(loadMatrix(step, ROW_UPPER, 1)) : loadMatrix(step, ROW_SECOND, node);
     }
+    else if (number == 1 && end == 0)
+        row.border[1] = transposed(loadMatrix(step, ROW_SECOND, 1));
     else if (number == 1)
-        row.border[end == 0 ? 1 : 0] = end == 0 ? transposed(loadMatrix(step, ROW_SECOND, 1)) :
-                loadMatrix(step, ROW_SECOND, node);
+        row.border[0] = loadMatrix(step, ROW_SECOND, node);
 #endif
     return row;
 }
@@ -222,7 +222,8 @@ CALLED DEVICE void eliminateFromEnd(const Step* step, int end) {
     link.resistance = FIELD(COMPLIANCE, first);
     link.right = FIELD(COMPLIANCE, first)*FIELD(TENSION_START, first);
     link.first = directionOf(step, end, first);
-    link.border[end == 0 ? 1 : 0] = link.first*-1.0;
+    link.border[0] = link.first*(end == 0 ? 0.0 : -1.0);
+    link.border[1] = link.first*(end == 0 ? -1.0 : 0.0);
     Row border[2];
     border[0] = border[1] = emptyRow();
 #endif
@@ -337,7 +338,7 @@ inline DEVICE void keepTensionLeft(const Step* step, int s, double tension, bool
 }
 
 /** Find the changes of nodes and the tensions, or add to them, if wanted. */
-DEVICE void substitute(const Step* step, bool adds, bool wanted) {
+CALLED DEVICE void substitute(const Step* step, bool adds, bool wanted) {
     if (wanted && LOCAL_ID < NUMBERS_LEFT) {
         double found = 0;
         for (int column = 0; column < NUMBERS_LEFT; column++)
@@ -382,7 +383,7 @@ DEVICE void substitute(const Step* step, bool adds, bool wanted) {
 }
 
 /** Let the change of tensions act along the mean direction as well, with the same elimination, if wanted. */
-DEVICE void refine(const Step* step, bool wanted) {
+CALLED DEVICE void refine(const Step* step, bool wanted) {
     EACH(node, wanted ? step->own : 0) {
         Vector own = zeroVector();
         if (node < step->segments)
@@ -478,7 +479,7 @@ CALLED DEVICE void addMetricForces(const Step* step, bool wanted) {
         }
 #ifdef CLOSED
         keepResponse(step, end, segmentBefore(end, nodeOfEnd(step, end, 0)),
-                responses.ofBorder[end == 0 ? 1 : 0]-responses.after);
+                (end == 0 ? responses.ofBorder[1] : responses.ofBorder[0])-responses.after);
 #endif
         if (end == 0) {
             keepResponse(step, 0, nodeLeft(step, 0),
