@@ -55,7 +55,7 @@ def compile_to_ptx(source, architecture):
 
 
 def resources_of(ptx, architecture, folder):
-    """Registers, bytes of stack and bytes of spilled registers of each kernel; the latter of each of its functions, too."""
+    """Registers, bytes of stack and of spilled registers of each kernel; the latter of each of its functions, too."""
     file = folder / "kernels.ptx"
     file.write_text(ptx)
     result = subprocess.run(

@@ -63,7 +63,7 @@ inline DEVICE Step describeChain(int chain, int numChains, int places, int flags
 inline DEVICE void setMemory(Step* step, GLOBAL double* RESTRICT workspace, int places) {
 #if defined(CHAIN_BY_GROUP)
     step->memory = workspace+(size_t) GROUP_ID*places*NUM_FIELDS;
-    step->stride = places;
+    step->places = places;
 #elif defined(CHAIN_BY_CHAIN)
     step->memory = workspace+(size_t) GLOBAL_ID*places*NUM_FIELDS;
     step->stride = 1;

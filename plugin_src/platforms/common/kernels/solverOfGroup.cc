@@ -132,37 +132,46 @@ CALLED DEVICE void gatherRows(const Step* step, bool compressed) {
     } while (first < step->nodes-1);
 }
 
-/** The equations of a node as an end sees it. End 0 has those of the nodes in the middle. */
-inline DEVICE Row rowOfEnd(const Step* step, int end, int number, int count) {
+/** A matrix as an end sees it. */
+inline DEVICE Matrix matrixOfEnd(const Step* step, int end, int field, int place) {
+    Matrix m = loadMatrix(step, field, place), other = transposed(m);
+    m.x = make_double3(m.x.x, end == 0 ? m.x.y : other.x.y, end == 0 ? m.x.z : other.x.z);
+    m.y = make_double3(end == 0 ? m.y.x : other.y.x, m.y.y, end == 0 ? m.y.z : other.y.z);
+    m.z = make_double3(end == 0 ? m.z.x : other.z.x, end == 0 ? m.z.y : other.z.y, m.z.z);
+    return m;
+}
+
+/**
+ * The equations of a node as an end sees it. Nothing is asked of the number, so that they can be on their way while the
+ * node before is eliminated: both ends have all of the nodes in the middle.
+ */
+inline DEVICE Row rowOfEnd(const Step* step, int end, int number) {
     Row row = emptyRow();
     const int node = nodeOfEnd(step, end, number);
-    if (number < count || end == 0) {
-        row.diagonal = loadSymmetric(step, ROW_DIAGONAL, node);
-        row.right = loadVector(step, ROW_RIGHT, node);
-    }
-    if (number < count || (end == 0 && number == count)) {
-        row.upper = loadMatrix(step, ROW_UPPER, segmentBehind(end, node));
-        if (end == 1)
-            row.upper = transposed(row.upper);
-    }
-    if (number < count) {
-        row.second = loadMatrix(step, ROW_SECOND, end == 0 ? node : node-2);
-        if (end == 1)
-            row.second = transposed(row.second);
-    }
-#ifdef CLOSED
-    // An array whose index is not known when this is compiled would be in memory.
-    if (number == 0) {
-        row.border[0] = end == 0 ? transposed(loadMatrix(step, ROW_SECOND, 0)) : loadMatrix(step, ROW_UPPER, node);
-        row.border[1] = end == 0 ? transposed(loadMatrix(step, ROW_UPPER, 1)) : loadMatrix(step, ROW_SECOND, node);
-    }
-    else if (number == 1 && end == 0)
-        row.border[1] = transposed(loadMatrix(step, ROW_SECOND, 1));
-    else if (number == 1)
-        row.border[0] = loadMatrix(step, ROW_SECOND, node);
-#endif
+    row.diagonal = loadSymmetric(step, ROW_DIAGONAL, node);
+    row.right = loadVector(step, ROW_RIGHT, node);
+    row.upper = matrixOfEnd(step, end, ROW_UPPER, max(end == 0 ? node : node-1, 0));
+    row.second = matrixOfEnd(step, end, ROW_SECOND, max(end == 0 ? node : node-2, 0));
     return row;
 }
+
+#ifdef CLOSED
+/** Couple the first two rows that an end has to the first two nodes of a ring. */
+inline DEVICE void coupleToBorder(const Step* step, int end, Row* first, Row* second) {
+    // An array whose index is not known when this is compiled would be in memory.
+    const int last = step->own-1;
+    if (end == 0) {
+        first->border[0] = transposed(loadMatrix(step, ROW_SECOND, 0));
+        first->border[1] = transposed(loadMatrix(step, ROW_UPPER, 1));
+        second->border[1] = transposed(loadMatrix(step, ROW_SECOND, 1));
+    }
+    else {
+        first->border[0] = loadMatrix(step, ROW_UPPER, last);
+        first->border[1] = loadMatrix(step, ROW_SECOND, last);
+        second->border[0] = loadMatrix(step, ROW_SECOND, last-1);
+    }
+}
+#endif
 
 inline DEVICE void addRowLeft(LOCAL_ARG double* left, int row, int column, Vector v) {
     LEFT_MATRIX(left, row, column) += v.x;
@@ -227,10 +236,13 @@ CALLED DEVICE void eliminateFromEnd(const Step* step, int end) {
     Row border[2];
     border[0] = border[1] = emptyRow();
 #endif
-    Row here = rowOfEnd(step, end, 0, count), next = rowOfEnd(step, end, 1, count);
+    Row here = rowOfEnd(step, end, 0), next = rowOfEnd(step, end, 1);
+#ifdef CLOSED
+    coupleToBorder(step, end, &here, &next);
+#endif
     for (int number = 0; number < count; number++) {
         const int node = nodeOfEnd(step, end, number), s = segmentBehind(end, node);
-        Row second = rowOfEnd(step, end, number+2, count);
+        Row second = rowOfEnd(step, end, number+2);
         TensionEquation behind = {directionOf(step, end, s), FIELD(COMPLIANCE, s), FIELD(TENSION_START, s)};
 #ifdef CLOSED
         Link before = link;
@@ -260,9 +272,18 @@ CALLED DEVICE void eliminateFromEnd(const Step* step, int end) {
 #endif
 }
 
-/** Add what is left as it was: the tension in the middle, and of a ring the first two nodes, with that between them. */
+/**
+ * Add what is left as it was: the tension in the middle, and of a ring the first two nodes, with that between them.
+ * Both ends have had the equations of the nodes in the middle.
+ */
 inline DEVICE void addUntouched(const Step* step) {
     LOCAL_ARG double* left = LEFT_OF_END(0);
+    for (int number = 0; number < 2; number++) {
+        const int node = nodeLeft(step, number);
+        addNodeLeft(left, number, scaledSymmetric(loadSymmetric(step, ROW_DIAGONAL, node), -1),
+                loadVector(step, ROW_RIGHT, node)*-1.0);
+    }
+    addBlockLeft(left, 0, 1, scaled(loadMatrix(step, ROW_UPPER, nodeLeft(step, 0)), -1));
     addSegmentLeft(step, left, TENSION_BETWEEN, 0, nodeLeft(step, 0));
 #ifdef CLOSED
     // They come a second time behind the last node.
@@ -278,6 +299,7 @@ inline DEVICE void addUntouched(const Step* step) {
 inline DEVICE void invertLeft(const Step* step) {
     const int row = LOCAL_ID;
     const bool takesPart = row < NUMBERS_LEFT;
+    const int ownRow = takesPart ? row : 0;
     const double mobile = takesPart && row < 3*NODES_LEFT ? PROPERTY(MOBILE, nodeLeft(step, row/3)) : 1;
     LOCAL_ARG double* left = LEFT_OF_END(0);
     LOCAL_ARG const double* ofOther = LEFT_OF_END(1);
@@ -295,17 +317,18 @@ inline DEVICE void invertLeft(const Step* step) {
     int pivot = 0;
     do {
         const double reciprocal = 1/LEFT_MATRIX(left, pivot, pivot);
-        if (takesPart && row != pivot) {
-            const double factor = LEFT_MATRIX(left, row, pivot)*reciprocal;
-            LEFT_MATRIX(left, row, pivot) = 0;
-            for (int column = 0; column < NUMBERS_LEFT; column++)
-                LEFT_MATRIX(left, row, column) -= factor*(column == pivot ? 1 : LEFT_MATRIX(left, pivot, column));
+        const double factor = LEFT_MATRIX(left, ownRow, pivot)*reciprocal;
+        double numbers[NUMBERS_LEFT];
+        for (int column = 0; column < NUMBERS_LEFT; column++) {
+            const double own = LEFT_MATRIX(left, ownRow, column), ofPivot = LEFT_MATRIX(left, pivot, column);
+            const double changed = own-factor*ofPivot, divided = ofPivot*reciprocal;
+            numbers[column] = row == pivot ? divided : changed;
         }
         SYNC_THREADS
-        if (row == pivot) {
+        if (takesPart) {
             for (int column = 0; column < NUMBERS_LEFT; column++)
-                LEFT_MATRIX(left, row, column) *= reciprocal;
-            LEFT_MATRIX(left, row, row) = reciprocal;
+                LEFT_MATRIX(left, row, column) = numbers[column];
+            LEFT_MATRIX(left, row, pivot) = row == pivot ? reciprocal : -factor;
         }
         SYNC_THREADS
     } while (++pivot < NUMBERS_LEFT);

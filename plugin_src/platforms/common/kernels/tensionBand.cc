@@ -164,8 +164,8 @@ inline DEVICE Vector forceOfTurning(const Step* step, int s) {
  * @param before    the segment before it, or -1
  */
 inline DEVICE void substitutePair(const Step* step, int node, bool coupled, int before, bool adds, Found* behind) {
-    Vector here = loadVector(step, SOLUTION, node);
-    double found = FIELD(TENSION_FOUND, node);
+    Vector here = loadVector(step, SOLUTION, node), change = loadVector(step, CHANGE, node);
+    double found = FIELD(TENSION_FOUND, node), tension = FIELD(TENSION, before < 0 ? 0 : before);
     if (coupled) {
         here = here-matrixTimes(loadMatrix(step, NEXT, node), behind->next)-
                 matrixTimes(loadMatrix(step, SECOND, node), behind->second)+
@@ -179,9 +179,12 @@ inline DEVICE void substitutePair(const Step* step, int node, bool coupled, int 
     found += product(loadVector(step, TENSION_BORDER, node), behind->border[0])+
             product(loadVector(step, TENSION_BORDER+3, node), behind->border[1]);
 #endif
-    storeVector(step, CHANGE, node, adds ? loadVector(step, CHANGE, node)+here : here);
+    change = change+here;
+    tension += found;
+    storeVector(step, CHANGE, node, make_double3(adds ? change.x : here.x, adds ? change.y : here.y,
+            adds ? change.z : here.z));
     if (before >= 0)
-        FIELD(TENSION, before) = found+(adds ? FIELD(TENSION, before) : 0);
+        FIELD(TENSION, before) = adds ? tension : found;
     behind->tension = found;
     behind->second = behind->next;
     behind->next = here;

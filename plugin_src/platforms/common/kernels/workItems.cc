@@ -5,8 +5,8 @@
  *
  * All work-items of a group wait at the same places of a program, whatever there is to do between. No branch goes
  * around such a place, and loops with one of them test at their end: PoCL, which splits programs there, compiles what
- * follows a branch once for either side of it. What is not wanted is done for no place. Results do not depend on the order in
- * which work-items run.
+ * follows a branch once for either side of it. What is not wanted is done for no place. Results do not depend on the
+ * order in which work-items run.
  */
 
 #ifdef CHAIN_BY_GROUP

@@ -24,6 +24,7 @@ typedef struct {
     LOCAL_ARG double* middle;
 #endif
     size_t stride, tableStride;
+    int places;
     NoiseKey key;
     Vector shift, flowAtZero;
     double h, kT, nodeFriction;
@@ -39,7 +40,7 @@ typedef struct {
 #endif
 #ifdef CHAIN_BY_GROUP
 /** Work-items of a group read the same field of neighbouring places together. */
-#define FIELD(field, place) step->memory[(size_t) (field)*step->stride+(place)]
+#define FIELD(field, place) step->memory[(field)*step->places+(place)]
 #else
 #define FIELD(field, place) step->memory[(size_t) ((place)*NUM_FIELDS+(field))*step->stride]
 #endif
