@@ -27,10 +27,11 @@ static const int GROUP_SIZE = layout::ITEMS_OF_CHAIN;
 
 /**
  * A group of work-items for each chain takes implicit steps of no more chains than these.  A group takes a step in about
- * a tenth of the time of one work-item, but that is still three times the work.  With more chains than these, one
- * work-item for each of them keeps a GPU as busy, and the work counts: see the page on platforms.
+ * a seventh of the time of one work-item, but a GPU can have fewer groups at once.  With an estimate of 0.3 us of an
+ * H100 for each chain of 64 segments and step, as many chains as these take the 1.8 ms that one work-item for each of
+ * them would, however few they are; see the page on platforms.
  */
-static const int MOST_CHAINS_OF_GROUPS = 10000;
+static const int MOST_CHAINS_OF_GROUPS = 6000;
 
 /**
  * Chains that one kernel computes.
@@ -341,6 +342,10 @@ void CommonCylinderChains::addForces(bool includeForces, ChainEnergy* energy) {
 }
 
 int CommonCylinderChains::advance(const StepSettings& settings, int count, bool findsForces, long long& divided) {
+    divided = 0;
+    stepsTaken.assign(description.getChains().size(), count);
+    if (count == 0)
+        return 0;
     const int flags = describeStep(settings) | (findsForces ? layout::FINDS_FORCES : 0);
     const bool isImplicit = settings.scheme == Scheme::Implicit || settings.scheme == Scheme::ImplicitSecondOrder;
     const bool byGroup = usesGroups && isImplicit;
@@ -372,7 +377,6 @@ int CommonCylinderChains::advance(const StepSettings& settings, int count, bool 
     }
     const vector<uint64_t> found = readSummary();
     divided = found[layout::NUM_DIVIDED_STEPS];
-    stepsTaken.assign(description.getChains().size(), count);
     if (found[layout::NUM_UNSTABLE_CHAINS] > 0)
         taken.download(stepsTaken);
     return stepsTaken.empty() ? count : *min_element(stepsTaken.begin(), stepsTaken.end());
