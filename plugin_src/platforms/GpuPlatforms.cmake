@@ -3,8 +3,8 @@
 # platforms.txt, which is installed, and never stops the build.
 
 get_filename_component(OPENMM_LIBRARIES "${OPENMM_LIBRARY}" DIRECTORY)
-set(COMMON_KERNELS layout constants vectors noise potentials workspace stages tensionBand equations metricForces
-    implicitStep explicitStep chainForces chainKernels particles couplings contacts)
+set(COMMON_KERNELS layout constants vectors noise potentials workspace workItems stages tensionBand equations metricForces
+    solverOfItem solverOfGroup implicitStep explicitStep chainForces chainKernels particles couplings contacts)
 list(TRANSFORM COMMON_KERNELS PREPEND "${CMAKE_CURRENT_SOURCE_DIR}/platforms/common/kernels/")
 list(TRANSFORM COMMON_KERNELS APPEND ".cc")
 set(KERNEL_SOURCES "${CMAKE_CURRENT_BINARY_DIR}/CommonCylinderChainKernelSources.cpp")

@@ -21,7 +21,7 @@ from openmm_cylchain import (
 )
 from support.contexts import energy_of, forces_of, new_context, positions_of
 from support.platform_variants import ACTIN, SHEAR, VARIANTS, filaments_of_variant, step_of_variant
-from support.platforms import GPU_CASES, GPU_NAMES, NOT_TESTED
+from support.platforms import GPU_CASES, GPU_NAMES, NOT_TESTED, WORK_ITEMS
 from support.solvent import TEMPERATURE, VISCOSITY
 
 # Of paths, in nm. Pushes of 0.3 kJ/(mol nm) take filaments 1000 nm far here.
@@ -36,6 +36,21 @@ def gpu(request):
     os.environ["OPENMM_DEFAULT_PLATFORM"] = "CPU"
     openmm_cylchain.enable_platform(request.param)
     return request.param
+
+
+@pytest.fixture(params=WORK_ITEMS)
+def work_items(request, monkeypatch):
+    """How many work-items take the implicit steps of a filament."""
+    monkeypatch.setenv("CYLCHAIN_WORK_ITEMS", str(request.param))
+    return request.param
+
+
+EITHER_WAY = pytest.mark.parametrize("work_items", WORK_ITEMS, indirect=True)
+"""Runs a test with one work-item for a filament, and with a group."""
+
+# PoCL compiles the kernel of groups for some 20 s in each precision.
+EITHER_WAY_IF_SLOW = pytest.mark.parametrize("work_items", [1, pytest.param(32, marks=pytest.mark.slow)], indirect=True)
+"""The same, with a group where slow tests run."""
 
 
 def _context(variant, scheme, platform, precision=None, flow=None, pushed=True):
@@ -61,22 +76,39 @@ def _compare(gpu, variant, scheme, precision, steps=20, flow=None):
     assert np.abs(positions_of(found) - end).max() < TOLERANCES[precision]
 
 
-@pytest.mark.parametrize("precision", TOLERANCES)
-def test_trajectories_with_noise_agree(gpu, precision):
+@pytest.mark.parametrize(
+    ("precision", "work_items"),
+    [
+        *((precision, 1) for precision in TOLERANCES),
+        ("double", 32),
+        *(pytest.param(precision, 32, marks=pytest.mark.slow) for precision in ("mixed", "single")),
+    ],
+    indirect=["work_items"],
+)
+def test_trajectories_with_noise_agree(gpu, precision, work_items):
     """100 steps of open filaments among beads, in each precision."""
     _compare(gpu, "open", "implicit", precision, steps=100)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scheme", ["implicit", "implicit-second-order", "euler", "midpoint"])
+@EITHER_WAY
+@pytest.mark.parametrize("scheme", ["implicit", "implicit-second-order"])
 @pytest.mark.parametrize("variant", VARIANTS)
-def test_all_variants_agree(gpu, variant, scheme):
+def test_all_variants_agree_at_implicit_steps(gpu, work_items, variant, scheme):
     _compare(gpu, variant, scheme, "double")
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("scheme", ["euler", "midpoint"])
 @pytest.mark.parametrize("variant", VARIANTS)
-def test_without_forces_of_openmm_they_agree_to_rounding(gpu, variant):
+def test_all_variants_agree_at_explicit_steps(gpu, variant, scheme):
+    _compare(gpu, variant, scheme, "double")
+
+
+@EITHER_WAY
+@pytest.mark.slow
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_without_forces_of_openmm_they_agree_to_rounding(gpu, work_items, variant):
     """A hundred steps with noise. What OpenMM computes itself is added in units of 2^-32 kJ/(mol nm) there."""
     contexts = [
         _context(variant, "implicit", platform, precision, pushed=False)
@@ -90,11 +122,68 @@ def test_without_forces_of_openmm_they_agree_to_rounding(gpu, variant):
     assert np.abs(found - expected).max() < 1e-10
 
 
+@EITHER_WAY
 @pytest.mark.slow
 @pytest.mark.parametrize("variant", ["open", "fixed", "ring", "planar", "beads"])
-def test_filaments_in_a_flow_agree(gpu, variant):
+def test_filaments_in_a_flow_agree(gpu, work_items, variant):
     for scheme in ("implicit", "midpoint"):
         _compare(gpu, variant, scheme, "double", flow=SHEAR)
+
+
+def _add_of_all_lengths(filaments):
+    """From the fewest nodes that there can be to some for each work-item of a group, and fixed ones in the middle."""
+    for number, segments in enumerate((1, 2, 3, 4, 5, 31, 32, 33, 64, 65, 100)):
+        filaments.add_equilibrium(ACTIN, segments, seed=number, start=[0.0, 500.0 * number, 0.0])
+    for number, fixed in enumerate(([5], [6], [7], [5, 6], [6, 7], [5, 6, 7], [4, 8], [0, 6], [0, 1, 12])):
+        filaments.add_equilibrium(ACTIN, 12, seed=number, start=[3000.0, 500.0 * number, 0.0], clamped=fixed)
+
+
+def _add_rings_of_all_lengths(filaments):
+    for number, segments in enumerate((4, 5, 6, 7, 8, 9, 33, 64, 100)):
+        filaments.add_ring(ACTIN, segments, [0.0, 900.0 * number, 0.0], [1, 2, 3])
+
+
+def _compare_work_items(gpu, monkeypatch, add, step, scheme):
+    """Positions after 40 steps with one work-item for a filament and with groups, and how many were divided."""
+    ends, divided = [], []
+    for items in WORK_ITEMS:
+        monkeypatch.setenv("CYLCHAIN_WORK_ITEMS", str(items))
+        filaments = Filaments(VISCOSITY, TEMPERATURE, "compiled")
+        add(filaments)
+        _, system, start = filaments.build()
+        integrator = filaments.create_integrator(system, step, scheme, random_seed=4, checks=False)
+        context = new_context(system, start, integrator, gpu, {"Precision": "double"})
+        integrator.step(40)
+        ends.append(positions_of(context))
+        divided.append(integrator.getNumDividedSteps())
+    moved = np.abs(ends[0] - start._value).max(axis=1)
+    assert np.median(moved) > 1 and np.abs(ends[1] - ends[0]).max() < 1e-10
+    return divided
+
+
+@pytest.mark.parametrize("scheme", ["implicit", "implicit-second-order"])
+def test_filaments_of_any_length_move_alike_either_way(gpu, scheme, monkeypatch):
+    assert _compare_work_items(gpu, monkeypatch, _add_of_all_lengths, 2e6, scheme) == [0, 0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", ["implicit", "implicit-second-order"])
+def test_rings_of_any_length_move_alike_either_way(gpu, scheme, monkeypatch):
+    """The steps of short ones are too long for them, and divided."""
+    divided = _compare_work_items(gpu, monkeypatch, _add_rings_of_all_lengths, 2e6, scheme)
+    assert divided[0] == divided[1] > 20
+
+
+def test_divided_steps_are_those_of_one_work_item(gpu, monkeypatch):
+    divided = _compare_work_items(gpu, monkeypatch, _add_of_all_lengths, 3e7, "implicit")
+    assert divided[0] == divided[1] > 0
+
+
+def test_only_one_work_item_or_a_group_can_be_asked_for(gpu, monkeypatch):
+    monkeypatch.setenv("CYLCHAIN_WORK_ITEMS", "7")
+    context = _context("open", "implicit", gpu, "double")
+    with pytest.raises(openmm.OpenMMException, match="CYLCHAIN_WORK_ITEMS must be 1 or 32, but is 7"):
+        context.getIntegrator().step(1)
 
 
 BOX = 1500.0
@@ -133,7 +222,8 @@ def _crossing_context(platform, precision=None, tether=True):
     return new_context(system, positions, integrator, platform, {"Precision": precision} if precision else {})
 
 
-def test_filaments_cross_a_periodic_box_while_particles_are_reordered(gpu):
+@EITHER_WAY
+def test_filaments_cross_a_periodic_box_while_particles_are_reordered(gpu, work_items):
     """For longer than OpenMM waits to reorder particles; the tether's point is some boxes away from its node."""
     expected, found = _crossing_context("Reference"), _crossing_context(gpu, "double")
     start = positions_of(expected)
@@ -179,7 +269,8 @@ def test_couplings_reach_across_periodic_boxes(gpu):
     assert np.abs(positions_of(found) - positions_of(expected)).max() < TOLERANCES["double"]
 
 
-def test_failure_leaves_positions_before_the_step(gpu):
+@EITHER_WAY
+def test_failure_leaves_positions_before_the_step(gpu, work_items):
     context = _context("open", "implicit", gpu, "double")
     integrator = context.getIntegrator()
     integrator.step(3)
@@ -194,7 +285,8 @@ def test_failure_leaves_positions_before_the_step(gpu):
     assert positions_of(context) == pytest.approx(before, abs=1e-9) and context.getStepCount() == steps
 
 
-def test_checkpoint_continues_the_same_trajectory(gpu):
+@EITHER_WAY_IF_SLOW
+def test_checkpoint_continues_the_same_trajectory(gpu, work_items):
     first, second = (_context("open", "implicit", gpu, "mixed") for _ in range(2))
     first.getIntegrator().step(5)
     checkpoint = first.createCheckpoint()
@@ -204,7 +296,8 @@ def test_checkpoint_continues_the_same_trajectory(gpu):
     assert np.array_equal(positions_of(first), positions_of(second))
 
 
-def test_steps_taken_together_are_those_taken_one_by_one(gpu):
+@EITHER_WAY_IF_SLOW
+def test_steps_taken_together_are_those_taken_one_by_one(gpu, work_items):
     ends = []
     for counts in ([40], [1] * 40):
         filaments = Filaments(VISCOSITY, TEMPERATURE, "compiled")
@@ -219,7 +312,8 @@ def test_steps_taken_together_are_those_taken_one_by_one(gpu):
     assert np.array_equal(*ends)
 
 
-def test_moved_tethers_hold_filaments_elsewhere(gpu):
+@EITHER_WAY
+def test_moved_tethers_hold_filaments_elsewhere(gpu, work_items):
     """Parameters are updated in one of two Contexts, which follows the Reference platform as before."""
     contexts, ends = [], []
     for platform, precision in (("Reference", None), (gpu, "double"), (gpu, "double")):
@@ -280,7 +374,8 @@ def _mixed_context(platform, precision=None):
     )
 
 
-def test_filaments_among_many_particles_with_virtual_sites_agree(gpu):
+@EITHER_WAY
+def test_filaments_among_many_particles_with_virtual_sites_agree(gpu, work_items):
     """100 steps with noise of all that a System of particles has, and ten filaments."""
     (filaments, expected), (_, found) = _mixed_context("Reference"), _mixed_context(gpu, "double")
     start = positions_of(expected)

@@ -23,6 +23,8 @@ class CompiledPlatform:
         In nm, by which stored positions are rounded that are less than 2048 nm from the origin.
     path_tolerance : float
         In nm, by which such positions may differ after up to 100 steps with noise.
+    items : int or None
+        How many work-items take the implicit steps of a filament on a platform for GPUs. None elsewhere.
     """
 
     name: str
@@ -30,9 +32,11 @@ class CompiledPlatform:
     tolerance: float
     rounding: float
     path_tolerance: float
+    items: int | None = None
 
     def __str__(self):
-        return self.name if self.precision is None else f"{self.name}-{self.precision}"
+        items = "" if self.items in (None, 1) else f"-by-{self.items}"
+        return self.name if self.precision is None else f"{self.name}-{self.precision}{items}"
 
     @property
     def properties(self):
@@ -43,4 +47,5 @@ class CompiledPlatform:
         """Load the plugin of a platform for GPUs. Where later tests name none, the processor is still what they get."""
         if self.name in GPU_PLATFORMS:
             os.environ["OPENMM_DEFAULT_PLATFORM"] = "CPU"
+            os.environ["CYLCHAIN_WORK_ITEMS"] = "" if self.items is None else str(self.items)
             openmm_cylchain.enable_platform(self.name)

@@ -23,6 +23,9 @@ OTHERS = {
 }
 """Defines of others, by the precisions in which they are compiled."""
 
+BY_GROUP = "CHAIN_BY_GROUP"
+"""The define of kernels in which a group of work-items takes the implicit steps of a filament."""
+
 PARTICLES = ("gatherNodes", "scatterForces", "moveNodes", "displaceOthers", "moveOthers")
 """The kernels of particles and nodes."""
 

@@ -13,10 +13,13 @@ struct CommonCylinderChainKernelSources {
     static const char* const noise;
     static const char* const potentials;
     static const char* const workspace;
+    static const char* const workItems;
     static const char* const stages;
     static const char* const tensionBand;
     static const char* const equations;
     static const char* const metricForces;
+    static const char* const solverOfItem;
+    static const char* const solverOfGroup;
     static const char* const implicitStep;
     static const char* const explicitStep;
     static const char* const chainForces;

@@ -18,7 +18,7 @@ namespace OpenMM {
  * The chains of a Context in the memory of its device, and the programs that compute them there.
  *
  * Chains that use the same models and have similar lengths make a batch: one kernel computes them, with a work-item for
- * each.  The nodes of all chains follow on each other; their positions and forces are doubles, and gather() brings them
+ * each, or, at implicit steps of few chains, with a group of work-items for each.  The nodes of all chains follow on each other; their positions and forces are doubles, and gather() brings them
  * from where OpenMM keeps its particles.
  */
 class CommonCylinderChains {
@@ -93,16 +93,17 @@ private:
     class ReorderListener;
     struct Batch;
     struct Arrays;
-    std::unique_ptr<Batch> makeBatch(const std::vector<int>& members);
-    ComputeProgram programFor(const cylchain::Chain& chain);
-    void makeBatches();
+    const std::vector<std::unique_ptr<Batch> >& getBatches(bool byGroup);
+    std::unique_ptr<Batch> makeBatch(const std::vector<int>& members, bool byGroup);
+    ComputeProgram programFor(const cylchain::Chain& chain, bool byGroup);
     void uploadTethers();
     void updateBox();
     void updateShifts();
     ComputeContext& cc;
     const CylinderChainDescription& description;
     std::map<std::string, ComputeProgram> programs;
-    std::vector<std::unique_ptr<Batch> > batches;
+    const bool usesGroups;
+    std::vector<std::unique_ptr<Batch> > itemBatches, groupBatches;
     std::unique_ptr<Arrays> arrays;
     std::vector<int> particleOfNode, firstNodes, stepsTaken;
     std::vector<double> flowNumbers, boxNumbers, shiftNumbers;

@@ -3,6 +3,7 @@
  * dynamics/elements.
  */
 
+#ifndef CHAIN_BY_GROUP
 inline DEVICE void addTo(const Step* step, GLOBAL double* RESTRICT forces, int node, Vector force) {
     const int place = 3*(node%step->own);
     forces[place] += force.x;
@@ -70,3 +71,4 @@ CALLED DEVICE void findForces(const Step* step, GLOBAL double* RESTRICT forces, 
     energies[BENDING_ENERGY] = bending;
     energies[TETHER_ENERGY] = ofTethers;
 }
+#endif

@@ -1,6 +1,6 @@
 /**
- * Steps of chains, one work-item for each chain. Nodes are those of all chains, one after the other; their positions
- * are doubles, as precise as the platform keeps them.
+ * Steps of chains, by one work-item for each chain, or by a group of them. Nodes are those of all chains, one after the
+ * other; their positions are doubles, as precise as the platform keeps them.
  */
 
 /** A coordinate as the platform stores it. */
@@ -48,9 +48,9 @@ inline DEVICE Step describeChain(int chain, int numChains, int places, int flags
     step.flowVaries = (flags&FLOW_VARIES) != 0;
     step.flowIsPeriodic = (flags&FLOW_IS_PERIODIC) != 0;
     step.periodic = (flags&IS_PERIODIC) != 0;
-    // Neighbours in memory are the same places of chains, which work-items of a GPU read together, or, on a processor,
-    // places of one chain.
-#ifdef CHAIN_BY_CHAIN
+    // Neighbours in memory are the same places of chains, which work-items of a GPU read together, or, on a processor
+    // and where a group has a chain, places of one chain.
+#if defined(CHAIN_BY_CHAIN) || defined(CHAIN_BY_GROUP)
     step.table = table+(size_t) chain*places*NUM_PROPERTIES;
     step.tableStride = 1;
 #else
@@ -61,7 +61,10 @@ inline DEVICE Step describeChain(int chain, int numChains, int places, int flags
 }
 
 inline DEVICE void setMemory(Step* step, GLOBAL double* RESTRICT workspace, int places) {
-#ifdef CHAIN_BY_CHAIN
+#if defined(CHAIN_BY_GROUP)
+    step->memory = workspace+(size_t) GROUP_ID*places*NUM_FIELDS;
+    step->places = places;
+#elif defined(CHAIN_BY_CHAIN)
     step->memory = workspace+(size_t) GLOBAL_ID*places*NUM_FIELDS;
     step->stride = 1;
 #else
@@ -70,6 +73,7 @@ inline DEVICE void setMemory(Step* step, GLOBAL double* RESTRICT workspace, int 
 #endif
 }
 
+#ifndef CHAIN_BY_GROUP
 /** Find the forces of a chain as they are after they have been added to those of the platform. */
 inline DEVICE void findAddedForces(const Step* step, GLOBAL double* RESTRICT forces,
         GLOBAL double* RESTRICT energies) {
@@ -81,8 +85,30 @@ inline DEVICE void findAddedForces(const Step* step, GLOBAL double* RESTRICT for
     }
 }
 
+/** Take a step of the scheme; returns how often it was divided, or -1 if it cannot be taken. */
+inline DEVICE int takeStepOfScheme(Step* step, int flags, GLOBAL double* RESTRICT forces,
+        GLOBAL double* RESTRICT energies) {
+    if (flags&FINDS_FORCES)
+        findAddedForces(step, forces, energies);
+    if (flags&(IS_EULER|IS_MIDPOINT))
+        return takeExplicitStep(step, forces, (flags&IS_EULER) != 0) ? 0 : -1;
+    return takeStep(step, forces);
+}
+#define FIRST_CHAIN GLOBAL_ID
+#define CHAINS_AT_ONCE GLOBAL_SIZE
+#define IS_FIRST_ITEM true
+#else
+inline DEVICE int takeStepOfScheme(Step* step, int flags, GLOBAL double* RESTRICT forces,
+        GLOBAL double* RESTRICT energies) {
+    return takeStep(step, forces);
+}
+#define FIRST_CHAIN GROUP_ID
+#define CHAINS_AT_ONCE NUM_GROUPS
+#define IS_FIRST_ITEM (LOCAL_ID == 0)
+#endif
+
 /**
- * Advance chains by some steps. The displacements are those of the last one.
+ * Advance chains by some steps. The displacements are those of the last one. Groups take implicit steps alone.
  *
  * @param forces    those on nodes; explicit schemes find them at the start of each step if the flags say so
  * @param taken     receives the number of steps that each chain could take
@@ -96,10 +122,23 @@ KERNEL void advanceChains(int numChains, int places, int count, int flags, doubl
         GLOBAL const int* RESTRICT firstTethers, GLOBAL const double* RESTRICT tethers,
         GLOBAL double* RESTRICT tetherMemory, GLOBAL const double* RESTRICT flow, GLOBAL const double* RESTRICT box,
         GLOBAL int* RESTRICT taken, GLOBAL mm_ulong* RESTRICT summary) {
-    for (int chain = GLOBAL_ID; chain < numChains; chain += GLOBAL_SIZE) {
+#ifdef CHAIN_BY_GROUP
+    LOCAL double exchanged[6*ITEMS_OF_CHAIN], middle[SIZE_OF_MIDDLE];
+#endif
+    // There are no more groups than chains, and one step is taken at least.
+    int chain = FIRST_CHAIN;
+#ifndef CHAIN_BY_GROUP
+    if (chain >= numChains)
+        return;
+#endif
+    do {
         Step step = describeChain(chain, numChains, places, flags, positions, table, chains, properties, shifts,
                 firstTethers, tethers, box);
         setMemory(&step, workspace, places);
+#ifdef CHAIN_BY_GROUP
+        step.exchanged = exchanged;
+        step.middle = middle;
+#endif
         step.tetherMemory = tetherMemory;
         step.flow = flow;
         step.h = h;
@@ -109,16 +148,12 @@ KERNEL void advanceChains(int numChains, int places, int count, int flags, doubl
         const size_t first = (size_t) 3*chains[chain*NUM_CHAIN_NUMBERS+CHAIN_FIRST_NODE];
         mm_ulong divided = 0;
         int done = 0;
-        for (; done < count; done++) {
+        bool fails = false;
+        do {
             step.key.step = firstStep+done;
-            int divisions = 0;
-            if (flags&FINDS_FORCES)
-                findAddedForces(&step, forces+first, energies+(size_t) NUM_ENERGIES*step.chain);
-            if (flags&(IS_EULER|IS_MIDPOINT))
-                divisions = takeExplicitStep(&step, forces+first, (flags&IS_EULER) != 0) ? 0 : -1;
-            else
-                divisions = takeStep(&step, forces+first);
-            for (int node = 0; node < step.own; node++) {
+            const int divisions = takeStepOfScheme(&step, flags, forces+first,
+                    energies+(size_t) NUM_ENERGIES*step.chain);
+            EACH(node, step.own) {
                 Vector moved = loadVector(&step, MOVED, node);
                 const size_t place = first+3*node;
                 displacements[place] = moved.x;
@@ -130,18 +165,23 @@ KERNEL void advanceChains(int numChains, int places, int count, int flags, doubl
                     positions[place+2] = stored(positions[place+2]+moved.z);
                 }
             }
-            if (divisions < 0)
-                break;
+            WAIT_FOR_ALL
+            fails = divisions < 0;
+            done += fails ? 0 : 1;
             divided += divisions > 0 ? 1 : 0;
+        } while (done < count && !fails);
+        if (IS_FIRST_ITEM) {
+            taken[step.chain] = done;
+            if (done < count)
+                ATOMIC_ADD(&summary[NUM_UNSTABLE_CHAINS], (mm_ulong) 1);
+            if (divided > 0)
+                ATOMIC_ADD(&summary[NUM_DIVIDED_STEPS], divided);
         }
-        taken[step.chain] = done;
-        if (done < count)
-            ATOMIC_ADD(&summary[NUM_UNSTABLE_CHAINS], (mm_ulong) 1);
-        if (divided > 0)
-            ATOMIC_ADD(&summary[NUM_DIVIDED_STEPS], divided);
-    }
+        chain += CHAINS_AT_ONCE;
+    } while (chain < numChains);
 }
 
+#ifndef CHAIN_BY_GROUP
 /** Find the forces and energies of chains. */
 KERNEL void computeForces(int numChains, int places, int flags, GLOBAL const double* RESTRICT positions,
         GLOBAL double* RESTRICT forces, GLOBAL double* RESTRICT energies, GLOBAL const double* RESTRICT table,
@@ -155,3 +195,4 @@ KERNEL void computeForces(int numChains, int places, int flags, GLOBAL const dou
                 energies+(size_t) NUM_ENERGIES*step.chain);
     }
 }
+#endif

@@ -39,10 +39,10 @@ inline DEVICE Vector forcesOn(const Step* step, int node) {
  * Add the drag of the flow, at the middle of the step, on a segment at rest. Its part along the segment is a tension,
  * which is returned.
  */
-inline DEVICE double addDragOfFlow(const Step* step, int s, const Geometry* geometry, Vector x1, Vector x2, Row* here,
-        Row* after) {
+inline DEVICE double addDragOfFlow(const Step* step, int s, const Geometry* geometry, Row* here, Row* after) {
     Vector direction = geometry->middleTangent;
-    Vector u1 = flowAt(step, x1+loadVector(step, NODE, s)*0.5), u2 = flowAt(step, x2+loadVector(step, NODE, s+1)*0.5);
+    Vector u1 = flowAt(step, loadVector(step, PLACE, s)+loadVector(step, NODE, s)*0.5);
+    Vector u2 = flowAt(step, loadVector(step, PLACE, s+1)+loadVector(step, NODE, s+1)*0.5);
     Vector sum = u1+u2, difference = u2-u1;
     double across = 0.25*PROPERTY(PERPENDICULAR, s), along = 0.25*PROPERTY(PARALLEL, s), share = shareOfForces(step);
     double turn = PROPERTY(ROTATIONAL, s)*turningFactor(step, s, geometry);
@@ -76,8 +76,8 @@ inline DEVICE double findTension(const Step* step, int s, double length, double 
 }
 
 /** Add a segment, its friction and its length, to the equations of its nodes. */
-inline DEVICE void addSegment(const Step* step, int s, const Geometry* geometry, Vector x1, Vector x2, bool compressed,
-        Row* here, Row* after) {
+inline DEVICE void addSegment(const Step* step, int s, const Geometry* geometry, bool compressed, Row* here,
+        Row* after) {
     double perStep = 1/step->h;
     double acrossTrans = 0.25*PROPERTY(PERPENDICULAR, s), alongTrans = 0.25*PROPERTY(PARALLEL, s);
     double acrossTurn = (PROPERTY(ROTATIONAL, s)+FIELD(EXTRA, s))*turningFactor(step, s, geometry);
@@ -95,7 +95,7 @@ inline DEVICE void addSegment(const Step* step, int s, const Geometry* geometry,
 
     double tensionOfFlow = 0;
     if (step->hasFlow)
-        tensionOfFlow = addDragOfFlow(step, s, geometry, x1, x2, here, after);
+        tensionOfFlow = addDragOfFlow(step, s, geometry, here, after);
     Vector t = geometry->tangent, turned = direction-t;
     double tension = findTension(step, s, geometry->length, tensionOfFlow), multiplier = FIELD(MULTIPLIER, s);
     double response = FIELD(RESPONSE, s), shift = fmin(0.5*response, alongTrans*perStep);
@@ -116,14 +116,15 @@ inline DEVICE void addSegment(const Step* step, int s, const Geometry* geometry,
 }
 
 /** Add what a node has by itself: friction, with the drag of the flow on it, and tethers. */
-inline DEVICE void addNode(const Step* step, int node, Vector x, Row* row) {
+inline DEVICE void addNode(const Step* step, int node, Row* row) {
     Vector moved = loadVector(step, NODE, node);
     if (step->nodeFriction > 0) {
         double friction = step->nodeFriction/step->h;
         row->diagonal = withDiagonal(row->diagonal, friction);
         row->right = row->right-moved*friction;
         if (step->hasFlow)
-            row->right = row->right+flowAt(step, x+moved*0.5)*(step->nodeFriction*shareOfForces(step));
+            row->right = row->right+flowAt(step, loadVector(step, PLACE, node)+moved*0.5)*
+                    (step->nodeFriction*shareOfForces(step));
     }
     if (!step->hasTethers)
         return;
@@ -193,55 +194,5 @@ inline DEVICE void addBend(const Step* step, int s, const Geometry* geometry1, c
     after->diagonal = sumOfSymmetric(after->diagonal, last);
     before->upper = differenceOf(sumOf(before->upper, mixed), fullMatrix(first));
     here->upper = differenceOf(sumOf(here->upper, mixed), fullMatrix(last));
-#endif
-}
-
-/** Linearise the equations around the nodes, and eliminate these from first to last. */
-DEVICE void eliminate(const Step* step, bool compressed) {
-    const int n = step->nodes;
-    Row before = emptyRow(), here = emptyRow(), after = emptyRow();
-    Geometry previous, current;
-    Link link = firstLink();
-#ifdef CLOSED
-    Row border[2];
-    border[0] = border[1] = emptyRow();
-#endif
-    Vector x = positionOf(step, 0)+loadVector(step, MOVED, 0);
-    here.right = forcesOn(step, 0);
-    for (int s = 0; s < n; s++) {
-        Vector xNext = x;
-        if (s < n-1) {
-            after = emptyRow();
-            xNext = x+loadVector(step, DIFFERENCE, s);
-            current = newGeometry(step, s);
-            // The last segment of a ring that is unrolled is there for its joint alone.
-            if (s < step->segments)
-                addSegment(step, s, &current, x, xNext, compressed, &here, &after);
-            else
-                after.right = forcesOn(step, s+1);
-        }
-        if (s < step->own)
-            addNode(step, s, x, &here);
-        if (s > 0) {
-            if (s < n-1)
-                addBend(step, s, &previous, &current, &before, &here, &after);
-#ifdef CLOSED
-            if (s < n-1)
-                eliminateOfRing(step, s-1, &before, &here, &after, border, &link);
-#else
-            eliminatePair(step, s-1, s < n-1 ? 2 : 1, &before, &here, &after, &link);
-#endif
-        }
-        if (s < n-1) {
-            previous = current;
-            before = here;
-            here = after;
-        }
-        x = xNext;
-    }
-#ifdef CLOSED
-    closeRing(step, &before, &here, border, &link);
-#else
-    eliminatePair(step, n-1, 0, &here, &here, &here, &link);
 #endif
 }

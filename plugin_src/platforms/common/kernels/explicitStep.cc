@@ -6,6 +6,7 @@
  * NEW_TANGENT, with SHARE and RESPONSE, are what elimination leaves of a node for substitution.
  */
 
+#ifndef CHAIN_BY_GROUP
 /** The friction of a segment on its ends: (s 1+r tt) on the velocity of the same end, and of the other. */
 typedef struct {
     Vector tangent;
@@ -204,3 +205,4 @@ CALLED DEVICE bool takeExplicitStep(Step* step, GLOBAL const double* forces, boo
     }
     return stable;
 }
+#endif

@@ -15,94 +15,90 @@ inline DEVICE double2 turningRates(const Step* step, int s) {
     return make_double2(friction, perShare*FIELD(MULTIPLIER, s)*FIELD(INVERSE_LENGTH, s));
 }
 
-/** Give friction and its noise to segments that are taut; returns whether any comes near to it. */
-DEVICE bool stiffenTautSegments(const Step* step) {
+/** Give friction and its noise to segments that are taut, if wanted; returns whether any comes near to it. */
+DEVICE bool stiffenTautSegments(const Step* step, bool wanted) {
     double greatest = 0;
-    for (int s = 0; s < step->segments; s++) {
+    EACH(s, wanted ? step->segments : 0) {
         double2 rates = turningRates(step, s);
         greatest = fmax(greatest, rates.y/rates.x);
     }
-    if (!(greatest > NEARLY_TAUT))
-        return false;
-    for (int s = 0; s < step->segments; s++) {
-        double2 rates = turningRates(step, s);
-        double length = FIELD(LENGTH, s), extra = fmax(0.5*rates.y-rates.x, 0.0)*length*length;
-        FIELD(EXTRA, s) = extra;
-        Vector pair = loadVector(step, RANDOM_PAIR, s)*(sqrt(1+extra/(PROPERTY(ROTATIONAL, s)+TINY_NUMBER))-1);
-        addVector(step, RANDOM, s, pair*-1.0);
-        addVector(step, RANDOM, s+1, pair);
-    }
-    return true;
+    const bool any = greatestOfItems(step, greatest) > NEARLY_TAUT;
+    int turn = 0;
+    do {
+        EACH_IN_TURN(s, any ? step->segments : 0, turn) {
+            double2 rates = turningRates(step, s);
+            double length = FIELD(LENGTH, s), extra = fmax(0.5*rates.y-rates.x, 0.0)*length*length;
+            FIELD(EXTRA, s) = extra;
+            Vector pair = loadVector(step, RANDOM_PAIR, s)*(sqrt(1+extra/(PROPERTY(ROTATIONAL, s)+TINY_NUMBER))-1);
+            addVector(step, RANDOM, s, pair*-1.0);
+            addVector(step, RANDOM, s+1, pair);
+        }
+        WAIT_FOR_ALL
+    } while (++turn < NUM_TURNS);
+    return any;
 }
 
-/** Add the metric force of a length, given how far a unit force along its segment moves its ends apart. */
-inline DEVICE void addMetricForce(const Step* step, int s, Vector response) {
-    Vector t = tangentAtStart(step, s);
-    double stiffness = PROPERTY(STIFFNESS, s), perLength = FIELD(INVERSE_LENGTH, s), theta = FIELD(THETA, s);
-    double noise = stiffness*(2*theta-1)+PROPERTY(EXTENSIONAL, s)*perLength*perLength/step->h;
-    double along = product(t, response);
-    // The length resists more in the second stage than in this one.
-    if (step->twoStages)
-        noise = noise/(1+stiffness*(theta-DIAGONAL)*along);
-    Vector force = (response-t*along)*(step->kT*noise*perLength);
-    addVector(step, METRIC, s, force);
-    addVector(step, METRIC, s+1, force*-1.0);
-}
-
-/** Give segments other lengths, around the same mean of all nodes; those meant by the equations, or those of REST. */
-DEVICE void rebuild(const Step* step, bool toRest) {
-    Vector sum = zeroVector(), shifted = zeroVector(), end = loadVector(step, NODE, 0), moved = end;
-    double count = 0;
-    for (int node = 0; node < step->nodes; node++) {
+#ifndef CLOSED
+/**
+ * Give segments of a chain without fixed nodes other lengths, around the same mean of all nodes; those meant by the
+ * equations, or those of REST.
+ */
+DEVICE void rebuild(const Step* step, bool toRest, bool wanted) {
+    const int nodes = wanted ? step->nodes : 0;
+    // How much further each node is from the one before it, and then, from where it was.
+    EACH(node, nodes) {
+        Vector further = zeroVector();
         if (node > 0) {
             int s = node-1;
-            Vector y = loadVector(step, NODE, node), change = y-end;
-            Vector difference = loadVector(step, DIFFERENCE, s)+change, rest = loadVector(step, REST, node);
+            Vector difference = loadVector(step, DIFFERENCE, s)+
+                    (loadVector(step, NODE, node)-loadVector(step, NODE, s));
             double length = fmax(product(loadVector(step, NEW_TANGENT, s), difference), 0.5*FIELD(LENGTH, s));
 #ifdef STRETCHING_FENE
             double range = (1-1e-9)/(PROPERTY(INVERSE_EXTENSION, s)+TINY_NUMBER), l0 = PROPERTY(REST_LENGTH, s);
             length = fmax(fmin(length, l0+range), l0-range);
 #endif
-            if (toRest)
+            if (toRest) {
+                Vector rest = loadVector(step, REST, node);
                 length = sqrt(product(rest, rest));
-            moved = moved+change+difference*(length/sqrt(product(difference, difference))-1);
-            end = y;
+            }
+            further = difference*(length/sqrt(product(difference, difference))-1);
         }
-        double mobile = PROPERTY(MOBILE, node);
-        sum = sum+end*mobile;
-        shifted = shifted+moved*mobile;
-        count += mobile;
-        storeVector(step, REST, node, moved);
+        storeVector(step, REST, node, further);
     }
-    Vector back = (sum-shifted)*(1/fmax(count, 1.0));
-    for (int node = 0; node < step->nodes; node++)
-        storeVector(step, NODE, node, loadVector(step, REST, node)+back);
+    Vector mean = sumAlongChain(step, REST, nodes)*(1.0/step->nodes);
+    EACH(node, nodes)
+        addVector(step, NODE, node, loadVector(step, REST, node)-mean);
+    WAIT_FOR_ALL
 }
 
 /** Begin the second stage where the noise of the first would have taken the chain, had it been that of the step. */
-DEVICE void extrapolate(const Step* step) {
-    Vector end = loadVector(step, NODE, 0);
-    for (int node = 0; node < step->nodes; node++) {
-        Vector found = loadVector(step, NODE, node), rest = found-end;
-        storeVector(step, NODE, node, found*(1/NOISE_OF_FIRST));
+DEVICE void extrapolate(const Step* step, bool wanted) {
+    const int nodes = wanted ? step->nodes : 0;
+    EACH(node, nodes) {
+        Vector rest = zeroVector();
         if (node > 0)
-            rest = rest+loadVector(step, DIFFERENCE, node-1);
+            rest = loadVector(step, NODE, node)-loadVector(step, NODE, node-1)+
+                    loadVector(step, DIFFERENCE, node-1);
         storeVector(step, REST, node, rest);
-        end = found;
     }
-    rebuild(step, true);
+    WAIT_FOR_ALL
+    EACH(node, nodes)
+        storeVector(step, NODE, node, loadVector(step, NODE, node)*(1/NOISE_OF_FIRST));
+    WAIT_FOR_ALL
+    rebuild(step, true, wanted);
 }
+#endif
 
 /** Begin the iteration where the flow carries the chain as a whole. */
 DEVICE void carryAlong(const Step* step, Vector first) {
     double time = step->h*shareOfForces(step);
     Vector carried = flowAt(step, first+flowAt(step, first)*(0.5*time))*time;
-    for (int node = 0; node < step->nodes; node++)
+    EACH(node, step->nodes)
         addVector(step, NODE, node, carried);
 }
 
-/** Whether the last iteration has changed too much for it to be the last. NaN counts as such. */
-DEVICE bool isUnfinished(const Step* step) {
+/** Whether the last iteration has changed too much for it to be the last, if wanted. NaN counts as such. */
+DEVICE bool isUnfinished(const Step* step, bool wanted) {
     double tighter = step->twoStages ? 1/(TOLERANCE_OF_STAGES*TOLERANCE_OF_STAGES) : 1;
     double ofSegments = NEWTON_TOLERANCE*NEWTON_TOLERANCE;
 #ifdef CLOSED
@@ -110,7 +106,8 @@ DEVICE bool isUnfinished(const Step* step) {
 #else
     double perEnergy = (step->free ? 0 : 1)*(1/(step->kT+TINY_NUMBER));
 #endif
-    for (int s = 0; s < step->segments; s++) {
+    bool unfinished = false;
+    EACH(s, wanted ? step->segments : 0) {
         Vector here = loadVector(step, CHANGE, s), difference = loadVector(step, CHANGE, s+1)-here;
         double inverse = 1/PROPERTY(REST_LENGTH, s), square = product(difference, difference);
         double moved = product(here, here)*(ofSegments/(NODE_TOLERANCE*NODE_TOLERANCE));
@@ -118,61 +115,59 @@ DEVICE bool isUnfinished(const Step* step) {
         double error = square*inverse*(0.5/LENGTH_TOLERANCE);
         double ofLength = step->kT > 0 ? error*error*FIELD(RESPONSE, s)*perEnergy*tighter : 0;
         // fmax() would take NaN for less than any number.
-        if (!(square < 1e300) || !(ratio < 1) || !(ofLength < 1))
-            return true;
+        if (!(square < 1e300) || !(ratio < 1) || !(ofLength < 1)) {
+            unfinished = true;
+            break;
+        }
     }
-    return false;
+    return isTrueOfAny(step, unfinished);
 }
 
 /** Whether a segment has changed by more than a step may, or has left the range of its potential. */
 DEVICE bool hasChangedTooMuch(const Step* step) {
-    for (int s = 0; s < step->segments; s++) {
+    bool tooMuch = false;
+    EACH(s, step->segments) {
         Vector before = loadVector(step, DIFFERENCE, s);
         Vector change = loadVector(step, NODE, s+1)-loadVector(step, NODE, s), after = before+change;
         double l0 = PROPERTY(REST_LENGTH, s);
 #ifdef BENDING_BondDifference
         double excess = sqrt(product(before, before)*product(after, after))*LEAST_COSINE-product(before, after);
-        if (!(excess < 0))
-            return true;
+        tooMuch = tooMuch || !(excess < 0);
 #else
-        if (!(0.5*product(change, change) < l0*l0))
-            return true;
+        tooMuch = tooMuch || !(0.5*product(change, change) < l0*l0);
 #endif
 #ifdef STRETCHING_FENE
-        if (!(fabs((sqrt(product(after, after))-l0)*PROPERTY(INVERSE_EXTENSION, s)) < 1))
-            return true;
+        tooMuch = tooMuch || !(fabs((sqrt(product(after, after))-l0)*PROPERTY(INVERSE_EXTENSION, s)) < 1);
 #endif
     }
-    return false;
+    return isTrueOfAny(step, tooMuch);
 }
 
 /** Solve the equations of a stage by Newton's method; returns whether they are solved. */
 DEVICE bool solveStage(const Step* step) {
-    bool needsThree = step->stage == ONLY_STAGE || step->flowVaries;
-    int least = needsThree ? 3 : step->stage == FIRST_STAGE ? 2 : 1;
-    for (int iteration = 0; iteration < NEWTON_ITERATIONS; iteration++) {
+    bool needsThree = step->stage == ONLY_STAGE || step->flowVaries, solved = false;
+    int least = needsThree ? 3 : step->stage == FIRST_STAGE ? 2 : 1, iteration = 0;
+    do {
         bool isFirst = iteration == 0 && step->stage != SECOND_STAGE;
-        bool mayStiffen = isFirst && step->kT > 0, again = true;
-        while (again) {
+        bool mayStiffen = isFirst && step->kT > 0, again;
+        do {
             eliminate(step, iteration < ITERATIONS_WITH_COMPRESSION);
-            substitute(step, false);
-            again = mayStiffen && stiffenTautSegments(step);
+            substitute(step, false, true);
+            again = stiffenTautSegments(step, mayStiffen);
             mayStiffen = false;
-        }
-        if (!isFirst)
-            refine(step);
-        else if (step->kT > 0)
-            addMetricForces(step);
-        for (int node = 0; node < step->nodes; node++)
+        } while (again);
+        refine(step, !isFirst);
+        addMetricForces(step, isFirst && step->kT > 0);
+        EACH(node, step->nodes)
             addVector(step, NODE, node, loadVector(step, CHANGE, node));
+        WAIT_FOR_ALL
 #ifndef CLOSED
-        if (step->free)
-            rebuild(step, false);
+        rebuild(step, false, step->free);
 #endif
-        if (iteration+1 >= least && !isUnfinished(step))
-            return true;
-    }
-    return false;
+        iteration++;
+        solved = !isUnfinished(step, iteration >= least) && iteration >= least;
+    } while (iteration < NEWTON_ITERATIONS && !solved);
+    return solved;
 }
 
 /** Take a step, or a part of one; returns whether its equations are solved, and no segment has changed too much. */
@@ -181,21 +176,22 @@ DEVICE bool takePart(Step* step, GLOBAL const double* forces, bool divided) {
     if (step->hasFlow)
         beginFlow(step, first);
     describeStart(step, forces, divided);
-    if (step->kT > 0)
-        drawNoise(step);
+    drawNoise(step);
     bool solved = true;
-    for (int stage = 0; stage < (step->twoStages ? 2 : 1); stage++) {
+    int stage = 0;
+    do {
         step->stage = !step->twoStages ? ONLY_STAGE : stage == 0 ? FIRST_STAGE : SECOND_STAGE;
         prepareStage(step);
 #ifndef CLOSED
-        if (step->stage == SECOND_STAGE && step->free)
-            extrapolate(step);
+        extrapolate(step, step->stage == SECOND_STAGE && step->free);
 #endif
         if (step->hasFlow && step->free && step->stage != SECOND_STAGE)
             carryAlong(step, first);
+        WAIT_FOR_ALL
         solved = solveStage(step) && solved;
-    }
-    return solved && !hasChangedTooMuch(step);
+    } while (++stage < (step->twoStages ? 2 : 1));
+    bool tooMuch = hasChangedTooMuch(step);
+    return solved && !tooMuch;
 }
 
 /**
@@ -207,29 +203,33 @@ CALLED DEVICE int takeStep(Step* step, GLOBAL const double* forces) {
     const NoiseKey key = step->key;
     const double h = step->h;
     int division = 0;
-    bool taken = false;
-    for (; division <= LARGEST_DIVISION && !taken; division++) {
-        step->h = h/(1<<division);
+    bool taken;
+    do {
+        const int parts = 1<<division;
+        step->h = h/parts;
         step->key.level = key.level+division;
-        for (int node = 0; node < step->nodes; node++)
+        EACH(node, step->nodes)
             storeVector(step, MOVED, node, zeroVector());
-        taken = true;
-        for (int part = 0; part < (1<<division) && taken; part++) {
+        WAIT_FOR_ALL
+        int part = 0;
+        do {
             step->key.step = (key.step<<division)+part;
             taken = takePart(step, forces, division > 0);
-            for (int node = 0; node < step->nodes; node++) {
+            EACH(node, step->nodes) {
                 Vector y = loadVector(step, NODE, node);
                 addVector(step, MOVED, node, y);
                 // Where no division helps, those of the whole step say which segment is at fault.
                 if (division == 0)
                     storeVector(step, WHOLE, node, y);
             }
-        }
-    }
+            WAIT_FOR_ALL
+        } while (++part < parts && taken);
+    } while (++division <= LARGEST_DIVISION && !taken);
     step->h = h;
     step->key = key;
     if (!taken)
-        for (int node = 0; node < step->nodes; node++)
+        EACH(node, step->nodes)
             storeVector(step, MOVED, node, loadVector(step, WHOLE, node));
+    WAIT_FOR_ALL
     return taken ? division-1 : -1;
 }

@@ -2,6 +2,9 @@
  * The numbers that the host and the kernels exchange, in their order. Both include this file.
  */
 
+/** Work-items that share a chain, where a group has one. */
+enum {ITEMS_OF_CHAIN = 32};
+
 /** Numbers that describe places of chains: the node, the segment behind it, and the joint at it. */
 enum {REST_LENGTH, STIFFNESS, INVERSE_EXTENSION, PARALLEL, PERPENDICULAR, ROTATIONAL, EXTENSIONAL, DRIFT, PROPULSION,
         JOINT, MOBILE, NUM_PROPERTIES};
@@ -20,8 +23,10 @@ enum {
     // Forces from outside, of noise, and metric ones; nodes, their changes, and where parts of a step have taken them.
     EXTERNAL, RANDOM = EXTERNAL+3, METRIC = RANDOM+3, NODE = METRIC+3, CHANGE = NODE+3, REST = CHANGE+3,
     MOVED = REST+3, WHOLE = MOVED+3,
+    // Where a node is at the start, if a flow is there.
+    PLACE = WHOLE+3,
     // What elimination leaves: see dynamics/TensionBand-inl.h.
-    INVERSE = WHOLE+3, NEXT = INVERSE+6, SECOND = NEXT+9, SOLUTION = SECOND+9, PULL = SOLUTION+3, FIRST = PULL+3,
+    INVERSE = PLACE+3, NEXT = INVERSE+6, SECOND = NEXT+9, SOLUTION = SECOND+9, PULL = SOLUTION+3, FIRST = PULL+3,
     LAST = FIRST+3, GIVE = LAST+3, TENSION_FOUND = GIVE+3, SHARE, RECIPROCAL, COMPLIANCE, TENSION_START, TENSION,
     NUM_FIELDS_OF_OPEN_CHAIN,
     // The same of rings: matrices and vectors for each of the first two nodes.

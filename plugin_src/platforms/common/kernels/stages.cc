@@ -67,18 +67,20 @@ inline DEVICE void describeTethers(const Step* step, int node, bool divided) {
 }
 
 /** Describe the start of a step without noise, and its forces from outside. */
-DEVICE void describeStart(const Step* step, GLOBAL const double* forces, bool divided) {
-    for (int s = 0; s < step->nodes; s++) {
-        storeVector(step, NODE, s, zeroVector());
-        storeVector(step, RANDOM, s, zeroVector());
-        storeVector(step, METRIC, s, zeroVector());
+CALLED DEVICE void describeStart(const Step* step, GLOBAL const double* forces, bool divided) {
+    EACH(node, step->nodes) {
+        storeVector(step, NODE, node, zeroVector());
+        storeVector(step, RANDOM, node, zeroVector());
+        storeVector(step, METRIC, node, zeroVector());
         Vector force = zeroVector();
-        if (s < step->own)
-            force = inSpace(make_double3(forces[3*s], forces[3*s+1], forces[3*s+2]));
-        storeVector(step, EXTERNAL, s, force);
+        if (node < step->own)
+            force = inSpace(make_double3(forces[3*node], forces[3*node+1], forces[3*node+2]));
+        storeVector(step, EXTERNAL, node, force);
     }
-    for (int s = 0; s < step->nodes; s++) {
-        if (s < step->nodes-1) {
+    WAIT_FOR_ALL
+    int turn = 0;
+    do {
+        EACH_IN_TURN(s, step->nodes-1, turn) {
             Vector difference = vectorOfSegment(step, s);
             if (divided)
                 difference = difference+loadVector(step, MOVED, s+1)-loadVector(step, MOVED, s);
@@ -96,12 +98,20 @@ DEVICE void describeStart(const Step* step, GLOBAL const double* forces, bool di
                 }
                 describeLength(step, s, length);
             }
-            if (s > 0)
-                describeBend(step, s);
         }
-        if (step->hasTethers && s < step->own)
-            describeTethers(step, s, divided);
+        WAIT_FOR_ALL
+    } while (++turn < NUM_TURNS);
+    EACH(node, step->nodes) {
+        if (node > 0 && node < step->nodes-1)
+            describeBend(step, node);
+        if (step->hasTethers && node < step->own)
+            describeTethers(step, node, divided);
+        if (step->hasFlow)
+            storeVector(step, PLACE, node, node == 0 ? positionOf(step, 0)+loadVector(step, MOVED, 0) :
+                    loadVector(step, DIFFERENCE, node-1));
     }
+    sumAlongChain(step, PLACE, step->hasFlow ? step->nodes : 0);
+    WAIT_FOR_ALL
 }
 
 #ifndef BENDING_BondDifference
@@ -209,48 +219,53 @@ inline DEVICE void drawTethers(const Step* step, int node) {
     }
 }
 
-/** Draw the noise of a step. */
-DEVICE void drawNoise(const Step* step) {
+/** Draw the noise of a step, if there is any. */
+CALLED DEVICE void drawNoise(const Step* step) {
+    const int nodes = step->kT > 0 ? step->nodes : 0;
     double amplitude = sqrt(2*step->kT/step->h);
-    for (int s = 0; s < step->nodes; s++) {
-        double4 node = make_double4(0, 0, 0, 0);
-        bool hasForce = step->nodeFriction > 0 && s < step->own;
+    int turn = 0;
+    do {
+        EACH_IN_TURN(s, nodes, turn) {
+            double4 node = make_double4(0, 0, 0, 0);
+            bool hasForce = step->nodeFriction > 0 && s < step->own;
 #ifndef BENDING_BondDifference
-        if (hasForce)
+            if (hasForce)
 #endif
-            node = drawNormals(step->key, NOISE_NODE, step->chain, s, 0);
-        if (hasForce)
-            addVector(step, RANDOM, s, inSpace(make_double3(node.x, node.y, node.z))*
-                    (sqrt(step->nodeFriction)*amplitude));
-        if (s < step->segments) {
-            double normal = node.w;
-            if (step->hasSegmentFriction) {
-                double4 first = drawNormals(step->key, NOISE_SEGMENT, step->chain, s, 0);
-                double4 second = drawNormals(step->key, NOISE_SEGMENT, step->chain, s, 1);
-                drawForces(step, s, first, second, amplitude);
-                normal = second.z;
+                node = drawNormals(step->key, NOISE_NODE, step->chain, s, 0);
+            if (hasForce)
+                addVector(step, RANDOM, s, inSpace(make_double3(node.x, node.y, node.z))*
+                        (sqrt(step->nodeFriction)*amplitude));
+            if (s < step->segments) {
+                double normal = node.w;
+                if (step->hasSegmentFriction) {
+                    double4 first = drawNormals(step->key, NOISE_SEGMENT, step->chain, s, 0);
+                    double4 second = drawNormals(step->key, NOISE_SEGMENT, step->chain, s, 1);
+                    drawForces(step, s, first, second, amplitude);
+                    normal = second.z;
+                }
+                FIELD(RANDOM_COORDINATE, s) = drawLength(step, s, normal);
             }
-            FIELD(RANDOM_COORDINATE, s) = drawLength(step, s, normal);
-        }
-        if (s > 0 && s < step->nodes-1 && PROPERTY(JOINT, s) != 0) {
-            double joint = PROPERTY(JOINT, s);
+            if (s > 0 && s < step->nodes-1 && PROPERTY(JOINT, s) != 0) {
+                double joint = PROPERTY(JOINT, s);
 #ifdef BENDING_BondDifference
-            double4 n = drawNormals(step->key, NOISE_NODE, step->chain, s, 1);
-            storeVector(step, RANDOM_BEND, s, inSpace(make_double3(n.x, n.y, n.z))*
-                    sqrt(step->kT/(joint+TINY_NUMBER)));
+                double4 n = drawNormals(step->key, NOISE_NODE, step->chain, s, 1);
+                storeVector(step, RANDOM_BEND, s, inSpace(make_double3(n.x, n.y, n.z))*
+                        sqrt(step->kT/(joint+TINY_NUMBER)));
 #else
-            if (step->twoStages || FIELD(JOINT_THETA, s) != 0.5) {
+                if (step->twoStages || FIELD(JOINT_THETA, s) != 0.5) {
 #ifdef PLANAR
-                storeVector(step, RANDOM_BEND, s, drawBendInPlane(step, s, joint/step->kT));
+                    storeVector(step, RANDOM_BEND, s, drawBendInPlane(step, s, joint/step->kT));
 #else
-                storeVector(step, RANDOM_BEND, s, drawBendInSpace(step, s, joint/step->kT));
+                    storeVector(step, RANDOM_BEND, s, drawBendInSpace(step, s, joint/step->kT));
+#endif
+                }
 #endif
             }
-#endif
+            if (step->hasTethers && s < step->own)
+                drawTethers(step, s);
         }
-        if (step->hasTethers && s < step->own)
-            drawTethers(step, s);
-    }
+        WAIT_FOR_ALL
+    } while (++turn < NUM_TURNS);
 }
 
 inline DEVICE void prepareLength(const Step* step, int s) {
@@ -314,11 +329,14 @@ inline DEVICE void prepareTethers(const Step* step, int node) {
 
 /** Describe a stage. The second one begins with the end of the first. */
 DEVICE void prepareStage(const Step* step) {
-    for (int s = 0; s < step->nodes; s++) {
-        if (step->stage == SECOND_STAGE && s < step->nodes-1) {
+    if (step->stage == SECOND_STAGE) {
+        EACH(s, step->nodes-1) {
             Vector difference = loadVector(step, DIFFERENCE, s)+loadVector(step, NODE, s+1)-loadVector(step, NODE, s);
             storeVector(step, NEW_TANGENT, s, difference*(1/sqrt(product(difference, difference))));
         }
+    }
+    WAIT_FOR_ALL
+    EACH(s, step->nodes) {
         if (s < step->segments)
             prepareLength(step, s);
         if (s > 0 && s < step->nodes-1)
@@ -326,4 +344,5 @@ DEVICE void prepareStage(const Step* step) {
         if (step->hasTethers && s < step->own)
             prepareTethers(step, s);
     }
+    WAIT_FOR_ALL
 }

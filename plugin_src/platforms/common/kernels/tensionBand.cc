@@ -1,6 +1,6 @@
 /**
  * The linear equations of the nodes of a chain and of the tensions of its segments, solved by elimination along the
- * chain: see dynamics/TensionBand-inl.h, whose names these are.
+ * chain: what it does at a node. See dynamics/TensionBand-inl.h, whose names these are.
  */
 
 /** The equations of a node while they are gathered: its own block, and those to the next node and the one after. */
@@ -21,6 +21,30 @@ typedef struct {
     Vector border[2];
 #endif
 } Link;
+
+/** The equation of the tension of the segment behind a node, with its direction from the node. */
+typedef struct {
+    Vector direction;
+    double compliance, start;
+} TensionEquation;
+
+/** What is found of the two nodes behind one, and of the tension between; of rings, of the first two nodes, too. */
+typedef struct {
+    Vector next, second;
+    double tension;
+#ifdef CLOSED
+    Vector border[2];
+#endif
+} Found;
+
+/** Right sides of a node, of the one behind it and of the tension before it, while they are gathered. */
+typedef struct {
+    Vector here, next;
+    double start;
+#ifdef CLOSED
+    Vector border[2];
+#endif
+} RightSides;
 
 inline DEVICE Row emptyRow() {
     Row row;
@@ -50,7 +74,8 @@ inline DEVICE Link firstLink() {
  *
  * @param following   how many nodes follow, or 2 if there are more
  */
-DEVICE void eliminatePair(const Step* step, int node, int following, const Row* row, Row* next, Row* second, Link* link) {
+DEVICE void eliminatePair(const Step* step, int node, int following, TensionEquation behind, const Row* row, Row* next,
+        Row* second, Link* link) {
     Symmetric inverse = inverseOfMobile(row->diagonal, PROPERTY(MOBILE, node));
     Vector raised = symmetricTimes(inverse, link->first);
     double reciprocal = 1/(link->resistance+product(link->first, raised));
@@ -65,8 +90,7 @@ DEVICE void eliminatePair(const Step* step, int node, int following, const Row* 
     FIELD(TENSION_FOUND, node) = tension;
     if (following == 0)
         return;
-    Vector t = loadVector(step, NEW_TANGENT, node), lastBefore = link->last, pull = symmetricTimes(inverse, t);
-    double compliance = FIELD(COMPLIANCE, node);
+    Vector t = behind.direction, lastBefore = link->last, pull = symmetricTimes(inverse, t);
     Matrix toNext = sumOf(symmetricTimesMatrix(inverse, row->upper), outer(give, lastBefore));
     Vector first = lastBefore*reciprocal-transposedTimes(row->upper, give);
     storeVector(step, PULL, node, pull);
@@ -75,8 +99,8 @@ DEVICE void eliminatePair(const Step* step, int node, int following, const Row* 
     storeVector(step, FIRST, node, first);
     next->right = next->right-transposedTimes(row->upper, solution)-lastBefore*tension;
     next->diagonal = withOuter(lessTransposedProduct(next->diagonal, row->upper, toNext), lastBefore, first);
-    link->resistance = compliance+product(t, pull);
-    link->right = compliance*FIELD(TENSION_START, node)-product(t, solution);
+    link->resistance = behind.compliance+product(t, pull);
+    link->right = behind.compliance*behind.start-product(t, solution);
     link->first = t+transposedTimes(toNext, t);
     Matrix toSecond = zeroMatrix();
     Vector last = zeroVector();
@@ -85,7 +109,8 @@ DEVICE void eliminatePair(const Step* step, int node, int following, const Row* 
         toSecond = symmetricTimesMatrix(inverse, row->second);
         last = transposedTimes(row->second, give)*-1.0;
         link->last = transposedTimes(toSecond, t);
-        next->upper = sumOf(differenceOf(next->upper, transposedProduct(row->upper, toSecond)), outer(lastBefore, last));
+        next->upper = sumOf(differenceOf(next->upper, transposedProduct(row->upper, toSecond)),
+                outer(lastBefore, last));
         second->diagonal = lessTransposedProduct(second->diagonal, row->second, toSecond);
         second->right = second->right-transposedTimes(row->second, solution);
     }
@@ -94,74 +119,30 @@ DEVICE void eliminatePair(const Step* step, int node, int following, const Row* 
 }
 
 #ifdef CLOSED
-/** Eliminate a node of a ring. The first two nodes come last, and all others are coupled to them. */
-DEVICE void eliminateOfRing(const Step* step, int node, Row* row, Row* next, Row* second, Row* border, Link* link) {
-    int n = step->own;
-    if (node < 2) {
-        border[node].diagonal = row->diagonal;
-        border[node].right = row->right;
-        second->border[node] = transposed(row->second);
-        if (node == 0)
-            border[0].upper = row->upper;
-        else {
-            next->border[1] = transposed(row->upper);
-            link->resistance = FIELD(COMPLIANCE, 1);
-            link->right = FIELD(COMPLIANCE, 1)*FIELD(TENSION_START, 1);
-            link->first = loadVector(step, NEW_TANGENT, 1);
-            link->last = link->border[0] = zeroVector();
-            link->border[1] = link->first*-1.0;
-        }
-        return;
-    }
-    // The nodes behind the last one are the first two.
-    if (node == n-2) {
-        row->border[0] = sumOf(row->border[0], row->second);
-        row->second = zeroMatrix();
-    }
-    if (node == n-1) {
-        row->border[0] = sumOf(row->border[0], row->upper);
-        row->border[1] = sumOf(row->border[1], row->second);
-        row->upper = row->second = zeroMatrix();
-        link->border[0] = link->border[0]+link->last;
-        link->last = zeroVector();
-    }
-    Link before = *link;
-    eliminatePair(step, node, 2, row, next, second, link);
+/** Pass on what couples a node of a ring, which has just been eliminated, to the first two nodes. */
+inline DEVICE void eliminateFromBorder(const Step* step, int node, Vector direction, const Row* row, Row* next,
+        Row* second, Row* border, const Link* before, Link* link) {
     Symmetric inverse = loadSymmetric(step, INVERSE, node);
     Vector give = loadVector(step, GIVE, node), solution = loadVector(step, SOLUTION, node);
-    Vector direction = loadVector(step, NEW_TANGENT, node), ofTension[2];
+    Vector ofTension[2];
     double reciprocal = FIELD(RECIPROCAL, node), tension = FIELD(TENSION_FOUND, node);
     Matrix couplings[2];
     for (int k = 0; k < 2; k++) {
-        Matrix coupling = sumOf(symmetricTimesMatrix(inverse, row->border[k]), outer(give, before.border[k]));
+        Matrix coupling = sumOf(symmetricTimesMatrix(inverse, row->border[k]), outer(give, before->border[k]));
         couplings[k] = coupling;
-        ofTension[k] = before.border[k]*reciprocal-transposedTimes(row->border[k], give);
+        ofTension[k] = before->border[k]*reciprocal-transposedTimes(row->border[k], give);
         storeMatrix(step, BORDER+9*k, node, coupling);
         storeVector(step, TENSION_BORDER+3*k, node, ofTension[k]);
         next->border[k] = sumOf(differenceOf(next->border[k], transposedProduct(row->upper, coupling)),
-                outer(before.last, ofTension[k]));
+                outer(before->last, ofTension[k]));
         second->border[k] = differenceOf(second->border[k], transposedProduct(row->second, coupling));
         border[k].diagonal = withOuter(lessTransposedProduct(border[k].diagonal, row->border[k], coupling),
-                before.border[k], ofTension[k]);
-        border[k].right = border[k].right-transposedTimes(row->border[k], solution)-before.border[k]*tension;
+                before->border[k], ofTension[k]);
+        border[k].right = border[k].right-transposedTimes(row->border[k], solution)-before->border[k]*tension;
         link->border[k] = transposedTimes(coupling, direction);
     }
     border[0].upper = sumOf(differenceOf(border[0].upper, transposedProduct(row->border[0], couplings[1])),
-            outer(before.border[0], ofTension[1]));
-}
-
-/** Eliminate the first two nodes of a ring, whose rows have been begun a second time behind the last node. */
-DEVICE void closeRing(const Step* step, const Row* first, const Row* second, Row* border, Link* link) {
-    border[0].diagonal = sumOfSymmetric(border[0].diagonal, first->diagonal);
-    border[0].upper = sumOf(border[0].upper, first->upper);
-    border[0].right = border[0].right+first->right;
-    border[1].diagonal = sumOfSymmetric(border[1].diagonal, second->diagonal);
-    border[1].right = border[1].right+second->right;
-    link->first = link->first+link->border[0];
-    link->last = link->border[1];
-    Row none = emptyRow();
-    for (int node = 0; node < 2; node++)
-        eliminatePair(step, node, 1-node, &border[node], &border[1], &none, link);
+            outer(before->border[0], ofTension[1]));
 }
 #endif
 
@@ -171,109 +152,57 @@ inline DEVICE void keepTension(const Step* step, int s) {
     FIELD(MULTIPLIER, s) = FIELD(TENSION, s)+FIELD(SHIFT, s)*product(loadVector(step, NEW_TANGENT, s), change);
 }
 
-/** Find the changes of nodes and the tensions, or add to them. */
-DEVICE void substitute(const Step* step, bool adds) {
-    const int n = step->own;
-    Vector next = zeroVector(), second = zeroVector();
-    double tension = 0;
-#ifdef CLOSED
-    Vector found1 = loadVector(step, SOLUTION, 1);
-    double tension0 = FIELD(TENSION_FOUND, 1);
-    Vector found0 = loadVector(step, SOLUTION, 0)-matrixTimes(loadMatrix(step, NEXT, 0), found1)+
-            loadVector(step, PULL, 0)*tension0;
-    tension = FIELD(TENSION_FOUND, 0)+product(loadVector(step, FIRST, 0), found1)+FIELD(SHARE, 0)*tension0;
-    FIELD(TENSION, 0) = tension0+(adds ? FIELD(TENSION, 0) : 0);
-    FIELD(TENSION, n-1) = tension+(adds ? FIELD(TENSION, n-1) : 0);
-    Vector change0 = adds ? loadVector(step, CHANGE, 0)+found0 : found0;
-    Vector change1 = adds ? loadVector(step, CHANGE, 1)+found1 : found1;
-    storeVector(step, CHANGE, 0, change0);
-    storeVector(step, CHANGE, 1, change1);
-    storeVector(step, CHANGE, n, change0);
-    storeVector(step, CHANGE, n+1, change1);
-    const int firstNode = 2;
-#else
-    const int firstNode = 0;
-#endif
-    for (int node = n-1; node >= firstNode; node--) {
-        Vector here = loadVector(step, SOLUTION, node);
-        double found = FIELD(TENSION_FOUND, node);
-#ifndef CLOSED
-        if (node < n-1)
-#endif
-        {
-            here = here-matrixTimes(loadMatrix(step, NEXT, node), next)-
-                    matrixTimes(loadMatrix(step, SECOND, node), second)+loadVector(step, PULL, node)*tension;
-            found += product(loadVector(step, FIRST, node), next)+product(loadVector(step, LAST, node), second)+
-                    FIELD(SHARE, node)*tension;
-        }
-#ifdef CLOSED
-        here = here-matrixTimes(loadMatrix(step, BORDER, node), found0)-
-                matrixTimes(loadMatrix(step, BORDER+9, node), found1);
-        found += product(loadVector(step, TENSION_BORDER, node), found0)+
-                product(loadVector(step, TENSION_BORDER+3, node), found1);
-#endif
-        storeVector(step, CHANGE, node, adds ? loadVector(step, CHANGE, node)+here : here);
-        if (node > 0)
-            FIELD(TENSION, node-1) = found+(adds ? FIELD(TENSION, node-1) : 0);
-        tension = found;
-        second = next;
-        next = here;
-    }
-    for (int s = 0; s < step->segments; s++)
-        keepTension(step, s);
-}
-
 /** What the last iteration's tensions lack of acting along the mean direction, as a force on a segment's first node. */
 inline DEVICE Vector forceOfTurning(const Step* step, int s) {
     return loadVector(step, TURNED, s)*(FIELD(MULTIPLIER, s)-FIELD(MULTIPLIER_BEFORE, s));
 }
 
-/** Let the change of tensions act along the mean direction as well, with the same elimination. */
-DEVICE void refine(const Step* step) {
-    const int n = step->own;
-    Vector here = zeroVector(), next = zeroVector(), forceBefore = zeroVector();
-    double start = 0;
-#ifdef CLOSED
-    Vector force0 = forceOfTurning(step, 0), force1 = forceOfTurning(step, 1), ofBorder[2];
-    ofBorder[0] = force0-forceOfTurning(step, n-1);
-    ofBorder[1] = force1-force0;
-    forceBefore = force1;
-    const int firstNode = 2;
-#else
-    const int firstNode = 0;
-#endif
-    for (int node = firstNode; node < n; node++) {
-        Vector right = here-forceBefore, give = loadVector(step, GIVE, node);
-        if (node < step->segments) {
-            forceBefore = forceOfTurning(step, node);
-            right = right+forceBefore;
-        }
-        Vector solution = symmetricTimes(loadSymmetric(step, INVERSE, node), right)-give*start;
-        storeVector(step, SOLUTION, node, solution);
-        FIELD(TENSION_FOUND, node) = FIELD(RECIPROCAL, node)*start+product(give, right);
-#ifdef CLOSED
-        for (int k = 0; k < 2; k++)
-            ofBorder[k] = ofBorder[k]-transposedTimes(loadMatrix(step, BORDER+9*k, node), right)-
-                    loadVector(step, TENSION_BORDER+3*k, node)*start;
-#else
-        if (node == n-1)
-            break;
-#endif
-        here = next-transposedTimes(loadMatrix(step, NEXT, node), right)-loadVector(step, FIRST, node)*start;
-        next = (transposedTimes(loadMatrix(step, SECOND, node), right)+loadVector(step, LAST, node)*start)*-1.0;
-        start = -product(loadVector(step, NEW_TANGENT, node), solution);
+/**
+ * Find the change of a node, or add to it, and the tension of the segment before it.
+ *
+ * @param coupled   whether other nodes are behind it
+ * @param before    the segment before it, or -1
+ */
+inline DEVICE void substitutePair(const Step* step, int node, bool coupled, int before, bool adds, Found* behind) {
+    Vector here = loadVector(step, SOLUTION, node), change = loadVector(step, CHANGE, node);
+    double found = FIELD(TENSION_FOUND, node), tension = FIELD(TENSION, before < 0 ? 0 : before);
+    if (coupled) {
+        here = here-matrixTimes(loadMatrix(step, NEXT, node), behind->next)-
+                matrixTimes(loadMatrix(step, SECOND, node), behind->second)+
+                loadVector(step, PULL, node)*behind->tension;
+        found += product(loadVector(step, FIRST, node), behind->next)+
+                product(loadVector(step, LAST, node), behind->second)+FIELD(SHARE, node)*behind->tension;
     }
 #ifdef CLOSED
-    for (int node = 0; node < 2; node++) {
-        Vector right = ofBorder[node], give = loadVector(step, GIVE, node);
-        Vector solution = symmetricTimes(loadSymmetric(step, INVERSE, node), right)-give*start;
-        storeVector(step, SOLUTION, node, solution);
-        FIELD(TENSION_FOUND, node) = FIELD(RECIPROCAL, node)*start+product(give, right);
-        if (node == 0)
-            ofBorder[1] = ofBorder[1]-transposedTimes(loadMatrix(step, NEXT, 0), right)-
-                    loadVector(step, FIRST, 0)*start;
-        start = -product(loadVector(step, NEW_TANGENT, node), solution);
-    }
+    here = here-matrixTimes(loadMatrix(step, BORDER, node), behind->border[0])-
+            matrixTimes(loadMatrix(step, BORDER+9, node), behind->border[1]);
+    found += product(loadVector(step, TENSION_BORDER, node), behind->border[0])+
+            product(loadVector(step, TENSION_BORDER+3, node), behind->border[1]);
 #endif
-    substitute(step, true);
+    change = change+here;
+    tension += found;
+    storeVector(step, CHANGE, node, make_double3(adds ? change.x : here.x, adds ? change.y : here.y,
+            adds ? change.z : here.z));
+    if (before >= 0)
+        FIELD(TENSION, before) = adds ? tension : found;
+    behind->tension = found;
+    behind->second = behind->next;
+    behind->next = here;
+}
+
+/** Take a new right side of a node, with the same elimination. */
+inline DEVICE void setRightSide(const Step* step, int node, Vector own, Vector direction, RightSides* sides) {
+    Vector right = sides->here+own, give = loadVector(step, GIVE, node);
+    double start = sides->start;
+    Vector solution = symmetricTimes(loadSymmetric(step, INVERSE, node), right)-give*start;
+    storeVector(step, SOLUTION, node, solution);
+    FIELD(TENSION_FOUND, node) = FIELD(RECIPROCAL, node)*start+product(give, right);
+#ifdef CLOSED
+    for (int k = 0; k < 2; k++)
+        sides->border[k] = sides->border[k]-transposedTimes(loadMatrix(step, BORDER+9*k, node), right)-
+                loadVector(step, TENSION_BORDER+3*k, node)*start;
+#endif
+    sides->here = sides->next-transposedTimes(loadMatrix(step, NEXT, node), right)-loadVector(step, FIRST, node)*start;
+    sides->next = (transposedTimes(loadMatrix(step, SECOND, node), right)+loadVector(step, LAST, node)*start)*-1.0;
+    sides->start = -product(direction, solution);
 }

@@ -38,6 +38,11 @@ inline DEVICE Symmetric sumOfSymmetric(Symmetric a, Symmetric b) {
     return m;
 }
 
+inline DEVICE Symmetric scaledSymmetric(Symmetric m, double s) {
+    Symmetric r = {m.xx*s, m.yx*s, m.yy*s, m.zx*s, m.zy*s, m.zz*s};
+    return r;
+}
+
 inline DEVICE Symmetric withDiagonal(Symmetric m, double s) {
     m.xx += s;
     m.yy += s;

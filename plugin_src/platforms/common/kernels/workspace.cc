@@ -19,7 +19,12 @@ typedef struct {
     GLOBAL const int* firstTethers;
     GLOBAL const double* tethers;
     GLOBAL double* tetherMemory;
+#ifdef CHAIN_BY_GROUP
+    LOCAL_ARG double* exchanged;
+    LOCAL_ARG double* middle;
+#endif
     size_t stride, tableStride;
+    int places;
     NoiseKey key;
     Vector shift, flowAtZero;
     double h, kT, nodeFriction;
@@ -33,7 +38,12 @@ typedef struct {
 #else
 #define NUM_FIELDS NUM_FIELDS_OF_OPEN_CHAIN
 #endif
+#ifdef CHAIN_BY_GROUP
+/** Work-items of a group read the same field of neighbouring places together. */
+#define FIELD(field, place) step->memory[(field)*step->places+(place)]
+#else
 #define FIELD(field, place) step->memory[(size_t) ((place)*NUM_FIELDS+(field))*step->stride]
+#endif
 #define PROPERTY(property, place) step->table[(size_t) ((place)*NUM_PROPERTIES+(property))*step->tableStride]
 
 inline DEVICE Vector loadVector(const Step* step, int field, int place) {

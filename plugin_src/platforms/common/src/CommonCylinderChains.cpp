@@ -3,6 +3,7 @@
 #include "CommonCylinderChainKernelSources.h"
 #include "openmm/OpenMMException.h"
 #include <algorithm>
+#include <cstdlib>
 #include <numeric>
 
 using namespace OpenMM;
@@ -22,7 +23,15 @@ static const double LARGEST_WORKSPACE = 1e9;
 /**
  * Work-items of a GPU are in groups of this size.
  */
-static const int GROUP_SIZE = 32;
+static const int GROUP_SIZE = layout::ITEMS_OF_CHAIN;
+
+/**
+ * A group of work-items for each chain takes implicit steps of no more chains than these.  A group takes a step in about
+ * a seventh of the time of one work-item, but a GPU can have fewer groups at once.  With an estimate of 0.3 us of an
+ * H100 for each chain of 64 segments and step, as many chains as these take the 1.8 ms that one work-item for each of
+ * them would, however few they are; see the page on platforms.
+ */
+static const int MOST_CHAINS_OF_GROUPS = 6000;
 
 /**
  * Chains that one kernel computes.
@@ -30,9 +39,9 @@ static const int GROUP_SIZE = 32;
 struct CommonCylinderChains::Batch {
     ChainTable table;
     int items, groupSize;
+    ComputeProgram program;
     ComputeArray numbers, properties, places, workspace;
     ComputeKernel advance, forces;
-    bool advanceHasArguments = false, forcesHaveArguments = false;
 };
 
 /**
@@ -56,6 +65,19 @@ private:
     bool& slotsAreValid;
 };
 
+/**
+ * Whether groups take implicit steps.  The variable CYLCHAIN_WORK_ITEMS of the environment, 1 or 32, says how many
+ * work-items take those of a chain.
+ */
+static bool takesGroups(const ComputeContext& cc, size_t numChains) {
+    const char* asked = getenv("CYLCHAIN_WORK_ITEMS");
+    if (asked == NULL || *asked == 0)
+        return !cc.getIsCPU() && numChains <= MOST_CHAINS_OF_GROUPS;
+    if (asked != to_string(GROUP_SIZE) && asked != string("1"))
+        throw OpenMMException("CYLCHAIN_WORK_ITEMS must be 1 or "+to_string(GROUP_SIZE)+", but is "+asked);
+    return asked != string("1");
+}
+
 template <class T> static void makeArray(ComputeContext& cc, ComputeArray& array, const vector<T>& values,
         const string& name) {
     // There are no empty arrays.
@@ -65,7 +87,7 @@ template <class T> static void makeArray(ComputeContext& cc, ComputeArray& array
 }
 
 CommonCylinderChains::CommonCylinderChains(ComputeContext& cc, const CylinderChainDescription& description) : cc(cc),
-        description(description), slotsAreValid(false) {
+        description(description), usesGroups(takesGroups(cc, description.getChains().size())), slotsAreValid(false) {
     if (!cc.getSupportsDoublePrecision())
         throw OpenMMException("Filaments need a device that computes in double precision, and this one does not. "
                 "Use the CPU platform, or another device");
@@ -90,7 +112,7 @@ CommonCylinderChains::CommonCylinderChains(ComputeContext& cc, const CylinderCha
     makeArray(cc, box, boxNumbers, "boxOfChains");
     makeArray(cc, summary, vector<uint64_t>(layout::NUM_SUMMARY_NUMBERS), "summaryOfStep");
     cc.addReorderListener(new ReorderListener(slotsAreValid));
-    makeBatches();
+    uploadTethers();
     const ComputeProgram program = compile(cc, CommonCylinderChainKernelSources::particles);
     gatherKernel = program->createKernel("gatherNodes");
     scatterKernel = program->createKernel("scatterForces");
@@ -111,10 +133,12 @@ ComputeProgram CommonCylinderChains::compile(ComputeContext& cc, const string& s
     return cc.compileProgram(string(Sources::layout)+Sources::constants+Sources::vectors+Sources::noise+source);
 }
 
-ComputeProgram CommonCylinderChains::programFor(const Chain& chain) {
+ComputeProgram CommonCylinderChains::programFor(const Chain& chain, bool byGroup) {
     typedef CommonCylinderChainKernelSources Sources;
     map<string, string> defines = definesFor(chain);
-    if (cc.getIsCPU())
+    if (byGroup)
+        defines["CHAIN_BY_GROUP"] = "1";
+    else if (cc.getIsCPU())
         defines["CHAIN_BY_CHAIN"] = "1";
     string variant;
     for (const auto& define : defines)
@@ -122,16 +146,17 @@ ComputeProgram CommonCylinderChains::programFor(const Chain& chain) {
     ComputeProgram& program = programs[variant];
     if (!program)
         program = cc.compileProgram(string(Sources::layout)+Sources::constants+Sources::vectors+Sources::noise+
-                Sources::potentials+Sources::workspace+Sources::stages+Sources::tensionBand+Sources::equations+
-                Sources::metricForces+Sources::implicitStep+Sources::explicitStep+Sources::chainForces+
-                Sources::chainKernels, defines);
+                Sources::potentials+Sources::workspace+Sources::workItems+Sources::stages+Sources::tensionBand+
+                Sources::equations+Sources::metricForces+Sources::solverOfItem+Sources::solverOfGroup+
+                Sources::implicitStep+Sources::explicitStep+Sources::chainForces+Sources::chainKernels, defines);
     return program;
 }
 
-void CommonCylinderChains::makeBatches() {
+const vector<unique_ptr<CommonCylinderChains::Batch> >& CommonCylinderChains::getBatches(bool byGroup) {
+    vector<unique_ptr<Batch> >& batches = byGroup ? groupBatches : itemBatches;
+    if (!batches.empty())
+        return batches;
     const vector<Chain>& chains = description.getChains();
-    batches.clear();
-    uploadTethers();
     vector<int> order(chains.size());
     iota(order.begin(), order.end(), 0);
     stable_sort(order.begin(), order.end(), [&] (int a, int b) {
@@ -150,30 +175,27 @@ void CommonCylinderChains::makeBatches() {
             batch->push_back(chain);
     }
     for (const vector<int>& own : members)
-        batches.push_back(makeBatch(own));
+        batches.push_back(makeBatch(own, byGroup));
+    return batches;
 }
 
-unique_ptr<CommonCylinderChains::Batch> CommonCylinderChains::makeBatch(const vector<int>& members) {
+unique_ptr<CommonCylinderChains::Batch> CommonCylinderChains::makeBatch(const vector<int>& members, bool byGroup) {
     unique_ptr<Batch> batch(new Batch());
-    batch->table = tabulate(description.getChains(), members, firstNodes, cc.getIsCPU());
+    batch->table = tabulate(description.getChains(), members, firstNodes, byGroup || cc.getIsCPU());
     const ChainTable& table = batch->table;
-    const double perItem = (double) sizeof(double)*table.numPlaces*table.numFields;
-    const int most = max(1, (int) min(1e9, LARGEST_WORKSPACE/perItem));
-    if (cc.getIsCPU()) {
-        batch->groupSize = 1;
-        batch->items = min(table.numChains, max(1, cc.getNumThreadBlocks()));
-    }
-    else {
-        batch->groupSize = GROUP_SIZE;
+    const double perChain = (double) sizeof(double)*table.numPlaces*table.numFields;
+    const int most = max(1, (int) min(1e9, LARGEST_WORKSPACE/perChain)), blocks = max(1, cc.getNumThreadBlocks());
+    batch->groupSize = byGroup || !cc.getIsCPU() ? GROUP_SIZE : 1;
+    if (byGroup)
+        batch->items = min(min(table.numChains, most), blocks)*GROUP_SIZE;
+    else if (cc.getIsCPU())
+        batch->items = min(table.numChains, blocks);
+    else
         batch->items = (min(table.numChains, most)+GROUP_SIZE-1)/GROUP_SIZE*GROUP_SIZE;
-    }
     makeArray(cc, batch->numbers, table.numbers, "chains");
     makeArray(cc, batch->properties, table.properties, "propertiesOfChains");
     makeArray(cc, batch->places, table.places, "places");
-    batch->workspace.initialize<double>(cc, (size_t) batch->items*table.numPlaces*table.numFields, "workspace");
-    const ComputeProgram program = programFor(description.getChains()[members[0]]);
-    batch->advance = program->createKernel("advanceChains");
-    batch->forces = program->createKernel("computeForces");
+    batch->program = programFor(description.getChains()[members[0]], byGroup);
     return batch;
 }
 
@@ -188,7 +210,9 @@ void CommonCylinderChains::uploadTethers() {
 }
 
 void CommonCylinderChains::update() {
-    makeBatches();
+    itemBatches.clear();
+    groupBatches.clear();
+    uploadTethers();
 }
 
 ComputeArray& CommonCylinderChains::getSlots() {
@@ -283,9 +307,9 @@ void CommonCylinderChains::addForces(bool includeForces, ChainEnergy* energy) {
     updateBox();
     updateShifts();
     const int flags = description.usesPeriodicBoundaryConditions() ? layout::IS_PERIODIC : 0;
-    for (auto& batch : batches) {
-        if (!batch->forcesHaveArguments) {
-            batch->forcesHaveArguments = true;
+    for (const unique_ptr<Batch>& batch : getBatches(false)) {
+        if (!batch->forces) {
+            batch->forces = batch->program->createKernel("computeForces");
             batch->forces->addArg(batch->table.numChains);
             batch->forces->addArg(batch->table.numPlaces);
             batch->forces->addArg(flags);
@@ -318,21 +342,30 @@ void CommonCylinderChains::addForces(bool includeForces, ChainEnergy* energy) {
 }
 
 int CommonCylinderChains::advance(const StepSettings& settings, int count, bool findsForces, long long& divided) {
+    divided = 0;
+    stepsTaken.assign(description.getChains().size(), count);
+    if (count == 0)
+        return 0;
     const int flags = describeStep(settings) | (findsForces ? layout::FINDS_FORCES : 0);
+    const bool isImplicit = settings.scheme == Scheme::Implicit || settings.scheme == Scheme::ImplicitSecondOrder;
+    const bool byGroup = usesGroups && isImplicit;
     cc.clearBuffer(summary);
-    for (auto& batch : batches) {
-        ComputeKernel kernel = batch->advance;
-        if (!batch->advanceHasArguments) {
-            batch->advanceHasArguments = true;
-            kernel->addArg(batch->table.numChains);
-            kernel->addArg(batch->table.numPlaces);
+    for (const unique_ptr<Batch>& batch : getBatches(byGroup)) {
+        if (!batch->advance) {
+            const size_t chainsAtOnce = batch->items/(byGroup ? GROUP_SIZE : 1);
+            batch->workspace.initialize<double>(cc, chainsAtOnce*batch->table.numPlaces*batch->table.numFields,
+                    "workspace");
+            batch->advance = batch->program->createKernel("advanceChains");
+            batch->advance->addArg(batch->table.numChains);
+            batch->advance->addArg(batch->table.numPlaces);
             for (int i = 0; i < 7; i++)
-                kernel->addArg();
+                batch->advance->addArg();
             for (ComputeArray* array : {&positions, &forces, &energies, &displacements, &batch->workspace,
                     &batch->places, &batch->numbers, &batch->properties, &shifts, &arrays->firstTethers,
                     &arrays->tethers, &arrays->tetherMemory, &flow, &box, &taken, &summary})
-                kernel->addArg(*array);
+                batch->advance->addArg(*array);
         }
+        const ComputeKernel kernel = batch->advance;
         kernel->setArg(2, count);
         kernel->setArg(3, flags);
         kernel->setArg(4, settings.stepSize);
@@ -344,7 +377,6 @@ int CommonCylinderChains::advance(const StepSettings& settings, int count, bool 
     }
     const vector<uint64_t> found = readSummary();
     divided = found[layout::NUM_DIVIDED_STEPS];
-    stepsTaken.assign(description.getChains().size(), count);
     if (found[layout::NUM_UNSTABLE_CHAINS] > 0)
         taken.download(stepsTaken);
     return stepsTaken.empty() ? count : *min_element(stepsTaken.begin(), stepsTaken.end());
