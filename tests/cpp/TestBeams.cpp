@@ -535,9 +535,6 @@ static void testFailures() {
             "elements longer than a persistence length");
     settings.scheme = Scheme::Midpoint;
     check(isRefused([&] {engine.step(0, x.data(), f.data(), NULL, settings, moves.data());}), "an explicit scheme");
-    settings.scheme = Scheme::Implicit;
-    settings.flow.present = true;
-    check(isRefused([&] {engine.step(0, x.data(), f.data(), NULL, settings, moves.data());}), "a flow");
 }
 
 int main() {
