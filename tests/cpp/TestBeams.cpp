@@ -5,6 +5,7 @@
 
 #include "TestBeamChains.h"
 #include "beams/ElementPlace.h"
+#include "couplings/CapsuleGeometry.h"
 #include <algorithm>
 
 static void testForces() {
@@ -328,6 +329,68 @@ static void testFriction() {
     }
 }
 
+/** Of an element in the middle of two arrays of positions: r' by x at a place. */
+static Vec3d slopeOf(const BeamChain& chain, int element, double place, const Array& x, const Array& y) {
+    const BezierWeights w = BezierWeights::ofTangent(place, 1);
+    Vec3d points[4];
+    for (int i = 0; i < 4; i++) {
+        const int particle = 3*chain.particles[2*element+i];
+        points[i] = Vec3d {x[particle]+y[particle], x[particle+1]+y[particle+1], x[particle+2]+y[particle+2]}*0.5;
+    }
+    return points[0]*w.position1+(points[1]-points[0])*w.control1+points[2]*w.position2+
+            (points[3]-points[2])*w.control2;
+}
+
+/**
+ * Where friction is the same in all directions, the mean place of a curve moves with the mean of its tangents, in a
+ * pack of chains with other propulsions, and without any.
+ */
+static void testPropulsion() {
+    const double places[] = {0.06943184420297371, 0.33000947820757187}, shares[] = {0.17392742256872693,
+            0.32607257743127307};
+    for (bool planar : {false, true}) {
+        NormalNumbers normalNumbers(7);
+        Array x;
+        vector<BeamChain> chains;
+        for (int elements : {5, 1, 3, 4, 4, 2}) {
+            chains.push_back(beam(elements, 2, 500, 70, x));
+            chains.back().planar = planar;
+            chains.back().parallelFriction = chains.back().perpendicularFriction = 1.7;
+            chains.back().propulsion = 4*((int) chains.size()-3);
+        }
+        const Array scatter = normalNumbers(x.size());
+        for (size_t i = 0; i < x.size(); i++)
+            if (!planar || i%3 < 2)
+                x[i] += 0.1*scatter[i];
+        const BeamEngine engine(chains);
+        const Array start = x, f(x.size());
+        StepSettings settings = {Scheme::Implicit, 0, 0.002, 5, 0};
+        check(advance(engine, x, f, settings) == 0, "a step is divided");
+        for (const BeamChain& chain : chains) {
+            double moved[3] = {}, expected[3] = {};
+            for (int e = 0; e < chain.numNodes()-1; e++) {
+                // The integral of the curve by x: half of each node, and a quarter of each control vector.
+                const double weights[] = {0.25, 0.25, 0.75, -0.25};
+                for (int i = 0; i < 4; i++)
+                    for (int k = 0; k < 3; k++) {
+                        const int number = 3*chain.particles[2*e+i]+k;
+                        moved[k] += weights[i]*(x[number]-start[number]);
+                    }
+                for (int g = 0; g < 4; g++) {
+                    const Vec3d slope = slopeOf(chain, e, g < 2 ? places[g] : 1-places[3-g], start, x);
+                    const Vec3d part = slope*(shares[g < 2 ? g : 3-g]/sqrt(slope.squared()));
+                    expected[0] += part.x;
+                    expected[1] += part.y;
+                    expected[2] += part.z;
+                }
+            }
+            for (int k = 0; k < 3; k++)
+                checkClose(expected[k]*chain.propulsion*settings.stepSize/(1.7*chain.elementLength), moved[k], 0.01, 2e-3,
+                        "how far propulsion takes a chain");
+        }
+    }
+}
+
 /**
  * A force moves a chain without stiffness, which is bent, by the inverse of the friction: Z dx = h f. Its control
  * vectors take the forces on control points, and positions those on both particles of a node.
@@ -570,6 +633,6 @@ static void testFailures() {
 
 int main() {
     return runTests({testForces, testTethers, testPlacesOfElements, testEnergyOfShapes, testCantilevers, testCouple,
-            testBuckling, testFriction, testMobility, testNoise, testRods, testNeighbours, testPlaneAndParts,
-            testFlow, testFailures});
+            testBuckling, testFriction, testPropulsion, testMobility, testNoise, testRods, testNeighbours,
+            testPlaneAndParts, testFlow, testFailures});
 }
