@@ -372,10 +372,12 @@ void ContactEquations::evaluate(int number, bool first, const PairOutlook* outlo
                 softness = softnessOf(pair, contact);
             side.rest = ContactRest(softness, first ? max(contact.gap, -LARGEST_RETURN*diameter) : 0);
         }
-        if (iterations <= RETURNING_ITERATIONS && !side.rest.isResolved() && !side.rest.isBack() && contact.gap < 0) {
+        const bool mayReturn = iterations <= RETURNING_ITERATIONS || contact.crossed;
+        if (mayReturn && !side.rest.isResolved() && !side.rest.isBack() && contact.gap < 0) {
             ContactCourse course;
             pairs.findCourse(number, contact, course);
             course.softness = softnessOf(pair, contact);
+            course.passed = iterations > RETURNING_ITERATIONS;
             side.rest.look(course, contact.gap, wallDepth, LARGEST_RETURN*diameter);
         }
         // Where contacts are not looked for any more, anyCross() sees whether they have come back.

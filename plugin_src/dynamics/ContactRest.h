@@ -12,6 +12,8 @@ struct ContactCourse {
     /** The normal there, the sum of the radii, and a = k c, see ContactRest. */
     const double* normal;
     double radii, softness;
+    /** Whether they have passed through each other although all that was behind the wall came back. */
+    bool passed = false;
 };
 
 /**

@@ -54,6 +54,7 @@ public:
     }
     void setCompliances(const double* compliances) override;
     bool finishIteration(const double* moves, const double* moved) override;
+    bool markUnfinished(PackFlags& packs) const override;
     void findFailures(const double* moved, std::vector<bool>& failed) const override;
     bool findCulprit(const double* moved, const CouplingEquation* equations, BrokenCoupling& culprit) const override;
     void findNeighbours(std::vector<std::pair<int, int> >& pairs) const override;
@@ -81,17 +82,24 @@ private:
         bool compliant, alone;
         /** The squared change of the last iteration, times the response. */
         double change;
+        /** How its places have moved while one of their packs took no part. */
+        double drift[3];
     };
     void place(const CoupledStart& start, const Link& link, State& state) const;
     void addStiffness(const ChainPlaces& places);
     void describe(const CoupledStart& start, State& state) const;
     void drawNoise(const CoupledStart& start);
+    void select();
+    void linearise(State& state, const double* moved, CouplingEquation& equation) const;
     bool isUnfinished(State& state, const double* move, const double* moved) const;
+    bool isTooMuch(const State& state, const double* move, double tolerance, double least) const;
     bool hasFailed(std::size_t number, const double* moved) const;
     static void turnResponse(const State& state, double* response);
     double describeMetric(const State& state, const double* r, double* force) const;
     void vectorOf(const State& state, const double* positions, double* r) const;
     std::vector<State> states;
+    /** Those of packs that take part in the iteration: its equations. */
+    std::vector<int> selected;
     /** Whether each needs another iteration. */
     std::vector<char> unfinished;
     const Loop* loop = nullptr;
