@@ -18,8 +18,8 @@ const double REACH = 0.25;
 const double LEAST_REACH = 0.2;
 /** The largest predicted overlap, and the largest gap that two come back to, over the same. */
 const double LARGEST_RETURN = 1;
-/** Where pairs with a larger gap are nearest is not looked for, over the same. */
-const double LARGEST_GAP = 0.3;
+/** Where pairs with a larger gap are nearest is not looked for, over the same: they come nearer first. */
+const double LARGEST_GAP = 0.02;
 /** Capsules that have travelled less touch where they did, over the same. */
 const double SAME_PLACE = 0.01;
 /**
@@ -549,8 +549,8 @@ bool ContactEquations::markUnfinished(PackFlags& packs) const {
 /** The packs of a pair take part in the next iteration. */
 void ContactEquations::mark(int pair) {
     for (int capsule : {pairs.getWatch(pair).a, pairs.getWatch(pair).b})
-        if (places[capsule].place.pack >= 0)
-            unfinished[places[capsule].place.pack] = 1;
+        if (packs[capsule] >= 0)
+            unfinished[packs[capsule]] = 1;
 }
 
 /** Find pairs that cross. */

@@ -258,7 +258,7 @@ void LinkEquations::linearise(int, const double* moved, vector<CouplingEquation>
 void LinkEquations::linearise(State& state, const double* moved, CouplingEquation& equation) const {
     copy(state.places, state.places+2, equation.places);
     const Link& link = *state.link;
-    double r[3];
+    double* const r = state.now;
     vectorOf(state, moved, r);
     double* const k = equation.stiffness;
     if (!state.turns) {
@@ -382,10 +382,11 @@ double LinkEquations::describeMetric(const State& state, const double* r, double
 }
 
 bool LinkEquations::isUnfinished(State& state, const double* move, const double* moved) const {
-    double r[3], ofStep = 0;
-    vectorOf(state, moved, r);
-    for (int k = 0; k < 3; k++)
-        ofStep += (r[k]-state.start[k])*(r[k]-state.start[k]);
+    double ofStep = 0;
+    for (int k = 0; k < 3; k++) {
+        const double way = state.now[k]+move[k]-state.start[k];
+        ofStep += way*way;
+    }
     const double ofChange = kT > 0 ? OF_CHANGE_WITH_NOISE : OF_CHANGE;
     const double rounding = kT > 0 ? 0 : OF_ROUNDING*largestCoordinate(*state.link, moved);
     const double least = ofChange*ofChange*ofStep+rounding*rounding+

@@ -72,8 +72,11 @@ private:
         double start[3], length, coordinate, random[3], theta;
         /** What a stage makes of these: the force is -k (implicit q(y)+constant). */
         double implicit, constant[3];
-        /** Of the last iteration: direction, distance, tension, its response, and the tension after it. */
-        double direction[3], distance, tension, response, slope, multiplier;
+        /**
+         * Of the last iteration: the vector from place to place with which it began, direction, distance, tension, its
+         * response, and the tension after it.
+         */
+        double now[3], direction[3], distance, tension, response, slope, multiplier;
         /** The least friction of its places, and how they move apart by a force between them, without this link. */
         double friction[2], compliance[6];
         /** The direction of the first iteration as a unit vector, and how a unit force along it moves them apart. */

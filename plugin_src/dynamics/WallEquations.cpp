@@ -73,6 +73,7 @@ void WallEquations::begin(const CoupledStart& start, const Loop& newLoop) {
 void WallEquations::beginStage(int stage, int numStages, const double*) {
     implicit = numStages == 2 && stage == 0 ? DIAGONAL : 1;
     reached.assign(places.size(), 0);
+    rooms.assign(places.size(), Room());
     for (Part& part : parts)
         part.states.clear();
 }
@@ -191,6 +192,9 @@ void WallEquations::finishPart(int number, const double* moves, const double* mo
             continue;
         const WallParticle& own = system->particles[i];
         const Position position = positionOf(i, moved);
+        if (rooms[i].holds(position.at))
+            continue;
+        double deepest = -HUGE_VAL;
         for (int face = 0; face < numFaces; face++) {
             if ((reached[i]>>face)&1)
                 continue;
@@ -198,6 +202,7 @@ void WallEquations::finishPart(int number, const double* moves, const double* mo
             state.particle = i;
             state.face = face;
             const double depth = findDepth(system->wall, face, position.at, own.radius, state.gradient);
+            deepest = max(deepest, depth);
             // What is beyond a face later on has been pushed there or was beside what was deeper: no prediction.
             const bool predicts = iterations < FREE_ITERATIONS;
             if (!(depth > (predicts ? 0 : tolerance)))
@@ -212,6 +217,11 @@ void WallEquations::finishPart(int number, const double* moves, const double* mo
             const double* y = position.at;
             state.offset = depth-(state.gradient[0]*y[0]+state.gradient[1]*y[1]+state.gradient[2]*y[2]);
             part.states.push_back(state);
+        }
+        // That of an ellipsoid is no distance.
+        if (deepest < 0 && system->wall.shape != WallShape::Ellipsoid) {
+            copy_n(position.at, 3, rooms[i].from);
+            rooms[i].square = deepest*deepest;
         }
     }
 }

@@ -87,6 +87,17 @@ private:
     std::vector<double> responses;
     std::vector<char> together;
     std::vector<unsigned char> reached;
+    /** Where a particle was, and the square of how far it may go from there before it is beyond another face. */
+    struct Room {
+        double from[3], square = -1;
+        bool holds(const double* to) const {
+            double way = 0;
+            for (int k = 0; k < 3; k++)
+                way += (to[k]-from[k])*(to[k]-from[k]);
+            return way < square;
+        }
+    };
+    std::vector<Room> rooms;
     std::vector<Part> parts;
 };
 
