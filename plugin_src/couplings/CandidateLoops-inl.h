@@ -120,6 +120,30 @@ CYLCHAIN_INLINE void transposeRecords(const float* base, Ints indices, Floats* n
         numbers[12+k] = (Floats) blocks<odd>(odd1, odd2);
     }
 }
+#elif defined(__AVX2__) && CYLCHAIN_LANES == 8
+/** The same of eight records. */
+CYLCHAIN_INLINE void transposeRecords(const float* base, Ints indices, Floats* numbers) {
+    for (int half = 0; half < 2; half++) {
+        __m256 a[8], b[8];
+        for (int i = 0; i < 8; i++)
+            a[i] = _mm256_loadu_ps(base+16*(std::size_t) indices[i]+8*half);
+        for (int i = 0; i < 8; i += 2) {
+            b[i] = _mm256_unpacklo_ps(a[i], a[i+1]);
+            b[i+1] = _mm256_unpackhi_ps(a[i], a[i+1]);
+        }
+        // Now in each block of four, number 4 block+k of records i to i+3.
+        for (int i = 0; i < 8; i += 4) {
+            a[i] = _mm256_shuffle_ps(b[i], b[i+2], 0x44);
+            a[i+1] = _mm256_shuffle_ps(b[i], b[i+2], 0xee);
+            a[i+2] = _mm256_shuffle_ps(b[i+1], b[i+3], 0x44);
+            a[i+3] = _mm256_shuffle_ps(b[i+1], b[i+3], 0xee);
+        }
+        for (int k = 0; k < 4; k++) {
+            numbers[8*half+k] = (Floats) _mm256_permute2f128_ps(a[k], a[4+k], 0x20);
+            numbers[8*half+4+k] = (Floats) _mm256_permute2f128_ps(a[k], a[4+k], 0x31);
+        }
+    }
+}
 #endif
 
 template <int Size> CYLCHAIN_INLINE LaneVector gatherVector(const float* base, Ints indices) {
@@ -133,7 +157,7 @@ struct LaneCapsules {
     CYLCHAIN_INLINE LaneCapsules(const CoarseCapsule* capsules, Ints indices) {
         static_assert(sizeof(CoarseCapsule) == 16*sizeof(float), "A capsule is sixteen numbers");
         const float* base = capsules[0].center;
-#if defined(__AVX512F__) && CYLCHAIN_LANES == 16
+#if (defined(__AVX512F__) && CYLCHAIN_LANES == 16) || (defined(__AVX2__) && CYLCHAIN_LANES == 8)
         Floats numbers[16];
         transposeRecords(base, indices, numbers);
         auto vector = [&] (int first) {
@@ -269,11 +293,11 @@ CYLCHAIN_INLINE DoubleVector gatherVectorOf(const double* base, Numbers records)
 /** Some segments in lanes. */
 struct LaneSegments {
     DoubleVector first, along, laterFirst, laterAlong, laterNext;
-#if defined(__AVX512F__) && CYLCHAIN_LANES == 16
+#if (defined(__AVX512F__) && CYLCHAIN_LANES == 16) || (defined(__AVX2__) && CYLCHAIN_LANES == 8)
     CYLCHAIN_INLINE LaneSegments(const MovingSegment* segments, Numbers records) {
         Doubles numbers[16];
-        for (int half = 0; half < 2; half++)
-            transposeHalves(segments[0].first+8*half, records, numbers+8*half);
+        for (int part = 0; part < 16/DOUBLES; part++)
+            transposePart(segments[0].first+DOUBLES*part, records, numbers+DOUBLES*part);
         auto vector = [&] (int begin) {
             return DoubleVector {numbers[begin], numbers[begin+1], numbers[begin+2]};
         };
@@ -284,11 +308,27 @@ struct LaneSegments {
         laterNext = vector(12);
     }
 private:
+#if CYLCHAIN_LANES == 8
+    /** Four numbers of each of four records, as transposeRecords() does. */
+    static CYLCHAIN_INLINE void transposePart(const double* base, Numbers records, Doubles* numbers) {
+        __m256d a[4], b[4];
+        for (int i = 0; i < 4; i++)
+            a[i] = _mm256_loadu_pd(base+16*(std::size_t) records[i]);
+        for (int i = 0; i < 4; i += 2) {
+            b[i] = _mm256_unpacklo_pd(a[i], a[i+1]);
+            b[i+1] = _mm256_unpackhi_pd(a[i], a[i+1]);
+        }
+        for (int k = 0; k < 2; k++) {
+            numbers[k] = (Doubles) _mm256_permute2f128_pd(b[k], b[2+k], 0x20);
+            numbers[2+k] = (Doubles) _mm256_permute2f128_pd(b[k], b[2+k], 0x31);
+        }
+    }
+#else
     template <int Which> static CYLCHAIN_INLINE __m512d blocksOf(__m512d one, __m512d other) {
         return _mm512_maskz_shuffle_f64x2(0xff, one, other, Which);
     }
     /** Eight numbers of each of eight records, as transposeRecords() does. */
-    static CYLCHAIN_INLINE void transposeHalves(const double* base, Numbers records, Doubles* numbers) {
+    static CYLCHAIN_INLINE void transposePart(const double* base, Numbers records, Doubles* numbers) {
         __m512d a[8], b[8];
         for (int i = 0; i < 8; i++)
             a[i] = _mm512_loadu_pd(base+16*(std::size_t) records[i]);
@@ -306,6 +346,7 @@ private:
             numbers[6+k] = (Doubles) blocksOf<odd>(odd1, odd2);
         }
     }
+#endif
 #else
     CYLCHAIN_INLINE LaneSegments(const MovingSegment* segments, Numbers records) {
         const double* base = segments[0].first;

@@ -18,8 +18,8 @@ const double REACH = 0.25;
 const double LEAST_REACH = 0.2;
 /** The largest predicted overlap, and the largest gap that two come back to, over the same. */
 const double LARGEST_RETURN = 1;
-/** Where pairs with a larger gap are nearest is not looked for, over the same. */
-const double LARGEST_GAP = 0.3;
+/** Where pairs with a larger gap are nearest is not looked for, over the same: they come nearer first. */
+const double LARGEST_GAP = 0.02;
 /** Capsules that have travelled less touch where they did, over the same. */
 const double SAME_PLACE = 0.01;
 /**
@@ -372,10 +372,12 @@ void ContactEquations::evaluate(int number, bool first, const PairOutlook* outlo
                 softness = softnessOf(pair, contact);
             side.rest = ContactRest(softness, first ? max(contact.gap, -LARGEST_RETURN*diameter) : 0);
         }
-        if (iterations <= RETURNING_ITERATIONS && !side.rest.isResolved() && !side.rest.isBack() && contact.gap < 0) {
+        const bool mayReturn = iterations <= RETURNING_ITERATIONS || contact.crossed;
+        if (mayReturn && !side.rest.isResolved() && !side.rest.isBack() && contact.gap < 0) {
             ContactCourse course;
             pairs.findCourse(number, contact, course);
             course.softness = softnessOf(pair, contact);
+            course.passed = iterations > RETURNING_ITERATIONS;
             side.rest.look(course, contact.gap, wallDepth, LARGEST_RETURN*diameter);
         }
         // Where contacts are not looked for any more, anyCross() sees whether they have come back.
@@ -547,8 +549,8 @@ bool ContactEquations::markUnfinished(PackFlags& packs) const {
 /** The packs of a pair take part in the next iteration. */
 void ContactEquations::mark(int pair) {
     for (int capsule : {pairs.getWatch(pair).a, pairs.getWatch(pair).b})
-        if (places[capsule].place.pack >= 0)
-            unfinished[places[capsule].place.pack] = 1;
+        if (packs[capsule] >= 0)
+            unfinished[packs[capsule]] = 1;
 }
 
 /** Find pairs that cross. */

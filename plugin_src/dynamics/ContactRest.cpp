@@ -77,7 +77,7 @@ void ContactRest::look(const ContactCourse& course, double gap, double depth, do
     copy_n(course.now, 3, now);
     // Lines have a side, which they may have left: discs have none.
     double distance = dot(begun, normal);
-    if (findAxis(course, axis)) {
+    if (!course.passed && findAxis(course, axis)) {
         findAcross(course.begun, axis, begun);
         findAcross(course.now, axis, now);
         distance = sqrt(dot(begun, begun));

@@ -12,6 +12,8 @@ struct ContactCourse {
     /** The normal there, the sum of the radii, and a = k c, see ContactRest. */
     const double* normal;
     double radii, softness;
+    /** Whether they have passed through each other although contacts behind the wall came back: they are lines. */
+    bool passed = false;
 };
 
 /**
@@ -38,7 +40,9 @@ struct ContactCourse {
  * is its own inverse, and each n.r* is as probable from one as from the other.
  *
  * What others push behind the wall in later iterations is held there, with k along the normal: if it came back as well,
- * its neighbours would follow, and the step would not end.
+ * its neighbours would follow, and the step would not end. k does not hold what is pushed through the other one, nor do
+ * discs see that they have turned about each other too far: once all has settled, pairs that have passed through each
+ * other come back as lines. They are few, and the step would have to be divided otherwise.
  */
 class ContactRest {
 public:

@@ -186,13 +186,15 @@ template <class Real> void CoupledEquations::iterate(const vector<PackStep*>& pa
             double tolerance, double leastEnergy, const Loop& loop) {
     const size_t count = terms.size();
     for (vector<Real>* values :
-            {&vectors.residual, &vectors.response, &vectors.force, &vectors.direction, &vectors.image})
+            {&vectors.residual, &vectors.response, &vectors.force, &vectors.direction, &vectors.image, &vectors.found,
+            &vectors.change})
         values->resize(3*count);
     vectors.exchanged.resize(count);
     vectors.stiffness.resize(count);
     Real *const residual = vectors.residual.data(), *const response = vectors.response.data();
     Real *const force = vectors.force.data(), *const direction = vectors.direction.data();
-    Real* const image = vectors.image.data();
+    Real *const image = vectors.image.data(), *const ownFound = vectors.found.data();
+    Real* const ownChange = vectors.change.data();
     auto* const stiffness = vectors.stiffness.data();
     auto* const exchanged = vectors.exchanged.data();
     typedef typename Four<Real>::Type Vector;
@@ -226,7 +228,7 @@ template <class Real> void CoupledEquations::iterate(const vector<PackStep*>& pa
             exchanged[i] = {};
             for (int k = 0; k < 3; k++) {
                 residual[3*i+k] = pull[k];
-                force[3*i+k] = direction[3*i+k] = 0;
+                force[3*i+k] = direction[3*i+k] = ownFound[3*i+k] = ownChange[3*i+k] = 0;
             }
         }
         respond(pack, first, last);
@@ -257,12 +259,11 @@ template <class Real> void CoupledEquations::iterate(const vector<PackStep*>& pa
             }
             sums[pack] = sumOfProducts(direction, image, 3*first, 3*last);
         });
-        const double length = energy/total();
-        const Real step = length;
+        const Real step = energy/total();
         forCoupled([&] (int pack, int first, int last) {
             for (int j = 3*first; j < 3*last; j++) {
-                found[j] += length*force[j];
-                change[j] += length*direction[j];
+                ownFound[j] += step*force[j];
+                ownChange[j] += step*direction[j];
                 residual[j] -= step*image[j];
             }
             for (int i = first; i < last; i++)
@@ -275,6 +276,12 @@ template <class Real> void CoupledEquations::iterate(const vector<PackStep*>& pa
         energy = total();
         ratio = energy/before;
     }
+    forCoupled([&] (int, int first, int last) {
+        for (int j = 3*first; j < 3*last; j++) {
+            found[j] = ownFound[j];
+            change[j] += ownChange[j];
+        }
+    });
 }
 
 void CoupledEquations::advance(const vector<PackStep*>& packs, const PackFlags& active, double share,

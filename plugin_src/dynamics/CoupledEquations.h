@@ -86,6 +86,8 @@ private:
             Real response[4], direction[4];
         };
         std::vector<Real> residual, response, force, direction, image;
+        /** What the method has found, and the change that it makes. */
+        std::vector<Real> found, change;
         std::vector<Exchanged> exchanged;
         /** The columns of the matrix of each term, for vector registers. */
         struct Columns {

@@ -21,7 +21,7 @@ const double DIAGONAL = 1-M_SQRT1_2, NOISE_OF_FIRST = DIAGONAL/(1-DIAGONAL);
 const double TOLERANCE = 0.3;
 /** The same for links that turn, which converge linearly. */
 const double TOLERANCE_OF_TURNS = 0.1;
-/** The same for a link one end of which does not know of the change. */
+/** The same for what one end of a link does not know of. */
 const double TOLERANCE_OF_ONE_SIDE = 0.05;
 /** What counts as no change: over the change of the whole step, and over the length. */
 const double OF_CHANGE = 1e-3, OF_CHANGE_WITH_NOISE = 1e-5, OF_LENGTH = 1e-7;
@@ -208,6 +208,7 @@ void LinkEquations::beginStage(int stage, int numStages, const double* moved) {
     shareOfMetricForces = first ? NOISE_OF_FIRST*NOISE_OF_FIRST : 1;
     for (State& state : states) {
         double before[3] = {state.coordinate, 0, 0}, ofStart, ofRandom;
+        fill(state.drift, state.drift+3, 0.0);
         if (!state.turns)
             copy(state.start, state.start+3, before);
         state.implicit = DIAGONAL;
@@ -234,62 +235,76 @@ void LinkEquations::beginStage(int stage, int numStages, const double* moved) {
     }
 }
 
+/** Select the links a place of which takes part in the iteration. */
+void LinkEquations::select() {
+    auto takesPart = [&] (const PlaceOnChain& place) {
+        return place.pack >= 0 && (*active)[place.pack];
+    };
+    selected.clear();
+    for (size_t i = 0; i < states.size(); i++)
+        if (takesPart(states[i].places[0]) || takesPart(states[i].places[1]))
+            selected.push_back(i);
+}
+
 void LinkEquations::linearise(int, const double* moved, vector<CouplingEquation>& equations) {
+    select();
     const size_t first = equations.size();
-    equations.resize(first+states.size());
-    runInChunks(*loop, states.size(), CHUNK, [&] (int number) {
-        State& state = states[number];
-        CouplingEquation& equation = equations[first+number];
-        copy(state.places, state.places+2, equation.places);
-        const Link& link = *state.link;
-        double r[3];
-        vectorOf(state, moved, r);
-        double* const k = equation.stiffness;
-        if (!state.turns) {
-            state.response = link.stiffness*state.implicit;
-            for (int i = 0; i < 3; i++)
-                equation.force[i] = -link.stiffness*(state.implicit*r[i]+state.constant[i]);
-            k[0] = k[3] = k[5] = state.response;
-            k[1] = k[2] = k[4] = 0;
-            return;
-        }
-        state.distance = sqrt(dot(r, r));
-        if (hasRange(link.model)) {
-            const FeneTension law = {link.stiffness, 1/link.maximumExtension, link.restLength, state.length,
-                    state.implicit, state.constant[0], 0, 0};
-            double own = state.distance;
-            if (state.multiplier != 0)
-                own = law.lengthFor(state.multiplier, own, state.response);
-            law.evaluate(own, state.tension, state.response);
-            state.tension += state.response*(state.distance-own);
-        }
-        else {
-            state.response = link.stiffness*state.implicit;
-            state.tension = link.stiffness*(state.implicit*(state.distance-link.restLength)+state.constant[0]);
-        }
-        // The gradient between start and end: its product with the change of r is the change of the distance.
-        double* const m = state.direction;
-        const double perSum = 1/max(state.length+state.distance, LEAST);
-        for (int i = 0; i < 3; i++)
-            m[i] = perSum*(state.start[i]+r[i]);
-        const double square = dot(m, m);
-        double metricForce[3];
-        const double ratio = describeMetric(state, r, metricForce);
-        state.slope = ratio*state.response;
-        // Compression lets links turn, up to a part of what resists. What others at the same place do is not known.
-        const double compliance = max(state.compliance[0], max(state.compliance[3], state.compliance[5]));
-        const double least = state.compliant && state.alone ? -COMPRESSION/compliance : 0;
-        const double turning = max(least, state.multiplier*perSum);
-        const double rest = state.slope-turning/max(square, LEAST);
-        for (int i = 0; i < 3; i++)
-            equation.force[i] = shareOfMetricForces*metricForce[i]-state.tension*m[i];
-        k[0] = turning+rest*m[0]*m[0];
-        k[1] = rest*m[0]*m[1];
-        k[2] = rest*m[0]*m[2];
-        k[3] = turning+rest*m[1]*m[1];
-        k[4] = rest*m[1]*m[2];
-        k[5] = turning+rest*m[2]*m[2];
+    equations.resize(first+selected.size());
+    runInChunks(*loop, selected.size(), CHUNK, [&] (int i) {
+        linearise(states[selected[i]], moved, equations[first+i]);
     });
+}
+
+void LinkEquations::linearise(State& state, const double* moved, CouplingEquation& equation) const {
+    copy(state.places, state.places+2, equation.places);
+    const Link& link = *state.link;
+    double* const r = state.now;
+    vectorOf(state, moved, r);
+    double* const k = equation.stiffness;
+    if (!state.turns) {
+        state.response = link.stiffness*state.implicit;
+        for (int i = 0; i < 3; i++)
+            equation.force[i] = -link.stiffness*(state.implicit*r[i]+state.constant[i]);
+        k[0] = k[3] = k[5] = state.response;
+        k[1] = k[2] = k[4] = 0;
+        return;
+    }
+    state.distance = sqrt(dot(r, r));
+    if (hasRange(link.model)) {
+        const FeneTension law = {link.stiffness, 1/link.maximumExtension, link.restLength, state.length,
+                state.implicit, state.constant[0], 0, 0};
+        double own = state.distance;
+        if (state.multiplier != 0)
+            own = law.lengthFor(state.multiplier, own, state.response);
+        law.evaluate(own, state.tension, state.response);
+        state.tension += state.response*(state.distance-own);
+    }
+    else {
+        state.response = link.stiffness*state.implicit;
+        state.tension = link.stiffness*(state.implicit*(state.distance-link.restLength)+state.constant[0]);
+    }
+    // The gradient between start and end: its product with the change of r is the change of the distance.
+    double* const m = state.direction;
+    const double perSum = 1/max(state.length+state.distance, LEAST);
+    for (int i = 0; i < 3; i++)
+        m[i] = perSum*(state.start[i]+r[i]);
+    const double square = dot(m, m);
+    double metricForce[3];
+    const double ratio = describeMetric(state, r, metricForce);
+    state.slope = ratio*state.response;
+    // Compression lets links turn, up to a part of what resists. What others at the same place do is not known.
+    const double compliance = max(state.compliance[0], max(state.compliance[3], state.compliance[5]));
+    const double least = state.compliant && state.alone ? -COMPRESSION/compliance : 0;
+    const double turning = max(least, state.multiplier*perSum);
+    const double rest = state.slope-turning/max(square, LEAST);
+    for (int i = 0; i < 3; i++)
+        equation.force[i] = shareOfMetricForces*metricForce[i]-state.tension*m[i];
+    k[0] = turning+rest*m[0]*m[0];
+    k[1] = rest*m[0]*m[1];
+    k[2] = rest*m[0]*m[2];
+    k[3] = turning+rest*m[1]*m[1];
+    k[4] = rest*m[1]*m[2];
+    k[5] = turning+rest*m[2]*m[2];
 }
 
 void LinkEquations::setCompliances(const double* compliances) {
@@ -367,24 +382,34 @@ double LinkEquations::describeMetric(const State& state, const double* r, double
 }
 
 bool LinkEquations::isUnfinished(State& state, const double* move, const double* moved) const {
-    double r[3], square = dot(move, move), ofStep = 0;
-    vectorOf(state, moved, r);
-    for (int k = 0; k < 3; k++)
-        ofStep += (r[k]-state.start[k])*(r[k]-state.start[k]);
+    double ofStep = 0;
+    for (int k = 0; k < 3; k++) {
+        const double way = state.now[k]+move[k]-state.start[k];
+        ofStep += way*way;
+    }
     const double ofChange = kT > 0 ? OF_CHANGE_WITH_NOISE : OF_CHANGE;
     const double rounding = kT > 0 ? 0 : OF_ROUNDING*largestCoordinate(*state.link, moved);
     const double least = ofChange*ofChange*ofStep+rounding*rounding+
             OF_LENGTH*OF_LENGTH*(state.length*state.length+state.link->restLength*state.link->restLength);
+    state.change = state.response*dot(move, move);
+    if (state.turns)
+        state.multiplier = state.tension+state.slope*dot(state.direction, move);
+    if (isTooMuch(state, move, state.turns ? TOLERANCE_OF_TURNS : TOLERANCE, least))
+        return true;
     const int a = state.places[0].pack, b = state.places[1].pack;
     const bool oneSided = a >= 0 && b >= 0 && (*active)[a] != (*active)[b];
-    const double tolerance = oneSided ? TOLERANCE_OF_ONE_SIDE : state.turns ? TOLERANCE_OF_TURNS : TOLERANCE;
-    const double fluctuation = kT/state.response, thermal = tolerance*tolerance*fluctuation;
-    state.change = state.response*square;
-    // Written so that NaN is not finished.
+    for (int k = 0; k < 3; k++)
+        state.drift[k] = oneSided ? state.drift[k]+move[k] : 0;
+    return isTooMuch(state, state.drift, TOLERANCE_OF_ONE_SIDE, least);
+}
+
+/** Whether a move changes a link by more than a tolerance, or than what counts as no change. */
+bool LinkEquations::isTooMuch(const State& state, const double* move, double tolerance, double least) const {
+    const double square = dot(move, move), fluctuation = kT/state.response, thermal = tolerance*tolerance*fluctuation;
+    // Written so that NaN is too much.
     if (!state.turns)
         return !(square <= thermal+least);
     const double along = dot(state.direction, move);
-    state.multiplier = state.tension+state.slope*along;
     const double error = (square-along*along)/(2*LENGTH_TOLERANCE*max(state.length, LEAST));
     bool result = !(along*along <= thermal+least);
     result |= kT > 0 && !(error*error <= fluctuation+least);
@@ -393,10 +418,18 @@ bool LinkEquations::isUnfinished(State& state, const double* move, const double*
 }
 
 bool LinkEquations::finishIteration(const double* moves, const double* moved) {
-    runInChunks(*loop, states.size(), CHUNK, [&] (int i) {
-        unfinished[i] = isUnfinished(states[i], moves+3*i, moved);
+    runInChunks(*loop, selected.size(), CHUNK, [&] (int i) {
+        unfinished[selected[i]] = isUnfinished(states[selected[i]], moves+3*i, moved);
     });
     return find(unfinished.begin(), unfinished.end(), 1) != unfinished.end();
+}
+
+bool LinkEquations::markUnfinished(PackFlags& packs) const {
+    for (size_t i = 0; i < states.size(); i++)
+        for (const PlaceOnChain& place : states[i].places)
+            if (unfinished[i] && place.pack >= 0)
+                packs[place.pack] = 1;
+    return true;
 }
 
 /** Whether a link cannot be solved, or has left the range of its potential. */

@@ -54,6 +54,7 @@ public:
     }
     void setCompliances(const double* compliances) override;
     bool finishIteration(const double* moves, const double* moved) override;
+    bool markUnfinished(PackFlags& packs) const override;
     void findFailures(const double* moved, std::vector<bool>& failed) const override;
     bool findCulprit(const double* moved, const CouplingEquation* equations, BrokenCoupling& culprit) const override;
     void findNeighbours(std::vector<std::pair<int, int> >& pairs) const override;
@@ -71,8 +72,11 @@ private:
         double start[3], length, coordinate, random[3], theta;
         /** What a stage makes of these: the force is -k (implicit q(y)+constant). */
         double implicit, constant[3];
-        /** Of the last iteration: direction, distance, tension, its response, and the tension after it. */
-        double direction[3], distance, tension, response, slope, multiplier;
+        /**
+         * Of the last iteration: the vector from place to place with which it began, direction, distance, tension, its
+         * response, and the tension after it.
+         */
+        double now[3], direction[3], distance, tension, response, slope, multiplier;
         /** The least friction of its places, and how they move apart by a force between them, without this link. */
         double friction[2], compliance[6];
         /** The direction of the first iteration as a unit vector, and how a unit force along it moves them apart. */
@@ -81,17 +85,24 @@ private:
         bool compliant, alone;
         /** The squared change of the last iteration, times the response. */
         double change;
+        /** How its places have moved while one of their packs took no part. */
+        double drift[3];
     };
     void place(const CoupledStart& start, const Link& link, State& state) const;
     void addStiffness(const ChainPlaces& places);
     void describe(const CoupledStart& start, State& state) const;
     void drawNoise(const CoupledStart& start);
+    void select();
+    void linearise(State& state, const double* moved, CouplingEquation& equation) const;
     bool isUnfinished(State& state, const double* move, const double* moved) const;
+    bool isTooMuch(const State& state, const double* move, double tolerance, double least) const;
     bool hasFailed(std::size_t number, const double* moved) const;
     static void turnResponse(const State& state, double* response);
     double describeMetric(const State& state, const double* r, double* force) const;
     void vectorOf(const State& state, const double* positions, double* r) const;
     std::vector<State> states;
+    /** Those of packs that take part in the iteration: its equations. */
+    std::vector<int> selected;
     /** Whether each needs another iteration. */
     std::vector<char> unfinished;
     const Loop* loop = nullptr;

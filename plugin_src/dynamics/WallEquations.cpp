@@ -46,6 +46,7 @@ void WallEquations::setWalls(const WallSystem* newSystem) {
 
 void WallEquations::begin(const CoupledStart& start, const Loop& newLoop) {
     loop = &newLoop;
+    active = &start.active;
     begun = start.positions;
     stepSize = start.settings.stepSize;
     wallDepth = findDepthOfWall(start.settings.kT, system->stiffness);
@@ -72,6 +73,7 @@ void WallEquations::begin(const CoupledStart& start, const Loop& newLoop) {
 void WallEquations::beginStage(int stage, int numStages, const double*) {
     implicit = numStages == 2 && stage == 0 ? DIAGONAL : 1;
     reached.assign(places.size(), 0);
+    rooms.assign(places.size(), Room());
     for (Part& part : parts)
         part.states.clear();
 }
@@ -99,8 +101,11 @@ void WallEquations::linearise(int iteration, const double* moved, vector<Couplin
     const size_t first = equations.size();
     for (Part& part : parts)
         for (State& state : part.states) {
+            if (!takesPart(state.particle))
+                continue;
             const WallParticle& particle = system->particles[state.particle];
-            if (iteration <= SEARCHING_ITERATIONS) {
+            const bool searches = iteration <= SEARCHING_ITERATIONS || state.deviates;
+            if (searches) {
                 const Position position = positionOf(state.particle, moved);
                 const double* y = position.at;
                 double* const g = state.gradient;
@@ -123,7 +128,7 @@ void WallEquations::linearise(int iteration, const double* moved, vector<Couplin
             for (int k = 0; k < 3; k++)
                 equation.force[k] = -own*beyond*g[k];
             setOuter(own, g, equation.stiffness);
-            if (iteration <= SEARCHING_ITERATIONS)
+            if (searches)
                 addTurning(system->wall, g, state.force*state.curvature, equation.stiffness);
             equations.push_back(equation);
         }
@@ -154,10 +159,12 @@ bool WallEquations::isBesideDeeper(int particle, int face, double depth, const d
     return false;
 }
 
-bool WallEquations::finishPart(int number, const double* moves, const double* moved) {
+void WallEquations::finishPart(int number, const double* moves, const double* moved) {
     Part& part = parts[number];
-    bool unfinished = false;
+    part.unfinished.clear();
     for (State& state : part.states) {
+        if (!takesPart(state.particle))
+            continue;
         const double depth = findDepthAt(state, moved), b = state.restGap.get(), beyond = depth+b;
         if (state.equation < 0)
             state.unfinished = beyond > tolerance;
@@ -172,17 +179,22 @@ bool WallEquations::finishPart(int number, const double* moves, const double* mo
         double gradient[3];
         const double real = findDepth(system->wall, state.face, positionOf(state.particle, moved).at, own.radius,
                 gradient);
-        state.unfinished |= !(real+b-max(0.0, beyond) <= max(tolerance, LARGEST_DEVIATION*b));
-        if (state.unfinished)
-            state.restGap.correct(-depth);
-        unfinished |= state.unfinished;
+        state.deviates = !(real+b-max(0.0, beyond) <= max(tolerance, LARGEST_DEVIATION*b));
+        state.unfinished |= state.deviates;
+        if (!state.unfinished)
+            continue;
+        state.restGap.correct(-depth);
+        part.unfinished.push_back(places[state.particle].pack);
     }
     const int count = places.size();
     for (int i = number*CHUNK; i < min(count, (number+1)*CHUNK); i++) {
-        if (places[i].pack < 0)
+        if (!takesPart(i))
             continue;
         const WallParticle& own = system->particles[i];
         const Position position = positionOf(i, moved);
+        if (rooms[i].holds(position.at))
+            continue;
+        double deepest = -HUGE_VAL;
         for (int face = 0; face < numFaces; face++) {
             if ((reached[i]>>face)&1)
                 continue;
@@ -190,6 +202,7 @@ bool WallEquations::finishPart(int number, const double* moves, const double* mo
             state.particle = i;
             state.face = face;
             const double depth = findDepth(system->wall, face, position.at, own.radius, state.gradient);
+            deepest = max(deepest, depth);
             // What is beyond a face later on has been pushed there or was beside what was deeper: no prediction.
             const bool predicts = iterations < FREE_ITERATIONS;
             if (!(depth > (predicts ? 0 : tolerance)))
@@ -197,7 +210,7 @@ bool WallEquations::finishPart(int number, const double* moves, const double* mo
             state.restGap = findRestGap(i, face, predicts ? depth : 0);
             if (!(depth+state.restGap.get() > (predicts ? 0 : tolerance)))
                 continue;
-            unfinished = true;
+            part.unfinished.push_back(places[i].pack);
             if (iterations < FREE_ITERATIONS-1 || (predicts && isBesideDeeper(i, face, depth, moved)))
                 continue;
             reached[i] |= 1<<face;
@@ -205,15 +218,26 @@ bool WallEquations::finishPart(int number, const double* moves, const double* mo
             state.offset = depth-(state.gradient[0]*y[0]+state.gradient[1]*y[1]+state.gradient[2]*y[2]);
             part.states.push_back(state);
         }
+        // That of an ellipsoid is no distance.
+        if (deepest < 0 && system->wall.shape != WallShape::Ellipsoid) {
+            copy_n(position.at, 3, rooms[i].from);
+            rooms[i].square = deepest*deepest;
+        }
     }
-    return unfinished;
 }
 
 bool WallEquations::finishIteration(const double* moves, const double* moved) {
     (*loop)(parts.size(), [&] (int part) {
-        parts[part].unfinished = finishPart(part, moves, moved);
+        finishPart(part, moves, moved);
     });
-    return any_of(parts.begin(), parts.end(), [] (const Part& part) {return part.unfinished;});
+    return any_of(parts.begin(), parts.end(), [] (const Part& part) {return !part.unfinished.empty();});
+}
+
+bool WallEquations::markUnfinished(PackFlags& packs) const {
+    for (const Part& part : parts)
+        for (int pack : part.unfinished)
+            packs[pack] = 1;
+    return true;
 }
 
 void WallEquations::findFailures(const double*, vector<bool>& failed) const {

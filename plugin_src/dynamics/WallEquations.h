@@ -32,6 +32,7 @@ public:
     void beginStage(int stage, int numStages, const double* moved) override;
     void linearise(int iteration, const double* moved, std::vector<CouplingEquation>& equations) override;
     bool finishIteration(const double* moves, const double* moved) override;
+    bool markUnfinished(PackFlags& packs) const override;
     /** A wall has no other side that a step could get to: chains fail if iterations end before a depth has settled. */
     void findFailures(const double* moved, std::vector<bool>& failed) const override;
     bool findCulprit(const double* moved, const CouplingEquation* equations, BrokenCoupling& culprit) const override;
@@ -53,21 +54,28 @@ private:
         double force = 0, curvature = 0;
         /** Whether another iteration is needed for it. */
         bool unfinished = true;
+        /** Whether the tangent plane is too far from the face where the last iteration has led. */
+        bool deviates = false;
     };
     struct Part {
         std::vector<State> states;
-        bool unfinished;
+        /** The packs that need another iteration, some of them more than once. */
+        std::vector<int> unfinished;
     };
     struct Position {
         double at[3];
     };
     Position positionOf(int particle, const double* positions) const;
     double findDepthAt(const State& state, const double* positions) const;
-    bool finishPart(int part, const double* moves, const double* moved);
+    bool takesPart(int particle) const {
+        return places[particle].pack >= 0 && (*active)[places[particle].pack];
+    }
+    void finishPart(int part, const double* moves, const double* moved);
     bool isBesideDeeper(int particle, int face, double depth, const double* moved) const;
     RestGap findRestGap(int particle, int face, double depth) const;
     const WallSystem* system = nullptr;
     const Loop* loop = nullptr;
+    const PackFlags* active = nullptr;
     const double* begun = nullptr;
     double stepSize = 0, tolerance = 0, wallDepth = 0, implicit = 1;
     int numFaces = 0, iterations = 0;
@@ -79,6 +87,17 @@ private:
     std::vector<double> responses;
     std::vector<char> together;
     std::vector<unsigned char> reached;
+    /** Where a particle was, and the square of how far it may go from there before it is beyond another face. */
+    struct Room {
+        double from[3], square = -1;
+        bool holds(const double* to) const {
+            double way = 0;
+            for (int k = 0; k < 3; k++)
+                way += (to[k]-from[k])*(to[k]-from[k]);
+            return way < square;
+        }
+    };
+    std::vector<Room> rooms;
     std::vector<Part> parts;
 };
 

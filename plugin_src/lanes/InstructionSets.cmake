@@ -4,7 +4,8 @@
 option(CYLCHAIN_FOR_THIS_PROCESSOR "Compile loops for the instruction set of this processor alone" OFF)
 set(CYLCHAIN_INSTRUCTION_SETS Baseline)
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64|amd64)$")
-    set(CYLCHAIN_INSTRUCTION_SETS Avx512 Avx2 Baseline)
+    # In this order: where files share an inline function, the linker takes the first, which every processor can run.
+    set(CYLCHAIN_INSTRUCTION_SETS Baseline Avx2 Avx512)
     add_compile_definitions(CYLCHAIN_X86_64)
     if(CYLCHAIN_FOR_THIS_PROCESSOR AND NOT CMAKE_CROSSCOMPILING)
         include(CheckCXXSourceRuns)

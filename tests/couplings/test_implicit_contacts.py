@@ -241,7 +241,7 @@ def test_errors_name_both_segments_of_a_contact():
     filaments.add_straight(ACTIN, 20, [50, -1050, 45], [0, 1, 0])
     _, system, positions = filaments.build()
     system.addForce(capsule_contact_force(filaments, system, DIAMETER, STIFFNESS))
-    weight = openmm.CustomExternalForce(f"{100 * PICONEWTON / 21}*z")
+    weight = openmm.CustomExternalForce(f"{300 * PICONEWTON / 21}*z")
     for node in filaments.node_indices[2]:
         weight.addParticle(int(node))
     system.addForce(weight)

@@ -88,6 +88,20 @@ static void testLines() {
     checkClose(2.5, found[2], RADII, 1e-12, "lines come back along the normal");
 }
 
+/** Two that lie along each other, and that have passed through each other by turning about each other. */
+static void testPassed() {
+    const double other[3] = {5, 0.5, 0}, begun[3] = {0.4, 0.3, 2.5}, now[3] = {0.1, -0.2, -1.5}, normal[3] = {0, 0, 1};
+    ContactCourse course = makeCourse(4, begun, now, other, normal);
+    course.passed = true;
+    ContactRest rest(4, -3.5);
+    rest.look(course, -3.5, DEPTH, LARGEST);
+    check(rest.isBack(), "it comes back");
+    double found[3];
+    balance(rest, 4, now, found);
+    check(found[0] == now[0] && found[1] == now[1], "what has passed does not turn");
+    checkClose(2.5, found[2], RADII, 1e-12, "what has passed comes back along the normal");
+}
+
 static void testSpheres() {
     const double none[3] = {0, 0, 0}, begun[3] = {2.1, 0.3, 0.4}, now[3] = {0.2, 1.0, 0}, normal[3] = {0, 1, 0};
     ContactCourse course = makeCourse(4, begun, now, none, normal);
@@ -173,7 +187,7 @@ static void testSurface() {
 
 int main() {
     try {
-        for (auto test : {testDiscs, testLines, testSpheres, testDiffusion, testSurface})
+        for (auto test : {testDiscs, testLines, testPassed, testSpheres, testDiffusion, testSurface})
             test();
     }
     catch (const exception& error) {
