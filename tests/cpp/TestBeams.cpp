@@ -385,8 +385,8 @@ static void testPropulsion() {
                 }
             }
             for (int k = 0; k < 3; k++)
-                checkClose(expected[k]*chain.propulsion*settings.stepSize/(1.7*chain.elementLength), moved[k], 0.01, 2e-3,
-                        "how far propulsion takes a chain");
+                checkClose(expected[k]*chain.propulsion*settings.stepSize/(1.7*chain.elementLength), moved[k], 0.01,
+                        2e-3, "how far propulsion takes a chain");
         }
     }
 }

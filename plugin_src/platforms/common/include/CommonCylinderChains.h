@@ -18,8 +18,8 @@ namespace OpenMM {
  * The chains of a Context in the memory of its device, and the programs that compute them there.
  *
  * Chains that use the same models and have similar lengths make a batch: one kernel computes them, with a work-item for
- * each, or, at implicit steps of few chains, with a group of work-items for each.  The nodes of all chains follow on each other; their positions and forces are doubles, and gather() brings them
- * from where OpenMM keeps its particles.
+ * each, or, at implicit steps of few chains, with a group of work-items for each.  The nodes of all chains follow on
+ * each other; their positions and forces are doubles, and gather() brings them from where OpenMM keeps its particles.
  */
 class CommonCylinderChains {
 public:

@@ -26,10 +26,10 @@ static const double LARGEST_WORKSPACE = 1e9;
 static const int GROUP_SIZE = layout::ITEMS_OF_CHAIN;
 
 /**
- * A group of work-items for each chain takes implicit steps of no more chains than these.  A group takes a step in about
- * a seventh of the time of one work-item, but a GPU can have fewer groups at once.  With an estimate of 0.3 us of an
- * H100 for each chain of 64 segments and step, as many chains as these take the 1.8 ms that one work-item for each of
- * them would, however few they are; see the page on platforms.
+ * A group of work-items for each chain takes implicit steps of no more chains than these.  A group takes a step in
+ * about a seventh of the time of one work-item, but a GPU can have fewer groups at once.  With an estimate of 0.3 us of
+ * an H100 for each chain of 64 segments and step, as many chains as these take the 1.8 ms that one work-item for each
+ * of them would, however few they are; see the page on platforms.
  */
 static const int MOST_CHAINS_OF_GROUPS = 6000;
 
