@@ -158,8 +158,9 @@ double CoupledEquations::total() const {
 void CoupledEquations::solve(const vector<PackStep*>& packs, const PackFlags& active,
             const vector<CouplingEquation>& equations, double kT, const Demands& demands, const Loop& loop) {
     const int numPacks = packs.size();
-    const bool stiff = demands.stiffness > STIFF;
-    const double tighter = min(demands.forTensions ? OF_TENSIONS : 1, stiff ? OF_STIFF/demands.stiffness : 1);
+    const bool stiff = demands.demandingStiffness > STIFF;
+    const double tighter = min({demands.forTensions ? OF_TENSIONS : 1, stiff ? OF_STIFF/demands.demandingStiffness : 1,
+            1/max(1.0, demands.stiffness)});
     gatherTerms(equations, active, loop);
     loop(numPacks, [&] (int pack) {
         const int first = firstTerms[pack], last = firstTerms[pack+1];
@@ -169,7 +170,7 @@ void CoupledEquations::solve(const vector<PackStep*>& packs, const PackFlags& ac
     });
     const double least = tighter*LEAST_ENERGY*kT*(stiff ? 1 : count(active.begin(), active.end(), 1));
     // What is stiff, or must be right in tensions, needs more digits.
-    if (demands.single && tighter == 1)
+    if (demands.single && !demands.forTensions && !stiff)
         iterate(packs, single, tighter*demands.tolerance, least, loop);
     else
         iterate(packs, twice, tighter*demands.tolerance, least, loop);

@@ -51,6 +51,10 @@ public:
     virtual bool needsCompliances() const {
         return false;
     }
+    /** Of couplings between two places that move, the stiffness of the stiffest, over the friction of them in a step. */
+    virtual double getStiffness() const {
+        return 0;
+    }
     /**
      * Of couplings that need equations which are solved well, the stiffness of the stiffest, over the friction of its
      * places in a step. Those are couplings that turn, those of beam elements, which bend 2 % too little otherwise, and

@@ -109,12 +109,17 @@ void LinkEquations::begin(const CoupledStart& start, const Loop& newLoop) {
     });
     anyTurns = any_of(states.begin(), states.end(), [] (const State& state) {return state.turns;});
     const bool twoStages = start.settings.scheme == Scheme::ImplicitSecondOrder;
-    demandingStiffness = 0;
+    largestStiffness = demandingStiffness = 0;
     for (const State& state : states)
-        for (int side = 0; side < 2; side++)
-            if (state.places[side].pack >= 0 &&
-                    (state.turns || twoStages || start.places.isBeam(state.places[side].chain)))
-                demandingStiffness = max(demandingStiffness, stepSize*state.link->stiffness/state.friction[side]);
+        for (int side = 0; side < 2; side++) {
+            if (state.places[side].pack < 0)
+                continue;
+            const double own = stepSize*state.link->stiffness/state.friction[side];
+            if (state.places[1-side].pack >= 0)
+                largestStiffness = max(largestStiffness, own);
+            if (state.turns || twoStages || start.places.isBeam(state.places[side].chain))
+                demandingStiffness = max(demandingStiffness, own);
+        }
     unfinished.assign(states.size(), 0);
     if (kT > 0)
         drawNoise(start);

@@ -49,6 +49,9 @@ public:
     bool needsCompliances() const override {
         return anyTurns;
     }
+    double getStiffness() const override {
+        return largestStiffness;
+    }
     double getDemandingStiffness() const override {
         return demandingStiffness;
     }
@@ -110,7 +113,7 @@ private:
     const std::vector<Link>* links = nullptr;
     LinkBoxes boxes;
     const double* begun = nullptr;
-    double kT = 0, stepSize = 0, shareOfMetricForces = 1, demandingStiffness = 0;
+    double kT = 0, stepSize = 0, shareOfMetricForces = 1, largestStiffness = 0, demandingStiffness = 0;
     bool anyTurns = false;
     int force = 0;
     /** Of all links on the segment that begins with a particle. */

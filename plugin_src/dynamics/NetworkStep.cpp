@@ -199,7 +199,8 @@ bool NetworkStep::iterate(const Attempt& attempt, int stage) {
     // Beam elements have double precision alone.
     demands.single = attempt.settings.precision != Precision::Double && beamEngine.getNumPacks() == 0;
     for (const ImplicitCouplings* own : couplings) {
-        demands.stiffness = max(demands.stiffness, own->getDemandingStiffness());
+        demands.stiffness = max(demands.stiffness, own->getStiffness());
+        demands.demandingStiffness = max(demands.demandingStiffness, own->getDemandingStiffness());
         demands.tolerance = min(demands.tolerance, own->getRelativeTolerance());
     }
     const int most = turns ? NEWTON_ITERATIONS_OF_TURNING_LINKS : NEWTON_ITERATIONS;
