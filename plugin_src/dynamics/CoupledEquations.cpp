@@ -11,7 +11,13 @@ using namespace std;
 
 namespace {
 
-/** The energy of an error that conjugate gradients leave anyway, for each pack, in units of k_B T. */
+/**
+ * The energy of an error that conjugate gradients leave anyway, for each pack, in units of k_B T. It is that of the
+ * residual in A, where each place is held by the coupling alone. Where both places of one move as one, nothing but
+ * friction holds them, and the same residual has as many times this energy as the coupling is stiffer. So the tolerances
+ * are divided by that, but for a factor OF_STIFF: without it, free joints of stiff links straighten, and with no such
+ * factor, some steps of welded beams are divided.
+ */
 const double LEAST_ENERGY = 5e-2;
 /**
  * The tolerances over these where tensions of segments are wanted that are right. These energies are those of forces
@@ -160,7 +166,7 @@ void CoupledEquations::solve(const vector<PackStep*>& packs, const PackFlags& ac
     const int numPacks = packs.size();
     const bool stiff = demands.demandingStiffness > STIFF;
     const double tighter = min({demands.forTensions ? OF_TENSIONS : 1, stiff ? OF_STIFF/demands.demandingStiffness : 1,
-            1/max(1.0, demands.stiffness)});
+            OF_STIFF/max(OF_STIFF, demands.stiffness)});
     gatherTerms(equations, active, loop);
     loop(numPacks, [&] (int pack) {
         const int first = firstTerms[pack], last = firstTerms[pack+1];

@@ -169,6 +169,28 @@ def test_links_and_bends_keep_their_energies_at_the_recommended_step(pair, stiff
         assert abs(np.mean(mean) - expected) < SIGMAS * error + allowed
 
 
+@pytest.mark.parametrize("stiffness", [10.0, 100.0, 1000.0])
+@pytest.mark.parametrize("kind", [(BEAM, 1), (STRAIGHT, 4)], ids=["beams", "segments"])
+def test_a_link_between_two_ends_leaves_their_angle_free(kind, stiffness):
+    """Its cosine is 0 on average, as that of a free joint, which a step that is solved badly straightens."""
+    filaments, system, positions, _ = linked_pairs((kind, kind), ((kind[1] - 1, 1.0), (0, 0.0)), stiffness, 300)
+    step = filaments.recommended_time_step(system=system)
+    integrator = filaments.create_integrator(system, step, random_seed=2)
+    context = new_context(system, positions, integrator, "CPU")
+    integrator.step(150)
+    cosines = []
+    for _ in range(10):
+        integrator.step(5)
+        now = positions_of(context)
+        chords = np.array([now[nodes[-1]] - now[nodes[0]] for nodes in filaments.node_indices])
+        chords /= np.linalg.norm(chords, axis=1)[:, None]
+        cosines.append(np.sum(chords[::2] * chords[1::2], axis=1))
+    mean = np.mean(cosines, axis=0)
+    error = np.std(mean, ddof=1) / np.sqrt(len(mean))
+    assert error < 0.04
+    assert abs(np.mean(mean)) < SIGMAS * error
+
+
 def test_a_loop_of_two_links_is_that_of_weighted_draws():
     """Elements that are linked at one place are drawn exactly; a second, soft link weighs them by its energy.
 
