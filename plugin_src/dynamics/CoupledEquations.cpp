@@ -14,9 +14,9 @@ namespace {
 /**
  * The energy of an error that conjugate gradients leave anyway, for each pack, in units of k_B T. It is that of the
  * residual in A, where each place is held by the coupling alone. Where both places of one move as one, nothing but
- * friction holds them, and the same residual has as many times this energy as the coupling is stiffer. So the tolerances
- * are divided by that, but for a factor OF_STIFF: without it, free joints of stiff links straighten, and with no such
- * factor, some steps of welded beams are divided.
+ * friction holds them, and the same residual has as many times this energy as the coupling is stiffer. So the
+ * tolerances are divided by that, but for a factor OF_STIFF: without it, free joints of stiff links straighten, and
+ * with no such factor, some steps of welded beams are divided.
  */
 const double LEAST_ENERGY = 5e-2;
 /**

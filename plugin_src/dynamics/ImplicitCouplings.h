@@ -51,7 +51,7 @@ public:
     virtual bool needsCompliances() const {
         return false;
     }
-    /** Of couplings between two places that move, the stiffness of the stiffest, over the friction of them in a step. */
+    /** Of couplings between two places that move, the stiffness of the stiffest, over their friction in a step. */
     virtual double getStiffness() const {
         return 0;
     }
