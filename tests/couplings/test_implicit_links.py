@@ -187,10 +187,10 @@ def change_of_last_iteration(potential):
     return 0.1 * np.sqrt(KT / (potential.stiffness * PICONEWTON_PER_NANOMETER)) if potential.rest_length else 1e-4
 
 
-@pytest.mark.parametrize("precision, steps", [("double", 5), ("mixed", 2)])
+@pytest.mark.parametrize("precision", ["double", "mixed"])
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("form", FORMS)
-def test_periodic_images_are_the_same(form, scheme, precision, steps):
+def test_periodic_images_are_the_same(form, scheme, precision):
     generator, ends = np.random.default_rng(8), []
     shifts = BOX * generator.integers(-2, 3, (8, 1, 3))
     shifts[7, :, 2] = 0
@@ -199,10 +199,10 @@ def test_periodic_images_are_the_same(form, scheme, precision, steps):
             FORMS[form], scheme, 0.02 * MICROSECOND, periodic=True, moved=moved, precision=precision
         )
         # Links of hundreds of nm that are far too long go to and fro in long steps. Each of these makes a thousand
-        # times as much of rounding.
+        # times as much of rounding, and of what an iteration more or less has changed: there is one of them.
         advance(context, 100)
         context.getIntegrator().setStepSize(MICROSECOND)
-        end = advance(context, steps)
+        end = advance(context, 1)
         for number, nodes in enumerate(filaments.node_indices):
             end[nodes] -= 0 if moved is None else moved[number]
         ends.append(end)
