@@ -11,10 +11,9 @@ from openmm import unit
 from openmm_cylchain import F_ACTIN, MICROTUBULE, Crosslinker, Filaments, Hand, InputError, LinkerWarning
 from openmm_cylchain.kinetics.binding_force import find_binding_force
 from support.contexts import new_context, positions_of
+from support.linker_contexts import PICONEWTON, SECOND, check_that_runs_go_on_to_the_bit, same_linkers
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 
-SECOND = 1e12
-PICONEWTON = 0.602214076
 HAND = Hand(binding_rate=3e4 / SECOND, reach=60.0, unbinding_rate=2e3 / SECOND)
 MOTOR = Hand(
     binding_rate=3e4 / SECOND,
@@ -42,10 +41,6 @@ def network(
     _, system, positions = filaments.build(box_vectors=500.0 * np.eye(3))
     integrator = filaments.create_integrator(system, step, random_seed=5, checks=False)
     return filaments, new_context(system, positions, integrator, **options)
-
-
-def same(first, second):
-    return all(np.array_equal(getattr(first, name), getattr(second, name)) for name in first.__dataclass_fields__)
 
 
 def test_hands_and_crosslinkers_take_units():
@@ -304,24 +299,8 @@ def test_runs_go_on_from_checkpoints_and_states_to_the_bit():
         (Crosslinker(hands=MOTOR, stiffness=0.1 * PICONEWTON, rest_length=20.0), {"count": 60, "bound": 40}),
         (SPRING, {"concentration": 3e-8}),
     ]
-    filaments, context = network(linkers)
-    integrator = context.getIntegrator()
-    integrator.step(100)
-    checkpoint = context.createCheckpoint()
-    state = context.getState(positions=True, parameters=True, integratorParameters=True)
-    integrator.step(60)
-    expected = filaments.linkers_in(context), positions_of(context)
-    assert expected[0].counts()[2] > 3
-    context.loadCheckpoint(checkpoint)
-    integrator.step(60)
-    assert same(filaments.linkers_in(context), expected[0])
-    assert np.array_equal(positions_of(context), expected[1])
-    # In another Context of the same System, from XML.
-    other, fresh = network(linkers)
-    fresh.setState(openmm.XmlSerializer.deserialize(openmm.XmlSerializer.serialize(state)))
-    fresh.getIntegrator().step(60)
-    assert same(other.linkers_in(fresh), expected[0])
-    assert np.array_equal(positions_of(fresh), expected[1])
+    _, table = check_that_runs_go_on_to_the_bit(lambda: network(linkers))
+    assert table.counts()[2] > 3
 
 
 def test_checkpoints_of_systems_without_linkers_are_refused():
@@ -354,9 +333,9 @@ def test_two_contexts_have_linkers_of_their_own():
     )
     before = filaments.linkers_in(other)
     context.getIntegrator().step(20)
-    assert same(filaments.linkers_in(other), before)
+    assert same_linkers(filaments.linkers_in(other), before)
     other.getIntegrator().step(20)
-    assert not same(filaments.linkers_in(other), filaments.linkers_in(context))
+    assert not same_linkers(filaments.linkers_in(other), filaments.linkers_in(context))
 
 
 def test_tables_are_checked():
@@ -389,7 +368,7 @@ def test_threads_change_nothing(threads):
         filaments, context = network(linkers, platform="CPU", properties={"Threads": number})
         context.getIntegrator().step(60)
         results.append((filaments.linkers_in(context), positions_of(context)))
-    assert same(results[0][0], results[1][0])
+    assert same_linkers(results[0][0], results[1][0])
     assert np.array_equal(results[0][1], results[1][1])
 
 

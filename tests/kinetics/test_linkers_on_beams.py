@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import openmm
 import pytest
 from scipy.spatial.transform import Rotation
 
@@ -11,10 +10,9 @@ from openmm_cylchain import F_ACTIN, Crosslinker, Filaments, FilamentType, Hand,
 from openmm_cylchain.beams.curve import arc_lengths, control_points_of, element_points
 from openmm_cylchain.beams.equilibrium import draw_beam
 from support.contexts import energy_of, forces_of, new_context, positions_of, slopes_of
+from support.linker_contexts import PICONEWTON, SECOND, check_that_runs_go_on_to_the_bit, glide, same_linkers
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 
-SECOND = 1e12
-PICONEWTON = 0.602214076
 # An element bends by about half a radian.
 SOFT = FilamentType(
     name="SOFT",
@@ -132,10 +130,6 @@ ALL = [
 ]
 
 
-def same(first, second):
-    return all(np.array_equal(getattr(first, name), getattr(second, name)) for name in first.__dataclass_fields__)
-
-
 def on_beams(filaments, table):
     """Which hands are bound to beams: (n, 2)."""
     beams = np.array([filament.type.has_beam_elements for filament in filaments] + [False])
@@ -143,24 +137,8 @@ def on_beams(filaments, table):
 
 
 def test_runs_go_on_from_checkpoints_and_states_to_the_bit():
-    filaments, context = network(ALL)
-    integrator = context.getIntegrator()
-    integrator.step(100)
-    checkpoint = context.createCheckpoint()
-    state = context.getState(positions=True, parameters=True, integratorParameters=True)
-    integrator.step(60)
-    expected = filaments.linkers_in(context), positions_of(context)
-    assert np.count_nonzero(on_beams(filaments, expected[0]).all(axis=1)) > 3
-    context.loadCheckpoint(checkpoint)
-    integrator.step(60)
-    assert same(filaments.linkers_in(context), expected[0])
-    assert np.array_equal(positions_of(context), expected[1])
-    # In another Context of the same System, from XML.
-    other, fresh = network(ALL)
-    fresh.setState(openmm.XmlSerializer.deserialize(openmm.XmlSerializer.serialize(state)))
-    fresh.getIntegrator().step(60)
-    assert same(other.linkers_in(fresh), expected[0])
-    assert np.array_equal(positions_of(fresh), expected[1])
+    filaments, table = check_that_runs_go_on_to_the_bit(lambda: network(ALL))
+    assert np.count_nonzero(on_beams(filaments, table).all(axis=1)) > 3
 
 
 def test_threads_change_nothing():
@@ -170,7 +148,7 @@ def test_threads_change_nothing():
         context.getIntegrator().step(60)
         results.append((filaments.linkers_in(context), positions_of(context)))
     for table, positions in results[1:]:
-        assert same(results[0][0], table)
+        assert same_linkers(results[0][0], table)
         assert np.array_equal(results[0][1], positions)
 
 
@@ -262,24 +240,10 @@ def test_hands_walk_along_the_arc_at_their_speed(direction):
 def test_fixed_motors_make_a_beam_glide_at_their_speed():
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
     filaments.add_straight(ACTIN, 10, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
-    speed = 1000.0 / SECOND
-    hand = Hand(
-        binding_rate=200.0 / SECOND, reach=40.0, unbinding_rate=5.0 / SECOND, speed=speed, stall_force=6.0 * PICONEWTON
-    )
-    generator = np.random.default_rng(1)
-    points = np.column_stack([generator.uniform(-4000.0, 2000.0, 1200), generator.normal(0.0, 10.0, (1200, 2))])
-    filaments.add_linkers(Crosslinker(hands=hand, stiffness=0.1 * PICONEWTON), anchors=points)
-    _, system, positions = filaments.build()
-    integrator = filaments.create_integrator(system, 1e-4 * SECOND, random_seed=2, checks=False)
-    context = new_context(system, positions, integrator)
-    integrator.step(2000)
-    nodes = filaments.node_indices[0]
-    start = positions_of(context)[nodes].mean(axis=0)
-    integrator.step(10000)
-    end = positions_of(context)[nodes].mean(axis=0)
+    *_, displacement = glide(filaments)
     # Towards the plus end they walk, so the filament goes the other way.
-    assert (end - start)[0] == pytest.approx(-1000.0, rel=0.03)
-    assert np.linalg.norm((end - start)[1:]) < 60.0
+    assert displacement[0] == pytest.approx(-1000.0, rel=0.03)
+    assert np.linalg.norm(displacement[1:]) < 60.0
 
 
 @pytest.mark.parametrize("shift", [0.0, 1.0])

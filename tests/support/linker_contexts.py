@@ -1,0 +1,75 @@
+"""Contexts with linkers: whether they go on to the bit, and how far fixed motors move a filament."""
+
+import numpy as np
+import openmm
+
+from openmm_cylchain import Crosslinker, Hand
+from support.contexts import new_context, positions_of
+
+SECOND = 1e12
+PICONEWTON = 0.602214076
+
+
+def same_linkers(first, second):
+    """Whether two LinkerTables are equal to the bit."""
+    return all(np.array_equal(getattr(first, name), getattr(second, name)) for name in first.__dataclass_fields__)
+
+
+def check_that_runs_go_on_to_the_bit(network):
+    """From a checkpoint in the same Context, and from XML of a State in another one.
+
+    Parameters
+    ----------
+    network : callable
+        Makes filaments and a Context, the same ones each time.
+
+    Returns
+    -------
+    filaments, linkers at the end
+    """
+    filaments, context = network()
+    integrator = context.getIntegrator()
+    integrator.step(100)
+    checkpoint = context.createCheckpoint()
+    state = context.getState(positions=True, parameters=True, integratorParameters=True)
+    integrator.step(60)
+    expected = filaments.linkers_in(context), positions_of(context)
+    context.loadCheckpoint(checkpoint)
+    integrator.step(60)
+    assert same_linkers(filaments.linkers_in(context), expected[0])
+    assert np.array_equal(positions_of(context), expected[1])
+    # In another Context of the same System, from XML.
+    other, fresh = network()
+    fresh.setState(openmm.XmlSerializer.deserialize(openmm.XmlSerializer.serialize(state)))
+    fresh.getIntegrator().step(60)
+    assert same_linkers(other.linkers_in(fresh), expected[0])
+    assert np.array_equal(positions_of(fresh), expected[1])
+    return filaments, expected[0]
+
+
+def glide(filaments):
+    """Let motors on fixed points, of 1000 nm/s, move a filament along x for a second.
+
+    Returns
+    -------
+    system, step, displacement of the centre in nm
+    """
+    hand = Hand(
+        binding_rate=200.0 / SECOND,
+        reach=40.0,
+        unbinding_rate=5.0 / SECOND,
+        speed=1000.0 / SECOND,
+        stall_force=6.0 * PICONEWTON,
+    )
+    generator = np.random.default_rng(1)
+    points = np.column_stack([generator.uniform(-4000.0, 2000.0, 1200), generator.normal(0.0, 10.0, (1200, 2))])
+    filaments.add_linkers(Crosslinker(hands=hand, stiffness=0.1 * PICONEWTON), anchors=points)
+    _, system, positions = filaments.build()
+    step = 1e-4 * SECOND
+    integrator = filaments.create_integrator(system, step, random_seed=2, checks=False)
+    context = new_context(system, positions, integrator)
+    integrator.step(2000)
+    nodes = filaments.node_indices[0]
+    start = positions_of(context)[nodes].mean(axis=0)
+    integrator.step(10000)
+    return system, step, positions_of(context)[nodes].mean(axis=0) - start
