@@ -14,7 +14,7 @@ from openmm_cylchain.benchmark.kinetic_systems import BundleSystem, create_bundl
 from openmm_cylchain.benchmark.kinetics import Course
 
 SMALL = BundleSystem(filaments=8, motors=20, crosslinkers=15, length=2500.0)
-FEW = many_linkers.NetworkSystem(filaments=12, segments=8, linkers=300, edge=300.0, steps=40)
+FEW = many_linkers.NetworkSystem(filaments=12, segments=8, linkers=900, edge=300.0, steps=40)
 THERMAL_ENERGY = 8.31446261815324e-3 * 298.15
 
 
