@@ -128,6 +128,7 @@ def test_stress_is_the_change_of_energy_by_strain(kind, ring):
     np.testing.assert_allclose(found, found.T, atol=1e-9 * np.abs(found).max())
 
 
+@pytest.mark.slow
 def test_free_beams_in_equilibrium_press_as_ideal_gas():
     """Elements drawn from equilibrium: their virial takes up the ideal part of their four particles but one."""
     kT, generator = thermal_energy(TEMPERATURE), np.random.default_rng(5)

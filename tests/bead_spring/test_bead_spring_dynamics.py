@@ -54,7 +54,8 @@ def check_means(values, expected, tolerance, power):
     assert np.all(np.abs(values.mean(axis=0) - expected) < tolerance * expected + 4.0 * error)
 
 
-@pytest.mark.parametrize("precision", ["mixed", pytest.param("double", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("precision", ["mixed", "double"])
 def test_averages_at_the_recommended_step(precision):
     # 1.6 ns, 1e4 tau; the slowest of the three relaxes in a hundred steps.
     chains = Chains(63, 256, "implicit", 1e4 * UNIT, precision)
@@ -64,12 +65,12 @@ def test_averages_at_the_recommended_step(precision):
 
 @pytest.mark.parametrize(
     "bonds, step",
-    [(63, 1.0), (511, 1600.0)]
+    [(63, 1.0)]
     + [
         pytest.param(bonds, step, marks=pytest.mark.slow)
         for bonds in (63, 127, 255, 511)
         for step in (1.0, 16.0, 160.0, 1600.0)
-        if (bonds, step) not in ((63, 1.0), (511, 1600.0))
+        if (bonds, step) != (63, 1.0)
     ],
 )
 def test_correlations_of_bonds_at_any_step(bonds, step):

@@ -165,11 +165,20 @@ def test_energies_add_up():
     assert excess / kind.stiffness == pytest.approx(mean - lowest, rel=1e-9)
 
 
-DRAWN = [(0.35, 0.034, 1), (0.35, 0.034, 2), (0.35, 0.034, 3), (0.35, 0.034, 12), (0.1, 1.0, 6), (1e-4, 0.01, 5)]
+DRAWN = [
+    (0.35, 0.034, 1),
+    (0.35, 0.034, 2),
+    (0.35, 0.034, 3),
+    pytest.param(0.35, 0.034, 12, marks=pytest.mark.slow),
+    (0.1, 1.0, 6),
+    (1e-4, 0.01, 5),
+]
 
 
 @pytest.mark.parametrize("planar", [False, True])
-@pytest.mark.parametrize(("nu", "reduced_temperature", "bonds"), [*DRAWN, (0.49, 0.02, 6)])
+@pytest.mark.parametrize(
+    ("nu", "reduced_temperature", "bonds"), [*DRAWN, pytest.param(0.49, 0.02, 6, marks=pytest.mark.slow)]
+)
 def test_draws_have_the_exact_moments(nu, reduced_temperature, bonds, planar):
     from openmm_cylchain.bead_spring.draws import draw_bonds
 

@@ -78,7 +78,10 @@ def test_tensions_are_the_pulls_of_bonds():
     assert tensions == pytest.approx(-0.5 * (plus[1:] + plus[:-1]))
 
 
-@pytest.mark.parametrize(("engine", "scheme"), [("compiled", "implicit"), *((engine, "euler") for engine in ENGINES)])
+@pytest.mark.parametrize(
+    ("engine", "scheme"),
+    [("compiled", "implicit"), ("compiled", "euler"), pytest.param("portable", "euler", marks=pytest.mark.slow)],
+)
 def test_equilibrium_is_kept(engine, scheme):
     """At the recommended step, without a warning."""
     segments, count = 10, 100

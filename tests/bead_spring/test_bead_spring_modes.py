@@ -100,6 +100,7 @@ def test_a_long_step_forgets():
     assert noise[1:] ** 2 == pytest.approx(kT / (KIND.bead_friction * bending[1:]))
 
 
+@pytest.mark.slow
 def test_steps_in_modes_keep_the_exact_equilibrium():
     """The scheme with a short step samples what the transfer operator says: neither knows of the other."""
     kind = BeadSpringType.from_reduced(

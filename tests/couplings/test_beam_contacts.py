@@ -108,6 +108,7 @@ def test_beads_are_at_nodes_and_their_spacing_fits_the_diameter():
     assert contact_spacing(BEAM, 8.0 * unit.nanometer, TEMPERATURE) == pytest.approx(LENGTH / 6)
 
 
+@pytest.mark.slow
 def test_a_beam_that_is_pulled_onto_another_rests_where_their_energy_is_least():
     """Without noise: bent over each other, with the contact in the middle of an element of each."""
     elements, spring, stiffness, diameter = 3, 0.02, 0.2, 20.0
@@ -232,6 +233,7 @@ def least_distances(first, second):
     return least, above
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stiffness", [0.2, 1.0])
 def test_equilibrium_is_that_of_weighted_draws(stiffness):
     """Pairs of crossed elements that springs pull into each other: how far apart they are, how they lie, and bends.

@@ -135,7 +135,9 @@ BENDS = 1.93
 
 
 @pytest.mark.parametrize(("stiffness", "rest_length"), [(0.01, 0.0), (100.0, 0.0), (1.0, 60.0)])
-@pytest.mark.parametrize("pair", PAIRS)
+@pytest.mark.parametrize(
+    "pair", [pytest.param(pair, marks=[] if pair == "two ends" else pytest.mark.slow) for pair in PAIRS]
+)
 def test_links_and_bends_keep_their_energies_at_the_recommended_step(pair, stiffness, rest_length):
     """Exactly 3/2 k_B T in a link without a rest length; bends and strains are those of chains without links."""
     kinds, places = PAIRS[pair]
@@ -191,6 +193,7 @@ def test_a_link_between_two_ends_leaves_their_angle_free(kind, stiffness):
     assert abs(np.mean(mean)) < SIGMAS * error
 
 
+@pytest.mark.slow
 def test_a_loop_of_two_links_is_that_of_weighted_draws():
     """Elements that are linked at one place are drawn exactly; a second, soft link weighs them by its energy.
 

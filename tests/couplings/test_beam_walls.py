@@ -59,6 +59,7 @@ def test_a_stiff_wall_holds_the_curve_in_long_steps():
     assert heights.max() < -50.0 + 1e-2 and heights.min() > -150.0 - 1e-2
 
 
+@pytest.mark.slow
 def test_filaments_between_walls_are_those_of_weighted_draws():
     """Elements between walls that are closer than they are long: where middles are, how they lie, and bends."""
     draws, samples, copies, width, stiffness = 200000, 300, 1200, 80.0, 0.5

@@ -53,7 +53,9 @@ def _bends_in_steps(step, steps, count):
     return blocks.mean(axis=0), blocks.std(axis=0, ddof=1) / np.sqrt(len(blocks))
 
 
-@pytest.mark.parametrize(("milliseconds", "steps"), [(5.0, 200), (1.0, 300), (0.2, 1500)])
+@pytest.mark.parametrize(
+    ("milliseconds", "steps"), [(5.0, 200), (1.0, 300), pytest.param(0.2, 1500, marks=pytest.mark.slow)]
+)
 def test_bends_between_walls(milliseconds, steps):
     """Against draws from equilibrium, which NumPy makes. Steps of any length are within 8 % of it: what a wall does to
     a filament that bends in a step is not exact, see RestGap.h."""

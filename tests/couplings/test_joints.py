@@ -133,7 +133,12 @@ def mean_energy_and_cosine(stiffness, angle):
 
 
 @pytest.mark.parametrize(
-    ("stiffness", "angle", "welded"), [(100.0, 1.0, True), (1000.0, 0.0, True), (50.0, 0.0, False)]
+    ("stiffness", "angle", "welded"),
+    [
+        pytest.param(100.0, 1.0, True, marks=pytest.mark.slow),
+        pytest.param(1000.0, 0.0, True, marks=pytest.mark.slow),
+        (50.0, 0.0, False),
+    ],
 )
 def test_equilibrium_of_joints_at_the_recommended_step(stiffness, angle, welded):
     """The ends of two filaments: the angle has its own distribution, as directions of free chains have no other weight.

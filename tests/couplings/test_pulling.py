@@ -138,7 +138,7 @@ def test_tension_pulls_at_the_ends_of_the_filaments_that_are_named():
     "engine, platform, force, steps",
     [
         ("compiled", "CPU", 1.0, 80),
-        ("portable", "CPU", 3.0, 20),
+        pytest.param("portable", "CPU", 3.0, 20, marks=pytest.mark.slow),
         pytest.param("compiled", "Reference", 3.0, 80, marks=pytest.mark.slow),
         pytest.param("portable", "Reference", 1.0, 500, marks=pytest.mark.slow),
     ],
@@ -305,6 +305,7 @@ def test_slow_pulling_measures_the_force_in_equilibrium(engine):
                 assert friction * velocity[0] < 1.5 * error
 
 
+@pytest.mark.slow
 def test_work_obeys_the_equality_of_jarzynski():
     """Dragging a free filament through the solvent leaves its free energy: <exp(-W/k_BT)> = 1 however fast it goes."""
     chains, stiffness = 3200, 50 * KT / 100**2

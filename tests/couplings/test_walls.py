@@ -57,6 +57,7 @@ def test_energy_and_force(shape, platform):
     assert np.abs(forces).max() > 1
 
 
+@pytest.mark.slow
 def test_a_segment_in_a_slab_has_the_exact_energy():
     """The energy of both nodes in the wall, against an integral over height and angle of a rigid segment."""
     length, thickness, stiffness, chains = F_ACTIN.segment_length, 300.0, 0.05, 5600

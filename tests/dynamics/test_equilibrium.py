@@ -6,7 +6,7 @@ import pytest
 
 from openmm_cylchain.theory import chain_mean_square_end_to_end, wlc_mean_square_end_to_end
 from support.equilibrium_cases import CASES, Case, exact_means, measured_means, soft_chain
-from support.platforms import ENGINE_PLATFORMS, ENGINES
+from support.platforms import ENGINE_PLATFORMS, ENGINES, ENGINES_PORTABLE_SLOW
 from support.solvent import KT, TEMPERATURE
 
 SIGMAS = 4.0
@@ -39,7 +39,7 @@ def _check(name, engine, platform):
 
 
 @pytest.mark.parametrize("name", CASES)
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ENGINES_PORTABLE_SLOW)
 def test_midpoint_keeps_equilibrium(name, engine):
     _check(name, engine, "Reference")
 
@@ -51,6 +51,7 @@ def test_midpoint_keeps_equilibrium_on_platform(name, engine, platform):
     _check(name, engine, platform)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["freely-jointed", "f-actin-60nm"])
 @pytest.mark.parametrize("engine", ENGINES)
 def test_printed_scheme_fails(name, engine):
@@ -79,7 +80,7 @@ END_TO_END = [(0.05, 16, 150), (0.2, 16, 150), (1.0, 32, 300), (5.0, 24, 2200)]
 
 
 @pytest.mark.parametrize(("ratio", "segments", "chains"), END_TO_END)
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ENGINES_PORTABLE_SLOW)
 def test_drawn_chains_keep_their_end_to_end_distance(engine, ratio, segments, chains):
     length = 100.0
     kind = soft_chain("WLC", bending_rigidity=KT * segments * length / ratio)

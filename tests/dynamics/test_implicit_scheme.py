@@ -44,7 +44,14 @@ def _actin(chains=3, segments=8, **options):
 
 
 @pytest.mark.parametrize("name", CASES)
-@pytest.mark.parametrize("step_over_recommended", [1, 0.05])
+@pytest.mark.parametrize(
+    ("step_over_recommended", "scheme"),
+    [
+        pytest.param(step, scheme, marks=[] if (step, scheme) == (1, "implicit") else pytest.mark.slow)
+        for step in (1, 0.05)
+        for scheme in IMPLICIT_SCHEMES
+    ],
+)
 def test_equilibrium_at_the_recommended_step(name, step_over_recommended, scheme):
     # Samples of short steps are worth less.
     case = replace(CASES[name], chains=CASES[name].chains * (1 if step_over_recommended == 1 else 2))
@@ -59,6 +66,7 @@ def test_equilibrium_at_the_recommended_step(name, step_over_recommended, scheme
             assert 0.05 * exact[name] > SIGMAS * error
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("microseconds", [5, 50])
 def test_energies_of_actin_within_three_percent(microseconds, scheme):
     case = Case(F_ACTIN, 16, 2000, 400, None)
@@ -70,6 +78,7 @@ def test_energies_of_actin_within_three_percent(microseconds, scheme):
         assert abs(mean - exact[name]) < 0.03 * exact[name], (name, mean, error, exact[name])
 
 
+@pytest.mark.parametrize("scheme", ["implicit", pytest.param("implicit-second-order", marks=pytest.mark.slow)])
 def test_equilibrium_of_lengths_much_stiffer_than_the_step_resolves(scheme):
     """Joints that are free, in chains whose lengths are all but fixed: <cos> = 0 and <cos^2> = 1/3.
 

@@ -70,7 +70,9 @@ def test_steps_of_different_lengths_shorten_filaments_alike(scheme):
     assert abs(mean / other - 1) < 4 * relative_error, shortening
 
 
-@pytest.mark.parametrize("extension_time, moment, steps", [(10, 3, (0.01, 0.1, 1)), (100, 10, (1,))])
+@pytest.mark.parametrize(
+    "extension_time, moment, steps", [pytest.param(10, 3, (0.01, 0.1, 1), marks=pytest.mark.slow), (100, 10, (1,))]
+)
 def test_lengths_with_much_friction(extension_time, moment, steps):
     """Their tension is that of friction alone: steps, short or long, must turn it with the segments."""
     kind = replace(F_ACTIN, extension_relaxation_time=extension_time * MICROSECOND)

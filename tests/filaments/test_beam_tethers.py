@@ -149,6 +149,7 @@ def test_equilibrium_on_one_tether_is_that_of_a_free_beam(stiffness, linked):
         assert abs(np.mean(means) - expected) < SIGMAS * error + allowed * expected
 
 
+@pytest.mark.slow
 def test_equilibrium_between_two_tethers_is_that_of_weighted_draws():
     """Springs at both ends of an element, half of its length apart: how far they reach, and how much it is bent."""
     draws, copies, samples, stiffness, apart = 200000, 800, 60, 2e-3, 0.5 * LENGTH

@@ -153,6 +153,7 @@ def _mean_orientation(peclet):
     return -density[modes + 1].imag
 
 
+@pytest.mark.slow
 def test_rods_that_diffuse_lie_along_a_shear():
     """Single elements in a plane, at a Peclet number of two; a twentieth of the mean would fail."""
     kind = replace(STIFF, friction_length="segment")

@@ -15,7 +15,7 @@ from support.contexts import new_context, positions_of
 from support.dense_mechanics import bent_chain, dense_resistance
 from support.equilibrium_cases import CASES, time_step
 from support.noise_covariance import assert_covariance, moves_of_a_step
-from support.platforms import ENGINE_PLATFORMS, ENGINES, EVERYWHERE
+from support.platforms import ENGINE_PLATFORMS, ENGINES, ENGINES_PORTABLE_SLOW, EVERYWHERE
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 
 SIGMAS = 4.0
@@ -238,7 +238,7 @@ QUICK = ("freely-jointed", "inscribed-circle")
 
 
 @pytest.mark.parametrize("name", QUICK)
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ENGINES_PORTABLE_SLOW)
 def test_dynamics_keep_the_equilibrium_of_the_plane(engine, name):
     _check_dynamics(engine, "Reference", name)
 
@@ -277,7 +277,7 @@ def _check_dynamics(engine, platform, name):
     _assert_mean(ends, _mean_square_end_to_end(kind, segments))
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ENGINES_PORTABLE_SLOW)
 def test_free_segment_has_the_right_drift_with_the_printed_scheme(engine):
     """Scheme "euler" is right for one free segment, with the thermal torque of two dimensions."""
     kind = CASES["kratky-porod"].type

@@ -18,7 +18,7 @@ from support.dense_mechanics import bent_chain, dense_resistance
 from support.equilibrium_cases import Case as EquilibriumCase
 from support.equilibrium_cases import soft_chain, time_step
 from support.noise_covariance import assert_covariance, moves_of_a_step
-from support.platforms import ENGINES, EVERYWHERE
+from support.platforms import ENGINES, ENGINES_PORTABLE_SLOW, EVERYWHERE
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 
 FRICTION = F_ACTIN.segment_friction(VISCOSITY, TEMPERATURE)
@@ -398,7 +398,7 @@ def _mean(values):
     return values.mean(), values.std(ddof=1) / np.sqrt(len(values))
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ENGINES_PORTABLE_SLOW)
 def test_equilibrium_of_stiff_rings_equals_monte_carlo(engine):
     kind = soft_chain("RING", bending_rigidity=2 * KT * 100)
     shapes, expected = _metropolis(kind, 6, 800, 80, seed=7)
@@ -447,7 +447,7 @@ def _check_freely_jointed_rings(engine, segments, copies, steps):
             assert 0.05 * exact > SIGMAS * error, name
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ENGINES_PORTABLE_SLOW)
 def test_equilibrium_of_freely_jointed_rings_is_exact(engine):
     _check_freely_jointed_rings(engine, 4, 1200, 600)
 

@@ -32,7 +32,8 @@ def expected_binding(weight, stiffness, rest_length, trap, above):
 
 
 @pytest.mark.parametrize(
-    ("rest_length", "step", "strain_share"), [(0.0, 0.03, 0.0), (0.0, 2.0, 0.4), (25.0, 0.2, 0.4), (25.0, 2.0, 0.0)]
+    ("rest_length", "step", "strain_share"),
+    [pytest.param(0.0, 0.03, 0.0, marks=pytest.mark.slow), (0.0, 2.0, 0.4), (25.0, 0.2, 0.4), (25.0, 2.0, 0.0)],
 )
 def test_binding_and_motion_are_in_equilibrium_together(step, rest_length, strain_share):
     """Of particles in traps above a filament, each with a hand: how many are bound, and how far their springs reach.

@@ -70,6 +70,7 @@ def expected_on_soft_beams(weight, stiffness, rest_length, reach, anchor, shapes
     return weight * bound / (shapes * turns) * 60.0 / per_element, energies / bound, arc / bound
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("rest_length", "step"),
     [(25.0, 0.1), pytest.param(0.0, 0.1, marks=pytest.mark.slow), pytest.param(25.0, 0.02, marks=pytest.mark.slow)],

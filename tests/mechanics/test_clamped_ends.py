@@ -17,7 +17,7 @@ from openmm_cylchain.output.reporters import FilamentReporter
 from support.bending_models import BENDING_MODELS
 from support.contexts import forces_of, new_context, new_simulation, positions_of
 from support.equilibrium_cases import Case, soft_chain, time_step
-from support.platforms import ENGINES
+from support.platforms import ENGINES, ENGINES_PORTABLE_SLOW
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 
 SIGMAS = 4.0
@@ -262,7 +262,7 @@ def test_draws_of_clamped_filaments(planar):
 
 
 @pytest.mark.parametrize("planar", [False, True])
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ENGINES_PORTABLE_SLOW)
 def test_dynamics_keep_the_fluctuations_of_clamped_filaments(engine, planar):
     filaments = _drawn(engine, STIFF, 3, planar, 2500)
     _, system, positions = filaments.build()
@@ -278,6 +278,7 @@ def test_dynamics_keep_the_fluctuations_of_clamped_filaments(engine, planar):
     _assert_means(samples, _exact_fluctuations(STIFF, 3, planar))
 
 
+@pytest.mark.slow
 def test_stiff_clamped_filaments_have_gaussian_angles():
     """Eqs. (41) to (43) of Chandran and Mofrad, Phys. Rev. E 2009, 79, 011906, for 25 segments."""
     segments, length = 25, 5000.0

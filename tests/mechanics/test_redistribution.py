@@ -113,6 +113,7 @@ def test_fixed_nodes_equal_dense_solution_of_the_free_ones(fixed):
     assert np.all(velocity[list(fixed)] == 0.0)
 
 
+@pytest.mark.slow
 def test_midpoint_drift_is_the_divergence_of_the_mobility():
     """Mean displacement without forces against k_B T div(Z^-1) by finite differences of a dense inverse."""
     chains = _chain_set([2])

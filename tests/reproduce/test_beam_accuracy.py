@@ -18,6 +18,7 @@ def soft(monkeypatch):
     monkeypatch.setattr(rods_on_string, "SIMULATED_ACTIN", changed)
 
 
+@pytest.mark.slow
 def test_the_page(tmp_path, monkeypatch):
     monkeypatch.setattr(chromosome, "_BEAM_COPIES", {True: 400})
     monkeypatch.setattr(beam_accuracy, "_DRAWN", (3,))

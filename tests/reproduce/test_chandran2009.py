@@ -100,6 +100,7 @@ def planted(monkeypatch, column, **changes):
     monkeypatch.setattr(rods_on_string, name, replace(original, **factors))
 
 
+@pytest.mark.slow
 def test_rods_and_a_planted_fault(tmp_path, monkeypatch):
     monkeypatch.setattr(rod_diffusion, "_LENGTHS", (1, 5))
     monkeypatch.setattr(rod_diffusion, "_SEGMENTS", (1, 20))
@@ -124,6 +125,7 @@ def test_cantilevers_and_a_planted_fault(tmp_path, monkeypatch):
     assert stiff["ruler_deflection_loads_of_the_text_2_beam_elements"] == "differs"
 
 
+@pytest.mark.slow
 def test_chromosome_and_planted_faults(tmp_path, monkeypatch):
     monkeypatch.setattr(chromosome, "_VISCOSITIES", {"water": 1.0})
     monkeypatch.setattr(chromosome, "_COPIES", {True: 400})

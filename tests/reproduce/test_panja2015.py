@@ -108,6 +108,7 @@ def test_coupling_of_modes_and_a_planted_fault(tmp_path, monkeypatch):
     assert "ratio_of_mode_31" in differing(case, tmp_path / "stiff")
 
 
+@pytest.mark.slow
 def test_largest_steps_and_a_planted_fault(tmp_path, monkeypatch):
     runs = largest_steps._Runs(64, 4e4, 1e2, 2, (5.0, 10.0, 20.0, 50.0, 100.0), (20.0,))
     monkeypatch.setattr(largest_steps, "_RUNS", {True: {63: runs}})
@@ -175,6 +176,7 @@ def test_euler_and_its_bound(tmp_path):
     assert results["largest_stable_step_of_euler_over_nu_at_small_nu"].verdict == "differs"
 
 
+@pytest.mark.slow
 def test_inextensible_chains_and_a_planted_fault(tmp_path, monkeypatch):
     monkeypatch.setattr(explicit_steps, "_TIMES", {True: {(7, 1e-2): 6.0}})
     _, case = explicit_steps.CASES
@@ -185,6 +187,7 @@ def test_inextensible_chains_and_a_planted_fault(tmp_path, monkeypatch):
     assert "deviation_of_shortening_7_bonds_step_0.01" in differing(case, tmp_path / "soft")
 
 
+@pytest.mark.slow
 def test_dimers_and_a_planted_fault(tmp_path, monkeypatch):
     *_, case = coarse_graining.CASES
     assert not differing(case, tmp_path / "right")

@@ -35,6 +35,7 @@ def test_bending_potentials(tmp_path):
     assert set(verdicts(case, tmp_path).values()) == {"agrees"}
 
 
+@pytest.mark.slow
 def test_free_segments_and_planted_faults(tmp_path, monkeypatch):
     orientation, displacement = free_segments.CASES
     content = reproduce("pesek2016", tmp_path / "right", figure=7, quick=True)

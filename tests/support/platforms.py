@@ -25,6 +25,9 @@ def _usable(name):
 PLATFORMS = [name for name in _WANTED if _usable(name)]
 
 ENGINES = ("portable", "compiled")
+ENGINES_PORTABLE_SLOW = (pytest.param("portable", marks=pytest.mark.slow), "compiled")
+"""For statistics, of which the portable engine takes many times as long."""
+
 ENGINE_SCHEMES = [(engine, scheme) for engine in ENGINES for scheme in EXPLICIT_SCHEMES] + [("compiled", "implicit")]
 
 

@@ -33,6 +33,7 @@ def test_the_recommended_step_of_beams_is_right():
     assert check.relaxation > 0.0
 
 
+@pytest.mark.slow
 def test_a_step_that_is_far_too_long_is_wrong():
     """Soft elements, which turn far: with sixty times the recommended step, they keep to neither energy nor length."""
     kind = replace(BEAM, bending_rigidity=None, persistence_length=300.0, temperature=TEMPERATURE)

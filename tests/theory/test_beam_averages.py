@@ -23,7 +23,9 @@ def kind(bend, modulus=6e4):
     )
 
 
-@pytest.mark.parametrize(("bend", "modulus"), [(0.05, 6e4), (0.3, 6e4), (1.0, 6e4), (0.05, 6.0)])
+@pytest.mark.parametrize(
+    ("bend", "modulus"), [(0.05, 6e4), (0.3, 6e4), (1.0, 6e4), pytest.param(0.05, 6.0, marks=pytest.mark.slow)]
+)
 def test_averages_are_those_of_draws(bend, modulus):
     own, generator = kind(bend, modulus), np.random.default_rng(4)
     element = own.beam_element(300.0)
