@@ -27,7 +27,7 @@ function(add_gpu_plugin name folder library)
     target_include_directories(OpenMMCylinderChain${name} SYSTEM PRIVATE ${ARGN})
     target_link_libraries(OpenMMCylinderChain${name} PRIVATE OpenMMCylinderChain OpenMMCylinderChainReference
         CylinderChainMechanics "${library}")
-    target_compile_options(OpenMMCylinderChain${name} PRIVATE ${CYLCHAIN_NOT_IN_STEPS} -Wall -Wextra -Werror=switch)
+    target_compile_options(OpenMMCylinderChain${name} PRIVATE ${CYLCHAIN_NOT_IN_STEPS} ${CYLCHAIN_WARNING_OPTIONS})
     # Each platform has classes of the same names, and so do these plugins.
     set_target_properties(OpenMMCylinderChain${name} PROPERTIES
         CXX_VISIBILITY_PRESET hidden
