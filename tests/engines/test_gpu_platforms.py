@@ -1,6 +1,7 @@
 """Filaments on OpenMM's platforms for GPUs follow the trajectory of the Reference platform, noise and all."""
 
 import os
+from dataclasses import replace
 
 import numpy as np
 import openmm
@@ -483,6 +484,35 @@ def test_modes_are_refused_with_the_context(gpu):
     integrator = filaments.create_integrator(system, 0.05, "modes", checks=False, **arguments)
     with pytest.raises(openmm.OpenMMException, match=f"On the {gpu} platform, filaments are not moved by their modes"):
         new_context(system, positions, integrator, gpu)
+
+
+def test_beam_elements_are_refused_with_the_context(gpu):
+    filaments = Filaments(VISCOSITY, TEMPERATURE, "compiled")
+    filaments.add_straight(
+        replace(ACTIN, segment_length=100.0, element="beam", extension_relaxation_time=None), 3, [0, 0, 0], [1, 0, 0]
+    )
+    _, system, positions = filaments.build()
+    integrator = filaments.create_integrator(system, 1e6, checks=False)
+    with pytest.raises(
+        openmm.OpenMMException, match=f"On the {gpu} platform, filaments have no beam elements. Use the"
+    ):
+        new_context(system, positions, integrator, gpu)
+
+
+@pytest.mark.parametrize("scheme", ["implicit", "midpoint"])
+def test_mixed_precision_of_steps_is_refused_before_them(gpu, scheme):
+    """By one name for another: it is not the platform's."""
+    filaments, system, positions, arguments = filaments_of_variant("open")
+    step = step_of_variant("open", scheme)
+    integrator = filaments.create_integrator(system, step, scheme, precision="mixed", checks=False, **arguments)
+    context = new_context(system, positions, integrator, gpu, {"Precision": "mixed"})
+    before = positions_of(context)
+    with pytest.raises(openmm.OpenMMException, match=f'On the {gpu} platform, steps .* Use precision "automatic" or'):
+        integrator.step(1)
+    assert np.array_equal(positions_of(context), before) and context.getStepCount() == 0
+    integrator.setPrecision(integrator.Automatic)
+    integrator.step(1)
+    assert not np.array_equal(positions_of(context), before)
 
 
 def test_tensions_are_refused_before_the_step(gpu):
