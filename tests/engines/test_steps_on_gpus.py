@@ -16,7 +16,7 @@ from openmm_cylchain.engines.compiled import plugin
 from support.contexts import energy_of, new_context, positions_of
 from support.mixed_systems import mixed_context
 from support.platform_variants import ACTIN, SHEAR, VARIANTS, filaments_of_variant, step_of_variant
-from support.platforms import GPU_NAMES, NOT_TESTED
+from support.platforms import GPU_NAMES, NOT_TESTED, WORK_ITEMS
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 
 pytestmark = pytest.mark.skipif(not GPU_NAMES, reason=str(NOT_TESTED))
@@ -27,8 +27,25 @@ STEP_TOLERANCES = {"double": 1e-9, "mixed": 1e-6, "single": 1e-3}
 FAR = {"double": 0.0, "mixed": 0.0, "single": 1e4}
 """The coordinates around which such a step is taken, in nm."""
 
-KINDS = [("implicit", 1), ("implicit", 32), ("implicit-second-order", 1), ("implicit-second-order", 32)]
-KINDS += [("euler", 1), ("midpoint", 1)]
+SCHEMES = ("implicit", "implicit-second-order", "euler", "midpoint")
+
+
+def _cases():
+    """In double precision all that there is. What differs in others is compiled anew for many seconds."""
+    for precision in STEP_TOLERANCES:
+        for variant in VARIANTS:
+            for scheme in SCHEMES:
+                for items in WORK_ITEMS if scheme.startswith("implicit") else (1,):
+                    for flow in ("at rest", "in a flow"):
+                        if precision == "double" or (flow == "at rest" and (items == 1 or variant == "open")):
+                            yield pytest.param(
+                                precision,
+                                variant,
+                                scheme,
+                                items,
+                                SHEAR if flow == "in a flow" else None,
+                                id=f"{precision}-{variant}-{scheme}-by {items}-{flow}",
+                            )
 
 
 @pytest.fixture(params=GPU_NAMES, scope="module")
@@ -58,15 +75,15 @@ def _compare_one_step(variant, scheme, gpu, precision, flow, far=0.0):
     for context in (expected, found):
         context.getIntegrator().step(1)
     end = positions_of(expected)
-    assert np.abs(end - start).max() > 2 * STEP_TOLERANCES[precision]
-    assert np.abs(positions_of(found) - end).max() < STEP_TOLERANCES[precision]
+    moved = np.abs(end - start).max()
+    # Here the flow takes filaments hundreds of nm far, and Newton's method may end an iteration earlier or later.
+    tolerance = max(STEP_TOLERANCES[precision], 1e-8 * moved if flow else 0.0)
+    assert moved > 2 * tolerance
+    assert np.abs(positions_of(found) - end).max() < tolerance
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("flow", [None, SHEAR], ids=["at rest", "in a flow"])
-@pytest.mark.parametrize(("scheme", "items"), KINDS)
-@pytest.mark.parametrize("variant", VARIANTS)
-@pytest.mark.parametrize("precision", STEP_TOLERANCES)
+@pytest.mark.parametrize(("precision", "variant", "scheme", "items", "flow"), _cases())
 def test_one_step_without_noise_is_that_of_reference(gpu, precision, variant, scheme, items, flow, monkeypatch):
     """In single precision 10 um from the origin in x, y and z, where its numbers are 0.001 nm apart."""
     monkeypatch.setenv("CYLCHAIN_WORK_ITEMS", str(items))
