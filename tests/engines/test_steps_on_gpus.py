@@ -83,7 +83,7 @@ def _compare_one_step(variant, scheme, gpu, precision, flow, far=0.0):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("precision", "variant", "scheme", "items", "flow"), _cases())
+@pytest.mark.parametrize(("precision", "variant", "scheme", "items", "flow"), list(_cases()))
 def test_one_step_without_noise_is_that_of_reference(gpu, precision, variant, scheme, items, flow, monkeypatch):
     """In single precision 10 um from the origin in x, y and z, where its numbers are 0.001 nm apart."""
     monkeypatch.setenv("CYLCHAIN_WORK_ITEMS", str(items))
