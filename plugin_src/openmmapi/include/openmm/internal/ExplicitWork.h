@@ -8,7 +8,8 @@
 namespace OpenMM {
 
 /**
- * Sums over the steps of a window, for one particle: the changes of forces over kT, displacements, and products of them.
+ * Sums over the steps of a window, for one particle: the changes of forces over kT, displacements, and products of
+ * them.
  */
 struct WorkSums {
     Vec3 change, way;
