@@ -48,7 +48,8 @@ void CommonIntegrateCylinderChainStepKernel::refuse(const StepSettings& settings
                 "Use the CPU platform for this");
     if (settings.precision == Precision::Mixed)
         throw OpenMMException("On the "+getPlatform().getName()+" platform, steps of filaments are in double "
-                "precision. Use precision \"automatic\" or \"double\", and the platform's property Precision for all else");
+                "precision. Use precision \"automatic\" or \"double\", and the platform's property Precision "
+                "for all else");
 }
 
 void CommonIntegrateCylinderChainStepKernel::makeArrays() {
