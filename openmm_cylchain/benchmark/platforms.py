@@ -160,7 +160,7 @@ def mixed_system(particles, chains):
         return system, positions, None
     friction = stokes_friction(0.5 * DIAMETER, VISCOSITY)
     integrator = filaments.create_integrator(
-        system, MIXED_TIME_STEP, "implicit", particle_friction=friction, random_seed=1, checks=False
+        system, MIXED_TIME_STEP, "implicit", particle_friction=friction, random_seed=1
     )
     return system, positions, integrator
 

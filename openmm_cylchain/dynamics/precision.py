@@ -1,5 +1,8 @@
 """The precision that the steps of filaments are computed in."""
 
+from collections.abc import Iterable
+from typing import Any
+
 from ..errors import InputError
 from ..units.quantities import shown
 
@@ -10,3 +13,16 @@ def check_precision(precision: str) -> None:
     """Raise InputError unless ``precision`` names one of filaments."""
     if precision not in PRECISIONS:
         raise InputError(f"precision must be one of {', '.join(PRECISIONS)}, but is {shown(precision)}.")
+
+
+def refuse_mixed_precision_of_beams(filaments: Iterable[Any], precision: str) -> None:
+    """Raise InputError if ``precision`` is "mixed" and all filaments, each with a ``type``, have beam elements.
+
+    Their steps are in double precision. Beside others, they are as filaments in which "mixed" would not do.
+    """
+    have = [one.type.has_beam_elements for one in filaments]
+    if precision == "mixed" and have and all(have):
+        raise InputError(
+            'precision "mixed" is for filaments of straight segments, but all of these have beam elements, whose steps '
+            'are in double precision: choose "automatic" or "double".'
+        )

@@ -12,7 +12,7 @@ from openmm import app, unit
 
 from ..couplings.beam_curves import BeamCurves
 from ..dynamics.bead_spring_step import refuse_modes
-from ..dynamics.precision import check_precision
+from ..dynamics.precision import check_precision, refuse_mixed_precision_of_beams
 from ..dynamics.schemes import MODES, check_scheme
 from ..dynamics.step_of_system import recommended_step_of
 from ..dynamics.step_warnings import warn_of_long_step
@@ -876,7 +876,8 @@ class Filaments:
             statistical error: for open filaments with harmonic lengths and an implicit scheme of the compiled engine,
             above zero temperature, without flow, while 4 h K/gamma_rot is at most 10^4, k l0^2/k_BT at most 10^9, and
             noise changes lengths by 10^-5 of themselves in a step, or more.
-            Positions and forces are in double precision, and other filaments altogether. "automatic" does so where it
+            Positions and forces are in double precision, and other filaments altogether; so are those of beam elements,
+            and all on platforms for GPUs, where "mixed" is refused before the first step. "automatic" does so where it
             is faster as well, about twice as fast: where there are enough filaments of similar length, or few that are
             long. With the portable engine it is the same as "double".
             ``integrator.getNumMixedPrecisionChains()`` says for how many filaments the last step did so.
@@ -897,10 +898,12 @@ class Filaments:
         Raises
         ------
         InputError
-            If the engine does not have the scheme or the precision, or the System does not hold the filaments.
+            If the engine does not have the scheme or the precision, all filaments have beam elements and the precision
+            is "mixed", or the System does not hold the filaments.
         """
         step_size = as_step(step_size)
         check_precision(precision)
+        refuse_mixed_precision_of_beams(self, precision)
         self._refuse_if_not_in(system)
         scheme = default_scheme(self._engine_name) if scheme is None else scheme
         check_scheme(scheme)

@@ -75,6 +75,22 @@ def test_portable_engine_refuses_mixed_precision():
     filaments.create_integrator(system, 1.0, precision="double")
 
 
+def test_mixed_precision_of_beam_elements_alone_is_refused():
+    kind = dataclasses.replace(F_ACTIN, segment_length=100.0, element="beam", extension_relaxation_time=None)
+    for beside in (False, True):
+        filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
+        filaments.add_straight(kind, 3, [0, 0, 0], [1, 0, 0])
+        if beside:
+            filaments.add_straight(F_ACTIN, 3, [0, 50, 0], [1, 0, 0])
+        _, system, _ = filaments.build()
+        filaments.create_integrator(system, 1.0, precision="double")
+        if beside:
+            assert filaments.create_integrator(system, 1.0, precision="mixed").getPrecision() == PRECISIONS["mixed"]
+            continue
+        with pytest.raises(InputError, match="have beam elements, whose steps are in double precision: choose"):
+            filaments.create_integrator(system, 1.0, precision="mixed")
+
+
 def test_precision_is_serialized():
     integrator = CylinderChainIntegrator(TEMPERATURE, 1.0, 1.0)
     for value in PRECISIONS.values():

@@ -1,6 +1,7 @@
 """Filaments on OpenMM's platforms for GPUs follow the trajectory of the Reference platform, noise and all."""
 
 import os
+from dataclasses import replace
 
 import numpy as np
 import openmm
@@ -20,12 +21,16 @@ from openmm_cylchain import (
     stokes_friction,
 )
 from support.contexts import energy_of, forces_of, new_context, positions_of
+from support.mixed_systems import mixed_context
 from support.platform_variants import ACTIN, SHEAR, VARIANTS, filaments_of_variant, step_of_variant
 from support.platforms import GPU_CASES, GPU_NAMES, NOT_TESTED, WORK_ITEMS
 from support.solvent import TEMPERATURE, VISCOSITY
 
 # Of paths, in nm. Pushes of 0.3 kJ/(mol nm) take filaments 1000 nm far here.
 TOLERANCES = {case.precision: case.path_tolerance for case in GPU_CASES}
+
+# The same where OpenMM adds all forces without a loss.
+EXACT_TOLERANCES = {"double": 1e-9, "mixed": 1e-6, "single": 5e-3}
 
 pytestmark = pytest.mark.skipif(not GPU_NAMES, reason=str(NOT_TESTED))
 
@@ -61,7 +66,7 @@ def _context(variant, scheme, platform, precision=None, flow=None, pushed=True):
     return new_context(system, positions, integrator, platform, {"Precision": precision} if precision else {})
 
 
-def _compare(gpu, variant, scheme, precision, steps=20, flow=None):
+def _compare(gpu, variant, scheme, precision, steps=20, flow=None, tolerances=TOLERANCES):
     expected, found = (
         _context(variant, scheme, platform, own, flow) for platform, own in (("Reference", None), (gpu, precision))
     )
@@ -72,8 +77,8 @@ def _compare(gpu, variant, scheme, precision, steps=20, flow=None):
     for context in (expected, found):
         context.getIntegrator().step(steps)
     end = positions_of(expected)
-    assert np.abs(end - start).max() > 100 * TOLERANCES[precision]
-    assert np.abs(positions_of(found) - end).max() < TOLERANCES[precision]
+    assert np.abs(end - start).max() > 100 * tolerances[precision]
+    assert np.abs(positions_of(found) - end).max() < tolerances[precision]
 
 
 @pytest.mark.parametrize(
@@ -87,7 +92,7 @@ def _compare(gpu, variant, scheme, precision, steps=20, flow=None):
 )
 def test_trajectories_with_noise_agree(gpu, precision, work_items):
     """100 steps of open filaments among beads, in each precision."""
-    _compare(gpu, "open", "implicit", precision, steps=100)
+    _compare(gpu, "open", "implicit", precision, steps=100, tolerances=EXACT_TOLERANCES)
 
 
 @pytest.mark.slow
@@ -333,51 +338,10 @@ def test_moved_tethers_hold_filaments_elsewhere(gpu, work_items):
     assert np.abs(ends[2] - ends[0]).max() > 10
 
 
-def _mixed_context(platform, precision=None):
-    """Ten filaments among Lennard-Jones particles, some of them bound to virtual sites on segments."""
-    topology, system = app.Topology(), openmm.System()
-    system.setDefaultPeriodicBoxVectors(*(BOX * np.eye(3)))
-    topology.setPeriodicBoxVectors(BOX * np.eye(3) * unit.nanometer)
-    chain = topology.addChain()
-    lattice = 100.0 * np.stack(np.meshgrid(range(15), range(15), [9, 11, 13]), axis=-1).reshape(-1, 3)
-    for _ in lattice:
-        topology.addAtom("LJ", None, topology.addResidue("PAR", chain))
-        system.addParticle(1e5)
-    filaments = Filaments(VISCOSITY, TEMPERATURE, "compiled")
-    for number in range(10):
-        filaments.add_straight(ACTIN, 10, [50.0, 150.0 * number + 20, 400.0], [1, 0, 0.3])
-        filaments.add_attachment(number, segment=4, fraction=0.3)
-    positions = filaments.add_to(topology, system, lattice * unit.nanometer)
-    # Parameters that single precision holds, in which OpenMM has them on GPUs.
-    attraction, bonds = openmm.NonbondedForce(), openmm.HarmonicBondForce()
-    attraction.setNonbondedMethod(openmm.NonbondedForce.CutoffPeriodic)
-    attraction.setCutoffDistance(150.0)
-    attraction.setUseDispersionCorrection(False)
-    for particle in range(system.getNumParticles()):
-        attraction.addParticle(0.0, 60.0 if particle < len(lattice) else 20.0, 2.25)
-    for filament, nodes in enumerate(filaments.node_indices):
-        for first in [*nodes, filaments.attachment_indices[filament]]:
-            for second in [*nodes, filaments.attachment_indices[filament]]:
-                if first < second:
-                    attraction.addException(int(first), int(second), 0.0, 1.0, 0.0)
-    for number, site in enumerate(filaments.attachment_indices):
-        bonds.addBond(int(site), 40 * number, 100.0, 2**-10)
-    bonds.setUsesPeriodicBoundaryConditions(True)
-    system.addForce(attraction)
-    system.addForce(bonds)
-    friction = stokes_friction(30, VISCOSITY)
-    integrator = filaments.create_integrator(
-        system, 2e4, "implicit", particle_friction=friction, random_seed=4, precision="double", checks=False
-    )
-    return filaments, new_context(
-        system, positions, integrator, platform, {"Precision": precision} if precision else {}
-    )
-
-
 @EITHER_WAY
 def test_filaments_among_many_particles_with_virtual_sites_agree(gpu, work_items):
     """100 steps with noise of all that a System of particles has, and ten filaments."""
-    (filaments, expected), (_, found) = _mixed_context("Reference"), _mixed_context(gpu, "double")
+    (filaments, expected), (_, found) = mixed_context("Reference"), mixed_context(gpu, "double")
     start = positions_of(expected)
     for context in (expected, found):
         context.getIntegrator().step(100)
@@ -523,6 +487,35 @@ def test_modes_are_refused_with_the_context(gpu):
     integrator = filaments.create_integrator(system, 0.05, "modes", checks=False, **arguments)
     with pytest.raises(openmm.OpenMMException, match=f"On the {gpu} platform, filaments are not moved by their modes"):
         new_context(system, positions, integrator, gpu)
+
+
+def test_beam_elements_are_refused_with_the_context(gpu):
+    filaments = Filaments(VISCOSITY, TEMPERATURE, "compiled")
+    filaments.add_straight(
+        replace(ACTIN, segment_length=100.0, element="beam", extension_relaxation_time=None), 3, [0, 0, 0], [1, 0, 0]
+    )
+    _, system, positions = filaments.build()
+    integrator = filaments.create_integrator(system, 1e6, checks=False)
+    with pytest.raises(
+        openmm.OpenMMException, match=f"On the {gpu} platform, filaments have no beam elements. Use the"
+    ):
+        new_context(system, positions, integrator, gpu)
+
+
+@pytest.mark.parametrize("scheme", ["implicit", "midpoint"])
+def test_mixed_precision_of_steps_is_refused_before_them(gpu, scheme):
+    """By one name for another: it is not the platform's."""
+    filaments, system, positions, arguments = filaments_of_variant("open")
+    step = step_of_variant("open", scheme)
+    integrator = filaments.create_integrator(system, step, scheme, precision="mixed", checks=False, **arguments)
+    context = new_context(system, positions, integrator, gpu, {"Precision": "mixed"})
+    before = positions_of(context)
+    with pytest.raises(openmm.OpenMMException, match=f'On the {gpu} platform, steps .* Use precision "automatic" or'):
+        integrator.step(1)
+    assert np.array_equal(positions_of(context), before) and context.getStepCount() == 0
+    integrator.setPrecision(integrator.Automatic)
+    integrator.step(1)
+    assert not np.array_equal(positions_of(context), before)
 
 
 def test_tensions_are_refused_before_the_step(gpu):

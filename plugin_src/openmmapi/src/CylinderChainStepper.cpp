@@ -224,7 +224,13 @@ void CylinderChainStepper::refuseInfiniteEnergies() const {
 
 void CylinderChainStepper::takeNoteOfForces(const StepSettings& settings, bool followsOn) {
     const int window = integrator.getWorkWindow();
-    if (window > 0 && settings.kT > 0)
+    const bool watched = (window > 0 && settings.kT > 0);
+    workOfStep = (watched && getKernel().sumsWork() ? explicitWork.beginStep(followsOn, settings.kT, window) :
+            StepWork());
+    getKernel().beginWork(workOfStep);
+    if (workOfStep.watched)
+        return;
+    if (watched)
         explicitWork.beginStep(getKernel().getForces(context), getKernel().getDisplacements(), followsOn, settings.kT,
                 window);
     else
@@ -236,7 +242,7 @@ void CylinderChainStepper::step(uint64_t seed, int level, uint64_t step, bool fo
     StepSettings settings = describeStep(seed, level, step);
     recordForces(settings, records);
     takeNoteOfForces(settings, followsOn);
-    const int particle = getKernel().displaceOthers(context, settings, integrator.getFriction());
+    getKernel().displaceOthers(context, settings, integrator.getFriction());
     const CoupledForces& coupled = couplings.describe(getCoupledGroups(), integrator.getFriction());
     const Instability found = coupled.empty() ? getKernel().displaceChains(context, settings) :
             getKernel().displaceCoupledChains(context, settings, coupled);
@@ -252,11 +258,17 @@ void CylinderChainStepper::step(uint64_t seed, int level, uint64_t step, bool fo
     if (found.chain != -1)
         reportInstability(found.chain, settings);
     divided += found.divided;
+    const int particle = getKernel().findUnstableParticle();
     if (particle != -1)
         reportParticle(particle, settings);
 
     // Nothing has blown up, so the new positions replace the old ones.
 
+    if (workOfStep.endsWindow) {
+        vector<WorkSums> sums;
+        getKernel().getWork(sums);
+        explicitWork.finish(sums);
+    }
     getKernel().move(context, settings);
     explicitWork.endStep();
     recorded = (settings.segmentForces != NULL);

@@ -42,6 +42,25 @@ void ExplicitWork::beginStep(const vector<Vec3>& forces, const vector<Vec3>& mov
         finish();
 }
 
+StepWork ExplicitWork::beginStep(bool followsOn, double kT, int window) {
+    StepWork work;
+    work.watched = true;
+    work.followsOn = (known && followsOn);
+    work.beginsWindow = (count == 0);
+    work.perEnergy = 1/kT;
+    known = false;
+    if (work.followsOn)
+        work.endsWindow = (++count >= window);
+    return work;
+}
+
+void ExplicitWork::finish(const vector<WorkSums>& sumsOfParticles) {
+    sums.resize(particles.size());
+    for (size_t i = 0; i < particles.size(); i++)
+        sums[i] = sumsOfParticles[particles[i]];
+    finish();
+}
+
 void ExplicitWork::stop() {
     known = false;
     count = 0;
@@ -49,7 +68,7 @@ void ExplicitWork::stop() {
 }
 
 void ExplicitWork::add(int particle, const Vec3& force, const Vec3& move, double perEnergy) {
-    Sums& own = sums[particle];
+    WorkSums& own = sums[particle];
     const Vec3 change = (force-forcesBefore[particle])*perEnergy;
     own.work -= change.dot(move);
     own.change += change;
@@ -62,7 +81,7 @@ void ExplicitWork::finish() {
     largest = 0;
     worst = -1;
     for (size_t i = 0; i < particles.size(); i++) {
-        Sums& own = sums[i];
+        WorkSums& own = sums[i];
         const double work = (own.work+own.change.dot(own.way)/count)/count;
         if (work != 0) {
             active++;
@@ -72,7 +91,7 @@ void ExplicitWork::finish() {
                 worst = particles[i];
             }
         }
-        own = Sums();
+        own = WorkSums();
     }
     count = 0;
 }

@@ -13,6 +13,7 @@
 #include "openmm/Vec3.h"
 #include "openmm/internal/ContextImpl.h"
 #include "openmm/internal/CylinderChainDescription.h"
+#include "openmm/internal/ExplicitWork.h"
 #include "openmm/internal/OtherParticles.h"
 #include "openmm/internal/ParallelLoop.h"
 #include <cstdint>
@@ -281,9 +282,28 @@ public:
      * @param context   the context in which to execute this kernel
      * @param settings  the settings of the step
      * @param friction  the friction of particles that have none of their own, divided by their mass
-     * @return the first particle whose displacement is not finite, or -1
      */
-    virtual int displaceOthers(ContextImpl& context, const cylchain::StepSettings& settings, double friction) = 0;
+    virtual void displaceOthers(ContextImpl& context, const cylchain::StepSettings& settings, double friction) = 0;
+    /**
+     * Get the first particle outside chains whose displacement is not finite, or -1, once chains have been displaced.
+     */
+    virtual int findUnstableParticle() = 0;
+    /**
+     * Whether displaceOthers() and displaceChains() sum up the work of forces where they are, see ExplicitWork.
+     */
+    virtual bool sumsWork() const {
+        return false;
+    }
+    /**
+     * Say what they sum up in the step that begins.
+     */
+    virtual void beginWork(const StepWork&) {
+    }
+    /**
+     * Get the sums of all particles.
+     */
+    virtual void getWork(std::vector<WorkSums>&) {
+    }
     /**
      * Move all particles by their displacements, and advance the time by one step.
      *

@@ -6,6 +6,7 @@
 #include "openmm/common/ComputeArray.h"
 #include "openmm/common/ComputeContext.h"
 #include "openmm/internal/CylinderChainDescription.h"
+#include "openmm/internal/ExplicitWork.h"
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -35,8 +36,22 @@ public:
     void update();
     /**
      * Bring the positions of nodes, and the forces on them unless they are to be zero, into the order of chains.
+     *
+     * @param work   what is summed up of the work of these forces
      */
-    void gather(bool withForces);
+    void gather(bool withForces, const StepWork& work = {});
+    /**
+     * Get what kernels need to know of the sums of work.
+     */
+    static int flagsOf(const StepWork& work);
+    /**
+     * Copy sums of work, as kernels have them, to those of particles.
+     */
+    static void copyWork(const ComputeArray& work, const std::vector<int>& particles, std::vector<WorkSums>& sums);
+    /**
+     * Copy the sums of work of nodes to those of all particles.
+     */
+    void getWork(std::vector<WorkSums>& sums);
     /**
      * Find the forces and energies of chains at the positions that were gathered, and add the forces to those of the
      * platform.
@@ -79,12 +94,17 @@ public:
     }
     int describeStep(const cylchain::StepSettings& settings);
     /**
-     * Get what went wrong in a step, which kernels add to.
+     * Get the counts of what went wrong in all steps, which kernels add to.
      */
     ComputeArray& getSummary() {
         return summary;
     }
-    std::vector<std::uint64_t> readSummary();
+    /**
+     * Get a count of what went wrong in the steps of the last call of advance(), and in kernels since the one before.
+     */
+    std::uint64_t getCount(int number) const {
+        return counts[number];
+    }
     /**
      * Compile kernels that have no chains.
      */
@@ -97,6 +117,7 @@ private:
     std::unique_ptr<Batch> makeBatch(const std::vector<int>& members, bool byGroup);
     ComputeProgram programFor(const cylchain::Chain& chain, bool byGroup);
     void uploadTethers();
+    void readSummary();
     void updateBox();
     void updateShifts();
     ComputeContext& cc;
@@ -105,10 +126,12 @@ private:
     const bool usesGroups;
     std::vector<std::unique_ptr<Batch> > itemBatches, groupBatches;
     std::unique_ptr<Arrays> arrays;
-    std::vector<int> particleOfNode, firstNodes, stepsTaken;
+    std::vector<int> particleOfNode, slotOfParticle, firstNodes, stepsTaken;
+    std::vector<std::uint64_t> counts, countsBefore;
     std::vector<double> flowNumbers, boxNumbers, shiftNumbers;
     bool slotsAreValid, gatherHasArguments = false, scatterHasArguments = false, moveHasArguments = false;
-    ComputeArray slots, particles, positions, forces, displacements, shifts, energies, flow, box, taken, summary;
+    ComputeArray slots, particles, positions, forces, displacements, shifts, energies, flow, box, taken, summary,
+            work;
     ComputeKernel gatherKernel, scatterKernel, moveKernel;
 };
 

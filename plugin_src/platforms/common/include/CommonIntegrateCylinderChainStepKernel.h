@@ -26,7 +26,15 @@ public:
     cylchain::Instability displaceChains(ContextImpl& context, const cylchain::StepSettings& settings);
     cylchain::Instability displaceCoupledChains(ContextImpl& context, const cylchain::StepSettings& settings,
             const cylchain::CoupledForces& coupled);
-    int displaceOthers(ContextImpl& context, const cylchain::StepSettings& settings, double friction);
+    void displaceOthers(ContextImpl& context, const cylchain::StepSettings& settings, double friction);
+    int findUnstableParticle();
+    bool sumsWork() const {
+        return true;
+    }
+    void beginWork(const StepWork& work) {
+        this->work = work;
+    }
+    void getWork(std::vector<WorkSums>& sums);
     void move(ContextImpl& context, const cylchain::StepSettings& settings);
     int advanceChains(ContextImpl& context, const cylchain::StepSettings& settings, int count, long long& divided);
     void moveAdvanced(ContextImpl& context, const cylchain::StepSettings& settings, int count);
@@ -48,8 +56,9 @@ private:
     const OtherParticles* others;
     bool hasArguments;
     std::vector<Vec3> forces, displacements;
-    std::vector<double> mobilityNumbers;
-    ComputeArray particles, mobilities, displacementsOfOthers, unstable;
+    double frictionOfMobilities;
+    StepWork work;
+    ComputeArray particles, mobilities, displacementsOfOthers, unstable, workOnOthers;
     ComputeKernel displaceKernel, moveKernel;
 };
 

@@ -55,6 +55,10 @@ enum {TWO_STAGES = 1, HAS_FLOW = 2, FLOW_VARIES = 4, FLOW_IS_PERIODIC = 8, IS_PE
 /** The energies of a chain. */
 enum {STRETCHING_ENERGY, BENDING_ENERGY, TETHER_ENERGY, NUM_ENERGIES};
 
+/** The work that is summed up for a particle: see ExplicitWork. What is true of a step of it. */
+enum {WORK_FORCE = 0, WORK_CHANGE = 3, WORK_WAY = 6, WORK_DONE = 9, NUM_WORK_NUMBERS = 10};
+enum {IS_WATCHED = 1, FOLLOWS_ON = 2, BEGINS_WINDOW = 4};
+
 /** What went wrong in a step, and what was divided. */
 enum {NUM_UNSTABLE_CHAINS, NUM_DIVIDED_STEPS, NUM_UNSTABLE_PARTICLES, NUM_SUMMARY_NUMBERS};
 

@@ -3,13 +3,47 @@
  * OpenMM keeps particles in an order of its own, in which slots says where each of them is.
  */
 
+/**
+ * Sum up the work that forces do because they are those of the start of a step: see ExplicitWork.
+ *
+ * @param moved   the displacement in the step before
+ * @param own     the numbers of the particle
+ */
+inline DEVICE void addWork(int workFlags, double perEnergy, Vector force, GLOBAL const double* RESTRICT moved,
+        GLOBAL double* RESTRICT own) {
+    if (!(workFlags&IS_WATCHED))
+        return;
+    if (workFlags&FOLLOWS_ON) {
+        const Vector way = make_double3(moved[0], moved[1], moved[2]);
+        const Vector change = (force-make_double3(own[WORK_FORCE], own[WORK_FORCE+1], own[WORK_FORCE+2]))*perEnergy;
+        const int isFirst = workFlags&BEGINS_WINDOW;
+        own[WORK_DONE] = (isFirst ? 0 : own[WORK_DONE])-(change.x*way.x+change.y*way.y+change.z*way.z);
+        own[WORK_CHANGE] = (isFirst ? 0 : own[WORK_CHANGE])+change.x;
+        own[WORK_CHANGE+1] = (isFirst ? 0 : own[WORK_CHANGE+1])+change.y;
+        own[WORK_CHANGE+2] = (isFirst ? 0 : own[WORK_CHANGE+2])+change.z;
+        own[WORK_WAY] = (isFirst ? 0 : own[WORK_WAY])+way.x;
+        own[WORK_WAY+1] = (isFirst ? 0 : own[WORK_WAY+1])+way.y;
+        own[WORK_WAY+2] = (isFirst ? 0 : own[WORK_WAY+2])+way.z;
+    }
+    own[WORK_FORCE] = force.x;
+    own[WORK_FORCE+1] = force.y;
+    own[WORK_FORCE+2] = force.z;
+}
+
+/** Forces that are not finite, or too large to be added, are the largest in either direction. */
+inline DEVICE double checkedForce(double force) {
+    return fabs(force) < LARGEST_FORCE ? force : NAN;
+}
+
 /** Bring the nodes of chains, and the forces on them unless these are zero, into the order of chains. */
-KERNEL void gatherNodes(int count, int paddedNumAtoms, int withForces, GLOBAL const real4* RESTRICT posq,
+KERNEL void gatherNodes(int count, int paddedNumAtoms, int withForces, int workFlags, double perEnergy,
+        GLOBAL const real4* RESTRICT posq,
 #ifdef USE_MIXED_PRECISION
         GLOBAL const real4* RESTRICT posqCorrection,
 #endif
         GLOBAL const mm_long* RESTRICT forceBuffers, GLOBAL const int* RESTRICT particles,
-        GLOBAL const int* RESTRICT slots, GLOBAL double* RESTRICT positions, GLOBAL double* RESTRICT forces) {
+        GLOBAL const int* RESTRICT slots, GLOBAL double* RESTRICT positions, GLOBAL double* RESTRICT forces,
+        GLOBAL const double* RESTRICT displacements, GLOBAL double* RESTRICT work) {
     const double scale = 1/(double) 0x100000000;
     for (int i = GLOBAL_ID; i < count; i += GLOBAL_SIZE) {
         const int slot = slots[particles[i]];
@@ -24,11 +58,10 @@ KERNEL void gatherNodes(int count, int paddedNumAtoms, int withForces, GLOBAL co
         positions[3*i] = x;
         positions[3*i+1] = y;
         positions[3*i+2] = z;
-        for (int k = 0; k < 3; k++) {
-            const double force = withForces ? scale*forceBuffers[slot+k*paddedNumAtoms] : 0;
-            // Forces that are not finite, or too large to be added, are the largest in either direction.
-            forces[3*i+k] = fabs(force) < LARGEST_FORCE ? force : NAN;
-        }
+        for (int k = 0; k < 3; k++)
+            forces[3*i+k] = withForces ? checkedForce(scale*forceBuffers[slot+k*paddedNumAtoms]) : 0;
+        addWork(workFlags, perEnergy, make_double3(forces[3*i], forces[3*i+1], forces[3*i+2]), displacements+3*i,
+                work+(size_t) NUM_WORK_NUMBERS*i);
     }
 }
 
@@ -90,11 +123,14 @@ inline DEVICE Vector velocityOfFlow(GLOBAL const double* RESTRICT flow, GLOBAL c
  * @param unstable   receives one for each particle whose displacement is not finite, or zero
  */
 KERNEL void displaceOthers(int count, int paddedNumAtoms, int flags, double h, double kT, unsigned int seed,
-        unsigned int level, mm_ulong step, GLOBAL const real4* RESTRICT posq,
+        unsigned int level, mm_ulong step, int workFlags, double perEnergy, GLOBAL const real4* RESTRICT posq,
+#ifdef USE_MIXED_PRECISION
+        GLOBAL const real4* RESTRICT posqCorrection,
+#endif
         GLOBAL const mm_long* RESTRICT forceBuffers, GLOBAL const int* RESTRICT particles,
         GLOBAL const int* RESTRICT slots, GLOBAL const double* RESTRICT mobilities, GLOBAL const double* RESTRICT flow,
         GLOBAL const double* RESTRICT box, GLOBAL double* RESTRICT displacements, GLOBAL int* RESTRICT unstable,
-        GLOBAL mm_ulong* RESTRICT summary) {
+        GLOBAL mm_ulong* RESTRICT summary, GLOBAL double* RESTRICT work) {
     const double scale = 1/(double) 0x100000000;
     NoiseKey key;
     key.seed = seed;
@@ -106,11 +142,17 @@ KERNEL void displaceOthers(int count, int paddedNumAtoms, int flags, double h, d
         const double4 n = drawNormals(key, NOISE_PARTICLE, 0, particles[i], 0);
         Vector force = make_double3((double) forceBuffers[slot], (double) forceBuffers[slot+paddedNumAtoms],
                 (double) forceBuffers[slot+2*paddedNumAtoms])*scale;
+        addWork(workFlags, perEnergy, make_double3(checkedForce(force.x), checkedForce(force.y),
+                checkedForce(force.z)), displacements+3*i, work+(size_t) NUM_WORK_NUMBERS*i);
         Vector moved = force*(h*mobility)+make_double3(n.x, n.y, n.z)*noise;
         if (flags&HAS_FLOW) {
             // The velocity half-way, so that particles keep to closed streamlines.
             const real4 position = posq[slot];
             Vector x = make_double3(position.x, position.y, position.z);
+#ifdef USE_MIXED_PRECISION
+            const real4 correction = posqCorrection[slot];
+            x = x+make_double3(correction.x, correction.y, correction.z);
+#endif
             const int isPeriodic = flags&FLOW_IS_PERIODIC;
             Vector halfway = x+velocityOfFlow(flow, box, isPeriodic, x)*(0.5*h);
             moved = moved+velocityOfFlow(flow, box, isPeriodic, halfway)*h;

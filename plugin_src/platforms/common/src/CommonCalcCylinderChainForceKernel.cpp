@@ -34,8 +34,8 @@ CommonCalcCylinderChainForceKernel::CommonCalcCylinderChainForceKernel(string na
 
 void CommonCalcCylinderChainForceKernel::initialize(const System&, const CylinderChainDescription& chains) {
     if (!chains.getBeams().empty())
-        throw OpenMMException("CylinderChainForce: Chains of beam elements are for the platforms Reference and CPU "
-                "alone");
+        throw OpenMMException("On the "+getPlatform().getName()+" platform, filaments have no beam elements. Use the "
+                "CPU platform, or filaments of straight segments (element=\"straight\")");
     description = &chains;
     cc.addForce(new ForceInfo(chains));
 }

@@ -110,7 +110,10 @@ CommonCylinderChains::CommonCylinderChains(ComputeContext& cc, const CylinderCha
     makeArray(cc, flow, flowNumbers, "flow");
     boxNumbers.resize(9);
     makeArray(cc, box, boxNumbers, "boxOfChains");
-    makeArray(cc, summary, vector<uint64_t>(layout::NUM_SUMMARY_NUMBERS), "summaryOfStep");
+    counts.resize(layout::NUM_SUMMARY_NUMBERS);
+    countsBefore.resize(layout::NUM_SUMMARY_NUMBERS);
+    makeArray(cc, summary, counts, "summaryOfSteps");
+    makeArray(cc, work, vector<double>(layout::NUM_WORK_NUMBERS*particleOfNode.size()), "workOnNodes");
     cc.addReorderListener(new ReorderListener(slotsAreValid));
     uploadTethers();
     const ComputeProgram program = compile(cc, CommonCylinderChainKernelSources::particles);
@@ -218,7 +221,7 @@ void CommonCylinderChains::update() {
 ComputeArray& CommonCylinderChains::getSlots() {
     if (!slotsAreValid) {
         const vector<int>& order = cc.getAtomIndex();
-        vector<int> slotOfParticle(cc.getNumAtoms());
+        slotOfParticle.resize(cc.getNumAtoms());
         for (int slot = 0; slot < cc.getNumAtoms(); slot++)
             slotOfParticle[order[slot]] = slot;
         slots.upload(slotOfParticle);
@@ -245,9 +248,7 @@ void CommonCylinderChains::updateShifts() {
     vector<double> present(shiftNumbers.size());
     const vector<Chain>& chains = description.getChains();
     if (any_of(chains.begin(), chains.end(), [] (const Chain& chain) {return !chain.tethers.empty();})) {
-        vector<int> slotOfParticle(cc.getNumAtoms());
-        for (int slot = 0; slot < cc.getNumAtoms(); slot++)
-            slotOfParticle[cc.getAtomIndex()[slot]] = slot;
+        getSlots();
         for (size_t chain = 0; chain < chains.size(); chain++) {
             const mm_int4 offset = cc.getPosCellOffsets()[slotOfParticle[chains[chain].nodes[0]]];
             for (int k = 0; k < 3; k++)
@@ -279,27 +280,57 @@ int CommonCylinderChains::describeStep(const StepSettings& settings) {
             (description.usesPeriodicBoundaryConditions() ? layout::IS_PERIODIC : 0);
 }
 
-vector<uint64_t> CommonCylinderChains::readSummary() {
-    vector<uint64_t> result(layout::NUM_SUMMARY_NUMBERS);
-    summary.download(result);
-    return result;
+void CommonCylinderChains::readSummary() {
+    // Kernels count on and on, so that nothing has to be set to zero in a step.
+
+    vector<uint64_t> present(layout::NUM_SUMMARY_NUMBERS);
+    summary.download(present);
+    for (size_t i = 0; i < present.size(); i++)
+        counts[i] = present[i]-countsBefore[i];
+    countsBefore = present;
 }
 
-void CommonCylinderChains::gather(bool withForces) {
+int CommonCylinderChains::flagsOf(const StepWork& work) {
+    return (work.watched ? layout::IS_WATCHED : 0) | (work.followsOn ? layout::FOLLOWS_ON : 0) |
+            (work.beginsWindow ? layout::BEGINS_WINDOW : 0);
+}
+
+void CommonCylinderChains::copyWork(const ComputeArray& work, const vector<int>& particles, vector<WorkSums>& sums) {
+    vector<double> found(work.getSize());
+    work.download(found);
+    for (size_t i = 0; i < particles.size(); i++) {
+        const double* own = &found[layout::NUM_WORK_NUMBERS*i];
+        WorkSums& result = sums[particles[i]];
+        for (int k = 0; k < 3; k++) {
+            result.change[k] = own[layout::WORK_CHANGE+k];
+            result.way[k] = own[layout::WORK_WAY+k];
+        }
+        result.work = own[layout::WORK_DONE];
+    }
+}
+
+void CommonCylinderChains::getWork(vector<WorkSums>& sums) {
+    copyWork(work, particleOfNode, sums);
+}
+
+void CommonCylinderChains::gather(bool withForces, const StepWork& work) {
     getSlots();
     if (!gatherHasArguments) {
         gatherHasArguments = true;
         gatherKernel->addArg((int) particleOfNode.size());
         gatherKernel->addArg(cc.getPaddedNumAtoms());
-        gatherKernel->addArg((int) withForces);
+        for (int i = 0; i < 3; i++)
+            gatherKernel->addArg();
         gatherKernel->addArg(cc.getPosq());
         if (cc.getUseMixedPrecision())
             gatherKernel->addArg(cc.getPosqCorrection());
         gatherKernel->addArg(cc.getLongForceBuffer());
-        for (ComputeArray* array : {&particles, &slots, &positions, &forces})
+        for (ComputeArray* array : {&particles, &slots, &positions, &forces, &displacements, &this->work})
             gatherKernel->addArg(*array);
     }
     gatherKernel->setArg(2, (int) withForces);
+    gatherKernel->setArg(3, flagsOf(work));
+    gatherKernel->setArg(4, work.perEnergy);
     gatherKernel->execute(particleOfNode.size());
 }
 
@@ -349,7 +380,6 @@ int CommonCylinderChains::advance(const StepSettings& settings, int count, bool 
     const int flags = describeStep(settings) | (findsForces ? layout::FINDS_FORCES : 0);
     const bool isImplicit = settings.scheme == Scheme::Implicit || settings.scheme == Scheme::ImplicitSecondOrder;
     const bool byGroup = usesGroups && isImplicit;
-    cc.clearBuffer(summary);
     for (const unique_ptr<Batch>& batch : getBatches(byGroup)) {
         if (!batch->advance) {
             const size_t chainsAtOnce = batch->items/(byGroup ? GROUP_SIZE : 1);
@@ -375,9 +405,9 @@ int CommonCylinderChains::advance(const StepSettings& settings, int count, bool 
         kernel->setArg(8, settings.step);
         kernel->execute(batch->items, batch->groupSize);
     }
-    const vector<uint64_t> found = readSummary();
-    divided = found[layout::NUM_DIVIDED_STEPS];
-    if (found[layout::NUM_UNSTABLE_CHAINS] > 0)
+    readSummary();
+    divided = counts[layout::NUM_DIVIDED_STEPS];
+    if (counts[layout::NUM_UNSTABLE_CHAINS] > 0)
         taken.download(stepsTaken);
     return stepsTaken.empty() ? count : *min_element(stepsTaken.begin(), stepsTaken.end());
 }

@@ -14,7 +14,7 @@ using namespace std;
 
 CommonIntegrateCylinderChainStepKernel::CommonIntegrateCylinderChainStepKernel(string name, const Platform& platform,
         ComputeContext& cc) : IntegrateCylinderChainStepKernel(name, platform), cc(cc), chainKernel(NULL),
-        others(NULL), hasArguments(false) {
+        others(NULL), hasArguments(false), frictionOfMobilities(-1) {
 }
 
 void CommonIntegrateCylinderChainStepKernel::HostLoop::run(int count, const function<void(int)>& iteration) {
@@ -46,6 +46,10 @@ void CommonIntegrateCylinderChainStepKernel::refuse(const StepSettings& settings
     if (settings.segmentForces != NULL)
         throw OpenMMException("On the "+getPlatform().getName()+" platform, tensions of segments are not recorded. "
                 "Use the CPU platform for this");
+    if (settings.precision == Precision::Mixed)
+        throw OpenMMException("On the "+getPlatform().getName()+" platform, steps of filaments are in double "
+                "precision. Use precision \"automatic\" or \"double\", and the platform's property Precision "
+                "for all else");
 }
 
 void CommonIntegrateCylinderChainStepKernel::makeArrays() {
@@ -55,6 +59,7 @@ void CommonIntegrateCylinderChainStepKernel::makeArrays() {
     mobilities.initialize<double>(cc, mobile.size(), "mobilities");
     displacementsOfOthers.initialize<double>(cc, 3*mobile.size(), "displacementsOfOthers");
     unstable.initialize<int>(cc, mobile.size(), "unstableParticles");
+    workOnOthers.initialize<double>(cc, layout::NUM_WORK_NUMBERS*mobile.size(), "workOnOthers");
     const ComputeProgram program = CommonCylinderChains::compile(cc,
             CommonCylinderChainKernelSources::particles);
     displaceKernel = program->createKernel("displaceOthers");
@@ -94,7 +99,7 @@ Instability CommonIntegrateCylinderChainStepKernel::displaceChains(ContextImpl&,
     ContextSelector selector(cc);
     refuse(settings);
     CommonCylinderChains& chains = chainKernel->getChains();
-    chains.gather(true);
+    chains.gather(true, work);
     Instability result;
     long long divided;
     if (chains.advance(settings, 1, false, divided) < 1)
@@ -108,34 +113,35 @@ Instability CommonIntegrateCylinderChainStepKernel::displaceCoupledChains(Contex
     CommonCylinderChains::refuseImplicitSteps(getPlatform().getName(), "filaments with links, contacts or walls");
 }
 
-int CommonIntegrateCylinderChainStepKernel::displaceOthers(ContextImpl&, const StepSettings& settings,
+void CommonIntegrateCylinderChainStepKernel::displaceOthers(ContextImpl&, const StepSettings& settings,
         double friction) {
     const vector<int>& mobile = others->getMobile();
     if (mobile.empty())
-        return -1;
+        return;
     ContextSelector selector(cc);
     CommonCylinderChains& chains = chainKernel->getChains();
     if (!hasArguments)
         makeArrays();
-    vector<double> present;
-    for (int particle : mobile)
-        present.push_back(others->getMobility(particle, friction));
-    if (present != mobilityNumbers) {
-        mobilityNumbers = present;
-        mobilities.upload(mobilityNumbers);
+    if (friction != frictionOfMobilities) {
+        vector<double> present;
+        for (int particle : mobile)
+            present.push_back(others->getMobility(particle, friction));
+        mobilities.upload(present);
+        frictionOfMobilities = friction;
     }
     const int flags = chains.describeStep(settings);
-    cc.clearBuffer(chains.getSummary());
     if (!hasArguments) {
         hasArguments = true;
         displaceKernel->addArg((int) mobile.size());
         displaceKernel->addArg(cc.getPaddedNumAtoms());
-        for (int i = 0; i < 6; i++)
+        for (int i = 0; i < 8; i++)
             displaceKernel->addArg();
         displaceKernel->addArg(cc.getPosq());
+        if (cc.getUseMixedPrecision())
+            displaceKernel->addArg(cc.getPosqCorrection());
         displaceKernel->addArg(cc.getLongForceBuffer());
         for (ComputeArray* array : {&particles, &chains.getSlots(), &mobilities, &chains.getFlow(), &chains.getBox(),
-                &displacementsOfOthers, &unstable, &chains.getSummary()})
+                &displacementsOfOthers, &unstable, &chains.getSummary(), &workOnOthers})
             displaceKernel->addArg(*array);
         moveKernel->addArg((int) mobile.size());
         moveKernel->addArg();
@@ -153,12 +159,27 @@ int CommonIntegrateCylinderChainStepKernel::displaceOthers(ContextImpl&, const S
     displaceKernel->setArg(5, (uint32_t) settings.seed);
     displaceKernel->setArg(6, (uint32_t) settings.level);
     displaceKernel->setArg(7, settings.step);
+    displaceKernel->setArg(8, CommonCylinderChains::flagsOf(work));
+    displaceKernel->setArg(9, work.perEnergy);
     displaceKernel->execute(mobile.size());
-    if (chains.readSummary()[layout::NUM_UNSTABLE_PARTICLES] == 0)
+}
+
+int CommonIntegrateCylinderChainStepKernel::findUnstableParticle() {
+    const vector<int>& mobile = others->getMobile();
+    if (mobile.empty() || chainKernel->getChains().getCount(layout::NUM_UNSTABLE_PARTICLES) == 0)
         return -1;
+    ContextSelector selector(cc);
     vector<int> found(mobile.size());
     unstable.download(found);
     return mobile[find(found.begin(), found.end(), 1)-found.begin()];
+}
+
+void CommonIntegrateCylinderChainStepKernel::getWork(vector<WorkSums>& sums) {
+    ContextSelector selector(cc);
+    sums.resize(cc.getNumAtoms());
+    chainKernel->getChains().getWork(sums);
+    if (hasArguments)
+        CommonCylinderChains::copyWork(workOnOthers, others->getMobile(), sums);
 }
 
 void CommonIntegrateCylinderChainStepKernel::moveOthers(double stepSize) {

@@ -28,7 +28,10 @@ public:
     cylchain::Instability displaceChains(ContextImpl& context, const cylchain::StepSettings& settings);
     cylchain::Instability displaceCoupledChains(ContextImpl& context, const cylchain::StepSettings& settings,
             const cylchain::CoupledForces& coupled);
-    int displaceOthers(ContextImpl& context, const cylchain::StepSettings& settings, double friction);
+    void displaceOthers(ContextImpl& context, const cylchain::StepSettings& settings, double friction);
+    int findUnstableParticle() {
+        return unstableParticle;
+    }
     void move(ContextImpl& context, const cylchain::StepSettings& settings);
     int advanceChains(ContextImpl& context, const cylchain::StepSettings& settings, int count, long long& divided);
     void moveAdvanced(ContextImpl& context, const cylchain::StepSettings& settings, int count);
@@ -49,7 +52,7 @@ private:
 
     std::unique_ptr<cylchain::NetworkStep> network;
     int versionOfNetwork;
-    int mixedChains;
+    int mixedChains, unstableParticle = -1;
     std::vector<Vec3> displacements, newPositions;
 };
 

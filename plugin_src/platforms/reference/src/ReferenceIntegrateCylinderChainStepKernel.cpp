@@ -110,7 +110,7 @@ Instability ReferenceIntegrateCylinderChainStepKernel::displaceCoupledChains(Con
     return result;
 }
 
-int ReferenceIntegrateCylinderChainStepKernel::displaceOthers(ContextImpl& context, const StepSettings& settings,
+void ReferenceIntegrateCylinderChainStepKernel::displaceOthers(ContextImpl& context, const StepSettings& settings,
         double friction) {
     const vector<int>& mobile = others->getMobile();
     const vector<Vec3>& forces = *extractData(context).forces;
@@ -118,10 +118,10 @@ int ReferenceIntegrateCylinderChainStepKernel::displaceOthers(ContextImpl& conte
     loop.run(numBlocks, [&] (int block) {
         displaceBlock(block, *extractData(context).positions, forces, settings, friction);
     });
-    for (int particle : mobile)
-        if (!isFinite(displacements[particle]))
-            return particle;
-    return -1;
+    const auto found = find_if(mobile.begin(), mobile.end(), [&] (int particle) {
+        return !isFinite(displacements[particle]);
+    });
+    unstableParticle = (found == mobile.end() ? -1 : *found);
 }
 
 static Vec3 velocityOf(const BackgroundFlow& flow, const Vec3& x) {

@@ -104,6 +104,7 @@ private:
     ChainCouplings couplings;
     Kernel kernel;
     ExplicitWork explicitWork;
+    StepWork workOfStep;
     const bool periodic;
     // The periodic box that a flow refers to.
 

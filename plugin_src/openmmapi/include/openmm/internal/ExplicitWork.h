@@ -8,6 +8,31 @@
 namespace OpenMM {
 
 /**
+ * Sums over the steps of a window, for one particle: the changes of forces over kT, displacements, and products of
+ * them.
+ */
+struct WorkSums {
+    Vec3 change, way;
+    double work = 0;
+};
+
+/**
+ * What a platform that sums up work itself does in a step.
+ */
+struct StepWork {
+    /** Whether forces at the start of the step are taken note of. */
+    bool watched = false;
+    /** Whether the step follows on from one that was watched, whose sums are added to those of the window. */
+    bool followsOn = false;
+    /** Whether these sums are the first of the window. */
+    bool beginsWindow = false;
+    /** Whether they are the last ones. */
+    bool endsWindow = false;
+    /** 1/kT. */
+    double perEnergy = 0;
+};
+
+/**
  * The work that forces do because they are those of the start of a step.  With the forces f on a particle before and
  * after a step that moves it by dx, this is w = -(f(after)-f(before)).dx.  Its means over windows of steps are those of
  * CylinderChainIntegrator::setWorkWindow().
@@ -34,6 +59,18 @@ public:
     void beginStep(const std::vector<Vec3>& forces, const std::vector<Vec3>& moves, bool followsOn, double kT,
             int window);
     /**
+     * Begin a step whose work the platform sums up.
+     *
+     * @param followsOn  as above
+     * @param kT         as above
+     * @param window     as above
+     */
+    StepWork beginStep(bool followsOn, double kT, int window);
+    /**
+     * Finish a window with the sums of all particles, which the platform has summed up.
+     */
+    void finish(const std::vector<WorkSums>& sumsOfParticles);
+    /**
      * Measure nothing in this step, and begin anew after it.
      */
     void stop();
@@ -55,12 +92,6 @@ public:
      */
     void take(double& work, int& particle, int& steps, int& particles);
 private:
-    struct Sums {
-        // The changes of forces over kT, displacements, and products of them.
-
-        Vec3 change, way;
-        double work = 0;
-    };
     void add(int particle, const Vec3& force, const Vec3& move, double perEnergy);
     void finish();
     ParallelLoop& loop;
@@ -68,7 +99,7 @@ private:
     // At the start of the step before.
     std::vector<Vec3> forcesBefore;
     // Nothing until two steps have followed on each other: those of filaments alone are taken many at a time.
-    std::vector<Sums> sums;
+    std::vector<WorkSums> sums;
     bool known;
     int count;
     double largest;
