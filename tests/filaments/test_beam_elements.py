@@ -272,8 +272,8 @@ def test_what_filaments_of_beam_elements_cannot_have():
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
     nodes = [[0, 0, 0], [250, 0, 0], [500, 0, 0], [500, 250, 0]]
     for add, message in (
-        (lambda: filaments.add_ring(KIND, 6, [0, 0, 0]), "no rings as yet"),
-        (lambda: filaments.add_nodes(KIND, nodes, closed=True), "no rings as yet"),
+        (lambda: filaments.add_ring(KIND, 3, [0, 0, 0]), "at least 4 segments"),
+        (lambda: filaments.add_nodes(KIND, nodes[:3], closed=True), "at least 4 segments"),
         (lambda: filaments.add_straight(KIND, 3, [0, 0, 0], [1, 0, 0], propulsion=np.nan), "must be finite"),
         (
             lambda: filaments.add_straight(KIND, 3, [0, 0, 0], [1, 0, 0], clamped_tangents=1),
