@@ -61,7 +61,8 @@ def control_points_of(nodes: FloatArray, tangents: FloatArray, length: float) ->
 
 def unrolled(nodes: FloatArray, control_points: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Nodes and control points (..., nodes + 1, 3) of a ring, with the first node once more behind the last one."""
-    return tuple(np.concatenate([own, own[..., :1, :]], axis=-2) for own in (nodes, control_points))
+    around, controls = (np.concatenate([own, own[..., :1, :]], axis=-2) for own in (nodes, control_points))
+    return around, controls
 
 
 def natural_tangents(nodes: FloatArray, closed: bool = False) -> FloatArray:

@@ -38,8 +38,8 @@ def beam_time_step(
     elements with eps from 0.05 to 1, see the page on beam elements. Fewer than one in a thousand steps of a chain are
     divided at it. A step must also resolve the slowest relaxation of the filament, zeta/EI (L/4.73)^4, or that in which
     a ring becomes oval, zeta/EI (L/10.9)^4, by 20 steps, and a flow may strain the solvent by 0.03 in it. Propulsion
-    may take an element by a tenth of its length: with that, bends of self-propelled chains of four elements have up to 2 %
-    too much energy, with a fifth of it 5 to 10 %.
+    may take an element by a tenth of its length: with that, bends of self-propelled chains of four elements have up to
+    2 % too much energy, with a fifth of it 5 to 10 %.
 
     Parameters
     ----------

@@ -177,7 +177,7 @@ def test_links_of_last_elements_have_their_energy(stiffness):
     Bends and strains are those of rings that are free.
     """
     count, energies, bends = 48, [], []
-    kind = replace(BEAM, persistence_length=2500.0)
+    kind = replace(BEAM, bending_rigidity=None, persistence_length=2500.0, temperature=TEMPERATURE)
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
     for number in range(count):
         for side in range(2):
