@@ -248,7 +248,8 @@ class Run:
                 before = [i for i, one in enumerate(own.filaments) if one.nodes[0] < particles[0]]
                 if particles not in filaments and before:
                     number = max(before, key=lambda i: own.filaments[i].nodes[0])
-                    filaments[particles] = number, (len(particles) - 1) // (len(own.filaments[number].nodes) - 1)
+                    ends = 0 if own.filaments[number].ring else 1
+                    filaments[particles] = number, (len(particles) - ends) // (len(own.filaments[number].nodes) - ends)
         return [DescribedContactFinder(contacts, filaments, own.particles, self.box) for contacts in own.contacts]
 
     def contacts(self, frame: int) -> ContactFrame:

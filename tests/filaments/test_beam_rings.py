@@ -24,7 +24,7 @@ from openmm_cylchain import (
     filament_wall_force,
     make_whole,
 )
-from openmm_cylchain.beams.curve import arc_lengths, curve_points, element_energies, element_points
+from openmm_cylchain.beams.curve import arc_lengths, curve_points, element_energies, element_points, unrolled
 from openmm_cylchain.cli import main
 from openmm_cylchain.output.reporters import FilamentReporter
 from support.contexts import close_reporters, energy_of, forces_of, new_context, new_simulation, positions_of, slopes_of
@@ -321,6 +321,26 @@ def test_what_is_written_and_read_of_a_ring(tmp_path):
     own, _ = curve_of(filaments, whole)
     assert own - own[0] == pytest.approx(nodes - nodes[0], abs=1e-6)
     assert whole[filaments.attachment_indices[0]] - own[0] == pytest.approx(place - nodes[0], abs=1e-6)
+
+
+def test_contacts_of_a_run_name_the_last_element(tmp_path):
+    """A ring of four elements of five pieces each, and a filament that crosses the element that closes it."""
+    filaments = Filaments(VISCOSITY, 0.0, engine="compiled")
+    filaments.add_ring(BEAM, 4, [0, 0, 0])
+    place = element_points(*unrolled(filaments[0].positions, filaments[0].control_points), [0.3])[-1, 0]
+    filaments.add_straight(BEAM, 2, place + [0, 0, 15.0 - LENGTH], [0, 0, 1])
+    for number in range(2):
+        filaments.add_beads(number, LENGTH / 5)
+    topology, system, positions = filaments.build()
+    system.addForce(capsule_contact_force(filaments, system, 24.0, 0.3))
+    simulation = new_simulation(topology, system, positions, filaments.create_integrator(system, 1.0))
+    simulation.reporters.append(RunReporter(tmp_path / "run", 1, filaments))
+    simulation.step(1)
+    close_reporters(simulation)
+    found = analysis.load(tmp_path / "run").contacts(0)
+    ring = found.filaments == 0
+    assert np.count_nonzero(ring) >= 1 and np.all(found.segments[ring] == 3)
+    assert found.fractions[ring] == pytest.approx(np.full(np.count_nonzero(ring), 0.3), abs=0.02)
 
 
 def _check_stress(run, system, filaments):
