@@ -4,8 +4,8 @@
  * Linear equations with one block of six rows for each node of a chain, and their solution from the first node to the
  * last one. The six are the position and the control vector of a node.
  *
- * Those of a ring are solved as of a chain whose first and last nodes are the same: with the matrix A of the open chain,
- * and C that takes the last node from the first one, A x+C^T m = r and C x = 0 have the solution
+ * Those of a ring are solved as of a chain whose first and last nodes are the same: with the matrix A of the open
+ * chain, and C that takes the last node from the first one, A x+C^T m = r and C x = 0 have the solution
  *
  *     x = x'-A^-1 C^T S^-1 C x',    A x' = r,    S = C A^-1 C^T,
  *
@@ -261,7 +261,7 @@ private:
         // The same to the last digit.
         result[n-1] = result[0];
     }
-    /** Take from a block of the inverse what it has less of because the chain is a ring. */
+    /** Take from a block of the inverse what it has less of because the chain is a ring; of nodes, its lower half. */
     __attribute__((noinline)) void closeBlock(int node, int other, SixMatrix<Real>& block) const {
         Real one[6][6], second[6][6];
         for (int k = 0; k < 6; k++) {
@@ -273,7 +273,7 @@ private:
                 Real force = Real{};
                 for (int l = 0; l < 6; l++)
                     force = force+element(stiffness, k, l)*second[l][j];
-                for (int i = 0; i < 6; i++)
+                for (int i = node == other ? j : 0; i < 6; i++)
                     block.a[i][j] = block.a[i][j]-one[k][i]*force;
             }
     }

@@ -18,8 +18,8 @@ struct BeamTether : Tether {
  * lane. Chains that are shorter than the longest one are filled up with elements that have neither energy nor friction,
  * with nodes that are fixed.
  *
- * Rings are unrolled: their first node comes once more behind the last one, as a node with the same particles. All rings
- * of a pack have the same number of nodes.
+ * Rings are unrolled: their first node comes once more behind the last one, as a node with the same particles. All
+ * rings of a pack have the same number of nodes.
  */
 struct BeamPack {
     /** The properties of the elements of a lane. */

@@ -55,7 +55,7 @@ static void testForces() {
     }
 }
 
-/** Long steps without noise, of rings that are free, hinged and clamped: the same when nodes are counted from another. */
+/** Long steps without noise, of free, hinged and clamped rings: the same when nodes are counted from another one. */
 static void testWhereItBegins() {
     const int elements = 5, turn = 4;
     for (int held : {0, 1, 2}) {

@@ -147,8 +147,8 @@ void CylinderChainStepper::refuseTornBeams() const {
             takeToNearestImage(nearest, box);
             if (norm(Vec3(nearest[0], nearest[1], nearest[2])) < 0.999*norm(between))
                 throw OpenMMException("Beam chain "+to_string(chain)+" is torn between its particles "+
-                        to_string(i-1)+" and "+to_string(i%count)+": positions were wrapped into the periodic box particle "
-                        "by particle. Make chains whole before setting them");
+                        to_string(i-1)+" and "+to_string(i%count)+": positions were wrapped into the periodic box "
+                        "particle by particle. Make chains whole before setting them");
         }
     }
 }
