@@ -235,7 +235,7 @@ class Run:
 
     @cached_property
     def _beam_curves(self):
-        chains = [(own.nodes, own.control_points) for own in self.filaments if len(own.control_points)]
+        chains = [(own.nodes, own.control_points, own.ring) for own in self.filaments if len(own.control_points)]
         return BeamCurves(chains, self._description.particles) if chains else None
 
     @cached_property
@@ -248,7 +248,8 @@ class Run:
                 before = [i for i, one in enumerate(own.filaments) if one.nodes[0] < particles[0]]
                 if particles not in filaments and before:
                     number = max(before, key=lambda i: own.filaments[i].nodes[0])
-                    filaments[particles] = number, (len(particles) - 1) // (len(own.filaments[number].nodes) - 1)
+                    ends = 0 if own.filaments[number].ring else 1
+                    filaments[particles] = number, (len(particles) - ends) // (len(own.filaments[number].nodes) - ends)
         return [DescribedContactFinder(contacts, filaments, own.particles, self.box) for contacts in own.contacts]
 
     def contacts(self, frame: int) -> ContactFrame:
@@ -392,11 +393,11 @@ class Run:
         """Points (points, 3) in nm along each filament in a frame.
 
         Its nodes where segments are straight; of beam elements, ``per_element`` points of the curve of each, and the
-        last node.
+        last node. Those of a ring end before its first point, to which the last one is joined.
         """
         positions = self.positions(frame)
         return [
-            curve_points(positions[own.nodes], positions[own.control_points], per_element)
+            curve_points(positions[own.nodes], positions[own.control_points], per_element, own.ring)
             if own.has_beam_elements
             else positions[own.nodes]
             for own in self.filaments
@@ -416,7 +417,7 @@ class Run:
             )
             units = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
             between = np.arccos(np.clip(joint_cosines(units, own.ring), -1.0, 1.0))
-            angles.append(between if own.has_beam_elements else _of_segments(between, own.ring))
+            angles.append(_of_elements(between, own.ring) if own.has_beam_elements else _of_segments(between, own.ring))
         return angles
 
     def segment_tensions(self, frame: int, average: int = 1) -> list[FloatArray]:
@@ -455,7 +456,13 @@ class Run:
 
     def _beam_tensions(self, own, nodes, control_points):
         element = own.beam_element(self.temperature)
-        return element.modulus * (arc_lengths(nodes, control_points) / element.length - 1.0 + element.shortening)
+        lengths = arc_lengths(nodes, control_points, own.ring)
+        return element.modulus * (lengths / element.length - 1.0 + element.shortening)
+
+
+def _of_elements(angles, ring):
+    # Those of a ring begin with the angle between the tangents at its last and its first node.
+    return np.roll(angles, -1) if ring else angles
 
 
 def _of_segments(angles, ring):

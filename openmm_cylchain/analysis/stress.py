@@ -77,7 +77,7 @@ def stress(run: Run, frame: int, volume: Scalar | None = None) -> Stress:
     for own in run.filaments:
         if own.has_beam_elements:
             chains += beam_virial(
-                positions[own.nodes], positions[own.control_points], own.beam_element(run.temperature)
+                positions[own.nodes], positions[own.control_points], own.beam_element(run.temperature), own.ring
             )
         else:
             chains += _virial_of_chain(own, positions[own.nodes])

@@ -84,12 +84,19 @@ def control_point_positions(
 def filament_curves(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> list[FloatArray]:
     """Points by which filaments are drawn: nodes, or of beam elements eight along the curve of each and the last node.
 
+    Those of a ring end before its first point, to which the last one is joined.
+
     Returns
     -------
     list of (frames, points, 3) arrays in nm
     """
-    pairs = zip(node_positions(trajectory, filaments), control_point_positions(trajectory, filaments))
-    return [nodes if own is None else curve_points(nodes, own, _POINTS_OF_ELEMENT) for nodes, own in pairs]
+    rings = ring_filaments(trajectory)
+    closed = rings[list(_selection(filaments, len(rings)))]
+    chains = zip(node_positions(trajectory, filaments), control_point_positions(trajectory, filaments), closed)
+    return [
+        nodes if own is None else curve_points(nodes, own, _POINTS_OF_ELEMENT, bool(ring))
+        for nodes, own, ring in chains
+    ]
 
 
 def _selection(filaments, count):
@@ -161,7 +168,8 @@ def segment_lengths(trajectory: mdtraj.Trajectory, filaments: int | Indices | No
     """Lengths of the segments, of beam elements along their arcs: a list of (frames, segments) arrays in nm."""
     chains = zip(_segment_vectors(trajectory, filaments), *_curves(trajectory, filaments))
     return [
-        np.linalg.norm(vectors, axis=-1) if own is None else arc_lengths(nodes, own) for vectors, nodes, own in chains
+        np.linalg.norm(vectors, axis=-1) if own is None else arc_lengths(nodes, own, vectors.shape[1] == nodes.shape[1])
+        for vectors, nodes, own in chains
     ]
 
 

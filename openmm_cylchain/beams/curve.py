@@ -1,7 +1,8 @@
 """The curve of a chain of beam elements: tangents, places, arc lengths and energies.
 
 Node i has a position P and a control point Q. Element i of length h is the cubic curve with the Bezier points P_i, Q_i,
-2 P_(i+1) - Q_(i+1) and P_(i+1), so r' = 3 (Q - P)/h at a node. Its energy is that of ``plugin_src/beams/BeamChain.h``.
+2 P_(i+1) - Q_(i+1) and P_(i+1), so r' = 3 (Q - P)/h at a node. The last element of a ring, which is closed, leads from
+the last node to the first. The energy is that of ``plugin_src/beams/BeamChain.h``.
 Axes in front of (nodes, 3) belong to several filaments or frames; everything is in OpenMM's units.
 """
 
@@ -58,9 +59,22 @@ def control_points_of(nodes: FloatArray, tangents: FloatArray, length: float) ->
     return nodes + length / 3.0 * tangents
 
 
-def natural_tangents(nodes: FloatArray) -> FloatArray:
-    """Unit vectors (nodes, 3) along the natural cubic spline through nodes (nodes, 3), which bends least."""
-    if len(nodes) == 2:
+def unrolled(nodes: FloatArray, control_points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Nodes and control points (..., nodes + 1, 3) of a ring, with the first node once more behind the last one."""
+    around, controls = (np.concatenate([own, own[..., :1, :]], axis=-2) for own in (nodes, control_points))
+    return around, controls
+
+
+def natural_tangents(nodes: FloatArray, closed: bool = False) -> FloatArray:
+    """Unit vectors (nodes, 3) along the natural cubic spline through nodes (nodes, 3), which bends least.
+
+    Of a ring, along the periodic one.
+    """
+    if closed:
+        around = np.concatenate([nodes, nodes[:1]])
+        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(around, axis=0), axis=1))])
+        slopes = CubicSpline(along, around, bc_type="periodic")(along[:-1], 1)
+    elif len(nodes) == 2:
         slopes = np.repeat(np.diff(nodes, axis=0), 2, axis=0)
     else:
         along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(nodes, axis=0), axis=1))])
@@ -108,15 +122,22 @@ def element_slopes(nodes: FloatArray, control_points: FloatArray, places: npt.Ar
     return _on_elements(nodes, control_points, places, derivative=True) / length
 
 
-def curve_points(nodes: FloatArray, control_points: FloatArray, per_element: int) -> FloatArray:
-    """Points along the curve, ``per_element`` for each element and the last node: (..., points, 3)."""
+def curve_points(nodes: FloatArray, control_points: FloatArray, per_element: int, closed: bool = False) -> FloatArray:
+    """Points along the curve, ``per_element`` for each element and the last node: (..., points, 3).
+
+    Of a ring, the first point is also behind the last one, and is not there twice.
+    """
+    if closed:
+        return curve_points(*unrolled(nodes, control_points), per_element)[..., :-1, :]
     points = element_points(nodes, control_points, np.arange(per_element) / per_element)
     points = points.reshape(*points.shape[:-3], -1, 3)
     return np.concatenate([points, nodes[..., -1:, :]], axis=-2)
 
 
-def arc_lengths(nodes: FloatArray, control_points: FloatArray) -> FloatArray:
+def arc_lengths(nodes: FloatArray, control_points: FloatArray, closed: bool = False) -> FloatArray:
     """Lengths of the elements along the curve: (..., elements) in nm, by eight Gauss points."""
+    if closed:
+        return arc_lengths(*unrolled(nodes, control_points))
     slopes = _on_elements(nodes, control_points, _GAUSS_PLACES, derivative=True)
     return np.linalg.norm(slopes, axis=-1) @ _GAUSS_WEIGHTS
 
@@ -130,7 +151,7 @@ def _bend(first, second):
 
 
 def element_energies(
-    nodes: FloatArray, control_points: FloatArray, element: BeamElement
+    nodes: FloatArray, control_points: FloatArray, element: BeamElement, closed: bool = False
 ) -> tuple[FloatArray, FloatArray]:
     """Stretching and bending energies of the elements, (..., elements) each, in kJ/mol.
 
@@ -139,7 +160,11 @@ def element_energies(
     nodes, control_points : (..., nodes, 3) arrays
         In nm.
     element : BeamElement
+    closed : bool
+        A ring.
     """
+    if closed:
+        return element_energies(*unrolled(nodes, control_points), element)
     h = element.length
     slopes = node_tangents(nodes, control_points, h)
     middle = element_slopes(nodes, control_points, [0.5], h)[..., 0, :]
@@ -157,7 +182,9 @@ def element_energies(
     return 0.5 * element.modulus * h * (ends + 2.0 / 3.0 * inner**2), bending
 
 
-def beam_virial(nodes: FloatArray, control_points: FloatArray, element: BeamElement) -> FloatArray:
+def beam_virial(
+    nodes: FloatArray, control_points: FloatArray, element: BeamElement, closed: bool = False
+) -> FloatArray:
     """The derivative of the energy of a chain by an affine strain of its nodes and control points: (3, 3) in kJ/mol.
 
     By central differences of strains of 1e-6, in which energies are nearly quadratic; component (i, j) is the sum over
@@ -168,13 +195,15 @@ def beam_virial(nodes: FloatArray, control_points: FloatArray, element: BeamElem
     nodes, control_points : (nodes, 3) arrays
         In nm.
     element : BeamElement
+    closed : bool
+        A ring.
     """
     strains = _STRAIN * np.eye(9).reshape(9, 3, 3)
     particles = np.stack([nodes, control_points]) - nodes[0]
 
     def energies(signed):
         points, controls = particles[:, None] + particles[:, None] @ signed
-        stretching, bending = element_energies(points, controls, element)
+        stretching, bending = element_energies(points, controls, element, closed)
         return stretching.sum(axis=-1) + bending.sum(axis=-1)
 
     return (energies(strains) - energies(-strains)).reshape(3, 3) / (2.0 * _STRAIN)

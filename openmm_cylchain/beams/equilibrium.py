@@ -154,7 +154,7 @@ def _drawn_elements(element, bend, lengths, kT, generator, planar):
         if not planar:
             chance *= _sinc(total - apart) * _sinc(total + apart)
         strain = width * generator.normal(size=count) - 1.5 * element.shortening
-        length, slope = _middle_length(strain, (t1 + t2)[:, 0], np.sum((t1 + t2) ** 2, axis=1), turn)
+        length, slope = middle_length(strain, (t1 + t2)[:, 0], np.sum((t1 + t2) ** 2, axis=1), turn)
         # At most 1.5 for bends and 1 + 8 standard deviations for strains.
         chance *= length**power * slope / (1.6 * (1.0 + _WIDEST_STRAIN * width) ** 3)
         taken = generator.random(count) < chance
@@ -164,8 +164,16 @@ def _drawn_elements(element, bend, lengths, kT, generator, planar):
     return first, middle, last
 
 
-def _middle_length(strain, along, square, turn):
-    # |u| and d|u|/de of e = |u| - 1 - |t1 + t2 - 2u|^2/40 + turn^2/480, with (t1 + t2).u/|u| and |t1 + t2|^2.
+def middle_length(
+    strain: FloatArray | float, along: FloatArray | float, square: FloatArray | float, turn: FloatArray | float
+) -> tuple[FloatArray, FloatArray]:
+    """|u| and d|u|/de of e = |u| - 1 - |t1 + t2 - 2u|^2/40 + turn^2/480 = strain, for a vector u in the middle.
+
+    Parameters
+    ----------
+    strain, along, square, turn : arrays or floats
+        e, (t1 + t2).u/|u|, |t1 + t2|^2 and |t2 - t1|^2.
+    """
     half = 1.0 + 0.1 * along
     root = np.sqrt(np.maximum(half**2 - 0.4 * (1.0 + square / 40.0 - turn**2 / 480.0 + strain), 1e-12))
     return np.maximum(5.0 * (half - root), 0.0), 1.0 / root
@@ -230,7 +238,7 @@ def element_averages(bend: float) -> ElementAverages:
     density = np.exp(-energy) * np.sin(a) * np.sin(b)
     # Of stiff lengths.
     square = 2.0 + 2.0 * ends
-    length, slope = _middle_length(-1.5 * shortening_of(bend, False), np.cos(a) + np.cos(b), square, turn)
+    length, slope = middle_length(-1.5 * shortening_of(bend, False), np.cos(a) + np.cos(b), square, turn)
     density *= length**2 * slope * weights[:, None, None] * weights[None, :, None]
     along = (length * np.cos(a) + 0.25 * (1.0 + ends)) / 1.5
     chord = (length**2 + 0.5 * length * (np.cos(a) + np.cos(b)) + square / 16.0) / 2.25

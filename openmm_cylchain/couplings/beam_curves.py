@@ -17,18 +17,21 @@ class BeamCurves:
 
     Parameters
     ----------
-    chains : sequence of ((n,) int array, (n,) int array)
-        The particles of the nodes of each filament of beam elements, and of their control points.
+    chains : sequence of ((n,) int array, (n,) int array, bool)
+        The particles of the nodes of each filament of beam elements, and of their control points, and whether it is a
+        ring.
     particles : int
         How many there are.
     """
 
-    def __init__(self, chains: Sequence[tuple[IntArray, IntArray]], particles: int) -> None:
+    def __init__(self, chains: Sequence[tuple[IntArray, IntArray, bool]], particles: int) -> None:
         self._controls = np.full(particles, -1)
         self._next = np.full(particles, -1)
-        for nodes, controls in chains:
+        for nodes, controls, closed in chains:
             self._controls[nodes] = controls
             self._next[nodes[:-1]] = nodes[1:]
+            if closed:
+                self._next[nodes[-1]] = nodes[0]
 
     @classmethod
     def of_system(cls, system: openmm.System) -> "BeamCurves | None":
@@ -41,7 +44,7 @@ class BeamCurves:
             own = plugin.CylinderChainForce.cast(force)
             for chain in range(own.getNumBeamChains()):
                 particles = np.array(own.getBeamChainParticles(chain))
-                chains.append((particles[::2], particles[1::2]))
+                chains.append((particles[::2], particles[1::2], own.isBeamChainClosed(chain)))
         return cls(chains, system.getNumParticles()) if chains else None
 
     def on_curve(self, first: IntArray, second: IntArray) -> BoolArray:

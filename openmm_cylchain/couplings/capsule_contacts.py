@@ -173,7 +173,8 @@ def _capsule_lengths(filaments, number):
     lengths = filament.type.segment_lengths(filament.segments, filament.closed)
     if not filament.type.has_beam_elements:
         return lengths
-    return lengths * (filament.segments / (len(filaments.bead_indices[number]) - 1))
+    beads = len(filaments.bead_indices[number])
+    return lengths * (filament.segments / (beads if filament.closed else beads - 1))
 
 
 def _box_vectors(system):

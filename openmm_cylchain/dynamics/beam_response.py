@@ -18,7 +18,8 @@ _GAUSS_PLACES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(4)
 class BeamResponse(PlaceResponse):
     """The response of one filament of beam elements, taken as straight, to explicit forces in a step.
 
-    Clamped nodes and tangents stay. Filaments of more than 128 elements are cut into pieces.
+    Clamped nodes and tangents stay. Filaments of more than 128 elements are cut into pieces, and rings, whose elements
+    are taken as straight but joined all the same, are then open.
 
     Parameters
     ----------
@@ -32,6 +33,7 @@ class BeamResponse(PlaceResponse):
         self.segments = filament.segments
         self._piece = min(self.segments, _LONGEST_PIECE)
         self._filament = filament
+        self._closed = filament.closed and self.segments <= _LONGEST_PIECE
         h = element.length
         # The coordinates of an element by P and Q - P of its nodes, their stiffness, and their rates.
         ends, middle = np.array([[0, 3, 0, 0], [0, 0, 0, 3]]) / h, np.array([-1.5, -0.75, 1.5, -0.75]) / h
@@ -56,8 +58,9 @@ class BeamResponse(PlaceResponse):
         elements = min(self._piece, self.segments - first)
         free = ~self._fixed(first, elements)
         local = np.asarray(segments) - first
-        shapes = np.zeros((len(local), 2 * elements + 2))
-        columns = 2 * local[:, None] + np.arange(4)
+        unknowns = 2 * elements + (0 if self._closed else 2)
+        shapes = np.zeros((len(local), unknowns))
+        columns = (2 * local[:, None] + np.arange(4)) % unknowns
         np.put_along_axis(shapes, columns, place_weights(fractions), axis=1)
         weights = place_weights(0.5 * (1.0 + _GAUSS_PLACES))
         consistent = 0.5 * weights.T @ (_GAUSS_WEIGHTS[:, None] * weights)
@@ -65,16 +68,21 @@ class BeamResponse(PlaceResponse):
             # What an implicit step resists: friction, and coordinates whose theta is above 1/2.
             excess = np.maximum(0.0, 0.5 - 1.0 / (step * rates))
             own = friction / step * consistent + coordinates.T @ ((excess * stiffness)[:, None] * coordinates)
-            matrix = np.zeros((2 * elements + 2, 2 * elements + 2))
+            matrix = np.zeros((unknowns, unknowns))
             for element in range(elements):
-                matrix[2 * element : 2 * element + 4, 2 * element : 2 * element + 4] += own
+                of_element = (2 * element + np.arange(4)) % unknowns
+                matrix[np.ix_(of_element, of_element)] += own
             lower = cholesky(matrix[np.ix_(free, free)], lower=True)
             yield solve_triangular(lower, shapes[:, free].T, lower=True).T
 
     def _fixed(self, first, elements):
-        fixed = np.zeros((elements + 1, 2), dtype=bool)
+        count = elements if self._closed else elements + 1
+        fixed = np.zeros((count, 2), dtype=bool)
         for column, nodes in enumerate((self._filament.clamped, self._filament.clamped_tangents)):
             for node in nodes:
-                if first <= node <= first + elements:
+                # The last piece of a ring that is cut ends at its first node.
+                if first <= node < first + count:
                     fixed[node - first, column] = True
+                elif self._filament.closed and node == 0 and first + elements == self.segments:
+                    fixed[-1, column] = True
         return fixed.ravel()

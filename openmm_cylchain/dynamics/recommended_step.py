@@ -108,7 +108,7 @@ def recommended_time_step(
     if friction is None:
         friction = filament_type.segment_friction(viscosity, temperature, segments)
     if filament_type.has_beam_elements:
-        return beam_time_step(filament_type, temperature, scheme, segments, flow, friction, propulsion)
+        return beam_time_step(filament_type, temperature, scheme, segments, flow, friction, propulsion, closed)
     if scheme in IMPLICIT_SCHEMES:
         return implicit_time_step(filament_type, viscosity, temperature, segments, closed, flow, friction, scheme)
     bounds = bounds_of_chain(filament_type, friction, segments)

@@ -271,6 +271,7 @@ def _add_beam_chain(force, filament, nodes, control_points, viscosity, temperatu
         friction.parallel / element.length,
         friction.perpendicular / element.length,
         filament.planar,
+        filament.closed,
     )
     force.setBeamChainPropulsion(chain, filament.propulsion)
 

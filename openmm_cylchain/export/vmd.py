@@ -149,7 +149,10 @@ def _particles(own):
 
 
 def _curves(run, frame, curves):
-    drawn = run.curves(frame)
+    drawn = [
+        np.concatenate([points, points[:1]]) if own.ring else points
+        for own, points in zip(run.filaments, run.curves(frame))
+    ]
     kinds = []
     for _, members in curves.values():
         kinds.append("{" + " ".join("{" + " ".join(map(_point, drawn[i])) + "}" for i in members) + "}")

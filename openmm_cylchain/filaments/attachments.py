@@ -127,7 +127,7 @@ def add_virtual_site(system: openmm.System, attachment: Attachment, nodes: IntAr
     """
     particle = system.addParticle(0.0)
     if len(control_points):
-        ends = [attachment.segment, attachment.segment + 1]
+        ends = [attachment.segment, (attachment.segment + 1) % len(nodes)]
         parents = [int(own[end]) for end in ends for own in (nodes, control_points)]
         # A mean of four particles, without an offset in a frame that would have axes.
         none = [0.0] * 4
@@ -174,7 +174,8 @@ def attachment_positions(
     if control_points is not None:
         weights = place_weights(fractions[:, 0])
         vectors = control_points - positions
-        columns = (positions[segments], vectors[segments], positions[segments + 1], vectors[segments + 1])
+        following = (segments + 1) % len(positions)
+        columns = (positions[segments], vectors[segments], positions[following], vectors[following])
         return np.einsum("pw,wpx->px", weights, np.array(columns))
     return (1.0 - fractions) * positions[segments] + fractions * positions[(segments + 1) % len(positions)]
 

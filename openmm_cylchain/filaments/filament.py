@@ -77,7 +77,7 @@ class Filament:
         if self.type.has_beam_elements:
             if control_points is None:
                 raise InputError(f"Energies of beam elements ({self.type.name}) need the control points of its nodes.")
-            stretching, bending = element_energies(nodes, control_points, self.beam_element(temperature))
+            stretching, bending = element_energies(nodes, control_points, self.beam_element(temperature), self.closed)
             return float(np.sum(stretching)), float(np.sum(bending))
         return self.type.chain_energies(nodes, self.joint_stiffnesses, self.closed)
 

@@ -4,6 +4,7 @@ import numpy as np
 
 from ..beams.curve import control_points_of, natural_tangents
 from ..beams.equilibrium import draw_beam
+from ..beams.rings import circle
 from ..errors import InputError
 from ..mechanics.geometry import regular_polygon
 from ..units.quantities import (
@@ -67,19 +68,47 @@ def ring(filament_type: ChainType, segments: int, center: Vector, normal: Vector
     return regular_polygon(segments, filament_type.segment_length, center, unit_vector(normal, label, "normal"))
 
 
+def beam_ring(
+    filament_type: ChainType,
+    elements: int,
+    temperature: float,
+    center: Vector,
+    normal: Vector,
+    planar: bool,
+    label: str,
+) -> tuple[FloatArray, FloatArray]:
+    """Nodes and control points, (elements, 3) in nm each, of a circle of beam elements without strains."""
+    elements = _number_of_ring(elements, label)
+    center = vector(center, LENGTH, f"{label}: center")
+    element = filament_type.beam_element(temperature, _flag(planar, f"{label}: planar"))
+    return circle(element, elements, center, unit_vector(normal, label, "normal"))
+
+
+def _number_of_ring(segments, label):
+    segments = number_of_segments(segments, label)
+    if segments < MINIMUM_RING:
+        raise InputError(f"{label}: a ring needs at least {MINIMUM_RING} segments, but has {segments}.")
+    return segments
+
+
 def beam_control_points(
-    filament_type: ChainType, positions: FloatArray, tangents: Vectors | None, label: str
+    filament_type: ChainType,
+    positions: FloatArray,
+    tangents: Vectors | None,
+    label: str,
+    closed: bool = False,
 ) -> FloatArray | None:
     """Control points (n, 3) in nm of nodes with tangents, which are normalised; None if segments are straight.
 
-    Tangents that are not given are those of the natural cubic spline through the nodes.
+    Tangents that are not given are those of the natural cubic spline through the nodes, or of the periodic one of a
+    ring.
     """
     if not filament_type.has_beam_elements:
         if tangents is not None:
             raise InputError(f"{label}: tangents belong to nodes of beam elements; its segments are straight.")
         return None
     if tangents is None:
-        return control_points_of(positions, natural_tangents(positions), filament_type.segment_length)
+        return control_points_of(positions, natural_tangents(positions, closed), filament_type.segment_length)
     tangents = np.asarray(in_units_of(tangents, DIMENSIONLESS, f"{label}: tangents"))
     if tangents.shape != positions.shape:
         raise InputError(f"{label}: tangents must have the shape {positions.shape}, but have {tangents.shape}.")
@@ -167,14 +196,10 @@ def new_filament(
         if np.size(np.asarray(clamped_tangents, dtype=object)):
             raise InputError(f"{label}: clamped_tangents are those of beam elements; clamp two neighbouring nodes.")
         return Filament(filament_type, positions, clamped, closed, planar, propulsion)
-    if closed:
-        raise InputError(
-            f"{label} has beam elements, of which there are no rings as yet: give its type element='straight'."
-        )
     if planar:
         control_points = _in_plane_of_nodes(control_points, positions, filament_type.segment_length, label)
     held, held_tangents = clamped_beam(clamped, clamped_tangents, len(positions), label)
-    return Filament(filament_type, positions, held, False, planar, propulsion, control_points, held_tangents)
+    return Filament(filament_type, positions, held, closed, planar, propulsion, control_points, held_tangents)
 
 
 def clamped_beam(

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..beams.curve import curve_points, place_weights
+from ..beams.curve import curve_points, place_weights, unrolled
 from ..errors import InputError
 from ..filaments.filament import Filament
 from ..mechanics.geometry import to_nearest_images
@@ -155,8 +155,9 @@ class FirstPlaces:
                 continue
             nodes, bows = self._nodes(number), np.zeros(filament.segments)
             if filament.control_points is not None:
-                bows = np.repeat(_largest_bows(nodes, filament.control_points), _PIECES)
-                nodes = curve_points(nodes, filament.control_points, _PIECES)
+                nodes, control_points = _open_curve(filament)
+                bows = np.repeat(_largest_bows(nodes, control_points), _PIECES)
+                nodes = curve_points(nodes, control_points, _PIECES)
                 contour = np.linspace(0.0, contour[-1], len(nodes))
             own = (nodes[:-1], np.diff(nodes, axis=0), np.full(len(bows), number), contour[:-1])
             for column, values in zip(columns, (*own, np.diff(contour), bows)):
@@ -195,6 +196,12 @@ class FirstPlaces:
         return chains, (numbers + 0.5) * spacing
 
 
+def _open_curve(filament):
+    # Nodes and control points; of a ring, the first ones once more behind the last.
+    own = filament.positions, filament.control_points
+    return unrolled(*own) if filament.closed else own
+
+
 def _largest_bows(nodes, control_points):
     # Of each element, how far its curve can be from the line between the ends of a piece, at the same fraction: no more
     # than an eighth of the second derivative, which is largest at one of the two ends.
@@ -207,6 +214,7 @@ def _on_curve(filament, contour, along):
     # Places on a filament of beam elements, at lengths along it.
     element = np.clip(np.searchsorted(contour, along, side="right") - 1, 0, filament.segments - 1)
     weights = place_weights((along - contour[element]) / np.diff(contour)[element])
-    nodes, vectors = filament.positions, filament.control_points - filament.positions
+    nodes, control_points = _open_curve(filament)
+    vectors = control_points - nodes
     ends = np.stack([nodes[element], vectors[element], nodes[element + 1], vectors[element + 1]], axis=1)
     return np.einsum("nw,nwx->nx", weights, ends)

@@ -185,7 +185,8 @@ class FilamentReporter(FilamentsReporter):
 
 def _describe_beam(filament, nodes, control_points, temperature):
     energies = filament.energies(nodes, control_points, temperature)
-    return *energies, np.linalg.norm(nodes[-1] - nodes[0]), arc_lengths(nodes, control_points).sum()
+    end_to_end_distance = 0.0 if filament.closed else np.linalg.norm(nodes[-1] - nodes[0])
+    return *energies, end_to_end_distance, arc_lengths(nodes, control_points, filament.closed).sum()
 
 
 def _describe(filament, nodes):

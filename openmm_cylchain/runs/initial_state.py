@@ -225,7 +225,8 @@ def _inside(group, temperature, seed, number, places):
     for attempt in range(attempts):
         shape = _shape(group, temperature, seed, number, places, attempt)
         nodes, controls = _moved(group, shape, group.inside.draw(places), shape[0].mean(axis=0), group.height)
-        if group.inside.contains(nodes if controls is None else curve_points(nodes, controls, _POINTS_OF_ELEMENT)):
+        curve = nodes if controls is None else curve_points(nodes, controls, _POINTS_OF_ELEMENT, group.closed)
+        if group.inside.contains(curve):
             return nodes, controls
     raise ConfigurationError(
         f"[[filament]] number {group.table}: filament {number} of {group.segments} segments does not fit into its "
@@ -245,6 +246,8 @@ def _attempts(group):
 def _shape(group, temperature, seed, number, places, attempt=0):
     # Nodes with the first one at the origin, and control points. Each filament has a seed of its own.
     kind, origin, label = group.type, (0.0, 0.0, 0.0), f"Filament {number}"
+    if group.closed and group.has_beam_elements:
+        return shapes.beam_ring(kind, group.segments, temperature, origin, group.normal, group.planar, label)
     if group.closed:
         return shapes.ring(kind, group.segments, origin, group.normal, label), None
     direction = group.direction
@@ -366,10 +369,12 @@ def _tangent(entries, filaments):
     # The place of a tangent and the vector there; None and the vector for a direction.
     if entries["direction"] is not None:
         return None, np.array(entries["direction"])
-    number, segments = entries["filament"], filaments[entries["filament"]].segments
+    number = entries["filament"]
     if entries["node"] is not None:
-        node = entries["node"] % (segments + 1)
-        place = filaments.segment_place(number, segment=max(node - 1, 0), fraction=float(node > 0))
+        node = entries["node"] % len(filaments[number].positions)
+        # At the end of the element before it, or of a ring at the beginning of the one behind it.
+        after = filaments[number].closed or node == 0
+        place = filaments.segment_place(number, segment=node if after else node - 1, fraction=float(not after))
     else:
         place = filaments.segment_place(number, entries["arc_length"], entries["segment"], entries["fraction"])
     return place, _tangent_at(place, filaments, number)
@@ -377,7 +382,7 @@ def _tangent(entries, filaments):
 
 def _tangent_at(place, filaments, number):
     own = filaments[number]
-    element = slice(*(place.first - filaments.node_indices[number][0] + np.array([0, 2])))
+    element = np.array([place.first, place.second]) - filaments.node_indices[number][0]
     return element_slopes(own.positions[element], own.control_points[element], [place.fraction], 1.0)[0, 0]
 
 
@@ -413,7 +418,7 @@ def _position_of(place, filaments, number):
     first, own = filaments.node_indices[number][0], filaments[number]
     nodes = own.positions
     if own.control_points is not None:
-        element = slice(place.first - first, place.second - first + 1)
+        element = np.array([place.first, place.second]) - first
         return element_points(nodes[element], own.control_points[element], [place.fraction])[0, 0]
     return (1.0 - place.fraction) * nodes[place.first - first] + place.fraction * nodes[place.second - first]
 

@@ -291,12 +291,14 @@ def _series_of_beams(group, temperature, trajectory, members):
     kind, exact = group.type, beam_elements.beam_averages(group.type, temperature)
     nodes, controls = node_positions(trajectory, members), control_point_positions(trajectory, members)
     element = kind.beam_element(temperature, group.planar)
-    stretching, bending = element_energies(np.stack(nodes, axis=1), np.stack(controls, axis=1), element)
+    stretching, bending = element_energies(np.stack(nodes, axis=1), np.stack(controls, axis=1), element, group.closed)
     theory_of_stretching = beam_elements.beam_stretching_energy_mean(kind, group.segments, temperature) / kT
     yield _STRETCHING_OF_ELEMENTS, "kT", stretching.mean(axis=2) / kT, theory_of_stretching
     yield "bending energy per element", "kT", bending.mean(axis=2) / kT, exact.bending
     cosines = np.stack(joint_cosines(trajectory, members), axis=1)
     yield "cosine between ends of an element", "", cosines.mean(axis=2), exact.cosine
+    if group.closed:
+        return
     squares = np.sum(end_to_end_vectors(trajectory, members) ** 2, axis=2)
     mean_square = beam_elements.beam_mean_square_end_to_end(kind, group.segments, temperature)
     yield "mean square end-to-end distance", "nm^2", squares, mean_square
@@ -378,7 +380,9 @@ def _persistence_length(group, temperature, trajectory, members, comparable):
 
 
 def _persistence_length_of_beams(group, temperature, trajectory, members, comparable):
-    # -h/ln<c> of the cosine c between tangents at the ends of an element, and its error.
+    # -h/ln<c> of the cosine c between tangents at the ends of an element, and its error. Rings bend all around.
+    if group.closed:
+        return []
     cosine, error = _mean_with_error(np.stack(joint_cosines(trajectory, members), axis=1).mean(axis=2))
     exact = beam_elements.beam_persistence_length(group.type, temperature)
     if not 0.0 < cosine < 1.0:

@@ -114,9 +114,9 @@ def _length_unit(length):
 
 def _draw_conformations(axis, groups, trajectory):
     last = trajectory[-1]
-    for _, members, label, colour in groups:
+    for group, members, label, colour in groups:
         for number, positions in enumerate(filament_curves(last, members)):
-            points = positions[0]
+            points = np.concatenate([positions[0], positions[0][:1]]) if group.closed else positions[0]
             axis.plot(
                 points[:, 0],
                 points[:, 1],

@@ -256,7 +256,7 @@ class Filaments:
             Make a ring: a last segment leads from the last node back to the first.
         tangents : (n, 3) array, optional
             Of beam elements: directions of the curve at the nodes, which need not be normalised; those of the natural
-            cubic spline through the nodes if not given.
+            cubic spline through the nodes, or of the periodic one of a ring, if not given.
         control_points : (n, 3) length, optional
             Of beam elements, in place of tangents: those of another chain, as it is, with its strains.
         planar, propulsion, clamped_tangents
@@ -270,7 +270,7 @@ class Filaments:
         label = self._label(filament_type)
         positions = shapes.given(positions, label)
         if control_points is None:
-            controls = shapes.beam_control_points(filament_type, positions, tangents, label)
+            controls = shapes.beam_control_points(filament_type, positions, tangents, label, bool(closed))
         else:
             controls = self._given_control_points(filament_type, positions, tangents, control_points, label)
         return self._add(
@@ -287,8 +287,9 @@ class Filaments:
         clamped: int | Indices = (),
         planar: bool = False,
         propulsion: Scalar = 0.0,
+        clamped_tangents: int | Indices = (),
     ) -> int:
-        """Add a ring: a regular polygon with segments of rest length.
+        """Add a ring: a regular polygon with segments of rest length, or a circle of beam elements without strains.
 
         Parameters
         ----------
@@ -298,7 +299,7 @@ class Filaments:
         center : (3,) length
         normal : (3,) array
             Of the polygon's plane; nodes go counter-clockwise around it. It need not be normalised.
-        clamped, planar, propulsion
+        clamped, planar, propulsion, clamped_tangents
             See ``add_straight``.
 
         Returns
@@ -307,10 +308,14 @@ class Filaments:
             The filament's number.
         """
         label = self._label(filament_type)
+        controls = None
         if filament_type.has_beam_elements:
-            raise InputError(f"{label} has beam elements, of which there are no rings as yet: take straight segments.")
-        positions = shapes.ring(filament_type, segments, center, normal, label)
-        return self._add(filament_type, positions, clamped, label, True, planar, propulsion)
+            positions, controls = shapes.beam_ring(
+                filament_type, segments, self._temperature, center, normal, planar, label
+            )
+        else:
+            positions = shapes.ring(filament_type, segments, center, normal, label)
+        return self._add(filament_type, positions, clamped, label, True, planar, propulsion, controls, clamped_tangents)
 
     def add_equilibrium(
         self,

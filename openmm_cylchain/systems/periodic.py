@@ -72,7 +72,7 @@ def make_whole(positions: Vectors, filaments: Filaments, box_vectors: BoxVectors
             frames[:, control_points] -= _lattice_sums(_images_between(apart, vectors), vectors)
     for attachment, particle in zip(filaments.attachments, filaments.attachment_indices):
         nodes = filaments.node_indices[attachment.filament]
-        minus, plus = (frames[:, nodes[attachment.segment + end]] for end in (0, 1))
+        minus, plus = (frames[:, nodes[(attachment.segment + end) % len(nodes)]] for end in (0, 1))
         place = (1.0 - attachment.fraction) * minus + attachment.fraction * plus
         frames[:, particle] -= _lattice_sums(_images_between(frames[:, particle] - place, vectors), vectors)
     return frames.reshape(given.shape) * unit.nanometer

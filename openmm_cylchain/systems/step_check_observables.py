@@ -141,7 +141,7 @@ class Probe:
         amplitudes = scale * np.einsum("ms,fsk->mfk", waves, tangents)
         moved = [amplitudes, middle] if before is None else [amplitudes - before[0], middle - before[1]]
         if kind.element is not None:
-            energies = element_energies(nodes, positions[kind.control_points], kind.element)
+            energies = element_energies(nodes, positions[kind.control_points], kind.element, closed)
         else:
             energies = one.stretching_energies(lengths, closed), self._bending_energies(kind, vectors)
         values = [*(own.mean(axis=1) / self._kT for own in energies), np.sum(ends**2, axis=1)]

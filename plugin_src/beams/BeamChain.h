@@ -58,8 +58,13 @@ struct BeamChain {
     bool planar = false;
     /** Springs between the positions of nodes and points. */
     std::vector<Tether> tethers;
+    /** Whether one more element, the last one, leads from the last node to the first: a ring. */
+    bool closed = false;
     int numNodes() const {
         return particles.size()/2;
+    }
+    int numElements() const {
+        return numNodes()-(closed ? 0 : 1);
     }
 };
 

@@ -30,8 +30,13 @@ static const BeamKernels& kernels() {
     noOtherEntry();
 }
 
+/** The fewest nodes of a ring: its elements bend by a third of a turn. */
+static const int FEWEST_NODES_OF_RING = 3;
+
 static void check(const BeamChain& chain, int index) {
     const string name = "Beam chain "+to_string(index);
+    if (chain.closed && chain.numNodes() < FEWEST_NODES_OF_RING)
+        throw invalid_argument(name+" is closed, and must have at least "+to_string(FEWEST_NODES_OF_RING)+" nodes");
     if (chain.numNodes() < 2 || chain.particles.size()%2 != 0)
         throw invalid_argument(name+" must have two particles for each of at least two nodes");
     if (chain.fixed.size() != chain.particles.size())
@@ -49,17 +54,18 @@ static void fillLane(BeamPack& pack, int lane, const BeamChain& chain, int index
     const int lanes = pack.lanes;
     pack.chain[lane] = index;
     pack.noiseChain[lane] = firstNoise+index;
-    pack.nodesOfLane[lane] = chain.numNodes();
+    pack.nodesOfLane[lane] = chain.numElements()+1;
     const double properties[] = {chain.elementLength, chain.stretchingModulus, chain.bendingRigidity,
             chain.shortening, chain.parallelFriction, chain.perpendicularFriction, chain.propulsion};
     pack.propelled |= chain.propulsion != 0;
     for (int property = 0; property < BeamPack::NumProperties; property++)
         pack.properties[property*lanes+lane] = properties[property];
-    for (size_t i = 0; i < chain.particles.size(); i++) {
-        pack.particles[i*lanes+lane] = chain.particles[i];
-        pack.mobile[i*lanes+lane] = chain.fixed[i] ? 0 : 1;
+    for (int place = 0; place < 2*pack.nodesOfLane[lane]; place++) {
+        const size_t i = place%chain.particles.size();
+        pack.particles[place*lanes+lane] = chain.particles[i];
+        pack.mobile[place*lanes+lane] = chain.fixed[i] ? 0 : 1;
     }
-    for (int element = 0; element < chain.numNodes()-1; element++)
+    for (int element = 0; element < chain.numElements(); element++)
         pack.present[element*lanes+lane] = 1;
     pack.free[lane] = any_of(chain.fixed.begin(), chain.fixed.end(), [] (bool fixed) {return fixed;}) ? 0 : 1;
     pack.particlesOfChains.insert(pack.particlesOfChains.end(), chain.particles.begin(), chain.particles.end());
@@ -71,8 +77,9 @@ static BeamPack packed(const vector<BeamChain>& chains, const int* members, int 
     BeamPack pack;
     const BeamChain& longest = chains[members[0]];
     pack.lanes = lanes;
-    pack.nodes = longest.numNodes();
+    pack.nodes = longest.numElements()+1;
     pack.planar = longest.planar;
+    pack.closed = longest.closed;
     pack.chain.resize(lanes);
     pack.noiseChain.resize(lanes);
     pack.nodesOfLane.resize(lanes);
@@ -109,16 +116,18 @@ BeamEngine::BeamEngine(const vector<BeamChain>& chains, int firstNoise) : implem
     vector<int> order(chains.size());
     iota(order.begin(), order.end(), 0);
     stable_sort(order.begin(), order.end(), [&] (int a, int b) {
-        return make_tuple(-chains[a].numNodes(), chains[a].planar) <
-                make_tuple(-chains[b].numNodes(), chains[b].planar);
+        return make_tuple(-chains[a].numNodes(), chains[a].planar, chains[a].closed) <
+                make_tuple(-chains[b].numNodes(), chains[b].planar, chains[b].closed);
     });
     for (size_t first = 0; first < order.size();) {
         const BeamChain& longest = chains[order[first]];
-        const int least = ceil((1-LARGEST_FILLING)*(longest.numNodes()-1))+1;
+        const int least = longest.closed ? longest.numNodes() :
+                ceil((1-LARGEST_FILLING)*(longest.numNodes()-1))+1;
         int fitting = 1;
         while (fitting < kernels().lanes && first+fitting < order.size() &&
                 chains[order[first+fitting]].numNodes() >= least &&
-                chains[order[first+fitting]].planar == longest.planar)
+                chains[order[first+fitting]].planar == longest.planar &&
+                chains[order[first+fitting]].closed == longest.closed)
             fitting++;
         const int lanes = lanesFor(fitting);
         implementation->packs.push_back(packed(chains, &order[first], lanes, firstNoise));

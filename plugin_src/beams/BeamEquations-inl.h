@@ -3,6 +3,13 @@
 /**
  * Linear equations with one block of six rows for each node of a chain, and their solution from the first node to the
  * last one. The six are the position and the control vector of a node.
+ *
+ * Those of a ring are solved as of a chain whose first and last nodes are the same: with the matrix A of the open
+ * chain, and C that takes the last node from the first one, A x+C^T m = r and C x = 0 have the solution
+ *
+ *     x = x'-A^-1 C^T S^-1 C x',    A x' = r,    S = C A^-1 C^T,
+ *
+ * and the inverse A^-1-A^-1 C^T S^-1 C A^-1.
  */
 
 template <class Real> struct SixVector {
@@ -38,9 +45,12 @@ public:
         SixMatrix<Real> inverse, factor;
         Real right[6];
     };
-    /** @param mobile  one or zero for each particle and lane */
-    BeamEquations(const std::vector<double>& mobile, int nodes, Eliminated* memory) : mobile(mobile), n(nodes),
-            rows(memory) {
+    /**
+     * @param mobile   one or zero for each particle and lane
+     * @param columns  memory for 6 vectors of all nodes if the chains are rings, or NULL
+     */
+    BeamEquations(const std::vector<double>& mobile, int nodes, Eliminated* memory, SixVector<Real>* columns) :
+            mobile(mobile), n(nodes), rows(memory), columns(columns) {
     }
     /** Add an element to the equations of its nodes; it is the first to do so for the second one. */
     static CYLCHAIN_INLINE void addElement(const BeamMatrix<Real>& m, Row& here, Row& after) {
@@ -97,8 +107,19 @@ public:
         for (int node = 0; node < n; node++)
             store(right[node], rows[node].right);
     }
+    /** After the last node was eliminated: make the last node the first one if chains are rings. */
+    void close() {
+        if (columns != NULL)
+            findColumns();
+    }
     /** Solve the equations with the right side that they have. */
     void substitute(SixVector<Real>* result) {
+        substituteOpen(result);
+        if (columns != NULL)
+            closeResult(result);
+    }
+    /** Solve those of open chains. */
+    __attribute__((noinline)) void substituteOpen(SixVector<Real>* result) {
         for (int node = 0; node < n-1; node++) {
             const Eliminated& own = rows[node];
 #pragma GCC unroll 6
@@ -138,7 +159,15 @@ public:
      */
     template <class Function> void findInverse(Function use) const {
         SixMatrix<Real> next = rows[n-1].inverse, both = {};
-        use(n-1, next, both, next);
+        // What is used of rings: their own blocks of the last two nodes, and those between them.
+        SixMatrix<Real> ofRing[3];
+        if (columns != NULL) {
+            ofRing[0] = next;
+            closeBlock(n-1, n-1, ofRing[0]);
+            use(n-1, ofRing[0], both, ofRing[0]);
+        }
+        else
+            use(n-1, next, both, next);
         for (int node = n-2; node >= 0; node--) {
             const Eliminated& own = rows[node];
             SixMatrix<Real> here;
@@ -162,7 +191,15 @@ public:
                         value = value-both.a[i][k]*own.factor.a[j][k];
                     here.a[i][j] = value;
                 }
-            use(node, here, both, next);
+            if (columns != NULL) {
+                ofRing[2] = ofRing[0];
+                ofRing[0] = here;
+                ofRing[1] = both;
+                closeBlock(node, node, ofRing[0]);
+                closeBlock(node, node+1, ofRing[1]);
+            }
+            const bool open = columns == NULL;
+            use(node, open ? here : ofRing[0], open ? both : ofRing[1], open ? next : ofRing[2]);
             next = here;
         }
     }
@@ -185,7 +222,61 @@ private:
     const std::vector<double>& mobile;
     const int n;
     Eliminated* const rows;
+    /** A^-1 C^T of rings, column by column; or NULL. */
+    SixVector<Real>* const columns;
+    /** S^-1 of rings. */
+    SixMatrix<Real> stiffness;
 
+    __attribute__((noinline)) void findColumns() {
+        for (int k = 0; k < 6; k++) {
+            for (int node = 0; node < n; node++)
+                std::fill(rows[node].right, rows[node].right+6, Real{});
+            rows[0].right[k] = splat<Real>(1);
+            rows[n-1].right[k] = splat<Real>(-1);
+            substituteOpen(columns+k*n);
+        }
+        for (int j = 0; j < 6; j++) {
+            Real first[6], last[6];
+            store(columns[j*n], first);
+            store(columns[j*n+n-1], last);
+            for (int i = j; i < 6; i++)
+                stiffness.a[i][j] = first[i]-last[i];
+        }
+        invert(0, stiffness);
+    }
+    __attribute__((noinline)) void closeResult(SixVector<Real>* result) const {
+        Real first[6], last[6];
+        store(result[0], first);
+        store(result[n-1], last);
+        for (int k = 0; k < 6; k++) {
+            Real force = Real{};
+            for (int j = 0; j < 6; j++)
+                force = force+element(stiffness, k, j)*(first[j]-last[j]);
+            for (int node = 0; node < n; node++) {
+                const SixVector<Real>& column = columns[k*n+node];
+                result[node].position = result[node].position-column.position*force;
+                result[node].control = result[node].control-column.control*force;
+            }
+        }
+        // The same to the last digit.
+        result[n-1] = result[0];
+    }
+    /** Take from a block of the inverse what it has less of because the chain is a ring; of nodes, its lower half. */
+    __attribute__((noinline)) void closeBlock(int node, int other, SixMatrix<Real>& block) const {
+        Real one[6][6], second[6][6];
+        for (int k = 0; k < 6; k++) {
+            store(columns[k*n+node], one[k]);
+            store(columns[k*n+other], second[k]);
+        }
+        for (int k = 0; k < 6; k++)
+            for (int j = 0; j < 6; j++) {
+                Real force = Real{};
+                for (int l = 0; l < 6; l++)
+                    force = force+element(stiffness, k, l)*second[l][j];
+                for (int i = node == other ? j : 0; i < 6; i++)
+                    block.a[i][j] = block.a[i][j]-one[k][i]*force;
+            }
+    }
     /** The inverse. Fixed particles have none of it: they neither move nor pass anything on. */
     CYLCHAIN_INLINE void invert(int node, SixMatrix<Real>& m) const {
         const Real moves[] = {loaded<Real>(mobile, 2*node), loaded<Real>(mobile, 2*node+1)};

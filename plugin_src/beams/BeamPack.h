@@ -17,12 +17,15 @@ struct BeamTether : Tether {
  * Chains of beam elements side by side: the numbers of all chains for one node lie next to each other, one in each
  * lane. Chains that are shorter than the longest one are filled up with elements that have neither energy nor friction,
  * with nodes that are fixed.
+ *
+ * Rings are unrolled: their first node comes once more behind the last one, as a node with the same particles. All
+ * rings of a pack have the same number of nodes.
  */
 struct BeamPack {
     /** The properties of the elements of a lane. */
     enum Property {Length, Stretching, Bending, Shortening, Parallel, Perpendicular, Propulsion, NumProperties};
     int lanes, nodes;
-    bool planar;
+    bool planar, closed;
     /** Whether any chain has a propulsion. */
     bool propelled = false;
     /** The number of each lane's chain, that by which its noise is known, and that of its nodes. */
@@ -41,6 +44,10 @@ struct BeamPack {
     std::vector<double> free;
     /** The tethers of all lanes, by their nodes. */
     std::vector<BeamTether> tethers;
+    /** The number of a lane's nodes that are not there twice. */
+    int ownNodes(int lane) const {
+        return nodesOfLane[lane]-(closed ? 1 : 0);
+    }
 };
 
 /** The loops over a pack, compiled for one instruction set. */

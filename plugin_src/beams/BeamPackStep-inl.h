@@ -125,7 +125,7 @@ private:
         for (int node = 0; node < pack.nodes; node++) {
             Vec changes[] = {y[node].position, y[node].position+y[node].control};
             for (int i = 0; i < W; i++) {
-                if (node >= pack.nodesOfLane[i] || lane(takes, i) == 0)
+                if (node >= pack.ownNodes(i) || lane(takes, i) == 0)
                     continue;
                 for (int which = 0; which < 2; which++) {
                     const int particle = pack.particles[(2*node+which)*W+i];

@@ -60,7 +60,7 @@ template <int W> void gatherBeamForces(const BeamPack& pack, const double* force
     for (int node = 0; node < pack.nodes; node++)
         for (int i = 0; i < W; i++) {
             double position[3] = {}, control[3] = {};
-            for (int k = 0; k < 3 && node < pack.nodesOfLane[i]; k++) {
+            for (int k = 0; k < 3 && node < pack.ownNodes(i); k++) {
                 control[k] = forces[3*pack.particles[(2*node+1)*W+i]+k];
                 position[k] = forces[3*pack.particles[2*node*W+i]+k]+control[k];
             }
@@ -94,7 +94,7 @@ template <int W> void scatterBeams(const BeamPack& pack, const SixVector<typenam
             double* displacements) {
     for (int node = 0; node < pack.nodes; node++)
         for (int i = 0; i < W; i++) {
-            if (node >= pack.nodesOfLane[i])
+            if (node >= pack.ownNodes(i))
                 continue;
             double* const position = displacements+3*pack.particles[2*node*W+i];
             double* const control = displacements+3*pack.particles[(2*node+1)*W+i];

@@ -35,14 +35,15 @@ template <int W> class BeamStep {
     typedef BeamEquations<W> Equations;
 public:
     struct Memory {
-        Scratch elements, vectors, rows;
+        Scratch elements, vectors, rows, columns;
         std::vector<BeamTetherState> tethers;
     };
     BeamStep(const BeamPack& pack, const StepSettings& settings, const BeamStart<W>& start, Memory& memory) :
             pack(pack), settings(settings), start(start), n(pack.nodes),
             elements(memory.elements.template reserve<BeamElementState<Real> >(n)),
             forces(memory.vectors.template reserve<Six>(3*n)), right(forces+n), change(forces+2*n),
-            equations(pack.mobile, n, memory.rows.template reserve<typename Equations::Eliminated>(n)),
+            equations(pack.mobile, n, memory.rows.template reserve<typename Equations::Eliminated>(n),
+                    pack.closed ? memory.columns.template reserve<Six>(6*n) : NULL),
             tethers(memory.tethers),
             length(of(BeamPack::Length)), perLength(1/length), parallel(of(BeamPack::Parallel)),
             perpendicular(of(BeamPack::Perpendicular)),
@@ -134,6 +135,7 @@ public:
             std::swap(here, after);
         }
         equations.eliminate(n-1, *here, *after, true);
+        equations.close();
         equations.setRight(right);
         equations.substitute(change);
     }
@@ -158,7 +160,7 @@ public:
     bool anyUnfinished(Real& active) const {
         const Scalar perDirection = 1/(DIRECTION_TOLERANCE*DIRECTION_TOLERANCE);
         const Scalar perPlace = 1/(PLACE_TOLERANCE*PLACE_TOLERANCE);
-        const Real held = 1-loaded<Real>(pack.free, 0);
+        const Real held = pack.closed ? splat<Real>(1) : 1-loaded<Real>(pack.free, 0);
         const Real perEnergy = held*(1/(settings.kT+TINY))*(settings.kT > 0 ? 1 : 0);
         Real excess = Real{};
         for (int e = 0; e < n; e++) {
@@ -229,9 +231,12 @@ private:
         BeamElementState<Real>& own = elements[e];
         const Real modulus = of(BeamPack::Stretching)*length;
         own.ofNode = own.ofMiddle = BeamStrain<Real> {};
-        const Real before = e > 0 ? present(e-1) : Real{};
+        const Real before = e > 0 ? present(e-1) : pack.closed ? present(n-2) : Real{};
         own.ofNode.stiffness = modulus*(before+present(e))*Scalar(1.0/6);
         if (e == n-1) {
+            // The first node of a ring has its strain.
+            if (pack.closed)
+                own.ofNode.stiffness = Real{};
             const Vec control = start.control[e]*(3*perLength);
             own.ofNode.start = root(control.dot(control))-1;
             return;
@@ -504,7 +509,8 @@ private:
             y[node].position = y[node].position+change[node].position*active;
             y[node].control = y[node].control+change[node].control*active;
         }
-        resetLengths(y);
+        if (!pack.closed)
+            resetLengths(y);
     }
     /**
      * Vectors that turn far become longer, because nodes move along straight lines. Give them the directions that they

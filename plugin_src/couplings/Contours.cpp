@@ -19,12 +19,13 @@ Contours::Contours(const vector<Chain>& ofChains, const vector<BeamChain>& beams
         chains.push_back(contour);
     }
     for (const BeamChain& own : beams) {
-        const int elements = own.numNodes()-1;
+        const int elements = own.numElements(), particles = own.particles.size();
         const double length = own.elementLength;
         for (int i = 0; i < elements; i++)
-            segments.push_back({getNumChains(), own.particles[2*i], own.particles[2*i+2], i*length, length,
-                    {own.particles[2*i+1], own.particles[2*i+3]}});
-        chains.push_back({static_cast<int>(segments.size())-elements, elements, elements*length, length, false});
+            segments.push_back({getNumChains(), own.particles[2*i], own.particles[(2*i+2)%particles], i*length, length,
+                    {own.particles[2*i+1], own.particles[(2*i+3)%particles]}});
+        chains.push_back({static_cast<int>(segments.size())-elements, elements, elements*length, length,
+                own.closed});
     }
 }
 

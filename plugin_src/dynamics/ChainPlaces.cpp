@@ -61,7 +61,7 @@ bool ChainPlaces::find(const Place& place, PlaceOnChain& result) const {
             result = PlaceOnChain();
         return !place.isOnSegment();
     }
-    const bool closed = !isBeam(chain) && chains[chain].closed;
+    const bool closed = isBeam(chain) ? getBeam(chain).closed : chains[chain].closed;
     const int nodes = isBeam(chain) ? getBeam(chain).numNodes() : chains[chain].nodes.size();
     const int first = nodeOfParticle[place.first];
     int node = first;

@@ -31,7 +31,8 @@ void PlaceResponses::begin(const ChainPlaces& newPlaces, double newStepSize) {
     }
     for (size_t i = chains.size(); i < beams.size(); i++) {
         const BeamChain& chain = places->getBeam(i);
-        beams[i].segments = chain.numNodes()-1;
+        beams[i].segments = chain.numElements();
+        beams[i].closed = chain.closed;
         beams[i].length = beams[i].segments*chain.elementLength;
         beams[i].least = stepSize/(chain.elementLength*chain.perpendicularFriction);
         describe(chain.perpendicularFriction, chain.bendingRigidity, beams[i]);

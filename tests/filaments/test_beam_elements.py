@@ -272,8 +272,8 @@ def test_what_filaments_of_beam_elements_cannot_have():
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
     nodes = [[0, 0, 0], [250, 0, 0], [500, 0, 0], [500, 250, 0]]
     for add, message in (
-        (lambda: filaments.add_ring(KIND, 6, [0, 0, 0]), "no rings as yet"),
-        (lambda: filaments.add_nodes(KIND, nodes, closed=True), "no rings as yet"),
+        (lambda: filaments.add_ring(KIND, 3, [0, 0, 0]), "at least 4 segments"),
+        (lambda: filaments.add_nodes(KIND, nodes[:3], closed=True), "at least 4 segments"),
         (lambda: filaments.add_straight(KIND, 3, [0, 0, 0], [1, 0, 0], propulsion=np.nan), "must be finite"),
         (
             lambda: filaments.add_straight(KIND, 3, [0, 0, 0], [1, 0, 0], clamped_tangents=1),
@@ -326,3 +326,28 @@ def test_errors_of_steps_name_the_filament():
     contexts.append(new_context(system, broken, integrator))
     with pytest.raises(RuntimeError, match=r"Filament 1 \(BEAM\) has blown up in step"):
         integrator.step(10)
+
+
+@pytest.mark.parametrize("times", [20.0, 100.0, 1000.0])
+def test_a_couple_bends_a_cantilever_into_an_arc(times):
+    """M L/EI = 1.5, by the energy -M theta of a tangent, in steps of many times the recommended one."""
+    filaments = Filaments(VISCOSITY, 0.0, engine="compiled")
+    for planar in (True, False):
+        clamped = {"clamped": 0, "clamped_tangents": 0, "planar": planar}
+        filaments.add_straight(KIND, 3, [0, 0, 500.0 * planar], [1, 0, 0], **clamped)
+    _, system, positions = filaments.build()
+    couple = openmm.CustomCompoundBondForce(2, "-couple*atan2(y2-y1, x2-x1)")
+    couple.addPerBondParameter("couple")
+    length = 3 * KIND.segment_length
+    for nodes, controls in zip(filaments.node_indices, filaments.control_point_indices):
+        couple.addBond([int(nodes[-1]), int(controls[-1])], [1.5 * filaments[0].beam_element(0.0).rigidity / length])
+    system.addForce(couple)
+    recommended = filaments.recommended_time_step(system=system)
+    assert "relaxation" in recommended.reason
+    integrator = filaments.create_integrator(system, times * recommended.step, checks=False)
+    context = new_context(system, positions, integrator)
+    integrator.step(max(60, int(15000 / times)))
+    radius = length / 1.5
+    for own, first in zip(curves_of(filaments, positions_of(context))[0], curves_of(filaments, positions._value)[0]):
+        end = [radius * np.sin(1.5), radius * (1.0 - np.cos(1.5)), 0.0]
+        assert own[-1] - first[0] == pytest.approx(end, abs=2e-4 * length)

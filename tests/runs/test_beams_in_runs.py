@@ -107,7 +107,8 @@ def changed(old, new):
             "clamped_tangents = [0]\ndiameter",
             'clamped_tangents belongs to element = "beam"',
         ),
-        ("segments = 3\n", "segments = 3\nclosed = true\n", "closed cannot be with element"),
+        ("segments = 3\n", "segments = 4\nclosed = true\n", None),
+        ("segments = 3\n", "segments = 3\nclosed = true\n", "segments must be at least 4 in a ring"),
         ("segments = 3\n", 'segments = 3\npropulsion = "1 pN"\n', None),
         ("segments = 3\n", "segments = 3\ntangents = [[1, 0, 0], [1, 0, 0]]\n", "tangents belongs to nodes"),
         (
@@ -141,6 +142,79 @@ def test_tangents_out_of_the_plane_are_refused():
     text = changed("clamped = ", "planar = true\nclamped = ").replace("[1, 0.5, 0]", "[1, 0.5, 0.1]")
     with pytest.raises(InputError, match="tangents must lie in the xy plane"):
         parse_configuration(text)
+
+
+RINGS = """
+[[filament]]
+name = "LOOP"
+element = "beam"
+diameter = "8 nm"
+segment_length = "500 nm"
+persistence_length = "5 um"
+stretching_modulus = "10 nN"
+closed = true
+segments = 6
+count = 2
+inside = { shape = "sphere", radius = "3 um" }
+[[filament]]
+name = "LOOP"
+element = "beam"
+diameter = "8 nm"
+segment_length = "500 nm"
+persistence_length = "5 um"
+stretching_modulus = "10 nN"
+closed = true
+nodes = [["0 nm", "0 nm", "0 um"], ["450 nm", "0 nm", "0 um"], ["450 nm", "450 nm", "0 um"], ["0 nm", "450 nm", "0 um"]]
+clamped = [0]
+clamped_tangents = [0]
+[[link]]
+between = [{ filament = 6, arc_length = "2.75 um" }, { filament = 7, segment = 5, fraction = 0.4 }]
+stiffness = "0.001 pN/nm"
+[[joint]]
+between = [{ filament = 6, node = 0 }, { filament = 7, segment = 5, fraction = 0.9 }]
+stiffness = "1 kJ/mol"
+"""
+
+
+def test_runs_of_rings(tmp_path):
+    """Begun as circles in a region and from nodes, linked at their last elements, summarised, and gone on with."""
+    text = BEAMS.replace("[[link]]", f"{RINGS}[[link]]", 1)
+    out = simulated(tmp_path, text)
+    filaments = build_system(parse_configuration(text), None, 5).filaments
+    loop = filaments[6]
+    assert loop.closed and loop.segments == 6
+    curve = curve_points(loop.positions, loop.control_points, 20, closed=True)
+    assert np.linalg.norm(curve, axis=1).max() < 3000.0
+    radii = np.linalg.norm(curve - curve.mean(axis=0), axis=1)
+    assert radii == pytest.approx(np.full(len(radii), 3000.0 / (2.0 * np.pi)), rel=0.01)
+    run = analysis.load(out)
+    assert [own.ring for own in run.filaments[6:]] == [True] * 3
+    configuration = read_configuration(out / "configuration.toml")
+    groups = summarise(configuration, load_trajectory(configuration, RunDirectory(out)))
+    rings = [group for group in groups if "LOOP" in group.label]
+    assert len(rings) == 2
+    for group in rings:
+        assert any("They are rings" in note for note in group.notes)
+        names = [own.name for own in group.observables]
+        assert names == [
+            "stretching energy per element",
+            "bending energy per element",
+            "cosine between ends of an element",
+        ]
+    energies, bending = read_energies(out / "energies.csv"), 0.0
+    for own, nodes, controls in chains_of(filaments, run.positions(-1)):
+        parts = own.energies(nodes, controls, 310.0) if own.type.has_beam_elements else own.energies(nodes)
+        bending += parts[1]
+    assert energies["bending energy (kJ/mol)"][-1] == pytest.approx(bending, rel=1e-3)
+    assert main(["render", str(out), "--output", str(tmp_path / "rings.png")]) == 0
+    # Rings of a trajectory are known by their bonds.
+    files = f'file = "{out}/trajectory.dcd"\ntopology = "{out}/topology.cif"\nfilaments = [6, 7]\n'
+    begin = text.split("[[filament]]")[0]
+    own = RINGS.split("[[filament]]")[1].split("closed")[0]
+    again = f"{begin}[[filament]]{own}{files}[simulation]{text.split('[simulation]')[1]}"
+    for chain, before in zip(build_system(parse_configuration(again), None, 5).filaments, run.filaments[6:8]):
+        assert chain.closed
+        np.testing.assert_allclose(chain.control_points, run.positions(-1)[before.control_points], atol=2e-3)
 
 
 LINKERS = """

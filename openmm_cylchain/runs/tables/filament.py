@@ -82,7 +82,7 @@ FILAMENT = TableKind(
             None,
             'Of element = "beam", with nodes: directions of its curve there; those of a smooth curve if not given.',
         ),
-        Key("closed", Flag(), False, "A ring, which begins as a regular polygon."),
+        Key("closed", Flag(), False, "A ring, which begins as a regular polygon, or as a circle of beam elements."),
         Key("normal", direction(), (0.0, 0.0, 1.0), "Of the plane of a ring."),
         Key("planar", Flag(), False, "The filament moves in a plane of constant z."),
         Key("height", Quantity(units.LENGTH, "any"), 0.0, "z of that plane, where no position is given."),
@@ -195,12 +195,9 @@ def read_filaments(entries, table, solvent, box, folder):
 
 
 def _check_element(entries, kind):
-    # What beam elements alone have, and what they do not have.
+    # What beam elements alone have.
     if not kind.has_beam_elements:
         entries.refuse(("tangents", "clamped_tangents"), 'belongs to element = "beam".')
-        return
-    if entries["closed"]:
-        raise entries.at("closed").error('cannot be with element = "beam", of which there are no rings as yet.')
 
 
 def _from_nodes(entries, kind):
@@ -215,7 +212,7 @@ def _from_nodes(entries, kind):
     _check_lengths(entries, "nodes", kind, nodes, closed, None)
     with entries.naming():
         tangents = None if entries["tangents"] is None else np.array(entries["tangents"])
-        controls = beam_control_points(kind, nodes, tangents, label)
+        controls = beam_control_points(kind, nodes, tangents, label, closed)
     if entries["planar"] and controls is not None and np.any(controls[:, 2] != nodes[0, 2]):
         raise entries.at("tangents").error("must lie in the xy plane, because this filament is planar.")
     yield FilamentGroup(
@@ -314,7 +311,7 @@ def _from_file(entries, kind, box, folder):
         whole = _whole(nodes, box)
         _check_lengths(entries, "file", kind, whole, closed, box)
         shapes.setdefault((len(nodes) - (not closed), closed), []).append(
-            (whole, _control_points(entries, kind, nodes, whole, controls, box))
+            (whole, _control_points(entries, kind, nodes, whole, controls, box, closed))
         )
     for (segments, closed), starts in shapes.items():
         if segments < (MINIMUM_RING if closed else 1):
@@ -334,14 +331,14 @@ def _from_file(entries, kind, box, folder):
         )
 
 
-def _control_points(entries, kind, nodes, whole, controls, box):
+def _control_points(entries, kind, nodes, whole, controls, box, closed):
     # Those of a file next to whole nodes; of a smooth curve where it has none.
     if not kind.has_beam_elements:
         if controls is not None:
             raise entries.at("file").error('has beam elements: write element = "beam".')
         return None
     if controls is None:
-        return beam_control_points(kind, whole, None, entries.label.rstrip(":"))
+        return beam_control_points(kind, whole, None, entries.label.rstrip(":"), closed)
     vectors = controls - nodes
     return whole + (vectors if box is None else vectors - np.round(vectors / box) * box)
 

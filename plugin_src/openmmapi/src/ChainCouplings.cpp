@@ -37,9 +37,10 @@ ChainCouplings::ChainCouplings(ContextImpl& context, const CylinderChainDescript
             const int particle = beam.particles[i];
             isNode[particle] = isOfBeam[particle] = true;
             isControlPoint[particle] = (i%2 == 1);
-            if (i%2 == 0 && i > 0) {
-                before[particle] = beam.particles[i-2];
-                behind[beam.particles[i-2]] = particle;
+            if (i%2 == 0 && (i > 0 || beam.closed)) {
+                const int last = beam.particles[i > 0 ? i-2 : beam.particles.size()-2];
+                before[particle] = last;
+                behind[last] = particle;
             }
         }
     for (ForceImpl* impl : context.getForceImpls()) {

@@ -80,6 +80,7 @@ static cylchain::BeamChain describeBeam(const CylinderChainForce& force, int ind
     force.getBeamChainParameters(index, beam.elementLength, beam.stretchingModulus, beam.bendingRigidity,
             beam.shortening, beam.parallelFriction, beam.perpendicularFriction);
     beam.planar = force.isBeamChainPlanar(index);
+    beam.closed = force.isBeamChainClosed(index);
     force.getBeamChainPropulsion(index, beam.propulsion);
     return beam;
 }

@@ -90,12 +90,14 @@ int CylinderChainForce::addChain(const vector<int>& particles, BendingModel bend
 
 int CylinderChainForce::addBeamChain(const vector<int>& particles, double elementLength, double stretchingModulus,
         double bendingRigidity, double shortening, double parallelFriction, double perpendicularFriction,
-        bool planar) {
+        bool planar, bool closed) {
+    if (closed && particles.size() < 6)
+        throw OpenMMException("CylinderChainForce: A closed chain of beam elements must have at least three nodes");
     if (particles.size() < 4 || particles.size()%2 != 0)
         throw OpenMMException("CylinderChainForce: A chain of beam elements must have two particles for each of at "
                 "least two nodes");
     refuseParticles(particles);
-    beams.push_back({particles, 0, 0, 0, 0, 0, 0, planar, 0});
+    beams.push_back({particles, 0, 0, 0, 0, 0, 0, planar, closed, 0});
     const int index = beams.size()-1;
     try {
         setBeamChainParameters(index, elementLength, stretchingModulus, bendingRigidity, shortening, parallelFriction,
@@ -111,6 +113,11 @@ int CylinderChainForce::addBeamChain(const vector<int>& particles, double elemen
 const vector<int>& CylinderChainForce::getBeamChainParticles(int chain) const {
     ASSERT_VALID_INDEX(chain, beams);
     return beams[chain].particles;
+}
+
+bool CylinderChainForce::isBeamChainClosed(int chain) const {
+    ASSERT_VALID_INDEX(chain, beams);
+    return beams[chain].closed;
 }
 
 bool CylinderChainForce::isBeamChainPlanar(int chain) const {

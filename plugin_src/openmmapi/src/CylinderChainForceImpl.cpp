@@ -56,6 +56,8 @@ vector<pair<int, int> > CylinderChainForceImpl::getBondedParticles() const {
         const vector<int>& particles = owner.getBeamChainParticles(chain);
         for (size_t i = 1; i < particles.size(); i++)
             bonds.push_back(make_pair(particles[i-1], particles[i]));
+        if (owner.isBeamChainClosed(chain))
+            bonds.push_back(make_pair(particles.back(), particles.front()));
     }
     return bonds;
 }

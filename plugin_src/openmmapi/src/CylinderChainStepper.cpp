@@ -138,16 +138,17 @@ void CylinderChainStepper::refuseTornBeams() const {
     const double half = 0.5*min({box[0], box[4], box[8]});
     for (size_t chain = 0; chain < chains.getBeams().size(); chain++) {
         const BeamChain& beam = chains.getBeams()[chain];
-        for (size_t i = 1; i < beam.particles.size(); i++) {
-            const Vec3 between = positions[beam.particles[i]]-positions[beam.particles[i-1]];
+        const size_t count = beam.particles.size();
+        for (size_t i = 1; i < count+(beam.closed ? 1 : 0); i++) {
+            const Vec3 between = positions[beam.particles[i%count]]-positions[beam.particles[i-1]];
             if (norm(between) <= max(half, 2*beam.elementLength))
                 continue;
             double nearest[] = {between[0], between[1], between[2]};
             takeToNearestImage(nearest, box);
             if (norm(Vec3(nearest[0], nearest[1], nearest[2])) < 0.999*norm(between))
                 throw OpenMMException("Beam chain "+to_string(chain)+" is torn between its particles "+
-                        to_string(i-1)+" and "+to_string(i)+": positions were wrapped into the periodic box particle "
-                        "by particle. Make chains whole before setting them");
+                        to_string(i-1)+" and "+to_string(i%count)+": positions were wrapped into the periodic box "
+                        "particle by particle. Make chains whole before setting them");
         }
     }
 }

@@ -29,8 +29,8 @@ PlaceResolver::PlaceResolver(const System& system) : system(system) {
                 controls[particles[node]] = particles[node+1];
                 elementLengths[particles[node]] = length;
                 isControl[particles[node+1]] = true;
-                if (node+2 < particles.size())
-                    next[particles[node]] = particles[node+2];
+                if (node+2 < particles.size() || force->isBeamChainClosed(chain))
+                    next[particles[node]] = particles[(node+2)%particles.size()];
             }
         }
     }

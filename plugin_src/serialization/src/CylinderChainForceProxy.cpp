@@ -27,6 +27,8 @@ static void serializeBeams(const CylinderChainForce& force, SerializationNode& n
                 .setBoolProperty("planar", force.isBeamChainPlanar(i));
         if (propulsionOf(force, i) != 0)
             beam.setDoubleProperty("propulsion", propulsionOf(force, i));
+        if (force.isBeamChainClosed(i))
+            beam.setBoolProperty("closed", true);
         SerializationNode& particles = beam.createChildNode("Particles");
         for (int particle : force.getBeamChainParticles(i))
             particles.createChildNode("Particle").setIntProperty("index", particle);
@@ -40,7 +42,8 @@ static void addBeam(CylinderChainForce& force, const SerializationNode& node) {
     const int chain = force.addBeamChain(particles, node.getDoubleProperty("elementLength"),
             node.getDoubleProperty("stretchingModulus"), node.getDoubleProperty("bendingRigidity"),
             node.getDoubleProperty("shortening"), node.getDoubleProperty("parallel"),
-            node.getDoubleProperty("perpendicular"), node.getBoolProperty("planar"));
+            node.getDoubleProperty("perpendicular"), node.getBoolProperty("planar"),
+            node.getBoolProperty("closed", false));
     force.setBeamChainPropulsion(chain, node.getDoubleProperty("propulsion", 0));
 }
 
@@ -56,6 +59,9 @@ static Vec3 pointOf(const SerializationNode& tether) {
 
 /** The first one that knows what a Force has. */
 static int versionOf(const CylinderChainForce& force) {
+    for (int i = 0; i < force.getNumBeamChains(); i++)
+        if (force.isBeamChainClosed(i))
+            return 8;
     for (int i = 0; i < force.getNumBeamChains(); i++)
         if (propulsionOf(force, i) != 0)
             return 7;
@@ -171,7 +177,7 @@ static void addChain(CylinderChainForce& force, const SerializationNode& node, i
 
 void* CylinderChainForceProxy::deserialize(const SerializationNode& node) const {
     const int version = node.getIntProperty("version");
-    if (version < 1 || version > 7)
+    if (version < 1 || version > 8)
         throw OpenMMException("Unsupported version number");
     unique_ptr<CylinderChainForce> force(new CylinderChainForce());
     force->setForceGroup(node.getIntProperty("forceGroup"));

@@ -233,11 +233,13 @@ public:
      * @param parallelFriction      the friction per length against motion along the curve, measured in kJ ps/mol/nm^3
      * @param perpendicularFriction the friction per length against motion across it
      * @param planar                whether particles keep their z
+     * @param closed                whether one more element leads from the last node to the first; there must be at
+     *                              least three nodes then
      * @return the index of the chain among those of beam elements
      */
     int addBeamChain(const std::vector<int>& particles, double elementLength, double stretchingModulus,
             double bendingRigidity, double shortening, double parallelFriction, double perpendicularFriction,
-            bool planar = false);
+            bool planar = false, bool closed = false);
     /**
      * Get the number of chains of beam elements.
      */
@@ -262,6 +264,10 @@ public:
      * Get whether the particles of a chain of beam elements keep their z.
      */
     bool isBeamChainPlanar(int chain) const;
+    /**
+     * Get whether a chain of beam elements is closed: a ring, whose last element leads from its last node to the first.
+     */
+    bool isBeamChainClosed(int chain) const;
     /**
      * Get the propulsion of a chain of beam elements.
      *
@@ -433,7 +439,7 @@ class CylinderChainForce::BeamInfo {
 public:
     std::vector<int> particles;
     double elementLength, stretchingModulus, bendingRigidity, shortening, parallelFriction, perpendicularFriction;
-    bool planar;
+    bool planar, closed;
     double propulsion;
 };
 
