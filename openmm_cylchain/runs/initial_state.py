@@ -22,7 +22,6 @@ from ..filaments import shapes
 from ..filaments.segment_place import SegmentPlace
 from ..systems.filaments import Filaments
 from ..theory import chain_mean_square_end_to_end
-from ..theory.beam_elements import beam_mean_square_end_to_end
 from .keys import ConfigurationError
 
 _ATTEMPTS, _NODES_OF_ATTEMPTS = 2000, 10**5
@@ -283,8 +282,7 @@ def _extent(group, temperature):
         return group.segments * group.type.segment_length / np.pi
     if group.start == "straight":
         return group.segments * group.type.segment_length
-    mean_square = beam_mean_square_end_to_end if group.has_beam_elements else chain_mean_square_end_to_end
-    return np.sqrt(mean_square(group.type, group.segments, temperature))
+    return np.sqrt(chain_mean_square_end_to_end(group.type, group.segments, temperature))
 
 
 def _add_particles(configuration, seed, topology, system, positions):

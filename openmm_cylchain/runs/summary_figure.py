@@ -13,7 +13,6 @@ from ..analysis.statistics import mean_with_error
 from ..analysis.trajectories import filament_curves, joint_cosines, segment_lengths, tangent_correlation
 from ..output.colors import FILAMENT_COLORS, LINKER_COLORS
 from ..output.files import write_atomically
-from ..theory.beam_elements import beam_persistence_length
 from ..units.quantities import thermal_energy
 from ..units.text import time_unit
 from .configuration import linker_labels
@@ -282,8 +281,7 @@ def _draw_tangent_correlation(axis, groups, temperature, trajectory):
             linewidth=1.2,
             label=label,
         )
-        persistence_length = beam_persistence_length if group.has_beam_elements else theory.chain_persistence_length
-        persistence = persistence_length(group.type, temperature)
+        persistence = theory.chain_persistence_length(group.type, temperature)
         length, own = group.segments * group.type.segment_length, colour
         if persistence in exact:
             length, own = max(length, exact[persistence][0]), _EXACT_COLOUR

@@ -4,7 +4,8 @@ Equation numbers refer to Pesek et al., Soft Matter 2016, 12, 3360. Arguments ar
 quantities or plain numbers in OpenMM's units; results are plain numbers or arrays in OpenMM's units (nm,
 ps, kJ/mol). Every function raises InputError for values that are not finite, have the wrong unit or lie
 outside the stated range. Functions of the discrete chain are exact for the model that is simulated, at
-any stiffness; the others belong to the continuous wormlike chain (WLC).
+any stiffness, and those of beam elements but for products of strains and bends; the others belong to the
+continuous wormlike chain (WLC).
 """
 
 from ..bead_spring.equilibrium import (
@@ -20,6 +21,13 @@ from ..bead_spring.equilibrium import (
     bead_spring_stretching_energies,
 )
 from ..bead_spring.modes import bead_spring_mode_rates
+from .beam_elements import (
+    beam_bending_energy_mean,
+    beam_mean_square_end_to_end,
+    beam_persistence_length,
+    beam_stretching_energy_mean,
+    beam_tangent_correlation,
+)
 from .discrete_chain import (
     chain_bending_mode_variance,
     chain_mean_square_end_to_end,
@@ -66,6 +74,11 @@ __all__ = [
     "bead_spring_mode_variances",
     "bead_spring_persistence_length",
     "bead_spring_stretching_energies",
+    "beam_bending_energy_mean",
+    "beam_mean_square_end_to_end",
+    "beam_persistence_length",
+    "beam_stretching_energy_mean",
+    "beam_tangent_correlation",
     "bending_energy_mean",
     "bending_energy_variance",
     "bending_mode_variance",

@@ -10,12 +10,20 @@ from ..units.quantities import DIMENSIONLESS, TEMPERATURE, in_units_of, positive
 from ..units.types import FloatOrArray, Numbers, Scalar
 
 
-def refuse_beads(filament_type: ChainType) -> None:
-    """Raise InputError for a chain of beads, whose lengths and joints do not fluctuate independently."""
+def require_straight_segments(filament_type: ChainType) -> None:
+    """Raise InputError for a chain of beads or of beam elements, for which closed forms of straight segments fail.
+
+    Lengths and joints of beads do not fluctuate independently, and beam elements bend inside.
+    """
     if filament_type.node_friction > 0.0:
         raise InputError(
             f"Filament type {filament_type.name!r} is a chain of beads, for which this closed form does not hold: see "
             "the functions theory.bead_spring_..."
+        )
+    if filament_type.has_beam_elements:
+        raise InputError(
+            f"Filament type {filament_type.name!r} has beam elements, for which this closed form does not hold: see "
+            "the functions theory.beam_..."
         )
 
 

@@ -1,38 +1,108 @@
 """Averages of free chains of beam elements in space, in equilibrium; exact but for products of strains and bends."""
 
 import numpy as np
+import numpy.typing as npt
 
 from ..beams.equilibrium import ElementAverages, element_averages
 from ..filaments.filament_type import FilamentType
-from ..units.types import Scalar
-from .arguments import thermal_energy_above_zero
+from ..units.quantities import whole_number
+from ..units.types import FloatOrArray, Scalar
+from .arguments import each_whole_number, thermal_energy_above_zero
 
 
 def beam_averages(filament_type: FilamentType, temperature: Scalar) -> ElementAverages:
     """Those of an element with stiff lengths: see ``ElementAverages``."""
+    kT = thermal_energy_above_zero(temperature)
     element = filament_type.beam_element(temperature)
-    return element_averages(element.length * thermal_energy_above_zero(temperature) / element.rigidity)
+    return element_averages(element.length * kT / element.rigidity)
+
+
+def beam_tangent_correlation(filament_type: FilamentType, lag: npt.ArrayLike, temperature: Scalar) -> FloatOrArray:
+    """Correlation of tangents at nodes of a free chain of beam elements in space, ``<t(i).t(i+k)> = <t.t'>^k``.
+
+    Parameters
+    ----------
+    filament_type : FilamentType
+        With ``element="beam"``.
+    lag : int or array of int, not negative
+        The distance k along the chain in elements.
+    temperature : temperature, above zero
+
+    Raises
+    ------
+    InputError
+        If segments are straight, or a lag or the temperature is none.
+    """
+    return beam_averages(filament_type, temperature).cosine ** each_whole_number(lag, 0, "lag")
 
 
 def beam_persistence_length(filament_type: FilamentType, temperature: Scalar) -> float:
-    """-h/ln<t.t'> of tangents at neighbouring nodes, in nm."""
+    """-h/ln<t.t'> of tangents at neighbouring nodes of a free chain of beam elements of the length h in space, in nm.
+
+    Of a type given by its ``persistence_length`` it is that length at the temperature given with it. Raises InputError
+    if segments are straight, or the temperature is not above zero.
+    """
     return float(-filament_type.segment_length / np.log(beam_averages(filament_type, temperature).cosine))
 
 
 def beam_mean_square_end_to_end(filament_type: FilamentType, elements: int, temperature: Scalar) -> float:
-    """<R^2> in nm^2: bends of different elements are independent, and turn about the tangent between them at random."""
+    """<R^2> of a free chain of beam elements in space, in nm^2.
+
+    Bends of different elements are independent, and turn about the tangent between them at random. With the chord c of
+    an element and the tangents t and t' at its ends,
+
+        <R^2> = N <c^2> + 2 <c.t>^2 sum_k (N - k) <t.t'>^(k-1)
+
+    Parameters
+    ----------
+    filament_type : FilamentType
+        With ``element="beam"``.
+    elements : int
+        Their number N.
+    temperature : temperature, above zero
+
+    Raises
+    ------
+    InputError
+        If segments are straight, or the number or the temperature is none.
+    """
+    elements = whole_number(elements, 1, "elements")
     own = beam_averages(filament_type, temperature)
     apart = np.arange(1, elements)
     pairs = 2.0 * own.chord_along**2 * np.sum((elements - apart) * own.cosine ** (apart - 1))
     return float(filament_type.segment_length**2 * (elements * own.chord_square + pairs))
 
 
+def beam_bending_energy_mean(filament_type: FilamentType, temperature: Scalar) -> float:
+    """Mean bending energy of one element of a free chain of beam elements in space, in kJ/mol, by quadrature.
+
+    An element has four bends, two in each direction: of short ones it is 2 k_B T. Raises InputError if segments are
+    straight, or the temperature is not above zero.
+    """
+    return beam_averages(filament_type, temperature).bending * thermal_energy_above_zero(temperature)
+
+
 def beam_stretching_energy_mean(filament_type: FilamentType, elements: int, temperature: Scalar) -> float:
-    """Mean stretching energy per element in kJ/mol of a chain: that of its strains at nodes and in middles.
+    """Mean stretching energy per element in kJ/mol of a free chain in space, of strains at nodes and in middles.
 
     A strain e with the energy (c/2) e^2 and the measure (1 + e)^2 de, that of a vector, has
-    (k_B T/2) (1 + 3w)/(1 + w) with w = k_B T/c; in the middle of an element d|u|/de makes a little of it more.
+    (k_B T/2) (1 + 3w)/(1 + w) with w = k_B T/c; in the middle of an element d|u|/de makes a little of it more. N stiff
+    elements have (2 N + 1) k_B T/2 together.
+
+    Parameters
+    ----------
+    filament_type : FilamentType
+        With ``element="beam"``.
+    elements : int
+        Their number N.
+    temperature : temperature, above zero
+
+    Raises
+    ------
+    InputError
+        If segments are straight, or the number or the temperature is none.
     """
+    elements = whole_number(elements, 1, "elements")
     kT = thermal_energy_above_zero(temperature)
     element = filament_type.beam_element(temperature)
     shares = np.full(elements + 1, 1.0 / 3.0)

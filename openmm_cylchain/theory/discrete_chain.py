@@ -14,12 +14,13 @@ from ..filaments.equilibrium import JointAngleDistribution, PlanarJointAngleDist
 from ..filaments.filament_type import FilamentType
 from ..units.quantities import whole_number
 from ..units.types import FloatOrArray, Scalar
-from .arguments import each_whole_number, refuse_beads
+from .arguments import each_whole_number, require_straight_segments
+from .beam_elements import beam_mean_square_end_to_end, beam_persistence_length, beam_tangent_correlation
 
 
 def mean_joint_cosine(filament_type: FilamentType, temperature: Scalar, planar: bool = False) -> float:
     """Mean cosine <t1.t2> between neighbouring segments of the free discrete chain, in space or in a plane; exact."""
-    refuse_beads(filament_type)
+    require_straight_segments(filament_type)
     if planar:
         return float(PlanarJointAngleDistribution(filament_type, temperature).mean(np.cos))
     return float(JointAngleDistribution(filament_type, temperature).mean(lambda cosine: cosine))
@@ -30,6 +31,8 @@ def chain_tangent_correlation(
 ) -> FloatOrArray:
     """Correlation of tangents of the free discrete chain, ``<t(i).t(i+k)> = <c>^k``, exact.
 
+    Of beam elements, which there are in space alone, it is that of tangents at nodes: see ``beam_tangent_correlation``.
+
     Parameters
     ----------
     filament_type : FilamentType
@@ -39,6 +42,8 @@ def chain_tangent_correlation(
     planar : bool
         In a plane.
     """
+    if filament_type.has_beam_elements and not planar:
+        return beam_tangent_correlation(filament_type, lag, temperature)
     return mean_joint_cosine(filament_type, temperature, planar) ** each_whole_number(lag, 0, "lag")
 
 
@@ -47,10 +52,13 @@ def chain_persistence_length(filament_type: FilamentType | BeadSpringType, tempe
 
     Of a type given by its ``persistence_length`` it is that length at the temperature given with it, times <l>/l0. Of
     one given by its ``bending_rigidity`` it tends to the a/(k_B T) of ``FilamentType.persistence_length_at`` for
-    segments that are short against it. A freely jointed chain has 0. Of beads, see ``bead_spring_persistence_length``.
+    segments that are short against it. A freely jointed chain has 0. Of beads and of
+    beam elements, see ``bead_spring_persistence_length`` and ``beam_persistence_length``.
     """
     if isinstance(filament_type, BeadSpringType):
         return bead_spring_persistence_length(filament_type, temperature)
+    if filament_type.has_beam_elements:
+        return beam_persistence_length(filament_type, temperature)
     if filament_type.joint_stiffness == 0:
         return 0.0
     length = SegmentLengthDistribution(filament_type, temperature).mean(lambda length: length)
@@ -59,6 +67,7 @@ def chain_persistence_length(filament_type: FilamentType | BeadSpringType, tempe
 
 
 def _subchain_mean_square(filament_type, segments, temperature, planar):
+    require_straight_segments(filament_type)
     # <R^2> of every run of 1 to N segments: n<l^2> + 2<l>^2 sum_k (n-k) <c>^k.
     distribution = SegmentLengthDistribution(filament_type, temperature, planar)
     mean, square = distribution.mean(lambda length: length), distribution.mean(lambda length: length**2)
@@ -73,7 +82,8 @@ def chain_mean_square_end_to_end(
     """Mean square end-to-end distance of the free discrete chain in nm^2, exact at any stiffness.
 
     ``<R^2> = N <l^2> + 2 <l>^2 sum_k (N-k) <c>^k``, the averages over (19) and exp(-V_b/k_B T), or over what
-    they are in a plane. Of beads, by the transfer operator.
+    they are in a plane. Of beads, by the transfer operator; of beam elements, which there are in space alone, see
+    ``beam_mean_square_end_to_end``.
 
     Parameters
     ----------
@@ -85,6 +95,8 @@ def chain_mean_square_end_to_end(
     """
     if isinstance(filament_type, BeadSpringType):
         return bead_spring_mean_square_end_to_end(filament_type, segments, temperature, planar)
+    if filament_type.has_beam_elements and not planar:
+        return beam_mean_square_end_to_end(filament_type, segments, temperature)
     segments = whole_number(segments, 1, "segments")
     return float(_subchain_mean_square(filament_type, segments, temperature, planar)[-1])
 
@@ -121,7 +133,7 @@ def chain_bending_mode_variance(
     mode : int or array of int, from 1 to segments - 1
     temperature : temperature, above zero
     """
-    refuse_beads(filament_type)
+    require_straight_segments(filament_type)
     segments, modes = _bending_modes(segments, mode)
     cosines = np.cos(np.multiply.outer(modes, np.pi * (np.arange(segments) + 0.5) / segments))
     lag = np.abs(np.subtract.outer(np.arange(segments), np.arange(segments)))
@@ -152,7 +164,7 @@ def chain_planar_bending_mode_variance(
     mode : int or array of int, from 1 to segments - 1
     temperature : temperature, above zero
     """
-    refuse_beads(filament_type)
+    require_straight_segments(filament_type)
     segments, modes = _bending_modes(segments, mode)
     square = PlanarJointAngleDistribution(filament_type, temperature).mean(lambda angle: angle**2)
     return filament_type.segment_length * square / (4.0 * np.sin(0.5 * np.pi * modes / segments) ** 2)

@@ -7,7 +7,7 @@ import numpy as np
 from ..filaments.equilibrium import PlanarJointAngleDistribution, SegmentLengthDistribution
 from ..filaments.filament_type import FilamentType
 from ..units.types import Scalar
-from .arguments import refuse_beads, thermal_energy_above_zero
+from .arguments import require_straight_segments, thermal_energy_above_zero
 
 
 def bending_energy_mean(filament_type: FilamentType, temperature: Scalar, planar: bool = False) -> float:
@@ -25,7 +25,7 @@ def bending_energy_mean(filament_type: FilamentType, temperature: Scalar, planar
     planar : bool
         In a plane.
     """
-    refuse_beads(filament_type)
+    require_straight_segments(filament_type)
     kT = thermal_energy_above_zero(temperature)
     if planar:
         distribution = PlanarJointAngleDistribution(filament_type, temperature)
@@ -39,7 +39,7 @@ def bending_energy_variance(filament_type: FilamentType, temperature: Scalar) ->
     Inscribed circle: eq. (41), ``(x k_B T)^2 (E_0/E_2 - (E_1/E_2)^2)`` at x = 2 K/k_B T. Kratky-Porod:
     ``(k_B T)^2 (1 - (u/sinh u)^2)`` with u = K/k_B T. Quadratic: by quadrature.
     """
-    refuse_beads(filament_type)
+    require_straight_segments(filament_type)
     kT = thermal_energy_above_zero(temperature)
     return kT**2 * _reduced_bending_moments(filament_type, kT)[1]
 
@@ -117,7 +117,7 @@ def stretching_energy_mean(filament_type: FilamentType, temperature: Scalar, pla
     planar : bool
         In a plane.
     """
-    refuse_beads(filament_type)
+    require_straight_segments(filament_type)
     if planar:
         return float(
             SegmentLengthDistribution(filament_type, temperature, planar).mean(filament_type.stretching_energy)
@@ -127,7 +127,7 @@ def stretching_energy_mean(filament_type: FilamentType, temperature: Scalar, pla
 
 def stretching_energy_variance(filament_type: FilamentType, temperature: Scalar) -> float:
     """Variance of the stretching energy of one segment, in (kJ/mol)^2; exact, see ``stretching_energy_mean``."""
-    refuse_beads(filament_type)
+    require_straight_segments(filament_type)
     return _stretching_moments(filament_type, temperature)[1]
 
 

@@ -9,7 +9,7 @@ from ..filaments.equilibrium import JointAngleDistribution
 from ..filaments.filament_type import FilamentType
 from ..units.quantities import DIMENSIONLESS, FORCE, LENGTH, STIFFNESS, in_units_of, positive, whole_number
 from ..units.types import FloatOrArray, Numbers, Scalar
-from .arguments import each_not_negative, refuse_beads, thermal_energy_above_zero
+from .arguments import each_not_negative, require_straight_segments, thermal_energy_above_zero
 
 
 def marko_siggia_force(relative_extension: Numbers, persistence_length: Scalar, temperature: Scalar) -> FloatOrArray:
@@ -75,7 +75,7 @@ def chain_extension(filament_type: FilamentType, segments: int, force: Numbers, 
     force : force, number or array, not negative
     temperature : temperature, above zero
     """
-    refuse_beads(filament_type)
+    require_straight_segments(filament_type)
     segments = whole_number(segments, 1, "segments")
     kT = thermal_energy_above_zero(temperature)
     forces = np.asarray(each_not_negative(force, FORCE, "force")) / kT

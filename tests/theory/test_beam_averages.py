@@ -1,9 +1,12 @@
 """Averages of free chains of beam elements against draws from their equilibrium, and where they are known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from openmm import unit
 
-from openmm_cylchain import FilamentType, theory
+from openmm_cylchain import FilamentType, InputError, theory
 from openmm_cylchain.beams.curve import element_energies, node_tangents
 from openmm_cylchain.beams.equilibrium import draw_beam
 from openmm_cylchain.theory import beam_elements
@@ -74,3 +77,49 @@ def test_a_type_with_a_persistence_length_has_it():
         element="beam",
     )
     assert beam_elements.beam_persistence_length(own, 300.0) == pytest.approx(250.0, rel=1e-6)
+
+
+def test_functions_of_chains_take_them_or_say_which_do():
+    own, warm = kind(0.3), 300.0 * unit.kelvin
+    averages = beam_elements.beam_averages(own, warm)
+    assert theory.chain_persistence_length(own, warm) == theory.beam_persistence_length(own, 300.0)
+    assert theory.chain_mean_square_end_to_end(own, 6, warm) == theory.beam_mean_square_end_to_end(own, 6, 300.0)
+    correlation = theory.chain_tangent_correlation(own, [0, 2], warm)
+    np.testing.assert_allclose(correlation, [1.0, averages.cosine**2])
+    assert theory.beam_bending_energy_mean(own, warm) == pytest.approx(averages.bending * KT)
+    for function in (
+        lambda: theory.bending_energy_mean(own, warm),
+        lambda: theory.bending_energy_variance(own, warm),
+        lambda: theory.stretching_energy_mean(own, warm),
+        lambda: theory.stretching_energy_variance(own, warm),
+        lambda: theory.mean_joint_cosine(own, warm),
+        lambda: theory.chain_tangent_correlation(own, 1, warm, planar=True),
+        lambda: theory.chain_mean_square_end_to_end(own, 6, warm, planar=True),
+        lambda: theory.chain_mean_square_radius_of_gyration(own, 6, warm),
+        lambda: theory.chain_bending_mode_variance(own, 6, 1, warm),
+        lambda: theory.chain_planar_bending_mode_variance(own, 6, 1, warm),
+        lambda: theory.chain_extension(own, 6, 1.0, warm),
+    ):
+        with pytest.raises(InputError, match=r"'BEAM' has beam elements.*theory\.beam_"):
+            function()
+
+
+@pytest.mark.parametrize(
+    "arguments, message",
+    [
+        ((0, 300.0), "elements must be"),
+        ((2.5, 300.0), "elements must be"),
+        ((3, 0.0), "temperature"),
+        ((3, float("nan")), "temperature"),
+    ],
+)
+@pytest.mark.parametrize("function", [theory.beam_mean_square_end_to_end, theory.beam_stretching_energy_mean])
+def test_bad_input_is_refused(function, arguments, message):
+    with pytest.raises(InputError, match=message):
+        function(kind(0.3), *arguments)
+
+
+def test_straight_segments_are_refused():
+    straight = replace(kind(0.3), element="straight")
+    with pytest.raises(InputError, match="straight"):
+        theory.beam_persistence_length(straight, 300.0)
