@@ -78,6 +78,10 @@ class EngineWarning(UserWarning):
     """The compiled engine is installed, but does not work: the portable one, much slower, is taken in its place."""
 
 
+class JointWarning(UserWarning):
+    """Joints so stiff that bends beside them are wrong in long steps: the message says which, and what to do."""
+
+
 class LinkerWarning(UserWarning):
     """Linkers that do not do what their numbers suggest, such as hands whose springs keep them from binding."""
 

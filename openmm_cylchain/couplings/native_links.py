@@ -29,6 +29,11 @@ def is_link_force(force: openmm.Force) -> bool:
     return plugin is not None and plugin.CylinderChainLinkForce.isinstance(force)
 
 
+def table_of_force(force: Any) -> CrosslinkTable:
+    """The links of a CylinderChainLinkForce, with which Contexts begin."""
+    return _as_table(force.getLinks())
+
+
 class NativeLinks(LinkStore):
     """The crosslinks of a CylinderChainLinkForce of a System.
 

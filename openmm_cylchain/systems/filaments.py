@@ -11,6 +11,7 @@ import openmm
 from openmm import app, unit
 
 from ..couplings.beam_curves import BeamCurves
+from ..couplings.stiff_joints import warn_of_stiff_joints
 from ..dynamics.bead_spring_step import refuse_modes
 from ..dynamics.precision import check_precision, refuse_mixed_precision_of_beams
 from ..dynamics.schemes import MODES, check_scheme
@@ -899,6 +900,8 @@ class Filaments:
             forces of the System are so stiff that variances double (k mu h > 1, see ``recommended_time_step``); if it
             is too long for the flow or for self-propelled filaments; or if FENE lengths have too much energy at it
             (``timestep.fene_steps``).
+        JointWarning
+            If a joint of filaments that are not linked where it is has more than 20 EI/h of an element.
 
         Raises
         ------
@@ -921,6 +924,7 @@ class Filaments:
         bath = self._bath(temperature)
         if checks:
             warn_of_long_step(self, system, step_size, scheme, bath, particle_friction, flow)
+            warn_of_stiff_joints(system, self)
         settings = IntegratorSettings(step_size, scheme, bath, particle_friction, random_seed, flow, checks, precision)
         return self._engine.create_integrator(system, self._placed(), settings)
 

@@ -1,5 +1,6 @@
 """Joints of beam elements: energies, moments, welded filaments, equilibrium, States and XML, and what is refused."""
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -7,7 +8,7 @@ import openmm
 import pytest
 from openmm import unit
 
-from openmm_cylchain import Crosslinks, Filaments, InputError, Joints, SegmentPlace
+from openmm_cylchain import Crosslinks, Filaments, InputError, Joints, JointWarning, SegmentPlace
 from openmm_cylchain.beams.curve import element_energies, element_slopes
 from openmm_cylchain.engines.compiled import CylinderChainForce
 from support.contexts import energy_of, forces_of, new_context, positions_of, slopes_of
@@ -270,3 +271,52 @@ def test_what_is_refused():
     only.add_straight(STRAIGHT, 2, [0, 0, 0], [1, 0, 0])
     with pytest.raises(InputError, match="of which this System has none"):
         Joints(1.0).add_to(only.build()[1])
+
+
+def beside_each_other(closed=False):
+    """Two filaments, and a place on each."""
+    filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
+    if closed:
+        filaments.add_ring(BEAM, 6, [0, 0, 0])
+    else:
+        filaments.add_straight(BEAM, 3, [0, 0, 0], [1, 0, 0])
+    filaments.add_straight(BEAM, 2, [0, 50, 0], [1, 0, 0])
+    element = BEAM.beam_element(TEMPERATURE)
+    return filaments, filaments.build()[1], element.rigidity / element.length
+
+
+def integrator_of(filaments, system):
+    return filaments.create_integrator(system, filaments.recommended_time_step())
+
+
+@pytest.mark.parametrize("closed", [False, True])
+@pytest.mark.parametrize("angle", [0.0, 1.0])
+def test_stiff_joints_of_filaments_that_are_not_linked_there_are_warned_of(closed, angle):
+    filaments, system, rigidity = beside_each_other(closed)
+    first = filaments.segment_place(0, segment=-1, fraction=1.0)
+    second = filaments.segment_place(1, segment=0, fraction=0.4)
+    joints, links = Joints(10.0 * rigidity), Crosslinks(1.0, 0.0)
+    joints.add(None, first, second)
+    joints.add(None, filaments.segment_place(0, segment=0, fraction=0.5), second, angle, 30.0 * rigidity)
+    joints.add(None, first, [0, 0, 1], stiffness=500.0 * rigidity)
+    links.add(None, first, second)
+    links.add_to(system)
+    joints.add_to(system)
+    with pytest.warns(JointWarning, match=r"Joint 1 between filaments 0 and 1, .* is 30 times as stiff"):
+        integrator_of(filaments, system)
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_stiff_joints_of_filaments_that_are_linked_there_are_not(closed):
+    """The link is given the other way around, and by the node of the same place: of a ring, the first one."""
+    filaments, system, rigidity = beside_each_other(closed)
+    node = filaments.node_indices[0][0 if closed else -1]
+    place = filaments.segment_place(1, segment=0, fraction=0.4)
+    joints, links = Joints(500.0 * rigidity), Crosslinks(1.0, 0.0)
+    joints.add(None, filaments.segment_place(0, segment=-1, fraction=1.0), place)
+    links.add(None, place, int(node))
+    links.add_to(system)
+    joints.add_to(system)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", JointWarning)
+        integrator_of(filaments, system)
