@@ -230,6 +230,7 @@ def test_a_chain_is_drawn_where_and_as_it_is_asked_for():
         assert not planar or np.all(chains[0][:, 2] == 3.0)
 
 
+@pytest.mark.slow
 def test_a_long_chain():
     """10^4 bonds: what is added to <L^2> by a bond is the same for all of them once the chain is long."""
     bonds = 10_000

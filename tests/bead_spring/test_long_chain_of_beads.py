@@ -28,6 +28,7 @@ def context_of(chain, precision):
     return new_context(system, positions, integrator)
 
 
+@pytest.mark.slow
 def test_energies_are_exact(chain):
     context = context_of(chain, "automatic")
     integrator = context.getIntegrator()

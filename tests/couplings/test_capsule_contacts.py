@@ -104,7 +104,7 @@ def test_two_crossed_rods(platform, height, place):
 
 
 @ON_COMPILED_PLATFORMS
-@pytest.mark.parametrize("box", [None, 1300 * np.eye(3), TRICLINIC])
+@pytest.mark.parametrize("box", [None, pytest.param(1300 * np.eye(3), marks=pytest.mark.slow), TRICLINIC])
 def test_straight_filaments_are_whole_rods(box, platform):
     """Every pair of filaments has one contact where the whole rods are nearest, joints or not, in each image."""
     count, extent = (90, 1200) if box is not None else (30, 250)

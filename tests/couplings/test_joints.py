@@ -133,11 +133,12 @@ def mean_energy_and_cosine(stiffness, angle):
     return weights @ energy, weights @ np.cos(theta), theta, weights
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("stiffness", "angle", "welded"),
     [
-        pytest.param(100.0, 1.0, True, marks=pytest.mark.slow),
-        pytest.param(1000.0, 0.0, True, marks=pytest.mark.slow),
+        (100.0, 1.0, True),
+        (1000.0, 0.0, True),
         (50.0, 0.0, False),
     ],
 )

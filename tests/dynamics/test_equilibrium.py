@@ -76,7 +76,7 @@ def _check_printed_scheme_fails(name, engine):
 
 
 # Contour length over persistence length, with the segments that resolve it and the chains that measure it.
-END_TO_END = [(0.05, 16, 150), (0.2, 16, 150), (1.0, 32, 300), (5.0, 24, 2200)]
+END_TO_END = [(0.05, 16, 150), (0.2, 16, 150), (1.0, 32, 300), pytest.param(5.0, 24, 2200, marks=pytest.mark.slow)]
 
 
 @pytest.mark.parametrize(("ratio", "segments", "chains"), END_TO_END)

@@ -274,6 +274,7 @@ def test_hands_bind_to_their_types_of_filaments():
     assert seen.min() > 20
 
 
+@pytest.mark.slow
 def test_linkers_out_of_a_concentration_come_and_go():
     filaments, context = network([(SPRING, {"concentration": 5e-8})])
     table = filaments.linkers_in(context)

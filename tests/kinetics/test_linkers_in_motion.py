@@ -125,6 +125,7 @@ def test_motors_with_two_hands_slide_antiparallel_filaments():
     assert offset() - start == pytest.approx(2 * 400.0 * 0.5, rel=0.02)
 
 
+@pytest.mark.slow
 def test_catch_bonds_live_longest_under_the_load_of_their_closed_form():
     """Of hands under springs of fixed lengths, on a segment that does not move: 1/(k e^(F/F_u) + k_c e^(-F/F_c))."""
     slip, catch, number, stiffness = 2.0 / SECOND, 60.0 / SECOND, 4000, 0.05 * PICONEWTON

@@ -78,7 +78,7 @@ def _neighbours(ends):
 
 @pytest.mark.parametrize(
     ("kind", "segments"),
-    [(MICROTUBULE.with_segment_length(500.0), 4), (BEAM, 2)],
+    [(MICROTUBULE.with_segment_length(500.0), 4), pytest.param(BEAM, 2, marks=pytest.mark.slow)],
     ids=["straight", "beam"],
 )
 def test_motors_that_hold_at_ends_make_an_aster(kind, segments):

@@ -17,7 +17,7 @@ from openmm_cylchain.output.reporters import FilamentReporter
 from support.bending_models import BENDING_MODELS
 from support.contexts import forces_of, new_context, new_simulation, positions_of
 from support.equilibrium_cases import Case, soft_chain, time_step
-from support.platforms import ENGINES, ENGINES_PORTABLE_SLOW
+from support.platforms import ENGINES
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 
 SIGMAS = 4.0
@@ -253,6 +253,7 @@ def _assert_means(samples, exact):
 STIFF = soft_chain("CLAMP", bending_rigidity=6 * KT * 100)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("planar", [False, True])
 def test_draws_of_clamped_filaments(planar):
     filaments = _drawn("portable", STIFF, 6, planar, 6000)
@@ -261,8 +262,9 @@ def test_draws_of_clamped_filaments(planar):
     _assert_means([_fluctuations(nodes)], _exact_fluctuations(STIFF, 6, planar))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("planar", [False, True])
-@pytest.mark.parametrize("engine", ENGINES_PORTABLE_SLOW)
+@pytest.mark.parametrize("engine", ENGINES)
 def test_dynamics_keep_the_fluctuations_of_clamped_filaments(engine, planar):
     filaments = _drawn(engine, STIFF, 3, planar, 2500)
     _, system, positions = filaments.build()

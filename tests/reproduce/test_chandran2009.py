@@ -111,6 +111,7 @@ def test_rods_and_a_planted_fault(tmp_path, monkeypatch):
     assert {name.split("_")[0] for name in wrong} == {"parallel", "normal", "rotational"}
 
 
+@pytest.mark.slow
 def test_cantilevers_and_a_planted_fault(tmp_path, monkeypatch):
     arguments = ["reproduce", "diffusion", "--quick", "--figure", "8", "--output", str(tmp_path / "page")]
     assert cli.main(arguments) == 0

@@ -168,6 +168,7 @@ def test_chains_are_timed():
     assert all(np.shape(times[curve]) == (1, 3) and np.min(times[curve]) > 0 for curve in steps)
 
 
+@pytest.mark.slow
 def test_euler_and_its_bound(tmp_path):
     euler, _ = explicit_steps.CASES
     results = {each.name: each for each in euler.evaluate(Records(tmp_path), True).results}
