@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstring>
 #include <numeric>
+#include <type_traits>
 
 using namespace cylchain;
 using namespace std;
@@ -32,6 +33,8 @@ const double OF_TENSIONS = 2e-4;
  */
 const double STIFF = 2e3, OF_STIFF = 10;
 const int LARGEST_NUMBER_OF_ITERATIONS = 1000;
+/** Where energies grow by more, single precision rounds away what is small: that of stiff links between free particles. */
+const double LARGEST_GROWTH = 1e6;
 /** Equations that a thread looks at together. */
 const int CHUNK = 256;
 /** What a term far from the processor's caches shows is asked for this many terms ahead. */
@@ -161,7 +164,7 @@ double CoupledEquations::total() const {
     return sum;
 }
 
-void CoupledEquations::solve(const vector<PackStep*>& packs, const PackFlags& active,
+bool CoupledEquations::solve(const vector<PackStep*>& packs, const PackFlags& active,
             const vector<CouplingEquation>& equations, double kT, const Demands& demands, const Loop& loop) {
     const int numPacks = packs.size();
     const bool stiff = demands.demandingStiffness > STIFF;
@@ -176,9 +179,9 @@ void CoupledEquations::solve(const vector<PackStep*>& packs, const PackFlags& ac
     });
     const double least = tighter*LEAST_ENERGY*kT*(stiff ? 1 : count(active.begin(), active.end(), 1));
     // What is stiff, or must be right in tensions, needs more digits.
-    if (demands.single && !demands.forTensions && !stiff)
-        iterate(packs, single, tighter*demands.tolerance, least, loop);
-    else
+    const bool trySingle = demands.single && !demands.forTensions && !stiff;
+    const bool solved = trySingle && iterate(packs, single, tighter*demands.tolerance, least, loop);
+    if (!solved)
         iterate(packs, twice, tighter*demands.tolerance, least, loop);
     moves.resize(3*equations.size());
     runInChunks(loop, equations.size(), CHUNK, [&] (int i) {
@@ -186,10 +189,14 @@ void CoupledEquations::solve(const vector<PackStep*>& packs, const PackFlags& ac
         for (int k = 0; k < 3; k++)
             moves[3*i+k] = (first >= 0 ? change[3*first+k] : 0)-(second >= 0 ? change[3*second+k] : 0);
     });
+    return solved || !trySingle;
 }
 
-/** Conjugate gradients, until what is left of the energy is less than a part of it, or than some energy. */
-template <class Real> void CoupledEquations::iterate(const vector<PackStep*>& packs, Vectors<Real>& vectors,
+/**
+ * Conjugate gradients, until what is left of the energy is less than a part of it, or than some energy. Where numbers in
+ * single precision do not get there, it returns false, and nothing is found.
+ */
+template <class Real> bool CoupledEquations::iterate(const vector<PackStep*>& packs, Vectors<Real>& vectors,
             double tolerance, double leastEnergy, const Loop& loop) {
     const size_t count = terms.size();
     for (vector<Real>* values :
@@ -243,6 +250,7 @@ template <class Real> void CoupledEquations::iterate(const vector<PackStep*>& pa
     iterations = 1;
     double energy = total();
     const double least = max(tolerance*energy, leastEnergy);
+    const double largest = LARGEST_GROWTH*energy;
     Real ratio = 0;
     while (energy > least && iterations < LARGEST_NUMBER_OF_ITERATIONS) {
         forCoupled([&] (int pack, int first, int last) {
@@ -282,13 +290,19 @@ template <class Real> void CoupledEquations::iterate(const vector<PackStep*>& pa
         const double before = energy;
         energy = total();
         ratio = energy/before;
+        // Written so that NaN is too large.
+        if (is_same<Real, float>::value && !(energy >= -least && energy < largest))
+            return false;
     }
+    if (is_same<Real, float>::value && energy > least)
+        return false;
     forCoupled([&] (int, int first, int last) {
         for (int j = 3*first; j < 3*last; j++) {
             found[j] = ownFound[j];
             change[j] += ownChange[j];
         }
     });
+    return true;
 }
 
 void CoupledEquations::advance(const vector<PackStep*>& packs, const PackFlags& active, double share,

@@ -51,8 +51,9 @@ public:
      * Linearise packs and solve the equations, to within a tolerance of energy.
      *
      * @param active  the packs that take part; others stay where they are
+     * @return false if single precision was asked for, and did not do
      */
-    void solve(const std::vector<PackStep*>& packs, const PackFlags& active,
+    bool solve(const std::vector<PackStep*>& packs, const PackFlags& active,
             const std::vector<CouplingEquation>& equations, double kT, const Demands& demands, const Loop& loop);
     /** For each equation, how much its first place moves against the second: three numbers. */
     const std::vector<double>& getMoves() const {
@@ -99,7 +100,7 @@ private:
     void sortPlaces(const std::vector<CouplingEquation>& equations, const PackFlags& active);
     void gatherTerms(const std::vector<CouplingEquation>& equations, const PackFlags& active,
             const Loop& loop);
-    template <class Real> void iterate(const std::vector<PackStep*>& packs, Vectors<Real>& vectors, double tolerance,
+    template <class Real> bool iterate(const std::vector<PackStep*>& packs, Vectors<Real>& vectors, double tolerance,
             double least, const Loop& loop);
     double total() const;
     void findCompliancesOfTerms(const std::vector<PackStep*>& packs, const Loop& loop);

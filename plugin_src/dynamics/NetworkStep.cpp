@@ -213,7 +213,8 @@ bool NetworkStep::iterate(const Attempt& attempt, int stage) {
         first[couplings.size()] = equations.size();
         // What the first stage takes for taut segments stays as it is for the second one.
         demands.forTensions = iteration == 0 && stage == 0 && steps[0]->getNumStages() > 1;
-        coupled.solve(stepsOfPacks, active, equations, attempt.settings.kT, demands, attempt.loop);
+        if (!coupled.solve(stepsOfPacks, active, equations, attempt.settings.kT, demands, attempt.loop))
+            demands.single = false;
         substitutions += coupled.getNumIterations();
         if (iteration == 0 && stage == 0) {
             coupled.findJointStiffness(stepsOfPacks, attempt.loop);
