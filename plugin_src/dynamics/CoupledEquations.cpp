@@ -33,7 +33,7 @@ const double OF_TENSIONS = 2e-4;
  */
 const double STIFF = 2e3, OF_STIFF = 10;
 const int LARGEST_NUMBER_OF_ITERATIONS = 1000;
-/** Where energies grow by more, single precision rounds away what is small: that of stiff links between free particles. */
+/** Where energies grow by more, single precision has rounded away what matters: in stiff links of free particles. */
 const double LARGEST_GROWTH = 1e6;
 /** Equations that a thread looks at together. */
 const int CHUNK = 256;
@@ -193,8 +193,8 @@ bool CoupledEquations::solve(const vector<PackStep*>& packs, const PackFlags& ac
 }
 
 /**
- * Conjugate gradients, until what is left of the energy is less than a part of it, or than some energy. Where numbers in
- * single precision do not get there, it returns false, and nothing is found.
+ * Conjugate gradients, until what is left of the energy is less than a part of it, or than some energy. Where numbers
+ * in single precision do not get there, it returns false, and nothing is found.
  */
 template <class Real> bool CoupledEquations::iterate(const vector<PackStep*>& packs, Vectors<Real>& vectors,
             double tolerance, double leastEnergy, const Loop& loop) {
