@@ -261,8 +261,8 @@ def test_what_a_type_of_beam_elements_cannot_have():
     for name in ("joint_stiffness", "clamped_bending_stiffness"):
         with pytest.raises(InputError, match="beam elements have no joint stiffness"):
             getattr(KIND, name)
-    with pytest.raises(InputError, match="beam elements have no"):
-        theory.chain_mean_square_end_to_end(KIND, 4, TEMPERATURE)
+    with pytest.raises(InputError, match="has beam elements, for which this closed form does not hold"):
+        theory.chain_mean_square_radius_of_gyration(KIND, 4, TEMPERATURE)
     with pytest.raises(InputError, match="segments are straight"):
         F_ACTIN.beam_element(TEMPERATURE)
     assert replace(F_ACTIN, element="beam", extension_relaxation_time=None).has_beam_elements
