@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
+from ..mechanics.geometry import unrolled
 from ..units.types import FloatArray
 
 _GAUSS_PLACES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)
@@ -59,19 +60,13 @@ def control_points_of(nodes: FloatArray, tangents: FloatArray, length: float) ->
     return nodes + length / 3.0 * tangents
 
 
-def unrolled(nodes: FloatArray, control_points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Nodes and control points (..., nodes + 1, 3) of a ring, with the first node once more behind the last one."""
-    around, controls = (np.concatenate([own, own[..., :1, :]], axis=-2) for own in (nodes, control_points))
-    return around, controls
-
-
 def natural_tangents(nodes: FloatArray, closed: bool = False) -> FloatArray:
     """Unit vectors (nodes, 3) along the natural cubic spline through nodes (nodes, 3), which bends least.
 
     Of a ring, along the periodic one.
     """
     if closed:
-        around = np.concatenate([nodes, nodes[:1]])
+        around = unrolled(nodes)
         along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(around, axis=0), axis=1))])
         slopes = CubicSpline(along, around, bc_type="periodic")(along[:-1], 1)
     elif len(nodes) == 2:
@@ -128,7 +123,7 @@ def curve_points(nodes: FloatArray, control_points: FloatArray, per_element: int
     Of a ring, the first point is also behind the last one, and is not there twice.
     """
     if closed:
-        return curve_points(*unrolled(nodes, control_points), per_element)[..., :-1, :]
+        return curve_points(unrolled(nodes), unrolled(control_points), per_element)[..., :-1, :]
     points = element_points(nodes, control_points, np.arange(per_element) / per_element)
     points = points.reshape(*points.shape[:-3], -1, 3)
     return np.concatenate([points, nodes[..., -1:, :]], axis=-2)
@@ -137,7 +132,7 @@ def curve_points(nodes: FloatArray, control_points: FloatArray, per_element: int
 def arc_lengths(nodes: FloatArray, control_points: FloatArray, closed: bool = False) -> FloatArray:
     """Lengths of the elements along the curve: (..., elements) in nm, by eight Gauss points."""
     if closed:
-        return arc_lengths(*unrolled(nodes, control_points))
+        return arc_lengths(unrolled(nodes), unrolled(control_points))
     slopes = _on_elements(nodes, control_points, _GAUSS_PLACES, derivative=True)
     return np.linalg.norm(slopes, axis=-1) @ _GAUSS_WEIGHTS
 
@@ -164,7 +159,7 @@ def element_energies(
         A ring.
     """
     if closed:
-        return element_energies(*unrolled(nodes, control_points), element)
+        return element_energies(unrolled(nodes), unrolled(control_points), element)
     h = element.length
     slopes = node_tangents(nodes, control_points, h)
     middle = element_slopes(nodes, control_points, [0.5], h)[..., 0, :]

@@ -5,16 +5,18 @@ from typing import Any
 
 import numpy as np
 import openmm
+from scipy.spatial import cKDTree
 
 from ..engine_choice import load_plugin
 from ..errors import JointWarning
 from ..filaments.collection import FilamentCollection
-from ..units.types import BoolArray, FloatArray, IntArray
+from ..units.types import FloatArray, IntArray
 from .native_links import is_link_force, table_of_force
 
 LARGEST_STIFFNESS = 20.0
 """Of a joint over EI/h of an element, up to which energies and bends are right at the recommended step within 1.3 %."""
 _SAME_PLACE = 1e-3
+_NONE, _NOWHERE = np.zeros((0, 4)), np.full(4, -2.0)
 
 
 def warn_of_stiff_joints(system: openmm.System, filaments: FilamentCollection) -> None:
@@ -35,26 +37,27 @@ def warn_of_stiff_joints(system: openmm.System, filaments: FilamentCollection) -
     if not any(force.getJoinsTangents() for force in forces) or filaments.temperature == 0.0:
         return
     places = _PlacesOnFilaments(system.getNumParticles(), filaments)
-    linked, stiffest = np.zeros((0, 4)), None
-    for force in forces:
-        if not force.getJoinsTangents():
-            table = table_of_force(force)
-            held = table.active & (table.rest_length == 0.0)
-            linked = np.concatenate([linked, places.of(table)[held]])
-    for force in forces:
-        if force.getJoinsTangents():
-            table = table_of_force(force)
-            own = places.of(table)
-            joined = table.active & np.all(own[:, ::2] >= 0, axis=1)
-            for row in np.flatnonzero(joined):
-                first, second = own[row, ::2].astype(int)
-                # Of the angle: its energy is that of the difference of unit vectors, see Joints.add().
-                stiffness = table.stiffness[row] * (1.0 - 0.25 * table.rest_length[row] ** 2)
-                ratio = stiffness / min(places.rigidities[first], places.rigidities[second])
-                if ratio > LARGEST_STIFFNESS and not places.are_linked(own[row], linked):
-                    found = ratio, int(table.numbers[row]), first, second
-                    stiffest = found if stiffest is None else max(stiffest, found)
-    if stiffest is not None:
+    tables = [(force.getJoinsTangents(), table_of_force(force)) for force in forces]
+    linked = np.concatenate(
+        [places.of(table)[_holds_together(table)] for joins, table in tables if not joins] or [_NONE]
+    )
+    # In either order.
+    linked = np.concatenate([linked, linked[:, [2, 3, 0, 1]], [_NOWHERE]])
+    stiffest: tuple[float, int, int, int] = LARGEST_STIFFNESS, 0, 0, 0
+    for joins, table in tables:
+        if not joins:
+            continue
+        own = places.of(table)
+        joined = table.active & np.all(own[:, ::2] >= 0, axis=1)
+        rigidities = places.rigidities[own[:, ::2].astype(int)].min(axis=1)
+        # Of the angle: its energy is that of the difference of unit vectors, see Joints.add().
+        ratios = np.where(joined, table.stiffness * (1.0 - 0.25 * table.rest_length**2) / rigidities, 0.0)
+        stiff = np.flatnonzero(ratios > LARGEST_STIFFNESS)
+        away, _ = cKDTree(linked).query(own[stiff], p=np.inf)
+        for row in stiff[away > _SAME_PLACE]:
+            first, second = own[row, ::2].astype(int)
+            stiffest = max(stiffest, (ratios[row], int(table.numbers[row]), first, second))
+    if stiffest[0] > LARGEST_STIFFNESS:
         ratio, number, first, second = stiffest
         warnings.warn(
             f"Joint {number} between filaments {first} and {second}, which are not linked there, is {ratio:.3g} times "
@@ -72,7 +75,7 @@ class _PlacesOnFilaments:
     def __init__(self, particles: int, filaments: FilamentCollection) -> None:
         self._filament: IntArray = np.full(particles, -1)
         self._node: IntArray = np.zeros(particles, dtype=int)
-        self._elements = np.array([filament.segments if filament.closed else 0 for filament in filaments])
+        self._elements = np.array([filament.segments if filament.closed else np.inf for filament in filaments])
         rigidities = []
         for number, filament in enumerate(filaments):
             nodes = filaments.node_indices[number]
@@ -96,19 +99,12 @@ class _PlacesOnFilaments:
             # Across the end of a ring.
             step = np.where(np.abs(step) > 1, -np.sign(step), step)
             found[:, 2 * side] = np.where(there, self._filament[first], -1)
-            found[:, 2 * side + 1] = node + step * fractions[:, side]
+            along = node + step * fractions[:, side]
+            # The end of a ring is its beginning.
+            around = self._elements[self._filament[first]]
+            found[:, 2 * side + 1] = np.where(along > around - 0.5 * _SAME_PLACE, along - around, along)
         return found
 
-    def are_linked(self, places: FloatArray, linked: FloatArray) -> bool:
-        """Whether one of some links is between two places, in either order."""
-        return bool(np.any(self._same(linked, places) | self._same(linked, places[[2, 3, 0, 1]])))
 
-    def _same(self, linked: FloatArray, places: FloatArray) -> BoolArray:
-        same = np.full(len(linked), True)
-        for side in (0, 2):
-            away = np.abs(linked[:, side + 1] - places[side + 1])
-            around = self._elements[int(places[side])]
-            if around > 0:
-                away = np.minimum(away, around - away)
-            same &= (linked[:, side] == places[side]) & (away < _SAME_PLACE)
-        return same
+def _holds_together(table):
+    return table.active & (table.rest_length == 0.0)

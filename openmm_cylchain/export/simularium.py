@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..analysis.runs import Run
+from ..mechanics.geometry import unrolled
 from ..output.files import write_atomically
 from ..rendering.colors import WALL_COLOR, filament_colors, linker_color, particle_colors
 from ..units.text import time_unit
@@ -105,7 +106,7 @@ def _box(run, outlines):
 def _agents(run, frame, types, center, outlines):
     data: list[float] = []
     for number, (own, points) in enumerate(zip(run.filaments, run.curves(frame))):
-        points = np.concatenate([points, points[:1]]) if own.ring else points
+        points = unrolled(points) if own.ring else points
         data += _agent(_FIBER, number, types["filament", own.type.name], 0.5 * own.diameter, points - center)
     number = len(run.filaments)
     for own in run.particles:

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from ..analysis.runs import Run
+from ..mechanics.geometry import unrolled
 from ..output.files import write_atomically
 from ..rendering.colors import WALL_COLOR, filament_colors, linker_color, particle_colors
 from ..units.text import time_unit
@@ -149,10 +150,7 @@ def _particles(own):
 
 
 def _curves(run, frame, curves):
-    drawn = [
-        np.concatenate([points, points[:1]]) if own.ring else points
-        for own, points in zip(run.filaments, run.curves(frame))
-    ]
+    drawn = [unrolled(points) if own.ring else points for own, points in zip(run.filaments, run.curves(frame))]
     kinds = []
     for _, members in curves.values():
         kinds.append("{" + " ".join("{" + " ".join(map(_point, drawn[i])) + "}" for i in members) + "}")

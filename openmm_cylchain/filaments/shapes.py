@@ -63,7 +63,7 @@ def given(positions: Vectors, label: str) -> FloatArray:
 
 def ring(filament_type: ChainType, segments: int, center: Vector, normal: Vector, label: str) -> FloatArray:
     """Positions (segments, 3) in nm of a regular polygon with segments of rest length."""
-    segments = number_of_segments(segments, label)
+    segments = _number_of_ring(number_of_segments(segments, label), label)
     center = vector(center, LENGTH, f"{label}: center")
     return regular_polygon(segments, filament_type.segment_length, center, unit_vector(normal, label, "normal"))
 
@@ -78,14 +78,13 @@ def beam_ring(
     label: str,
 ) -> tuple[FloatArray, FloatArray]:
     """Nodes and control points, (elements, 3) in nm each, of a circle of beam elements without strains."""
-    elements = _number_of_ring(elements, label)
+    elements = _number_of_ring(number_of_segments(elements, label), label)
     center = vector(center, LENGTH, f"{label}: center")
     element = filament_type.beam_element(temperature, _flag(planar, f"{label}: planar"))
     return circle(element, elements, center, unit_vector(normal, label, "normal"))
 
 
 def _number_of_ring(segments, label):
-    segments = number_of_segments(segments, label)
     if segments < MINIMUM_RING:
         raise InputError(f"{label}: a ring needs at least {MINIMUM_RING} segments, but has {segments}.")
     return segments
@@ -185,8 +184,8 @@ def new_filament(
         If forces are not defined there, or the filament is not what it is said to be.
     """
     closed, planar = _flag(closed, f"{label}: closed"), _flag(planar, f"{label}: planar")
-    if closed and len(positions) < MINIMUM_RING:
-        raise InputError(f"{label}: a ring needs at least {MINIMUM_RING} segments, but has {len(positions)}.")
+    if closed:
+        _number_of_ring(len(positions), label)
     check_shape(filament_type, positions, label, closed)
     propulsion = finite_number(propulsion, FORCE, f"{label}: propulsion")
     if planar:

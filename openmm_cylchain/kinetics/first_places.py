@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..beams.curve import curve_points, place_weights, unrolled
+from ..beams.curve import curve_points, place_weights
 from ..errors import InputError
 from ..filaments.filament import Filament
-from ..mechanics.geometry import to_nearest_images
+from ..mechanics.geometry import to_nearest_images, unrolled
 from ..units.types import FloatArray, IntArray
 from .crosslinker import Crosslinker
 from .hand import Hand
@@ -166,7 +166,7 @@ class FirstPlaces:
 
     def _nodes(self, number):
         nodes = self._filaments[number].positions
-        return np.concatenate([nodes, nodes[:1]]) if self._filaments[number].closed else nodes
+        return unrolled(nodes) if self._filaments[number].closed else nodes
 
     def _positions(self, chains, along):
         found = np.empty((len(chains), 3))
@@ -199,7 +199,7 @@ class FirstPlaces:
 def _open_curve(filament):
     # Nodes and control points; of a ring, the first ones once more behind the last.
     own = filament.positions, filament.control_points
-    return unrolled(*own) if filament.closed else own
+    return tuple(map(unrolled, own)) if filament.closed else own
 
 
 def _largest_bows(nodes, control_points):

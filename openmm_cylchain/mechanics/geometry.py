@@ -26,6 +26,11 @@ def to_nearest_images(vectors: FloatArray, box: FloatArray) -> FloatArray:
     return nearest
 
 
+def unrolled(points: FloatArray) -> FloatArray:
+    """Points (..., n + 1, 3) around a ring of points (..., n, 3): the first one once more behind the last."""
+    return np.concatenate([points, points[..., :1, :]], axis=-2)
+
+
 def joined(segments: npt.NDArray[Any], closed: bool = False) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
     """An array of one entry per segment as a pair: the segments before and behind every joint."""
     return (np.roll(segments, 1, axis=0), segments) if closed else (segments[:-1], segments[1:])

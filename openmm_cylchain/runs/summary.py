@@ -292,23 +292,13 @@ def _series_of_beams(group, temperature, trajectory, members):
     nodes, controls = node_positions(trajectory, members), control_point_positions(trajectory, members)
     element = kind.beam_element(temperature, group.planar)
     stretching, bending = element_energies(np.stack(nodes, axis=1), np.stack(controls, axis=1), element, group.closed)
-    theory_of_stretching = beam_elements.beam_stretching_energy_mean(kind, group.segments, temperature) / kT
+    theory_of_stretching = theory.beam_stretching_energy_mean(kind, group.segments, temperature) / kT
     yield _STRETCHING_OF_ELEMENTS, "kT", stretching.mean(axis=2) / kT, theory_of_stretching
     yield "bending energy per element", "kT", bending.mean(axis=2) / kT, exact.bending
     cosines = np.stack(joint_cosines(trajectory, members), axis=1)
     yield "cosine between ends of an element", "", cosines.mean(axis=2), exact.cosine
-    if group.closed:
-        return
-    squares = np.sum(end_to_end_vectors(trajectory, members) ** 2, axis=2)
-    mean_square = beam_elements.beam_mean_square_end_to_end(kind, group.segments, temperature)
-    yield "mean square end-to-end distance", "nm^2", squares, mean_square
-    length = group.segments * kind.segment_length
-    yield (
-        _WORMLIKE,
-        "nm^2",
-        squares,
-        float(theory.wlc_mean_square_end_to_end(length, kind.persistence_length_at(temperature))),
-    )
+    if not group.closed:
+        yield from _end_to_end(kind, group.segments, temperature, trajectory, members)
 
 
 def _series_of_beads(kind, bonds, temperature, trajectory, members):
@@ -333,8 +323,8 @@ def mean_energies(group, temperature):
     """
     kind = group.type
     if group.has_beam_elements:
-        stretching = beam_elements.beam_stretching_energy_mean(kind, group.segments, temperature)
-        return stretching, beam_elements.beam_averages(kind, temperature).bending * thermal_energy(temperature)
+        stretching = theory.beam_stretching_energy_mean(kind, group.segments, temperature)
+        return stretching, theory.beam_bending_energy_mean(kind, temperature)
     if not isinstance(kind, BeadSpringType):
         return theory.stretching_energy_mean(kind, temperature), theory.bending_energy_mean(kind, temperature)
     free = kind, group.segments, temperature
@@ -384,7 +374,7 @@ def _persistence_length_of_beams(group, temperature, trajectory, members, compar
     if group.closed:
         return []
     cosine, error = _mean_with_error(np.stack(joint_cosines(trajectory, members), axis=1).mean(axis=2))
-    exact = beam_elements.beam_persistence_length(group.type, temperature)
+    exact = theory.beam_persistence_length(group.type, temperature)
     if not 0.0 < cosine < 1.0:
         return []
     value = -group.type.segment_length / math.log(cosine)

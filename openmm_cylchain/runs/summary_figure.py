@@ -11,6 +11,7 @@ from scipy.integrate import trapezoid
 from .. import theory
 from ..analysis.statistics import mean_with_error
 from ..analysis.trajectories import filament_curves, joint_cosines, segment_lengths, tangent_correlation
+from ..mechanics.geometry import unrolled
 from ..output.colors import FILAMENT_COLORS, LINKER_COLORS
 from ..output.files import write_atomically
 from ..units.quantities import thermal_energy
@@ -115,7 +116,7 @@ def _draw_conformations(axis, groups, trajectory):
     last = trajectory[-1]
     for group, members, label, colour in groups:
         for number, positions in enumerate(filament_curves(last, members)):
-            points = np.concatenate([positions[0], positions[0][:1]]) if group.closed else positions[0]
+            points = unrolled(positions[0]) if group.closed else positions[0]
             axis.plot(
                 points[:, 0],
                 points[:, 1],

@@ -7,21 +7,13 @@
 
 /** A circle around a center; its particles are appended to x. */
 static BeamChain ring(int elements, double h, double modulus, double rigidity, Array& x) {
-    BeamChain chain;
-    chain.elementLength = h;
-    chain.stretchingModulus = modulus;
-    chain.bendingRigidity = rigidity;
-    chain.parallelFriction = 1;
-    chain.perpendicularFriction = 2;
+    BeamChain chain = beamOfNodes(elements, h, modulus, rigidity, x);
     chain.closed = true;
-    const int first = x.size()/3;
     const double radius = elements*h/(2*M_PI);
     for (int node = 0; node < elements; node++) {
         const double angle = 2*M_PI*node/elements, c = cos(angle), s = sin(angle);
-        chain.particles.insert(chain.particles.end(), {first+2*node, first+2*node+1});
         x.insert(x.end(), {radius*c, radius*s, 0, radius*c-h/3*s, radius*s+h/3*c, 0});
     }
-    chain.fixed.resize(chain.particles.size(), false);
     return chain;
 }
 
@@ -99,22 +91,7 @@ static void testNeighbours() {
     chains.push_back(beam(6, 1, 1e4, 20, x));
     chains[2].fixed[0] = true;
     chains[4].fixed[0] = chains[4].fixed[1] = true;
-    const Array f(x.size());
-    const BeamEngine engine(chains, 40);
-    StepSettings settings = {Scheme::Implicit, 1, 1e-3, 5, 0};
-    Array together = x;
-    for (int i = 0; i < 20; i++)
-        advance(engine, together, f, settings);
-    for (size_t i = 0; i < chains.size(); i++) {
-        const BeamEngine alone({chains[i]}, 40+i);
-        Array moved = x;
-        settings.step = 0;
-        for (int step = 0; step < 20; step++)
-            advance(alone, moved, f, settings);
-        for (int particle : chains[i].particles)
-            for (int k = 0; k < 3; k++)
-                checkClose(moved[3*particle+k], together[3*particle+k], 1, 1e-6, "a ring among others");
-    }
+    checkNeighbours(chains, x, "a ring among others");
 }
 
 static void testWhatIsRefused() {

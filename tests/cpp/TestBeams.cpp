@@ -513,22 +513,7 @@ static void testNeighbours() {
         chains.push_back(beam(elements, 1, 1e4, 20, x));
     chains[2].fixed[0] = true;
     chains[4].fixed[0] = chains[4].fixed[1] = true;
-    const Array f(x.size());
-    const BeamEngine engine(chains, 40);
-    StepSettings settings = {Scheme::Implicit, 1, 1e-3, 5, 0};
-    Array together = x;
-    for (int i = 0; i < 20; i++)
-        advance(engine, together, f, settings);
-    for (size_t i = 0; i < chains.size(); i++) {
-        const BeamEngine alone({chains[i]}, 40+i);
-        Array moved = x;
-        settings.step = 0;
-        for (int step = 0; step < 20; step++)
-            advance(alone, moved, f, settings);
-        for (int particle : chains[i].particles)
-            for (int k = 0; k < 3; k++)
-                checkClose(moved[3*particle+k], together[3*particle+k], 1, 1e-6, "a chain among others");
-    }
+    const Array together = checkNeighbours(chains, x, "a chain among others");
     checkClose(x[3*chains[2].particles[0]], together[3*chains[2].particles[0]], 1, 0, "a hinge");
     checkClose(x[3*chains[4].particles[1]], together[3*chains[4].particles[1]], 1, 0, "a clamp");
 }

@@ -51,25 +51,14 @@ def test_midpoint_keeps_equilibrium_on_platform(name, engine, platform):
     _check(name, engine, platform)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["freely-jointed", "f-actin-60nm"])
-@pytest.mark.parametrize("engine", ENGINES)
-def test_printed_scheme_fails(name, engine):
-    _check_printed_scheme_fails(name, engine)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name in CASES if name not in ("freely-jointed", "f-actin-60nm")])
-@pytest.mark.parametrize("engine", ENGINES)
-def test_printed_scheme_fails_elsewhere(name, engine):
-    _check_printed_scheme_fails(name, engine)
-
-
 # The bias of DNA's segment length, 0.08 %, is 4.4 standard errors of the case as it is.
 MORE_CHAINS = {"dna-8nm": 3}
 
 
-def _check_printed_scheme_fails(name, engine):
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("engine", ENGINES)
+def test_printed_scheme_fails(name, engine):
     case = replace(CASES[name], chains=CASES[name].chains * MORE_CHAINS.get(name, 1))
     deviations = _deviations(case, measured_means(case, engine, "Reference", "euler"))
     assert max(deviations.values()) > SIGMAS, deviations

@@ -10,10 +10,10 @@ from openmm_cylchain.beams.curve import (
     element_energies,
     element_slopes,
     place_weights,
-    unrolled,
 )
 from openmm_cylchain.beams.rings import circle
 from openmm_cylchain.engines.compiled import CylinderChainForce, CylinderChainIntegrator
+from openmm_cylchain.mechanics.geometry import unrolled
 from support.contexts import positions_of
 from support.solvent import KT, TEMPERATURE
 
@@ -105,7 +105,7 @@ def test_rings_relax_to_circles(elements):
 
 def dense_resistance(particles, friction, length):
     """Z (6 n, 6 n) of positions P and control vectors Q-P, by Gauss points."""
-    nodes, controls = unrolled(particles[::2], particles[1::2])
+    nodes, controls = unrolled(particles[::2]), unrolled(particles[1::2])
     elements = len(nodes) - 1
     places, weights = np.polynomial.legendre.leggauss(4)
     places, weights = 0.5 * (1.0 + places), 0.5 * weights * length

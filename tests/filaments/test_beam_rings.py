@@ -24,8 +24,9 @@ from openmm_cylchain import (
     filament_wall_force,
     make_whole,
 )
-from openmm_cylchain.beams.curve import arc_lengths, curve_points, element_energies, element_points, unrolled
+from openmm_cylchain.beams.curve import arc_lengths, curve_points, element_energies, element_points
 from openmm_cylchain.cli import main
+from openmm_cylchain.mechanics.geometry import unrolled
 from openmm_cylchain.output.reporters import FilamentReporter
 from support.contexts import close_reporters, energy_of, forces_of, new_context, new_simulation, positions_of, slopes_of
 from support.linked_beams import BEAM, LENGTH
@@ -327,7 +328,7 @@ def test_contacts_of_a_run_name_the_last_element(tmp_path):
     """A ring of four elements of five pieces each, and a filament that crosses the element that closes it."""
     filaments = Filaments(VISCOSITY, 0.0, engine="compiled")
     filaments.add_ring(BEAM, 4, [0, 0, 0])
-    place = element_points(*unrolled(filaments[0].positions, filaments[0].control_points), [0.3])[-1, 0]
+    place = element_points(unrolled(filaments[0].positions), unrolled(filaments[0].control_points), [0.3])[-1, 0]
     filaments.add_straight(BEAM, 2, place + [0, 0, 15.0 - LENGTH], [0, 0, 1])
     for number in range(2):
         filaments.add_beads(number, LENGTH / 5)
