@@ -297,7 +297,7 @@ struct LaneSegments {
     CYLCHAIN_INLINE LaneSegments(const MovingSegment* segments, Numbers records) {
         Doubles numbers[16];
         for (int part = 0; part < 16/DOUBLES; part++)
-            transposePart(segments[0].first+DOUBLES*part, records, numbers+DOUBLES*part);
+            transposePart(reinterpret_cast<const double*>(segments)+DOUBLES*part, records, numbers+DOUBLES*part);
         auto vector = [&] (int begin) {
             return DoubleVector {numbers[begin], numbers[begin+1], numbers[begin+2]};
         };
@@ -349,7 +349,7 @@ private:
 #endif
 #else
     CYLCHAIN_INLINE LaneSegments(const MovingSegment* segments, Numbers records) {
-        const double* base = segments[0].first;
+        const double* base = reinterpret_cast<const double*>(segments);
         first = gatherVectorOf(base, records);
         along = gatherVectorOf(base+3, records);
         laterFirst = gatherVectorOf(base+6, records);
