@@ -1,5 +1,6 @@
 #define CYLCHAIN_LOOPS avx512
 #define CYLCHAIN_LANES 8
+#include "lanes/InstructionSet.h"
 #if CYLCHAIN_HAS_AVX2
 #define CYLCHAIN_SMALL_PACKS avx2Kernels
 #endif

@@ -1,12 +1,15 @@
 #ifndef CYLCHAIN_INSTRUCTION_SET_H_
 #define CYLCHAIN_INSTRUCTION_SET_H_
 
+// CMake writes it: see InstructionSets.cmake.
+#include "lanes/CompiledInstructionSets.h"
+
 namespace cylchain {
 
 /** The instruction sets that loops over lanes are compiled for. Processors other than x86-64 have the first alone. */
 enum class InstructionSet {Baseline, Avx2, Avx512};
 
-/** Which of them have been compiled: see InstructionSets.cmake. The functions of others must not be named. */
+/** Which of them have been compiled. The functions of others must not be named. */
 constexpr bool HAS_BASELINE = CYLCHAIN_HAS_BASELINE, HAS_AVX2 = CYLCHAIN_HAS_AVX2, HAS_AVX512 = CYLCHAIN_HAS_AVX512;
 
 /**

@@ -37,15 +37,18 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64|amd64)$")
     endif()
 endif()
 
-# For lanes/InstructionSet.h.
-foreach(set Avx512 Avx2 Baseline)
+# For lanes/InstructionSet.h: in a file, so that with other instruction sets only what asks for them is compiled again.
+set(listed "")
+foreach(set Baseline Avx2 Avx512)
     string(TOUPPER "${set}" name)
     if(set IN_LIST CYLCHAIN_INSTRUCTION_SETS)
-        add_compile_definitions("CYLCHAIN_HAS_${name}=true")
+        string(APPEND listed "#define CYLCHAIN_HAS_${name} true\n")
     else()
-        add_compile_definitions("CYLCHAIN_HAS_${name}=false")
+        string(APPEND listed "#define CYLCHAIN_HAS_${name} false\n")
     endif()
 endforeach()
+file(CONFIGURE OUTPUT "${CMAKE_BINARY_DIR}/generated/lanes/CompiledInstructionSets.h" CONTENT "${listed}" @ONLY)
+include_directories("${CMAKE_BINARY_DIR}/generated")
 
 # Add files to a target, of each pattern one for each instruction set, whose name is where the pattern has an @. What
 # follows OPTIONS are options for all of them.
