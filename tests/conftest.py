@@ -1,6 +1,7 @@
 """Hooks of pytest, and fixtures that several test files share."""
 
 import os
+import re
 import sys
 
 import openmm
@@ -22,6 +23,17 @@ def pytest_report_header():
     untested = [f"not on {name}: {reason}" for name, reason in NOT_TESTED.items()]
     filaments = "; ".join([", ".join(map(str, COMPILED_PLATFORMS)), *untested])
     return [f"OpenMM platforms: {', '.join(PLATFORMS)}", f"Filaments of the compiled engine: {filaments}"]
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Of cases with a sample, those that are not in it are exhaustive: slow ones that run before a release."""
+    for item in items:
+        sample = item.get_closest_marker("sample")
+        if sample and not re.search(sample.args[0], item.callspec.id):
+            item.add_marker("exhaustive")
+        if item.get_closest_marker("exhaustive"):
+            item.add_marker("slow")
 
 
 @pytest.fixture(params=PLATFORMS, scope="session")

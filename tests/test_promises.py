@@ -242,6 +242,7 @@ ALL += [(k, joint, (0,)) for k in (1e2, 1e11) for joint in (0, 10, 1000)]
 FREE = [each if each in QUICK else slow(*each) for each in ALL]
 
 
+@pytest.mark.sample(r"^(?!100\.0-10+-clamped1[34]|100000000\.0)")
 @pytest.mark.parametrize("stiffness, joint, clamped", FREE)
 def test_energies_of_chains_of_any_stiffness(stiffness, joint, clamped):
     kind = chain_of(stiffness, joint)
@@ -258,6 +259,7 @@ def test_energies_of_chains_of_any_stiffness(stiffness, joint, clamped):
 HELD = [(stiffness, joint) for stiffness in STIFFNESSES for joint in (0, 10, 1000)]
 
 
+@pytest.mark.sample(r"-100000\.0|held-100\.0-10$|ring-100\.0-0|100000000000\.0-1000")
 @pytest.mark.slow
 @pytest.mark.parametrize("stiffness, joint", HELD)
 @pytest.mark.parametrize("shape", ["both ends held", "ring"])
@@ -283,6 +285,7 @@ def test_energies_of_held_chains_and_rings_of_any_stiffness(stiffness, joint, sh
     assert_energies(kind, filaments, energies, bound, steps, max(4, steps // 700), closed=distance is None)
 
 
+@pytest.mark.sample("^[12]-")
 @pytest.mark.parametrize("segments, stiffness", [(1, 100), slow(1, 10), slow(1, 300), slow(2, 100), slow(4, 30)])
 def test_soft_lengths_are_right_at_the_recommended_step(segments, stiffness):
     kind = chain_of(stiffness, 0)

@@ -54,6 +54,7 @@ def check_means(values, expected, tolerance, power):
     assert np.all(np.abs(values.mean(axis=0) - expected) < tolerance * expected + 4.0 * error)
 
 
+@pytest.mark.sample("mixed")
 @pytest.mark.slow
 @pytest.mark.parametrize("precision", ["mixed", "double"])
 def test_averages_at_the_recommended_step(precision):
@@ -63,6 +64,7 @@ def test_averages_at_the_recommended_step(precision):
     assert chains.integrator.getNumDividedSteps() < 1e-3 * 256 * 1200
 
 
+@pytest.mark.sample(r"^63-|^127-1\.0|^255-1600|^511-160\.0")
 @pytest.mark.parametrize(
     "bonds, step",
     [(63, 1.0)]
@@ -91,6 +93,7 @@ def test_correlations_of_bonds_at_any_step(bonds, step):
     check_means(np.mean(means[12:], axis=0), expected, 0.01, 0.0125)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_averages_of_longer_chains():
     found = Chains(127, 384, "implicit", 1e4 * UNIT).mean_squares(250, 10)
@@ -109,6 +112,7 @@ def test_averages_of_modes():
     assert squares.mean() == pytest.approx(1.0 - 0.067, abs=0.01 + 3.0 * error)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_loss_of_correlation_is_that_of_modes_at_their_smallest_step():
     # In a thousand units of tau and more, at a step of 1e3 tau.

@@ -134,6 +134,7 @@ BENDS = 1.93
 """Of an element of a quarter of a persistence length in space, in k_B T: see the tests of chains without links."""
 
 
+@pytest.mark.sample(r"two ends|1\.0-60\.0|straight filament-0")
 @pytest.mark.parametrize(("stiffness", "rest_length"), [(0.01, 0.0), (100.0, 0.0), (1.0, 60.0)])
 @pytest.mark.parametrize(
     "pair", [pytest.param(pair, marks=[] if pair == "two ends" else pytest.mark.slow) for pair in PAIRS]

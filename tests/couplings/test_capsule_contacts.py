@@ -103,6 +103,7 @@ def test_two_crossed_rods(platform, height, place):
     np.testing.assert_allclose(forces, expected, atol=max(1e-9, 20 * platform.tolerance))
 
 
+@pytest.mark.sample("^(?!box1)")
 @ON_COMPILED_PLATFORMS
 @pytest.mark.parametrize("box", [None, pytest.param(1300 * np.eye(3), marks=pytest.mark.slow), TRICLINIC])
 def test_straight_filaments_are_whole_rods(box, platform):

@@ -26,7 +26,7 @@ def test_a_dense_crosslinked_network_for_long():
     network, crosslinks = crosslinked_network(200, 10, 600.0, links=200)
     crossings = network.count_crossings(steps=1000, interval=20)
     memory, _ = resident_and_peak()
-    crossings += network.count_crossings(steps=4000, interval=20)
+    crossings += network.count_crossings(steps=2000, interval=20)
     assert crossings == 0
     assert network.context.getIntegrator().getNumDividedSteps() < 100
     positions = network.positions()._value

@@ -84,6 +84,7 @@ def test_pairs_keep_their_energies(potential, step, scheme):
     check_filaments(network, energies)
 
 
+@pytest.mark.sample("implicit$|35nm")
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("potential", [MIDDLE, STIFF, LONG_STIFF], ids=label)
 @pytest.mark.parametrize("tree", [name for name in TREES if name != "pair"])
@@ -93,6 +94,7 @@ def test_trees_keep_their_energies(tree, potential, scheme):
     check_filaments(network, energies, 0.02 if scheme == "implicit-second-order" else 0.01)
 
 
+@pytest.mark.sample(r"^(?!100\.0pN/nm-35nm-implicit-second)")
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("potential", [MIDDLE, STIFF, LONG, LONG_STIFF], ids=label)
 def test_vectors_of_links_have_the_right_distribution(potential, scheme):
@@ -121,6 +123,7 @@ def test_vectors_of_links_have_the_right_distribution(potential, scheme):
     check("along the filament", 3 * against / samples, 1.0, 0.01, 0.03)
 
 
+@pytest.mark.sample("^(?!kind[012]-16.*second)")
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize(
     ("kind", "segments", "step", "stiffness"),
@@ -173,6 +176,7 @@ def check_loop(loop, potential, scheme, step, copies, moves, samples, allowed=0.
         check(name, energies[name], exact, allowed + 4 * error / exact, 0.02)
 
 
+@pytest.mark.sample(r"^0\.0-.*-(1-implicit|10-implicit-second-order)$|^35\.0-.*-(10-implicit|1-implicit-second-order)$")
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("step", [1, 10])
 @pytest.mark.parametrize("loop", LOOPS)

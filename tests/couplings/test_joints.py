@@ -133,6 +133,7 @@ def mean_energy_and_cosine(stiffness, angle):
     return weights @ energy, weights @ np.cos(theta), theta, weights
 
 
+@pytest.mark.sample("^(?!1000)")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("stiffness", "angle", "welded"),

@@ -49,6 +49,7 @@ def _impulse(start, end, friction):
     return (friction.perpendicular * moves[:, 2] + parallel * along[:, 2]).sum()
 
 
+@pytest.mark.sample(r"^implicit-20|order-1\.0")
 @pytest.mark.slow
 @pytest.mark.parametrize("stiffness", [1.0, 20.0])
 @pytest.mark.parametrize("scheme", ["implicit", "implicit-second-order"])

@@ -134,6 +134,7 @@ def test_tension_pulls_at_the_ends_of_the_filaments_that_are_named():
     assert forces_of(context)[[0, 2, 6, 8], 0] == pytest.approx([-5, 5, -5, 5])
 
 
+@pytest.mark.sample("^(?!portable-Reference)")
 @pytest.mark.parametrize(
     "engine, platform, force, steps",
     [

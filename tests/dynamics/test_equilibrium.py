@@ -38,12 +38,14 @@ def _check(name, engine, platform):
     assert max(deviations.values()) < SIGMAS, (deviations, measured, exact)
 
 
+@pytest.mark.sample("compiled|f-actin|fene")
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("engine", ENGINES_PORTABLE_SLOW)
 def test_midpoint_keeps_equilibrium(name, engine):
     _check(name, engine, "Reference")
 
 
+@pytest.mark.sample("compiled|f-actin-60nm-portable-CPU|freely-jointed-portable-OpenCL")
 @pytest.mark.slow
 @pytest.mark.parametrize(("engine", "platform"), [pair for pair in ENGINE_PLATFORMS if pair[1] != "Reference"])
 @pytest.mark.parametrize("name", CASES)
@@ -55,6 +57,7 @@ def test_midpoint_keeps_equilibrium_on_platform(name, engine, platform):
 MORE_CHAINS = {"dna-8nm": 3}
 
 
+@pytest.mark.sample("compiled|f-actin")
 @pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("engine", ENGINES)
@@ -68,6 +71,7 @@ def test_printed_scheme_fails(name, engine):
 END_TO_END = [(0.05, 16, 150), (0.2, 16, 150), (1.0, 32, 300), pytest.param(5.0, 24, 2200, marks=pytest.mark.slow)]
 
 
+@pytest.mark.sample("^(?!portable-5)")
 @pytest.mark.parametrize(("ratio", "segments", "chains"), END_TO_END)
 @pytest.mark.parametrize("engine", ENGINES_PORTABLE_SLOW)
 def test_drawn_chains_keep_their_end_to_end_distance(engine, ratio, segments, chains):

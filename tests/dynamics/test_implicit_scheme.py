@@ -43,6 +43,7 @@ def _actin(chains=3, segments=8, **options):
     return filaments
 
 
+@pytest.mark.sample(r"^(?!0\.05-.*(fene|quadratic|kratky)|1-implicit-second-order-(fene|quadratic))")
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize(
     ("step_over_recommended", "scheme"),
@@ -66,6 +67,7 @@ def test_equilibrium_at_the_recommended_step(name, step_over_recommended, scheme
             assert 0.05 * exact[name] > SIGMAS * error
 
 
+@pytest.mark.sample("^implicit-5$|order-50")
 @pytest.mark.slow
 @pytest.mark.parametrize("microseconds", [5, 50])
 def test_energies_of_actin_within_three_percent(microseconds, scheme):

@@ -141,6 +141,7 @@ def link_energies(kind, segments, stiffness, step, count, steps, seed=1):
 LINKS = [(DSDNA, 8, 10.0), (MICROTUBULE, 8, 0.03), (MICROTUBULE, 8, 0.1), (F_ACTIN, 16, 1e-3), (F_ACTIN, 16, 3e-3)]
 
 
+@pytest.mark.sample("kind[034]")
 @pytest.mark.slow
 @pytest.mark.parametrize("kind, segments, stiffness", LINKS)
 def test_links_have_their_energy_at_the_recommended_step(kind, segments, stiffness):
@@ -549,6 +550,7 @@ def test_soft_lengths_bind():
             assert recommended.bounds["soft lengths"] == pytest.approx(0.0008 * segments * friction.extensional / KT)
 
 
+@pytest.mark.sample(r"36|3\.6|0\.6")
 @pytest.mark.slow
 @pytest.mark.parametrize("extension", [36.0, 10.8, 3.6, 1.0, 0.6])
 def test_fene_energies_at_the_recommended_step(extension):

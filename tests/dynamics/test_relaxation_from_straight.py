@@ -42,6 +42,7 @@ def reference():
     return _relax("midpoint", 0.02, TIMES[1:], seed=1)
 
 
+@pytest.mark.sample("^(5|10)")
 @pytest.mark.slow
 @pytest.mark.parametrize("step", [1, 5, 10])
 def test_shortening_is_that_of_fine_steps(reference, step):
@@ -59,6 +60,7 @@ def test_shortening_is_that_of_fine_steps(reference, step):
         assert relaxation[200][1][0] + 4 * relaxation[200][1][1] < 1.1 * 0.5
 
 
+@pytest.mark.sample("^implicit$")
 @pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["implicit", "implicit-second-order"])
 def test_steps_of_different_lengths_shorten_filaments_alike(scheme):

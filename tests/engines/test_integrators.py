@@ -25,6 +25,7 @@ def periodic_force():
     return force
 
 
+@pytest.mark.sample("compiled|midpoint")
 @pytest.mark.parametrize(
     ("engine", "scheme"),
     [pytest.param(*each, marks=pytest.mark.slow if "portable" in each else []) for each in ENGINE_SCHEMES],

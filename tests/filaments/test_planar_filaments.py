@@ -243,6 +243,7 @@ def test_dynamics_keep_the_equilibrium_of_the_plane(engine, name):
     _check_dynamics(engine, "Reference", name)
 
 
+@pytest.mark.sample("compiled|OpenCL-freely|CPU-fene|Reference-kratky")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("engine", "platform", "name"),

@@ -452,6 +452,7 @@ def test_equilibrium_of_freely_jointed_rings_is_exact(engine):
     _check_freely_jointed_rings(engine, 4, 1200, 600)
 
 
+@pytest.mark.sample("compiled")
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_equilibrium_of_longer_freely_jointed_rings_is_exact(engine):
