@@ -73,6 +73,13 @@ static void fillLane(BeamPack& pack, int lane, const BeamChain& chain, int index
         pack.tethers.push_back({chain.tethers[number], lane, (int) number});
 }
 
+static int lanesForBeams(int chains) {
+    int lanes = 1;
+    while (2*lanes <= chains)
+        lanes *= 2;
+    return lanes;
+}
+
 static BeamPack packed(const vector<BeamChain>& chains, const int* members, int lanes, int firstNoise) {
     BeamPack pack;
     const BeamChain& longest = chains[members[0]];
@@ -129,7 +136,7 @@ BeamEngine::BeamEngine(const vector<BeamChain>& chains, int firstNoise) : implem
                 chains[order[first+fitting]].planar == longest.planar &&
                 chains[order[first+fitting]].closed == longest.closed)
             fitting++;
-        const int lanes = lanesFor(fitting);
+        const int lanes = lanesForBeams(fitting);
         implementation->packs.push_back(packed(chains, &order[first], lanes, firstNoise));
         first += lanes;
     }

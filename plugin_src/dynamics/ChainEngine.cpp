@@ -156,7 +156,7 @@ ChainPack<double> packed(const vector<Chain>& chains, const vector<int>& members
 void setOrigins(ChainPack<double>& pack, const vector<PieceOfChain>& origins) {
     for (LaneTether& tether : pack.tethers)
         tether.number = origins[pack.chain[tether.lane]].tethers[tether.number];
-    for (int lane = 0; lane < pack.lanes; lane++) {
+    for (int lane = 0; lane < pack.lanes && pack.chain[lane] >= 0; lane++) {
         const PieceOfChain& origin = origins[pack.chain[lane]];
         pack.firstNode[lane] = origin.firstNode;
         pack.chain[lane] = origin.chain;
@@ -332,24 +332,24 @@ ChainEngine::ChainEngine(const vector<Chain>& chains, const vector<PieceOfChain>
         while (fitting < kernels().lanes && first+fitting < order.size() &&
                 mayShareLanes(chains[order[first]], chains[order[first+fitting]]))
             fitting++;
-        const int lanes = lanesFor(fitting);
-        members.push_back(vector<int>(order.begin()+first, order.begin()+first+lanes));
-        implementation->packs.push_back(packed(chains, members.back(), lanes));
+        members.push_back(vector<int>(order.begin()+first, order.begin()+first+fitting));
+        implementation->packs.push_back(packed(chains, members.back(), lanesFor(fitting, kernels().lanes)));
         if (!origins.empty())
             setOrigins(implementation->packs.back(), origins);
         const bool isLong = origins.empty() && ChainPieces::mayBeUsed(chains, members.back(), kernels().wide.lanes);
         implementation->pieces.emplace_back(!isLong ? NULL :
                 new ChainPieces(chains, members.back(), kernels().lanes, kernels().wide.lanes));
-        first += lanes;
+        first += fitting;
     }
 
     // Wide packs are made of those that come next to each other.
     for (size_t first = 0, last; first < members.size(); first = last) {
         const Chain& longest = chains[members[first][0]];
         vector<int> together = members[first];
+        int lanes = implementation->packs[first].lanes;
         for (last = first+1; last < members.size(); last++) {
-            if (together.size()+members[last].size() > (size_t) kernels().wide.lanes ||
-                    !mayShareLanes(longest, chains[members[last].back()]))
+            lanes += implementation->packs[last].lanes;
+            if (lanes > kernels().wide.lanes || !mayShareLanes(longest, chains[members[last].back()]))
                 break;
             together.insert(together.end(), members[last].begin(), members[last].end());
         }
@@ -405,7 +405,7 @@ int ChainEngine::getNumMixedChains(const vector<int>& packs, const StepSettings&
     for (int pack : packs) {
         ChainPieces* const pieces = implementation->piecesOf(pack);
         if (pieces != NULL && pieces->isUsed(settings) && pieces->isMixed(settings))
-            count += getChainsOfLanes(pack).size();
+            count += pieces->getNumChains();
     }
     return count;
 }

@@ -7,6 +7,7 @@
  */
 
 #include "dynamics/ModePack.h"
+#include "dynamics/PackPlaces.h"
 #include "dynamics/PackStep.h"
 #include "lanes/Noise.h"
 #include "mechanics/PeriodicBox.h"
@@ -102,7 +103,7 @@ template <int W> Instability stepPackAs(const Pack& pack, const double* position
 template <int W = CYLCHAIN_LANES, class Function> auto withLanesOf(const Pack& pack, Function function) {
     if constexpr (W > 1)
         if (pack.lanes < W)
-            return withLanesOf<W/2>(pack, function);
+            return withLanesOf<(W > LEAST_LANES ? W/2 : 1)>(pack, function);
     return function(std::integral_constant<int, W>());
 }
 

@@ -47,6 +47,10 @@ public:
      */
     bool step(const double* positions, const double* forces, const double* box, const StepSettings& settings,
             double* displacements, Instability& result);
+    /** The number of chains that are cut into pieces. */
+    int getNumChains() const {
+        return chains.size();
+    }
     /** Whether the pieces take a step in mixed precision. */
     bool isMixed(const StepSettings& settings);
     /** Find the nodes of each chain where one piece is joined to the next. */

@@ -73,8 +73,8 @@ void ModePacks::addFamily(const vector<Chain>& chains, const vector<int>& member
     for (int start = 0; start < count; start += wideLanes) {
         const int together = min(count-start, wideLanes), firstPack = packs.size();
         for (int first = 0, number; first < together; first += number) {
-            number = min(lanes, lanesFor(together-first));
-            packs.push_back(packOf(family, chains, &members[start+first], number, number));
+            number = min(lanes, together-first);
+            packs.push_back(packOf(family, chains, &members[start+first], number, lanesFor(number, lanes)));
         }
         wide.push_back({packOf(wideFamily, chains, &members[start], together, wideLanes), firstPack,
                 (int) packs.size(), together});

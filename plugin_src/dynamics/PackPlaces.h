@@ -8,10 +8,16 @@
 
 namespace cylchain {
 
-/** The largest power of two that is not above a number of chains: lanes for some of them. */
-inline int lanesFor(int chains) {
-    int lanes = 1;
-    while (2*lanes <= chains)
+/** Packs of more than one chain have at least so many lanes, where there are as many: others need not be compiled. */
+const int LEAST_LANES = 4;
+
+/**
+ * Lanes for some chains, of which there are no more than lanes. A chain alone has one, in which steps are faster; what
+ * is left of the lanes of others is filled up.
+ */
+inline int lanesFor(int chains, int allLanes) {
+    int lanes = chains == 1 ? 1 : std::min(LEAST_LANES, allLanes);
+    while (lanes < chains)
         lanes *= 2;
     return lanes;
 }

@@ -59,7 +59,8 @@ template <int W> void gatherPositions(const Pack& pack, const double* positions,
             Vector<typename Lanes<W>::Type>* x) {
     gather<W>(pack, positions, x);
     for (int i = 0; i < W; i++) {
-        for (int node = pack.nodesOfLane[i]; node < pack.nodes; node++) {
+        // Where there is no chain, the first node is at the origin.
+        for (int node = std::max(1, pack.nodesOfLane[i]); node < pack.nodes; node++) {
             lane(x[node].x, i) = lane(x[node-1].x, i)+1;
             lane(x[node].y, i) = lane(x[node-1].y, i);
             lane(x[node].z, i) = lane(x[node-1].z, i);
