@@ -32,6 +32,15 @@ CASES = [
     ("crosslinked_bundle", "bundle", 40, 40, 6 * 31, 6 * 30),
     ("force_extension", "dna", 200, 100, 24 * 21, 24 * 20),
 ]
+# The others are slow tests.
+AT_ONCE = (
+    "lennard_jones_box",
+    "two_filament_types",
+    "tumbling_in_shear",
+    "periodic_box",
+    "dense_network",
+    "gliding_assay",
+)
 # What an example writes beside the files that all of them write.
 MORE_FILES = {"periodic_box": ["periodic.psf"]}
 
@@ -50,7 +59,12 @@ def test_every_example_is_run_here():
     assert sorted(path.stem for path in EXAMPLES.glob("*.py")) == sorted(case[0] for case in CASES)
 
 
-@pytest.mark.parametrize("name, stem, steps, frames, particles, bonds", CASES)
+def cases():
+    for case in CASES:
+        yield pytest.param(*case, id=case[0], marks=[] if case[0] in AT_ONCE else pytest.mark.slow)
+
+
+@pytest.mark.parametrize("name, stem, steps, frames, particles, bonds", list(cases()))
 def test_example(name, stem, steps, frames, particles, bonds, tmp_path):
     folder = tmp_path / "results"
     process = run(name, folder, steps)

@@ -175,6 +175,7 @@ DRAWN = [
 ]
 
 
+@pytest.mark.sample(r"^(?!0\.1-1\.0-6-True|0\.35-0\.034-12-True)")
 @pytest.mark.parametrize("planar", [False, True])
 @pytest.mark.parametrize(
     ("nu", "reduced_temperature", "bonds"), [*DRAWN, pytest.param(0.49, 0.02, 6, marks=pytest.mark.slow)]

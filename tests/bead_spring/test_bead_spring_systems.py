@@ -195,6 +195,7 @@ def test_noise_of_planar_beads_and_rings(engine):
 SIGMAS, ALLOWED = 4.0, 0.02
 
 
+@pytest.mark.sample("compiled|True")
 @pytest.mark.parametrize("planar", [False, True])
 @pytest.mark.parametrize("engine", ENGINES)
 def test_energies_of_short_chains_are_exact(engine, planar):

@@ -134,7 +134,7 @@ BENDS = 1.93
 """Of an element of a quarter of a persistence length in space, in k_B T: see the tests of chains without links."""
 
 
-@pytest.mark.sample(r"two ends|1\.0-60\.0|straight filament-0")
+@pytest.mark.sample(r"two ends-0|1\.0-60\.0|straight filament-0")
 @pytest.mark.parametrize(("stiffness", "rest_length"), [(0.01, 0.0), (100.0, 0.0), (1.0, 60.0)])
 @pytest.mark.parametrize(
     "pair", [pytest.param(pair, marks=[] if pair == "two ends" else pytest.mark.slow) for pair in PAIRS]
@@ -172,6 +172,7 @@ def test_links_and_bends_keep_their_energies_at_the_recommended_step(pair, stiff
         assert abs(np.mean(mean) - expected) < SIGMAS * error + allowed
 
 
+@pytest.mark.sample(r"beams-10+\.0|segments-100\.")
 @pytest.mark.parametrize("stiffness", [10.0, 100.0, 1000.0])
 @pytest.mark.parametrize("kind", [(BEAM, 1), (STRAIGHT, 4)], ids=["beams", "segments"])
 def test_a_link_between_two_ends_leaves_their_angle_free(kind, stiffness):

@@ -291,7 +291,8 @@ def test_density_of_free_particles_is_even():
     np.testing.assert_allclose(shares, widths / widths.sum(), atol=4 * error + 0.002)
 
 
-@pytest.mark.parametrize("stiffness", [1.0, pytest.param(20.0, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("stiffness", [1.0, 20.0])
 def test_rods_between_walls_are_where_they_should_be(stiffness):
     """Heights and directions of rods in a slab that is narrower than they are long, against an integral."""
     length, thickness, chains = F_ACTIN.segment_length, 300.0, 800

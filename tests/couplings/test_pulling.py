@@ -242,6 +242,7 @@ np.save({file!r}, positions_of(simulation.context))
 """
 
 
+@pytest.mark.sample("compiled-22|portable-20")
 @pytest.mark.parametrize("split", [20, 22])
 def test_a_restart_goes_on_with_the_tether_where_it_was(engine, split, tmp_path):
     ends, tables = [], []

@@ -38,7 +38,7 @@ def _check(name, engine, platform):
     assert max(deviations.values()) < SIGMAS, (deviations, measured, exact)
 
 
-@pytest.mark.sample("compiled|f-actin|fene")
+@pytest.mark.sample("f-actin|fene|compiled-(freely|dna)")
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("engine", ENGINES_PORTABLE_SLOW)
 def test_midpoint_keeps_equilibrium(name, engine):

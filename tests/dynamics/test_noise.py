@@ -55,6 +55,7 @@ def correlation(one, other):
     return np.corrcoef(one, other)[0, 1] * np.sqrt(one.size)
 
 
+@pytest.mark.sample("compiled-implicit|portable-midpoint")
 @pytest.mark.parametrize(("engine", "scheme"), ENGINE_SCHEMES)
 def test_state_without_integrator_parameters_does_not_replay_noise(engine, scheme):
     context, integrator = context_of(engine, scheme)
@@ -109,6 +110,7 @@ def test_checkpoints_and_states_restore_noise_exactly_after_the_step_count_was_s
         assert np.array_equal(positions_of(other_context), expected)
 
 
+@pytest.mark.sample("midpoint|implicit")
 @pytest.mark.parametrize("scheme", ["midpoint", "euler"])
 def test_finer_steps_follow_the_same_path(scheme):
     """Differences between runs at neighbouring levels shrink with the step; other seeds share nothing."""

@@ -72,6 +72,7 @@ CHOICES = [(name, None) for name in PLATFORMS if name == "CPU"]
 CHOICES += [("OpenCL", precision) for precision in ("single", "mixed", "double") if "OpenCL" in PLATFORMS]
 
 
+@pytest.mark.sample(r"^(?!euler-(CPU|\w+-mixed)|midpoint-\w+-(single|double))")
 @pytest.mark.parametrize(("platform", "precision"), CHOICES)
 def test_platforms_follow_the_reference_trajectory(reference_run, platform, precision):
     scheme, start, expected = reference_run

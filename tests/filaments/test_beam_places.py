@@ -66,6 +66,7 @@ def test_forces_are_handed_to_four_particles(direction):
     assert np.sum(expected, axis=0) == pytest.approx([1.0, 2.0, 3.0])
 
 
+@pytest.mark.sample(r"^0\.1-1|^0\.02-3")
 @pytest.mark.parametrize(("elements", "place"), [(1, (0, 1.0)), (3, (1, 0.4))])
 @pytest.mark.parametrize("stiffness", [0.02, 0.1])
 def test_springs_at_places_are_as_accurate_as_the_recommended_step_says(elements, place, stiffness):

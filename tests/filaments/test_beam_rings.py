@@ -171,6 +171,7 @@ def test_it_does_not_matter_which_node_is_the_first():
         assert other == pytest.approx(ends[0], abs=0.01)
 
 
+@pytest.mark.sample("100")
 @pytest.mark.parametrize("stiffness", [0.1, 100.0])
 def test_links_of_last_elements_have_their_energy(stiffness):
     """3/2 k_B T in a link without a rest length, whatever the shapes of the two rings that it joins, and in a tether.

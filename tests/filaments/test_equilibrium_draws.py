@@ -282,6 +282,7 @@ def discretisation_error(ratio, step):
     return exponent * (1.5 * step + 4 * step**2) + ratio * step**2 / 3 / continuum_mean_square(ratio, 1.0)
 
 
+@pytest.mark.sample("^(?!inscribed-circle-5)")
 @pytest.mark.parametrize(
     "model, ratio, segments, chains",
     [("inscribed-circle", *chain) for chain in CHAINS]

@@ -123,6 +123,7 @@ def _segment_in_flow(engine, platform, kind, flow, step, steps):
     return positions._value, positions_of(context)
 
 
+@pytest.mark.sample("^(?!portable-Reference-(shear|uniform))")
 @pytest.mark.parametrize(("engine", "platform", "name"), RUNS)
 def test_segment_tumbles_stretches_and_drifts(engine, platform, name):
     """A slender segment: t' = (1 - tt) G t, l' = l t.G t - l^2 k (l - l0)/gamma_def, and its middle follows u."""
@@ -229,6 +230,7 @@ def test_a_step_equals_the_dense_solution(engine, name, scheme, planar):
     assert np.all(moved[1] == 0)
 
 
+@pytest.mark.sample("compiled|shear")
 @pytest.mark.parametrize("name", ["shear", "extension"])
 @pytest.mark.parametrize("engine", ENGINES)
 def test_chains_follow_the_equation_of_motion(engine, name):

@@ -247,6 +247,7 @@ def halfway(tmp_path, unbroken):
     return output
 
 
+@pytest.mark.sample(r"^(?!energies\.csv-\\n|trajectory\.dcd-h.+)")
 @pytest.mark.parametrize(
     ("file", "rest"),
     [

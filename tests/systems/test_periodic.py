@@ -36,6 +36,7 @@ def crossing_context(engine, platform, vectors):
     return filaments, topology, integrator, context
 
 
+@pytest.mark.sample("^(?!portable-OpenCL-cubic)")
 @pytest.mark.parametrize("vectors", [CUBIC, TRICLINIC], ids=["cubic", "triclinic"])
 @pytest.mark.parametrize(("engine", "platform"), EVERYWHERE)
 def test_wrapping_shifts_whole_filaments_and_restarts_do_not_jump(engine, platform, vectors):
