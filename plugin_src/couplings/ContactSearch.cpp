@@ -150,11 +150,15 @@ void ContactSearch::Implementation::checkPositions(const double* x, const double
     for (size_t i = 0; i < described.size(); i++)
         if (!described[i].finite) {
             const Capsule& capsule = system.capsules[i];
-            for (int particle : {capsule.first, capsule.end()})
-                for (const double* positions : {x, y})
+            for (const double* positions : {x, y})
+                for (int particle : {capsule.first, capsule.end()})
                     for (int k = 0; k < 3; k++)
-                        if (!isfinite(positions[3*particle+k]))
-                            throw invalid_argument("The position of particle "+to_string(particle)+" is not finite");
+                        if (!isfinite(positions[3*particle+k])) {
+                            const string what = "The position of particle "+to_string(particle)+" is not finite";
+                            if (positions == x)
+                                throw invalid_argument(what);
+                            throw EndlessMotionError(what+" where it moves to");
+                        }
             throw invalid_argument("Capsule "+to_string(i)+" is too far away");
         }
 }
@@ -355,7 +359,7 @@ void ContactSearch::Implementation::describeAgain(const vector<int>& capsules, c
                 cell/frame.cells[2]%frame.cells[1], cell%frame.cells[2]};
         describe(i, x, y, own, placed[i], true);
         if (!own.finite)
-            throw NarrowBoxError("A capsule has moved too far");
+            throw EndlessMotionError("A capsule has moved too far");
         for (int k = 0; k < 3; k++) {
             largestHalf[k] = max(largestHalf[k], own.half[k]);
             const double place = own.center[k]*frame.cells[k]-cells[k];

@@ -17,6 +17,12 @@ public:
     using std::invalid_argument::invalid_argument;
 };
 
+/** Where a capsule moves to is not finite, or too far away for the search. */
+class EndlessMotionError : public std::invalid_argument {
+public:
+    using std::invalid_argument::invalid_argument;
+};
+
 /** A first look at a pair of capsules at y. */
 struct PairOutlook {
     /** The distance less the radii, not signed, and the sum of these. */
@@ -56,7 +62,8 @@ public:
      *
      * @param box    the three vectors of a periodic box (nine doubles, in reduced form), or NULL. Its widths must be
      *               more than twice the extent of a capsule in a step with its diameter and the reach, so that two
-     *               capsules do not meet twice; NarrowBoxError says so if not.
+     *               capsules do not meet twice; NarrowBoxError says so if not, and EndlessMotionError if y is not
+     *               finite.
      * @param reach  not negative
      * @param pairs  receives the pairs
      * @param run    runs the parts of the search; one after the other if there is none
@@ -66,7 +73,7 @@ public:
     /**
      * Find the same pairs as far as some capsules are in them, which have another y than in the search before. Others
      * are taken to be where they were when they were searched for last. A few pairs are farther apart. This takes less
-     * time where capsules are few; NarrowBoxError says so if they extend too far in a periodic box now.
+     * time where capsules are few; it throws the same errors.
      *
      * @param capsules  some capsules, each of them once
      * @param pairs     receives the pairs, in an order that does not depend on how the loop is run

@@ -50,8 +50,6 @@ const int PASSING_ITERATIONS = 3;
 const int HOLDING_ITERATIONS = 9;
 /** Where more capsules than this share have moved, all are searched for again, which takes less time for each. */
 const double SHARE_OF_MOVERS = 0.4;
-/** Up to this share of packs are few: what concerns them alone is looked at. */
-const double SHARE_OF_FEW = 0.25;
 /** Capsules that a thread looks at together. */
 const int CHUNK = 128;
 
@@ -111,10 +109,10 @@ void ContactEquations::begin(const CoupledStart& start, const Loop& newLoop) {
     }
     reaches[0] = REACH*diameter;
     reaches[1] = LEAST_REACH*diameter;
-    leavesBox = false;
+    movesTooFar = isEndless = false;
     pairs.clear();
     motion.clear();
-    selection.all = true;
+    selection.selectAll();
     crossingsKnown = false;
 }
 
@@ -133,15 +131,19 @@ PlaceOnChain ContactEquations::placeOf(int capsule, double fraction) const {
 }
 
 void ContactEquations::findPairs(const double* moved) {
-    leavesBox = true;
-    for (int i = 0; i < 2 && leavesBox; i++)
+    movesTooFar = true;
+    for (int i = 0; i < 2 && movesTooFar; i++)
         try {
             reach = reaches[i];
             search->findPairs(begun, moved, box, reach, found, *loop);
-            leavesBox = false;
+            movesTooFar = false;
         }
         catch (const NarrowBoxError&) {
             found.clear();
+        }
+        catch (const EndlessMotionError&) {
+            found.clear();
+            isEndless = true;
         }
     motion.begin(search->getSystem().capsules, moved, *loop);
     pairs.begin(found, places.size());
@@ -165,79 +167,28 @@ bool ContactEquations::findNewPairs(const double* moved) {
             search->findPairsOf(motion.getMovers(), begun, moved, found, *loop);
     }
     catch (const NarrowBoxError&) {
-        leavesBox = true;
+        movesTooFar = true;
+        return false;
+    }
+    catch (const EndlessMotionError&) {
+        movesTooFar = isEndless = true;
         return false;
     }
     if (most)
         motion.beginAgain(moved, *loop);
     else
         motion.beginAgain(motion.getMovers(), moved);
-    bool any = false;
+    const int known = pairs.getNumPairs();
     for (const ContactPair& pair : found)
-        if (pairs.add(pair)) {
+        if (pairs.add(pair))
             mark(pairs.getNumPairs()-1);
-            if (!selection.all)
-                selection.pairs.push_back(pairs.getNumPairs()-1);
-            any = true;
-        }
-    if (any && !selection.all)
-        divideSelection();
-    return any;
-}
-
-/** Select pairs for an iteration: those of the packs that take part, if these are few. */
-void ContactEquations::select() {
-    const size_t numActive = count(active->begin(), active->end(), 1);
-    if (numActive > SHARE_OF_FEW*active->size())
-        selection.all = true;
-    if (numActive > SHARE_OF_FEW*active->size() || (!selection.all && isSelected(*active)))
-        return;
-    selection.all = false;
-    selection.packs = *active;
-    selection.pairs.clear();
-    for (int i = 0; i < pairs.getNumPairs(); i++)
-        if (takesPart(pairs.getWatch(i).a) || takesPart(pairs.getWatch(i).b))
-            selection.pairs.push_back(i);
-    divideSelection();
-}
-
-void ContactEquations::divideSelection() {
-    selection.runs.assign(1, 0);
-    int chunk = -1;
-    for (int i = 0; i < (int) selection.pairs.size(); i++) {
-        const int own = selection.pairs[i]/CapsulePairs::CHUNK;
-        if (own != chunk && i-selection.runs.back() >= CapsulePairs::CHUNK)
-            selection.runs.push_back(i);
-        chunk = own;
-    }
-    selection.runs.push_back(selection.pairs.size());
-}
-
-/** Whether all pairs of some packs are selected. */
-bool ContactEquations::isSelected(const PackFlags& some) const {
-    return selection.all || equal(some.begin(), some.end(), selection.packs.begin(), [] (char one, char known) {
-        return !one || known;
-    });
-}
-
-/** The parts that pairs are looked at in: all of them, or those that are selected. */
-int ContactEquations::getNumRuns(bool all) const {
-    return all ? pairs.getNumChunks() : selection.runs.size()-1;
-}
-
-/** Call a function with the number of each pair of a part. */
-template <class Function> void ContactEquations::forPairs(bool all, int run, Function function) const {
-    if (all)
-        for (int i = run*CapsulePairs::CHUNK; i < min(pairs.getNumPairs(), (run+1)*CapsulePairs::CHUNK); i++)
-            function(i);
-    else
-        for (int i = selection.runs[run]; i < selection.runs[run+1]; i++)
-            function(selection.pairs[i]);
+    selection.addFrom(known, pairs);
+    return pairs.getNumPairs() > known;
 }
 
 /** Mark the packs of the pairs that a function finds among all or those that are selected; false if there are none. */
 template <class Function> bool ContactEquations::markPairs(bool all, Function findIn) {
-    const int runs = getNumRuns(all);
+    const int runs = selection.getNumRuns(pairs, all);
     if ((int) parts.size() < runs)
         parts.resize(runs);
     (*loop)(runs, [&] (int run) {
@@ -301,12 +252,12 @@ struct ContactEquations::Looks {
 /** Evaluate some pairs that may touch. */
 void ContactEquations::look(int run, bool first, Part& part) {
     Looks& looks = Looks::ofThread();
-    forPairs(selection.all, run, [&] (int i) {
+    selection.forPairs(pairs, selection.hasAll(), run, [&] (int i) {
         const CapsulePairs::Watch& watch = pairs.getWatch(i);
         motion.prefetchWay(watch.a, watch.b);
         prefetch(&packs[watch.b]);
     });
-    forPairs(selection.all, run, [&] (int i) {
+    selection.forPairs(pairs, selection.hasAll(), run, [&] (int i) {
         const CapsulePairs::Watch& watch = pairs.getWatch(i);
         if (motion.getWay(watch.a, watch.b) < watch.due)
             return;
@@ -440,8 +391,8 @@ void ContactEquations::linearise(int iteration, const double* moved, vector<Coup
         return;
     if (first)
         findPairs(moved);
-    select();
-    const int runs = getNumRuns(selection.all);
+    selection.select(pairs, packs, *active);
+    const int runs = selection.getNumRuns(pairs, selection.hasAll());
     if ((int) parts.size() < runs)
         parts.resize(runs);
     (*loop)(runs, [&] (int run) {
@@ -474,8 +425,8 @@ bool ContactEquations::anyComeNear(const double* moved) {
         return true;
     const double tolerance = TOLERANCE*sqrt(kT/stiffness)+LEAST_CHANGE*reach;
     // Those that are not selected have not moved.
-    bool any = markPairs(selection.all, [&] (int run, Part& part) {
-        forPairs(selection.all, run, [&] (int i) {
+    bool any = markPairs(selection.hasAll(), [&] (int run, Part& part) {
+        selection.forPairs(pairs, selection.hasAll(), run, [&] (int i) {
             const CapsulePairs::Watch& watch = pairs.getWatch(i);
             if (watch.due > 0 && motion.getWay(watch.a, watch.b) > watch.due+tolerance)
                 part.pairs.push_back(i);
@@ -515,12 +466,12 @@ bool ContactEquations::finishIteration(const double* moves, const double* moved)
     clear = false;
     unsettled = -1;
     unfinished.assign(active->size(), 0);
-    if (leavesBox)
+    if (movesTooFar)
         return false;
     if (!motion.hasBegun())
         return true;
     bool any = anyComeNear(moved);
-    if (leavesBox)
+    if (movesTooFar)
         return false;
     if (iterations < 2)
         return true;
@@ -556,7 +507,7 @@ void ContactEquations::mark(int pair) {
 /** Find pairs that cross. */
 void ContactEquations::findCrossed(bool all, int run, Part& part) const {
     Looks& looks = Looks::ofThread();
-    forPairs(all, run, [&] (int i) {
+    selection.forPairs(pairs, all, run, [&] (int i) {
         const CapsulePairs::Watch& watch = pairs.getWatch(i);
         if (motion.getWay(watch.a, watch.b) < watch.clearance)
             return;
@@ -574,7 +525,7 @@ void ContactEquations::findCrossed(bool all, int run, Part& part) const {
 /** Whether pairs cross elsewhere than where they were last seen to touch: they are looked at again. */
 bool ContactEquations::anyCross() {
     // Pairs that have not moved since they were seen do not cross.
-    const bool all = selection.all || !crossingsKnown || !isSelected(movedSince);
+    const bool all = selection.hasAll() || !crossingsKnown || !selection.includes(movedSince);
     crossingsKnown = true;
     movedSince.assign(active->size(), 0);
     return markPairs(all, [&] (int run, Part& part) {
@@ -589,7 +540,7 @@ bool ContactEquations::anyCross() {
 void ContactEquations::findFailures(const double* moved, vector<bool>& failed) const {
     if (clear)
         return;
-    for (size_t i = 0; leavesBox && i < places.size(); i++)
+    for (size_t i = 0; movesTooFar && i < places.size(); i++)
         if (places[i].place.pack >= 0)
             failed[places[i].place.chain] = true;
     for (int i = 0; i < pairs.getNumPairs(); i++)
@@ -615,7 +566,10 @@ int ContactEquations::findFastest(const double* moved) const {
 
 bool ContactEquations::findCulprit(const double* moved, const CouplingEquation* equations,
         BrokenCoupling& culprit) const {
-    if (leavesBox) {
+    // The chain itself is known.
+    if (isEndless)
+        return false;
+    if (movesTooFar) {
         culprit.kind = BrokenCoupling::Contact;
         culprit.reason = BrokenCoupling::LeavesBox;
         culprit.places[0] = describePlace(places[findFastest(moved)].place);

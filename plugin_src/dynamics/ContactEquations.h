@@ -6,6 +6,7 @@
 #include "dynamics/CapsulePairs.h"
 #include "dynamics/CurveSites.h"
 #include "dynamics/ImplicitCouplings.h"
+#include "dynamics/PairSelection.h"
 #include "dynamics/PlaceResponses.h"
 #include <cstddef>
 #include <utility>
@@ -69,23 +70,6 @@ private:
     };
     /** Pairs that are looked at in lanes, in memory of a thread. */
     struct Looks;
-    /**
-     * The pairs that are looked at in an iteration: all, or those of few packs. Late iterations have few, and should
-     * take no time for others.
-     */
-    struct Selection {
-        bool all = true;
-        /** The packs all pairs of which are there. */
-        PackFlags packs;
-        std::vector<int> pairs;
-        /** Where runs of them begin, each for a thread: no two of them have pairs of the same chunk. */
-        std::vector<int> runs;
-    };
-    void select();
-    void divideSelection();
-    bool isSelected(const PackFlags& packs) const;
-    int getNumRuns(bool all) const;
-    template <class Function> void forPairs(bool all, int run, Function function) const;
     template <class Function> bool markPairs(bool all, Function findIn);
     void mark(int pair);
     bool takesPart(int capsule) const {
@@ -122,7 +106,7 @@ private:
     /** Those of the last search. */
     std::vector<ContactPair> found;
     CapsuleMotion motion;
-    Selection selection;
+    PairSelection selection;
     /** Whether anyCross() has seen all pairs, and the packs that have moved since it was called. */
     bool crossingsKnown = false;
     PackFlags movedSince;
@@ -134,8 +118,8 @@ private:
     /** The pairs that were crossed where they were evaluated last, and whether none is now. */
     std::vector<int> crossed;
     bool clear = false;
-    /** Whether capsules move too far to look for contacts in the periodic box: the step must be divided. */
-    bool leavesBox = false;
+    /** Whether capsules move too far to look for contacts, in the periodic box or anywhere: the step is divided. */
+    bool movesTooFar = false, isEndless = false;
     /** The packs that need another iteration. */
     PackFlags unfinished;
     /** The number of an equation that has not settled in the last iteration, or -1. */

@@ -9,7 +9,7 @@ from openmm import unit
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
-from openmm_cylchain import Filaments, InputError, capsule_contact_force, find_contacts
+from openmm_cylchain import F_ACTIN, Filaments, InputError, InstabilityError, capsule_contact_force, find_contacts
 from openmm_cylchain.beams.curve import curve_points, element_energies, element_points
 from openmm_cylchain.beams.equilibrium import draw_beam
 from openmm_cylchain.couplings.capsule_contacts import contact_spacing
@@ -317,3 +317,25 @@ def test_what_is_refused():
     system.addForce(force)
     with pytest.raises(openmm.OpenMMException, match="contacts of this plugin between their nodes"):
         new_context(system, positions, filaments.create_integrator(system, 1e4))
+
+
+@pytest.mark.parametrize("piconewton", [1e3, 1e5, 1e6])
+def test_beams_that_are_torn_through_each_other_end_in_an_error_that_names_them(piconewton):
+    """Also where the first iteration leads to no finite place."""
+    kind = replace(F_ACTIN.with_segment_length(100), element="beam", extension_relaxation_time=None)
+    filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
+    for start, direction in (([0, 0, 0], [1, 0, 0]), ([300, -300, 40], [0, 1, 0])):
+        filaments.add_beads(filaments.add_straight(kind, 6, start, direction), 25)
+    _, system, positions = filaments.build()
+    system.addForce(capsule_contact_force(filaments, system, DIAMETER, STIFFNESS))
+    pull = openmm.CustomExternalForce("-f*z")
+    pull.addGlobalParameter("f", 0.6022 * piconewton)
+    pull.addParticle(int(filaments.node_indices[0][3]))
+    system.addForce(pull)
+    integrator = filaments.create_integrator(system, 1e6, random_seed=1, checks=False)
+    context = new_context(system, positions, integrator, "CPU")
+    before = positions_of(context)
+    with pytest.raises(InstabilityError, match="Filament 0 .*(it would pass through|equations cannot be solved)"):
+        integrator.step(20)
+    assert np.isfinite(positions_of(context)).all()
+    assert np.abs(positions_of(context) - before).max() < 1e3
