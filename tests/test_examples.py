@@ -59,12 +59,10 @@ def test_every_example_is_run_here():
     assert sorted(path.stem for path in EXAMPLES.glob("*.py")) == sorted(case[0] for case in CASES)
 
 
-def cases():
-    for case in CASES:
-        yield pytest.param(*case, id=case[0], marks=[] if case[0] in AT_ONCE else pytest.mark.slow)
-
-
-@pytest.mark.parametrize("name, stem, steps, frames, particles, bonds", list(cases()))
+@pytest.mark.parametrize(
+    "name, stem, steps, frames, particles, bonds",
+    [pytest.param(*case, id=case[0], marks=[] if case[0] in AT_ONCE else pytest.mark.slow) for case in CASES],
+)
 def test_example(name, stem, steps, frames, particles, bonds, tmp_path):
     folder = tmp_path / "results"
     process = run(name, folder, steps)

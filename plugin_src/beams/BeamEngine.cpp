@@ -73,6 +73,7 @@ static void fillLane(BeamPack& pack, int lane, const BeamChain& chain, int index
         pack.tethers.push_back({chain.tethers[number], lane, (int) number});
 }
 
+/** The largest power of two that is not above a number of chains: these packs have no lanes without a chain. */
 static int lanesForBeams(int chains) {
     int lanes = 1;
     while (2*lanes <= chains)

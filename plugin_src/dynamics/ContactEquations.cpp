@@ -132,7 +132,7 @@ PlaceOnChain ContactEquations::placeOf(int capsule, double fraction) const {
 
 void ContactEquations::findPairs(const double* moved) {
     movesTooFar = true;
-    for (int i = 0; i < 2 && movesTooFar; i++)
+    for (int i = 0; i < 2 && movesTooFar && !isEndless; i++)
         try {
             reach = reaches[i];
             search->findPairs(begun, moved, box, reach, found, *loop);

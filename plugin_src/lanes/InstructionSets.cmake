@@ -38,16 +38,16 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64|amd64)$")
 endif()
 
 # For lanes/InstructionSet.h: in a file, so that with other instruction sets only what asks for them is compiled again.
-set(listed "")
+set(definitions "")
 foreach(set Baseline Avx2 Avx512)
     string(TOUPPER "${set}" name)
     if(set IN_LIST CYLCHAIN_INSTRUCTION_SETS)
-        string(APPEND listed "#define CYLCHAIN_HAS_${name} true\n")
+        string(APPEND definitions "#define CYLCHAIN_HAS_${name} true\n")
     else()
-        string(APPEND listed "#define CYLCHAIN_HAS_${name} false\n")
+        string(APPEND definitions "#define CYLCHAIN_HAS_${name} false\n")
     endif()
 endforeach()
-file(CONFIGURE OUTPUT "${CMAKE_BINARY_DIR}/generated/lanes/CompiledInstructionSets.h" CONTENT "${listed}" @ONLY)
+file(CONFIGURE OUTPUT "${CMAKE_BINARY_DIR}/generated/lanes/CompiledInstructionSets.h" CONTENT "${definitions}" @ONLY)
 include_directories("${CMAKE_BINARY_DIR}/generated")
 
 # Add files to a target, of each pattern one for each instruction set, whose name is where the pattern has an @. What

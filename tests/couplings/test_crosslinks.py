@@ -394,7 +394,7 @@ def test_twenty_thousand_changes_and_steps_take_no_memory():
         context.getIntegrator().step(1)
         if round_ % 2_000 == 0:
             sizes.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
-    assert sizes[-1] - sizes[1] < 2000, sizes
+    assert sizes[-1] - sizes[1] < 1000, sizes
 
 
 BY_DEFAULT = [("compiled", "implicit", "filament"), ("compiled", "midpoint", "particle")]

@@ -31,7 +31,7 @@ def test_a_dense_crosslinked_network_for_long():
     assert network.context.getIntegrator().getNumDividedSteps() < 100
     positions = network.positions()._value
     assert np.isfinite(positions).all()
-    assert resident_and_peak()[0] < memory + 20e6
+    assert resident_and_peak()[0] < memory + 10e6
     # Twice as far as the soft wall lets a node go with a few k_B T.
     assert np.linalg.norm(positions[np.concatenate(network.filaments.node_indices)], axis=1).max() < 600 + 60
     extensions = crosslinks.extensions(network.context)
