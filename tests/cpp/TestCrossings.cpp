@@ -1,6 +1,6 @@
 /**
- * This tests where segments are nearest, against other formulas, and what crosses on its way, against many short parts of
- * the time.
+ * This tests where segments are nearest, against other formulas, and what crosses on its way, against many short parts
+ * of the time.
  */
 
 #include "TestCapsuleSystems.h"
