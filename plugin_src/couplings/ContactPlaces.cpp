@@ -14,7 +14,7 @@ const double AT_END = 1e-9;
 /** Gaps that differ by less, relative to distances, are equal. */
 const double LEAST_DIFFERENCE = 1e-10;
 /** Capsules whose motion is noted together. */
-const int CHUNK = 512;
+const int CHUNK_OF_MOTIONS = 512;
 
 /** Whether capsules may pass through each other: from the distance of their axes at the end, and the sum of radii. */
 bool mayPass(const SegmentPair& start, const SegmentPair& end, double distance, double radii) {
@@ -219,8 +219,8 @@ void ContactSearch::setMotion(const double* x, const double* y, const Loop& run)
     vector<MovingSegment>& moving = search.moving;
     moving.resize(capsules.size());
     const int count = capsules.size();
-    runParts(run, (count+CHUNK-1)/CHUNK, [&] (int chunk) {
-        for (int i = chunk*CHUNK; i < min(count, (chunk+1)*CHUNK); i++) {
+    runParts(run, (count+CHUNK_OF_MOTIONS-1)/CHUNK_OF_MOTIONS, [&] (int chunk) {
+        for (int i = chunk*CHUNK_OF_MOTIONS; i < min(count, (chunk+1)*CHUNK_OF_MOTIONS); i++) {
             const Capsule& own = capsules[i];
             const int next = search.next[i];
             MovingSegment& segment = moving[i];

@@ -8,7 +8,7 @@ using namespace std;
 namespace {
 
 /** Capsules that a thread follows together. */
-const int CHUNK = 128;
+const int CHUNK_OF_MOTIONS = 128;
 
 } // namespace
 
@@ -27,7 +27,7 @@ void CapsuleMotion::begin(const vector<Capsule>& newCapsules, const double* move
     capsules = &newCapsules;
     searched.resize(6*capsules->size());
     before.resize(6*capsules->size());
-    runInChunks(loop, capsules->size(), CHUNK, [&] (int i) {
+    runInChunks(loop, capsules->size(), CHUNK_OF_MOTIONS, [&] (int i) {
         takeNoteOf(i, moved);
         copy_n(&searched[6*i], 6, &before[6*i]);
     });
@@ -36,7 +36,7 @@ void CapsuleMotion::begin(const vector<Capsule>& newCapsules, const double* move
 }
 
 void CapsuleMotion::beginAgain(const double* moved, const Loop& loop) {
-    runInChunks(loop, capsules->size(), CHUNK, [&] (int i) {
+    runInChunks(loop, capsules->size(), CHUNK_OF_MOTIONS, [&] (int i) {
         takeNoteOf(i, moved);
         motion[i] = 0;
     });
@@ -72,14 +72,14 @@ double CapsuleMotion::followOne(int number, const double* moved) {
 
 void CapsuleMotion::follow(const function<bool(int)>& takesPart, const double* moved, double reach, const Loop& loop,
         const function<void(const vector<int>&)>& use) {
-    const int count = capsules->size(), chunks = (count+CHUNK-1)/CHUNK;
+    const int count = capsules->size(), chunks = (count+CHUNK_OF_MOTIONS-1)/CHUNK_OF_MOTIONS;
     parts.resize(chunks);
     loop(chunks, [&] (int chunk) {
         Largest& part = parts[chunk];
         part.first = part.second = 0;
         part.movers.clear();
         part.taken.clear();
-        for (int i = chunk*CHUNK; i < min(count, (chunk+1)*CHUNK); i++) {
+        for (int i = chunk*CHUNK_OF_MOTIONS; i < min(count, (chunk+1)*CHUNK_OF_MOTIONS); i++) {
             if (takesPart(i)) {
                 part.taken.push_back(i);
                 if (2*followOne(i, moved) > reach)

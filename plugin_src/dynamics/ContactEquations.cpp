@@ -28,7 +28,7 @@ const double SAME_PLACE = 0.01;
  */
 const double RELATIVE_TOLERANCE = 5e-4;
 /** The largest change of a gap in the last iteration, over the thermal fluctuation of a contact. */
-const double TOLERANCE = 0.3;
+const double TOLERANCE_OF_GAPS = 0.3;
 /** The same for the change of a gap that one of the two does not know of. */
 const double DRIFT_TOLERANCE = 0.1;
 /** After so many iterations, this times as much is enough: one contact in thousands must not keep others waiting. */
@@ -51,7 +51,7 @@ const int HOLDING_ITERATIONS = 9;
 /** Where more capsules than this share have moved, all are searched for again, which takes less time for each. */
 const double SHARE_OF_MOVERS = 0.4;
 /** Capsules that a thread looks at together. */
-const int CHUNK = 128;
+const int CHUNK_OF_CONTACTS = 128;
 
 } // namespace
 
@@ -84,7 +84,7 @@ void ContactEquations::begin(const CoupledStart& start, const Loop& newLoop) {
         places[i].leastResponse = place.pack < 0 ? 0 : responses.findLeast(place.chain);
         places[i].friction = place.pack < 0 ? LateralFriction() : start.places.findLateralFriction(place);
     };
-    runInChunks(*loop, capsules.size(), CHUNK, [&] (int i) {
+    runInChunks(*loop, capsules.size(), CHUNK_OF_CONTACTS, [&] (int i) {
         const Capsule& capsule = capsules[i];
         Place place;
         place.first = capsule.first;
@@ -148,7 +148,7 @@ void ContactEquations::findPairs(const double* moved) {
     motion.begin(search->getSystem().capsules, moved, *loop);
     pairs.begin(found, places.size());
     // Of most pairs, the search has told that they are far apart.
-    runInChunks(*loop, found.size(), CHUNK, [&] (int i) {
+    runInChunks(*loop, found.size(), CHUNK_OF_CONTACTS, [&] (int i) {
         const ContactPair& pair = found[i];
         const double radii = pairs.radiiOf(pair);
         if (pair.clearance > 0 && pair.distance-radii >= LARGEST_GAP*radii)
@@ -423,7 +423,7 @@ bool ContactEquations::anyComeNear(const double* moved) {
         });
     if (iterations < 2)
         return true;
-    const double tolerance = TOLERANCE*sqrt(kT/stiffness)+LEAST_CHANGE*reach;
+    const double tolerance = TOLERANCE_OF_GAPS*sqrt(kT/stiffness)+LEAST_CHANGE*reach;
     // Those that are not selected have not moved.
     bool any = markPairs(selection.hasAll(), [&] (int run, Part& part) {
         selection.forPairs(pairs, selection.hasAll(), run, [&] (int i) {
@@ -450,7 +450,7 @@ bool ContactEquations::isUnfinished(int number, const double* move) {
     if (side.rest.isBack())
         change /= ContactRest::STIFFENING;
     const double least = LEAST_CHANGE*LEAST_CHANGE*reach*reach*stiffness;
-    const double tolerance = TOLERANCE*(iterations < PATIENT_ITERATIONS ? 1 : LATE);
+    const double tolerance = TOLERANCE_OF_GAPS*(iterations < PATIENT_ITERATIONS ? 1 : LATE);
     if (!(change < tolerance*tolerance*kT+least))
         return true;
     double& drift = side.drift;

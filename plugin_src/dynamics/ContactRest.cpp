@@ -12,10 +12,6 @@ namespace {
 /** Up to this sine of the angle between them, and of that between the normal and the plane across, two are discs. */
 const double LARGEST_SINE = 0.3;
 
-double dot(const double* a, const double* b) {
-    return a[0]*b[0]+a[1]*b[1]+a[2]*b[2];
-}
-
 /** Make a vector one of length 1; false if it has no length. */
 bool normalize(double* v) {
     const double length = sqrt(dot(v, v));

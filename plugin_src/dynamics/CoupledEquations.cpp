@@ -36,7 +36,7 @@ const int LARGEST_NUMBER_OF_ITERATIONS = 1000;
 /** Where energies grow by more, single precision has rounded away what matters: in stiff links of free particles. */
 const double LARGEST_GROWTH = 1e6;
 /** Equations that a thread looks at together. */
-const int CHUNK = 256;
+const int CHUNK_OF_EQUATIONS = 256;
 /** What a term far from the processor's caches shows is asked for this many terms ahead. */
 const int AHEAD = 16;
 
@@ -81,7 +81,7 @@ bool CoupledEquations::hasSamePlaces(const vector<CouplingEquation>& equations, 
     if (2*equations.size() != sortedPlaces.size() || active != activeOfTerms)
         return false;
     atomic<bool> same(true);
-    runInChunks(loop, sortedPlaces.size(), CHUNK, [&] (int number) {
+    runInChunks(loop, sortedPlaces.size(), CHUNK_OF_EQUATIONS, [&] (int number) {
         if (!same.load(memory_order_relaxed))
             return;
         const PlaceOnChain& place = equations[number/2].places[number%2];
@@ -141,7 +141,7 @@ void CoupledEquations::gatherTerms(const vector<CouplingEquation>& equations, co
     if (!hasSamePlaces(equations, active, loop))
         sortPlaces(equations, active);
     sums.assign(active.size(), 0.0);
-    runInChunks(loop, termOf.size(), CHUNK, [&] (int number) {
+    runInChunks(loop, termOf.size(), CHUNK_OF_EQUATIONS, [&] (int number) {
         if (termOf[number] < 0)
             return;
         const int i = number/2, side = number%2;
@@ -184,7 +184,7 @@ bool CoupledEquations::solve(const vector<PackStep*>& packs, const PackFlags& ac
     if (!solved)
         iterate(packs, twice, tighter*demands.tolerance, least, loop);
     moves.resize(3*equations.size());
-    runInChunks(loop, equations.size(), CHUNK, [&] (int i) {
+    runInChunks(loop, equations.size(), CHUNK_OF_EQUATIONS, [&] (int i) {
         const int first = termOf[2*i], second = termOf[2*i+1];
         for (int k = 0; k < 3; k++)
             moves[3*i+k] = (first >= 0 ? change[3*first+k] : 0)-(second >= 0 ? change[3*second+k] : 0);

@@ -1,4 +1,5 @@
 #include "dynamics/LinkEquations.h"
+#include "dynamics/StageWeights.h"
 #include "dynamics/SymmetricMatrices.h"
 #include "lanes/Noise.h"
 #include <algorithm>
@@ -15,10 +16,8 @@ namespace {
 #include "lanes/VectorLanes-inl.h"
 #include "mechanics/StretchingModels-inl.h"
 
-/** As for the stages of chains: see dynamics/ImplicitState-inl.h. */
-const double DIAGONAL = 1-M_SQRT1_2, NOISE_OF_FIRST = DIAGONAL/(1-DIAGONAL);
 /** The largest change of a link in the last iteration, over its thermal fluctuation. */
-const double TOLERANCE = 0.3;
+const double TOLERANCE_OF_LINKS = 0.3;
 /** The same for links that turn, which converge linearly. */
 const double TOLERANCE_OF_TURNS = 0.1;
 /** The same for what one end of a link does not know of. */
@@ -40,11 +39,7 @@ const double LENGTH_TOLERANCE = 0.07;
 /** Without noise: the largest change across a link in the last iteration, over its length. */
 const double OF_TURN = 1e-2;
 /** Links that a thread looks at together. */
-const int CHUNK = 64;
-
-double dot(const double* a, const double* b) {
-    return a[0]*b[0]+a[1]*b[1]+a[2]*b[2];
-}
+const int CHUNK_OF_LINKS = 64;
 
 /** Whether a link has a direction. */
 bool turns(const Link& link) {
@@ -98,13 +93,13 @@ void LinkEquations::begin(const CoupledStart& start, const Loop& newLoop) {
     kT = start.settings.kT;
     stepSize = start.settings.stepSize;
     states.resize(links->size());
-    runInChunks(*loop, states.size(), CHUNK, [&] (int i) {
+    runInChunks(*loop, states.size(), CHUNK_OF_LINKS, [&] (int i) {
         place(start, (*links)[i], states[i]);
     });
     states.erase(remove_if(states.begin(), states.end(), [] (const State& state) {return state.link == NULL;}),
             states.end());
     addStiffness(start.places);
-    runInChunks(*loop, states.size(), CHUNK, [&] (int i) {
+    runInChunks(*loop, states.size(), CHUNK_OF_LINKS, [&] (int i) {
         describe(start, states[i]);
     });
     anyTurns = any_of(states.begin(), states.end(), [] (const State& state) {return state.turns;});
@@ -187,8 +182,8 @@ void LinkEquations::drawNoise(const CoupledStart& start) {
     chains.assign(count, force);
     parts.resize(count);
     normals.resize(4*count);
-    (*loop)((count+CHUNK-1)/CHUNK, [&] (int chunk) {
-        const size_t begin = (size_t) chunk*CHUNK, end = min(count, begin+CHUNK);
+    (*loop)((count+CHUNK_OF_LINKS-1)/CHUNK_OF_LINKS, [&] (int chunk) {
+        const size_t begin = (size_t) chunk*CHUNK_OF_LINKS, end = min(count, begin+CHUNK_OF_LINKS);
         for (size_t i = begin; i < end; i++)
             parts[i] = states[i].link->number;
         drawNormals(key, NoiseKind::Link, &chains[begin], &parts[begin], end-begin, &normals[4*begin]);
@@ -255,7 +250,7 @@ void LinkEquations::linearise(int, const double* moved, vector<CouplingEquation>
     select();
     const size_t first = equations.size();
     equations.resize(first+selected.size());
-    runInChunks(*loop, selected.size(), CHUNK, [&] (int i) {
+    runInChunks(*loop, selected.size(), CHUNK_OF_LINKS, [&] (int i) {
         linearise(states[selected[i]], moved, equations[first+i]);
     });
 }
@@ -399,7 +394,7 @@ bool LinkEquations::isUnfinished(State& state, const double* move, const double*
     state.change = state.response*dot(move, move);
     if (state.turns)
         state.multiplier = state.tension+state.slope*dot(state.direction, move);
-    if (isTooMuch(state, move, state.turns ? TOLERANCE_OF_TURNS : TOLERANCE, least))
+    if (isTooMuch(state, move, state.turns ? TOLERANCE_OF_TURNS : TOLERANCE_OF_LINKS, least))
         return true;
     const int a = state.places[0].pack, b = state.places[1].pack;
     const bool oneSided = a >= 0 && b >= 0 && (*active)[a] != (*active)[b];
@@ -423,7 +418,7 @@ bool LinkEquations::isTooMuch(const State& state, const double* move, double tol
 }
 
 bool LinkEquations::finishIteration(const double* moves, const double* moved) {
-    runInChunks(*loop, selected.size(), CHUNK, [&] (int i) {
+    runInChunks(*loop, selected.size(), CHUNK_OF_LINKS, [&] (int i) {
         unfinished[selected[i]] = isUnfinished(states[selected[i]], moves+3*i, moved);
     });
     return find(unfinished.begin(), unfinished.end(), 1) != unfinished.end();

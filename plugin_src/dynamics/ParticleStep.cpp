@@ -1,4 +1,5 @@
 #include "dynamics/ParticleStep.h"
+#include "dynamics/StageWeights.h"
 #include "dynamics/SymmetricMatrices.h"
 #include "lanes/Noise.h"
 #include <algorithm>
@@ -9,9 +10,6 @@ using namespace cylchain;
 using namespace std;
 
 namespace {
-
-/** As for the stages of chains: see dynamics/ImplicitState-inl.h. */
-const double DIAGONAL = 1-M_SQRT1_2, NOISE_OF_FIRST = DIAGONAL/(1-DIAGONAL);
 
 /** The inverse of a symmetric matrix (xx, xy, xz, yy, yz, zz). */
 void invert(const double* m, double* result) {

@@ -2,9 +2,13 @@
 #define CYLCHAIN_SYMMETRIC_MATRICES_H_
 
 /**
- * Symmetric 3x3 matrices as couplings have them: six numbers, (xx, xy, xz, yy, yz, zz).
+ * Vectors of three numbers, and symmetric 3x3 matrices as couplings have them: six numbers, (xx, xy, xz, yy, yz, zz).
  */
 namespace cylchain {
+
+inline double dot(const double* a, const double* b) {
+    return a[0]*b[0]+a[1]*b[1]+a[2]*b[2];
+}
 
 /** Find the product with a vector. */
 template <class Number> inline void multiply(const Number* m, const Number* v, Number* result) {

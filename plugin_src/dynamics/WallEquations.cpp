@@ -1,5 +1,6 @@
 #include "dynamics/WallEquations.h"
 #include "dynamics/PlaceResponses.h"
+#include "dynamics/StageWeights.h"
 #include "dynamics/SymmetricMatrices.h"
 #include <algorithm>
 #include <cmath>
@@ -10,22 +11,20 @@ using namespace std;
 
 namespace {
 
-/** As for the stages of chains: see dynamics/ImplicitState-inl.h. */
-const double DIAGONAL = 1-M_SQRT1_2;
 /** The largest change of a depth in the last iteration, over the depth that thermal motion gets to. */
-const double TOLERANCE = 0.3;
+const double TOLERANCE_OF_DEPTHS = 0.3;
 /** The same in nm, where nothing moves thermally. */
 const double LEAST_TOLERANCE = 1e-7;
 /** The number of iterations that know of no walls: what they lead to is predicted. */
 const int FREE_ITERATIONS = 2;
 /** The number of iterations that look where faces are. */
-const int SEARCHING_ITERATIONS = 10;
+const int ITERATIONS_THAT_LOOK_AT_FACES = 10;
 /** By how much a tangent plane may be wrong, over the gap below which there is a force. */
 const double LARGEST_DEVIATION = 0.1;
 /** The largest way beyond a curved face or back from it, over the way to the middle. */
-const double LARGEST_RETURN = 0.5;
+const double LARGEST_WAY_TO_FACE = 0.5;
 /** Particles that a thread looks at together. */
-const int CHUNK = 256;
+const int CHUNK_OF_PARTICLES = 256;
 
 } // namespace
 
@@ -50,16 +49,16 @@ void WallEquations::begin(const CoupledStart& start, const Loop& newLoop) {
     begun = start.positions;
     stepSize = start.settings.stepSize;
     wallDepth = findDepthOfWall(start.settings.kT, system->stiffness);
-    tolerance = max(LEAST_TOLERANCE, TOLERANCE*sqrt(start.settings.kT/system->stiffness));
+    tolerance = max(LEAST_TOLERANCE, TOLERANCE_OF_DEPTHS*sqrt(start.settings.kT/system->stiffness));
     const size_t count = system->particles.size();
     places.resize(count);
     responses.resize(count);
     together.assign(count, 0);
     PlaceResponses found;
     found.begin(start.places, stepSize);
-    parts.resize((count+CHUNK-1)/CHUNK);
+    parts.resize((count+CHUNK_OF_PARTICLES-1)/CHUNK_OF_PARTICLES);
     (*loop)(parts.size(), [&] (int part) {
-        for (size_t i = (size_t) part*CHUNK; i < min(count, (size_t) (part+1)*CHUNK); i++) {
+        for (size_t i = (size_t) part*CHUNK_OF_PARTICLES; i < min(count, (size_t) (part+1)*CHUNK_OF_PARTICLES); i++) {
             if (start.places.find(system->particles[i].getPlace(), places[i]) && start.taken[places[i].chain]) {
                 responses[i] = found.find(places[i]);
                 together[i] = found.moveTogether(places[i].chain);
@@ -104,7 +103,7 @@ void WallEquations::linearise(int iteration, const double* moved, vector<Couplin
             if (!takesPart(state.particle))
                 continue;
             const WallParticle& particle = system->particles[state.particle];
-            const bool searches = iteration <= SEARCHING_ITERATIONS || state.deviates;
+            const bool searches = iteration <= ITERATIONS_THAT_LOOK_AT_FACES || state.deviates;
             if (searches) {
                 const Position position = positionOf(state.particle, moved);
                 const double* y = position.at;
@@ -115,7 +114,7 @@ void WallEquations::linearise(int iteration, const double* moved, vector<Couplin
                 const bool round = shape == WallShape::Sphere || shape == WallShape::Cylinder;
                 // The distance from the middle. Where it is short, there would be more stiffness than steps can have.
                 const double distance = depth-particle.radius+system->wall.length;
-                state.curvature = round ? 1/max(distance, LARGEST_RETURN*system->wall.length) : 0;
+                state.curvature = round ? 1/max(distance, LARGEST_WAY_TO_FACE*system->wall.length) : 0;
             }
             state.equation = -1;
             const double beyond = findDepthAt(state, moved)+state.restGap.get();
@@ -138,7 +137,7 @@ RestGap WallEquations::findRestGap(int particle, int face, double depth) const {
     const WallParticle& own = system->particles[particle];
     double gradient[3];
     const double before = findDepth(system->wall, face, positionOf(particle, begun).at, own.radius, gradient);
-    const double largest = isFlat(system->wall) ? HUGE_VAL : LARGEST_RETURN*(getRoom(system->wall)-own.radius);
+    const double largest = isFlat(system->wall) ? HUGE_VAL : LARGEST_WAY_TO_FACE*(getRoom(system->wall)-own.radius);
     return RestGap(max(-largest, -depth), min(largest, -before), implicit*system->stiffness*responses[particle],
             wallDepth);
 }
@@ -187,7 +186,7 @@ void WallEquations::finishPart(int number, const double* moves, const double* mo
         part.unfinished.push_back(places[state.particle].pack);
     }
     const int count = places.size();
-    for (int i = number*CHUNK; i < min(count, (number+1)*CHUNK); i++) {
+    for (int i = number*CHUNK_OF_PARTICLES; i < min(count, (number+1)*CHUNK_OF_PARTICLES); i++) {
         if (!takesPart(i))
             continue;
         const WallParticle& own = system->particles[i];
