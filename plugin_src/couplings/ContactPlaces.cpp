@@ -298,11 +298,8 @@ void ContactSearch::prefetchMotion(int a, int b) const {
     }
 }
 
-void ContactSearch::findVector(const ContactPair& pair, double s, double t, bool atEnd, double* result) const {
-    const Vec3d r = implementation->movingSegments(pair, atEnd).between(s, t);
-    result[0] = r.x;
-    result[1] = r.y;
-    result[2] = r.z;
+SegmentPair ContactSearch::getSegments(const ContactPair& pair, bool atEnd) const {
+    return implementation->movingSegments(pair, atEnd);
 }
 
 bool ContactSearch::Implementation::crosses(const ContactPair& pair, const SegmentPair& start,

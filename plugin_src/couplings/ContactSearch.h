@@ -127,13 +127,8 @@ public:
     /** Find the contacts of a pair at y, as the other function of this name does. */
     int evaluate(const ContactPair& pair, Contact* contacts,
             double limit = std::numeric_limits<double>::infinity()) const;
-    /**
-     * Find the vector from the point at fraction t of the second capsule of a pair to that at s of the first.
-     *
-     * @param atEnd   at y, or else at x
-     * @param result  three numbers
-     */
-    void findVector(const ContactPair& pair, double s, double t, bool atEnd, double* result) const;
+    /** Get the axes of a pair, at y or else at x. */
+    SegmentPair getSegments(const ContactPair& pair, bool atEnd) const;
     /**
      * Get whether the capsules of a pair pass through each other on the way from x to y, an odd number of times.
      * Spheres do if they come nearer to an axis than 0.7 of the sum of radii, and end on the other side of it.

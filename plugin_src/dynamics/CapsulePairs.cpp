@@ -74,10 +74,9 @@ double CapsulePairs::getLargestRestGap(int number) const {
 void CapsulePairs::updateGaps(int number) {
     for (int i = 0; i < watches[number].count; i++) {
         Contact& contact = getContact(number, i).contact;
-        double r[3];
-        search->findVector(pairs[number], contact.s, contact.t, true, r);
+        const Vec3d r = getSegments(number, true).between(contact.s, contact.t);
         const double* n = contact.normal;
-        contact.gap = r[0]*n[0]+r[1]*n[1]+r[2]*n[2]-radiiOf(pairs[number]);
+        contact.gap = r.x*n[0]+r.y*n[1]+r.z*n[2]-radiiOf(pairs[number]);
     }
 }
 
@@ -110,20 +109,4 @@ void CapsulePairs::placeContacts(int number, const Contact* found, int count) {
             next.rest = ContactRest();
     }
     known = total > 0 ? total : count;
-}
-
-void CapsulePairs::findCourse(int number, const Contact& contact, ContactCourse& course) const {
-    const ContactPair& pair = pairs[number];
-    search->findVector(pair, contact.s, contact.t, false, course.begun);
-    search->findVector(pair, contact.s, contact.t, true, course.now);
-    double ends[3][3];
-    search->findVector(pair, 0, 0, false, ends[0]);
-    search->findVector(pair, 1, 0, false, ends[1]);
-    search->findVector(pair, 0, 1, false, ends[2]);
-    for (int k = 0; k < 3; k++) {
-        course.along[0][k] = ends[1][k]-ends[0][k];
-        course.along[1][k] = ends[0][k]-ends[2][k];
-    }
-    course.normal = contact.normal;
-    course.radii = radiiOf(pair);
 }

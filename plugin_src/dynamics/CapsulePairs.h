@@ -78,8 +78,10 @@ public:
     void updateGaps(int number);
     /** Take the contacts of a pair that were found, instead of those that do not come back. */
     void placeContacts(int number, const Contact* found, int count);
-    /** Find the way of a contact in the step. */
-    void findCourse(int number, const Contact& contact, ContactCourse& course) const;
+    /** Get the axes of a pair at the beginning of the step, or where an iteration has led them. */
+    SegmentPair getSegments(int number, bool atEnd) const {
+        return search->getSegments(pairs[number], atEnd);
+    }
 private:
     /** The contacts of a pair. */
     struct Contacts {

@@ -39,7 +39,7 @@ const double LEAST_CHANGE = 3e-3;
 /** The number of iterations that look where capsules touch. */
 const int SEARCHING_ITERATIONS = 4;
 /**
- * Up to this iteration, contacts that would be behind their surface come back. The first of them knows where the step
+ * Up to this iteration, contacts that would be behind their surface come back, and are placed. The first of them knows where the step
  * leads without contacts, others what those that come back change of it. With all of them, bends of a dense bundle have
  * 1.5 % too little energy in equilibrium; with two, a bundle that motors contract is bent too much by a tenth.
  */
@@ -316,20 +316,19 @@ void ContactEquations::evaluate(int number, bool first, const PairOutlook* outlo
     bool touches = false;
     for (int i = 0; i < watch.count; i++) {
         PairContact& side = pairs.getContact(number, i);
-        const Contact& contact = side.contact;
+        Contact& contact = side.contact;
         if (!side.rest.isKnown()) {
             double softness = stiffness*(places[pair.a].leastResponse+places[pair.b].leastResponse);
             if (softness < 1)
                 softness = softnessOf(pair, contact);
             side.rest = ContactRest(softness, first ? max(contact.gap, -LARGEST_RETURN*diameter) : 0);
         }
-        const bool mayReturn = iterations <= RETURNING_ITERATIONS || contact.crossed;
-        if (mayReturn && !side.rest.isResolved() && !side.rest.isBack() && contact.gap < 0) {
-            ContactCourse course;
-            pairs.findCourse(number, contact, course);
-            course.softness = softnessOf(pair, contact);
-            course.passed = iterations > RETURNING_ITERATIONS;
-            side.rest.look(course, contact.gap, wallDepth, LARGEST_RETURN*diameter);
+        const bool late = iterations > RETURNING_ITERATIONS;
+        const bool isLookedAt = side.rest.isBack() ? !late : contact.gap < 0 && (!late || contact.crossed);
+        if (isLookedAt && !side.rest.isResolved()) {
+            const double softness = softnessOf(pair, contact);
+            side.rest.look({pairs.getSegments(number, false), pairs.getSegments(number, true), diameter, softness, late},
+                    contact, wallDepth, LARGEST_RETURN*diameter);
         }
         // Where contacts are not looked for any more, anyCross() sees whether they have come back.
         if (contact.crossed && iterations < SEARCHING_ITERATIONS)
@@ -366,8 +365,7 @@ bool ContactEquations::addEquation(int number, int which, Part& part) {
     equation.places[1] = placeOf(pair.b, contact.t);
     const double own = contact.weight*stiffness;
     if (side.rest.isBack()) {
-        double now[3];
-        search->findVector(pair, contact.s, contact.t, true, now);
+        const Vec3d now = pairs.getSegments(number, true).between(contact.s, contact.t);
         side.rest.findForce(now, own, equation.force, equation.stiffness);
     }
     else {

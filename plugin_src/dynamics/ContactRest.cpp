@@ -11,15 +11,13 @@ namespace {
 
 /** Up to this sine of the angle between them, and of that between the normal and the plane across, two are discs. */
 const double LARGEST_SINE = 0.3;
+/** The least cosine of the angle by which the normal turns in half of a step. */
+const double LEAST_COSINE = 0.2;
 
-/** Make a vector one of length 1; false if it has no length. */
-bool normalize(double* v) {
-    const double length = sqrt(dot(v, v));
-    if (!(length > 0))
-        return false;
-    for (int k = 0; k < 3; k++)
-        v[k] /= length;
-    return true;
+/** Get a vector of length 1; zero if it has no length. */
+Vec3d normalized(const Vec3d& v) {
+    const double length = sqrt(v.squared());
+    return length > 0 ? v*(1/length) : Vec3d {0, 0, 0};
 }
 
 /**
@@ -28,33 +26,50 @@ bool normalize(double* v) {
  * @param axis  receives it; zero for spheres
  * @return false if they cross at an angle
  */
-bool findAxis(const ContactCourse& course, double* axis) {
-    double e[2][3];
-    bool hasLength[2];
-    for (int i = 0; i < 2; i++) {
-        copy_n(course.along[i], 3, e[i]);
-        hasLength[i] = normalize(e[i]);
-    }
-    fill(axis, axis+3, 0.0);
-    if (!hasLength[0] && !hasLength[1])
-        return true;
-    copy_n(hasLength[0] ? e[0] : e[1], 3, axis);
-    if (hasLength[0] && hasLength[1]) {
-        const double cosine = dot(e[0], e[1]);
-        if (1-cosine*cosine > LARGEST_SINE*LARGEST_SINE)
-            return false;
-        for (int k = 0; k < 3; k++)
-            axis[k] += (cosine < 0 ? -1 : 1)*e[1][k];
-        normalize(axis);
-    }
-    return fabs(dot(axis, course.normal)) <= LARGEST_SINE;
+bool findAxis(const SegmentPair& pair, const Vec3d& normal, Vec3d& axis) {
+    const Vec3d p = normalized(pair.p), q = normalized(pair.q);
+    const double cosine = p.dot(q);
+    if (p.squared() > 0 && q.squared() > 0 && 1-cosine*cosine > LARGEST_SINE*LARGEST_SINE)
+        return false;
+    axis = normalized(p+q*(cosine < 0 ? -1 : 1));
+    return fabs(axis.dot(normal)) <= LARGEST_SINE;
 }
 
 /** Find what of a vector is across an axis of length 1. */
-void findAcross(const double* v, const double* axis, double* result) {
-    const double along = dot(v, axis);
-    for (int k = 0; k < 3; k++)
-        result[k] = v[k]-along*axis[k];
+Vec3d across(const Vec3d& v, const Vec3d& axis) {
+    return v-axis*axis.dot(v);
+}
+
+Vec3d normalOf(const Contact& contact) {
+    return {contact.normal[0], contact.normal[1], contact.normal[2]};
+}
+
+/**
+ * Place a contact where two lines are nearest in the middle of the step.
+ *
+ * @return false if the normal is another one there: then the contact stays where it is
+ */
+bool placeInMiddle(const ContactCourse& course, Contact& contact) {
+    const SegmentPair &x = course.begun, &y = course.now;
+    const SegmentPair middle = {(x.p+y.p)*0.5, (x.q+y.q)*0.5, (x.w+y.w)*0.5};
+    const NearestPoints nearest = findNearestPoints(middle);
+    Vec3d normal = middle.p.cross(middle.q);
+    const bool cross = normal.squared() > LARGEST_SINE*LARGEST_SINE*middle.p.squared()*middle.q.squared() &&
+            nearest.s > 0 && nearest.s < 1 && nearest.t > 0 && nearest.t < 1;
+    // What has passed is on neither side there.
+    if (!cross && course.passed)
+        return false;
+    normal = normalized(cross ? normal : middle.between(nearest.s, nearest.t));
+    const double cosine = normal.dot(normalOf(contact));
+    if (!(fabs(cosine) > LEAST_COSINE))
+        return false;
+    const double sign = cosine < 0 ? -1 : 1;
+    contact.s = nearest.s;
+    contact.t = nearest.t;
+    contact.normal[0] = sign*normal.x;
+    contact.normal[1] = sign*normal.y;
+    contact.normal[2] = sign*normal.z;
+    return true;
 }
 
 } // namespace
@@ -64,41 +79,51 @@ ContactRest::ContactRest(double softness, double predicted) : softness(softness)
         gap = RestGap(predicted, 0, softness, 0).get();
 }
 
-void ContactRest::look(const ContactCourse& course, double gap, double depth, double largest) {
-    if (!(gap < 0))
+void ContactRest::look(const ContactCourse& course, Contact& contact, double depth, double largest) {
+    if (back) {
+        if (followsMiddle && placeInMiddle(course, contact)) {
+            normal = normalOf(contact);
+            target = normal.dot(course.begun.between(contact.s, contact.t))+beyond;
+        }
         return;
-    copy_n(course.normal, 3, normal);
-    double axis[3], begun[3], now[3];
-    copy_n(course.begun, 3, begun);
-    copy_n(course.now, 3, now);
-    // Lines have a side, which they may have left: discs have none.
-    double distance = dot(begun, normal);
-    if (!course.passed && findAxis(course, axis)) {
-        findAcross(course.begun, axis, begun);
-        findAcross(course.now, axis, now);
-        distance = sqrt(dot(begun, begun));
-        double middle[3];
-        for (int k = 0; k < 3; k++)
-            middle[k] = begun[k]+now[k];
-        if (normalize(middle))
-            copy_n(middle, 3, normal);
     }
-    const double before = distance-course.radii;
-    const bool beginsBehind = !(before > -depth);
-    if (!(gap < (beginsBehind ? 0 : -depth)))
+    if (!(contact.gap < -depth))
         return;
     back = true;
-    double wanted = dot(begun, normal);
-    if (beginsBehind)
-        wanted = course.radii;
-    else if (before > largest)
+    Vec3d axis, begun, now;
+    double distance;
+    if (!course.passed && findAxis(course.begun, normalOf(contact), axis)) {
+        begun = across(course.begun.between(contact.s, contact.t), axis);
+        now = across(course.now.between(contact.s, contact.t), axis);
+        distance = sqrt(begun.squared());
+        normal = normalized(begun+now);
+        if (!(normal.squared() > 0))
+            normal = normalOf(contact);
+    }
+    else {
+        followsMiddle = placeInMiddle(course, contact);
+        normal = normalOf(contact);
+        begun = course.begun.between(contact.s, contact.t);
+        now = course.now.between(contact.s, contact.t);
+        distance = followsMiddle ? sqrt(findNearestPoints(course.begun).squared) : normal.dot(begun);
+    }
+    const double before = distance-course.radii;
+    double wanted = normal.dot(begun);
+    if (!(before > -depth)) {
+        wanted = course.radii-depth;
+        followsMiddle = false;
+    }
+    else if (before > largest) {
         wanted = min(wanted, course.radii+largest);
-    target = wanted+(wanted-dot(now, normal))/(STIFFENING*course.softness);
+        followsMiddle = false;
+    }
+    beyond = (wanted-normal.dot(now))/(STIFFENING*course.softness);
+    target = wanted+beyond;
 }
 
-void ContactRest::findForce(const double* now, double stiffness, double* force, double* projection) const {
-    const double size = STIFFENING*stiffness*(target-dot(normal, now));
+void ContactRest::findForce(const Vec3d& now, double stiffness, double* force, double* projection) const {
+    const double n[3] = {normal.x, normal.y, normal.z}, size = STIFFENING*stiffness*(target-normal.dot(now));
     for (int k = 0; k < 3; k++)
-        force[k] = size*normal[k];
-    setOuter(STIFFENING*stiffness, normal, projection);
+        force[k] = size*n[k];
+    setOuter(STIFFENING*stiffness, n, projection);
 }

@@ -1,16 +1,16 @@
 #ifndef CYLCHAIN_CONTACT_REST_H_
 #define CYLCHAIN_CONTACT_REST_H_
 
+#include "couplings/CapsuleGeometry.h"
+#include "couplings/Capsules.h"
+
 namespace cylchain {
 
-/** Two capsules in a step, at the places where they touch. */
+/** Two capsules in a step that touch. */
 struct ContactCourse {
-    /** From the place on the second to that on the first: r0 at the beginning, and r* where an iteration has led. */
-    double begun[3], now[3];
-    /** From end to end of the two at the beginning; zero for a sphere. */
-    double along[2][3];
-    /** The normal there, the sum of the radii, and a = k c, see ContactRest. */
-    const double* normal;
+    /** At the beginning, and where an iteration has led. */
+    SegmentPair begun, now;
+    /** The sum of the radii, and a = k c, see ContactRest. */
     double radii, softness;
     /** Whether they have passed through each other although contacts behind the wall came back: they are lines. */
     bool passed = false;
@@ -27,11 +27,15 @@ struct ContactCourse {
  *
  *     K n (b-n.r),   b = n.r0+(n.r0-n.r*)/(K c),   K = 5 k,
  *
- * in the rest of the step. Two that cross at an angle are lines, which cannot pass each other along their normal n. Two
- * capsules that lie along each other are discs: r0 and r* are those across them, and n has the direction of r0+r*. Then
+ * in the rest of the step. Here r is the vector between two places, one on each capsule; r0 is that of the beginning, and
+ * r* that where an iteration has led. Two that cross at an angle are lines, which cannot pass each other along their
+ * normal. The places and n are those where they are nearest in the middle of the step: then their distance comes back to
+ * the third order of what they move, although they turn and slide along each other. With n and the places of r*, or of
+ * r0, it would differ by nanometers, which bends a dense bundle.
+ * Two capsules that lie along each other are discs: r0 and r* are those across them, and n has the direction of r0+r*. Then
  * n.r = n.r0, and along the surface t.r = t.r* = -t.r0: they have their distance back, and have turned about each other
  * as far as they wanted to. n along r0 or r* would not do for discs, for it turns in the step. Spheres are as discs
- * are. What began behind the wall is brought to the surface.
+ * are. What began behind the wall is brought to the wall.
  *
  * This is a move that Metropolis refuses. Where a step without contacts keeps detailed balance and is linear, one in
  * which n.r comes back to n.r0 keeps it, too: with y = y*+C n (n C n)^-1 (n.r0-n.r*), and C the response of the step to
@@ -71,22 +75,27 @@ public:
         return gap;
     }
     /**
-     * Look where an iteration has led a contact that is not resolved: it may come back from now on.
+     * Look where an iteration has led a contact that is not resolved: it may come back from now on. Where lines that come
+     * back to where they began are nearest in the middle of the step is found again.
      *
-     * @param gap      g
+     * @param contact  receives the places and the normal of one that comes back
      * @param depth    d
      * @param largest  the largest gap that it comes back to
      */
-    void look(const ContactCourse& course, double gap, double depth, double largest);
-    /** Find the force on the first capsule, and K n nT. */
-    void findForce(const double* now, double stiffness, double* force, double* projection) const;
+    void look(const ContactCourse& course, Contact& contact, double depth, double largest);
+    /** Find the force on the first capsule where r is now, and K n nT. */
+    void findForce(const Vec3d& now, double stiffness, double* force, double* projection) const;
     /** K/k. */
     static constexpr double STIFFENING = 5;
 private:
     static constexpr double LEAST_STIFF = 1;
     double softness = -1, gap = 0;
     bool back = false;
-    double normal[3], target;
+    /** Whether it comes back to where the step began, as lines. */
+    bool followsMiddle = false;
+    Vec3d normal;
+    /** b, and by how much it is beyond where the contact comes back to. */
+    double target, beyond;
 };
 
 } // namespace cylchain

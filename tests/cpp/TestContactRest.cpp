@@ -1,7 +1,8 @@
 /**
- * This tests where contacts come back to: discs and spheres to their distance, lines along their normal, and what began
- * behind its surface to the surface. The responses are those of free motion, so that what comes back gets exactly to
- * where it belongs. Discs and spheres that diffuse in steps as long as their radius have no preferred distance.
+ * This tests where contacts come back to: discs and spheres to their distance, lines along the normal that they have in
+ * the middle of the step, so that their distance comes back although they turn and slide, and what began behind the wall
+ * to the wall. The responses are those of free motion, so that what comes back gets exactly to where it belongs. Discs and
+ * spheres that diffuse in steps as long as their radius have no preferred distance.
  */
 
 #include "TestChains.h"
@@ -11,34 +12,32 @@
 
 static const double STIFFNESS = 3, DEPTH = 0.2, RADII = 2, LARGEST = 2;
 
-struct Vector {
-    double v[3];
-};
-
-static double dot(const double* a, const double* b) {
-    return a[0]*b[0]+a[1]*b[1]+a[2]*b[2];
+/** Two segments that begin as in one place, and are as in the other now. */
+static ContactCourse makeCourse(double softness, const SegmentPair& begun, const SegmentPair& now) {
+    return {begun, now, RADII, softness};
 }
 
-static ContactCourse makeCourse(double softness, const double (&begun)[3], const double (&now)[3],
-        const double (&other)[3], const double* normal) {
-    ContactCourse course = {};
-    copy_n(begun, 3, course.begun);
-    copy_n(now, 3, course.now);
-    course.along[0][0] = 5;
-    copy_n(other, 3, course.along[1]);
-    course.normal = normal;
-    course.radii = RADII;
-    course.softness = softness;
-    return course;
+/** Two that do not turn, whose places at s = t = 0 are where they touch: r0 and r*. */
+static ContactCourse makeCourse(double softness, const Vec3d& begun, const Vec3d& now, const Vec3d& other,
+        double length = 5) {
+    const Vec3d along = {length, 0, 0};
+    return makeCourse(softness, {along, other, begun}, {along, other, now});
 }
 
-/** Move what comes back by its force, with the response that it was told: the place where they balance. */
-static void balance(const ContactRest& rest, double softness, const double* start, double* now) {
+static Contact makeContact(const Vec3d& normal, double gap) {
+    return {0, 0, {normal.x, normal.y, normal.z}, gap, 1, false};
+}
+
+/** Move what comes back by its force, with the response that it was told: the way to the place where they balance. */
+static Vec3d balance(const ContactRest& rest, double softness, const Vec3d& now) {
     double force[3], projection[6];
-    rest.findForce(start, STIFFNESS, force, projection);
+    rest.findForce(now, STIFFNESS, force, projection);
     const double c = softness/STIFFNESS, factor = 1/(1+ContactRest::STIFFENING*softness);
-    for (int k = 0; k < 3; k++)
-        now[k] = start[k]+c*factor*force[k];
+    return Vec3d {force[0], force[1], force[2]}*(c*factor);
+}
+
+static double sizeOf(const Vec3d& v) {
+    return sqrt(v.squared());
 }
 
 static void testDiscs() {
@@ -46,71 +45,104 @@ static void testDiscs() {
     uniform_real_distribution<double> uniform(-1, 1);
     for (int i = 0; i < 100; i++) {
         // Along x, against each other in half of the cases, at an angle below 0.2; the normal turns in the step.
-        const double other[3] = {i%2 ? 4.0 : -4.0, 0.5*uniform(generator), 0.5*uniform(generator)};
+        const Vec3d other = {i%2 ? 4.0 : -4.0, 0.5*uniform(generator), 0.5*uniform(generator)};
         const double angle = M_PI*uniform(generator), turned = angle+uniform(generator);
         const double distance = RADII+1+uniform(generator), deep = RADII-0.5;
-        const double begun[3] = {uniform(generator), distance*cos(angle), distance*sin(angle)};
-        const double now[3] = {uniform(generator), deep*cos(turned), deep*sin(turned)};
-        const double normal[3] = {0, cos(turned), sin(turned)};
+        const Vec3d begun = {uniform(generator), distance*cos(angle), distance*sin(angle)};
+        const Vec3d now = {uniform(generator), deep*cos(turned), deep*sin(turned)};
         ContactRest rest(10, -0.5);
         check(rest.isKnown() && !rest.isResolved(), "a long step");
-        rest.look(makeCourse(10, begun, now, other, normal), -0.5, DEPTH, LARGEST);
+        Contact contact = makeContact({0, cos(turned), sin(turned)}, -0.5);
+        rest.look(makeCourse(10, begun, now, other), contact, DEPTH, LARGEST);
         check(rest.isBack(), "it comes back");
-        double found[3], axis[3] = {5, 0, 0};
-        balance(rest, 10, now, found);
+        const Vec3d moved = balance(rest, 10, now);
         // Across the mean of both directions.
-        const double size = sqrt(dot(other, other));
-        for (int k = 0; k < 3; k++)
-            axis[k] = axis[k]/5+(i%2 ? 1 : -1)*other[k]/size;
-        auto across = [&] (const double* v) {
-            const double along = dot(v, axis)/dot(axis, axis);
-            return Vector {v[0]-along*axis[0], v[1]-along*axis[1], v[2]-along*axis[2]};
+        const Vec3d axis = Vec3d {1, 0, 0}+other*((i%2 ? 1 : -1)/sizeOf(other));
+        auto across = [&] (const Vec3d& v) {
+            return v-axis*(v.dot(axis)/axis.squared());
         };
-        const Vector first = across(begun), last = across(found), moved = {found[0]-now[0], found[1]-now[1],
-                found[2]-now[2]};
-        checkClose(sqrt(dot(first.v, first.v)), sqrt(dot(last.v, last.v)), RADII, 1e-12,
-                "discs have their distance back");
-        const double with = (first.v[0]+last.v[0])*moved.v[0]+(first.v[1]+last.v[1])*moved.v[1]+
-                (first.v[2]+last.v[2])*moved.v[2];
-        const Vector sum = {first.v[0]+last.v[0], first.v[1]+last.v[1], first.v[2]+last.v[2]};
-        checkClose(dot(sum.v, sum.v)*dot(moved.v, moved.v), with*with, pow(RADII, 4), 1e-12,
+        const Vec3d first = across(begun), last = across(now+moved), sum = first+last;
+        checkClose(sizeOf(first), sizeOf(last), RADII, 1e-12, "discs have their distance back");
+        checkClose(sum.squared()*moved.squared(), pow(sum.dot(moved), 2), pow(RADII, 4), 1e-12,
                 "the way back is along the mean of both");
     }
 }
 
 static void testLines() {
-    const double other[3] = {0, 5, 0}, begun[3] = {0.4, 0.3, 2.5}, now[3] = {0.1, -0.2, -1}, normal[3] = {0, 0, 1};
+    const Vec3d other = {0, 5, 0}, begun = {-0.4, 0.3, 2.5}, now = {-0.1, 0.2, -1};
     ContactRest rest(4, -3);
-    rest.look(makeCourse(4, begun, now, other, normal), -3, DEPTH, LARGEST);
-    double found[3];
-    balance(rest, 4, now, found);
-    check(found[0] == now[0] && found[1] == now[1], "lines slide");
-    checkClose(2.5, found[2], RADII, 1e-12, "lines come back along the normal");
+    Contact contact = makeContact({0, 0, 1}, -3);
+    rest.look(makeCourse(4, begun, now, other), contact, DEPTH, LARGEST);
+    const Vec3d moved = balance(rest, 4, now);
+    check(moved.x == 0 && moved.y == 0, "lines slide");
+    checkClose(2.5, now.z+moved.z, RADII, 1e-12, "lines come back along the normal");
+}
+
+/** The distance of two lines which cross. */
+static double distanceOf(const SegmentPair& pair) {
+    return fabs(pair.volume())/sizeOf(pair.p.cross(pair.q));
+}
+
+/**
+ * Two lines that turn and slide in the step have their distance back to the third order of what they move, and where
+ * they come back is found again when an iteration has led them elsewhere.
+ */
+static void testTurningLines() {
+    mt19937_64 generator(2);
+    uniform_real_distribution<double> uniform(-1, 1);
+    auto random = [&] (double size) {
+        return Vec3d {size*uniform(generator), size*uniform(generator), size*uniform(generator)};
+    };
+    double worst[2];
+    for (int halved = 0; halved < 2; halved++) {
+        const double size = halved ? 0.5 : 1;
+        worst[halved] = 0;
+        generator.seed(3);
+        for (int i = 0; i < 200; i++) {
+            const SegmentPair begun = {{6, 0, 0}, {3, 5, 0}, Vec3d {-3, 2, 2.5}+random(0.3)};
+            // Both turn by up to 0.2, slide by 1, and pass through each other.
+            const SegmentPair now = {begun.p+random(0.7*size), begun.q+random(0.7*size),
+                    begun.w+random(0.6*size)+Vec3d {0, 0, -3*size}};
+            const NearestPoints nearest = findNearestPoints(now);
+            Contact contact = {nearest.s, nearest.t, {0, 0, 1}, -1, 1, false};
+            ContactRest rest(1000, -1);
+            rest.look(makeCourse(1000, begun, now), contact, 0, 10);
+            check(rest.isBack(), "turning lines come back");
+            SegmentPair found = now;
+            for (int iteration = 0; iteration < 4; iteration++) {
+                // Where they balance: a force on the first one alone, whose places all move alike.
+                const Vec3d moved = balance(rest, 1000, now.between(contact.s, contact.t));
+                found.w = now.w+moved;
+                contact.gap = 1;
+                rest.look(makeCourse(1000, begun, found), contact, 0, 10);
+            }
+            worst[halved] = max(worst[halved], fabs(distanceOf(found)-distanceOf(begun)));
+        }
+    }
+    check(worst[0] < 0.03 && worst[0] > 1e-4, "turning lines have their distance back");
+    check(worst[1] < worst[0]/5, "to the third order");
 }
 
 /** Two that lie along each other, and that have passed through each other by turning about each other. */
 static void testPassed() {
-    const double other[3] = {5, 0.5, 0}, begun[3] = {0.4, 0.3, 2.5}, now[3] = {0.1, -0.2, -1.5}, normal[3] = {0, 0, 1};
-    ContactCourse course = makeCourse(4, begun, now, other, normal);
+    const Vec3d other = {5, 0.5, 0}, begun = {0.4, 0.3, 2.5}, now = {0.1, -0.2, -1.5};
+    ContactCourse course = makeCourse(4, begun, now, other);
     course.passed = true;
     ContactRest rest(4, -3.5);
-    rest.look(course, -3.5, DEPTH, LARGEST);
+    Contact contact = makeContact({0, 0, 1}, -3.5);
+    rest.look(course, contact, DEPTH, LARGEST);
     check(rest.isBack(), "it comes back");
-    double found[3];
-    balance(rest, 4, now, found);
-    check(found[0] == now[0] && found[1] == now[1], "what has passed does not turn");
-    checkClose(2.5, found[2], RADII, 1e-12, "what has passed comes back along the normal");
+    const Vec3d moved = balance(rest, 4, now);
+    check(moved.x == 0 && moved.y == 0, "what has passed does not turn");
+    checkClose(2.5, now.z+moved.z, RADII, 1e-12, "what has passed comes back along the normal");
 }
 
 static void testSpheres() {
-    const double none[3] = {0, 0, 0}, begun[3] = {2.1, 0.3, 0.4}, now[3] = {0.2, 1.0, 0}, normal[3] = {0, 1, 0};
-    ContactCourse course = makeCourse(4, begun, now, none, normal);
-    course.along[0][0] = 0;
+    const Vec3d begun = {2.1, 0.3, 0.4}, now = {0.2, 1.0, 0};
     ContactRest rest(4, -1);
-    rest.look(course, -1, DEPTH, LARGEST);
-    double found[3];
-    balance(rest, 4, now, found);
-    checkClose(sqrt(dot(begun, begun)), sqrt(dot(found, found)), RADII, 1e-12, "spheres have their distance back");
+    Contact contact = makeContact({0, 1, 0}, -1);
+    rest.look(makeCourse(4, begun, now, {0, 0, 0}, 0), contact, DEPTH, LARGEST);
+    checkClose(sizeOf(begun), sizeOf(now+balance(rest, 4, now)), RADII, 1e-12, "spheres have their distance back");
 }
 
 /**
@@ -123,29 +155,26 @@ static void checkDiffusion(int dimensions, double step) {
     normal_distribution<double> normal(0, step);
     const double farthest = RADII+3, softness = 50;
     const int steps = 4000000, blocks = 40;
-    double r[3] = {0, RADII+1, 0}, length = dimensions == 2 ? 5 : 0, sum = 0, squares = 0;
-    const double along[3] = {length, 0, 0};
+    Vec3d r = {0, RADII+1, 0};
+    const double length = dimensions == 2 ? 5 : 0;
+    double sum = 0, squares = 0;
     for (int block = 0; block < blocks; block++) {
         double near = 0;
         for (int i = 0; i < steps/blocks; i++) {
-            double now[3] = {0, 0, 0};
-            for (int k = 3-dimensions; k < 3; k++)
-                now[k] = r[k]+normal(generator);
-            const double distance = sqrt(dot(now, now)), gap = distance-RADII;
+            const double along = dimensions == 3 ? r.x+normal(generator) : 0;
+            const double y = r.y+normal(generator), z = r.z+normal(generator);
+            const Vec3d now = {along, y, z};
+            const double distance = sizeOf(now), gap = distance-RADII;
             if (gap < 0) {
-                const double outwards[3] = {now[0]/distance, now[1]/distance, now[2]/distance};
-                ContactCourse course = makeCourse(softness, r, now, along, outwards);
-                course.along[0][0] = length;
                 ContactRest rest(softness, gap);
                 // The wall at the surface, where spheres that began outside are.
-                rest.look(course, gap, 0, LARGEST+2);
-                double found[3];
-                balance(rest, softness, now, found);
-                copy_n(found, 3, r);
+                Contact contact = makeContact(now*(1/distance), gap);
+                rest.look(makeCourse(softness, r, now, {length, 0, 0}, length), contact, 0, LARGEST+2);
+                r = now+balance(rest, softness, now);
             }
             else if (distance < farthest)
-                copy_n(now, 3, r);
-            near += sqrt(dot(r, r)) < RADII+0.5;
+                r = now;
+            near += sizeOf(r) < RADII+0.5;
         }
         near *= (double) blocks/steps;
         sum += near/blocks;
@@ -164,30 +193,29 @@ static void testDiffusion() {
     checkDiffusion(3, 0.7*RADII);
 }
 
-static void testSurface() {
-    const double other[3] = {5, 0, 0}, behind[3] = {0, 0, 1.5}, now[3] = {0, 0, 1.9}, normal[3] = {0, 0, 1};
-    ContactRest rest(4, -0.1), open(4, -0.1), resolved(0.5, -0.1);
-    rest.look(makeCourse(4, behind, now, other, normal), -0.1, DEPTH, LARGEST);
-    check(rest.isBack(), "what began behind comes to the surface");
-    double found[3];
-    balance(rest, 4, now, found);
-    checkClose(RADII, found[2], RADII, 1e-12, "at the surface");
-    const double before[3] = {0, 0, 2.5};
-    open.look(makeCourse(4, before, now, other, normal), -0.1, DEPTH, LARGEST);
+static void testWall() {
+    const Vec3d other = {5, 0, 0}, behind = {0, 0, 1.5}, deeper = {0, 0, 1.4}, now = {0, 0, 1.9};
+    ContactRest rest(4, -0.6), open(4, -0.1), resolved(0.5, -0.1);
+    Contact contact = makeContact({0, 0, 1}, -0.6);
+    rest.look(makeCourse(4, behind, deeper, other), contact, DEPTH, LARGEST);
+    check(rest.isBack(), "what began behind comes to the wall");
+    checkClose(RADII-DEPTH, deeper.z+balance(rest, 4, deeper).z, RADII, 1e-12, "at the wall");
+    contact = makeContact({0, 0, 1}, -0.1);
+    open.look(makeCourse(4, behind, now, other), contact, DEPTH, LARGEST);
     check(!open.isBack(), "less than the depth behind the surface is no overlap");
     check(resolved.isResolved() && resolved.getGap() > 0 && resolved.getGap() < 0.1, "short steps resolve");
     check(!ContactRest().isKnown(), "not looked at");
     // What comes from far away comes back no farther than it is told.
-    const double far[3] = {0, 0, 50};
+    const Vec3d far = {0, 0, 50}, deep = {0, 0, 1};
     ContactRest limited(4, -1);
-    limited.look(makeCourse(4, far, now, other, normal), -1, DEPTH, LARGEST);
-    balance(limited, 4, now, found);
-    checkClose(RADII+LARGEST, found[2], RADII, 1e-12, "not too far");
+    contact = makeContact({0, 0, 1}, -1);
+    limited.look(makeCourse(4, far, deep, other), contact, DEPTH, LARGEST);
+    checkClose(RADII+LARGEST, deep.z+balance(limited, 4, deep).z, RADII, 1e-12, "not too far");
 }
 
 int main() {
     try {
-        for (auto test : {testDiscs, testLines, testPassed, testSpheres, testDiffusion, testSurface})
+        for (auto test : {testDiscs, testLines, testTurningLines, testPassed, testSpheres, testDiffusion, testWall})
             test();
     }
     catch (const exception& error) {
