@@ -324,8 +324,9 @@ void ContactEquations::evaluate(int number, bool first, const PairOutlook* outlo
             side.rest = ContactRest(softness, first ? max(contact.gap, -LARGEST_RETURN*diameter) : 0);
         }
         const bool late = iterations > RETURNING_ITERATIONS;
-        const bool isLookedAt = side.rest.isBack() ? !late : contact.gap < 0 && (!late || contact.crossed);
-        if (isLookedAt && !side.rest.isResolved()) {
+        if (side.rest.isInMiddle() && !late)
+            side.rest.follow(pairs.getSegments(number, false), pairs.getSegments(number, true), contact);
+        else if (!side.rest.isResolved() && !side.rest.isBack() && contact.gap < 0 && (!late || contact.crossed)) {
             const double softness = softnessOf(pair, contact);
             side.rest.look({pairs.getSegments(number, false), pairs.getSegments(number, true), diameter, softness, late},
                     contact, wallDepth, LARGEST_RETURN*diameter);

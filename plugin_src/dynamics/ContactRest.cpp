@@ -1,4 +1,5 @@
 #include "dynamics/ContactRest.h"
+#include "couplings/Crossings.h"
 #include "dynamics/RestGap.h"
 #include "dynamics/SymmetricMatrices.h"
 #include <algorithm>
@@ -49,15 +50,14 @@ Vec3d normalOf(const Contact& contact) {
  *
  * @return false if the normal is another one there: then the contact stays where it is
  */
-bool placeInMiddle(const ContactCourse& course, Contact& contact) {
-    const SegmentPair &x = course.begun, &y = course.now;
-    const SegmentPair middle = {(x.p+y.p)*0.5, (x.q+y.q)*0.5, (x.w+y.w)*0.5};
+bool placeInMiddle(const SegmentPair& begun, const SegmentPair& now, bool passed, Contact& contact) {
+    const SegmentPair middle = interpolate(begun, now, 0.5);
     const NearestPoints nearest = findNearestPoints(middle);
     Vec3d normal = middle.p.cross(middle.q);
     const bool cross = normal.squared() > LARGEST_SINE*LARGEST_SINE*middle.p.squared()*middle.q.squared() &&
             nearest.s > 0 && nearest.s < 1 && nearest.t > 0 && nearest.t < 1;
     // What has passed is on neither side there.
-    if (!cross && course.passed)
+    if (!cross && passed)
         return false;
     normal = normalized(cross ? normal : middle.between(nearest.s, nearest.t));
     const double cosine = normal.dot(normalOf(contact));
@@ -80,13 +80,6 @@ ContactRest::ContactRest(double softness, double predicted) : softness(softness)
 }
 
 void ContactRest::look(const ContactCourse& course, Contact& contact, double depth, double largest) {
-    if (back) {
-        if (followsMiddle && placeInMiddle(course, contact)) {
-            normal = normalOf(contact);
-            target = normal.dot(course.begun.between(contact.s, contact.t))+beyond;
-        }
-        return;
-    }
     if (!(contact.gap < -depth))
         return;
     back = true;
@@ -101,24 +94,31 @@ void ContactRest::look(const ContactCourse& course, Contact& contact, double dep
             normal = normalOf(contact);
     }
     else {
-        followsMiddle = placeInMiddle(course, contact);
+        inMiddle = placeInMiddle(course.begun, course.now, course.passed, contact);
         normal = normalOf(contact);
         begun = course.begun.between(contact.s, contact.t);
         now = course.now.between(contact.s, contact.t);
-        distance = followsMiddle ? sqrt(findNearestPoints(course.begun).squared) : normal.dot(begun);
+        distance = inMiddle ? sqrt(findNearestPoints(course.begun).squared) : normal.dot(begun);
     }
     const double before = distance-course.radii;
     double wanted = normal.dot(begun);
     if (!(before > -depth)) {
         wanted = course.radii-depth;
-        followsMiddle = false;
+        inMiddle = false;
     }
     else if (before > largest) {
         wanted = min(wanted, course.radii+largest);
-        followsMiddle = false;
+        inMiddle = false;
     }
     beyond = (wanted-normal.dot(now))/(STIFFENING*course.softness);
     target = wanted+beyond;
+}
+
+void ContactRest::follow(const SegmentPair& begun, const SegmentPair& now, Contact& contact) {
+    if (placeInMiddle(begun, now, false, contact)) {
+        normal = normalOf(contact);
+        target = normal.dot(begun.between(contact.s, contact.t))+beyond;
+    }
 }
 
 void ContactRest::findForce(const Vec3d& now, double stiffness, double* force, double* projection) const {

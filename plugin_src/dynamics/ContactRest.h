@@ -75,14 +75,19 @@ public:
         return gap;
     }
     /**
-     * Look where an iteration has led a contact that is not resolved: it may come back from now on. Where lines that come
-     * back to where they began are nearest in the middle of the step is found again.
+     * Look where an iteration has led a contact that is not resolved: it may come back from now on.
      *
-     * @param contact  receives the places and the normal of one that comes back
+     * @param contact  receives the places and the normal of lines that come back
      * @param depth    d
      * @param largest  the largest gap that it comes back to
      */
     void look(const ContactCourse& course, Contact& contact, double depth, double largest);
+    /** Get whether it comes back to where the step began, as lines do. */
+    bool isInMiddle() const {
+        return inMiddle;
+    }
+    /** Find anew where such lines are nearest in the middle of the step. */
+    void follow(const SegmentPair& begun, const SegmentPair& now, Contact& contact);
     /** Find the force on the first capsule where r is now, and K n nT. */
     void findForce(const Vec3d& now, double stiffness, double* force, double* projection) const;
     /** K/k. */
@@ -90,9 +95,7 @@ public:
 private:
     static constexpr double LEAST_STIFF = 1;
     double softness = -1, gap = 0;
-    bool back = false;
-    /** Whether it comes back to where the step began, as lines. */
-    bool followsMiddle = false;
+    bool back = false, inMiddle = false;
     Vec3d normal;
     /** b, and by how much it is beyond where the contact comes back to. */
     double target, beyond;

@@ -113,8 +113,7 @@ static void testTurningLines() {
                 // Where they balance: a force on the first one alone, whose places all move alike.
                 const Vec3d moved = balance(rest, 1000, now.between(contact.s, contact.t));
                 found.w = now.w+moved;
-                contact.gap = 1;
-                rest.look(makeCourse(1000, begun, found), contact, 0, 10);
+                rest.follow(begun, found, contact);
             }
             worst[halved] = max(worst[halved], fabs(distanceOf(found)-distanceOf(begun)));
         }
