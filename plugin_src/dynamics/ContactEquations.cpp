@@ -39,9 +39,9 @@ const double LEAST_CHANGE = 3e-3;
 /** The number of iterations that look where capsules touch. */
 const int SEARCHING_ITERATIONS = 4;
 /**
- * Up to this iteration, contacts that would be behind their surface come back, and are placed. The first of them knows where the step
- * leads without contacts, others what those that come back change of it. With all of them, bends of a dense bundle have
- * 1.5 % too little energy in equilibrium; with two, a bundle that motors contract is bent too much by a tenth.
+ * Up to this iteration, contacts that would be behind their surface come back, and are placed. The first of them knows
+ * where the step leads without contacts, others what those that come back change of it. With all of them, steps of a
+ * dense bundle take two iterations more, and bends had 1.5 % too little energy in equilibrium.
  */
 const int RETURNING_ITERATIONS = 3;
 /** The number of iterations in which a contact may pass to a neighbour. */
@@ -328,8 +328,8 @@ void ContactEquations::evaluate(int number, bool first, const PairOutlook* outlo
             side.rest.follow(pairs.getSegments(number, false), pairs.getSegments(number, true), contact);
         else if (!side.rest.isResolved() && !side.rest.isBack() && contact.gap < 0 && (!late || contact.crossed)) {
             const double softness = softnessOf(pair, contact);
-            side.rest.look({pairs.getSegments(number, false), pairs.getSegments(number, true), diameter, softness, late},
-                    contact, wallDepth, LARGEST_RETURN*diameter);
+            const SegmentPair begun = pairs.getSegments(number, false), now = pairs.getSegments(number, true);
+            side.rest.look({begun, now, diameter, softness, late}, contact, wallDepth, LARGEST_RETURN*diameter);
         }
         // Where contacts are not looked for any more, anyCross() sees whether they have come back.
         if (contact.crossed && iterations < SEARCHING_ITERATIONS)

@@ -27,15 +27,18 @@ struct ContactCourse {
  *
  *     K n (b-n.r),   b = n.r0+(n.r0-n.r*)/(K c),   K = 5 k,
  *
- * in the rest of the step. Here r is the vector between two places, one on each capsule; r0 is that of the beginning, and
- * r* that where an iteration has led. Two that cross at an angle are lines, which cannot pass each other along their
- * normal. The places and n are those where they are nearest in the middle of the step: then their distance comes back to
- * the third order of what they move, although they turn and slide along each other. With n and the places of r*, or of
- * r0, it would differ by nanometers, which bends a dense bundle.
- * Two capsules that lie along each other are discs: r0 and r* are those across them, and n has the direction of r0+r*. Then
+ * in the rest of the step. Here r is the vector between two places, one on each capsule; r0 is that of the beginning,
+ * and r* that where an iteration has led. What began behind the wall is brought to the wall.
+ *
+ * Two that cross at an angle are lines, which cannot pass each other along their normal. The places and n are those
+ * where they are nearest in the middle of the step: then their distance comes back to the third order of what they
+ * move, although they turn and slide along each other. With n and the places of the end, or of the beginning, it would
+ * differ by nanometers, which bends a dense bundle.
+ *
+ * Two that lie along each other are discs: r0 and r* are those across them, and n has the direction of r0+r*. Then
  * n.r = n.r0, and along the surface t.r = t.r* = -t.r0: they have their distance back, and have turned about each other
  * as far as they wanted to. n along r0 or r* would not do for discs, for it turns in the step. Spheres are as discs
- * are. What began behind the wall is brought to the wall.
+ * are.
  *
  * This is a move that Metropolis refuses. Where a step without contacts keeps detailed balance and is linear, one in
  * which n.r comes back to n.r0 keeps it, too: with y = y*+C n (n C n)^-1 (n.r0-n.r*), and C the response of the step to

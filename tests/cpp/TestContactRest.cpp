@@ -1,8 +1,8 @@
 /**
  * This tests where contacts come back to: discs and spheres to their distance, lines along the normal that they have in
- * the middle of the step, so that their distance comes back although they turn and slide, and what began behind the wall
- * to the wall. The responses are those of free motion, so that what comes back gets exactly to where it belongs. Discs and
- * spheres that diffuse in steps as long as their radius have no preferred distance.
+ * the middle of the step, so that their distance comes back although they turn and slide, and what began behind the
+ * wall to the wall. The responses are those of free motion, so that what comes back gets exactly to where it belongs.
+ * Discs and spheres that diffuse in steps as long as their radius have no preferred distance.
  */
 
 #include "TestChains.h"
