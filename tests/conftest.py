@@ -26,14 +26,22 @@ def pytest_report_header():
 
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items):
+def pytest_collection_modifyitems(config, items):
     """Of cases with a sample, those that are not in it are exhaustive: slow ones that run before a release."""
+    has_cases = {}
     for item in items:
         sample = item.get_closest_marker("sample")
-        if sample and not re.search(sample.args[0], item.callspec.id):
-            item.add_marker("exhaustive")
+        if sample:
+            test, taken = item.nodeid.partition("[")[0], re.search(sample.args[0], item.callspec.id)
+            has_cases[test] = has_cases.get(test, False) or bool(taken)
+            if not taken:
+                item.add_marker("exhaustive")
         if item.get_closest_marker("exhaustive"):
             item.add_marker("slow")
+    # Who names single cases may name those outside the sample.
+    if not any("::" in argument for argument in config.args):
+        for test in [test for test, has_case in has_cases.items() if not has_case]:
+            raise pytest.UsageError(f"{test}: its sample is none of its cases")
 
 
 @pytest.fixture(params=PLATFORMS, scope="session")
