@@ -50,20 +50,16 @@ static void check(const BeamChain& chain, int index) {
             throw invalid_argument(name+" has a tether at node "+to_string(tether.node)+", which it has not");
 }
 
-static void setProperties(BeamPack& pack, int lane, const BeamChain& chain) {
-    const double properties[] = {chain.elementLength, chain.stretchingModulus, chain.bendingRigidity,
-            chain.shortening, chain.parallelFriction, chain.perpendicularFriction, chain.propulsion};
-    for (int property = 0; property < BeamPack::NumProperties; property++)
-        pack.properties[property*pack.lanes+lane] = properties[property];
-}
-
 static void fillLane(BeamPack& pack, int lane, const BeamChain& chain, int index, int firstNoise) {
     const int lanes = pack.lanes;
     pack.chain[lane] = index;
     pack.noiseChain[lane] = firstNoise+index;
     pack.nodesOfLane[lane] = chain.numElements()+1;
-    setProperties(pack, lane, chain);
+    const double properties[] = {chain.elementLength, chain.stretchingModulus, chain.bendingRigidity,
+            chain.shortening, chain.parallelFriction, chain.perpendicularFriction, chain.propulsion};
     pack.propelled |= chain.propulsion != 0;
+    for (int property = 0; property < BeamPack::NumProperties; property++)
+        pack.properties[property*lanes+lane] = properties[property];
     for (int place = 0; place < 2*pack.nodesOfLane[lane]; place++) {
         const size_t i = place%chain.particles.size();
         pack.particles[place*lanes+lane] = chain.particles[i];
@@ -77,33 +73,31 @@ static void fillLane(BeamPack& pack, int lane, const BeamChain& chain, int index
         pack.tethers.push_back({chain.tethers[number], lane, (int) number});
 }
 
-/** The most lanes that all have one of some chains, but no fewer than packs of several chains have. */
+/** The largest power of two that is not above a number of chains: these packs have no lanes without a chain. */
 static int lanesForBeams(int chains) {
-    int lanes = lanesFor(min(chains, LEAST_LANES), kernels().lanes);
+    int lanes = 1;
     while (2*lanes <= chains)
         lanes *= 2;
     return lanes;
 }
 
-static BeamPack packed(const vector<BeamChain>& chains, const int* members, int count, int lanes, int firstNoise) {
+static BeamPack packed(const vector<BeamChain>& chains, const int* members, int lanes, int firstNoise) {
     BeamPack pack;
     const BeamChain& longest = chains[members[0]];
     pack.lanes = lanes;
     pack.nodes = longest.numElements()+1;
     pack.planar = longest.planar;
     pack.closed = longest.closed;
-    pack.chain.resize(lanes, -1);
-    pack.noiseChain.resize(lanes, 0);
+    pack.chain.resize(lanes);
+    pack.noiseChain.resize(lanes);
     pack.nodesOfLane.resize(lanes);
     pack.free.resize(lanes);
     pack.properties.resize((size_t) BeamPack::NumProperties*lanes);
     pack.particles.resize((size_t) 2*pack.nodes*lanes, -1);
     pack.mobile.resize((size_t) 2*pack.nodes*lanes, 0.0);
     pack.present.resize((size_t) pack.nodes*lanes, 0.0);
-    for (int lane = 0; lane < count; lane++)
+    for (int lane = 0; lane < lanes; lane++)
         fillLane(pack, lane, chains[members[lane]], members[lane], firstNoise);
-    for (int lane = count; lane < lanes; lane++)
-        setProperties(pack, lane, longest);
     stable_sort(pack.tethers.begin(), pack.tethers.end(), [] (const BeamTether& a, const BeamTether& b) {
         return a.node < b.node;
     });
@@ -143,9 +137,9 @@ BeamEngine::BeamEngine(const vector<BeamChain>& chains, int firstNoise) : implem
                 chains[order[first+fitting]].planar == longest.planar &&
                 chains[order[first+fitting]].closed == longest.closed)
             fitting++;
-        const int lanes = lanesForBeams(fitting), count = min(fitting, lanes);
-        implementation->packs.push_back(packed(chains, &order[first], count, lanes, firstNoise));
-        first += count;
+        const int lanes = lanesForBeams(fitting);
+        implementation->packs.push_back(packed(chains, &order[first], lanes, firstNoise));
+        first += lanes;
     }
 }
 

@@ -7,7 +7,6 @@
 
 #include "beams/BeamPack.h"
 #include "beams/ElementPlace.h"
-#include "dynamics/PackPlaces.h"
 #include "dynamics/PackStep.h"
 #include "lanes/Noise.h"
 #include "mechanics/BackgroundFlow.h"
@@ -97,7 +96,7 @@ template <int W> ChainEnergy addForcesTo(const BeamPack& pack, const double* pos
 template <int W = CYLCHAIN_LANES, class Function> auto withLanesOf(const BeamPack& pack, Function function) {
     if constexpr (W > 1)
         if (pack.lanes < W)
-            return withLanesOf<(W > LEAST_LANES ? W/2 : 1)>(pack, function);
+            return withLanesOf<W/2>(pack, function);
     return function(std::integral_constant<int, W>());
 }
 

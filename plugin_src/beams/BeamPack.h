@@ -15,8 +15,8 @@ struct BeamTether : Tether {
 
 /**
  * Chains of beam elements side by side: the numbers of all chains for one node lie next to each other, one in each
- * lane. Chains that are shorter than the longest one, and lanes without a chain, are filled up with elements that have
- * neither energy nor friction, with nodes that are fixed.
+ * lane. Chains that are shorter than the longest one are filled up with elements that have neither energy nor friction,
+ * with nodes that are fixed.
  *
  * Rings are unrolled: their first node comes once more behind the last one, as a node with the same particles. All
  * rings of a pack have the same number of nodes.
@@ -28,7 +28,7 @@ struct BeamPack {
     bool planar, closed;
     /** Whether any chain has a propulsion. */
     bool propelled = false;
-    /** The number of each lane's chain, or -1, that by which its noise is known, and that of its nodes. */
+    /** The number of each lane's chain, that by which its noise is known, and that of its nodes. */
     std::vector<int> chain, noiseChain, nodesOfLane;
     /** Particle of each position and control point, [2*node, 2*node+1][lane]; -1 for one that only fills up. */
     std::vector<int> particles;

@@ -518,44 +518,6 @@ static void testNeighbours() {
     checkClose(x[3*chains[4].particles[1]], together[3*chains[4].particles[1]], 1, 0, "a clamp");
 }
 
-/** A pack of two or three chains has empty lanes, which change neither forces, nor energies, nor iterations. */
-static void testEmptyLanes() {
-    for (int count : {2, 3}) {
-        Array x;
-        vector<BeamChain> chains;
-        for (int i = 0; i < count; i++)
-            chains.push_back(beam(6-i%2, 1, 1e4, 20, x));
-        const Array bent = checkNeighbours(chains, x, "a chain beside empty lanes");
-        const BeamEngine engine(chains);
-        const int lanesOfBaseline = 2;
-        const bool together = count <= lanesOfBaseline || ChainEngine::getInstructionSet() != "baseline";
-        check(engine.getNumPacks() == (together ? 1 : 2), "few chains do not share a pack");
-        const StepSettings settings = {Scheme::Implicit, 1, 1e-3, 5, 0};
-        const Array zero(x.size());
-        Array unused(x.size()), expected(x.size()), forces(x.size());
-        double energy = 0;
-        int iterations = 0;
-        for (int i = 0; i < count; i++) {
-            const BeamEngine alone({chains[i]}, i);
-            energy += energyOf(alone, bent);
-            alone.addForces(0, bent.data(), expected.data(), NULL, false);
-            iterations = max(iterations,
-                    alone.step(0, bent.data(), zero.data(), NULL, settings, unused.data()).iterations);
-        }
-        checkClose(energy, energyOf(engine, bent), energy, 1e-12, "energy beside empty lanes");
-        int iterationsTogether = 0;
-        for (int pack = 0; pack < engine.getNumPacks(); pack++) {
-            engine.addForces(pack, bent.data(), forces.data(), NULL, false);
-            const Instability found = engine.step(pack, bent.data(), zero.data(), NULL, settings, unused.data());
-            iterationsTogether = max(iterationsTogether, found.iterations);
-            check(found.chain == -1 && found.divided == 0, "an empty lane takes its step in parts");
-        }
-        check(iterations == iterationsTogether, "an empty lane needs other iterations");
-        for (size_t k = 0; k < x.size(); k++)
-            checkClose(expected[k], forces[k], 1e4, 1e-9, "forces beside empty lanes");
-    }
-}
-
 /** Chains that stay in a plane do, and parts of a step follow its path. */
 static void testPlaneAndParts() {
     Array x;
@@ -657,5 +619,5 @@ static void testFailures() {
 int main() {
     return runTests({testForces, testTethers, testPlacesOfElements, testEnergyOfShapes, testCantilevers, testCouple,
             testBuckling, testFriction, testPropulsion, testMobility, testNoise, testRods, testNeighbours,
-            testEmptyLanes, testPlaneAndParts, testFlow, testFailures});
+            testPlaneAndParts, testFlow, testFailures});
 }
