@@ -37,7 +37,7 @@ def test_motors_shorten_a_bundle_and_crosslinkers_alone_do_not():
     assert with_motors.mean() > 0.08
     assert abs(without.mean()) < 0.25 * with_motors.mean()
     assert 3 * error < with_motors.mean()
-    assert abs(with_motors.mean() - in_short_steps.mean()) < 4 * error
+    assert abs(with_motors.mean() - in_short_steps.mean()) < 3 * error
 
 
 BEAM = replace(MICROTUBULE, segment_length=1000.0, extension_relaxation_time=None, element="beam")
