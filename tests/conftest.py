@@ -40,8 +40,9 @@ def pytest_collection_modifyitems(config, items):
             item.add_marker("slow")
     # Who names single cases may name those outside the sample.
     if not any("::" in argument for argument in config.args):
-        for test in [test for test, has_case in has_cases.items() if not has_case]:
-            raise pytest.UsageError(f"{test}: its sample is none of its cases")
+        for test, has_case in has_cases.items():
+            if not has_case:
+                raise pytest.UsageError(f"{test}: its sample is none of its cases")
 
 
 @pytest.fixture(params=PLATFORMS, scope="session")
