@@ -1,12 +1,14 @@
 """The console script ``openmm-cylchain``: runs a configuration, explains its time step, measures, reproduces, informs.
 
 Exit codes: 0 done, 1 the simulation blew up, a file could not be written or results are not reproduced, 2 wrong input,
-3 a time step is wrong, 130 and 143 interrupted by SIGINT and SIGTERM.
+3 a time step is wrong, 130 and 143 interrupted by SIGINT and SIGTERM, 141 what read the output has ended.
 """
 
 import argparse
 import json
 import math
+import os
+import select
 import sys
 import warnings
 from dataclasses import replace
@@ -21,6 +23,8 @@ from .scans import command as scans
 from .version import __version__
 
 _FAILED, _WRONG_INPUT, _WRONG_STEP, _KEYBOARD_INTERRUPT = 1, 2, 3, 130
+_OUTPUT_CLOSED = 141
+"""As a shell has it for SIGPIPE."""
 _SECONDS_OF_CHECK = 20.0
 
 
@@ -41,6 +45,7 @@ def main(arguments=None):
         )
         try:
             options.command(options)
+            sys.stdout.flush()
         except InputError as error:
             _say("error", error)
             return _WRONG_INPUT
@@ -48,6 +53,10 @@ def main(arguments=None):
             _say("error", error)
             return _FAILED
         except OSError as error:
+            if isinstance(error, BrokenPipeError) and _output_is_closed():
+                if _resumable(options):
+                    _say("error", "what read the output has ended, and so has the run: continue it with --resume.")
+                return _OUTPUT_CLOSED
             hint = (
                 " A run that has been interrupted by this can be continued with --resume."
                 if _resumable(options)
@@ -64,6 +73,18 @@ def main(arguments=None):
         except SystemExit as exit_request:
             return exit_request.code
     return 0
+
+
+def _output_is_closed():
+    # Whether nobody reads it any more, as after "head". Then Python must not try once more when it ends.
+    output = sys.stdout.fileno()
+    if hasattr(select, "poll"):
+        poll = select.poll()
+        poll.register(output, 0)
+        if not poll.poll(0):
+            return False
+    os.dup2(os.open(os.devnull, os.O_WRONLY), output)
+    return True
 
 
 def _has_lost_its_directory(options):

@@ -7,6 +7,7 @@ import os
 import re
 import shutil
 import signal
+import subprocess
 
 import mdtraj
 import numpy as np
@@ -21,7 +22,7 @@ from openmm_cylchain.runs.run import create_filaments, run
 from openmm_cylchain.runs.run_directory import RunDirectory, read_energies
 from openmm_cylchain.runs.summary import format_summary, load_trajectory, summarise
 from support.checkpoints import resealed
-from support.commands import finish, start, wait_for_size
+from support.commands import COMMAND, finish, start, wait_for_size
 from support.contexts import positions_of
 
 SHORT = """
@@ -440,6 +441,26 @@ def test_signals_end_a_run_with_a_checkpoint(tmp_path, unbroken, number, code):
     assert "--resume" in errors and "Traceback" not in errors
     assert main(["run", text, "--output", str(output), "--resume"]) == 0
     assert_same_run(output, unbroken)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes of POSIX")
+def test_output_that_nobody_reads_ends_a_run_which_goes_on_with_resume(tmp_path, unbroken):
+    output, text = tmp_path / "out", configured(tmp_path)
+    process = start(text, output)
+    process.stdout.close()
+    errors = process.stderr.read()
+    assert process.wait(timeout=60) == 141
+    assert errors.count("error: ") == 1 and "--resume" in errors and "Exception" not in errors, errors
+    assert main(["run", text, "--output", str(output), "--resume"]) == 0
+    assert_same_run(output, unbroken)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes of POSIX")
+def test_output_that_nobody_reads_is_no_error(tmp_path):
+    process = subprocess.Popen([*COMMAND[:-1], "schema"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process.stdout.close()
+    assert process.stderr.read() == ""
+    assert process.wait(timeout=60) == 141
 
 
 def test_blow_up_is_reported_and_leaves_no_broken_frame(tmp_path, capsys):
