@@ -22,9 +22,7 @@ from .runs.beginnings import START_NAMES
 from .scans import command as scans
 from .version import __version__
 
-_FAILED, _WRONG_INPUT, _WRONG_STEP, _KEYBOARD_INTERRUPT = 1, 2, 3, 130
-_OUTPUT_CLOSED = 141
-"""As a shell has it for SIGPIPE."""
+_FAILED, _WRONG_INPUT, _WRONG_STEP, _KEYBOARD_INTERRUPT, _OUTPUT_CLOSED = 1, 2, 3, 130, 141
 _SECONDS_OF_CHECK = 20.0
 
 
@@ -76,14 +74,17 @@ def main(arguments=None):
 
 
 def _output_is_closed():
-    # Whether nobody reads it any more, as after "head". Then Python must not try once more when it ends.
-    output = sys.stdout.fileno()
-    if hasattr(select, "poll"):
-        poll = select.poll()
-        poll.register(output, 0)
-        if not poll.poll(0):
-            return False
-    os.dup2(os.open(os.devnull, os.O_WRONLY), output)
+    # Whether nobody reads it any more, as after "head": a pipe to another program may break as well.
+    if sys.stdout is not sys.__stdout__ or not hasattr(select, "poll"):
+        return False
+    poll = select.poll()
+    poll.register(sys.stdout, 0)
+    if not poll.poll(0):
+        return False
+    # Python writes what is left once more when it ends.
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, sys.stdout.fileno())
+    os.close(nowhere)
     return True
 
 
