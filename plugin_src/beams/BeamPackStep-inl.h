@@ -40,11 +40,11 @@ public:
         step->eliminate(y, &terms);
         terms.gather(step->getChange(), moves);
     }
-    using PackStep::respond;
     void respond(const double* forces, double* moves) override {
-        terms.spread(forces, pack.nodes, ofPlaces);
-        step->respond(ofPlaces, moved);
-        terms.gather(moved, moves);
+        respondAs(forces, moves);
+    }
+    void respond(const float* forces, float* moves) override {
+        respondAs(forces, moves);
     }
     void findCompliances(double* compliances) override {
         terms.findCompliances(step->getEquations(), compliances);
@@ -105,6 +105,12 @@ private:
     const CouplingTerm* given;
     std::vector<CouplingTerm> joints;
     int iteration;
+
+    template <class Number> void respondAs(const Number* forces, Number* moves) {
+        terms.spread(forces, pack.nodes, ofPlaces);
+        step->respond(ofPlaces, moved);
+        terms.gather(moved, moves);
+    }
 
     /**
      * Eliminate once more for the metric forces, which need to know how strains respond to tensions: with places that

@@ -48,20 +48,25 @@ public:
             addForce(next, term.force, right);
         }
     }
-    /** Find what forces on the places of the terms, three numbers for each, are on positions and control vectors. */
-    void spread(const double* forces, int nodes, Six* ofNodes) const {
+    /** Find what forces on the places of the terms are on positions and control vectors. */
+    template <class Number> void spread(const Number* forces, int nodes, Six* ofNodes) const {
         std::fill(ofNodes, ofNodes+nodes, Six {});
-        for (int i = 0; i < numTerms; i++)
-            addForce(i, forces+3*i, ofNodes);
+        for (int i = 0; i < numTerms; i++) {
+            double force[3];
+            for (int k = 0; k < 3; k++)
+                force[k] = forces[TermBlocks::place(i, k)];
+            addForce(i, force, ofNodes);
+        }
     }
     /** Find how places move with the nodes. */
-    void gather(const Six* ofNodes, double* moves) const {
+    template <class Number> void gather(const Six* ofNodes, Number* moves) const {
         for (int i = 0; i < numTerms; i++) {
             const Scalar* const first = numbersOf(ofNodes[terms[i].node], terms[i].lane);
             const Scalar* const second = numbersOf(ofNodes[terms[i].node+1], terms[i].lane);
             const double* const w = weights[i].of;
             for (int k = 0; k < 3; k++)
-                moves[3*i+k] = w[0]*first[k*W]+w[1]*first[(3+k)*W]+w[2]*second[k*W]+w[3]*second[(3+k)*W];
+                moves[TermBlocks::place(i, k)] =
+                        w[0]*first[k*W]+w[1]*first[(3+k)*W]+w[2]*second[k*W]+w[3]*second[(3+k)*W];
         }
     }
     /** Find how a force on the place of each term moves it: see PackStep::findCompliances(). */

@@ -1,11 +1,10 @@
 #include "dynamics/CoupledEquations.h"
 #include "dynamics/SymmetricMatrices.h"
+#include "dynamics/TermBlocks.h"
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
-#include <cstring>
-#include <numeric>
-#include <type_traits>
+#include <utility>
 
 using namespace cylchain;
 using namespace std;
@@ -32,46 +31,8 @@ const double OF_TENSIONS = 2e-4;
  * The least energy is that of all packs then, because a single coupling may have it.
  */
 const double STIFF = 2e3, OF_STIFF = 10;
-const int LARGEST_NUMBER_OF_ITERATIONS = 1000;
-/** Where energies grow by more, single precision has rounded away what matters: in stiff links of free particles. */
-const double LARGEST_GROWTH = 1e6;
 /** Equations that a thread looks at together. */
 const int CHUNK_OF_EQUATIONS = 256;
-/** What a term far from the processor's caches shows is asked for this many terms ahead. */
-const int AHEAD = 16;
-
-/** Vectors in registers: the fourth number is none of theirs. */
-template <class Real> struct Four {
-    typedef Real Type __attribute__((vector_size(4*sizeof(Real))));
-    static Type load(const Real* values) {
-        Type result;
-        memcpy(&result, values, sizeof(result));
-        return result;
-    }
-};
-
-/** In lanes, as compilers may not add in another order. */
-template <class Real> double sumOfProducts(const Real* a, const Real* b, int first, int last) {
-    const int LANES = 8;
-    double sums[LANES] = {};
-    for (; first+LANES <= last; first += LANES)
-        for (int lane = 0; lane < LANES; lane++)
-            sums[lane] += (double) a[first+lane]*b[first+lane];
-    for (int lane = 0; first < last; first++, lane++)
-        sums[lane] += (double) a[first]*b[first];
-    double sum = 0;
-    for (double ofLane : sums)
-        sum += ofLane;
-    return sum;
-}
-
-inline void respondTo(PackStep& pack, const double* forces, int, double* moves) {
-    pack.respond(forces, moves);
-}
-
-inline void respondTo(PackStep& pack, const float* forces, int numTerms, float* moves) {
-    pack.respond(forces, numTerms, moves);
-}
 
 } // namespace
 
@@ -107,26 +68,31 @@ void CoupledEquations::sortPlaces(const vector<CouplingEquation>& equations, con
     });
     for (int pack = 0; pack < numPacks; pack++)
         firstOfPack[pack+1] += firstOfPack[pack];
-    firstOfNode.assign(firstOfPack[numPacks]+1, 0);
+    firstOfNode.assign(firstOfPack[numPacks], 0);
     forPlaces([&] (const PlaceOnChain& place, size_t, int) {
-        firstOfNode[firstOfPack[place.pack]+place.node+1]++;
+        firstOfNode[firstOfPack[place.pack]+place.node]++;
     });
-    for (size_t i = 1; i < firstOfNode.size(); i++)
-        firstOfNode[i] += firstOfNode[i-1];
-    const size_t count = firstOfNode.back();
-    firstTerms.resize(numPacks+1);
-    for (int pack = 0; pack <= numPacks; pack++)
-        firstTerms[pack] = firstOfNode[firstOfPack[pack]];
-    terms.resize(count);
-    partners.resize(count);
-    coupled.assign(numPacks, 0);
+    gathered.first.resize(numPacks+1);
+    gathered.count.resize(numPacks);
+    gathered.first[0] = 0;
+    for (int pack = 0; pack < numPacks; pack++) {
+        int next = gathered.first[pack];
+        for (int node = firstOfPack[pack]; node < firstOfPack[pack+1]; node++)
+            next += exchange(firstOfNode[node], next);
+        gathered.count[pack] = next-gathered.first[pack];
+        gathered.first[pack+1] = gathered.first[pack]+TermBlocks::fill(gathered.count[pack]);
+    }
+    const size_t count = gathered.getNumTerms();
+    gathered.terms.resize(count);
+    gathered.partners.resize(count);
+    gathered.coupled.assign(numPacks, 0);
     change.resize(3*count);
     found.resize(3*count);
     termOf.assign(2*equations.size(), -1);
     forPlaces([&] (const PlaceOnChain& place, size_t i, int side) {
         termOf[2*i+side] = firstOfNode[firstOfPack[place.pack]+place.node]++;
         if (termOf[2*i+1-side] >= 0)
-            coupled[place.pack] = coupled[equations[i].places[1-side].pack] = 1;
+            gathered.coupled[place.pack] = gathered.coupled[equations[i].places[1-side].pack] = 1;
     });
     activeOfTerms = active;
     sortedPlaces.resize(termOf.size());
@@ -140,14 +106,13 @@ void CoupledEquations::gatherTerms(const vector<CouplingEquation>& equations, co
             const Loop& loop) {
     if (!hasSamePlaces(equations, active, loop))
         sortPlaces(equations, active);
-    sums.assign(active.size(), 0.0);
     runInChunks(loop, termOf.size(), CHUNK_OF_EQUATIONS, [&] (int number) {
         if (termOf[number] < 0)
             return;
         const int i = number/2, side = number%2;
         const PlaceOnChain& place = equations[i].places[side];
-        CouplingTerm& term = terms[termOf[number]];
-        partners[termOf[number]] = termOf[2*i+1-side];
+        CouplingTerm& term = gathered.terms[termOf[number]];
+        gathered.partners[termOf[number]] = termOf[2*i+1-side];
         term.node = place.node;
         term.lane = place.lane;
         term.fraction = place.fraction;
@@ -155,13 +120,6 @@ void CoupledEquations::gatherTerms(const vector<CouplingEquation>& equations, co
             term.force[k] = side == 0 ? equations[i].force[k] : -equations[i].force[k];
         copy(equations[i].stiffness, equations[i].stiffness+6, term.stiffness);
     });
-}
-
-double CoupledEquations::total() const {
-    double sum = 0;
-    for (double ofPack : sums)
-        sum += ofPack;
-    return sum;
 }
 
 bool CoupledEquations::solve(const vector<PackStep*>& packs, const PackFlags& active,
@@ -172,158 +130,51 @@ bool CoupledEquations::solve(const vector<PackStep*>& packs, const PackFlags& ac
             OF_STIFF/max(OF_STIFF, demands.stiffness)});
     gatherTerms(equations, active, loop);
     loop(numPacks, [&] (int pack) {
-        const int first = firstTerms[pack], last = firstTerms[pack+1];
-        fill(found.begin()+3*first, found.begin()+3*last, 0.0);
+        const int first = gathered.first[pack];
+        fill(found.begin()+3*first, found.begin()+3*gathered.first[pack+1], 0.0);
         if (active[pack])
-            packs[pack]->eliminate(terms.data()+first, last-first, change.data()+3*first);
+            packs[pack]->eliminate(gathered.terms.data()+first, gathered.count[pack], change.data()+3*first);
     });
     const double least = tighter*LEAST_ENERGY*kT*(stiff ? 1 : count(active.begin(), active.end(), 1));
     // What is stiff, or must be right in tensions, needs more digits.
     const bool trySingle = demands.single && !demands.forTensions && !stiff;
-    const bool solved = trySingle && iterate(packs, single, tighter*demands.tolerance, least, loop);
+    auto solveIn = [&] (auto& gradients) {
+        const bool solved = gradients.solve(packs, gathered, tighter*demands.tolerance, least, change, found, loop);
+        iterations = gradients.getNumIterations();
+        return solved;
+    };
+    const bool solved = trySingle && solveIn(single);
     if (!solved)
-        iterate(packs, twice, tighter*demands.tolerance, least, loop);
+        solveIn(twice);
     moves.resize(3*equations.size());
     runInChunks(loop, equations.size(), CHUNK_OF_EQUATIONS, [&] (int i) {
         const int first = termOf[2*i], second = termOf[2*i+1];
         for (int k = 0; k < 3; k++)
-            moves[3*i+k] = (first >= 0 ? change[3*first+k] : 0)-(second >= 0 ? change[3*second+k] : 0);
+            moves[3*i+k] = (first >= 0 ? change[TermBlocks::place(first, k)] : 0)-
+                    (second >= 0 ? change[TermBlocks::place(second, k)] : 0);
     });
     return solved || !trySingle;
-}
-
-/**
- * Conjugate gradients, until what is left of the energy is less than a part of it, or than some energy. Where numbers
- * in single precision do not get there, it returns false, and nothing is found.
- */
-template <class Real> bool CoupledEquations::iterate(const vector<PackStep*>& packs, Vectors<Real>& vectors,
-            double tolerance, double leastEnergy, const Loop& loop) {
-    const size_t count = terms.size();
-    for (vector<Real>* values :
-            {&vectors.residual, &vectors.response, &vectors.force, &vectors.direction, &vectors.image, &vectors.found,
-            &vectors.change})
-        values->resize(3*count);
-    vectors.exchanged.resize(count);
-    vectors.stiffness.resize(count);
-    Real *const residual = vectors.residual.data(), *const response = vectors.response.data();
-    Real *const force = vectors.force.data(), *const direction = vectors.direction.data();
-    Real *const image = vectors.image.data(), *const ownFound = vectors.found.data();
-    Real* const ownChange = vectors.change.data();
-    auto* const stiffness = vectors.stiffness.data();
-    auto* const exchanged = vectors.exchanged.data();
-    typedef typename Four<Real>::Type Vector;
-    auto load = [] (const Real* values) {
-        return Four<Real>::load(values);
-    };
-    auto forCoupled = [&] (auto function) {
-        loop(packs.size(), [&] (int pack) {
-            if (coupled[pack])
-                function(pack, firstTerms[pack], firstTerms[pack+1]);
-        });
-    };
-    // Of the matrix, X joins places of different terms: its product with a vector is that of K with the partner's.
-    auto respond = [&] (int pack, int first, int last) {
-        respondTo(*packs[pack], residual+3*first, last-first, response+3*first);
-        sums[pack] = sumOfProducts(residual, response, 3*first, 3*last);
-        for (int i = first; i < last; i++)
-            for (int k = 0; k < 3; k++)
-                exchanged[i].response[k] = response[3*i+k];
-    };
-    forCoupled([&] (int pack, int first, int last) {
-        for (int i = first; i < last; i++) {
-            double pull[3] = {};
-            if (partners[i] >= 0)
-                multiply(terms[i].stiffness, &change[3*partners[i]], pull);
-            const double* const s = terms[i].stiffness;
-            const double columns[3][4] = {{s[0], s[1], s[2], 0}, {s[1], s[3], s[4], 0}, {s[2], s[4], s[5], 0}};
-            for (int column = 0; column < 3; column++)
-                for (int k = 0; k < 4; k++)
-                    stiffness[i].of[column][k] = columns[column][k];
-            exchanged[i] = {};
-            for (int k = 0; k < 3; k++) {
-                residual[3*i+k] = pull[k];
-                force[3*i+k] = direction[3*i+k] = ownFound[3*i+k] = ownChange[3*i+k] = 0;
-            }
-        }
-        respond(pack, first, last);
-    });
-    iterations = 1;
-    double energy = total();
-    const double least = max(tolerance*energy, leastEnergy);
-    const double largest = LARGEST_GROWTH*energy;
-    Real ratio = 0;
-    while (energy > least && iterations < LARGEST_NUMBER_OF_ITERATIONS) {
-        forCoupled([&] (int pack, int first, int last) {
-            for (int i = first; i < last; i++) {
-                if (i+AHEAD < last && partners[i+AHEAD] >= 0)
-                    __builtin_prefetch(&exchanged[partners[i+AHEAD]]);
-                Vector pull = {};
-                if (partners[i] >= 0) {
-                    const auto& partner = exchanged[partners[i]];
-                    const Vector ofPartner = load(partner.response)+load(partner.direction)*ratio;
-                    const auto& columns = stiffness[i].of;
-                    pull = load(columns[0])*ofPartner[0]+load(columns[1])*ofPartner[1]+load(columns[2])*ofPartner[2];
-                }
-                for (int k = 0; k < 3; k++)
-                    image[3*i+k] = pull[k];
-            }
-            for (int j = 3*first; j < 3*last; j++) {
-                force[j] = residual[j]+ratio*force[j];
-                direction[j] = response[j]+ratio*direction[j];
-                image[j] = force[j]-image[j];
-            }
-            sums[pack] = sumOfProducts(direction, image, 3*first, 3*last);
-        });
-        const Real step = energy/total();
-        forCoupled([&] (int pack, int first, int last) {
-            for (int j = 3*first; j < 3*last; j++) {
-                ownFound[j] += step*force[j];
-                ownChange[j] += step*direction[j];
-                residual[j] -= step*image[j];
-            }
-            for (int i = first; i < last; i++)
-                for (int k = 0; k < 3; k++)
-                    exchanged[i].direction[k] = direction[3*i+k];
-            respond(pack, first, last);
-        });
-        iterations++;
-        const double before = energy;
-        energy = total();
-        ratio = energy/before;
-        // Written so that NaN is too large.
-        if (is_same<Real, float>::value && !(energy >= -least && energy < largest))
-            return false;
-    }
-    if (is_same<Real, float>::value && energy > least)
-        return false;
-    forCoupled([&] (int, int first, int last) {
-        for (int j = 3*first; j < 3*last; j++) {
-            found[j] = ownFound[j];
-            change[j] += ownChange[j];
-        }
-    });
-    return true;
 }
 
 void CoupledEquations::advance(const vector<PackStep*>& packs, const PackFlags& active, double share,
             LaneFlags& unfinished, const Loop& loop) {
     loop(packs.size(), [&] (int pack) {
         if (active[pack])
-            packs[pack]->advance(found.data()+3*firstTerms[pack], share, unfinished[pack].get());
+            packs[pack]->advance(found.data()+3*gathered.first[pack], share, unfinished[pack].get());
     });
 }
 
 void CoupledEquations::findCompliancesOfTerms(const vector<PackStep*>& packs, const Loop& loop) {
-    compliancesOfTerms.resize(6*terms.size());
+    compliancesOfTerms.resize(6*gathered.terms.size());
     loop(packs.size(), [&] (int pack) {
-        if (firstTerms[pack] < firstTerms[pack+1])
-            packs[pack]->findCompliances(compliancesOfTerms.data()+6*firstTerms[pack]);
+        if (gathered.count[pack] > 0)
+            packs[pack]->findCompliances(compliancesOfTerms.data()+6*gathered.first[pack]);
     });
 }
 
 void CoupledEquations::findJointStiffness(const vector<PackStep*>& packs, const Loop& loop) {
     auto needsIt = [&] (int pack) {
-        return firstTerms[pack] < firstTerms[pack+1] && packs[pack]->needsJointStiffness();
+        return gathered.count[pack] > 0 && packs[pack]->needsJointStiffness();
     };
     bool any = false;
     for (size_t pack = 0; pack < packs.size(); pack++)
@@ -331,13 +182,16 @@ void CoupledEquations::findJointStiffness(const vector<PackStep*>& packs, const 
     if (!any)
         return;
     findCompliancesOfTerms(packs, loop);
-    jointStiffness.resize(6*terms.size());
+    jointStiffness.resize(6*gathered.terms.size());
     loop(packs.size(), [&] (int pack) {
         if (!needsIt(pack))
             return;
-        for (int i = firstTerms[pack]; i < firstTerms[pack+1]; i++) {
+        const vector<int>& partners = gathered.partners;
+        const int first = gathered.first[pack];
+        for (int i = first; i < first+gathered.count[pack]; i++) {
+            const double* const stiffness = gathered.terms[i].stiffness;
             double* const result = &jointStiffness[6*i];
-            copy_n(terms[i].stiffness, 6, result);
+            copy_n(stiffness, 6, result);
             if (partners[i] < 0)
                 continue;
             // Column by column: K e, C K e, K C K e.
@@ -346,15 +200,15 @@ void CoupledEquations::findJointStiffness(const vector<PackStep*>& packs, const 
             for (int column = 0; column < 3; column++) {
                 double unit[3] = {}, pull[3] = {}, move[3] = {};
                 unit[column] = 1;
-                multiply(terms[i].stiffness, unit, pull);
+                multiply(stiffness, unit, pull);
                 multiply(&compliancesOfTerms[6*partners[i]], pull, move);
-                multiply(terms[i].stiffness, move, columns[column]);
+                multiply(stiffness, move, columns[column]);
             }
             for (int row = 0; row < 3; row++)
                 for (int column = row; column < 3; column++)
                     result[entry++] -= 0.5*(columns[column][row]+columns[row][column]);
         }
-        packs[pack]->setJointStiffness(&jointStiffness[6*firstTerms[pack]]);
+        packs[pack]->setJointStiffness(&jointStiffness[6*first]);
     });
 }
 

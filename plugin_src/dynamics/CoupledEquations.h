@@ -2,6 +2,7 @@
 #define CYLCHAIN_COUPLED_EQUATIONS_H_
 
 #include "dynamics/ChainPlaces.h"
+#include "dynamics/ConjugateGradients.h"
 #include "dynamics/PackStep.h"
 #include "mechanics/Loop.h"
 #include <memory>
@@ -77,37 +78,13 @@ public:
         return iterations;
     }
 private:
-    /**
-     * The vectors of conjugate gradients: three numbers for each term. Few and small ones stay in the cache, which most
-     * of the time of an iteration depends on.
-     */
-    template <class Real> struct Vectors {
-        /** What a term shows its partner, in one place: its response, and its last direction. */
-        struct Exchanged {
-            Real response[4], direction[4];
-        };
-        std::vector<Real> residual, response, force, direction, image;
-        /** What the method has found, and the change that it makes. */
-        std::vector<Real> found, change;
-        std::vector<Exchanged> exchanged;
-        /** The columns of the matrix of each term, for vector registers. */
-        struct Columns {
-            Real of[3][4];
-        };
-        std::vector<Columns> stiffness;
-    };
     bool hasSamePlaces(const std::vector<CouplingEquation>& equations, const PackFlags& active, const Loop& loop);
     void sortPlaces(const std::vector<CouplingEquation>& equations, const PackFlags& active);
     void gatherTerms(const std::vector<CouplingEquation>& equations, const PackFlags& active,
             const Loop& loop);
-    template <class Real> bool iterate(const std::vector<PackStep*>& packs, Vectors<Real>& vectors, double tolerance,
-            double least, const Loop& loop);
-    double total() const;
     void findCompliancesOfTerms(const std::vector<PackStep*>& packs, const Loop& loop);
-    /** One for each place on a chain, pack by pack, in the order of their nodes. */
-    std::vector<CouplingTerm> terms;
-    /** For each term, the number of that of the other place of its coupling, or -1. */
-    std::vector<int> partners;
+    /** One for each place on a chain. */
+    CoupledTerms gathered;
     /** For each equation and side, the number of its term, or -1. */
     std::vector<int> termOf;
     /** For each equation and side, the place by which it has been sorted, and the packs that took part then. */
@@ -116,14 +93,10 @@ private:
     };
     std::vector<SortedPlace> sortedPlaces;
     PackFlags activeOfTerms;
-    /** Where the terms of each pack begin. Packs that no coupling joins to another place take no part in iterations. */
-    std::vector<int> firstTerms;
-    PackFlags coupled;
-    std::vector<double> sums;
-    /** Three numbers for each term: the solution, and the forces found. */
+    /** In blocks of terms: the solution, and the forces found. */
     std::vector<double> change, found;
-    Vectors<float> single;
-    Vectors<double> twice;
+    ConjugateGradients<float> single;
+    ConjugateGradients<double> twice;
     std::vector<double> moves, compliancesOfTerms, jointStiffness;
     std::vector<int> firstOfPack, firstOfNode;
     int iterations = 0;

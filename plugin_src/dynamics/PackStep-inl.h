@@ -46,7 +46,7 @@ public:
     void respond(const double* forces, double* moves) override {
         respondAs(forces, moves);
     }
-    void respond(const float* forces, int, float* moves) override {
+    void respond(const float* forces, float* moves) override {
         respondAs(forces, moves);
     }
     void findCompliances(double* compliances) override {
@@ -130,7 +130,7 @@ private:
             // The coordinates of a node in a lane are W numbers apart.
             Scalar* const force = reinterpret_cast<Scalar*>(forcesOnNodes)+place.first;
             for (int k = 0; k < 3; k++) {
-                const Scalar own = forces[3*i+k];
+                const Scalar own = forces[TermBlocks::place(i, k)];
                 force[k*W] += place.ofFirst*own;
                 force[(3+k)*W] += place.ofSecond*own;
             }
@@ -144,7 +144,7 @@ private:
             const PlacedTerm& place = placed[i];
             const Scalar* const move = reinterpret_cast<const Scalar*>(ofNodes)+place.first;
             for (int k = 0; k < 3; k++)
-                moves[3*i+k] = place.ofFirst*move[k*W]+place.ofSecond*move[(3+k)*W];
+                moves[TermBlocks::place(i, k)] = place.ofFirst*move[k*W]+place.ofSecond*move[(3+k)*W];
         }
     }
 };

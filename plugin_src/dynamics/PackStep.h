@@ -2,6 +2,7 @@
 #define CYLCHAIN_PACK_STEP_H_
 
 #include "dynamics/ChainEngine.h"
+#include "dynamics/TermBlocks.h"
 
 namespace cylchain {
 
@@ -43,13 +44,13 @@ public:
      * Linearise the equations, and solve them as if no coupling joined two places of packs.
      *
      * @param terms  in the order of their nodes; they must not change before advance()
-     * @param moves  receives the change of each term's place, three numbers for each
+     * @param moves  receives the change of each term's place, in TermBlocks as all vectors of terms
      */
     virtual void eliminate(const CouplingTerm* terms, int numTerms, double* moves) = 0;
-    /** Find how forces on the places of the terms, three numbers for each, move them, with the same elimination. */
+    /** Find how forces on the places of the terms move them, with the same elimination. */
     virtual void respond(const double* forces, double* moves) = 0;
-    /** The same in single precision, with the number of terms. */
-    virtual void respond(const float* forces, int numTerms, float* moves);
+    /** The same in single precision. */
+    virtual void respond(const float* forces, float* moves) = 0;
     /**
      * Find for each term how a force on its place moves this place: a symmetric matrix in the order of a term's
      * stiffness.
@@ -68,7 +69,7 @@ public:
     /**
      * End the iteration: add what forces on the places of the terms do, and move the nodes.
      *
-     * @param forces      three numbers for each term
+     * @param forces      on the places of the terms
      * @param share       how much of the change of nodes to make
      * @param unfinished  receives, for each lane, whether another iteration is needed
      */

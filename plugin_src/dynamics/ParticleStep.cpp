@@ -98,16 +98,34 @@ void ParticleStep::eliminate(const CouplingTerm* newTerms, int count, double* mo
         solve(i, &right[3*i], &change[3*i]);
     }
     for (int i = 0; i < numTerms; i++)
-        copy_n(&change[3*terms[i].lane], 3, moves+3*i);
+        for (int k = 0; k < 3; k++)
+            moves[TermBlocks::place(i, k)] = change[3*terms[i].lane+k];
 }
 
-void ParticleStep::respond(const double* onPlaces, double* moves) {
+/** Find the forces on particles from those on places. */
+template <class Number> void ParticleStep::gatherForces(const Number* onPlaces) {
     fill(right.begin(), right.end(), 0.0);
     for (int i = 0; i < numTerms; i++)
         for (int k = 0; k < 3; k++)
-            right[3*terms[i].lane+k] += onPlaces[3*i+k];
-    for (int i = 0; i < numTerms; i++)
-        solve(terms[i].lane, &right[3*terms[i].lane], moves+3*i);
+            right[3*terms[i].lane+k] += onPlaces[TermBlocks::place(i, k)];
+}
+
+template <class Number> void ParticleStep::respondAs(const Number* onPlaces, Number* moves) {
+    gatherForces(onPlaces);
+    for (int i = 0; i < numTerms; i++) {
+        double move[3];
+        solve(terms[i].lane, &right[3*terms[i].lane], move);
+        for (int k = 0; k < 3; k++)
+            moves[TermBlocks::place(i, k)] = move[k];
+    }
+}
+
+void ParticleStep::respond(const double* onPlaces, double* moves) {
+    respondAs(onPlaces, moves);
+}
+
+void ParticleStep::respond(const float* onPlaces, float* moves) {
+    respondAs(onPlaces, moves);
 }
 
 void ParticleStep::findCompliances(double* compliances) {
@@ -116,10 +134,7 @@ void ParticleStep::findCompliances(double* compliances) {
 }
 
 void ParticleStep::advance(const double* onPlaces, double share, bool* unfinished) {
-    fill(right.begin(), right.end(), 0.0);
-    for (int i = 0; i < numTerms; i++)
-        for (int k = 0; k < 3; k++)
-            right[3*terms[i].lane+k] += onPlaces[3*i+k];
+    gatherForces(onPlaces);
     for (size_t i = 0; i < particles.size(); i++) {
         // The equations are linear: couplings decide whether another iteration is needed.
         unfinished[i] = false;

@@ -26,8 +26,8 @@ public:
     int getNumStages() const override;
     void beginStage(int stage) override;
     void eliminate(const CouplingTerm* terms, int numTerms, double* moves) override;
-    using PackStep::respond;
     void respond(const double* forces, double* moves) override;
+    void respond(const float* forces, float* moves) override;
     void findCompliances(double* compliances) override;
     void advance(const double* forces, double share, bool* unfinished) override;
     void findExcessiveChanges(bool* failed) const override;
@@ -35,6 +35,8 @@ public:
     void getDisplacements(double* displacements) const override;
 private:
     void solve(int particle, const double* force, double* move) const;
+    template <class Number> void gatherForces(const Number* onPlaces);
+    template <class Number> void respondAs(const Number* forces, Number* moves);
     const std::vector<CoupledParticle> particles;
     StepSettings settings = {};
     std::vector<bool> taken;

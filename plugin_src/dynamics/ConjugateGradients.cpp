@@ -1,0 +1,116 @@
+#include "dynamics/ConjugateGradients.h"
+#include "dynamics/SymmetricMatrices.h"
+#include "dynamics/TermBlocks.h"
+#include <algorithm>
+#include <cstddef>
+#include <type_traits>
+
+using namespace cylchain;
+using namespace std;
+
+namespace {
+
+const int LARGEST_NUMBER_OF_ITERATIONS = 1000;
+/** Where energies grow by more, single precision has rounded away what matters: in stiff links of free particles. */
+const double LARGEST_GROWTH = 1e6;
+
+template <class Real> const GradientKernels<Real>& kernels() {
+    if constexpr (is_same<Real, float>::value)
+        return gradientLoops().single;
+    else
+        return gradientLoops().twice;
+}
+
+} // namespace
+
+/** Take the terms of a pack: the first residuals are what X makes of the moves without it. */
+template <class Real> void ConjugateGradients<Real>::begin(const CoupledTerms& all, int pack,
+            const vector<double>& change) {
+    const int first = all.first[pack], last = all.first[pack+1], end = first+all.count[pack];
+    for (vector<Real>* values : {&residual, &response, &force, &direction, &ownFound, &ownChange})
+        fill(values->begin()+3*first, values->begin()+3*last, Real(0));
+    for (int i = first; i < last; i++) {
+        Real* const k = &stiffness[6*(i-i%TermBlocks::SIZE)+i%TermBlocks::SIZE];
+        const bool joined = i < end && all.partners[i] >= 0;
+        partners[i] = joined ? all.partners[i] : i;
+        shown[i] = {};
+        for (int entry = 0; entry < 6; entry++)
+            k[TermBlocks::SIZE*entry] = joined ? all.terms[i].stiffness[entry] : 0;
+        if (!joined)
+            continue;
+        double ofPartner[3], pull[3];
+        for (int coordinate = 0; coordinate < 3; coordinate++)
+            ofPartner[coordinate] = change[TermBlocks::place(partners[i], coordinate)];
+        multiply(all.terms[i].stiffness, ofPartner, pull);
+        for (int coordinate = 0; coordinate < 3; coordinate++)
+            residual[TermBlocks::place(i, coordinate)] = pull[coordinate];
+    }
+}
+
+template <class Real> bool ConjugateGradients<Real>::solve(const vector<PackStep*>& packs, const CoupledTerms& all,
+            double tolerance, double leastEnergy, vector<double>& change, vector<double>& found, const Loop& loop) {
+    const GradientKernels<Real>& kernel = kernels<Real>();
+    const size_t count = all.getNumTerms();
+    for (vector<Real>* values : {&residual, &response, &force, &direction, &image, &ownFound, &ownChange})
+        values->resize(3*count);
+    stiffness.resize(6*count);
+    shown.resize(count);
+    partners.resize(count);
+    sums.assign(packs.size(), 0.0);
+    const GradientVectors<Real> vectors = {residual.data(), response.data(), force.data(), direction.data(),
+            image.data(), ownFound.data(), ownChange.data(), shown.data(), stiffness.data(), partners.data()};
+    auto forCoupled = [&] (auto function) {
+        loop(packs.size(), [&] (int pack) {
+            if (all.coupled[pack])
+                function(pack, all.first[pack], all.first[pack+1]);
+        });
+    };
+    auto total = [&] () {
+        double sum = 0;
+        for (double ofPack : sums)
+            sum += ofPack;
+        return sum;
+    };
+    auto respond = [&] (int pack, int first, int last) {
+        packs[pack]->respond(&residual[3*first], &response[3*first]);
+        sums[pack] = kernel.show(vectors, first, last);
+    };
+    forCoupled([&] (int pack, int first, int last) {
+        begin(all, pack, change);
+        respond(pack, first, last);
+    });
+    iterations = 1;
+    double energy = total();
+    const double least = max(tolerance*energy, leastEnergy);
+    const double largest = LARGEST_GROWTH*energy;
+    Real ratio = 0;
+    while (energy > least && iterations < LARGEST_NUMBER_OF_ITERATIONS) {
+        forCoupled([&] (int pack, int first, int last) {
+            sums[pack] = kernel.turn(vectors, first, last, ratio);
+        });
+        const Real step = energy/total();
+        forCoupled([&] (int pack, int first, int last) {
+            kernel.move(vectors, first, last, step);
+            respond(pack, first, last);
+        });
+        iterations++;
+        const double before = energy;
+        energy = total();
+        ratio = energy/before;
+        // Written so that NaN is too large.
+        if (is_same<Real, float>::value && !(energy >= -least && energy < largest))
+            return false;
+    }
+    if (is_same<Real, float>::value && energy > least)
+        return false;
+    forCoupled([&] (int, int first, int last) {
+        for (int place = 3*first; place < 3*last; place++) {
+            found[place] = ownFound[place];
+            change[place] += ownChange[place];
+        }
+    });
+    return true;
+}
+
+template class cylchain::ConjugateGradients<float>;
+template class cylchain::ConjugateGradients<double>;
