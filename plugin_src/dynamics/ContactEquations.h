@@ -44,8 +44,8 @@ public:
     void linearise(int iteration, const double* moved, std::vector<CouplingEquation>& equations) override;
     bool finishIteration(const double* moves, const double* moved) override;
     double getRelativeTolerance() const override;
-    bool letsPacksRest() const override {
-        return true;
+    Rests getRests() const override {
+        return Rests::Worthwhile;
     }
     bool markUnfinished(PackFlags& packs) const override;
     void findFailures(const double* moved, std::vector<bool>& failed) const override;

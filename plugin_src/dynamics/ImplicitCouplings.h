@@ -28,6 +28,9 @@ inline BrokenCoupling::Place describePlace(const PlaceOnChain& place) {
     return {place.chain, place.pack < 0 ? -1 : place.node};
 }
 
+/** What couplings make of packs that rest: see ImplicitCouplings::getRests(). */
+enum class Rests {Possible, Worthwhile, Wrong};
+
 /**
  * Couplings of one kind: forces between places of chains, or on places of chains, that an implicit step has in its
  * equations. NetworkStep calls these functions in the order in which they stand here.
@@ -78,9 +81,12 @@ public:
      * @return whether another iteration is needed
      */
     virtual bool finishIteration(const double* moves, const double* moved) = 0;
-    /** Whether these couplings go on for long where few packs need it, so that others had better rest. */
-    virtual bool letsPacksRest() const {
-        return false;
+    /**
+     * Whether packs that have converged may rest while others go on. It is worthwhile where few packs go on for long,
+     * and wrong where couplings are so stiff that one of their places must not move alone.
+     */
+    virtual Rests getRests() const {
+        return Rests::Possible;
     }
     /**
      * Mark the packs that need another iteration, after finishIteration() has said that one is needed.

@@ -57,6 +57,7 @@ public:
     }
     void setCompliances(const double* compliances) override;
     bool finishIteration(const double* moves, const double* moved) override;
+    Rests getRests() const override;
     bool markUnfinished(PackFlags& packs) const override;
     void findFailures(const double* moved, std::vector<bool>& failed) const override;
     bool findCulprit(const double* moved, const CouplingEquation* equations, BrokenCoupling& culprit) const override;
@@ -114,6 +115,8 @@ private:
     LinkBoxes boxes;
     const double* begun = nullptr;
     double kT = 0, stepSize = 0, shareOfMetricForces = 1, largestStiffness = 0, demandingStiffness = 0;
+    /** The same of links that turn alone. */
+    double turningStiffness = 0;
     bool anyTurns = false;
     int force = 0;
     /** Of all links on the segment that begins with a particle. */

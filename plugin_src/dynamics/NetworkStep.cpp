@@ -257,10 +257,13 @@ bool NetworkStep::finishIteration(const vector<size_t>& first) {
         next[pack] |= any_of(unfinished[pack].get(), unfinished[pack].get()+lanes, [] (bool flag) {return flag;});
     }
     const bool any = unknown || find(next.begin(), next.end(), 1) != next.end();
-    // A few contacts take many iterations. Without any, all packs end together, and rests would not pay.
-    const bool rests = any_of(couplings.begin(), couplings.end(), [] (const ImplicitCouplings* own) {
-        return own->letsPacksRest();
-    });
+    // Where no couplings take many iterations for a few packs, all packs end together, and rests would not pay.
+    auto anyHas = [&] (Rests rests) {
+        return any_of(couplings.begin(), couplings.end(), [&] (const ImplicitCouplings* own) {
+            return own->getRests() == rests;
+        });
+    };
+    const bool rests = anyHas(Rests::Worthwhile) && !anyHas(Rests::Wrong);
     if (unknown || !rests)
         next.assign(next.size(), 1);
     active.swap(next);
