@@ -247,6 +247,7 @@ static int keepNear(const CoarseCapsule* capsules, const float* shifts, float re
         const unsigned sure = bitsOf((Ints) (nearest <= contact-2*margin));
         const Floats clearance = 0.5f*(before+after-motion)-margin;
         const Floats distance = clearance > zero ? after-margin : Floats{};
+        const Floats atStart = before > margin ? before-margin : Floats{};
         for (unsigned bits = bitsOf(near); bits != 0; bits &= bits-1) {
             const int lane = __builtin_ctz(bits), pair = start+lane;
             if (pair >= count)
@@ -255,6 +256,7 @@ static int keepNear(const CoarseCapsule* capsules, const float* shifts, float re
             pairs.second[kept] = pairs.second[pair];
             pairs.distance[kept] = distance[lane];
             pairs.clearance[kept] = clearance[lane];
+            pairs.before[kept] = atStart[lane];
             pairs.image[kept++] = pairs.image[pair]+((sure>>lane & 1) != 0 ? SURE : 0);
         }
     }
@@ -266,6 +268,7 @@ const int DOUBLES = CYLCHAIN_LANES/2;
 typedef double Doubles __attribute__((vector_size(8*DOUBLES)));
 typedef long long Masks __attribute__((vector_size(8*DOUBLES)));
 typedef int Numbers __attribute__((vector_size(4*DOUBLES)));
+typedef float FloatsOfDoubles __attribute__((vector_size(4*DOUBLES)));
 
 struct DoubleVector {
     Doubles x, y, z;
@@ -371,6 +374,13 @@ CYLCHAIN_INLINE Doubles toUnit(Doubles value) {
     return above < one ? above : one;
 }
 
+CYLCHAIN_INLINE Doubles root(Doubles value) {
+    Doubles result;
+    for (int i = 0; i < DOUBLES; i++)
+        reinterpret_cast<double*>(&result)[i] = std::sqrt(reinterpret_cast<const double*>(&value)[i]);
+    return result;
+}
+
 CYLCHAIN_INLINE Doubles smaller(Doubles a, Doubles b) {
     return a < b ? a : b;
 }
@@ -415,7 +425,10 @@ static void outlook(const MovingSegment* segments, double parallel, double atEnd
         const DoubleVector ends[] = {dw, dw+dp, dw-dq, dw+dp-dq};
         const Doubles motion = greater(greater(ends[0].dot(ends[0]), ends[1].dot(ends[1])),
                 greater(ends[2].dot(ends[2]), ends[3].dot(ends[3])));
-        const Masks mayCross = ~(oneSign | (squared > motion*ofMotion));
+        // They would have met on the way.
+        const Doubles distance = root(squared), way = root(motion);
+        const Doubles before = __builtin_convertvector(loadOf<FloatsOfDoubles>(pairs.before+start), Doubles);
+        const Masks mayCross = ~(oneSign | (before+distance > way*ofMotion));
 
         const DoubleVector p1 = one.laterNext, q1 = other.laterNext;
         const Doubles along = r.dot(p1), against = r.dot(q1);
@@ -425,7 +438,7 @@ static void outlook(const MovingSegment* segments, double parallel, double atEnd
                 ((s < atEnd) & FIRST_AT_START) | ((t < atEnd) & SECOND_AT_START) | (firstNearer & FIRST_GOES_NEARER) |
                 (secondNearer & SECOND_GOES_NEARER);
         for (int i = 0; i < DOUBLES; i++) {
-            pairs.distance[start+i] = std::sqrt(squared[i]);
+            pairs.distance[start+i] = distance[i];
             pairs.flags[start+i] = flags[i];
         }
     }

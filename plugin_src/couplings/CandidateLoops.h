@@ -28,7 +28,7 @@ struct CapsuleRow {
 /** Pairs of capsules, the second one in an image, and what keepNear() finds: see ContactPair. */
 struct CandidatePairs {
     int *first, *second, *image;
-    float *distance, *clearance;
+    float *distance, *clearance, *before;
 };
 
 /**
@@ -46,6 +46,8 @@ struct MovingSegment {
 struct PairsOfSegments {
     const int *first, *second;
     const double* shift[3];
+    /** What is known of their distance at the start of the step: it is not less. */
+    const float* before;
     double* distance;
     /** Some of the flags below. */
     int* flags;

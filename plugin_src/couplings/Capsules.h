@@ -56,6 +56,8 @@ struct ContactPair {
      * not, and will not before both have moved this far together. Zero if that is not known.
      */
     float distance, clearance;
+    /** At the start of the step, the distance of the axes is not less than this. */
+    float before;
 };
 
 /** Where two capsules are nearest to each other. */

@@ -16,7 +16,10 @@ const double LEAST_DIFFERENCE = 1e-10;
 /** Capsules whose motion is noted together. */
 const int CHUNK_OF_MOTIONS = 512;
 
-/** Whether capsules may pass through each other: from the distance of their axes at the end, and the sum of radii. */
+/**
+ * Whether capsules may pass through each other: from the distance of their axes at the end, or that and how much they
+ * are apart at the start at least, and the sum of radii.
+ */
 bool mayPass(const SegmentPair& start, const SegmentPair& end, double distance, double radii) {
     return distance <= largestMotion(start, end)+(hasSphere(start) ? DEEP*radii : 0);
 }
@@ -153,7 +156,7 @@ int ContactSearch::Implementation::evaluate(const ContactPair& pair, const Segme
         const Ends& ends, Contact* contacts, double limit) const {
     const double sum = radii(pair.a, pair.b);
     const Places places = findPlaces(end);
-    if (ends.moves && mayPass(start, end, places.distance, sum)) {
+    if (ends.moves && mayPass(start, end, places.distance+(hasSphere(start) ? 0 : pair.before), sum)) {
         if (hasSphere(start)) {
             Passage passage;
             if (findPassage(start, end, sum, passage)) {
@@ -262,6 +265,7 @@ void ContactSearch::findOutlooks(const ContactPair* const* pairs, int count, Pai
     const int most = 64;
     int first[most], second[most], flags[most];
     double x[most], y[most], z[most], distance[most];
+    float before[most];
     const CandidateKernels& kernels = candidateKernels();
     const vector<MovingSegment>& moving = implementation->moving;
     for (int start = 0; start < count; start += most) {
@@ -273,9 +277,10 @@ void ContactSearch::findOutlooks(const ContactPair* const* pairs, int count, Pai
             x[i] = pair.shift[0];
             y[i] = pair.shift[1];
             z[i] = pair.shift[2];
+            before[i] = pair.before;
         }
         kernels.outlook(moving.data(), LARGEST_PARALLEL, AT_END,
-                {first, second, {x, y, z}, distance, flags}, own);
+                {first, second, {x, y, z}, before, distance, flags}, own);
         for (int i = 0; i < own; i++) {
             const ContactPair& pair = *pairs[start+i];
             // How near a sphere comes on its way is not known here.

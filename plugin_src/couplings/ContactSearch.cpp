@@ -292,14 +292,15 @@ int ContactSearch::Implementation::findRows(int column, int iz, CapsuleRow* rows
 }
 
 /** Look for pairs with a capsule in one column of cells. */
-void ContactSearch::Implementation::searchCells(int column, const double* x, const double* y) {
+void ContactSearch::Implementation::searchCells(int column, const double* x, const double* y,
+        const PairFilter& known) {
     const CandidateKernels& kernels = candidateKernels();
     vector<ContactPair>& found = parts[column];
     found.clear();
     Candidates& candidates = Candidates::ofThread();
     int count = 0;
     auto look = [&] {
-        keepPairs(candidates, count, x, y, found);
+        keepPairs(candidates, count, x, y, known, found);
         count = 0;
     };
     CapsuleRow rows[32];
@@ -324,7 +325,7 @@ void ContactSearch::Implementation::searchCells(int column, const double* x, con
 
 /** Add those of some pairs of boxes that are near enough. */
 void ContactSearch::Implementation::keepPairs(Candidates& candidates, int count, const double* x, const double* y,
-        vector<ContactPair>& found) const {
+        const PairFilter& known, vector<ContactPair>& found) const {
     count = candidateKernels().keepNear(sorted.data(), imageShifts, reach, margin, candidates.from(0), count);
     for (int i = 0; i < count; i++) {
         if (i+AHEAD < count)
@@ -335,9 +336,12 @@ void ContactSearch::Implementation::keepPairs(Candidates& candidates, int count,
         const bool isAgain = again[one.number] != 0;
         if (isAgain && again[other.number] != 0 && one.number >= other.number)
             continue;
+        if (known && known(min(one.number, other.number), max(one.number, other.number)))
+            continue;
         if (addPair(one, other, images, isAgain || candidates.image[i] >= SURE, x, y, found)) {
             found.back().distance = isAgain ? 0 : candidates.distance[i];
             found.back().clearance = isAgain ? 0 : candidates.clearance[i];
+            found.back().before = candidates.before[i];
         }
     }
 }
@@ -424,7 +428,7 @@ bool ContactSearch::Implementation::addPair(const PlacedCapsule& one, const Plac
     for (int k = 0; k < 3; k++)
         number[k] = (inOrder ? 1 : -1)*(other.images[k]-one.images[k]-images[k]);
     const Vec3d shift = frame.toVector({number[0], number[1], number[2]});
-    ContactPair pair = {a, b, {shift.x, shift.y, shift.z}, 0, 0, 0};
+    ContactPair pair = {a, b, {shift.x, shift.y, shift.z}, 0, 0, 0, 0};
     const SegmentPair start = {first.along, second.along, first.first-second.first+shift};
     if (!sure) {
         const double limit = first.capsule.radius+second.capsule.radius+reach;
@@ -500,7 +504,7 @@ void cylchain::runParts(const Loop& run, int parts, const function<void(int)>& p
 }
 
 void ContactSearch::findPairs(const double* x, const double* y, const double* box, double reach,
-        vector<ContactPair>& pairs, const Loop& run) {
+        vector<ContactPair>& pairs, const Loop& run, const PairFilter& known) {
     if (!(reach >= 0 && isfinite(reach)))
         throw invalid_argument("The reach of a search for contacts is negative or not finite");
     pairs.clear();
@@ -519,12 +523,12 @@ void ContactSearch::findPairs(const double* x, const double* y, const double* bo
     const int columns = search.frame.cells[0]*search.frame.cells[1];
     if ((int) search.parts.size() < columns)
         search.parts.resize(columns);
-    runParts(run, columns, [&] (int column) {search.searchCells(column, x, y);});
+    runParts(run, columns, [&] (int column) {search.searchCells(column, x, y, known);});
     search.gather(pairs);
 }
 
 void ContactSearch::findPairsOf(const vector<int>& capsules, const double* x, const double* y,
-        vector<ContactPair>& pairs, const Loop& run) {
+        vector<ContactPair>& pairs, const Loop& run, const PairFilter& known) {
     Implementation& search = *implementation;
     search.describeAgain(capsules, x, y);
     for (int i : capsules)
@@ -543,7 +547,7 @@ void ContactSearch::findPairsOf(const vector<int>& capsules, const double* x, co
         int found = 0;
         for (int i = chunk*FEW; i < min(count, (chunk+1)*FEW); i++)
             found = search.searchAround(search.members[inOrder[i]], candidates, found);
-        search.keepPairs(candidates, found, x, y, search.parts[chunk]);
+        search.keepPairs(candidates, found, x, y, known, search.parts[chunk]);
     });
     for (int i : capsules)
         search.again[i] = 0;

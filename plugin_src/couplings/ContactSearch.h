@@ -4,6 +4,7 @@
 #include "couplings/CapsuleGeometry.h"
 #include "couplings/Capsules.h"
 #include "mechanics/Loop.h"
+#include <functional>
 #include <limits>
 #include <memory>
 #include <stdexcept>
@@ -32,6 +33,9 @@ struct PairOutlook {
     /** Whether evaluate() finds no contact: it is that of a neighbor. */
     bool isOfNeighbor;
 };
+
+/** Whether a pair of capsules is left out of a search. The first one has the lesser number. */
+typedef std::function<bool(int a, int b)> PairFilter;
 
 /**
  * Finds capsules that touch each other, and where.
@@ -67,9 +71,10 @@ public:
      * @param reach  not negative
      * @param pairs  receives the pairs
      * @param run    runs the parts of the search; one after the other if there is none
+     * @param known  pairs that are left out, if any: those that others know. It is called by several threads.
      */
     void findPairs(const double* x, const double* y, const double* box, double reach, std::vector<ContactPair>& pairs,
-            const Loop& run = Loop());
+            const Loop& run = Loop(), const PairFilter& known = PairFilter());
     /**
      * Find the same pairs as far as some capsules are in them, which have another y than in the search before. Others
      * are taken to be where they were when they were searched for last. A few pairs are farther apart. This takes less
@@ -78,9 +83,10 @@ public:
      * @param capsules  some capsules, each of them once
      * @param pairs     receives the pairs, in an order that does not depend on how the loop is run
      * @param run       runs the parts of the search; one after the other if there is none
+     * @param known     as for the other search
      */
     void findPairsOf(const std::vector<int>& capsules, const double* x, const double* y,
-            std::vector<ContactPair>& pairs, const Loop& run = Loop());
+            std::vector<ContactPair>& pairs, const Loop& run = Loop(), const PairFilter& known = PairFilter());
     /**
      * Find the contacts of a pair at y: none, one or two. Several threads may do so at the same time. With
      * nearestImages, the box is that of the last search.

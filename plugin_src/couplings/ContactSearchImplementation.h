@@ -91,22 +91,23 @@ struct PlacedCapsule {
 /** Memory for candidates. All parts of the search that a thread runs share it, so that it stays in its cache. */
 struct Candidates {
     std::vector<int> first, second, image;
-    std::vector<float> distance, clearance;
+    std::vector<float> distance, clearance, before;
     std::vector<CapsuleRow> rows;
     static Candidates& ofThread() {
         static thread_local Candidates memory;
         return memory;
     }
     CandidatePairs from(int from) {
-        return {first.data()+from, second.data()+from, image.data()+from, distance.data()+from, clearance.data()+from};
+        return {first.data()+from, second.data()+from, image.data()+from, distance.data()+from, clearance.data()+from,
+                before.data()+from};
     }
     void makeRoom(int size) {
         if ((int) first.size() >= size)
             return;
         for (std::vector<int>* list : {&first, &second, &image})
             list->resize(size);
-        distance.resize(size);
-        clearance.resize(size);
+        for (std::vector<float>* list : {&distance, &clearance, &before})
+            list->resize(size);
     }
 };
 
@@ -173,11 +174,11 @@ struct ContactSearch::Implementation {
     void describeAgain(const std::vector<int>& capsules, const double* x, const double* y);
     void putInOrder(int slot, int i);
     int searchAround(int i, Candidates& candidates, int count) const;
-    void keepPairs(Candidates& candidates, int count, const double* x, const double* y,
+    void keepPairs(Candidates& candidates, int count, const double* x, const double* y, const PairFilter& known,
             std::vector<ContactPair>& found) const;
     void checkPositions(const double* x, const double* y) const;
     void setCells();
-    void searchCells(int part, const double* x, const double* y);
+    void searchCells(int part, const double* x, const double* y, const PairFilter& known);
     int findRows(int column, int iz, CapsuleRow* rows) const;
     bool addPair(const PlacedCapsule& one, const PlacedCapsule& other, const int* images, bool sure, const double* x,
             const double* y, std::vector<ContactPair>& found) const;

@@ -40,20 +40,20 @@ void CapsulePairs::begin(const vector<ContactPair>& found, int numCapsules) {
     addedBefore.clear();
 }
 
-bool CapsulePairs::isKnown(const ContactPair& pair) const {
-    const auto first = watches.begin()+firstPairs[pair.a], last = watches.begin()+firstPairs[pair.a+1];
-    const auto found = lower_bound(first, last, pair.b, [] (const Watch& one, int other) {return one.b < other;});
-    if (found != last && found->b == pair.b)
+bool CapsulePairs::isKnown(int a, int b) const {
+    const auto first = watches.begin()+firstPairs[a], last = watches.begin()+firstPairs[a+1];
+    const auto found = lower_bound(first, last, b, [] (const Watch& one, int other) {return one.b < other;});
+    if (found != last && found->b == b)
         return true;
     const int numFirst = firstPairs.back();
-    for (int i = lastAdded[pair.a]; i >= 0; i = addedBefore[i-numFirst])
-        if (watches[i].b == pair.b)
+    for (int i = lastAdded[a]; i >= 0; i = addedBefore[i-numFirst])
+        if (watches[i].b == b)
             return true;
     return false;
 }
 
 bool CapsulePairs::add(const ContactPair& pair) {
-    if (isKnown(pair))
+    if (isKnown(pair.a, pair.b))
         return false;
     addedBefore.push_back(lastAdded[pair.a]);
     lastAdded[pair.a] = pairs.size();

@@ -42,6 +42,8 @@ public:
     void clear();
     /** Take the pairs that a search of all capsules has found, in its order. */
     void begin(const std::vector<ContactPair>& found, int numCapsules);
+    /** Get whether a pair is there. The number of a is less than that of b. */
+    bool isKnown(int a, int b) const;
     /** Add a pair that another search has found; false if it was known. */
     bool add(const ContactPair& pair);
     int getNumPairs() const {
@@ -87,7 +89,6 @@ private:
     struct Contacts {
         PairContact of[2];
     };
-    bool isKnown(const ContactPair& pair) const;
     const ContactSearch* search = nullptr;
     /** Those of the first search in its order, and behind them those that others have found. */
     std::vector<ContactPair> pairs;

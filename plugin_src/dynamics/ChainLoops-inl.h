@@ -25,6 +25,7 @@ namespace cylchain {
 namespace CYLCHAIN_LOOPS {
 
 #include "lanes/VectorLanes-inl.h"
+#include "lanes/Transposition-inl.h"
 
 typedef ChainPack<Scalar> Pack;
 

@@ -159,12 +159,13 @@ void ContactEquations::findPairs(const double* moved) {
 
 /** Look for pairs of capsules that have moved far, which no search has seen; false if none are new. */
 bool ContactEquations::findNewPairs(const double* moved) {
+    const PairFilter known = [&] (int a, int b) {return pairs.isKnown(a, b);};
     const bool most = motion.getMovers().size() > SHARE_OF_MOVERS*places.size();
     try {
         if (most)
-            search->findPairs(begun, moved, box, reach, found, *loop);
+            search->findPairs(begun, moved, box, reach, found, *loop, known);
         else
-            search->findPairsOf(motion.getMovers(), begun, moved, found, *loop);
+            search->findPairsOf(motion.getMovers(), begun, moved, found, *loop, known);
     }
     catch (const NarrowBoxError&) {
         movesTooFar = true;
@@ -178,12 +179,12 @@ bool ContactEquations::findNewPairs(const double* moved) {
         motion.beginAgain(moved, *loop);
     else
         motion.beginAgain(motion.getMovers(), moved);
-    const int known = pairs.getNumPairs();
+    const int numBefore = pairs.getNumPairs();
     for (const ContactPair& pair : found)
         if (pairs.add(pair))
             mark(pairs.getNumPairs()-1);
-    selection.addFrom(known, pairs);
-    return pairs.getNumPairs() > known;
+    selection.addFrom(numBefore, pairs);
+    return pairs.getNumPairs() > numBefore;
 }
 
 /** Mark the packs of the pairs that a function finds among all or those that are selected; false if there are none. */
@@ -326,7 +327,8 @@ void ContactEquations::evaluate(int number, bool first, const PairOutlook* outlo
         const bool late = iterations > RETURNING_ITERATIONS;
         if (side.rest.isInMiddle() && !late)
             side.rest.follow(pairs.getSegments(number, false), pairs.getSegments(number, true), contact);
-        else if (!side.rest.isResolved() && !side.rest.isBack() && contact.gap < 0 && (!late || contact.crossed)) {
+        else if (!side.rest.isResolved() && !side.rest.isBack() && contact.gap < -wallDepth &&
+                (!late || contact.crossed)) {
             const double softness = softnessOf(pair, contact);
             const SegmentPair begun = pairs.getSegments(number, false), now = pairs.getSegments(number, true);
             side.rest.look({begun, now, diameter, softness, late}, contact, wallDepth, LARGEST_RETURN*diameter);

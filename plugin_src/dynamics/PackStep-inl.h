@@ -36,11 +36,13 @@ public:
     void eliminate(const CouplingTerm* newTerms, int count, double* moves) override {
         terms = newTerms;
         numTerms = count;
-        placed.resize(count);
+        // What fills up the last block takes no part.
+        placed.assign(TermBlocks::fill(count), PlacedTerm {0, 0, 0});
         for (int i = 0; i < count; i++)
-            placed[i] = {3*W*terms[i].node+terms[i].lane, Scalar(1-terms[i].fraction), Scalar(terms[i].fraction)};
+            placed[i] = {W*terms[i].node+terms[i].lane, Scalar(1-terms[i].fraction), Scalar(terms[i].fraction)};
         step->getEquations().setTerms(terms, numTerms);
         step->eliminate(y, iteration);
+        takeWorkspace();
         gatherMoves(step->getChange(), moves);
     }
     void respond(const double* forces, double* moves) override {
@@ -86,13 +88,16 @@ private:
     StepSettings settings;
     Scratch vectors, tethers;
     StepStart<W> start;
+    /** A vector of a node in a lane, and a fourth number that is not used. */
+    typedef FourOf<Scalar> Record;
     Vec *y, *forcesOnNodes, *movesOfNodes;
+    Record* records;
     mutable Real active;
     typename ImplicitStep<W, CLOSED>::Memory memory;
     std::unique_ptr<ImplicitStep<W, CLOSED> > step;
     const CouplingTerm* terms;
     int numTerms, iteration;
-    /** Where the terms are: the first coordinate of the first node in its lane, and the parts of both nodes. */
+    /** Where the terms are: the record of the first node, W before that of the second one, and the parts of both. */
     struct PlacedTerm {
         int first;
         Scalar ofFirst, ofSecond;
@@ -112,9 +117,10 @@ private:
     }
     /** Use memory that the packs of a thread share: it stays in the nearest cache. */
     void takeWorkspace() {
-        static thread_local Scratch memory;
+        static thread_local Scratch memory, ofRecords;
         forcesOnNodes = memory.reserve<Vec>(2*pack.nodes);
         movesOfNodes = forcesOnNodes+pack.nodes;
+        records = ofRecords.reserve<Record>((std::size_t) W*pack.nodes);
     }
     template <class Number> void respondAs(const Number* forces, Number* moves) {
         takeWorkspace();
@@ -122,29 +128,64 @@ private:
         step->getEquations().respond(forcesOnNodes, movesOfNodes);
         gatherMoves(movesOfNodes, moves);
     }
+    static CYLCHAIN_INLINE void toVector(const Record* own, Vec& vector) {
+        Scalar* const numbers = reinterpret_cast<Scalar*>(&vector);
+        if constexpr (W == 1)
+            for (int k = 0; k < 3; k++)
+                numbers[k] = own[0][k];
+        else
+            for (int i = 0; i < W; i += 4) {
+                Record rows[] = {own[i], own[i+1], own[i+2], own[i+3]};
+                transpose<Scalar>(rows);
+                for (int k = 0; k < 3; k++)
+                    storeFour(rows[k], numbers+W*k+i);
+            }
+    }
+    static CYLCHAIN_INLINE void toRecords(const Vec& vector, Record* own) {
+        const Scalar* const numbers = reinterpret_cast<const Scalar*>(&vector);
+        if constexpr (W == 1)
+            own[0] = Record {numbers[0], numbers[1], numbers[2], 0};
+        else
+            for (int i = 0; i < W; i += 4) {
+                Record rows[4] = {};
+                for (int k = 0; k < 3; k++)
+                    rows[k] = loadFour(numbers+W*k+i);
+                transpose<Scalar>(rows);
+                for (int k = 0; k < 4; k++)
+                    own[i+k] = rows[k];
+            }
+    }
     template <class Number> void spreadForces(const Number* forces) {
-        for (int node = 0; node < pack.nodes; node++)
-            forcesOnNodes[node] = Vec {};
-        for (int i = 0; i < numTerms; i++) {
-            const PlacedTerm& place = placed[i];
-            // The coordinates of a node in a lane are W numbers apart.
-            Scalar* const force = reinterpret_cast<Scalar*>(forcesOnNodes)+place.first;
-            for (int k = 0; k < 3; k++) {
-                const Scalar own = forces[TermBlocks::place(i, k)];
-                force[k*W] += place.ofFirst*own;
-                force[(3+k)*W] += place.ofSecond*own;
+        std::fill(records, records+W*pack.nodes, Record {});
+        for (int term = 0; term < numTerms; term += TermBlocks::SIZE) {
+            Record rows[4] = {};
+            for (int k = 0; k < 3; k++)
+                rows[k] = __builtin_convertvector(loadFour(forces+TermBlocks::place(term, k)), Record);
+            transpose<Scalar>(rows);
+            for (int i = 0; i < TermBlocks::SIZE; i++) {
+                const PlacedTerm& place = placed[term+i];
+                records[place.first] += rows[i]*place.ofFirst;
+                records[place.first+W] += rows[i]*place.ofSecond;
             }
         }
-        if (pack.planar)
-            for (int node = 0; node < pack.nodes; node++)
+        for (int node = 0; node < pack.nodes; node++) {
+            toVector(records+W*node, forcesOnNodes[node]);
+            if (pack.planar)
                 forcesOnNodes[node].z = Real{};
+        }
     }
-    template <class Number> void gatherMoves(const Vec* ofNodes, Number* moves) const {
-        for (int i = 0; i < numTerms; i++) {
-            const PlacedTerm& place = placed[i];
-            const Scalar* const move = reinterpret_cast<const Scalar*>(ofNodes)+place.first;
+    template <class Number> void gatherMoves(const Vec* ofNodes, Number* moves) {
+        for (int node = 0; node < pack.nodes; node++)
+            toRecords(ofNodes[node], records+W*node);
+        for (int term = 0; term < numTerms; term += TermBlocks::SIZE) {
+            Record rows[4];
+            for (int i = 0; i < TermBlocks::SIZE; i++) {
+                const PlacedTerm& place = placed[term+i];
+                rows[i] = records[place.first]*place.ofFirst+records[place.first+W]*place.ofSecond;
+            }
+            transpose<Scalar>(rows);
             for (int k = 0; k < 3; k++)
-                moves[TermBlocks::place(i, k)] = place.ofFirst*move[k*W]+place.ofSecond*move[(3+k)*W];
+                storeFour(__builtin_convertvector(rows[k], FourOf<Number>), moves+TermBlocks::place(term, k));
         }
     }
 };

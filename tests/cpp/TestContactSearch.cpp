@@ -114,6 +114,8 @@ static FoundPairs comparePairs(const TestSystem& test, const vector<ContactPair>
             const Vec3d shift = {contact.shift[0], contact.shift[1], contact.shift[2]};
             checkClose(0, length(shift-image), 1, 1e-9, "image of "+name);
             const Vec3d start[] = {a0+shift, a1+shift, b0, b1};
+            const double before = distanceByHand(start[0], start[1], start[2], start[3]);
+            check(contact.before <= before && contact.before >= before-5 && contact.before >= 0, "distance of "+name);
             const double volume = volumeByHand(start, start, 0);
             if (fabs(volume) > 1e-6)
                 check((volume > 0 ? 1 : -1) == contact.side, "side of "+name);
@@ -289,13 +291,28 @@ static void testSearchingAgain() {
                     y[3*capsule.end()+k] += 30;
             }
             search.findPairsOf(moved, test.x.data(), y.data(), others);
+            vector<ContactPair> all, unknown, allUnknown;
+            const PairFilter isKnown = [&] (int a, int b) {return known.count({a, b}) == 1;};
+            search.findPairsOf(moved, test.x.data(), y.data(), unknown, Loop(), isKnown);
+            ContactSearch again(test.system);
+            again.findPairs(test.x.data(), y.data(), vectors, reach, all);
+            again.findPairs(test.x.data(), y.data(), vectors, reach, allUnknown, Loop(), isKnown);
+            for (auto lists : {make_pair(&others, &unknown), make_pair(&all, &allUnknown)}) {
+                vector<ContactPair>& left = *lists.first;
+                left.erase(remove_if(left.begin(), left.end(), [&] (const ContactPair& one) {
+                    return isKnown(one.a, one.b);
+                }), left.end());
+                check(left.size() == lists.second->size() && equal(left.begin(), left.end(), lists.second->begin(),
+                        [] (const ContactPair& one, const ContactPair& other) {
+                            return one.a == other.a && one.b == other.b;
+                        }), "known pairs are left out, and no others");
+            }
             for (const ContactPair& one : others)
                 added += known.insert({one.a, one.b}).second;
-            vector<ContactPair> all;
-            ContactSearch(test.system).findPairs(test.x.data(), y.data(), vectors, reach, all);
-            const set<int> again(moved.begin(), moved.end());
+            again.findPairs(test.x.data(), y.data(), vectors, reach, all);
+            const set<int> movers(moved.begin(), moved.end());
             for (const ContactPair& one : all)
-                check(known.count({one.a, one.b}) == 1 || (again.count(one.a) == 0 && again.count(one.b) == 0),
+                check(known.count({one.a, one.b}) == 1 || (movers.count(one.a) == 0 && movers.count(one.b) == 0),
                         "lost pair "+to_string(one.a)+", "+to_string(one.b));
         }
     }
