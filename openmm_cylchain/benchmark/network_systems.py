@@ -63,7 +63,7 @@ NETWORKS = (
     NetworkSystem("contacts", (5.0, 10.0), 0.5, contacts=True),
     NetworkSystem("links_very_soft", (20.0, 50.0, 100.0), 0.5, links=1000, stiffness=0.1),
     NetworkSystem("links_soft", (20.0, 50.0, 100.0), 0.2, links=1000, stiffness=0.25),
-    NetworkSystem("links_stiff", (20.0, 50.0), 0.0005, edge=700.0, links=900, stiffness=100.0),
+    NetworkSystem("links_stiff", (20.0, 50.0, 100.0), 0.0005, edge=700.0, links=900, stiffness=100.0),
     NetworkSystem("links_35_nm", (10.0, 20.0), 0.2, links=1000, stiffness=0.25, rest_length=35.0),
     NetworkSystem("contacts_and_links", (5.0, 10.0), 0.2, contacts=True, links=1000, stiffness=0.25, rest_length=35.0),
 )

@@ -36,8 +36,8 @@ public:
     void eliminate(const CouplingTerm* newTerms, int count, double* moves) override {
         terms = newTerms;
         numTerms = count;
-        // What fills up the last block takes no part.
-        placed.assign(TermBlocks::fill(count), PlacedTerm {0, 0, 0});
+        // What fills up the last block is on nodes behind the last one.
+        placed.assign(TermBlocks::fill(count), PlacedTerm {W*pack.nodes, 0, 0});
         for (int i = 0; i < count; i++)
             placed[i] = {W*terms[i].node+terms[i].lane, Scalar(1-terms[i].fraction), Scalar(terms[i].fraction)};
         step->getEquations().setTerms(terms, numTerms);
@@ -120,7 +120,7 @@ private:
         static thread_local Scratch memory, ofRecords;
         forcesOnNodes = memory.reserve<Vec>(2*pack.nodes);
         movesOfNodes = forcesOnNodes+pack.nodes;
-        records = ofRecords.reserve<Record>((std::size_t) W*pack.nodes);
+        records = ofRecords.reserve<Record>((std::size_t) W*(pack.nodes+2));
     }
     template <class Number> void respondAs(const Number* forces, Number* moves) {
         takeWorkspace();
@@ -128,6 +128,7 @@ private:
         step->getEquations().respond(forcesOnNodes, movesOfNodes);
         gatherMoves(movesOfNodes, moves);
     }
+    /** Bring the records of a node into lanes, and back. */
     static CYLCHAIN_INLINE void toVector(const Record* own, Vec& vector) {
         Scalar* const numbers = reinterpret_cast<Scalar*>(&vector);
         if constexpr (W == 1)
@@ -156,7 +157,7 @@ private:
             }
     }
     template <class Number> void spreadForces(const Number* forces) {
-        std::fill(records, records+W*pack.nodes, Record {});
+        std::fill(records, records+W*(pack.nodes+2), Record {});
         for (int term = 0; term < numTerms; term += TermBlocks::SIZE) {
             Record rows[4] = {};
             for (int k = 0; k < 3; k++)
@@ -177,6 +178,7 @@ private:
     template <class Number> void gatherMoves(const Vec* ofNodes, Number* moves) {
         for (int node = 0; node < pack.nodes; node++)
             toRecords(ofNodes[node], records+W*node);
+        std::fill(records+W*pack.nodes, records+W*(pack.nodes+2), Record {});
         for (int term = 0; term < numTerms; term += TermBlocks::SIZE) {
             Record rows[4];
             for (int i = 0; i < TermBlocks::SIZE; i++) {
