@@ -17,17 +17,7 @@ using namespace std;
 static const double LARGEST_FILLING = 0.2;
 
 static const BeamKernels& kernels() {
-    const InstructionSet best = instructionSet();
-    if constexpr (HAS_AVX512)
-        if (best == InstructionSet::Avx512)
-            return avx512BeamKernels();
-    if constexpr (HAS_AVX2)
-        if (best == InstructionSet::Avx2)
-            return avx2BeamKernels();
-    if constexpr (HAS_BASELINE)
-        if (best == InstructionSet::Baseline)
-            return baselineBeamKernels();
-    noOtherEntry();
+    return loopsOfBest<baselineBeamKernels, avx2BeamKernels, avx512BeamKernels>();
 }
 
 /** The fewest nodes of a ring: its elements bend by a third of a turn. */

@@ -22,22 +22,8 @@ namespace {
 /** Chains share a pack if they use the same models and at most a fifth of a lane is filled up. */
 const double LARGEST_FILLING = 0.2;
 
-const ChainKernels& bestKernels() {
-    const InstructionSet best = instructionSet();
-    if constexpr (HAS_AVX512)
-        if (best == InstructionSet::Avx512)
-            return avx512Kernels();
-    if constexpr (HAS_AVX2)
-        if (best == InstructionSet::Avx2)
-            return avx2Kernels();
-    if constexpr (HAS_BASELINE)
-        if (best == InstructionSet::Baseline)
-            return baselineKernels();
-    noOtherEntry();
-}
-
 const ChainKernels& kernels() {
-    static const ChainKernels& best = bestKernels();
+    static const ChainKernels& best = loopsOfBest<baselineKernels, avx2Kernels, avx512Kernels>();
     return best;
 }
 
