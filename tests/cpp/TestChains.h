@@ -6,6 +6,7 @@
  */
 
 #include "dynamics/ChainEngine.h"
+#include "mechanics/Loop.h"
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -18,6 +19,17 @@ using namespace cylchain;
 using namespace std;
 
 typedef vector<double> Array;
+
+/** Loops on one thread, one of them in the opposite order. */
+const Loop SERIAL = [] (int count, const function<void(int)>& iteration) {
+    for (int i = 0; i < count; i++)
+        iteration(i);
+};
+
+const Loop BACKWARDS = [] (int count, const function<void(int)>& iteration) {
+    for (int i = count-1; i >= 0; i--)
+        iteration(i);
+};
 
 inline void check(bool condition, const string& what) {
     if (!condition)

@@ -7,7 +7,6 @@
 #include "TestChains.h"
 #include "dynamics/ConjugateGradients.h"
 #include <algorithm>
-#include <functional>
 #include <memory>
 #include <random>
 
@@ -71,10 +70,6 @@ vector<Array> drawMatrix(int n, mt19937_64& generator) {
     return result;
 }
 
-const Loop FORWARDS = [] (int count, const function<void(int)>& iteration) {
-    for (int i = 0; i < count; i++)
-        iteration(i);
-};
 const int ENTRIES[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
 
 /** Packs, the terms of couplings between them, and what elimination finds. */
@@ -83,7 +78,7 @@ struct Problem {
     vector<unique_ptr<PackStep> > packs;
     /** In blocks: how places move without what joins them, the solution, and the forces that make up for it. */
     Array change, solution, found;
-    explicit Problem(const vector<int>& sizes, double stiffness, mt19937_64& generator) {
+    Problem(const vector<int>& sizes, double stiffness, mt19937_64& generator) {
         const int numPacks = sizes.size();
         terms.first.push_back(0);
         for (int size : sizes) {
@@ -175,13 +170,9 @@ template <class Real> int testProblem(const Problem& problem, double tolerance, 
     double largest = 0;
     for (double force : problem.found)
         largest = max(largest, fabs(force));
-    const Loop backwards = [] (int count, const function<void(int)>& iteration) {
-        for (int i = count-1; i >= 0; i--)
-            iteration(i);
-    };
     Array before;
     ConjugateGradients<Real> gradients;
-    for (const Loop& order : {FORWARDS, backwards}) {
+    for (const Loop& order : {SERIAL, BACKWARDS}) {
         Array change = problem.change, found(change.size(), 0.0);
         check(gradients.solve(packs, problem.terms, tolerance, 0, change, found, order), "it is solved");
         for (size_t pack = 0; pack < packs.size(); pack++)
@@ -228,24 +219,13 @@ void testNotANumber() {
     const vector<PackStep*> packs = problem.getPacks();
     Array change = problem.change, found(change.size(), 0.0);
     change[0] = NAN;
-    const Array before = change;
     ConjugateGradients<float> gradients;
-    gradients.solve(packs, problem.terms, 0.1, 0, change, found, FORWARDS);
+    gradients.solve(packs, problem.terms, 0.1, 0, change, found, SERIAL);
     check(gradients.getNumIterations() < 3, "it ends");
 }
 
 } // namespace
 
 int main() {
-    try {
-        testSolutions();
-        testWithoutPartners();
-        testNotANumber();
-    }
-    catch (const exception& error) {
-        printf("FAILED: %s\n", error.what());
-        return 1;
-    }
-    printf("Passed\n");
-    return 0;
+    return runTests({testSolutions, testWithoutPartners, testNotANumber});
 }

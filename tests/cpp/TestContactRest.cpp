@@ -213,14 +213,5 @@ static void testWall() {
 }
 
 int main() {
-    try {
-        for (auto test : {testDiscs, testLines, testTurningLines, testPassed, testSpheres, testDiffusion, testWall})
-            test();
-    }
-    catch (const exception& error) {
-        printf("FAILED: %s\n", error.what());
-        return 1;
-    }
-    printf("Passed\n");
-    return 0;
+    return runTests({testDiscs, testLines, testTurningLines, testPassed, testSpheres, testDiffusion, testWall});
 }

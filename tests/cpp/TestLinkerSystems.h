@@ -49,16 +49,6 @@ struct Rods {
     }
 };
 
-const Loop SERIAL = [] (int count, const function<void(int)>& iteration) {
-    for (int i = 0; i < count; i++)
-        iteration(i);
-};
-
-const Loop BACKWARDS = [] (int count, const function<void(int)>& iteration) {
-    for (int i = count-1; i >= 0; i--)
-        iteration(i);
-};
-
 inline Hand handOf(double bindingRate, double reach, double unbindingRate, const vector<int>& chains) {
     Hand hand;
     hand.bindingRate = bindingRate;

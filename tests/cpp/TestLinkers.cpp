@@ -569,26 +569,20 @@ static void testSegmentsAround() {
 }
 
 int main() {
-    try {
-        testSegmentsAround();
-        testUnbindingUnderLoad();
-        testSpeedUnderLoad();
-        testStalling();
-        testWalkingTogether();
-        testSpeedFromSiteToSite();
-        testTrafficOnSites();
-        testExtremes();
-        testRunLengthsAndEnds();
-        testSites();
-        testCompetitionForSites();
-        testThreadsAndImages();
-        testOrderOfStorage();
-        testEquilibriumOnRods();
-    }
-    catch (const exception& e) {
-        printf("exception: %s\n", e.what());
-        return 1;
-    }
-    printf("Done\n");
-    return 0;
+    return runTests({
+        testSegmentsAround,
+        testUnbindingUnderLoad,
+        testSpeedUnderLoad,
+        testStalling,
+        testWalkingTogether,
+        testSpeedFromSiteToSite,
+        testTrafficOnSites,
+        testExtremes,
+        testRunLengthsAndEnds,
+        testSites,
+        testCompetitionForSites,
+        testThreadsAndImages,
+        testOrderOfStorage,
+        testEquilibriumOnRods
+    });
 }

@@ -125,16 +125,5 @@ static void testCurvesAround() {
 }
 
 int main() {
-    try {
-        testCurvesAround();
-        testWalkingAlongAnArc();
-        testSpeedUnderLoadOnAnArc();
-        testEquilibriumOnCurves();
-    }
-    catch (const exception& e) {
-        printf("exception: %s\n", e.what());
-        return 1;
-    }
-    printf("Done\n");
-    return 0;
+    return runTests({testCurvesAround, testWalkingAlongAnArc, testSpeedUnderLoadOnAnArc, testEquilibriumOnCurves});
 }

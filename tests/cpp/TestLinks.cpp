@@ -205,15 +205,13 @@ static void testMemoryIsBounded() {
 }
 
 int main() {
-    try {
-        for (auto test : {testForcesAreDerivatives, testNearestParticles, testRangesAndDirections, testSamePlaces,
-                testChangesAreTakenBack, testChangesBetweenTables, testMemoryIsBounded})
-            test();
-    }
-    catch (const exception& error) {
-        printf("FAILED: %s\n", error.what());
-        return 1;
-    }
-    printf("Passed\n");
-    return 0;
+    return runTests({
+        testForcesAreDerivatives,
+        testNearestParticles,
+        testRangesAndDirections,
+        testSamePlaces,
+        testChangesAreTakenBack,
+        testChangesBetweenTables,
+        testMemoryIsBounded
+    });
 }

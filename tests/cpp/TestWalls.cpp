@@ -150,14 +150,5 @@ static void testMiddles() {
 }
 
 int main() {
-    try {
-        for (auto test : {testDepths, testRadii, testGradients, testMiddles})
-            test();
-    }
-    catch (const exception& error) {
-        printf("FAILED: %s\n", error.what());
-        return 1;
-    }
-    printf("Passed\n");
-    return 0;
+    return runTests({testDepths, testRadii, testGradients, testMiddles});
 }
