@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstring>
+#include <type_traits>
 #if defined(__AVX2__) || defined(__AVX512F__)
 #include <immintrin.h>
 #endif
@@ -38,10 +39,11 @@ CYLCHAIN_INLINE Floats clamped(Floats value) {
     return below > -one ? below : -one;
 }
 
-CYLCHAIN_INLINE Floats root(Floats value) {
-    Floats result;
-    for (int i = 0; i < CYLCHAIN_LANES; i++)
-        reinterpret_cast<float*>(&result)[i] = std::sqrt(reinterpret_cast<const float*>(&value)[i]);
+template <class Values> CYLCHAIN_INLINE Values root(Values value) {
+    typedef std::decay_t<decltype(value[0])> Number;
+    Values result;
+    for (std::size_t i = 0; i < sizeof(Values)/sizeof(Number); i++)
+        reinterpret_cast<Number*>(&result)[i] = std::sqrt(reinterpret_cast<const Number*>(&value)[i]);
     return result;
 }
 
@@ -372,13 +374,6 @@ CYLCHAIN_INLINE Doubles toUnit(Doubles value) {
     const Doubles zero = {}, one = zero+1;
     const Doubles above = value > zero ? value : zero;
     return above < one ? above : one;
-}
-
-CYLCHAIN_INLINE Doubles root(Doubles value) {
-    Doubles result;
-    for (int i = 0; i < DOUBLES; i++)
-        reinterpret_cast<double*>(&result)[i] = std::sqrt(reinterpret_cast<const double*>(&value)[i]);
-    return result;
 }
 
 CYLCHAIN_INLINE Doubles smaller(Doubles a, Doubles b) {

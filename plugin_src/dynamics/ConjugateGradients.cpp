@@ -33,7 +33,6 @@ template <class Real> void ConjugateGradients<Real>::begin(const CoupledTerms& a
         Real* const k = &stiffness[6*(i-i%TermBlocks::SIZE)+i%TermBlocks::SIZE];
         const bool joined = i < end && all.partners[i] >= 0;
         partners[i] = joined ? all.partners[i] : i;
-        shown[i] = {};
         for (int entry = 0; entry < 6; entry++)
             k[TermBlocks::SIZE*entry] = joined ? all.terms[i].stiffness[entry] : 0;
         if (!joined)
