@@ -2,6 +2,7 @@
 
 #include "couplings/CandidateLoops.h"
 #include "couplings/Capsules.h"
+#include "mechanics/Prefetch.h"
 #include <cmath>
 #include <cstddef>
 #include <cstring>
@@ -227,6 +228,8 @@ static int keepNear(const CoarseCapsule* capsules, const float* shifts, float re
     int kept = 0;
     for (int start = 0; start < count; start += CYLCHAIN_LANES) {
         Ints first, second, image;
+        for (int i = start+CYLCHAIN_LANES; i < count && i < start+2*CYLCHAIN_LANES; i++)
+            prefetch(&capsules[pairs.second[i]]);
         for (int i = 0; i < CYLCHAIN_LANES; i++) {
             const int pair = start+i < count ? start+i : start;
             first[i] = pairs.first[pair];

@@ -12,8 +12,6 @@ namespace {
 
 /** Capsules that are described together, those that are searched around together, and pairs looked at together. */
 const int CHUNK = 512, FEW = 32, BATCH = 512;
-/** Capsules that are far away in memory are asked for this many ahead. */
-const int AHEAD = 8;
 /** What rounding adds to distances in single precision, over the lengths that they are made of. */
 const double SINGLE_ROUNDING = 1e-6;
 /** The error of a distance where segments are nearly parallel, over their lengths, in single precision. */
@@ -545,6 +543,8 @@ void ContactSearch::findPairsOf(const vector<int>& capsules, const double* x, co
         search.parts[chunk].clear();
         Candidates& candidates = Candidates::ofThread();
         int found = 0;
+        for (int i = chunk*FEW; i < min(count, (chunk+1)*FEW); i++)
+            prefetch(&search.described[search.members[inOrder[i]]]);
         for (int i = chunk*FEW; i < min(count, (chunk+1)*FEW); i++)
             found = search.searchAround(search.members[inOrder[i]], candidates, found);
         search.keepPairs(candidates, found, x, y, known, search.parts[chunk]);

@@ -2,8 +2,9 @@
 #include "dynamics/ChainPack.h"
 #include "dynamics/ChainPieces.h"
 #include "dynamics/ModePacks.h"
-#include "dynamics/PackStep.h"
 #include "dynamics/PackPlaces.h"
+#include "dynamics/PackProperties.h"
+#include "dynamics/PackStep.h"
 #include "lanes/InstructionSet.h"
 #include <algorithm>
 #include <cmath>
@@ -71,69 +72,40 @@ const double LEAST_CHANGE = 1e-5;
 /** The resistance of a node to its motion. Third powers of it are computed, also for a thousandth of a step. */
 const double LEAST_RESISTANCE = 1e-9, LARGEST_RESISTANCE = 1e8;
 
-template <class Scalar> void setSegment(ChainPack<Scalar>& pack, int lane, int s, const Segment& segment,
-        int dimensions) {
-    typedef ChainPack<Scalar> Pack;
-    const int lanes = pack.lanes;
-    Scalar* properties = &pack.properties[(size_t) s*Pack::NumProperties*lanes+lane];
-    properties[Pack::RestLength*lanes] = segment.restLength;
-    properties[Pack::InverseRestLength*lanes] = 1/segment.restLength;
-    properties[Pack::Stiffness*lanes] = segment.stiffness;
-    properties[Pack::InverseExtension*lanes] = segment.maximumExtension > 0 ? 1/segment.maximumExtension : 0;
-    properties[Pack::Parallel*lanes] = segment.parallel;
-    properties[Pack::Perpendicular*lanes] = segment.perpendicular;
-    properties[Pack::Rotational*lanes] = segment.rotational;
-    properties[Pack::Extensional*lanes] = segment.extensional;
-    properties[Pack::RootParallel*lanes] = sqrt(segment.parallel);
-    properties[Pack::RootPerpendicular*lanes] = sqrt(segment.perpendicular);
-    properties[Pack::RootRotational*lanes] = sqrt(segment.rotational);
-    properties[Pack::RootExtensional*lanes] = sqrt(segment.extensional);
-    properties[Pack::Drift*lanes] = dimensions == 0 || segment.rotational == 0 ? 0.0 :
-            dimensions+1-(dimensions-1)*segment.extensional/segment.rotational;
-}
-
-void fillLane(ChainPack<double>& pack, int lane, const Chain& chain, int index) {
-    const int lanes = pack.lanes;
+void fillLane(ChainPack<double>& pack, PropertyRows<double>& properties, int lane, const Chain& chain, int index) {
+    typedef ChainPack<double> Pack;
     const size_t own = chain.nodes.size(), unrolled = own+(chain.closed ? 2 : 0);
     placeChain(pack, lane, chain, index);
     for (size_t node = 0; node < unrolled; node++)
-        pack.mobile[node*lanes+lane] = chain.fixed[node%own] ? 0.0 : 1.0;
+        properties.at(node, Pack::Mobile)[lane] = chain.fixed[node%own] ? 0 : 1;
     pack.free[lane] = any_of(chain.fixed.begin(), chain.fixed.end(), [] (bool fixed) {return fixed;}) ? 0.0 : 1.0;
     pack.nodeFriction[lane] = chain.nodeFriction;
     pack.rootNodeFriction[lane] = sqrt(chain.nodeFriction);
     for (size_t node = 1; node < unrolled-1; node++)
-        pack.joints[node*lanes+lane] = chain.joints[chain.closed ? node%own : node-1];
+        properties.at(node, Pack::Joint)[lane] = chain.joints[chain.closed ? node%own : node-1];
     for (size_t s = 0; s < unrolled-1; s++)
-        setSegment(pack, lane, s, chain.segments[s%chain.segments.size()], chain.planar ? 2 : 3);
+        properties.setSegment(s, lane, chain.segments[s%chain.segments.size()], chain.planar ? 2 : 3);
 }
 
-/** A pack whose lanes are all filled up. */
+/** A pack whose lanes are all filled up, but for its properties. */
 template <class Scalar> ChainPack<Scalar> packWithoutChains(const PackShape& shape, int lanes) {
-    typedef ChainPack<Scalar> Pack;
-    Pack pack = emptyPack<Scalar>(shape, lanes);
+    ChainPack<Scalar> pack = emptyPack<Scalar>(shape, lanes);
     pack.free.resize(lanes);
     pack.nodeFriction.resize(lanes);
     pack.rootNodeFriction.resize(lanes);
-    const size_t places = (size_t) pack.nodes*lanes;
-    pack.mobile.resize(places, 0.0);
-    pack.joints.resize(places, 0.0);
-    pack.properties.resize((places-lanes)*Pack::NumProperties);
-    // A filling segment that has no inverse length is not looked at when an iteration might end.
-    for (int s = 0; s < pack.nodes-1; s++)
-        for (int lane = 0; lane < lanes; lane++) {
-            setSegment(pack, lane, s, {1, 0, 1, 0, 0, 0, 0}, 0);
-            pack.properties[((size_t) s*Pack::NumProperties+Pack::InverseRestLength)*lanes+lane] = 0;
-        }
     return pack;
 }
 
-ChainPack<double> packed(const vector<Chain>& chains, const vector<int>& members, int lanes) {
+ChainPack<double> packed(const vector<Chain>& chains, const vector<int>& members, int lanes,
+            PropertyTables<double>& tables) {
     const Chain& longest = chains[members[0]];
     ChainPack<double> pack = packWithoutChains<double>({(int) longest.nodes.size()+(longest.closed ? 2 : 0),
             (int) longest.segments.size(), longest.bending, longest.stretching, longest.closed, longest.planar,
             longest.nodeFriction > 0, hasSegmentFriction(longest)}, lanes);
+    PropertyRows<double> properties(pack.nodes, lanes);
     for (size_t lane = 0; lane < members.size(); lane++)
-        fillLane(pack, lane, chains[members[lane]], members[lane]);
+        fillLane(pack, properties, lane, chains[members[lane]], members[lane]);
+    properties.giveTo(pack, tables);
     sortTethers(pack);
     return pack;
 }
@@ -149,7 +121,7 @@ void setOrigins(ChainPack<double>& pack, const vector<PieceOfChain>& origins) {
     }
 }
 
-/** Copy arrays that have a row of lanes for each node, segment or property, into lanes from one on. */
+/** Copy arrays that have a row of lanes for each node or segment, into lanes from one on. */
 template <class From, class To> void copyLanes(const vector<From>& from, int lanes, vector<To>& to, int allLanes,
         int firstLane) {
     for (size_t row = 0; row*lanes < from.size(); row++)
@@ -157,8 +129,11 @@ template <class From, class To> void copyLanes(const vector<From>& from, int lan
 }
 
 /** Some packs, of which the first is the longest, as one in single precision. */
-ChainPack<float> widened(const ChainPack<double>* first, const ChainPack<double>* last, int lanes) {
-    ChainPack<float> wide = packWithoutChains<float>(*first, lanes);
+ChainPack<float> widened(const ChainPack<double>* first, const ChainPack<double>* last, int lanes,
+        PropertyTables<float>& tables) {
+    typedef ChainPack<float> Pack;
+    Pack wide = packWithoutChains<float>(*first, lanes);
+    PropertyRows<float> properties(wide.nodes, lanes);
     int lane = 0;
     for (const ChainPack<double>* pack = first; pack != last; lane += pack->lanes, pack++) {
         auto copyTo = [&] (auto& to, const auto& from) {
@@ -169,9 +144,10 @@ ChainPack<float> widened(const ChainPack<double>* first, const ChainPack<double>
         copyTo(wide.segmentsOfLane, pack->segmentsOfLane);
         copyTo(wide.firstNode, pack->firstNode);
         copyTo(wide.particles, pack->particles);
-        copyTo(wide.properties, pack->properties);
-        copyTo(wide.joints, pack->joints);
-        copyTo(wide.mobile, pack->mobile);
+        for (int node = 0; node < pack->nodes; node++)
+            for (int property = 0; property < Pack::NumProperties; property++)
+                copy_n(pack->properties->begin()+(pack->rows[node]*Pack::NumProperties+property)*pack->lanes,
+                        pack->lanes, properties.at(node, property)+lane);
         copyTo(wide.free, pack->free);
         copyTo(wide.nodeFriction, pack->nodeFriction);
         copyTo(wide.rootNodeFriction, pack->rootNodeFriction);
@@ -185,6 +161,7 @@ ChainPack<float> widened(const ChainPack<double>* first, const ChainPack<double>
             wide.tethers.push_back(tether);
         }
     }
+    properties.giveTo(wide, tables);
     sortTethers(wide);
     return wide;
 }
@@ -206,9 +183,9 @@ public:
         for (int member : members)
             include(all[member]);
     }
-    void make(const vector<ChainPack<double> >& packs) {
+    void make(const vector<ChainPack<double> >& packs, PropertyTables<float>& tables) {
         if (!pack)
-            pack = widened(packs.data()+first, packs.data()+last, kernels().wide.lanes);
+            pack = widened(packs.data()+first, packs.data()+last, kernels().wide.lanes, tables);
     }
     bool isUsed(const StepSettings& settings) const {
         if (settings.precision == Precision::Automatic && 2*chains <= kernels().wide.lanes)
@@ -273,10 +250,12 @@ struct ChainEngine::Implementation {
     /** Packs are counted through all of these. Wide ones are in the order of those that they replace. */
     vector<ChainPack<double> > packs;
     vector<WidePack> wide;
+    PropertyTables<double> tables;
+    PropertyTables<float> wideTables;
     ModePacks modes;
     /** Those of each pack in double precision whose chains are few and long, or NULL. */
     vector<unique_ptr<ChainPieces> > pieces;
-    /** Held where wide packs are made. */
+    /** Held where wide packs and their tables are made. */
     mutex making;
     bool isOfModes(int pack) const {
         return pack >= (int) (packs.size()+wide.size());
@@ -319,7 +298,8 @@ ChainEngine::ChainEngine(const vector<Chain>& chains, const vector<PieceOfChain>
                 mayShareLanes(chains[order[first]], chains[order[first+fitting]]))
             fitting++;
         members.push_back(vector<int>(order.begin()+first, order.begin()+first+fitting));
-        implementation->packs.push_back(packed(chains, members.back(), lanesFor(fitting, kernels().lanes)));
+        implementation->packs.push_back(packed(chains, members.back(),
+                lanesFor(fitting, kernels().lanes), implementation->tables));
         if (!origins.empty())
             setOrigins(implementation->packs.back(), origins);
         const bool isLong = origins.empty() && ChainPieces::mayBeUsed(chains, members.back(), kernels().wide.lanes);
@@ -366,7 +346,7 @@ vector<int> ChainEngine::getPacksOfStep(const StepSettings& settings) const {
         const ChainPieces* const pieces = pack.last == pack.first+1 ? implementation->piecesOf(pack.first) : NULL;
         if (!pack.isUsed(settings) || (pieces != NULL && pieces->isUsed(settings)))
             continue;
-        pack.make(implementation->packs);
+        pack.make(implementation->packs, implementation->wideTables);
         for (; next < pack.first; next++)
             result.push_back(next);
         result.push_back(getNumPacks()+wide);

@@ -3,6 +3,7 @@
 
 #include "dynamics/ChainEngine.h"
 #include "lanes/Noise.h"
+#include <memory>
 #include <vector>
 
 namespace cylchain {
@@ -33,11 +34,13 @@ struct PackShape {
  */
 template <class Scalar> struct ChainPack : PackShape {
     /**
-     * The properties of a segment, each of them for all lanes. Drift is the thermal torque (15) over k_B T, which is
-     * d+1-(d-1)gamma_def/gamma_rot in d dimensions.
+     * The properties of a segment and of its first node, each of them for all lanes. Drift is the thermal torque (15)
+     * over k_B T, which is d+1-(d-1)gamma_def/gamma_rot in d dimensions. Joint is the stiffness of the joint at the
+     * node, which is zero at ends. Mobile is one if the node moves, and zero if it does not.
      */
     enum Property {RestLength, InverseRestLength, Stiffness, InverseExtension, Parallel, Perpendicular, Rotational,
-            Extensional, RootParallel, RootPerpendicular, RootRotational, RootExtensional, Drift, NumProperties};
+            Extensional, RootParallel, RootPerpendicular, RootRotational, RootExtensional, Drift, Joint, Mobile,
+            NumProperties};
     int lanes;
     /** Number of each lane's chain, or -1, of its nodes and of its segments. */
     std::vector<int> chain, nodesOfLane, segmentsOfLane;
@@ -47,12 +50,9 @@ template <class Scalar> struct ChainPack : PackShape {
     std::vector<int> particles;
     /** The same particles, each of them once, chain by chain. */
     std::vector<int> particlesOfChains;
-    /** Properties of segments, [segment][property][lane]. */
-    std::vector<Scalar> properties;
-    /** Stiffness of the joint at each node, [node][lane]; zero at ends. */
-    std::vector<Scalar> joints;
-    /** One for each node that moves, [node][lane]; zero for others. */
-    std::vector<Scalar> mobile;
+    /** Properties, [row][property][lane], which packs that are alike share; and the row of each node. */
+    std::shared_ptr<const std::vector<Scalar> > properties;
+    std::vector<int> rows;
     /** One for each lane whose chain has no node that is fixed; zero for others. */
     std::vector<Scalar> free;
     /** Friction of the nodes of each lane, and its square root. */

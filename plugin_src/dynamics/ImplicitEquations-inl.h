@@ -42,7 +42,7 @@ public:
             current = ahead;
             factors = factorsAhead;
             if (s+3 < n)
-                prefetch(&segments[s+2]);
+                prefetch<IteratedSegment<Real> >(&segments[s+2]);
             if (!CLOSED || s < pack.segments)
                 ofSegments.addSegment(y, s, current, band, *here, *after);
             else {
@@ -117,6 +117,10 @@ public:
             return;
         band.setForcesOnNodes(forcesOfOthers);
         substitute<Goal::Add>();
+    }
+    /** See TensionBand. */
+    void prefetchElimination() const {
+        band.prefetchElimination();
     }
     /** See TensionBand. */
     template <class Use> void findResponses(const Use& use) const {

@@ -60,7 +60,7 @@ private:
         Vec sum = {}, shifted = {}, end = y[0], moved = y[0];
         Real count = Real{};
         for (int node = 0; node < n; node++) {
-            const Real mobile = loaded<Real>(pack.mobile, node);
+            const Real mobile = property<Real>(pack, node, Pack::Mobile);
             if (node > 0) {
                 const Vec change = y[node]-end, difference = segments[node-1].difference+change;
                 moved = moved+change+difference*(lengthOf(node-1, difference)/root(difference.dot(difference))-1);

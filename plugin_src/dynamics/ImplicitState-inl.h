@@ -4,15 +4,13 @@
  * What an implicit step keeps of segments, of joints and of tethers while it is taken, and the forces of its stages.
  */
 
-/** What a step keeps of a segment, and of the joint with the segment before. */
-template <class Real> struct ImplicitSegment {
-    // At the start: the vector, its direction and length, the coordinate of the length, and the bend.
-    Vector<Real> difference, tangent, bend, bisector;
-    Real length, inverse, coordinate;
-    // The noise, and theta of the segment and of the joint.
-    Vector<Real> randomBend, randomForce, randomPair, metricForce;
-    Real randomCoordinate, randomTension, theta, jointTheta;
-    // What a stage makes of these: T = k (implicit q(y)+constant), with a part of the bend that turns with the joint.
+/** What all iterations of a step look at in a segment, and in the joint with the segment before. */
+template <class Real> struct IteratedSegment {
+    // At the start: the vector, its direction and length, and where a bend turns around.
+    Vector<Real> difference, tangent, bisector;
+    Real length, inverse;
+    // What a stage makes of noise and of theta: T = k (implicit q(y)+constant), with a part of the bend that turns with
+    // the joint.
     Vector<Real> constantBend, turningBend;
     Real implicit, constantCoordinate, constantTension, jointImplicit;
     // Of the last iteration or stage: the direction of the new segment, its tension and how the tension changes.
@@ -22,6 +20,16 @@ template <class Real> struct ImplicitSegment {
     // the tension that it was given.
     Real shift, multiplierBefore;
     Vector<Real> turned;
+};
+
+/** What a step keeps of a segment, and of the joint with the segment before. */
+template <class Real> struct ImplicitSegment : IteratedSegment<Real> {
+    // At the start: the coordinate of the length, and the bend.
+    Vector<Real> bend;
+    Real coordinate;
+    // The noise, and theta of the segment and of the joint.
+    Vector<Real> randomBend, randomForce, randomPair, metricForce;
+    Real randomCoordinate, randomTension, theta, jointTheta;
 };
 
 /** The vector from the point of a tether to its node. */

@@ -92,6 +92,14 @@ public:
         equations.eliminate(y, iteration);
         equations.template substitute<Goal::Find>();
     }
+    /** Ask for the memory that eliminate() begins with. */
+    void prefetchStart() const {
+        for (int i = 0; i < 3 && i < step.n; i++)
+            prefetch<IteratedSegment<Real> >(&step.segments[i]);
+        prefetchFirst(step.loads, step.n);
+        prefetchFirst(step.change, step.n);
+        equations.prefetchElimination();
+    }
     /** Finish the iteration, with what the linear equations have changed, and move the nodes of active lanes. */
     void advance(Vec* y, int iteration, Real active) {
         if (iteration > 0 || step.stage == Stage::Second) {
@@ -128,6 +136,9 @@ public:
         return convergence;
     }
     ImplicitEquations<W, CLOSED>& getEquations() {
+        return equations;
+    }
+    const ImplicitEquations<W, CLOSED>& getEquations() const {
         return equations;
     }
     Vec* getChange() {

@@ -45,6 +45,13 @@ public:
         takeWorkspace();
         gatherMoves(step->getChange(), moves);
     }
+    void prefetchStart() const override {
+        step->prefetchStart();
+        prefetchFirst(y, pack.nodes);
+    }
+    void prefetchElimination() const override {
+        step->getEquations().prefetchElimination();
+    }
     void respond(const double* forces, double* moves) override {
         respondAs(forces, moves);
     }

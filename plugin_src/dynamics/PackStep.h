@@ -47,6 +47,12 @@ public:
      * @param moves  receives the change of each term's place, in TermBlocks as all vectors of terms
      */
     virtual void eliminate(const CouplingTerm* terms, int numTerms, double* moves) = 0;
+    /** Ask for the memory that eliminate() begins with. */
+    virtual void prefetchStart() const {
+    }
+    /** Ask for the memory that begins what comes with the same elimination. */
+    virtual void prefetchElimination() const {
+    }
     /** Find how forces on the places of the terms move them, with the same elimination. */
     virtual void respond(const double* forces, double* moves) = 0;
     /** The same in single precision. */

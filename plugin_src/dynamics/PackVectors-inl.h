@@ -106,8 +106,9 @@ template <int W> void gatherSegments(const Pack& pack, const double* positions, 
     });
 }
 
+/** A property of a segment, or of its first node. */
 template <class Real> CYLCHAIN_INLINE Real property(const Pack& pack, int segment, int which) {
-    return loaded<Real>(pack.properties, (std::size_t) segment*Pack::NumProperties+which);
+    return loaded<Real>(*pack.properties, (std::size_t) pack.rows[segment]*Pack::NumProperties+which);
 }
 
 /** The vector from a tether's point to its node, in double precision. */

@@ -48,7 +48,7 @@ template <int W> void redistribute(const Pack& pack, const Vector<typename Lanes
 
         // Eliminate node s.
         Eliminated<Real>& node = nodes[s];
-        node.inverse = inverseOfMobile(diagonal, loaded<Real>(pack.mobile, s));
+        node.inverse = inverseOfMobile(diagonal, property<Real>(pack, s, Pack::Mobile));
         node.right = right;
         node.tangent = t;
         node.coupling = other;
@@ -71,7 +71,7 @@ template <int W> void redistribute(const Pack& pack, const Vector<typename Lanes
         const Vector<Real> moved = node.inverse*right;
         right = f[s+1]-moved*other-t*(otherAxial*t.dot(moved));
     }
-    v[last] = inverseOfMobile(diagonal, loaded<Real>(pack.mobile, last))*right;
+    v[last] = inverseOfMobile(diagonal, property<Real>(pack, last, Pack::Mobile))*right;
     for (int s = last-1; s >= 0; s--) {
         const Eliminated<Real>& node = nodes[s];
         v[s] = node.inverse*(node.right-v[s+1]*node.coupling-node.tangent*(node.axial*node.tangent.dot(v[s+1])));
@@ -114,7 +114,7 @@ template <int W> void redistributeClosed(const Pack& pack, const Vector<typename
             if (s == count-1)
                 coupling = coupling+other;
             Eliminated<Real>& node = nodes[s];
-            node.inverse = inverseOfMobile(diagonal, loaded<Real>(pack.mobile, s));
+            node.inverse = inverseOfMobile(diagonal, property<Real>(pack, s, Pack::Mobile));
             node.right = right;
             node.tangent = t;
             node.coupling = friction.other;
@@ -135,7 +135,7 @@ template <int W> void redistributeClosed(const Pack& pack, const Vector<typename
         right = nextRight;
         coupling = nextCoupling;
     }
-    v[0] = inverseOfMobile(first, loaded<Real>(pack.mobile, 0))*rightOfFirst;
+    v[0] = inverseOfMobile(first, property<Real>(pack, 0, Pack::Mobile))*rightOfFirst;
     for (int s = count-1; s > 0; s--) {
         const Eliminated<Real>& node = nodes[s];
         Vector<Real> rest = node.right-toFirst[s]*v[0];

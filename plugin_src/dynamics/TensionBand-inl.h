@@ -177,6 +177,11 @@ public:
                 ofBorder[k] = forces[k]+forces[n+k];
         setRightSides(ofBorder, [&] (int node, const Vec& right) {return right+forces[node];});
     }
+    /** Ask for the memory that begins an elimination, and what comes with it. */
+    void prefetchElimination() const {
+        prefetchFirst(nodes, n);
+        prefetchFirst(equations, n);
+    }
     /** See TensionResponses-inl.h. */
     template <class Use> void findResponses(const Use& use) const {
         cylchain::CYLCHAIN_LOOPS::findResponses<W, CLOSED>(n, nodes, equations, use);
@@ -232,7 +237,7 @@ private:
         EliminatedPair<Real, CLOSED>& result = nodes[node];
         if (node+1 < n)
             prefetch(&nodes[node+1]);
-        Sym inverse = inverseOfMobile(row.diagonal, loaded<Real>(pack.mobile, node));
+        Sym inverse = inverseOfMobile(row.diagonal, property<Real>(pack, node, Pack::Mobile));
         const Vec raised = inverse*link.first;
         const Real reciprocal = 1/(link.resistance+link.first.dot(raised));
         const Vec give = raised*reciprocal;

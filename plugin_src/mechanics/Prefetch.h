@@ -7,6 +7,8 @@ namespace cylchain {
 
 /** The bytes that a processor fetches from memory together. */
 const std::size_t CACHE_LINE = 64;
+/** How many turns of a loop ahead records are asked for. */
+const int AHEAD = 8;
 
 /**
  * Ask for a record that is needed soon. Where a step has many chains, memory is far from the processor, and what is
@@ -20,6 +22,12 @@ template <class Record> inline __attribute__((always_inline)) void prefetch(cons
     // A record that does not begin with a line ends in one more.
     if (alignof(Record) < CACHE_LINE && sizeof(Record) > 8)
         __builtin_prefetch(bytes+sizeof(Record)-1, 0, 2);
+}
+
+/** Ask for the first of some records: those behind them are asked for on the way. */
+template <class Record> inline __attribute__((always_inline)) void prefetchFirst(const Record* records, int count) {
+    for (int i = 0; i < 3 && i < count; i++)
+        prefetch(&records[i]);
 }
 
 } // namespace cylchain

@@ -43,7 +43,7 @@ template <int W> struct AngularBends : OnJoints {
         const Real l0 = property<Real>(pack, s, Pack::RestLength);
         const Real friction = lesser<Real>(property<Real>(pack, s-1, Pack::Rotational),
                 property<Real>(pack, s, Pack::Rotational))+loaded<Real>(pack.nodeFriction, 0)*(0.25*l0*l0);
-        const Real bendRate = 4*step.h*loaded<Real>(pack.joints, s)+TINY;
+        const Real bendRate = 4*step.h*property<Real>(pack, s, Pack::Joint)+TINY;
         segment.jointTheta = larger<Real>(splat<Real>(0.5), 1-friction/bendRate);
     }
     static void draw(const State& step, const NoisePlaces<W>& places, const PlaceNormals<Real>&, int s) {
@@ -93,7 +93,7 @@ template <int W> struct AngularBends : OnJoints {
                 axis*(axis.dot(segment.turningBend)*sumLength*perOne);
         const Vec newBend = newBent*newFactor.f;
 
-        const Real stiffness = loaded<Real>(step.pack.joints, s);
+        const Real stiffness = property<Real>(step.pack, s, Pack::Joint);
         const Vec u = newBend*segment.jointImplicit+segment.constantBend-turned;
         const Real twist = factor.slope*u.dot(bent);
         Vec force1 = t2*twist-u*factor.f, force2 = u*factor.f+t1*twist;
@@ -133,7 +133,7 @@ template <int W> struct AngularBends : OnJoints {
     static CYLCHAIN_INLINE void addForces(const Pack& pack, int s, const SegmentGeometry<Real>& geometry1,
             const SegmentGeometry<Real>& geometry2, Vec* f, ChainEnergy* energy) {
         const Vec before = geometry1.tangent, t = geometry2.tangent;
-        const Real joint = loaded<Real>(pack.joints, s);
+        const Real joint = property<Real>(pack, s, Pack::Joint);
         const Real c = before.dot(t);
         const Vec normal = crossProduct(before, t);
         const Real sineSquared = normal.dot(normal);
@@ -158,7 +158,7 @@ template <int W> void AngularBends<W>::drawInSpace(const State& step, const Nois
     const Pack& pack = step.pack;
     ImplicitSegment<Real>& segment = step.segments[s];
     const NoiseKey key = noiseKey(step.settings);
-    Real stiffness = loaded<Real>(pack.joints, s)/step.kT, theta = segment.jointTheta;
+    Real stiffness = property<Real>(pack, s, Pack::Joint)/step.kT, theta = segment.jointTheta;
     Real normals[2], acceptance;
     drawCandidates<W>(key, NoiseKind::Bend, places, normals, acceptance);
     // Nearly all bends of stiff joints are accepted at once.
@@ -208,7 +208,7 @@ template <int W> void AngularBends<W>::drawPlanar(const State& step, const Noise
     const Pack& pack = step.pack;
     ImplicitSegment<Real>& segment = step.segments[s];
     const NoiseKey key = noiseKey(step.settings);
-    Real stiffness = loaded<Real>(pack.joints, s)/step.kT, theta = segment.jointTheta, bend = Real{};
+    Real stiffness = property<Real>(pack, s, Pack::Joint)/step.kT, theta = segment.jointTheta, bend = Real{};
     Real normals[2], acceptance;
     drawCandidates<W>(key, NoiseKind::Bend, places, normals, acceptance);
     // The energy is that of a Gaussian or more, in the angle.

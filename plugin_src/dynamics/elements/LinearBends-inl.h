@@ -32,14 +32,14 @@ template <int W> struct LinearBends : OnJoints {
         const Real inverse = property<Real>(pack, s, Pack::InverseRestLength);
         const Real friction = loaded<Real>(pack.nodeFriction, 0)+
                 4*inverse*inverse*property<Real>(pack, s, Pack::Rotational);
-        const Real bendRate = 16*step.h*loaded<Real>(pack.joints, s)+TINY;
+        const Real bendRate = 16*step.h*property<Real>(pack, s, Pack::Joint)+TINY;
         segment.jointTheta = lesser<Real>(splat<Real>(LARGEST_THETA_OF_LINEAR_BENDS),
                 larger<Real>(splat<Real>(0.5), 1-friction/bendRate));
     }
     static constexpr bool DRAWS_WITH_NODES = true;
     /** Such a bend is Gaussian. */
     static void draw(const State& step, const NoisePlaces<W>&, const PlaceNormals<Real>& normals, int s) {
-        const Real stiffness = loaded<Real>(step.pack.joints, s);
+        const Real stiffness = property<Real>(step.pack, s, Pack::Joint);
         const Real deviation = stiffness > 0 ? root(step.kT/(stiffness+TINY)) : Real{};
         step.segments[s].randomBend = nodeNoise<Real>(normals.ofNode+4, step.pack.planar)*deviation;
     }
@@ -60,7 +60,7 @@ template <int W> struct LinearBends : OnJoints {
     template <class Factors, class Row> static void add(const State& step, int s, const Factors&,
                 const NewGeometry& geometry1, const NewGeometry& geometry2, Row& before, Row& here, Row& after) {
         const ImplicitSegment<Real>& segment = step.segments[s];
-        const Real stiffness = loaded<Real>(step.pack.joints, s);
+        const Real stiffness = property<Real>(step.pack, s, Pack::Joint);
         const Vec bend = geometry2.difference-geometry1.difference;
         const Vec force = (bend*segment.jointImplicit+segment.constantBend-segment.turningBend)*stiffness;
         before.right = before.right-force;
@@ -76,7 +76,7 @@ template <int W> struct LinearBends : OnJoints {
     }
     /** Such bends hold segments that are much shorter than what tension straightens. */
     template <class> static CYLCHAIN_INLINE Real stiffnessAgainstTurning(const Pack& pack, int s) {
-        return loaded<Real>(pack.joints, s)+loaded<Real>(pack.joints, s+1);
+        return property<Real>(pack, s, Pack::Joint)+property<Real>(pack, s+1, Pack::Joint);
     }
     /** All that is needed is a direction half-way, which a turn by 150 degrees leaves. */
     static CYLCHAIN_INLINE void findExcessiveChange(const State& step, const Vec* y, int s, bool* failed) {
@@ -88,7 +88,7 @@ template <int W> struct LinearBends : OnJoints {
     }
     static CYLCHAIN_INLINE void addForces(const Pack& pack, int s, const SegmentGeometry<Real>& geometry1,
             const SegmentGeometry<Real>& geometry2, Vec* f, ChainEnergy* energy) {
-        const Vec bend = geometry2.difference-geometry1.difference, force = bend*loaded<Real>(pack.joints, s);
+        const Vec bend = geometry2.difference-geometry1.difference, force = bend*property<Real>(pack, s, Pack::Joint);
         f[s-1] = f[s-1]-force;
         f[s] = f[s]+force+force;
         f[s+1] = f[s+1]-force;
