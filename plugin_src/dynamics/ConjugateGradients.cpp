@@ -1,6 +1,7 @@
 #include "dynamics/ConjugateGradients.h"
 #include "dynamics/SymmetricMatrices.h"
 #include "dynamics/TermBlocks.h"
+#include "mechanics/Prefetch.h"
 #include <algorithm>
 #include <cstddef>
 #include <type_traits>
@@ -23,13 +24,20 @@ template <class Real> const GradientKernels<Real>& kernels() {
 
 } // namespace
 
-/** Take the terms of a pack: the first residuals are what X makes of the moves without it. */
-template <class Real> void ConjugateGradients<Real>::begin(const CoupledTerms& all, int pack,
+/**
+ * Take the terms of a pack: the first residuals are what X makes of the moves without it. Returns no less than their
+ * energy r P^-1 r: P has the stiffness K of each coupling at its places, so that the energy is at most r K^-1 r.
+ */
+template <class Real> double ConjugateGradients<Real>::begin(const CoupledTerms& all, int pack,
             const vector<double>& change) {
     const int first = all.first[pack], last = all.first[pack+1], end = first+all.count[pack];
     for (vector<Real>* values : {&residual, &response, &force, &direction, &ownFound, &ownChange})
         fill(values->begin()+3*first, values->begin()+3*last, Real(0));
+    double energy = 0;
     for (int i = first; i < last; i++) {
+        if (i+AHEAD < end && all.partners[i+AHEAD] >= 0)
+            for (int coordinate = 0; coordinate < 3; coordinate++)
+                prefetch(&change[TermBlocks::place(all.partners[i+AHEAD], coordinate)]);
         Real* const k = &stiffness[6*(i-i%TermBlocks::SIZE)+i%TermBlocks::SIZE];
         const bool joined = i < end && all.partners[i] >= 0;
         partners[i] = joined ? all.partners[i] : i;
@@ -41,9 +49,12 @@ template <class Real> void ConjugateGradients<Real>::begin(const CoupledTerms& a
         for (int coordinate = 0; coordinate < 3; coordinate++)
             ofPartner[coordinate] = change[TermBlocks::place(partners[i], coordinate)];
         multiply(all.terms[i].stiffness, ofPartner, pull);
-        for (int coordinate = 0; coordinate < 3; coordinate++)
+        for (int coordinate = 0; coordinate < 3; coordinate++) {
             residual[TermBlocks::place(i, coordinate)] = pull[coordinate];
+            energy += pull[coordinate]*ofPartner[coordinate];
+        }
     }
+    return energy;
 }
 
 template <class Real> bool ConjugateGradients<Real>::solve(const vector<PackStep*>& packs, const CoupledTerms& all,
@@ -70,15 +81,23 @@ template <class Real> bool ConjugateGradients<Real>::solve(const vector<PackStep
             sum += ofPack;
         return sum;
     };
-    auto respond = [&] (int pack, int first, int last) {
-        packs[pack]->respond(&residual[3*first], &response[3*first]);
-        sums[pack] = kernel.show(vectors, first, last);
+    auto respondAfter = [&] (auto function) {
+        forCoupled([&] (int pack, int first, int last) {
+            if (pack+1 < (int) packs.size() && all.coupled[pack+1])
+                packs[pack+1]->prefetchElimination();
+            function(first, last);
+            packs[pack]->respond(&residual[3*first], &response[3*first]);
+            sums[pack] = kernel.show(vectors, first, last);
+        });
+        iterations++;
     };
-    forCoupled([&] (int pack, int first, int last) {
-        begin(all, pack, change);
-        respond(pack, first, last);
+    forCoupled([&] (int pack, int, int) {
+        sums[pack] = begin(all, pack, change);
     });
-    iterations = 1;
+    iterations = 0;
+    if (total() <= leastEnergy)
+        return true;
+    respondAfter([] (int, int) {});
     double energy = total();
     const double least = max(tolerance*energy, leastEnergy);
     const double largest = LARGEST_GROWTH*energy;
@@ -88,11 +107,9 @@ template <class Real> bool ConjugateGradients<Real>::solve(const vector<PackStep
             sums[pack] = kernel.turn(vectors, first, last, ratio);
         });
         const Real step = energy/total();
-        forCoupled([&] (int pack, int first, int last) {
+        respondAfter([&] (int first, int last) {
             kernel.move(vectors, first, last, step);
-            respond(pack, first, last);
         });
-        iterations++;
         const double before = energy;
         energy = total();
         ratio = energy/before;

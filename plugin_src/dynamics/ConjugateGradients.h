@@ -48,7 +48,7 @@ public:
         return iterations;
     }
 private:
-    void begin(const CoupledTerms& terms, int pack, const std::vector<double>& change);
+    double begin(const CoupledTerms& terms, int pack, const std::vector<double>& change);
     std::vector<Real> residual, response, force, direction, image, ownFound, ownChange, stiffness;
     std::vector<ShownTerm<Real> > shown;
     std::vector<int> partners;

@@ -1,6 +1,7 @@
 #include "dynamics/CoupledEquations.h"
 #include "dynamics/SymmetricMatrices.h"
 #include "dynamics/TermBlocks.h"
+#include "mechanics/Prefetch.h"
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
@@ -107,6 +108,8 @@ void CoupledEquations::gatherTerms(const vector<CouplingEquation>& equations, co
     if (!hasSamePlaces(equations, active, loop))
         sortPlaces(equations, active);
     runInChunks(loop, termOf.size(), CHUNK_OF_EQUATIONS, [&] (int number) {
+        if (number+AHEAD < (int) termOf.size() && termOf[number+AHEAD] >= 0)
+            prefetch(&gathered.terms[termOf[number+AHEAD]]);
         if (termOf[number] < 0)
             return;
         const int i = number/2, side = number%2;
@@ -130,6 +133,8 @@ bool CoupledEquations::solve(const vector<PackStep*>& packs, const PackFlags& ac
             OF_STIFF/max(OF_STIFF, demands.stiffness)});
     gatherTerms(equations, active, loop);
     loop(numPacks, [&] (int pack) {
+        if (pack+1 < numPacks && active[pack+1])
+            packs[pack+1]->prefetchStart();
         const int first = gathered.first[pack];
         fill(found.begin()+3*first, found.begin()+3*gathered.first[pack+1], 0.0);
         if (active[pack])
@@ -148,6 +153,9 @@ bool CoupledEquations::solve(const vector<PackStep*>& packs, const PackFlags& ac
         solveIn(twice);
     moves.resize(3*equations.size());
     runInChunks(loop, equations.size(), CHUNK_OF_EQUATIONS, [&] (int i) {
+        for (int side = 0; side < 2 && i+AHEAD < (int) equations.size(); side++)
+            if (const int ahead = termOf[2*(i+AHEAD)+side]; ahead >= 0)
+                prefetch(&change[TermBlocks::place(ahead, 1)]);
         const int first = termOf[2*i], second = termOf[2*i+1];
         for (int k = 0; k < 3; k++)
             moves[3*i+k] = (first >= 0 ? change[TermBlocks::place(first, k)] : 0)-
@@ -159,6 +167,8 @@ bool CoupledEquations::solve(const vector<PackStep*>& packs, const PackFlags& ac
 void CoupledEquations::advance(const vector<PackStep*>& packs, const PackFlags& active, double share,
             LaneFlags& unfinished, const Loop& loop) {
     loop(packs.size(), [&] (int pack) {
+        if (pack+1 < (int) packs.size() && active[pack+1])
+            packs[pack+1]->prefetchElimination();
         if (active[pack])
             packs[pack]->advance(found.data()+3*gathered.first[pack], share, unfinished[pack].get());
     });

@@ -208,8 +208,56 @@ void testWithoutPartners() {
     problem.terms.coupled.assign(2, 0);
     problem.solution = problem.change;
     problem.found.assign(problem.found.size(), 0.0);
-    check(testProblem<double>(problem, 1e-20, 1e-12) == 1, "no iteration");
-    check(testProblem<float>(problem, 1e-20, 1e-12) == 1, "no iteration");
+    check(testProblem<double>(problem, 1e-20, 1e-12) == 0, "no iteration");
+    check(testProblem<float>(problem, 1e-20, 1e-12) == 0, "no iteration");
+}
+
+/** The energy with which iterations begin, and what it is known not to exceed before packs respond. */
+void findEnergy(const Problem& problem, double& energy, double& bound) {
+    const CoupledTerms& terms = problem.terms;
+    Array residual(problem.change.size(), 0.0), response(residual.size(), 0.0);
+    energy = bound = 0;
+    for (int term = 0; term < terms.getNumTerms(); term++) {
+        const int partner = terms.partners[term];
+        if (partner < 0)
+            continue;
+        for (int k = 0; k < 3; k++) {
+            const double* const stiffness = terms.terms[term].stiffness;
+            double force = 0;
+            for (int other = 0; other < 3; other++)
+                force += stiffness[ENTRIES[k][other]]*problem.change[TermBlocks::place(partner, other)];
+            residual[TermBlocks::place(term, k)] = force;
+            bound += force*problem.change[TermBlocks::place(partner, k)];
+        }
+    }
+    for (size_t pack = 0; pack < problem.packs.size(); pack++)
+        problem.packs[pack]->respond(&residual[3*terms.first[pack]], &response[3*terms.first[pack]]);
+    for (size_t i = 0; i < residual.size(); i++)
+        energy += residual[i]*response[i];
+}
+
+/** Packs do not respond where what is left is too little whatever they do, and only there. */
+void testLittleLeft() {
+    mt19937_64 generator(4);
+    for (double stiffness : {0.1, 1.0, 10.0, 1000.0}) {
+        const Problem problem({4, 7, 2, 3}, stiffness, generator);
+        const vector<PackStep*> packs = problem.getPacks();
+        double energy, bound;
+        findEnergy(problem, energy, bound);
+        check(energy > 0 && energy < bound, "the energy is not more than is known");
+        auto iterationsTo = [&] (double least) {
+            Array change = problem.change, found(change.size(), 0.0);
+            ConjugateGradients<double> gradients;
+            check(gradients.solve(packs, problem.terms, 1e-20, least, change, found, SERIAL), "it is solved");
+            const bool same = change == problem.change && found == Array(found.size(), 0.0);
+            check(same == (gradients.getNumIterations() < 2), "moves change where there are iterations");
+            return gradients.getNumIterations();
+        };
+        check(iterationsTo(1.001*bound) == 0, "no pack responds");
+        check(iterationsTo(0.999*bound) > 0, "packs respond");
+        check(iterationsTo(1.001*energy) == 1, "they respond once");
+        check(iterationsTo(0.999*energy) > 1, "more than that is left");
+    }
 }
 
 /** What is not a number ends iterations. */
@@ -227,5 +275,5 @@ void testNotANumber() {
 } // namespace
 
 int main() {
-    return runTests({testSolutions, testWithoutPartners, testNotANumber});
+    return runTests({testSolutions, testWithoutPartners, testLittleLeft, testNotANumber});
 }
