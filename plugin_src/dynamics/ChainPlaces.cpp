@@ -1,5 +1,6 @@
 #include "dynamics/ChainPlaces.h"
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 
 using namespace cylchain;
@@ -23,6 +24,21 @@ ChainPlaces::ChainPlaces(const vector<Chain>& chains, const vector<BeamChain>& b
             chainOfParticle[beams[beam].particles[i]] = chains.size()+beam;
             nodeOfParticle[beams[beam].particles[i]] = i%2 == 0 ? i/2 : -1;
         }
+    findLeastFriction();
+}
+
+void ChainPlaces::findLeastFriction() {
+    leastFriction = HUGE_VAL;
+    for (int chain = 0; chain < getNumChains(); chain++) {
+        PlaceOnChain place;
+        place.chain = chain;
+        const int segments = chain < (int) chains.size() ? chains[chain].segments.size() : 1;
+        for (place.node = 0; place.node < segments; place.node++)
+            leastFriction = min(leastFriction, getFriction(place));
+        place.fraction = ElementPlace::ofTangent(0, true);
+        if (isBeam(chain))
+            leastFriction = min(leastFriction, getFriction(place));
+    }
 }
 
 void ChainPlaces::setParticles(const vector<CoupledParticle>& newParticles) {
@@ -31,6 +47,7 @@ void ChainPlaces::setParticles(const vector<CoupledParticle>& newParticles) {
     particles = newParticles;
     for (size_t i = 0; i < particles.size(); i++)
         chainOfParticle[particles[i].particle] = getNumFilaments()+i;
+    findLeastFriction();
     packOfChain.resize(getNumChains(), -1);
     laneOfChain.resize(getNumChains(), -1);
 }

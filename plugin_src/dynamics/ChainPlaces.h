@@ -69,6 +69,10 @@ public:
     }
     /** The least friction that a place has against any motion of its own. */
     double getFriction(const PlaceOnChain& place) const;
+    /** The same of the place that has the least. */
+    double getLeastFriction() const {
+        return leastFriction;
+    }
     /**
      * The friction that a place has against motion across its segment, which turns and moves as if it were alone: not
      * much more than the least friction against any motion.
@@ -115,6 +119,8 @@ private:
     const std::vector<BeamChain>& beams;
     std::vector<CoupledParticle> particles;
     std::vector<double> lengths;
+    double leastFriction;
+    void findLeastFriction();
     /** Of a control point, the node is -1. */
     std::vector<int> chainOfParticle, nodeOfParticle, packOfChain, laneOfChain;
 };

@@ -2,6 +2,7 @@
 #include "dynamics/StageWeights.h"
 #include "dynamics/SymmetricMatrices.h"
 #include "lanes/Noise.h"
+#include "mechanics/Prefetch.h"
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -45,6 +46,10 @@ const double LENGTH_TOLERANCE = 0.07;
 const double OF_TURN = 1e-2;
 /** Links that a thread looks at together. */
 const int CHUNK_OF_LINKS = 64;
+/** Nodes that follow each other are likely to do so in memory. */
+struct NeighbouringNodes {
+    double coordinates[6];
+};
 
 /** Whether a link has a direction. */
 bool turns(const Link& link) {
@@ -77,14 +82,22 @@ void LinkEquations::vectorOf(const State& state, const double* positions, double
         r[k] += state.shift[k]-second[k];
 }
 
+/** Ask for the positions around the places of a link. */
+void LinkEquations::prefetchPlaces(const State& state, const double* positions) const {
+    for (int particle : state.particles)
+        if (particle >= 0)
+            prefetch(reinterpret_cast<const NeighbouringNodes*>(positions+3*particle));
+}
+
 bool LinkEquations::needDoublePrecision(const ChainPlaces& places, double stepSize) const {
     for (const Link& link : *links) {
-        if (!turns(link))
+        const double rate = link.stiffness*stepSize;
+        // Most are known to be soft without their places.
+        if (!turns(link) || !(rate > LARGEST_RATE_IN_SINGLE_PRECISION*places.getLeastFriction()))
             continue;
         for (const Place& place : {link.first, link.second}) {
             PlaceOnChain found;
-            if (places.find(place, found) &&
-                    link.stiffness*stepSize > LARGEST_RATE_IN_SINGLE_PRECISION*places.getFriction(found))
+            if (places.find(place, found) && rate > LARGEST_RATE_IN_SINGLE_PRECISION*places.getFriction(found))
                 return true;
         }
     }
@@ -258,6 +271,8 @@ void LinkEquations::linearise(int, const double* moved, vector<CouplingEquation>
     const size_t first = equations.size();
     equations.resize(first+selected.size());
     runInChunks(*loop, selected.size(), CHUNK_OF_LINKS, [&] (int i) {
+        if (i+AHEAD < (int) selected.size())
+            prefetchPlaces(states[selected[i+AHEAD]], moved);
         linearise(states[selected[i]], moved, equations[first+i]);
     });
 }
@@ -448,12 +463,11 @@ bool LinkEquations::markUnfinished(PackFlags& packs) const {
 /** Whether a link cannot be solved, or has left the range of its potential. */
 bool LinkEquations::hasFailed(size_t number, const double* moved) const {
     const State& state = states[number];
+    if (unfinished[number] != 0 || !hasRange(state.link->model))
+        return unfinished[number] != 0;
     double r[3];
     vectorOf(state, moved, r);
-    const double length = sqrt(dot(r, r));
-    const bool left = hasRange(state.link->model) &&
-            !(fabs(length-state.link->restLength) < state.link->maximumExtension);
-    return unfinished[number] != 0 || left;
+    return !(fabs(sqrt(dot(r, r))-state.link->restLength) < state.link->maximumExtension);
 }
 
 void LinkEquations::findFailures(const double* moved, vector<bool>& failed) const {

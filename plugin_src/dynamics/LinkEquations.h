@@ -93,6 +93,7 @@ private:
         double drift[3];
     };
     void place(const CoupledStart& start, const Link& link, State& state) const;
+    void prefetchPlaces(const State& state, const double* positions) const;
     void addStiffness(const ChainPlaces& places);
     void describe(const CoupledStart& start, State& state) const;
     void drawNoise(const CoupledStart& start);
