@@ -22,12 +22,14 @@ void CapsulePairs::clear() {
     addedBefore.clear();
 }
 
-void CapsulePairs::begin(const vector<ContactPair>& found, int numCapsules) {
-    pairs.assign(found.begin(), found.end());
+void CapsulePairs::begin(vector<ContactPair>& found, int numCapsules) {
+    pairs.swap(found);
     firstPairs.assign(numCapsules+1, 0);
     watches.clear();
+    seconds.clear();
     for (const ContactPair& pair : pairs) {
         firstPairs[pair.a+1]++;
+        seconds.push_back(pair.b);
         watches.push_back({pair.a, pair.b, -HUGE_VAL, 0, -1, pair.clearance});
     }
     for (int i = 0; i < numCapsules; i++)
@@ -41,9 +43,7 @@ void CapsulePairs::begin(const vector<ContactPair>& found, int numCapsules) {
 }
 
 bool CapsulePairs::isKnown(int a, int b) const {
-    const auto first = watches.begin()+firstPairs[a], last = watches.begin()+firstPairs[a+1];
-    const auto found = lower_bound(first, last, b, [] (const Watch& one, int other) {return one.b < other;});
-    if (found != last && found->b == b)
+    if (binary_search(seconds.begin()+firstPairs[a], seconds.begin()+firstPairs[a+1], b))
         return true;
     const int numFirst = firstPairs.back();
     for (int i = lastAdded[a]; i >= 0; i = addedBefore[i-numFirst])

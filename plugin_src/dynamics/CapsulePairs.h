@@ -40,8 +40,8 @@ public:
         search = newSearch;
     }
     void clear();
-    /** Take the pairs that a search of all capsules has found, in its order. */
-    void begin(const std::vector<ContactPair>& found, int numCapsules);
+    /** Take over the pairs that a search of all capsules has found, in its order. */
+    void begin(std::vector<ContactPair>& found, int numCapsules);
     /** Get whether a pair is there. The number of a is less than that of b. */
     bool isKnown(int a, int b) const;
     /** Add a pair that another search has found; false if it was known. */
@@ -93,8 +93,8 @@ private:
     /** Those of the first search in its order, and behind them those that others have found. */
     std::vector<ContactPair> pairs;
     std::vector<Watch> watches;
-    /** Where those of the first search begin for each first capsule. */
-    std::vector<int> firstPairs;
+    /** The second capsules of those of the first search, and where they begin for each first capsule. */
+    std::vector<int> seconds, firstPairs;
     /** The last pair of each first capsule that another search has found, or -1, and the one before each of these. */
     std::vector<int> lastAdded, addedBefore;
     /** Where the contacts of each pair are among those of its chunk, or -1: most pairs never come near. */

@@ -48,6 +48,8 @@ const int RETURNING_ITERATIONS = 3;
 const int PASSING_ITERATIONS = 3;
 /** From this iteration on, contacts that touch go on to do so, even if that takes a small force which pulls. */
 const int HOLDING_ITERATIONS = 9;
+/** The first iteration that searches for new pairs: after those before, most capsules move on. */
+const int FIRST_NEW_PAIRS = 3;
 /** Where more capsules than this share have moved, all are searched for again, which takes less time for each. */
 const double SHARE_OF_MOVERS = 0.4;
 /** Capsules that a thread looks at together. */
@@ -148,8 +150,8 @@ void ContactEquations::findPairs(const double* moved) {
     motion.begin(search->getSystem().capsules, moved, *loop);
     pairs.begin(found, places.size());
     // Of most pairs, the search has told that they are far apart.
-    runInChunks(*loop, found.size(), CHUNK_OF_CONTACTS, [&] (int i) {
-        const ContactPair& pair = found[i];
+    runInChunks(*loop, pairs.getNumPairs(), CHUNK_OF_CONTACTS, [&] (int i) {
+        const ContactPair& pair = pairs.getPair(i);
         const double radii = pairs.radiiOf(pair);
         if (pair.clearance > 0 && pair.distance-radii >= LARGEST_GAP*radii)
             pairs.getWatch(i).due = pair.distance-radii;
@@ -434,9 +436,16 @@ bool ContactEquations::anyComeNear(const double* moved) {
         });
     });
     // Pairs that no search has seen were out of reach: one of the two has moved by more than half of it.
-    if (motion.exceedsReach())
-        any |= findNewPairs(moved);
-    return any;
+    if (!motion.exceedsReach())
+        return any;
+    bool waits = false;
+    if (iterations < FIRST_NEW_PAIRS)
+        for (int capsule : motion.getMovers())
+            if (packs[capsule] >= 0) {
+                unfinished[packs[capsule]] = 1;
+                waits = true;
+            }
+    return waits || findNewPairs(moved) || any;
 }
 
 /** Whether a contact has moved too much in the last iteration, or by itself since one of its packs took part. */
