@@ -4,6 +4,7 @@
  */
 
 #include "TestChains.h"
+#include "dynamics/PackProperties.h"
 #include "mechanics/BrokenSegment.h"
 
 static void testForces() {
@@ -285,8 +286,19 @@ static void testLengthsThatLeaveTheirRange() {
     }
 }
 
+/** Rows of properties that are equal are there once, in a pack and in all packs. */
+static void testSharedProperties() {
+    PropertyTables<double> tables;
+    vector<int> rows, ofOther;
+    const auto first = tables.find({1, 2, 3, 4, 1, 2}, 2, rows);
+    check(*first == Array {1, 2, 3, 4} && rows == vector<int> {0, 1, 0}, "rows that are equal are there once");
+    check(tables.find({1, 2, 3, 4}, 2, ofOther) == first && ofOther == vector<int> {0, 1}, "tables are shared");
+    check(tables.find({1, 2, 3, 5}, 2, ofOther) != first, "others are not");
+}
+
 int main() {
     return runTests({
+        testSharedProperties,
         testForces,
         testStraightAndFoldedChains,
         testStepsWithoutNoise,
