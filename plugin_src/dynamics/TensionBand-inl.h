@@ -38,13 +38,20 @@ template <class Real, bool CLOSED> struct BandRow : ToBorder<Real, CLOSED> {
  *     T(-1) = tension+first.y(+1)+last.y(+2)+share T.
  *
  * A force on the node alone moves it by its inverse, and changes T(-1) by its product with give; a unit of
- * compliance times start of T(-1) moves it by -give, and changes T(-1) by reciprocal.
+ * compliance times start of T(-1) moves it by -give, and changes T(-1) by reciprocal. What depends on right sides is in
+ * EliminatedRight: where there are many chains, all that is kept from one substitution to the next takes time to fetch.
  */
 template <class Real, bool CLOSED> struct EliminatedPair : ToBorder<Real, CLOSED>, TensionToBorder<Real, CLOSED> {
     Symmetric<Real> inverse;
     Matrix<Real> next, second;
-    Vector<Real> solution, pull, first, last, give;
-    Real tension, share, reciprocal;
+    Vector<Real> pull, first, last, give;
+    Real share, reciprocal;
+};
+
+/** What depends on right sides of the same. */
+template <class Real> struct EliminatedRight {
+    Vector<Real> solution;
+    Real tension;
 };
 
 /** The equation of the tension of a segment. */
@@ -66,15 +73,16 @@ template <int W, bool CLOSED> class TensionBand {
 public:
     typedef BandRow<Real, CLOSED> Row;
     struct Memory {
-        Scratch nodes, equations, tensions;
+        Scratch nodes, compliances, tensions;
     };
     TensionBand(const Pack& pack, Memory& memory) : pack(pack), n(pack.ownNodes()) {
         nodes = memory.nodes.template reserve<EliminatedPair<Real, CLOSED> >(n);
-        equations = memory.equations.template reserve<TensionEquation<Real> >(n);
+        compliances = memory.compliances.template reserve<Real>(n);
         tensions = memory.tensions.template reserve<Real>(n);
     }
-    /** Begin to eliminate. */
+    /** Begin to eliminate. Equations of tensions last until the next elimination or substitution of any pack. */
     void begin() {
+        takeWorkspace();
         // There is no tension before the first node.
         link = Link {};
         link.resistance = splat<Real>(1);
@@ -82,6 +90,7 @@ public:
     /** Set the equation of the tension of a segment, before its first node is eliminated. */
     CYLCHAIN_INLINE void setTension(int s, const Vec& direction, Real compliance, Real start) {
         equations[s] = {direction, compliance, start};
+        compliances[s] = compliance;
     }
     /**
      * Eliminate a node from the equations of the next ones. All that belongs to its row has been gathered.
@@ -119,10 +128,10 @@ public:
         Vec next = {}, second = {};
         Real tension = {};
         if constexpr (CLOSED) {
-            const Vec found1 = nodes[1].solution;
-            const Real tension0 = nodes[1].tension;
-            const Vec found0 = nodes[0].solution-nodes[0].next*found1+nodes[0].pull*tension0;
-            const Real tensionLast = nodes[0].tension+nodes[0].first.dot(found1)+nodes[0].share*tension0;
+            const Vec found1 = rights[1].solution;
+            const Real tension0 = rights[1].tension;
+            const Vec found0 = rights[0].solution-nodes[0].next*found1+nodes[0].pull*tension0;
+            const Real tensionLast = rights[0].tension+nodes[0].first.dot(found1)+nodes[0].share*tension0;
             if (GOAL != Goal::Nodes) {
                 tensions[0] = GOAL == Goal::Add ? tensions[0]+tension0 : tension0;
                 tensions[n-1] = GOAL == Goal::Add ? tensions[n-1]+tensionLast : tensionLast;
@@ -180,18 +189,18 @@ public:
     /** Ask for the memory that begins an elimination, and what comes with it. */
     void prefetchElimination() const {
         prefetchFirst(nodes, n);
-        prefetchFirst(equations, n);
     }
     /** See TensionResponses-inl.h. */
     template <class Use> void findResponses(const Use& use) const {
-        cylchain::CYLCHAIN_LOOPS::findResponses<W, CLOSED>(n, nodes, equations, use);
+        cylchain::CYLCHAIN_LOOPS::findResponses<W, CLOSED>(n, nodes, compliances, use);
     }
 private:
     const Pack& pack;
     const int n;
     EliminatedPair<Real, CLOSED>* nodes;
+    EliminatedRight<Real>* rights;
     TensionEquation<Real>* equations;
-    Real* tensions;
+    Real *compliances, *tensions;
     struct BorderVectors {
         Vec border[2];
     };
@@ -204,17 +213,24 @@ private:
     Link link;
     Row border[CLOSED ? 2 : 1];
 
+    /** Use memory that the packs of a thread share: substitution follows before another pack takes it. */
+    void takeWorkspace() {
+        static thread_local Scratch ofRights, ofEquations;
+        rights = ofRights.template reserve<EliminatedRight<Real> >(n);
+        equations = ofEquations.template reserve<TensionEquation<Real> >(n);
+    }
+
     /** Begin the border of a ring with some right sides; a function adds what others have to what is there. */
     template <class Function> CYLCHAIN_INLINE void setRightSides(Vec* ofBorder, Function added) {
+        takeWorkspace();
         Vec here = {}, next = {};
         Real start = {};
         for (int node = CLOSED ? 2 : 0; node < n; node++) {
-            EliminatedPair<Real, CLOSED>& own = nodes[node];
+            const EliminatedPair<Real, CLOSED>& own = nodes[node];
             if (node+2 < n)
                 prefetch(&nodes[node+2]);
             const Vec right = added(node, here);
-            own.solution = own.inverse*right-own.give*start;
-            own.tension = own.reciprocal*start+own.give.dot(right);
+            rights[node] = {own.inverse*right-own.give*start, own.reciprocal*start+own.give.dot(right)};
             if constexpr (CLOSED)
                 for (int k = 0; k < 2; k++)
                     ofBorder[k] = ofBorder[k]-own.border[k].transposedTimes(right)-own.tensionBorder[k]*start;
@@ -222,15 +238,18 @@ private:
                 return;
             here = next-own.next.transposedTimes(right)-own.first*start;
             next = -(own.second.transposedTimes(right)+own.last*start);
-            start = -equations[node].direction.dot(own.solution);
+            // Less the solution along the segment behind it, since pull is the inverse times its direction.
+            start = own.share*start-own.pull.dot(right);
         }
         if constexpr (CLOSED) {
-            nodes[0].solution = nodes[0].inverse*ofBorder[0]-nodes[0].give*start;
-            nodes[0].tension = nodes[0].reciprocal*start+nodes[0].give.dot(ofBorder[0]);
+            auto setRight = [&] (int node, const Vec& right) {
+                rights[node] = {nodes[node].inverse*right-nodes[node].give*start,
+                        nodes[node].reciprocal*start+nodes[node].give.dot(right)};
+            };
+            setRight(0, ofBorder[0]);
             const Vec right = ofBorder[1]-nodes[0].next.transposedTimes(ofBorder[0])-nodes[0].first*start;
-            start = -equations[0].direction.dot(nodes[0].solution);
-            nodes[1].solution = nodes[1].inverse*right-nodes[1].give*start;
-            nodes[1].tension = nodes[1].reciprocal*start+nodes[1].give.dot(right);
+            start = nodes[0].share*start-nodes[0].pull.dot(ofBorder[0]);
+            setRight(1, right);
         }
     }
     template <int FOLLOWING> CYLCHAIN_INLINE void eliminatePair(int node, const Row& row, Row& next, Row& second) {
@@ -247,8 +266,7 @@ private:
         result.inverse = inverse;
         result.give = give;
         result.reciprocal = reciprocal;
-        result.solution = solution;
-        result.tension = tension;
+        rights[node] = {solution, tension};
         if (FOLLOWING == 0)
             return;
         const TensionEquation<Real>& behind = equations[node];
@@ -325,7 +343,8 @@ private:
             border[k].diagonal.subtractTransposedProduct(row.border[k], coupling);
             border[k].diagonal.addOuter(before.border[k], ofTension);
             border[k].right =
-                    border[k].right-row.border[k].transposedTimes(result.solution)-before.border[k]*result.tension;
+                    border[k].right-row.border[k].transposedTimes(rights[node].solution)-
+                    before.border[k]*rights[node].tension;
             link.border[k] = coupling.transposedTimes(equations[node].direction);
         }
         border[0].upper = border[0].upper-row.border[0].transposedTimes(result.border[1])+
@@ -334,8 +353,8 @@ private:
     template <Goal GOAL> CYLCHAIN_INLINE void substitutePair(int node, const Vec& found0, const Vec& found1, Vec& next,
                 Vec& second, Real& tension, Vec* y) {
         const EliminatedPair<Real, CLOSED>& own = nodes[node];
-        Vec here = own.solution;
-        Real found = own.tension;
+        Vec here = rights[node].solution;
+        Real found = rights[node].tension;
         if (CLOSED || node < n-1) {
             here = here-own.next*next-own.second*second+own.pull*tension;
             found = found+own.first.dot(next)+own.last.dot(second)+own.share*tension;

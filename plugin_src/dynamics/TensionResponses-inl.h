@@ -7,13 +7,14 @@
  *
  * That of rings is long: there should be one type of use for each number of lanes.
  *
- * @param use   use.takeResponse is called with the number of each segment and that vector; use.takeBlocks with the
- *              number of each segment and three of the blocks: that of its first node, the one between its nodes, and
- *              that of its second node
+ * @param compliances   of the tensions of all segments
+ * @param use           use.takeResponse is called with the number of each segment and that vector; use.takeBlocks with
+ *                      the number of each segment and three of the blocks: that of its first node, the one between its
+ *                      nodes, and that of its second node
  */
 template <int W, bool CLOSED, class Use> void findResponses(int n,
             const EliminatedPair<typename Lanes<W>::Type, CLOSED>* nodes,
-            const TensionEquation<typename Lanes<W>::Type>* equations, const Use& use) {
+            const typename Lanes<W>::Type* compliances, const Use& use) {
     typedef typename Lanes<W>::Type Real;
     typedef Vector<Real> Vec;
     typedef Matrix<Real> Mat;
@@ -32,7 +33,7 @@ template <int W, bool CLOSED, class Use> void findResponses(int n,
         const Sym last = nodes[1].inverse;
         const Vec after1 = -nodes[1].give;
         const Vec here = node.pull*nodes[1].reciprocal-node.next*after1;
-        use.takeResponse(0, (here-after1)*equations[0].compliance);
+        use.takeResponse(0, (here-after1)*compliances[0]);
         borders[1][1] = Mat::of(last);
         borders[0][1] = -(node.next*borders[1][1]+Mat::outer(node.pull, after1));
         borders[1][0] = borders[0][1].transposed();
@@ -56,10 +57,10 @@ template <int W, bool CLOSED, class Use> void findResponses(int n,
         Vec here = node.pull*own-node.next*after-node.second*afterNext;
         if constexpr (CLOSED) {
             here = here-node.border[0]*ofBorder[0]-node.border[1]*ofBorder[1];
-            use.takeResponse(s, (here-(s == n-1 ? ofBorder[0] : after))*equations[s].compliance);
+            use.takeResponse(s, (here-(s == n-1 ? ofBorder[0] : after))*compliances[s]);
         }
         else {
-            use.takeResponse(s, (here-after)*equations[s].compliance);
+            use.takeResponse(s, (here-after)*compliances[s]);
             if (s == 0 && !Use::NEEDS_BLOCKS)
                 return;
         }
@@ -125,7 +126,7 @@ template <int W, bool CLOSED, class Use> void findResponses(int n,
         other = newOther;
     }
     if constexpr (CLOSED) {
-        use.takeResponse(1, (ofBorder[1]-after)*equations[1].compliance);
+        use.takeResponse(1, (ofBorder[1]-after)*compliances[1]);
         use.takeBlocks(1, borders[1][1].lower(), next[1].transposed(), same);
         use.takeBlocks(0, borders[0][0].lower(), borders[0][1], borders[1][1].lower());
     }
