@@ -131,8 +131,7 @@ template <class From, class To> void copyLanes(const vector<From>& from, int lan
 /** Some packs, of which the first is the longest, as one in single precision. */
 ChainPack<float> widened(const ChainPack<double>* first, const ChainPack<double>* last, int lanes,
         PropertyTables<float>& tables) {
-    typedef ChainPack<float> Pack;
-    Pack wide = packWithoutChains<float>(*first, lanes);
+    ChainPack<float> wide = packWithoutChains<float>(*first, lanes);
     PropertyRows<float> properties(wide.nodes, lanes);
     int lane = 0;
     for (const ChainPack<double>* pack = first; pack != last; lane += pack->lanes, pack++) {
@@ -144,10 +143,7 @@ ChainPack<float> widened(const ChainPack<double>* first, const ChainPack<double>
         copyTo(wide.segmentsOfLane, pack->segmentsOfLane);
         copyTo(wide.firstNode, pack->firstNode);
         copyTo(wide.particles, pack->particles);
-        for (int node = 0; node < pack->nodes; node++)
-            for (int property = 0; property < Pack::NumProperties; property++)
-                copy_n(pack->properties->begin()+(pack->rows[node]*Pack::NumProperties+property)*pack->lanes,
-                        pack->lanes, properties.at(node, property)+lane);
+        properties.setLanes(lane, *pack);
         copyTo(wide.free, pack->free);
         copyTo(wide.nodeFriction, pack->nodeFriction);
         copyTo(wide.rootNodeFriction, pack->rootNodeFriction);

@@ -441,10 +441,7 @@ bool ContactEquations::anyComeNear(const double* moved) {
     bool waits = false;
     if (iterations < FIRST_NEW_PAIRS)
         for (int capsule : motion.getMovers())
-            if (packs[capsule] >= 0) {
-                unfinished[packs[capsule]] = 1;
-                waits = true;
-            }
+            waits |= markCapsule(capsule);
     return waits || findNewPairs(moved) || any;
 }
 
@@ -507,11 +504,18 @@ bool ContactEquations::markUnfinished(PackFlags& packs) const {
     return iterations >= 2;
 }
 
+/** The pack of a capsule takes part in the next iteration; false if it has none. */
+bool ContactEquations::markCapsule(int capsule) {
+    if (packs[capsule] < 0)
+        return false;
+    unfinished[packs[capsule]] = 1;
+    return true;
+}
+
 /** The packs of a pair take part in the next iteration. */
 void ContactEquations::mark(int pair) {
-    for (int capsule : {pairs.getWatch(pair).a, pairs.getWatch(pair).b})
-        if (packs[capsule] >= 0)
-            unfinished[packs[capsule]] = 1;
+    markCapsule(pairs.getWatch(pair).a);
+    markCapsule(pairs.getWatch(pair).b);
 }
 
 /** Find pairs that cross. */

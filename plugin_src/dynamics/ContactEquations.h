@@ -71,6 +71,7 @@ private:
     /** Pairs that are looked at in lanes, in memory of a thread. */
     struct Looks;
     template <class Function> bool markPairs(bool all, Function findIn);
+    bool markCapsule(int capsule);
     void mark(int pair);
     bool takesPart(int capsule) const {
         return packs[capsule] >= 0 && (*active)[packs[capsule]];

@@ -463,8 +463,10 @@ bool LinkEquations::markUnfinished(PackFlags& packs) const {
 /** Whether a link cannot be solved, or has left the range of its potential. */
 bool LinkEquations::hasFailed(size_t number, const double* moved) const {
     const State& state = states[number];
-    if (unfinished[number] != 0 || !hasRange(state.link->model))
-        return unfinished[number] != 0;
+    if (unfinished[number] != 0)
+        return true;
+    if (!hasRange(state.link->model))
+        return false;
     double r[3];
     vectorOf(state, moved, r);
     return !(fabs(sqrt(dot(r, r))-state.link->restLength) < state.link->maximumExtension);

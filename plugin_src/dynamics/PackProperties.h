@@ -2,6 +2,7 @@
 #define CYLCHAIN_PACK_PROPERTIES_H_
 
 #include "dynamics/ChainPack.h"
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <map>
@@ -80,6 +81,13 @@ public:
         at(s, Pack::RootExtensional)[lane] = std::sqrt(segment.extensional);
         at(s, Pack::Drift)[lane] = dimensions == 0 || segment.rotational == 0 ? 0.0 :
                 dimensions+1-(dimensions-1)*segment.extensional/segment.rotational;
+    }
+    /** Take those of a pack of fewer lanes, into lanes from one on. */
+    template <class Other> void setLanes(int firstLane, const ChainPack<Other>& pack) {
+        for (int node = 0; node < pack.nodes; node++)
+            for (int property = 0; property < Pack::NumProperties; property++)
+                std::copy_n(pack.properties->begin()+(pack.rows[node]*Pack::NumProperties+property)*pack.lanes,
+                        pack.lanes, at(node, property)+firstLane);
     }
     /** Let a pack have these properties. */
     void giveTo(Pack& pack, PropertyTables<Scalar>& tables) const {
