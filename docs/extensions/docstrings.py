@@ -26,7 +26,7 @@ def _write_signature(app, what, name, thing, options, signature, return_annotati
     if what == "class":
         if dataclasses.is_dataclass(thing) and "__init__" in vars(thing):
             return _signature_of_fields(thing), None
-        thing = vars(thing).get("__init__")
+        thing = thing.__init__
     thing = inspect.unwrap(getattr(thing, "__func__", thing)) if thing is not None else None
     if not inspect.isfunction(thing) or thing.__module__.split(".")[0] != "openmm_cylchain":
         return None
