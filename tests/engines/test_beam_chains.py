@@ -12,10 +12,10 @@ from openmm_cylchain.engines.compiled import (
     CylinderChainIntegrator,
     plugin,
 )
-from openmm_cylchain.units.quantities import thermal_energy
+from support.beam_contexts import beam_context
+from support.contexts import positions_of
+from support.solvent import KT, TEMPERATURE
 
-TEMPERATURE = 300.0
-KT = thermal_energy(TEMPERATURE)
 PLATFORMS = ("Reference", "CPU")
 
 
@@ -39,23 +39,11 @@ def beam_system(count, elements, length, rigidity, modulus, clamped=False, frict
     return system, force, np.concatenate(positions)
 
 
-def context_of(system, positions, step, temperature=TEMPERATURE, platform="CPU", seed=1):
-    integrator = CylinderChainIntegrator(temperature, 1.0, step)
-    integrator.setRandomNumberSeed(seed)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatformByName(platform))
-    context.setPositions(positions)
-    return context
-
-
-def positions_of(context):
-    return context.getState(positions=True).getPositions(asNumpy=True)._value
-
-
 @pytest.mark.parametrize("platform", PLATFORMS)
 def test_forces_are_differences_of_the_energy(platform):
     system, _, positions = beam_system(2, 2, 1.0, 20.0, 1e3)
     positions = positions + np.random.default_rng(1).normal(0.0, 0.05, positions.shape)
-    context = context_of(system, positions, 0.01, platform=platform)
+    context = beam_context(system, positions, 0.01, platform=platform)
     state = context.getState(forces=True, energy=True)
     forces = state.getForces(asNumpy=True)._value
     parts = CylinderChainForce.cast(system.getForce(0)).computeEnergies(context)
@@ -84,7 +72,7 @@ def test_cantilever_is_the_elastica(platform, elements, load, back, across):
     pull.addGlobalParameter("pull", load)
     pull.addParticle(2 * elements)
     system.addForce(pull)
-    context = context_of(system, positions, 0.02, temperature=0.0, platform=platform)
+    context = beam_context(system, positions, 0.02, temperature=0.0, platform=platform)
     context.getIntegrator().step(400)
     end = positions_of(context)[2 * elements]
     assert np.array_equal(positions_of(context)[:2], positions[:2])
@@ -96,7 +84,7 @@ def test_equilibrium_of_a_stiff_cantilever():
     """<y^2> = k_B T L^3/3EI at every node, in steps far longer than what it takes to relax."""
     count, elements, length, rigidity = 64, 3, 0.5, 2000.0 * KT
     system, _, positions = beam_system(count, elements, length, rigidity, 1e5 * KT, clamped=True, friction=(KT, 2 * KT))
-    context = context_of(system, positions, 0.03)
+    context = beam_context(system, positions, 0.03)
     integrator = context.getIntegrator()
     integrator.step(50)
     samples = []
@@ -128,7 +116,7 @@ def test_steps_are_the_same_on_platforms_and_from_checkpoints_and_xml():
     positions = with_a_straight_chain(system, positions)
     ends = {}
     for platform in PLATFORMS:
-        context = context_of(system, positions, 1e-3, platform=platform)
+        context = beam_context(system, positions, 1e-3, platform=platform)
         context.getIntegrator().step(30)
         checkpoint = context.createCheckpoint()
         context.getIntegrator().step(10)
@@ -139,7 +127,7 @@ def test_steps_are_the_same_on_platforms_and_from_checkpoints_and_xml():
     assert np.allclose(ends["Reference"], ends["CPU"], rtol=0, atol=1e-12)
     assert np.all(np.any(ends["CPU"] != positions, axis=1))
     again = openmm.XmlSerializer.deserialize(openmm.XmlSerializer.serialize(system))
-    context = context_of(again, positions, 1e-3)
+    context = beam_context(again, positions, 1e-3)
     context.getIntegrator().step(40)
     assert np.array_equal(positions_of(context), ends["CPU"])
 
@@ -155,7 +143,7 @@ def test_parameters_are_read_back_and_changed_in_a_context():
     assert (shortening._value, along._value, across._value) == (0.0, 1.0, 2.0)
     positions[4, 1] += 0.3
     positions[5, 1] += 0.3
-    context = context_of(system, positions, 0.01)
+    context = beam_context(system, positions, 0.01)
     bending = force.computeEnergies(context)[1]
     force.setBeamChainParameters(0, 1.0, 1e3, 40.0, 0.0, 1.0, 2.0)
     force.updateParametersInContext(context)
@@ -178,7 +166,7 @@ def test_beams_that_were_wrapped_into_a_box_are_refused_unless_they_are_periodic
             refused_step(system, wrapped, "Beam chain 0 is torn between its particles 2 and 3")
             continue
         for start in (positions, wrapped):
-            context = context_of(system, start, 0.01)
+            context = beam_context(system, start, 0.01)
             context.getIntegrator().step(5)
             ends.append(positions_of(context) - start)
     assert np.allclose(ends[0], ends[1], rtol=0, atol=1e-9)
@@ -187,7 +175,7 @@ def test_beams_that_were_wrapped_into_a_box_are_refused_unless_they_are_periodic
 
 def refused_step(system, positions, message, scheme=None, temperature=TEMPERATURE):
     with pytest.raises(openmm.OpenMMException, match=message):
-        context = context_of(system, positions, 0.01, temperature)
+        context = beam_context(system, positions, 0.01, temperature)
         if scheme is not None:
             context.getIntegrator().setScheme(scheme)
         context.getIntegrator().step(1)
@@ -196,7 +184,12 @@ def refused_step(system, positions, message, scheme=None, temperature=TEMPERATUR
 def test_what_beams_cannot_have_is_refused():
     system, force, positions = beam_system(1, 2, 1.0, 20.0, 1e3)
     refused_step(system, positions, "scheme Implicit alone", scheme=CylinderChainIntegrator.Midpoint)
-    refused_step(system, positions, "8.* persistence lengths long.*divide it into more", temperature=20.0 / KT * 2400)
+    refused_step(
+        system,
+        positions,
+        "8.* persistence lengths long.*divide it into more",
+        temperature=8.0 * 20.0 / KT * TEMPERATURE,
+    )
     with pytest.raises(openmm.OpenMMException, match="two particles for each of at least two nodes"):
         force.addBeamChain([0, 1, 2], 1.0, 1e3, 20.0, 0.0, 1.0, 2.0)
     with pytest.raises(openmm.OpenMMException, match="Particle 1 appears twice"):
@@ -210,4 +203,4 @@ def test_what_beams_cannot_have_is_refused():
     system.removeForce(number)
     system.setParticleMass(3, 0.0)
     with pytest.raises(Exception, match="Beam chain 0"):
-        context_of(system, positions, 0.01)
+        beam_context(system, positions, 0.01)

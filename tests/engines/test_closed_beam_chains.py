@@ -12,21 +12,14 @@ from openmm_cylchain.beams.curve import (
     place_weights,
 )
 from openmm_cylchain.beams.rings import circle
-from openmm_cylchain.engines.compiled import CylinderChainForce, CylinderChainIntegrator
+from openmm_cylchain.engines.compiled import CylinderChainForce
 from openmm_cylchain.mechanics.geometry import unrolled
+from support.beam_contexts import beam_context
 from support.contexts import positions_of
-from support.solvent import KT, TEMPERATURE
+from support.solvent import KT
 
 PLATFORMS = ("Reference", "CPU")
 SIGMAS = 4.0
-
-
-def context_of(system, positions, step, temperature=TEMPERATURE, platform="CPU", seed=1):
-    integrator = CylinderChainIntegrator(temperature, 1.0, step)
-    integrator.setRandomNumberSeed(seed)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatformByName(platform))
-    context.setPositions(positions)
-    return context
 
 
 def interleaved(nodes, control_points):
@@ -70,7 +63,7 @@ def test_forces_are_differences_of_the_energy(platform, elements):
     """Of all elements, the last one too, whose energy is that of ``element_energies``."""
     element = BeamElement(1.0, 20.0, 1e3, 0.01)
     system, _, positions = rings(3, elements, element, start=bent(elements, element, 1, 0.05))
-    context = context_of(system, positions, 0.01, platform=platform)
+    context = beam_context(system, positions, 0.01, platform=platform)
     state = context.getState(forces=True, energy=True)
     assert state.getPotentialEnergy()._value == pytest.approx(np.sum(energies_of(positions, elements, element)))
     forces, width = state.getForces(asNumpy=True)._value, 1e-5
@@ -91,7 +84,7 @@ def test_rings_relax_to_circles(elements):
     """The energy of a circle, pi EI/R, and no other; R is (elements h)/2 pi within the error of cubic curves."""
     element = BeamElement(1.0, 20.0, 1e6)
     system, _, positions = rings(1, elements, element, start=bent(elements, element, 2, 0.1))
-    context = context_of(system, positions, 0.02, temperature=0.0)
+    context = beam_context(system, positions, 0.02, temperature=0.0)
     context.getIntegrator().step(3000)
     end = positions_of(context)
     stretching, bending = energies_of(end, elements, element)
@@ -129,7 +122,7 @@ def test_short_steps_are_those_of_the_dense_resistance(planar):
     start = bent(elements, element, 3, 0.05, planar)
     system, _, positions = rings(1, elements, element, friction, planar, start=start)
     step = 1e-9
-    context = context_of(system, positions, step, temperature=0.0)
+    context = beam_context(system, positions, step, temperature=0.0)
     forces = context.getState(forces=True).getForces(asNumpy=True)._value
     context.getIntegrator().step(1)
     velocities = (positions_of(context) - positions) / step
@@ -156,7 +149,7 @@ def test_it_does_not_matter_which_node_is_the_first(case):
         own = np.roll(start, turn, axis=0)
         system, force, positions = rings(1, elements, element, (1.0, 2.0), case == "planar", turned, own, propulsion)
         force.addBeamTether(0, turn // 2, openmm.Vec3(*(start[0] + 0.5 * (case != "planar"))), 50.0)
-        context = context_of(system, positions, 0.05, temperature=0.0, platform="Reference")
+        context = beam_context(system, positions, 0.05, temperature=0.0, platform="Reference")
         context.getIntegrator().step(4)
         ends.append(np.roll(positions_of(context), -turn, axis=0))
         assert np.array_equal(ends[-1][list(fixed)], start[list(fixed)])
@@ -187,7 +180,7 @@ def test_modes_relax_as_those_of_an_inextensible_ring(across, mode, elements, al
     start = interleaved(nodes, nodes + element.length / 3.0 * tangents)
     system, _, positions = rings(1, elements, element, (along, normal), start=start)
     step = 0.002 / rate
-    context = context_of(system, positions, step, temperature=0.0)
+    context = beam_context(system, positions, step, temperature=0.0)
 
     def amplitude_now():
         particles = positions_of(context)
@@ -205,7 +198,7 @@ def test_modes_relax_as_those_of_an_inextensible_ring(across, mode, elements, al
 def monte_carlo(count, elements, element, planar, leaps, samples, seed):
     """Energies (samples, 2, count) in k_B T of rings by hybrid Monte Carlo, with the measure of the particles."""
     system, _, positions = rings(count, elements, element, planar=planar)
-    context = context_of(system, positions, 1.0, platform="CPU")
+    context = beam_context(system, positions, 1.0, platform="CPU")
     generator, free = np.random.default_rng(seed), np.array([1.0, 1.0, 0.0 if planar else 1.0])
     leap = 0.35 / np.sqrt(40.0 * element.modulus / KT)
 
@@ -259,7 +252,7 @@ def test_equilibrium_is_that_of_monte_carlo(elements, bend, planar, count, leaps
     system, _, positions = rings(count, elements, element, (KT, 2.0 * KT), planar)
     step = 2.0 * bend * min(0.0021 / bend, 2e-5 / bend**3)
     relaxation = 2.0 * bend * (elements / 10.9) ** 4
-    context = context_of(system, positions, step)
+    context = beam_context(system, positions, step)
     context.getIntegrator().step(int(5.0 * relaxation / step) + 10)
     found = []
     for _ in range(runs):
@@ -289,7 +282,7 @@ def test_rings_diffuse_as_wholes(planar):
     element = BeamElement(1.0, (1e4 if planar else 10.0) * KT, 1e5 * KT)
     system, _, positions = rings(count, elements, element, friction, planar)
     step = 0.005
-    context = context_of(system, positions, step)
+    context = beam_context(system, positions, step)
     nodes, weights = np.polynomial.legendre.leggauss(4)
     middle = 0.5 * weights @ place_weights(0.5 * (1.0 + nodes))
 
@@ -330,7 +323,7 @@ def test_steps_are_the_same_on_platforms_and_from_checkpoints_and_xml():
     assert [own.isBeamChainClosed(chain) for chain in range(14)] == [True] * 9 + [False] * 5
     ends = []
     for platform, each in (("Reference", system), ("CPU", system), ("CPU", copied)):
-        context = context_of(each, positions, 1e-3, platform=platform)
+        context = beam_context(each, positions, 1e-3, platform=platform)
         context.getIntegrator().step(20)
         checkpoint = context.createCheckpoint()
         context.getIntegrator().step(10)
@@ -342,7 +335,7 @@ def test_steps_are_the_same_on_platforms_and_from_checkpoints_and_xml():
     assert np.array_equal(ends[1], ends[2])
     # Each ring as if it were alone.
     alone, _, start = rings(1, 5, element, (KT, 2 * KT))
-    context = context_of(alone, start, 1e-3, platform="CPU")
+    context = beam_context(alone, start, 1e-3, platform="CPU")
     context.getIntegrator().step(30)
     assert positions_of(context) == pytest.approx(ends[1][:10], abs=1e-11)
 
@@ -350,7 +343,7 @@ def test_steps_are_the_same_on_platforms_and_from_checkpoints_and_xml():
 def test_divided_steps_keep_rings_whole():
     element = BeamElement(1.0, 2.0 * KT, 1e4 * KT)
     system, _, positions = rings(32, 6, element, (KT, 2 * KT))
-    context = context_of(system, positions, 0.02)
+    context = beam_context(system, positions, 0.02)
     context.getIntegrator().step(100)
     assert context.getIntegrator().getNumDividedSteps() > 0
     particles = positions_of(context).reshape(32, 12, 3)
