@@ -10,6 +10,7 @@
 #include "dynamics/PackStep.h"
 #include "lanes/Noise.h"
 #include "mechanics/BackgroundFlow.h"
+#include "mechanics/Inline.h"
 #include "mechanics/PeriodicBox.h"
 #include <algorithm>
 #include <cmath>

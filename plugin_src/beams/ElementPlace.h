@@ -2,6 +2,7 @@
 #define CYLCHAIN_ELEMENT_PLACE_H_
 
 #include "beams/BezierWeights.h"
+#include "mechanics/Inline.h"
 #include <algorithm>
 #include <cmath>
 
@@ -14,36 +15,35 @@ namespace cylchain {
  *     2+x, -(2+x)    its tangent dr/ds there, and the opposite of it
  *     4 n+1+x        the place at the parameter x of n straight pieces between places on its curve
  *
- * Loops for each instruction set call these, so they are always compiled within their callers: a linker would keep one
- * of several, which might be for an instruction set that the processor lacks.
+ * Loops for each instruction set call these.
  */
 namespace ElementPlace {
 
-__attribute__((always_inline)) inline double ofTangent(double x, bool forwards) {
+CYLCHAIN_INLINE double ofTangent(double x, bool forwards) {
     return forwards ? 2+x : -2-x;
 }
 
-__attribute__((always_inline)) inline double onPieces(double x, int pieces) {
+CYLCHAIN_INLINE double onPieces(double x, int pieces) {
     return 4*pieces+1+x;
 }
 
-__attribute__((always_inline)) inline bool isTangent(double number) {
+CYLCHAIN_INLINE bool isTangent(double number) {
     return number < -1.5 || (number > 1.5 && number < 3.5);
 }
 
-__attribute__((always_inline)) inline int piecesOf(double number) {
+CYLCHAIN_INLINE int piecesOf(double number) {
     return number > 3.5 ? (int) (number/4) : 0;
 }
 
 /** The parameter x. */
-__attribute__((always_inline)) inline double parameterOf(double number) {
+CYLCHAIN_INLINE double parameterOf(double number) {
     if (isTangent(number))
         return std::fabs(number)-2;
     const int pieces = piecesOf(number);
     return pieces > 0 ? number-4*pieces-1 : number;
 }
 
-__attribute__((always_inline)) inline BezierWeights weightsOf(double number, double elementLength) {
+CYLCHAIN_INLINE BezierWeights weightsOf(double number, double elementLength) {
     const double x = parameterOf(number);
     if (isTangent(number))
         return BezierWeights::ofTangent(x, (number > 0 ? 1 : -1)/elementLength);

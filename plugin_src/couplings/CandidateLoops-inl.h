@@ -2,6 +2,7 @@
 
 #include "couplings/CandidateLoops.h"
 #include "couplings/Capsules.h"
+#include "mechanics/Inline.h"
 #include "mechanics/Prefetch.h"
 #include <cmath>
 #include <cstddef>
@@ -16,9 +17,6 @@ namespace CYLCHAIN_LOOPS {
 
 typedef float Floats __attribute__((vector_size(4*CYLCHAIN_LANES)));
 typedef int Ints __attribute__((vector_size(4*CYLCHAIN_LANES)));
-
-// Called functions cannot keep vectors in registers.
-#define CYLCHAIN_INLINE inline __attribute__((always_inline))
 
 CYLCHAIN_INLINE Floats splat(float value) {
     return value-Floats{};

@@ -1,4 +1,5 @@
 #include "couplings/Links.h"
+#include "mechanics/Inline.h"
 #include "mechanics/PeriodicBox.h"
 #include <cmath>
 #include <cstdint>

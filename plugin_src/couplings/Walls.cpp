@@ -1,14 +1,11 @@
 #include "couplings/Walls.h"
+#include "mechanics/SymmetricMatrices.h"
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 using namespace cylchain;
 using namespace std;
-
-static double dot(const double* a, const double* b) {
-    return a[0]*b[0]+a[1]*b[1]+a[2]*b[2];
-}
 
 int cylchain::countFaces(const Wall& wall) {
     switch (wall.shape) {

@@ -10,6 +10,7 @@
 #include "dynamics/PackPlaces.h"
 #include "dynamics/PackStep.h"
 #include "lanes/Noise.h"
+#include "mechanics/Inline.h"
 #include "mechanics/PeriodicBox.h"
 #include "mechanics/Prefetch.h"
 #include <algorithm>

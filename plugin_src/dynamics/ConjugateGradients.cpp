@@ -1,7 +1,7 @@
 #include "dynamics/ConjugateGradients.h"
-#include "dynamics/SymmetricMatrices.h"
 #include "dynamics/TermBlocks.h"
 #include "mechanics/Prefetch.h"
+#include "mechanics/SymmetricMatrices.h"
 #include <algorithm>
 #include <cstddef>
 #include <type_traits>

@@ -1,8 +1,8 @@
 #include "dynamics/ContactEquations.h"
 #include "beams/ElementPlace.h"
 #include "dynamics/RestGap.h"
-#include "dynamics/SymmetricMatrices.h"
 #include "mechanics/Prefetch.h"
+#include "mechanics/SymmetricMatrices.h"
 #include <algorithm>
 #include <cmath>
 #include <cstddef>

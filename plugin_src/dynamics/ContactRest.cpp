@@ -1,7 +1,7 @@
 #include "dynamics/ContactRest.h"
 #include "couplings/Crossings.h"
 #include "dynamics/RestGap.h"
-#include "dynamics/SymmetricMatrices.h"
+#include "mechanics/SymmetricMatrices.h"
 #include <algorithm>
 #include <cmath>
 

@@ -1,7 +1,7 @@
 #include "dynamics/CoupledEquations.h"
-#include "dynamics/SymmetricMatrices.h"
 #include "dynamics/TermBlocks.h"
 #include "mechanics/Prefetch.h"
+#include "mechanics/SymmetricMatrices.h"
 #include <algorithm>
 #include <atomic>
 #include <cstddef>

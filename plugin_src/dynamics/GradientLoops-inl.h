@@ -2,14 +2,12 @@
 
 #include "dynamics/GradientLoops.h"
 #include "dynamics/TermBlocks.h"
+#include "mechanics/Inline.h"
 #include <cstdint>
 #include <cstring>
 
 namespace cylchain {
 namespace CYLCHAIN_LOOPS {
-
-// Called functions cannot keep vectors in registers.
-#define CYLCHAIN_INLINE inline __attribute__((always_inline))
 
 const int SIZE = TermBlocks::SIZE;
 

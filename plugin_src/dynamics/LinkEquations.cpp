@@ -1,8 +1,9 @@
 #include "dynamics/LinkEquations.h"
 #include "dynamics/StageWeights.h"
-#include "dynamics/SymmetricMatrices.h"
 #include "lanes/Noise.h"
+#include "mechanics/Inline.h"
 #include "mechanics/Prefetch.h"
+#include "mechanics/SymmetricMatrices.h"
 #include <algorithm>
 #include <cmath>
 #include <cstddef>

@@ -1,7 +1,7 @@
 #include "dynamics/ParticleStep.h"
 #include "dynamics/StageWeights.h"
-#include "dynamics/SymmetricMatrices.h"
 #include "lanes/Noise.h"
+#include "mechanics/SymmetricMatrices.h"
 #include <algorithm>
 #include <cmath>
 #include <cstddef>

@@ -1,7 +1,7 @@
 #include "dynamics/WallEquations.h"
 #include "dynamics/PlaceResponses.h"
 #include "dynamics/StageWeights.h"
-#include "dynamics/SymmetricMatrices.h"
+#include "mechanics/SymmetricMatrices.h"
 #include <algorithm>
 #include <cmath>
 #include <cstddef>

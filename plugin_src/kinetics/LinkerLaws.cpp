@@ -1,4 +1,5 @@
 #include "kinetics/LinkerKinetics.h"
+#include "mechanics/SymmetricMatrices.h"
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -16,10 +17,6 @@ const double MOST_PARTS = 100;
 
 double boundedExp(double x) {
     return exp(min(x, LARGEST_EXPONENT));
-}
-
-double dot(const double* a, const double* b) {
-    return a[0]*b[0]+a[1]*b[1]+a[2]*b[2];
 }
 
 } // namespace

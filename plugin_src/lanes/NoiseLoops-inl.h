@@ -7,6 +7,7 @@
  */
 
 #include "lanes/Noise.h"
+#include "mechanics/Inline.h"
 #ifdef CYLCHAIN_X86_64
 #include <immintrin.h>
 #endif

@@ -4,9 +4,6 @@
  * Numbers, vectors and matrices in the lanes of vector registers.
  */
 
-// Called functions cannot keep vectors in registers.
-#define CYLCHAIN_INLINE inline __attribute__((always_inline))
-
 /** The numbers in lanes, and integers of the same size. */
 #ifdef CYLCHAIN_SINGLE_PRECISION
 typedef float Scalar;

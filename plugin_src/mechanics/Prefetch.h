@@ -1,6 +1,7 @@
 #ifndef CYLCHAIN_PREFETCH_H_
 #define CYLCHAIN_PREFETCH_H_
 
+#include "mechanics/Inline.h"
 #include <cstddef>
 
 namespace cylchain {
@@ -15,7 +16,7 @@ const int AHEAD = 8;
  * found in an order of its own, such as the other capsule of a pair, comes late. It is fetched to the second cache: the
  * first has room for few requests, and when they are used up everything waits.
  */
-template <class Record> inline __attribute__((always_inline)) void prefetch(const Record* record) {
+template <class Record> CYLCHAIN_INLINE void prefetch(const Record* record) {
     const char* const bytes = reinterpret_cast<const char*>(record);
     for (std::size_t i = 0; i < sizeof(Record); i += CACHE_LINE)
         __builtin_prefetch(bytes+i, 0, 2);
@@ -25,7 +26,7 @@ template <class Record> inline __attribute__((always_inline)) void prefetch(cons
 }
 
 /** Ask for the first of some records: those behind them are asked for on the way. */
-template <class Record> inline __attribute__((always_inline)) void prefetchFirst(const Record* records, int count) {
+template <class Record> CYLCHAIN_INLINE void prefetchFirst(const Record* records, int count) {
     for (int i = 0; i < 3 && i < count; i++)
         prefetch(&records[i]);
 }
