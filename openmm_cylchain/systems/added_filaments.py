@@ -1,4 +1,4 @@
-"""Filaments, and what is tied to them, before they are put into a System."""
+"""Filaments, and what is tied to them, as they are added: before they are in a System."""
 
 from collections import defaultdict
 from collections.abc import Iterator
@@ -33,7 +33,7 @@ from ..units.quantities import (
 from ..units.types import Indices, IntArray, Scalar, Vector, Vectors
 
 
-class FilamentCollection:
+class AddedFilaments:
     """Filaments in a solvent, with their tethers, attachment points, beads and linkers: what ``Filaments`` adds."""
 
     def __init__(self, viscosity: Scalar, temperature: Scalar, engine: str | None = None) -> None:
