@@ -54,7 +54,8 @@ def test_another_minor_version_of_openmm(tmp_path):
     # A fresh interpreter, since an engine that has been loaded stays so.
     program = (
         "import openmm; openmm.Platform.getOpenMMVersion = staticmethod(lambda: '7.9.1')\n"
-        "import openmm_cylchain as package; package.Filaments(1.0, 300.0)\n"
+        "import openmm_cylchain as package\n"
+        "package.Filaments(1.0, 300.0)\n"
         "from openmm_cylchain import engine_choice as choice; print(choice.available_engines()['compiled'])\n"
     )
     result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=tmp_path, check=True)
@@ -62,6 +63,8 @@ def test_another_minor_version_of_openmm(tmp_path):
     assert re.search(sentence, result.stdout)
     assert len(re.findall(f"EngineWarning: The compiled engine does not work: .*{sentence}", result.stderr)) == 2
     assert "portable engine is taken in its place" in result.stderr
+    # It names the line that makes the Filaments.
+    assert "<string>:3: EngineWarning" in result.stderr
 
 
 def test_no_warning_where_all_is_well(tmp_path):
