@@ -117,6 +117,23 @@ def beam_control_points(
     return control_points_of(positions, tangents / lengths, filament_type.segment_length)
 
 
+def given_control_points(
+    filament_type: ChainType, positions: FloatArray, tangents: Vectors | None, control_points: Vectors, label: str
+) -> FloatArray:
+    """Control points (n, 3) in nm that are given in place of tangents."""
+    if tangents is not None:
+        raise InputError(f"{label}: give either tangents or control_points, not both.")
+    if not filament_type.has_beam_elements:
+        raise InputError(f"{label}: control_points belong to nodes of beam elements; its segments are straight.")
+    controls = np.array(in_units_of(control_points, LENGTH, f"{label}: control_points"))
+    if controls.shape != positions.shape:
+        raise InputError(f"{label}: control_points must have the shape {positions.shape}, but have {controls.shape}.")
+    apart = np.linalg.norm(controls - positions, axis=1)
+    if not np.all(apart > 0.0):
+        raise InputError(f"{label}: the control point of node {int(np.argmin(apart))} is at the node.")
+    return controls
+
+
 def drawn_beam(
     filament_type: ChainType,
     segments: int,

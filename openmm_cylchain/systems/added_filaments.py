@@ -23,7 +23,6 @@ from ..units.quantities import (
     STIFFNESS,
     TEMPERATURE,
     VISCOSITY,
-    in_units_of,
     non_negative,
     positive,
     shown,
@@ -209,7 +208,7 @@ class AddedFilaments:
         if control_points is None:
             controls = shapes.beam_control_points(filament_type, positions, tangents, label, bool(closed))
         else:
-            controls = self._given_control_points(filament_type, positions, tangents, control_points, label)
+            controls = shapes.given_control_points(filament_type, positions, tangents, control_points, label)
         return self._add(
             filament_type, positions, clamped, label, closed, planar, propulsion, controls, clamped_tangents
         )
@@ -294,17 +293,18 @@ class AddedFilaments:
         """
         label = self._label(filament_type)
         generator = np.random.default_rng(whole_number(seed, 0, f"{label}: seed"))
+        controls = None
         if filament_type.has_beam_elements:
             positions, controls = shapes.drawn_beam(
                 filament_type, segments, self._temperature, generator, start, direction, planar, label
             )
-            return self._add(
-                filament_type, positions, clamped, label, False, planar, propulsion, controls, clamped_tangents
+        else:
+            positions = shapes.drawn(
+                filament_type, segments, self._temperature, generator, start, direction, clamped, planar, label
             )
-        positions = shapes.drawn(
-            filament_type, segments, self._temperature, generator, start, direction, clamped, planar, label
+        return self._add(
+            filament_type, positions, clamped, label, False, planar, propulsion, controls, clamped_tangents
         )
-        return self._add(filament_type, positions, clamped, label, False, planar, propulsion, None, clamped_tangents)
 
     def add_tether(self, filament: int, node: int, point: Vector, stiffness: Scalar) -> int:
         """Tether a node to a point by a harmonic spring, such as an optical trap: energy (k/2) |x - point|^2.
@@ -539,33 +539,17 @@ class AddedFilaments:
             )
         return f"Filament {len(self)} ({filament_type.name})"
 
-    @staticmethod
-    def _given_control_points(filament_type, positions, tangents, control_points, label):
-        if tangents is not None:
-            raise InputError(f"{label}: give either tangents or control_points, not both.")
-        if not filament_type.has_beam_elements:
-            raise InputError(f"{label}: control_points belong to nodes of beam elements; its segments are straight.")
-        controls = np.array(in_units_of(control_points, LENGTH, f"{label}: control_points"))
-        if controls.shape != positions.shape:
-            raise InputError(
-                f"{label}: control_points must have the shape {positions.shape}, but have {controls.shape}."
-            )
-        apart = np.linalg.norm(controls - positions, axis=1)
-        if not np.all(apart > 0.0):
-            raise InputError(f"{label}: the control point of node {int(np.argmin(apart))} is at the node.")
-        return controls
-
     def _add(
         self,
         filament_type,
         positions,
         clamped,
         label,
-        closed=False,
-        planar=False,
-        propulsion=0.0,
-        control_points=None,
-        clamped_tangents=(),
+        closed,
+        planar,
+        propulsion,
+        control_points,
+        clamped_tangents,
     ):
         self._refuse_if_built(label)
         if filament_type.has_beam_elements and not self._engine.has_beam_elements:
