@@ -9,39 +9,30 @@ import os
 import pytest
 
 from support.cuda_compiler import MISSING, compile_to_ptx, resources_of
-from support.gpu_sources import BY_GROUP, COUPLINGS, OTHERS, PARTICLES, USUAL, source_of
+from support.gpu_sources import BY_GROUP, BY_ITEM, BY_PART, COUPLINGS, OTHERS, PARTICLES, USUAL, source_of
 
 if MISSING and os.environ.get("OPENMM_CYLCHAIN_TEST_CUDA"):
     raise RuntimeError(f"kernels for CUDA cannot be compiled without {', '.join(MISSING)}")
 
 pytestmark = pytest.mark.skipif(bool(MISSING), reason=f"not installed: {', '.join(MISSING)}")
 
-# Bytes that a change may spill, and keep on the stack, in an A100. There were 40 and 216 at the last change, and in the
-# kernel of groups 204 and 304, nearly all of them where functions are called once in a step; the most registers that
-# there can be are 255.
-LARGEST_SPILLS, LARGEST_STACK = 80, 260
-LARGEST_SPILLS_OF_GROUPS, LARGEST_STACK_OF_GROUPS = 260, 360
-
-# What work-items of a group do from node to node, one after the other: what these spill is waited for at each node.
-ALONG_THE_CHAIN = ("eliminateFromEnd", "substitute", "refine", "addMetricForces")
+# Bytes that a change may spill, and keep on the stack, in an A100. There were 1404 and 432 at the last change. Kernels
+# whose functions are called spill a fifth of that, but took 1.1 to 3 times as long on an H200: registers hold no numbers
+# across a call, and what is read through a pointer may be in any memory.
+LARGEST_SPILLS, LARGEST_STACK = 1600, 500
+BY = {"item": BY_ITEM, "group": BY_GROUP, "part": BY_PART}
 
 
-def test_registers_suffice(tmp_path):
-    ptx = compile_to_ptx(source_of("CUDA", USUAL, "mixed"), "compute_80")
+@pytest.mark.parametrize("by", BY)
+def test_registers_suffice(by, tmp_path):
+    ptx = compile_to_ptx(source_of("CUDA", (*USUAL, *BY[by]), "mixed"), "compute_80")
     found = resources_of(ptx, "sm_80", tmp_path)
-    assert set(found) == {"advanceChains", "computeForces"}
-    assert found["computeForces"]["registers"] <= 96 and found["computeForces"]["spills"] == 0
+    if by == "item":
+        forces = found.pop("computeForces")
+        assert forces["registers"] <= 96 and forces["spills"] == 0
+    assert set(found) == {"advanceChains"}
     assert found["advanceChains"]["spills"] <= LARGEST_SPILLS, found
     assert found["advanceChains"]["stack"] <= LARGEST_STACK, found
-
-
-def test_registers_suffice_for_groups(tmp_path):
-    ptx = compile_to_ptx(source_of("CUDA", (*USUAL, BY_GROUP), "mixed"), "compute_80")
-    found = resources_of(ptx, "sm_80", tmp_path)
-    assert set(found) == {"advanceChains"}
-    advance = found["advanceChains"]
-    assert advance["spills"] <= LARGEST_SPILLS_OF_GROUPS and advance["stack"] <= LARGEST_STACK_OF_GROUPS, found
-    assert all(advance["functions"][name] <= 16 for name in ALONG_THE_CHAIN), found
 
 
 @pytest.mark.parametrize("precision", OTHERS)
@@ -65,9 +56,8 @@ def test_kernels_of_couplings_compile(precision, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("by", BY)
 @pytest.mark.parametrize("precision", OTHERS)
-def test_kernels_of_other_chains_compile(precision):
-    ptx = compile_to_ptx(source_of("CUDA", OTHERS[precision], precision), "compute_70")
-    assert ".entry advanceChains" in ptx and ".entry computeForces" in ptx
-    ptx = compile_to_ptx(source_of("CUDA", (*OTHERS[precision], BY_GROUP), precision), "compute_70")
-    assert ".entry advanceChains" in ptx
+def test_kernels_of_other_chains_compile(precision, by):
+    ptx = compile_to_ptx(source_of("CUDA", (*OTHERS[precision], *BY[by]), precision), "compute_70")
+    assert ".entry advanceChains" in ptx and (".entry computeForces" in ptx) == (by == "item")

@@ -7,7 +7,7 @@ import os
 
 import pytest
 
-from support.gpu_sources import BY_GROUP, COUPLINGS, OTHERS, PARTICLES, USUAL, source_of
+from support.gpu_sources import BY_GROUP, BY_ITEM, COUPLINGS, OTHERS, PARTICLES, USUAL, source_of
 from support.hip_compiler import MISSING, scratch_of
 
 if MISSING and os.environ.get("OPENMM_CYLCHAIN_TEST_HIP"):
@@ -21,9 +21,9 @@ CHAINS += [(precision, defines, "gfx90a") for precision, defines in OTHERS.items
 
 @pytest.mark.parametrize("precision, defines, architecture", CHAINS)
 def test_kernels_of_chains_compile(precision, defines, architecture, tmp_path):
-    found = scratch_of(source_of("HIP", defines, precision), architecture, tmp_path)
+    found = scratch_of(source_of("HIP", (*defines, *BY_ITEM), precision), architecture, tmp_path)
     assert set(found) == {"advanceChains", "computeForces"}
-    found = scratch_of(source_of("HIP", (*defines, BY_GROUP), precision), architecture, tmp_path)
+    found = scratch_of(source_of("HIP", (*defines, *BY_GROUP), precision), architecture, tmp_path)
     assert set(found) == {"advanceChains"}
 
 

@@ -9,6 +9,7 @@ import pytest
 from openmm import app, unit
 
 from openmm_cylchain import F_ACTIN, Filaments, stokes_friction
+from openmm_cylchain.engines.gpu_platforms import GPU_PLATFORMS
 from support.contexts import new_context
 from support.platforms import PLATFORMS
 from support.solvent import VISCOSITY
@@ -69,7 +70,9 @@ def reference_run(request):
 
 TOLERANCES = {None: 1e-5, "double": 2e-5, "mixed": 1e-3, "single": 0.02}  # nm, of coordinates of some thousand nm
 CHOICES = [(name, None) for name in PLATFORMS if name == "CPU"]
-CHOICES += [("OpenCL", precision) for precision in ("single", "mixed", "double") if "OpenCL" in PLATFORMS]
+CHOICES += [
+    (name, precision) for name in GPU_PLATFORMS if name in PLATFORMS for precision in ("single", "mixed", "double")
+]
 
 
 @pytest.mark.sample(r"^(?!euler-(CPU|\w+-mixed)|midpoint-\w+-(single|double))")

@@ -10,6 +10,7 @@ from openmm import unit
 from scipy.spatial.transform import Rotation
 
 from openmm_cylchain import Filament, Filaments, FilamentType, InputError
+from openmm_cylchain.engines.gpu_platforms import GPU_PLATFORMS
 from openmm_cylchain.mechanics.potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
 from openmm_cylchain.mechanics.tension import segment_end_forces
 from support.bending_models import BENDING_MODELS
@@ -156,7 +157,7 @@ def computed(platform):
 
 
 def bending_tolerance(platform, model, angle, nodes, expected):
-    if platform != "OpenCL":
+    if platform not in GPU_PLATFORMS:
         return 1e-7 * np.abs(expected).max() + 1e-9
     # Single precision rounds the positions, and OpenMM takes the angle from its cosine: it is wrong by up to
     # epsilon/sin(theta), or sqrt(2 epsilon) = 5e-4 where the joint is that straight.
@@ -183,7 +184,7 @@ def test_bending_forces(computed, model):
 
 
 def stretching_tolerance(platform, model, nodes, expected):
-    if platform != "OpenCL":
+    if platform not in GPU_PLATFORMS:
         return 1e-7 * np.abs(expected).max() + 1e-7
     strain = np.abs(np.linalg.norm(np.diff(nodes, axis=0), axis=1) - LENGTH).max()
     relative = (strain / EXTENSION) ** 2
@@ -233,7 +234,7 @@ def test_energies(platform, energy_of, models):
         forces = bending_forces(bending, nodes), stretching_forces(stretching, nodes)
         for energy, exact, force in zip(found, expected, forces):
             tolerance = 1e-7 * exact + 1e-9
-            if platform.getName() == "OpenCL":
+            if platform.getName() in GPU_PLATFORMS:
                 rounding = 4 * 2.0**-23 * np.abs(nodes).max()
                 tolerance = rounding * np.abs(force).max() + 0.5 * STIFFNESS * rounding**2 + 1e-4 * exact + 5e-4
             assert abs(energy - exact) <= tolerance, shape

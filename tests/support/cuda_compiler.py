@@ -55,7 +55,7 @@ def compile_to_ptx(source, architecture):
 
 
 def resources_of(ptx, architecture, folder):
-    """Registers, bytes of stack and of spilled registers of each kernel; the latter of each of its functions, too."""
+    """Registers, bytes of stack and of spilled registers of each kernel."""
     file = folder / "kernels.ptx"
     file.write_text(ptx)
     result = subprocess.run(
@@ -68,22 +68,10 @@ def resources_of(ptx, architecture, folder):
     for text in result.stderr.split("Compiling entry function")[1:]:
         name = re.match(r" '(\w+)'", text).group(1)
         stack = re.search(r"(\d+) bytes stack frame", text).group(1)
-        functions = {
-            _name_of(function): int(stores) + int(loads)
-            for function, stores, loads in re.findall(
-                r"properties for (\w+)\n.*?(\d+) bytes spill stores, (\d+) bytes spill loads", text
-            )
-        }
+        spills = re.findall(r"(\d+) bytes spill stores, (\d+) bytes spill loads", text)
         found[name] = {
             "registers": int(re.search(r"Used (\d+) registers", text).group(1)),
             "stack": int(stack),
-            "spills": sum(functions.values()),
-            "functions": functions,
+            "spills": sum(int(stores) + int(loads) for stores, loads in spills),
         }
     return found
-
-
-def _name_of(function):
-    """The name of a function of C++ without its arguments."""
-    mangled = re.match(r"_Z(\d+)(\w+)", function)
-    return mangled.group(2)[: int(mangled.group(1))] if mangled else function

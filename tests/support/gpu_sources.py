@@ -23,8 +23,25 @@ OTHERS = {
 }
 """Defines of others, by the precisions in which they are compiled."""
 
-BY_GROUP = "CHAIN_BY_GROUP"
-"""The define of kernels in which a group of work-items takes the implicit steps of a filament."""
+BY_ITEM = ("ITEMS_OF_CHAIN=1",)
+"""Defines of kernels in which one work-item advances a filament."""
+
+
+def _by_group(items, chains, local_fields):
+    return (
+        "CHAIN_BY_GROUP",
+        f"ITEMS_OF_CHAIN={items}",
+        f"CHAINS_OF_GROUP={chains}",
+        "NUM_PLACES=72",
+        f"NUM_LOCAL_FIELDS={local_fields}",
+    )
+
+
+BY_GROUP = _by_group(32, 1, 73)
+"""Of kernels in which a group of work-items takes the implicit steps of a filament of up to 70 nodes."""
+
+BY_PART = _by_group(8, 4, 11)
+"""The same, by parts of groups, on CUDA."""
 
 PARTICLES = ("gatherNodes", "scatterForces", "moveNodes", "displaceOthers", "moveOthers")
 """The kernels of particles and nodes."""
@@ -64,7 +81,7 @@ def source_of(platform, defines=(), precision="double", program="programFor", *m
         switch[precision]
         + types
         + _text_of_openmm(platform, b"#define KERNEL extern")
-        + "".join(f"#define {name} 1\n" for name in defines)
+        + "".join("#define {} {}\n".format(*(define.split("=") if "=" in define else (define, 1))) for define in defines)
         + _text_of_openmm(platform, b"inline __device__ double3 make_double3(double a)")
         + parts
     )

@@ -8,7 +8,7 @@ from openmm_cylchain.engines.gpu_platforms import GPU_PLATFORMS, why_not_on
 
 from .compiled_platform import CompiledPlatform
 
-_WANTED = ("Reference", "CPU", "OpenCL")
+_WANTED = ("Reference", "CPU", *GPU_PLATFORMS)
 
 
 def _usable(name):
@@ -42,7 +42,7 @@ NOT_TESTED = {name: why_not_on(name) or "there is no device" for name in GPU_PLA
 """Why they are not on the others."""
 
 CPU_CASES = [CompiledPlatform(name, None, 1e-9, 0.0, 1e-9) for name in PLATFORMS if name in ("Reference", "CPU")]
-WORK_ITEMS = (1, 32)
+WORK_ITEMS = (1, 8, 32)
 """How many work-items may take the implicit steps of a filament on platforms for GPUs."""
 
 # Groups solve the same equations in double precision in all of them.

@@ -7,6 +7,7 @@ import pytest
 from openmm import unit
 
 from openmm_cylchain import F_ACTIN, Filaments, InputError, InstabilityError
+from openmm_cylchain.engines.gpu_platforms import GPU_PLATFORMS
 from openmm_cylchain.systems.periodic import make_trajectory_whole, make_whole, remove_jumps
 from support.contexts import new_context, positions_of
 from support.periodic_systems import BEADS, CUBIC, TRICLINIC, crossing_filaments, particles_of
@@ -31,7 +32,7 @@ def lattice_coordinates(differences, vectors):
 def crossing_context(engine, platform, vectors):
     filaments, topology, system, positions = crossing_filaments(engine, vectors)
     integrator = filaments.create_integrator(system, 5e3, scheme="midpoint", particle_friction=5e5, random_seed=4)
-    precision = {"Precision": "mixed"} if platform == "OpenCL" else {}
+    precision = {"Precision": "mixed"} if platform in GPU_PLATFORMS else {}
     context = new_context(system, positions, integrator, platform, precision)
     return filaments, topology, integrator, context
 

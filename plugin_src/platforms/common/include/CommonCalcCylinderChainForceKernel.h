@@ -14,7 +14,8 @@ namespace OpenMM {
  */
 class CommonCalcCylinderChainForceKernel : public CalcCylinderChainForceKernel {
 public:
-    CommonCalcCylinderChainForceKernel(std::string name, const Platform& platform, ComputeContext& cc);
+    CommonCalcCylinderChainForceKernel(std::string name, const Platform& platform, ComputeContext& cc,
+            const WorkItemGroups& groups);
     void initialize(const System& system, const CylinderChainDescription& chains);
     double execute(ContextImpl& context, bool includeForces, bool includeEnergy);
     void computeEnergies(ContextImpl& context, double& stretching, double& bending);
@@ -26,6 +27,7 @@ public:
 private:
     class ForceInfo;
     ComputeContext& cc;
+    const WorkItemGroups groups;
     const CylinderChainDescription* description;
     std::unique_ptr<CommonCylinderChains> chains;
 };

@@ -1,6 +1,7 @@
 #ifndef OPENMM_COMMONCYLINDERCHAINKERNELS_H_
 #define OPENMM_COMMONCYLINDERCHAINKERNELS_H_
 
+#include "WorkItemGroups.h"
 #include "openmm/KernelImpl.h"
 #include "openmm/Platform.h"
 #include "openmm/common/ComputeContext.h"
@@ -17,7 +18,8 @@ std::vector<std::string> getCommonKernelNames();
 /**
  * Create one of these kernels.
  */
-KernelImpl* createCommonKernel(const std::string& name, const Platform& platform, ComputeContext& cc);
+KernelImpl* createCommonKernel(const std::string& name, const Platform& platform, ComputeContext& cc,
+        const WorkItemGroups& groups);
 
 } // namespace OpenMM
 

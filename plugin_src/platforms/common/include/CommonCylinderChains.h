@@ -1,6 +1,7 @@
 #ifndef OPENMM_COMMONCYLINDERCHAINS_H_
 #define OPENMM_COMMONCYLINDERCHAINS_H_
 
+#include "WorkItemGroups.h"
 #include "dynamics/ChainEngine.h"
 #include "openmm/Vec3.h"
 #include "openmm/common/ComputeArray.h"
@@ -19,12 +20,13 @@ namespace OpenMM {
  * The chains of a Context in the memory of its device, and the programs that compute them there.
  *
  * Chains that use the same models and have similar lengths make a batch: one kernel computes them, with a work-item for
- * each, or, at implicit steps of few chains, with a group of work-items for each.  The nodes of all chains follow on
- * each other; their positions and forces are doubles, and gather() brings them from where OpenMM keeps its particles.
+ * each, or, at implicit steps of few chains, with several for each.  The nodes of all chains follow on each other;
+ * their positions and forces are doubles, and gather() brings them from where OpenMM keeps its particles.
  */
 class CommonCylinderChains {
 public:
-    CommonCylinderChains(ComputeContext& cc, const CylinderChainDescription& description);
+    CommonCylinderChains(ComputeContext& cc, const WorkItemGroups& groups,
+            const CylinderChainDescription& description);
     ~CommonCylinderChains();
     /**
      * Throw what says that filaments of some kind take explicit steps on a platform.
@@ -113,9 +115,9 @@ private:
     class ReorderListener;
     struct Batch;
     struct Arrays;
-    const std::vector<std::unique_ptr<Batch> >& getBatches(bool byGroup);
-    std::unique_ptr<Batch> makeBatch(const std::vector<int>& members, bool byGroup);
-    ComputeProgram programFor(const cylchain::Chain& chain, bool byGroup);
+    const std::vector<std::unique_ptr<Batch> >& getBatches(int items);
+    std::unique_ptr<Batch> makeBatch(const std::vector<int>& members, int items);
+    ComputeProgram programFor(const cylchain::Chain& chain, const Batch& batch);
     void uploadTethers();
     void readSummary();
     void updateBox();
@@ -123,8 +125,9 @@ private:
     ComputeContext& cc;
     const CylinderChainDescription& description;
     std::map<std::string, ComputeProgram> programs;
-    const bool usesGroups;
-    std::vector<std::unique_ptr<Batch> > itemBatches, groupBatches;
+    const WorkItemGroups groups;
+    const int itemsOfSteps;
+    std::map<int, std::vector<std::unique_ptr<Batch> > > batches;
     std::unique_ptr<Arrays> arrays;
     std::vector<int> particleOfNode, slotOfParticle, firstNodes, stepsTaken;
     std::vector<std::uint64_t> counts, countsBefore;

@@ -12,7 +12,7 @@ inline DEVICE void addTo(const Step* step, GLOBAL double* RESTRICT forces, int n
 }
 
 /** Find the forces of a chain on its nodes, and its energies. */
-CALLED DEVICE void findForces(const Step* step, GLOBAL double* RESTRICT forces, GLOBAL double* RESTRICT energies) {
+DEVICE void findForces(const Step* step, GLOBAL double* RESTRICT forces, GLOBAL double* RESTRICT energies) {
     double stretching = 0, bending = 0, ofTethers = 0;
     for (int k = 0; k < 3*step->own; k++)
         forces[k] = 0;

@@ -60,10 +60,12 @@ inline DEVICE Step describeChain(int chain, int numChains, int places, int flags
     return step;
 }
 
+#define FIRST_CHAIN (GLOBAL_ID/ITEMS_OF_CHAIN)
+#define CHAINS_AT_ONCE (GLOBAL_SIZE/ITEMS_OF_CHAIN)
+
 inline DEVICE void setMemory(Step* step, GLOBAL double* RESTRICT workspace, int places) {
 #if defined(CHAIN_BY_GROUP)
-    step->memory = workspace+(size_t) GROUP_ID*places*NUM_FIELDS;
-    step->places = places;
+    step->memory = workspace+(size_t) FIRST_CHAIN*NUM_PLACES*FIRST_LOCAL_FIELD;
 #elif defined(CHAIN_BY_CHAIN)
     step->memory = workspace+(size_t) GLOBAL_ID*places*NUM_FIELDS;
     step->stride = 1;
@@ -94,17 +96,11 @@ inline DEVICE int takeStepOfScheme(Step* step, int flags, GLOBAL double* RESTRIC
         return takeExplicitStep(step, forces, (flags&IS_EULER) != 0) ? 0 : -1;
     return takeStep(step, forces);
 }
-#define FIRST_CHAIN GLOBAL_ID
-#define CHAINS_AT_ONCE GLOBAL_SIZE
-#define IS_FIRST_ITEM true
 #else
 inline DEVICE int takeStepOfScheme(Step* step, int flags, GLOBAL double* RESTRICT forces,
         GLOBAL double* RESTRICT energies) {
     return takeStep(step, forces);
 }
-#define FIRST_CHAIN GROUP_ID
-#define CHAINS_AT_ONCE NUM_GROUPS
-#define IS_FIRST_ITEM (LOCAL_ID == 0)
 #endif
 
 /**
@@ -123,11 +119,12 @@ KERNEL void advanceChains(int numChains, int places, int count, int flags, doubl
         GLOBAL double* RESTRICT tetherMemory, GLOBAL const double* RESTRICT flow, GLOBAL const double* RESTRICT box,
         GLOBAL int* RESTRICT taken, GLOBAL mm_ulong* RESTRICT summary) {
 #ifdef CHAIN_BY_GROUP
-    LOCAL double exchanged[6*ITEMS_OF_CHAIN], middle[SIZE_OF_MIDDLE];
+    LOCAL double exchanged[CHAINS_OF_GROUP*NUM_EXCHANGED*ITEMS_OF_CHAIN], middle[CHAINS_OF_GROUP*SIZE_OF_MIDDLE];
+    LOCAL double localMemory[CHAINS_OF_GROUP*NUM_LOCAL_FIELDS*NUM_PLACES+1];
 #endif
     // There are no more groups than chains, and one step is taken at least.
     int chain = FIRST_CHAIN;
-#ifndef CHAIN_BY_GROUP
+#if !defined(CHAIN_BY_GROUP) || CHAINS_OF_GROUP > 1
     if (chain >= numChains)
         return;
 #endif
@@ -136,8 +133,9 @@ KERNEL void advanceChains(int numChains, int places, int count, int flags, doubl
                 firstTethers, tethers, box);
         setMemory(&step, workspace, places);
 #ifdef CHAIN_BY_GROUP
-        step.exchanged = exchanged;
-        step.middle = middle;
+        step.exchanged = exchanged+CHAIN_OF_GROUP*NUM_EXCHANGED*ITEMS_OF_CHAIN;
+        step.middle = middle+CHAIN_OF_GROUP*SIZE_OF_MIDDLE;
+        step.localMemory = localMemory+CHAIN_OF_GROUP*NUM_LOCAL_FIELDS*NUM_PLACES;
 #endif
         step.tetherMemory = tetherMemory;
         step.flow = flow;
@@ -165,12 +163,12 @@ KERNEL void advanceChains(int numChains, int places, int count, int flags, doubl
                     positions[place+2] = stored(positions[place+2]+moved.z);
                 }
             }
-            WAIT_FOR_ALL
+            WAIT_FOR_ITEMS
             fails = divisions < 0;
             done += fails ? 0 : 1;
             divided += divisions > 0 ? 1 : 0;
         } while (done < count && !fails);
-        if (IS_FIRST_ITEM) {
+        if (ITEM == 0) {
             taken[step.chain] = done;
             if (done < count)
                 ATOMIC_ADD(&summary[NUM_UNSTABLE_CHAINS], (mm_ulong) 1);

@@ -36,10 +36,3 @@ enum {NOISE_SEGMENT, NOISE_LENGTH, NOISE_BEND, NOISE_TETHER, NOISE_PARTICLE, NOI
 #ifndef NAN
 #define NAN nan("")
 #endif
-
-/** Functions that are called, not inlined, so that what one of them keeps in registers is not kept in another. */
-#if defined(__CUDACC__) || defined(__HIP__)
-#define CALLED __attribute__((noinline))
-#else
-#define CALLED
-#endif

@@ -65,11 +65,11 @@ inline DEVICE double findTension(const Step* step, int s, double length, double 
     if (given != 0)
         own = feneLength(law, given+tensionOfFlow, own);
     double2 found = feneTension(law, own);
-    FIELD(RESPONSE, s) = found.y;
+    storeField(step, RESPONSE, s, found.y);
     return found.x+found.y*(length-own)-tensionOfFlow;
 #else
     double extension = length-PROPERTY(REST_LENGTH, s);
-    FIELD(RESPONSE, s) = stiffness*implicit+drag*before/(length*length);
+    storeField(step, RESPONSE, s, stiffness*implicit+drag*before/(length*length));
     return stiffness*(implicit*extension+FIELD(CONSTANT_COORDINATE, s))+drag*(length-before)/length+
             FIELD(CONSTANT_TENSION, s)-tensionOfFlow;
 #endif
@@ -101,10 +101,10 @@ inline DEVICE void addSegment(const Step* step, int s, const Geometry* geometry,
     double response = FIELD(RESPONSE, s), shift = fmin(0.5*response, alongTrans*perStep);
     storeVector(step, NEW_TANGENT, s, t);
     storeVector(step, TURNED, s, turned);
-    FIELD(MULTIPLIER_BEFORE, s) = multiplier;
-    FIELD(SHIFT, s) = shift;
-    FIELD(COMPLIANCE, s) = 1/(response-shift+TINY_NUMBER);
-    FIELD(TENSION_START, s) = tension;
+    storeField(step, MULTIPLIER_BEFORE, s, multiplier);
+    storeField(step, SHIFT, s, shift);
+    storeField(step, COMPLIANCE, s, 1/(response-shift+TINY_NUMBER));
+    storeField(step, TENSION_START, s, tension);
     double least = compressed ? -UNBOUNDED : acrossTurn*(-COMPRESSION*perStep);
     double turning = 0.5*fmax(multiplier*geometry->inverse, least);
     block = withAxial(block, turning, shift-turning, t);

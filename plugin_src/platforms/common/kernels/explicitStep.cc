@@ -53,8 +53,8 @@ inline DEVICE void keepEliminated(const Step* step, int s, Symmetric inverse, Ve
     storeSymmetric(step, INVERSE, s, inverse);
     storeVector(step, SOLUTION, s, right);
     storeVector(step, NEW_TANGENT, s, friction.tangent);
-    FIELD(SHARE, s) = friction.other;
-    FIELD(RESPONSE, s) = friction.otherAxial;
+    storeField(step, SHARE, s, friction.other);
+    storeField(step, RESPONSE, s, friction.otherAxial);
 }
 
 /** The velocity of a node, given that of the next one. */
@@ -168,7 +168,7 @@ DEVICE void addRandomForces(const Step* step, bool isEuler) {
 }
 
 /** Take a step; MOVED is how far nodes move. Returns whether no segment has changed too much. */
-CALLED DEVICE bool takeExplicitStep(Step* step, GLOBAL const double* forces, bool isEuler) {
+DEVICE bool takeExplicitStep(Step* step, GLOBAL const double* forces, bool isEuler) {
     Vector x = positionOf(step, 0);
     for (int node = 0; node < step->nodes; node++) {
         storeVector(step, NODE, node, x);

@@ -28,12 +28,12 @@ DEVICE bool stiffenTautSegments(const Step* step, bool wanted) {
         EACH_IN_TURN(s, any ? step->segments : 0, turn) {
             double2 rates = turningRates(step, s);
             double length = FIELD(LENGTH, s), extra = fmax(0.5*rates.y-rates.x, 0.0)*length*length;
-            FIELD(EXTRA, s) = extra;
+            storeField(step, EXTRA, s, extra);
             Vector pair = loadVector(step, RANDOM_PAIR, s)*(sqrt(1+extra/(PROPERTY(ROTATIONAL, s)+TINY_NUMBER))-1);
             addVector(step, RANDOM, s, pair*-1.0);
             addVector(step, RANDOM, s+1, pair);
         }
-        WAIT_FOR_ALL
+        WAIT_FOR_ITEMS
     } while (++turn < NUM_TURNS);
     return any;
 }
@@ -68,7 +68,7 @@ DEVICE void rebuild(const Step* step, bool toRest, bool wanted) {
     Vector mean = sumAlongChain(step, REST, nodes)*(1.0/step->nodes);
     EACH(node, nodes)
         addVector(step, NODE, node, loadVector(step, REST, node)-mean);
-    WAIT_FOR_ALL
+    WAIT_FOR_ITEMS
 }
 
 /** Begin the second stage where the noise of the first would have taken the chain, had it been that of the step. */
@@ -81,10 +81,10 @@ DEVICE void extrapolate(const Step* step, bool wanted) {
                     loadVector(step, DIFFERENCE, node-1);
         storeVector(step, REST, node, rest);
     }
-    WAIT_FOR_ALL
+    WAIT_FOR_ITEMS
     EACH(node, nodes)
         storeVector(step, NODE, node, loadVector(step, NODE, node)*(1/NOISE_OF_FIRST));
-    WAIT_FOR_ALL
+    WAIT_FOR_ITEMS
     rebuild(step, true, wanted);
 }
 #endif
@@ -160,7 +160,7 @@ DEVICE bool solveStage(const Step* step) {
         addMetricForces(step, isFirst && step->kT > 0);
         EACH(node, step->nodes)
             addVector(step, NODE, node, loadVector(step, CHANGE, node));
-        WAIT_FOR_ALL
+        WAIT_FOR_ITEMS
 #ifndef CLOSED
         rebuild(step, false, step->free);
 #endif
@@ -187,7 +187,7 @@ DEVICE bool takePart(Step* step, GLOBAL const double* forces, bool divided) {
 #endif
         if (step->hasFlow && step->free && step->stage != SECOND_STAGE)
             carryAlong(step, first);
-        WAIT_FOR_ALL
+        WAIT_FOR_ITEMS
         solved = solveStage(step) && solved;
     } while (++stage < (step->twoStages ? 2 : 1));
     bool tooMuch = hasChangedTooMuch(step);
@@ -199,7 +199,7 @@ DEVICE bool takePart(Step* step, GLOBAL const double* forces, bool divided) {
  *
  * @return the number of times that the step was divided, or -1 if it cannot be taken
  */
-CALLED DEVICE int takeStep(Step* step, GLOBAL const double* forces) {
+DEVICE int takeStep(Step* step, GLOBAL const double* forces) {
     const NoiseKey key = step->key;
     const double h = step->h;
     int division = 0;
@@ -210,7 +210,7 @@ CALLED DEVICE int takeStep(Step* step, GLOBAL const double* forces) {
         step->key.level = key.level+division;
         EACH(node, step->nodes)
             storeVector(step, MOVED, node, zeroVector());
-        WAIT_FOR_ALL
+        WAIT_FOR_ITEMS
         int part = 0;
         do {
             step->key.step = (key.step<<division)+part;
@@ -222,7 +222,7 @@ CALLED DEVICE int takeStep(Step* step, GLOBAL const double* forces) {
                 if (division == 0)
                     storeVector(step, WHOLE, node, y);
             }
-            WAIT_FOR_ALL
+            WAIT_FOR_ITEMS
         } while (++part < parts && taken);
     } while (++division <= LARGEST_DIVISION && !taken);
     step->h = h;
@@ -230,6 +230,6 @@ CALLED DEVICE int takeStep(Step* step, GLOBAL const double* forces) {
     if (!taken)
         EACH(node, step->nodes)
             storeVector(step, MOVED, node, loadVector(step, WHOLE, node));
-    WAIT_FOR_ALL
+    WAIT_FOR_ITEMS
     return taken ? division-1 : -1;
 }

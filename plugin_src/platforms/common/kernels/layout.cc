@@ -2,8 +2,10 @@
  * The numbers that the host and the kernels exchange, in their order. Both include this file.
  */
 
-/** Work-items that share a chain, where a group has one. */
-enum {ITEMS_OF_CHAIN = 32};
+/** Numbers of the equations that are left between the two ends of a chain: see solverOfGroup.cc. */
+enum {SIZE_OF_MIDDLE_OF_OPEN_CHAIN = 2*9*(9+2), SIZE_OF_MIDDLE_OF_RING = 2*16*(17+2)};
+/** Numbers that each work-item of a chain has for the others. */
+enum {NUM_EXCHANGED = 6};
 
 /** Numbers that describe places of chains: the node, the segment behind it, and the joint at it. */
 enum {REST_LENGTH, STIFFNESS, INVERSE_EXTENSION, PARALLEL, PERPENDICULAR, ROTATIONAL, EXTENSIONAL, DRIFT, PROPULSION,

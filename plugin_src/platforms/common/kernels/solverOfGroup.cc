@@ -1,5 +1,5 @@
 /**
- * The equations of a chain, set up and solved by the work-items of a group.
+ * The equations of a chain, set up and solved by several work-items.
  *
  * Each of them sets up some of the equations. Two of them, 0 and 1, eliminate nodes from the first and from the last
  * towards the middle; what is behind a node is for work-item 1 what is before it in the chain. In a ring, the first two
@@ -19,11 +19,13 @@
 #define NODES_LEFT 4
 #define NUMBERS_LEFT 16
 #define ROW_LENGTH 17
+#define SIZE_OF_MIDDLE SIZE_OF_MIDDLE_OF_RING
 #else
 #define FIRST_INNER_NODE 0
 #define NODES_LEFT 2
 #define NUMBERS_LEFT 9
 #define ROW_LENGTH 9
+#define SIZE_OF_MIDDLE SIZE_OF_MIDDLE_OF_OPEN_CHAIN
 #endif
 #define TENSION_OF_END (3*NODES_LEFT)
 #define TENSION_BETWEEN (3*NODES_LEFT+2)
@@ -36,7 +38,8 @@
 #define LEFT_MATRIX(left, i, j) (left)[(i)*ROW_LENGTH+(j)]
 #define LEFT_RIGHT(left, i) (left)[NUMBERS_LEFT*ROW_LENGTH+(i)]
 #define LEFT_FOUND(i) step->middle[NUMBERS_LEFT*(ROW_LENGTH+1)+(i)]
-#define SIZE_OF_MIDDLE (2*NUMBERS_LEFT*(ROW_LENGTH+2))
+/** How many of its rows a work-item has at most. */
+#define ROWS_OF_ITEM ((NUMBERS_LEFT+ITEMS_OF_CHAIN-1)/ITEMS_OF_CHAIN)
 
 /** Where the equations of nodes are, before elimination leaves its results there. */
 enum {ROW_DIAGONAL = INVERSE, ROW_UPPER = NEXT, ROW_SECOND = SECOND, ROW_RIGHT = SOLUTION};
@@ -79,7 +82,7 @@ inline DEVICE void addToUpper(const Step* step, int node, Matrix upper) {
 }
 
 /** Linearise the equations around the nodes. What segments and joints add to a node comes in an order of its own. */
-CALLED DEVICE void gatherRows(const Step* step, bool compressed) {
+DEVICE void gatherRows(const Step* step, bool compressed) {
     EACH(node, step->nodes) {
         Row row = emptyRow();
         if (node == 0 || node > step->segments)
@@ -91,10 +94,10 @@ CALLED DEVICE void gatherRows(const Step* step, bool compressed) {
         storeMatrix(step, ROW_UPPER, node, row.upper);
         storeMatrix(step, ROW_SECOND, node, row.second);
     }
-    SYNC_THREADS
+    WAIT_FOR_ITEMS
     int first = 0;
     do {
-        const int s = first+LOCAL_ID;
+        const int s = first+ITEM;
         Row here = emptyRow(), after = emptyRow();
         if (s < step->segments) {
             Geometry geometry = newGeometry(step, s);
@@ -102,15 +105,15 @@ CALLED DEVICE void gatherRows(const Step* step, bool compressed) {
             addToRow(step, s, here.diagonal, here.right);
             addToUpper(step, s, here.upper);
         }
-        SYNC_THREADS
+        WAIT_FOR_ITEMS
         if (s < step->segments)
             addToRow(step, s+1, after.diagonal, after.right);
-        SYNC_THREADS
+        WAIT_FOR_ITEMS
         first += ITEMS_OF_CHAIN;
     } while (first < step->segments);
     first = 1;
     do {
-        const int s = first+LOCAL_ID;
+        const int s = first+ITEM;
         Row before = emptyRow(), here = emptyRow(), after = emptyRow();
         if (s < step->nodes-1) {
             Geometry geometry1 = newGeometry(step, s-1), geometry2 = newGeometry(step, s);
@@ -119,15 +122,15 @@ CALLED DEVICE void gatherRows(const Step* step, bool compressed) {
             addToUpper(step, s-1, before.upper);
             storeMatrix(step, ROW_SECOND, s-1, before.second);
         }
-        SYNC_THREADS
+        WAIT_FOR_ITEMS
         if (s < step->nodes-1) {
             addToRow(step, s, here.diagonal, here.right);
             addToUpper(step, s, here.upper);
         }
-        SYNC_THREADS
+        WAIT_FOR_ITEMS
         if (s < step->nodes-1)
             addToRow(step, s+1, after.diagonal, after.right);
-        SYNC_THREADS
+        WAIT_FOR_ITEMS
         first += ITEMS_OF_CHAIN;
     } while (first < step->nodes-1);
 }
@@ -222,7 +225,7 @@ inline DEVICE void addSegmentLeft(const Step* step, LOCAL_ARG double* left, int 
 }
 
 /** Eliminate nodes from an end to the middle, and add what is arrived at to what is left. */
-CALLED DEVICE void eliminateFromEnd(const Step* step, int end) {
+DEVICE void eliminateFromEnd(const Step* step, int end) {
     const int count = countOfEnd(step, end), near = end, far = 1-end, tension = TENSION_OF_END+end;
     LOCAL_ARG double* left = LEFT_OF_END(end);
     Link link = firstLink();
@@ -295,46 +298,53 @@ inline DEVICE void addUntouched(const Step* step) {
 #endif
 }
 
+/** A row of what is left that a work-item computes. Where it has fewer than others, it computes the last one, too. */
+inline DEVICE int rowOfItem(int number) {
+    return min(ITEM+number*ITEMS_OF_CHAIN, NUMBERS_LEFT-1);
+}
+
 /** Invert the matrix of what is left. Fixed nodes neither move nor pass anything on. */
 inline DEVICE void invertLeft(const Step* step) {
-    const int row = LOCAL_ID;
-    const bool takesPart = row < NUMBERS_LEFT;
-    const int ownRow = takesPart ? row : 0;
-    const double mobile = takesPart && row < 3*NODES_LEFT ? PROPERTY(MOBILE, nodeLeft(step, row/3)) : 1;
     LOCAL_ARG double* left = LEFT_OF_END(0);
     LOCAL_ARG const double* ofOther = LEFT_OF_END(1);
-    if (takesPart)
-        LEFT_FOUND(row) = mobile;
-    SYNC_THREADS
-    if (takesPart) {
+    EACH(row, NUMBERS_LEFT)
+        LEFT_FOUND(row) = row < 3*NODES_LEFT ? PROPERTY(MOBILE, nodeLeft(step, row/3)) : 1;
+    WAIT_FOR_ITEMS
+    EACH(row, NUMBERS_LEFT) {
+        const double mobile = LEFT_FOUND(row);
         for (int column = 0; column < NUMBERS_LEFT; column++)
             LEFT_MATRIX(left, row, column) = mobile*LEFT_FOUND(column)*
                     (LEFT_MATRIX(left, row, column)+LEFT_MATRIX(ofOther, row, column));
         LEFT_MATRIX(left, row, row) += 1-mobile;
     }
-    SYNC_THREADS
+    WAIT_FOR_ITEMS
     // Nodes come before the tensions between them, whose stiffness cannot hide what moves nodes then.
     int pivot = 0;
     do {
         const double reciprocal = 1/LEFT_MATRIX(left, pivot, pivot);
-        const double factor = LEFT_MATRIX(left, ownRow, pivot)*reciprocal;
-        double numbers[NUMBERS_LEFT];
-        for (int column = 0; column < NUMBERS_LEFT; column++) {
-            const double own = LEFT_MATRIX(left, ownRow, column), ofPivot = LEFT_MATRIX(left, pivot, column);
-            const double changed = own-factor*ofPivot, divided = ofPivot*reciprocal;
-            numbers[column] = row == pivot ? divided : changed;
+        double factors[ROWS_OF_ITEM], numbers[ROWS_OF_ITEM][NUMBERS_LEFT];
+        for (int k = 0; k < ROWS_OF_ITEM; k++) {
+            const int row = rowOfItem(k);
+            factors[k] = LEFT_MATRIX(left, row, pivot)*reciprocal;
+            for (int column = 0; column < NUMBERS_LEFT; column++) {
+                const double own = LEFT_MATRIX(left, row, column), ofPivot = LEFT_MATRIX(left, pivot, column);
+                const double changed = own-factors[k]*ofPivot, divided = ofPivot*reciprocal;
+                numbers[k][column] = row == pivot ? divided : changed;
+            }
         }
-        SYNC_THREADS
-        if (takesPart) {
-            for (int column = 0; column < NUMBERS_LEFT; column++)
-                LEFT_MATRIX(left, row, column) = numbers[column];
-            LEFT_MATRIX(left, row, pivot) = row == pivot ? reciprocal : -factor;
+        WAIT_FOR_ITEMS
+        for (int k = 0; k < ROWS_OF_ITEM; k++) {
+            const int row = ITEM+k*ITEMS_OF_CHAIN;
+            for (int column = 0; column < NUMBERS_LEFT && row < NUMBERS_LEFT; column++)
+                LEFT_MATRIX(left, row, column) = column != pivot ? numbers[k][column] :
+                        row == pivot ? reciprocal : -factors[k];
         }
-        SYNC_THREADS
+        WAIT_FOR_ITEMS
     } while (++pivot < NUMBERS_LEFT);
-    if (mobile == 0)
-        LEFT_MATRIX(left, row, row) = 0;
-    SYNC_THREADS
+    EACH(row, NUMBERS_LEFT)
+        if (LEFT_FOUND(row) == 0)
+            LEFT_MATRIX(left, row, row) = 0;
+    WAIT_FOR_ITEMS
 }
 
 /** Linearise the equations around the nodes, and eliminate these from both ends. */
@@ -342,12 +352,12 @@ DEVICE void eliminate(const Step* step, bool compressed) {
     gatherRows(step, compressed);
     EACH(i, SIZE_OF_MIDDLE)
         step->middle[i] = 0;
-    SYNC_THREADS
-    if (LOCAL_ID < 2)
-        eliminateFromEnd(step, LOCAL_ID);
-    if (LOCAL_ID == 0)
+    WAIT_FOR_ITEMS
+    if (ITEM < 2)
+        eliminateFromEnd(step, ITEM);
+    if (ITEM == 0)
         addUntouched(step);
-    SYNC_THREADS
+    WAIT_FOR_ITEMS
     invertLeft(step);
 }
 
@@ -357,30 +367,30 @@ inline DEVICE Vector vectorLeft(const Step* step, int number) {
 
 inline DEVICE void keepTensionLeft(const Step* step, int s, double tension, bool adds) {
     if (s >= 0 && s < step->segments)
-        FIELD(TENSION, s) = tension+(adds ? FIELD(TENSION, s) : 0);
+        storeField(step, TENSION, s, tension+(adds ? FIELD(TENSION, s) : 0));
 }
 
 /** Find the changes of nodes and the tensions, or add to them, if wanted. */
-CALLED DEVICE void substitute(const Step* step, bool adds, bool wanted) {
-    if (wanted && LOCAL_ID < NUMBERS_LEFT) {
+DEVICE void substitute(const Step* step, bool adds, bool wanted) {
+    EACH(row, wanted ? NUMBERS_LEFT : 0) {
         double found = 0;
         for (int column = 0; column < NUMBERS_LEFT; column++)
-            found += LEFT_MATRIX(LEFT_OF_END(0), LOCAL_ID, column)*
+            found += LEFT_MATRIX(LEFT_OF_END(0), row, column)*
                     (LEFT_RIGHT(LEFT_OF_END(0), column)+LEFT_RIGHT(LEFT_OF_END(1), column));
-        LEFT_FOUND(LOCAL_ID) = found;
+        LEFT_FOUND(row) = found;
     }
-    SYNC_THREADS
-    if (wanted && LOCAL_ID < NODES_LEFT) {
-        const int node = nodeLeft(step, LOCAL_ID);
-        Vector change = vectorLeft(step, LOCAL_ID);
+    WAIT_FOR_ITEMS
+    if (wanted && ITEM < NODES_LEFT) {
+        const int node = nodeLeft(step, ITEM);
+        Vector change = vectorLeft(step, ITEM);
         if (adds)
             change = change+loadVector(step, CHANGE, node);
         // The first two nodes of a ring come a second time behind the last one.
         for (int place = node; place < step->nodes; place += step->own)
             storeVector(step, CHANGE, place, change);
     }
-    if (wanted && LOCAL_ID < 2) {
-        const int end = LOCAL_ID;
+    if (wanted && ITEM < 2) {
+        const int end = ITEM;
         Found behind;
         behind.next = vectorLeft(step, end);
         behind.second = vectorLeft(step, 1-end);
@@ -399,14 +409,14 @@ CALLED DEVICE void substitute(const Step* step, bool adds, bool wanted) {
             substitutePair(step, node, true, s < step->segments ? s : -1, adds, &behind);
         }
     }
-    SYNC_THREADS
+    WAIT_FOR_ITEMS
     EACH(s, wanted ? step->segments : 0)
         keepTension(step, s);
-    SYNC_THREADS
+    WAIT_FOR_ITEMS
 }
 
 /** Let the change of tensions act along the mean direction as well, with the same elimination, if wanted. */
-CALLED DEVICE void refine(const Step* step, bool wanted) {
+DEVICE void refine(const Step* step, bool wanted) {
     EACH(node, wanted ? step->own : 0) {
         Vector own = zeroVector();
         if (node < step->segments)
@@ -419,11 +429,11 @@ CALLED DEVICE void refine(const Step* step, bool wanted) {
 #endif
         storeVector(step, SOLUTION, node, own);
     }
-    if (LOCAL_ID < NUMBERS_LEFT)
-        LEFT_RIGHT(LEFT_OF_END(0), LOCAL_ID) = LEFT_RIGHT(LEFT_OF_END(1), LOCAL_ID) = 0;
-    SYNC_THREADS
-    if (wanted && LOCAL_ID < 2) {
-        const int end = LOCAL_ID, count = countOfEnd(step, end);
+    EACH(row, NUMBERS_LEFT)
+        LEFT_RIGHT(LEFT_OF_END(0), row) = LEFT_RIGHT(LEFT_OF_END(1), row) = 0;
+    WAIT_FOR_ITEMS
+    if (wanted && ITEM < 2) {
+        const int end = ITEM, count = countOfEnd(step, end);
         LOCAL_ARG double* left = LEFT_OF_END(end);
         RightSides sides;
         sides.here = sides.next = zeroVector();
@@ -445,7 +455,7 @@ CALLED DEVICE void refine(const Step* step, bool wanted) {
         addRightLeft(left, 2+end, loadVector(step, SOLUTION, end));
 #endif
     }
-    SYNC_THREADS
+    WAIT_FOR_ITEMS
     substitute(step, true, wanted);
 }
 
@@ -474,10 +484,10 @@ inline DEVICE void keepResponse(const Step* step, int end, int s, Vector respons
 }
 
 /** Add the metric forces of lengths, if wanted. */
-CALLED DEVICE void addMetricForces(const Step* step, bool wanted) {
-    if (wanted && LOCAL_ID < 2) {
+DEVICE void addMetricForces(const Step* step, bool wanted) {
+    if (wanted && ITEM < 2) {
         LOCAL_ARG const double* left = LEFT_OF_END(0);
-        const int end = LOCAL_ID, near = end, far = 1-end, tension = TENSION_OF_END+end;
+        const int end = ITEM, near = end, far = 1-end, tension = TENSION_OF_END+end;
         Responses responses;
         responses.same = lowerPart(inverseLeft(left, near, near));
         responses.sameAfter = lowerPart(inverseLeft(left, far, far));
@@ -513,12 +523,12 @@ CALLED DEVICE void addMetricForces(const Step* step, bool wanted) {
 #endif
         }
     }
-    SYNC_THREADS
+    WAIT_FOR_ITEMS
     int turn = 0;
     do {
         EACH_IN_TURN(s, wanted ? step->segments : 0, turn)
             addMetricForce(step, s, loadVector(step, SOLUTION, s));
-        SYNC_THREADS
+        WAIT_FOR_ITEMS
     } while (++turn < NUM_TURNS);
 }
 #endif

@@ -121,8 +121,8 @@ DEVICE void substitute(const Step* step, bool adds, bool wanted) {
     Vector found0 = loadVector(step, SOLUTION, 0)-matrixTimes(loadMatrix(step, NEXT, 0), found1)+
             loadVector(step, PULL, 0)*tension0;
     double tension = FIELD(TENSION_FOUND, 0)+product(loadVector(step, FIRST, 0), found1)+FIELD(SHARE, 0)*tension0;
-    FIELD(TENSION, 0) = tension0+(adds ? FIELD(TENSION, 0) : 0);
-    FIELD(TENSION, n-1) = tension+(adds ? FIELD(TENSION, n-1) : 0);
+    storeField(step, TENSION, 0, tension0+(adds ? FIELD(TENSION, 0) : 0));
+    storeField(step, TENSION, n-1, tension+(adds ? FIELD(TENSION, n-1) : 0));
     Vector change0 = adds ? loadVector(step, CHANGE, 0)+found0 : found0;
     Vector change1 = adds ? loadVector(step, CHANGE, 1)+found1 : found1;
     storeVector(step, CHANGE, 0, change0);
@@ -172,7 +172,7 @@ DEVICE void refine(const Step* step, bool wanted) {
             Vector right = sides.here+own, give = loadVector(step, GIVE, node);
             storeVector(step, SOLUTION, node, symmetricTimes(loadSymmetric(step, INVERSE, node), right)-
                     give*sides.start);
-            FIELD(TENSION_FOUND, node) = FIELD(RECIPROCAL, node)*sides.start+product(give, right);
+            storeField(step, TENSION_FOUND, node, FIELD(RECIPROCAL, node)*sides.start+product(give, right));
             break;
         }
 #endif
@@ -184,7 +184,7 @@ DEVICE void refine(const Step* step, bool wanted) {
         Vector right = sides.border[node], give = loadVector(step, GIVE, node);
         Vector solution = symmetricTimes(loadSymmetric(step, INVERSE, node), right)-give*start;
         storeVector(step, SOLUTION, node, solution);
-        FIELD(TENSION_FOUND, node) = FIELD(RECIPROCAL, node)*start+product(give, right);
+        storeField(step, TENSION_FOUND, node, FIELD(RECIPROCAL, node)*start+product(give, right));
         if (node == 0)
             sides.border[1] = sides.border[1]-transposedTimes(loadMatrix(step, NEXT, 0), right)-
                     loadVector(step, FIRST, 0)*start;

@@ -7,14 +7,16 @@
 inline DEVICE void describeLength(const Step* step, int s, double length) {
     double l0 = PROPERTY(REST_LENGTH, s);
 #ifdef STRETCHING_FENE
-    FIELD(COORDINATE, s) = stretchCoordinate(PROPERTY(INVERSE_EXTENSION, s), length-l0).x;
+    storeField(step, COORDINATE, s, stretchCoordinate(PROPERTY(INVERSE_EXTENSION, s), length-l0).x);
 #else
-    FIELD(COORDINATE, s) = length-l0;
+    storeField(step, COORDINATE, s, length-l0);
 #endif
     double stretchRate = step->h*PROPERTY(STIFFNESS, s)*l0*l0+TINY_NUMBER;
     double friction = PROPERTY(EXTENSIONAL, s)+step->nodeFriction*(0.25*l0*l0);
-    FIELD(THETA, s) = fmax(0.5, 1-friction/stretchRate);
-    FIELD(RANDOM_COORDINATE, s) = FIELD(RANDOM_TENSION, s) = FIELD(MULTIPLIER, s) = 0;
+    storeField(step, THETA, s, fmax(0.5, 1-friction/stretchRate));
+    storeField(step, RANDOM_COORDINATE, s, 0);
+    storeField(step, RANDOM_TENSION, s, 0);
+    storeField(step, MULTIPLIER, s, 0);
 }
 
 /** The bend of the joint between a segment and the one before it, and its theta. */
@@ -25,7 +27,7 @@ inline DEVICE void describeBend(const Step* step, int s) {
     double inverse = 1/PROPERTY(REST_LENGTH, s);
     double friction = step->nodeFriction+4*inverse*inverse*PROPERTY(ROTATIONAL, s);
     double bendRate = 16*step->h*PROPERTY(JOINT, s)+TINY_NUMBER;
-    FIELD(JOINT_THETA, s) = fmin(LARGEST_THETA_OF_LINEAR_BENDS, fmax(0.5, 1-friction/bendRate));
+    storeField(step, JOINT_THETA, s, fmin(LARGEST_THETA_OF_LINEAR_BENDS, fmax(0.5, 1-friction/bendRate)));
 #else
     Vector before = tangentAtStart(step, s-1), behind = tangentAtStart(step, s);
     Vector sum = before+behind, bent = behind-before;
@@ -34,7 +36,7 @@ inline DEVICE void describeBend(const Step* step, int s) {
     double l0 = PROPERTY(REST_LENGTH, s);
     double friction = fmin(PROPERTY(ROTATIONAL, s-1), PROPERTY(ROTATIONAL, s))+step->nodeFriction*(0.25*l0*l0);
     double bendRate = 4*step->h*PROPERTY(JOINT, s)+TINY_NUMBER;
-    FIELD(JOINT_THETA, s) = fmax(0.5, 1-friction/bendRate);
+    storeField(step, JOINT_THETA, s, fmax(0.5, 1-friction/bendRate));
 #endif
 }
 
@@ -67,7 +69,7 @@ inline DEVICE void describeTethers(const Step* step, int node, bool divided) {
 }
 
 /** Describe the start of a step without noise, and its forces from outside. */
-CALLED DEVICE void describeStart(const Step* step, GLOBAL const double* forces, bool divided) {
+DEVICE void describeStart(const Step* step, GLOBAL const double* forces, bool divided) {
     EACH(node, step->nodes) {
         storeVector(step, NODE, node, zeroVector());
         storeVector(step, RANDOM, node, zeroVector());
@@ -77,7 +79,7 @@ CALLED DEVICE void describeStart(const Step* step, GLOBAL const double* forces, 
             force = inSpace(make_double3(forces[3*node], forces[3*node+1], forces[3*node+2]));
         storeVector(step, EXTERNAL, node, force);
     }
-    WAIT_FOR_ALL
+    WAIT_FOR_ITEMS
     int turn = 0;
     do {
         EACH_IN_TURN(s, step->nodes-1, turn) {
@@ -86,9 +88,9 @@ CALLED DEVICE void describeStart(const Step* step, GLOBAL const double* forces, 
                 difference = difference+loadVector(step, MOVED, s+1)-loadVector(step, MOVED, s);
             double length = sqrt(product(difference, difference));
             storeVector(step, DIFFERENCE, s, difference);
-            FIELD(LENGTH, s) = length;
-            FIELD(INVERSE_LENGTH, s) = 1/length;
-            FIELD(EXTRA, s) = 0;
+            storeField(step, LENGTH, s, length);
+            storeField(step, INVERSE_LENGTH, s, 1/length);
+            storeField(step, EXTRA, s, 0);
             storeVector(step, RANDOM_PAIR, s, zeroVector());
             if (s < step->segments) {
                 if (step->hasPropulsion) {
@@ -99,7 +101,7 @@ CALLED DEVICE void describeStart(const Step* step, GLOBAL const double* forces, 
                 describeLength(step, s, length);
             }
         }
-        WAIT_FOR_ALL
+        WAIT_FOR_ITEMS
     } while (++turn < NUM_TURNS);
     EACH(node, step->nodes) {
         if (node > 0 && node < step->nodes-1)
@@ -111,7 +113,7 @@ CALLED DEVICE void describeStart(const Step* step, GLOBAL const double* forces, 
                     loadVector(step, DIFFERENCE, node-1));
     }
     sumAlongChain(step, PLACE, step->hasFlow ? step->nodes : 0);
-    WAIT_FOR_ALL
+    WAIT_FOR_ITEMS
 }
 
 #ifndef BENDING_BondDifference
@@ -181,7 +183,7 @@ inline DEVICE void drawForces(const Step* step, int s, double4 first, double4 se
     addVector(step, RANDOM, s, force-pair);
     addVector(step, RANDOM, s+1, force+pair);
     storeVector(step, RANDOM_PAIR, s, pair);
-    FIELD(RANDOM_TENSION, s) = product(t, b)*(sqrt(PROPERTY(EXTENSIONAL, s))*perLength);
+    storeField(step, RANDOM_TENSION, s, product(t, b)*(sqrt(PROPERTY(EXTENSIONAL, s))*perLength));
 }
 
 /** Draw the coordinate of a length, given a normal number. */
@@ -220,7 +222,7 @@ inline DEVICE void drawTethers(const Step* step, int node) {
 }
 
 /** Draw the noise of a step, if there is any. */
-CALLED DEVICE void drawNoise(const Step* step) {
+DEVICE void drawNoise(const Step* step) {
     const int nodes = step->kT > 0 ? step->nodes : 0;
     double amplitude = sqrt(2*step->kT/step->h);
     int turn = 0;
@@ -243,7 +245,7 @@ CALLED DEVICE void drawNoise(const Step* step) {
                     drawForces(step, s, first, second, amplitude);
                     normal = second.z;
                 }
-                FIELD(RANDOM_COORDINATE, s) = drawLength(step, s, normal);
+                storeField(step, RANDOM_COORDINATE, s, drawLength(step, s, normal));
             }
             if (s > 0 && s < step->nodes-1 && PROPERTY(JOINT, s) != 0) {
                 double joint = PROPERTY(JOINT, s);
@@ -264,23 +266,24 @@ CALLED DEVICE void drawNoise(const Step* step) {
             if (step->hasTethers && s < step->own)
                 drawTethers(step, s);
         }
-        WAIT_FOR_ALL
+        WAIT_FOR_ITEMS
     } while (++turn < NUM_TURNS);
 }
 
 inline DEVICE void prepareLength(const Step* step, int s) {
     double theta = FIELD(THETA, s);
     if (step->stage == FIRST_STAGE) {
-        FIELD(IMPLICIT, s) = DIAGONAL;
-        FIELD(CONSTANT_COORDINATE, s) = -DIAGONAL*NOISE_OF_FIRST*FIELD(RANDOM_COORDINATE, s);
-        FIELD(CONSTANT_TENSION, s) = -NOISE_OF_FIRST*FIELD(RANDOM_TENSION, s);
+        storeField(step, IMPLICIT, s, DIAGONAL);
+        storeField(step, CONSTANT_COORDINATE, s, -DIAGONAL*NOISE_OF_FIRST*FIELD(RANDOM_COORDINATE, s));
+        storeField(step, CONSTANT_TENSION, s, -NOISE_OF_FIRST*FIELD(RANDOM_TENSION, s));
         return;
     }
-    FIELD(IMPLICIT, s) = theta;
-    FIELD(CONSTANT_COORDINATE, s) = (1-theta)*FIELD(COORDINATE, s)-FIELD(RANDOM_COORDINATE, s)*sqrt(2*theta-1);
-    FIELD(CONSTANT_TENSION, s) = -FIELD(RANDOM_TENSION, s);
+    storeField(step, IMPLICIT, s, theta);
+    storeField(step, CONSTANT_COORDINATE, s,
+            (1-theta)*FIELD(COORDINATE, s)-FIELD(RANDOM_COORDINATE, s)*sqrt(2*theta-1));
+    storeField(step, CONSTANT_TENSION, s, -FIELD(RANDOM_TENSION, s));
     if (step->stage == SECOND_STAGE)
-        FIELD(MULTIPLIER, s) = FIELD(MULTIPLIER, s)*(1/NOISE_OF_FIRST);
+        storeField(step, MULTIPLIER, s, FIELD(MULTIPLIER, s)*(1/NOISE_OF_FIRST));
 }
 
 inline DEVICE void prepareBend(const Step* step, int s) {
@@ -304,7 +307,7 @@ inline DEVICE void prepareBend(const Step* step, int s) {
 #endif
         turning = 2*DIAGONAL;
     }
-    FIELD(JOINT_IMPLICIT, s) = step->stage == ONLY_STAGE ? theta : DIAGONAL;
+    storeField(step, JOINT_IMPLICIT, s, step->stage == ONLY_STAGE ? theta : DIAGONAL);
     storeVector(step, CONSTANT_BEND, s, offset);
     storeVector(step, TURNING_BEND, s, random*turning);
 }
@@ -335,7 +338,7 @@ DEVICE void prepareStage(const Step* step) {
             storeVector(step, NEW_TANGENT, s, difference*(1/sqrt(product(difference, difference))));
         }
     }
-    WAIT_FOR_ALL
+    WAIT_FOR_ITEMS
     EACH(s, step->nodes) {
         if (s < step->segments)
             prepareLength(step, s);
@@ -344,5 +347,5 @@ DEVICE void prepareStage(const Step* step) {
         if (step->hasTethers && s < step->own)
             prepareTethers(step, s);
     }
-    WAIT_FOR_ALL
+    WAIT_FOR_ITEMS
 }

@@ -85,16 +85,16 @@ DEVICE void eliminatePair(const Step* step, int node, int following, TensionEqua
     double tension = link->right*reciprocal+product(give, row->right);
     storeSymmetric(step, INVERSE, node, inverse);
     storeVector(step, GIVE, node, give);
-    FIELD(RECIPROCAL, node) = reciprocal;
+    storeField(step, RECIPROCAL, node, reciprocal);
     storeVector(step, SOLUTION, node, solution);
-    FIELD(TENSION_FOUND, node) = tension;
+    storeField(step, TENSION_FOUND, node, tension);
     if (following == 0)
         return;
     Vector t = behind.direction, lastBefore = link->last, pull = symmetricTimes(inverse, t);
     Matrix toNext = sumOf(symmetricTimesMatrix(inverse, row->upper), outer(give, lastBefore));
     Vector first = lastBefore*reciprocal-transposedTimes(row->upper, give);
     storeVector(step, PULL, node, pull);
-    FIELD(SHARE, node) = product(give, t);
+    storeField(step, SHARE, node, product(give, t));
     storeMatrix(step, NEXT, node, toNext);
     storeVector(step, FIRST, node, first);
     next->right = next->right-transposedTimes(row->upper, solution)-lastBefore*tension;
@@ -149,7 +149,8 @@ inline DEVICE void eliminateFromBorder(const Step* step, int node, Vector direct
 /** Keep the tension of a segment, and what the next iteration needs of it, once its nodes have been found. */
 inline DEVICE void keepTension(const Step* step, int s) {
     Vector change = loadVector(step, CHANGE, s+1)-loadVector(step, CHANGE, s);
-    FIELD(MULTIPLIER, s) = FIELD(TENSION, s)+FIELD(SHIFT, s)*product(loadVector(step, NEW_TANGENT, s), change);
+    storeField(step, MULTIPLIER, s,
+            FIELD(TENSION, s)+FIELD(SHIFT, s)*product(loadVector(step, NEW_TANGENT, s), change));
 }
 
 /** What the last iteration's tensions lack of acting along the mean direction, as a force on a segment's first node. */
@@ -184,7 +185,7 @@ inline DEVICE void substitutePair(const Step* step, int node, bool coupled, int 
     storeVector(step, CHANGE, node, make_double3(adds ? change.x : here.x, adds ? change.y : here.y,
             adds ? change.z : here.z));
     if (before >= 0)
-        FIELD(TENSION, before) = adds ? tension : found;
+        storeField(step, TENSION, before, adds ? tension : found);
     behind->tension = found;
     behind->second = behind->next;
     behind->next = here;
@@ -196,7 +197,7 @@ inline DEVICE void setRightSide(const Step* step, int node, Vector own, Vector d
     double start = sides->start;
     Vector solution = symmetricTimes(loadSymmetric(step, INVERSE, node), right)-give*start;
     storeVector(step, SOLUTION, node, solution);
-    FIELD(TENSION_FOUND, node) = FIELD(RECIPROCAL, node)*start+product(give, right);
+    storeField(step, TENSION_FOUND, node, FIELD(RECIPROCAL, node)*start+product(give, right));
 #ifdef CLOSED
     for (int k = 0; k < 2; k++)
         sides->border[k] = sides->border[k]-transposedTimes(loadMatrix(step, BORDER+9*k, node), right)-

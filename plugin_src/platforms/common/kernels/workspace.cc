@@ -20,11 +20,11 @@ typedef struct {
     GLOBAL const double* tethers;
     GLOBAL double* tetherMemory;
 #ifdef CHAIN_BY_GROUP
+    LOCAL_ARG double* localMemory;
     LOCAL_ARG double* exchanged;
     LOCAL_ARG double* middle;
 #endif
     size_t stride, tableStride;
-    int places;
     NoiseKey key;
     Vector shift, flowAtZero;
     double h, kT, nodeFriction;
@@ -38,22 +38,50 @@ typedef struct {
 #else
 #define NUM_FIELDS NUM_FIELDS_OF_OPEN_CHAIN
 #endif
-#ifdef CHAIN_BY_GROUP
-/** Work-items of a group read the same field of neighbouring places together. */
-#define FIELD(field, place) step->memory[(field)*step->places+(place)]
-#else
-#define FIELD(field, place) step->memory[(size_t) ((place)*NUM_FIELDS+(field))*step->stride]
-#endif
+#define FIELD(field, place) loadField(step, field, place)
 #define PROPERTY(property, place) step->table[(size_t) ((place)*NUM_PROPERTIES+(property))*step->tableStride]
+
+#ifdef CHAIN_BY_GROUP
+/**
+ * Work-items of a group read the same field of neighbouring places together. As many fields as it has room for are in
+ * the memory of the group: the last ones, which elimination leaves, and for which others wait.
+ */
+#define FIRST_LOCAL_FIELD (NUM_FIELDS-NUM_LOCAL_FIELDS)
+#define PLACE_IN_LOCAL_MEMORY(field, place) step->localMemory[((field)-FIRST_LOCAL_FIELD)*NUM_PLACES+(place)]
+#define PLACE_IN_MEMORY(field, place) step->memory[(field)*NUM_PLACES+(place)]
+
+inline DEVICE double loadField(const Step* step, int field, int place) {
+    if (field >= FIRST_LOCAL_FIELD)
+        return PLACE_IN_LOCAL_MEMORY(field, place);
+    return PLACE_IN_MEMORY(field, place);
+}
+
+inline DEVICE void storeField(const Step* step, int field, int place, double value) {
+    if (field >= FIRST_LOCAL_FIELD)
+        PLACE_IN_LOCAL_MEMORY(field, place) = value;
+    else
+        PLACE_IN_MEMORY(field, place) = value;
+}
+#else
+#define PLACE_IN_MEMORY(field, place) step->memory[(size_t) ((place)*NUM_FIELDS+(field))*step->stride]
+
+inline DEVICE double loadField(const Step* step, int field, int place) {
+    return PLACE_IN_MEMORY(field, place);
+}
+
+inline DEVICE void storeField(const Step* step, int field, int place, double value) {
+    PLACE_IN_MEMORY(field, place) = value;
+}
+#endif
 
 inline DEVICE Vector loadVector(const Step* step, int field, int place) {
     return make_double3(FIELD(field, place), FIELD(field+1, place), FIELD(field+2, place));
 }
 
 inline DEVICE void storeVector(const Step* step, int field, int place, Vector v) {
-    FIELD(field, place) = v.x;
-    FIELD(field+1, place) = v.y;
-    FIELD(field+2, place) = v.z;
+    storeField(step, field, place, v.x);
+    storeField(step, field+1, place, v.y);
+    storeField(step, field+2, place, v.z);
 }
 
 inline DEVICE void addVector(const Step* step, int field, int place, Vector v) {
@@ -81,12 +109,12 @@ inline DEVICE Symmetric loadSymmetric(const Step* step, int field, int place) {
 }
 
 inline DEVICE void storeSymmetric(const Step* step, int field, int place, Symmetric m) {
-    FIELD(field, place) = m.xx;
-    FIELD(field+1, place) = m.yx;
-    FIELD(field+2, place) = m.yy;
-    FIELD(field+3, place) = m.zx;
-    FIELD(field+4, place) = m.zy;
-    FIELD(field+5, place) = m.zz;
+    storeField(step, field, place, m.xx);
+    storeField(step, field+1, place, m.yx);
+    storeField(step, field+2, place, m.yy);
+    storeField(step, field+3, place, m.zx);
+    storeField(step, field+4, place, m.zy);
+    storeField(step, field+5, place, m.zz);
 }
 
 /** A vector without its part across the plane of chains that stay in one. */

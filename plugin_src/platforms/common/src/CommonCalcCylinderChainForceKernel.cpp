@@ -29,7 +29,8 @@ private:
 };
 
 CommonCalcCylinderChainForceKernel::CommonCalcCylinderChainForceKernel(string name, const Platform& platform,
-        ComputeContext& cc) : CalcCylinderChainForceKernel(name, platform), cc(cc), description(NULL) {
+        ComputeContext& cc, const WorkItemGroups& groups) : CalcCylinderChainForceKernel(name, platform), cc(cc),
+        groups(groups), description(NULL) {
 }
 
 void CommonCalcCylinderChainForceKernel::initialize(const System&, const CylinderChainDescription& chains) {
@@ -44,7 +45,7 @@ CommonCylinderChains& CommonCalcCylinderChainForceKernel::getChains() {
     // Kernels can be compiled once all forces have been added to the Context.
 
     if (!chains)
-        chains.reset(new CommonCylinderChains(cc, *description));
+        chains.reset(new CommonCylinderChains(cc, groups, *description));
     return *chains;
 }
 

@@ -15,9 +15,10 @@ vector<string> OpenMM::getCommonKernelNames() {
             CalcCylinderChainWallForceKernel::Name(), UpdateCylinderChainLinkersKernel::Name()};
 }
 
-KernelImpl* OpenMM::createCommonKernel(const string& name, const Platform& platform, ComputeContext& cc) {
+KernelImpl* OpenMM::createCommonKernel(const string& name, const Platform& platform, ComputeContext& cc,
+        const WorkItemGroups& groups) {
     if (name == CalcCylinderChainForceKernel::Name())
-        return new CommonCalcCylinderChainForceKernel(name, platform, cc);
+        return new CommonCalcCylinderChainForceKernel(name, platform, cc, groups);
     if (name == IntegrateCylinderChainStepKernel::Name())
         return new CommonIntegrateCylinderChainStepKernel(name, platform, cc);
     if (name == CalcCylinderChainLinkForceKernel::Name())

@@ -23,22 +23,35 @@ static const double LARGEST_WORKSPACE = 1e9;
 /**
  * Work-items of a GPU are in groups of this size.
  */
-static const int GROUP_SIZE = layout::ITEMS_OF_CHAIN;
+static const int GROUP_SIZE = 32;
 
 /**
- * A group of work-items for each chain takes implicit steps of no more chains than these.  A group takes a step in
- * about a seventh of the time of one work-item, but a GPU can have fewer groups at once.  With an estimate of 0.3 us of
- * an H100 for each chain of 64 segments and step, as many chains as these take the 1.8 ms that one work-item for each
- * of them would, however few they are; see the page on platforms.
+ * Work-items of a chain where several chains can share a group.
  */
-static const int MOST_CHAINS_OF_GROUPS = 6000;
+static const int ITEMS_OF_PART = 8;
+
+/**
+ * Several work-items for each chain take a step sooner than one, but a GPU has work-items for so many chains at once.
+ * On an H200, parts of groups are faster than whole ones for more chains than so many times the nodes of one (250 of 10
+ * segments, 1600 of 64), and one work-item is faster than parts for more chains than 5000 of any length.  Where there
+ * are no parts, one work-item is faster than a group for more than 100 times the nodes of one, but for long chains.
+ */
+static const double CHAINS_OF_WHOLE_GROUPS_PER_NODE = 25, CHAINS_OF_GROUPS_PER_NODE = 100;
+static const int MOST_CHAINS_OF_PARTS = 5000, MOST_CHAINS_OF_GROUPS = 6000;
+
+/**
+ * The numbers of places for which programs of several work-items are compiled are multiples of this.
+ */
+static const int PLACES_TOGETHER = 8;
 
 /**
  * Chains that one kernel computes.
  */
 struct CommonCylinderChains::Batch {
     ChainTable table;
-    int items, groupSize;
+    int itemsOfChain, chainsOfGroup, groupSize, numGroups;
+    /** The places for which a chain has memory; the fields of them that are in the memory of a group. */
+    int placesOfMemory, localFields;
     ComputeProgram program;
     ComputeArray numbers, properties, places, workspace;
     ComputeKernel advance, forces;
@@ -66,16 +79,28 @@ private:
 };
 
 /**
- * Whether groups take implicit steps.  The variable CYLCHAIN_WORK_ITEMS of the environment, 1 or 32, says how many
- * work-items take those of a chain.
+ * How many work-items take the implicit steps of a chain: what the variable CYLCHAIN_WORK_ITEMS of the environment
+ * says, 1, 8 or 32, or what is fastest.
  */
-static bool takesGroups(const ComputeContext& cc, size_t numChains) {
+static int findItemsOfSteps(const ComputeContext& cc, const WorkItemGroups& groups, const vector<Chain>& chains) {
     const char* asked = getenv("CYLCHAIN_WORK_ITEMS");
-    if (asked == NULL || *asked == 0)
-        return !cc.getIsCPU() && numChains <= MOST_CHAINS_OF_GROUPS;
-    if (asked != to_string(GROUP_SIZE) && asked != string("1"))
-        throw OpenMMException("CYLCHAIN_WORK_ITEMS must be 1 or "+to_string(GROUP_SIZE)+", but is "+asked);
-    return asked != string("1");
+    if (asked != NULL && *asked != 0) {
+        for (int items : {1, ITEMS_OF_PART, GROUP_SIZE})
+            if (asked == to_string(items))
+                return items;
+        throw OpenMMException("CYLCHAIN_WORK_ITEMS must be 1, "+to_string(ITEMS_OF_PART)+" or "+
+                to_string(GROUP_SIZE)+", but is "+asked);
+    }
+    if (cc.getIsCPU() || chains.empty())
+        return 1;
+    double nodes = 0;
+    for (const Chain& chain : chains)
+        nodes += chain.nodes.size()/(double) chains.size();
+    if (!groups.waitInParts)
+        return chains.size() > min(CHAINS_OF_GROUPS_PER_NODE*nodes, (double) MOST_CHAINS_OF_GROUPS) ? 1 : GROUP_SIZE;
+    if (chains.size() > MOST_CHAINS_OF_PARTS)
+        return 1;
+    return chains.size() > CHAINS_OF_WHOLE_GROUPS_PER_NODE*nodes ? ITEMS_OF_PART : GROUP_SIZE;
 }
 
 template <class T> static void makeArray(ComputeContext& cc, ComputeArray& array, const vector<T>& values,
@@ -86,8 +111,9 @@ template <class T> static void makeArray(ComputeContext& cc, ComputeArray& array
         array.upload(values);
 }
 
-CommonCylinderChains::CommonCylinderChains(ComputeContext& cc, const CylinderChainDescription& description) : cc(cc),
-        description(description), usesGroups(takesGroups(cc, description.getChains().size())), slotsAreValid(false) {
+CommonCylinderChains::CommonCylinderChains(ComputeContext& cc, const WorkItemGroups& groups,
+        const CylinderChainDescription& description) : cc(cc), description(description), groups(groups),
+        itemsOfSteps(findItemsOfSteps(cc, groups, description.getChains())), slotsAreValid(false) {
     if (!cc.getSupportsDoublePrecision())
         throw OpenMMException("Filaments need a device that computes in double precision, and this one does not. "
                 "Use the CPU platform, or another device");
@@ -136,16 +162,21 @@ ComputeProgram CommonCylinderChains::compile(ComputeContext& cc, const string& s
     return cc.compileProgram(string(Sources::layout)+Sources::constants+Sources::vectors+Sources::noise+source);
 }
 
-ComputeProgram CommonCylinderChains::programFor(const Chain& chain, bool byGroup) {
+ComputeProgram CommonCylinderChains::programFor(const Chain& chain, const Batch& batch) {
     typedef CommonCylinderChainKernelSources Sources;
     map<string, string> defines = definesFor(chain);
-    if (byGroup)
+    defines["ITEMS_OF_CHAIN"] = to_string(batch.itemsOfChain);
+    if (batch.itemsOfChain > 1) {
         defines["CHAIN_BY_GROUP"] = "1";
+        defines["CHAINS_OF_GROUP"] = to_string(batch.chainsOfGroup);
+        defines["NUM_PLACES"] = to_string(batch.placesOfMemory);
+        defines["NUM_LOCAL_FIELDS"] = to_string(batch.localFields);
+    }
     else if (cc.getIsCPU())
         defines["CHAIN_BY_CHAIN"] = "1";
     string variant;
     for (const auto& define : defines)
-        variant += define.first+" ";
+        variant += define.first+"="+define.second+" ";
     ComputeProgram& program = programs[variant];
     if (!program)
         program = cc.compileProgram(string(Sources::layout)+Sources::constants+Sources::vectors+Sources::noise+
@@ -155,10 +186,10 @@ ComputeProgram CommonCylinderChains::programFor(const Chain& chain, bool byGroup
     return program;
 }
 
-const vector<unique_ptr<CommonCylinderChains::Batch> >& CommonCylinderChains::getBatches(bool byGroup) {
-    vector<unique_ptr<Batch> >& batches = byGroup ? groupBatches : itemBatches;
-    if (!batches.empty())
-        return batches;
+const vector<unique_ptr<CommonCylinderChains::Batch> >& CommonCylinderChains::getBatches(int items) {
+    vector<unique_ptr<Batch> >& own = batches[items];
+    if (!own.empty())
+        return own;
     const vector<Chain>& chains = description.getChains();
     vector<int> order(chains.size());
     iota(order.begin(), order.end(), 0);
@@ -177,28 +208,38 @@ const vector<unique_ptr<CommonCylinderChains::Batch> >& CommonCylinderChains::ge
         else
             batch->push_back(chain);
     }
-    for (const vector<int>& own : members)
-        batches.push_back(makeBatch(own, byGroup));
-    return batches;
+    for (const vector<int>& alike : members)
+        own.push_back(makeBatch(alike, items));
+    return own;
 }
 
-unique_ptr<CommonCylinderChains::Batch> CommonCylinderChains::makeBatch(const vector<int>& members, bool byGroup) {
+unique_ptr<CommonCylinderChains::Batch> CommonCylinderChains::makeBatch(const vector<int>& members, int items) {
     unique_ptr<Batch> batch(new Batch());
-    batch->table = tabulate(description.getChains(), members, firstNodes, byGroup || cc.getIsCPU());
+    batch->table = tabulate(description.getChains(), members, firstNodes, items > 1 || cc.getIsCPU());
     const ChainTable& table = batch->table;
-    const double perChain = (double) sizeof(double)*table.numPlaces*table.numFields;
-    const int most = max(1, (int) min(1e9, LARGEST_WORKSPACE/perChain)), blocks = max(1, cc.getNumThreadBlocks());
-    batch->groupSize = byGroup || !cc.getIsCPU() ? GROUP_SIZE : 1;
-    if (byGroup)
-        batch->items = min(min(table.numChains, most), blocks)*GROUP_SIZE;
-    else if (cc.getIsCPU())
-        batch->items = min(table.numChains, blocks);
-    else
-        batch->items = (min(table.numChains, most)+GROUP_SIZE-1)/GROUP_SIZE*GROUP_SIZE;
+    const bool isRing = description.getChains()[members[0]].closed;
+    batch->itemsOfChain = items;
+    batch->chainsOfGroup = items > 1 ? (groups.waitInParts ? GROUP_SIZE/items : 1) : cc.getIsCPU() ? 1 : GROUP_SIZE;
+    batch->groupSize = batch->chainsOfGroup*items;
+    batch->placesOfMemory = table.numPlaces;
+    batch->localFields = 0;
+    if (items > 1) {
+        // Programs are compiled for a number of places: chains of similar lengths share one.
+        batch->placesOfMemory = (table.numPlaces+PLACES_TOGETHER-1)/PLACES_TOGETHER*PLACES_TOGETHER;
+        const int others = layout::NUM_EXCHANGED*items+
+                (isRing ? layout::SIZE_OF_MIDDLE_OF_RING : layout::SIZE_OF_MIDDLE_OF_OPEN_CHAIN);
+        const int free = (groups.localMemory/(int) sizeof(double)-1)/batch->chainsOfGroup-others;
+        batch->localFields = max(0, min(table.numFields, free/batch->placesOfMemory));
+    }
+    const double perChain = (double) sizeof(double)*batch->placesOfMemory*table.numFields;
+    const int most = min(table.numChains, max(1, (int) min(1e9, LARGEST_WORKSPACE/perChain)));
+    batch->numGroups = (most+batch->chainsOfGroup-1)/batch->chainsOfGroup;
+    if (items > 1 || cc.getIsCPU())
+        batch->numGroups = min(batch->numGroups, max(1, cc.getNumThreadBlocks()));
     makeArray(cc, batch->numbers, table.numbers, "chains");
     makeArray(cc, batch->properties, table.properties, "propertiesOfChains");
     makeArray(cc, batch->places, table.places, "places");
-    batch->program = programFor(description.getChains()[members[0]], byGroup);
+    batch->program = programFor(description.getChains()[members[0]], *batch);
     return batch;
 }
 
@@ -213,8 +254,7 @@ void CommonCylinderChains::uploadTethers() {
 }
 
 void CommonCylinderChains::update() {
-    itemBatches.clear();
-    groupBatches.clear();
+    batches.clear();
     uploadTethers();
 }
 
@@ -338,7 +378,7 @@ void CommonCylinderChains::addForces(bool includeForces, ChainEnergy* energy) {
     updateBox();
     updateShifts();
     const int flags = description.usesPeriodicBoundaryConditions() ? layout::IS_PERIODIC : 0;
-    for (const unique_ptr<Batch>& batch : getBatches(false)) {
+    for (const unique_ptr<Batch>& batch : getBatches(1)) {
         if (!batch->forces) {
             batch->forces = batch->program->createKernel("computeForces");
             batch->forces->addArg(batch->table.numChains);
@@ -379,12 +419,11 @@ int CommonCylinderChains::advance(const StepSettings& settings, int count, bool 
         return 0;
     const int flags = describeStep(settings) | (findsForces ? layout::FINDS_FORCES : 0);
     const bool isImplicit = settings.scheme == Scheme::Implicit || settings.scheme == Scheme::ImplicitSecondOrder;
-    const bool byGroup = usesGroups && isImplicit;
-    for (const unique_ptr<Batch>& batch : getBatches(byGroup)) {
+    for (const unique_ptr<Batch>& batch : getBatches(isImplicit ? itemsOfSteps : 1)) {
         if (!batch->advance) {
-            const size_t chainsAtOnce = batch->items/(byGroup ? GROUP_SIZE : 1);
-            batch->workspace.initialize<double>(cc, chainsAtOnce*batch->table.numPlaces*batch->table.numFields,
-                    "workspace");
+            const size_t chainsAtOnce = (size_t) batch->numGroups*batch->chainsOfGroup;
+            const size_t perChain = (size_t) batch->placesOfMemory*(batch->table.numFields-batch->localFields);
+            batch->workspace.initialize<double>(cc, max((size_t) 1, chainsAtOnce*perChain), "workspace");
             batch->advance = batch->program->createKernel("advanceChains");
             batch->advance->addArg(batch->table.numChains);
             batch->advance->addArg(batch->table.numPlaces);
@@ -403,7 +442,7 @@ int CommonCylinderChains::advance(const StepSettings& settings, int count, bool 
         kernel->setArg(6, (uint32_t) settings.seed);
         kernel->setArg(7, (uint32_t) settings.level);
         kernel->setArg(8, settings.step);
-        kernel->execute(batch->items, batch->groupSize);
+        kernel->execute(batch->numGroups*batch->groupSize, batch->groupSize);
     }
     readSummary();
     divided = counts[layout::NUM_DIVIDED_STEPS];

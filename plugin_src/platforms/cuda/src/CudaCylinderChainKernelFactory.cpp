@@ -25,6 +25,7 @@ CYLCHAIN_EXPORT void registerKernelFactories() {
 
 KernelImpl* CudaCylinderChainKernelFactory::createKernelImpl(string name, const Platform& platform,
         ContextImpl& context) const {
-    ComputeContext& cc = *static_cast<CudaPlatform::PlatformData*>(context.getPlatformData())->contexts[0];
-    return createCommonKernel(name, platform, cc);
+    CudaContext& cu = *static_cast<CudaPlatform::PlatformData*>(context.getPlatformData())->contexts[0];
+    // A kernel may have this much local memory without asking for more. Parts of a warp go their own ways since Volta.
+    return createCommonKernel(name, platform, cu, {48*1024, cu.getComputeCapability() >= 7});
 }

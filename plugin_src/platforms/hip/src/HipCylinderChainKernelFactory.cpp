@@ -26,5 +26,5 @@ CYLCHAIN_EXPORT void registerKernelFactories() {
 KernelImpl* HipCylinderChainKernelFactory::createKernelImpl(string name, const Platform& platform,
         ContextImpl& context) const {
     ComputeContext& cc = *static_cast<HipPlatform::PlatformData*>(context.getPlatformData())->contexts[0];
-    return createCommonKernel(name, platform, cc);
+    return createCommonKernel(name, platform, cc, {48*1024, false});
 }

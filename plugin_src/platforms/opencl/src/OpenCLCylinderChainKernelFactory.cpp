@@ -25,6 +25,7 @@ CYLCHAIN_EXPORT void registerKernelFactories() {
 
 KernelImpl* OpenCLCylinderChainKernelFactory::createKernelImpl(string name, const Platform& platform,
         ContextImpl& context) const {
-    ComputeContext& cc = *static_cast<OpenCLPlatform::PlatformData*>(context.getPlatformData())->contexts[0];
-    return createCommonKernel(name, platform, cc);
+    OpenCLContext& cl = *static_cast<OpenCLPlatform::PlatformData*>(context.getPlatformData())->contexts[0];
+    const cl_ulong localMemory = cl.getDevice().getInfo<CL_DEVICE_LOCAL_MEM_SIZE>();
+    return createCommonKernel(name, platform, cl, {(int) min(localMemory, (cl_ulong) (48*1024)), false});
 }
