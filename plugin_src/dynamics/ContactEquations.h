@@ -69,7 +69,17 @@ private:
         std::vector<int> pairs;
     };
     /** Pairs that are looked at in lanes, in memory of a thread. */
-    struct Looks;
+    struct Looks {
+        std::vector<const ContactPair*> due;
+        std::vector<int> numbers;
+        std::vector<PairOutlook> outlooks;
+        static Looks& ofThread() {
+            static thread_local Looks memory;
+            memory.due.clear();
+            memory.numbers.clear();
+            return memory;
+        }
+    };
     template <class Function> bool markPairs(bool all, Function findIn);
     bool markCapsule(int capsule);
     void mark(int pair);
