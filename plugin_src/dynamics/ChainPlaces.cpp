@@ -9,14 +9,21 @@ using namespace std;
 ChainPlaces::ChainPlaces(const vector<Chain>& chains, const vector<BeamChain>& beams, int particles) : chains(chains),
         beams(beams), chainOfParticle(particles, -1), nodeOfParticle(particles, -1),
         packOfChain(chains.size()+beams.size(), -1), laneOfChain(chains.size()+beams.size(), -1) {
-    for (size_t chain = 0; chain < chains.size(); chain++) {
-        for (size_t node = 0; node < chains[chain].nodes.size(); node++) {
-            chainOfParticle[chains[chain].nodes[node]] = chain;
-            nodeOfParticle[chains[chain].nodes[node]] = node;
-        }
+    firstNodes.push_back(0);
+    for (const Chain& chain : chains) {
         double length = 0;
-        for (const Segment& segment : chains[chain].segments)
+        for (const Segment& segment : chain.segments)
             length += segment.restLength;
+        for (size_t node = 0; node < chain.nodes.size(); node++) {
+            chainOfParticle[chain.nodes[node]] = lengths.size();
+            nodeOfParticle[chain.nodes[node]] = node;
+            // Places at the last node are on the segment before it.
+            const Segment& segment = chain.segments[min(node, chain.segments.size()-1)];
+            frictionOfNode.push_back(chain.nodeFriction+0.25*min(segment.parallel, segment.perpendicular));
+        }
+        particleOfNode.insert(particleOfNode.end(), chain.nodes.begin(), chain.nodes.end());
+        firstNodes.push_back(particleOfNode.size());
+        closed.push_back(chain.closed);
         lengths.push_back(length);
     }
     for (size_t beam = 0; beam < beams.size(); beam++)
@@ -32,7 +39,7 @@ void ChainPlaces::findLeastFriction() {
     for (int chain = 0; chain < getNumChains(); chain++) {
         PlaceOnChain place;
         place.chain = chain;
-        const int segments = chain < (int) chains.size() ? chains[chain].segments.size() : 1;
+        const int segments = isStraight(chain) ? chains[chain].segments.size() : 1;
         for (place.node = 0; place.node < segments; place.node++)
             leastFriction = min(leastFriction, getFriction(place));
         place.fraction = ElementPlace::ofTangent(0, true);
@@ -78,8 +85,8 @@ bool ChainPlaces::find(const Place& place, PlaceOnChain& result) const {
             result = PlaceOnChain();
         return !place.isOnSegment();
     }
-    const bool closed = isBeam(chain) ? getBeam(chain).closed : chains[chain].closed;
-    const int nodes = isBeam(chain) ? getBeam(chain).numNodes() : chains[chain].nodes.size();
+    const bool isRing = isClosed(chain);
+    const int nodes = getNumNodes(chain);
     const int first = nodeOfParticle[place.first];
     int node = first;
     double fraction = 0;
@@ -94,8 +101,8 @@ bool ChainPlaces::find(const Place& place, PlaceOnChain& result) const {
             return false;
         }
         const int second = nodeOfParticle[place.second];
-        const bool forwards = second == first+1 || (closed && second == (first+1)%nodes);
-        const bool backwards = first == second+1 || (closed && first == (second+1)%nodes);
+        const bool forwards = second == first+1 || (isRing && second == (first+1)%nodes);
+        const bool backwards = first == second+1 || (isRing && first == (second+1)%nodes);
         if (!forwards && !backwards) {
             result = PlaceOnChain();
             return false;
@@ -103,7 +110,7 @@ bool ChainPlaces::find(const Place& place, PlaceOnChain& result) const {
         node = forwards ? first : second;
         fraction = forwards ? place.fraction : 1-place.fraction;
     }
-    else if (!closed && first == nodes-1) {
+    else if (!isRing && first == nodes-1) {
         node = first-1;
         fraction = 1;
     }
@@ -113,26 +120,23 @@ bool ChainPlaces::find(const Place& place, PlaceOnChain& result) const {
 }
 
 double ChainPlaces::getFriction(const PlaceOnChain& place) const {
+    if (isStraight(place.chain))
+        return frictionOfNode[firstNodes[place.chain]+place.node];
     if (isParticle(place.chain))
         return particleOf(place.chain).friction;
-    if (isBeam(place.chain)) {
-        const BeamChain& beam = getBeam(place.chain);
-        const double friction = beam.elementLength*min(beam.parallelFriction, beam.perpendicularFriction);
-        if (ElementPlace::isTangent(place.fraction))
-            return friction*beam.elementLength*beam.elementLength/MOBILITY_OF_BEAM_TANGENT;
-        return friction/MOBILITY_OF_BEAM_END;
-    }
-    const Chain& chain = chains[place.chain];
-    const Segment& segment = chain.segments[place.node];
-    return chain.nodeFriction+0.25*min(segment.parallel, segment.perpendicular);
+    const BeamChain& beam = getBeam(place.chain);
+    const double friction = beam.elementLength*min(beam.parallelFriction, beam.perpendicularFriction);
+    if (ElementPlace::isTangent(place.fraction))
+        return friction*beam.elementLength*beam.elementLength/MOBILITY_OF_BEAM_TANGENT;
+    return friction/MOBILITY_OF_BEAM_END;
 }
 
 int ChainPlaces::getParticle(const PlaceOnChain& place) const {
+    if (isStraight(place.chain))
+        return particleOfNode[firstNodes[place.chain]+place.node];
     if (isParticle(place.chain))
         return particleOf(place.chain).particle;
-    if (isBeam(place.chain))
-        return getBeam(place.chain).particles[2*place.node];
-    return chains[place.chain].nodes[place.node];
+    return getBeam(place.chain).particles[2*place.node];
 }
 
 LateralFriction ChainPlaces::findLateralFriction(const PlaceOnChain& place) const {

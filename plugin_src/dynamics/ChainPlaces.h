@@ -115,10 +115,26 @@ private:
     const CoupledParticle& particleOf(int chain) const {
         return particles[chain-getNumFilaments()];
     }
+    bool isStraight(int chain) const {
+        return chain < (int) chains.size();
+    }
+    bool isClosed(int chain) const {
+        return isStraight(chain) ? closed[chain] != 0 : getBeam(chain).closed;
+    }
+    int getNumNodes(int chain) const {
+        return isStraight(chain) ? firstNodes[chain+1]-firstNodes[chain] : getBeam(chain).numNodes();
+    }
     const std::vector<Chain>& chains;
     const std::vector<BeamChain>& beams;
     std::vector<CoupledParticle> particles;
     std::vector<double> lengths;
+    /**
+     * What is asked of chains of segments for places in any order, close together in memory: the first node of each
+     * chain among those of all, and the particle of each node, with the least friction of the segment behind it.
+     */
+    std::vector<int> firstNodes, particleOfNode;
+    std::vector<char> closed;
+    std::vector<double> frictionOfNode;
     double leastFriction;
     void findLeastFriction();
     /** Of a control point, the node is -1. */

@@ -63,7 +63,7 @@ public:
     bool findCulprit(const double* moved, const CouplingEquation* equations, BrokenCoupling& culprit) const override;
     void findNeighbours(std::vector<std::pair<int, int> >& pairs) const override;
 private:
-    /** What a step keeps of a link. */
+    /** What a step keeps of a link: first what each iteration needs of all links, then what those that turn have. */
     struct State {
         const Link* link;
         PlaceOnChain places[2];
@@ -71,26 +71,29 @@ private:
         int particles[2];
         /** Whether it has a direction: one coordinate instead of three. */
         bool turns;
-        /** The image of the first place against the second. */
-        double shift[3];
-        double start[3], length, coordinate, random[3], theta;
-        /** What a stage makes of these: the force is -k (implicit q(y)+constant). */
-        double implicit, constant[3];
-        /**
-         * Of the last iteration: the vector from place to place with which it began, direction, distance, tension, its
-         * response, and the tension after it.
-         */
-        double now[3], direction[3], distance, tension, response, slope, multiplier;
-        /** The least friction of its places, and how they move apart by a force between them, without this link. */
-        double friction[2], compliance[6];
-        /** The direction of the first iteration as a unit vector, and how a unit force along it moves them apart. */
-        double first[3], firstResponse[3];
         /** Whether compliances are known, and whether no other link is on its segments. */
         bool compliant, alone;
+        /** The image of the first place against the second. */
+        double shift[3];
+        double start[3], length;
+        /** What a stage makes of these: the force is -k (implicit q(y)+constant). */
+        double implicit, constant[3];
+        /** Of the last iteration: the vector from place to place with which it began, and its response. */
+        double now[3], response;
         /** The squared change of the last iteration, times the response. */
         double change;
         /** How its places have moved while one of their packs took no part. */
         double drift[3];
+        /** Where a stage begins. */
+        double coordinate, random[3], theta;
+        /** The least friction of its places. */
+        double friction[2];
+        /** Of the last iteration: direction, distance, tension, the slope of it, and the tension after it. */
+        double direction[3], distance, tension, slope, multiplier;
+        /** How its places move apart by a force between them, without this link. */
+        double compliance[6];
+        /** The direction of the first iteration as a unit vector, and how a unit force along it moves them apart. */
+        double first[3], firstResponse[3];
     };
     void place(const CoupledStart& start, const Link& link, State& state) const;
     void prefetchPlaces(const State& state, const double* positions) const;

@@ -146,15 +146,13 @@ def test_a_beam_that_is_pulled_onto_another_rests_where_their_energy_is_least():
         return total + 0.5 * stiffness * max(0.0, diameter - (heights[1] - heights[0])) ** 2
 
     free = np.concatenate([start[0][:, 1:3].ravel(), start[1].ravel()]) / LENGTH
-    # The first search ends 0.4 nm away, where its approximate second derivatives lead it no farther.
-    for _ in range(2):
-        search = minimize(energy, free, method="BFGS", options={"gtol": 1e-3})
-        free = search.x
-    assert np.abs(search.jac).max() < 0.02
-    least = placed(free)
+    # With differences to one side, rounding would end the search at places that depend on the processor.
+    search = minimize(energy, free, method="BFGS", jac="3-point", options={"gtol": 1e-3})
+    assert np.abs(search.jac).max() < 1e-3
+    least = placed(search.x)
     for own, chain in enumerate(least):
         for particles, expected in zip((filaments.node_indices[own], filaments.control_point_indices[own]), chain):
-            assert found[particles] == pytest.approx(expected, abs=0.2)
+            assert found[particles] == pytest.approx(expected, abs=0.1)
     heights = [element_points(*chain, [0.5])[1, 0, 2] for chain in least]
     assert heights[0] < -10.0 and 2.0 < diameter - (heights[1] - heights[0]) < 4.0
 
