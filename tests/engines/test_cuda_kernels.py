@@ -17,8 +17,8 @@ if MISSING and os.environ.get("OPENMM_CYLCHAIN_TEST_CUDA"):
 pytestmark = pytest.mark.skipif(bool(MISSING), reason=f"not installed: {', '.join(MISSING)}")
 
 # Bytes that a change may spill, and keep on the stack, in an A100. There were 1404 and 432 at the last change. Kernels
-# whose functions are called spill a fifth of that, but took 1.1 to 3 times as long on an H200: registers hold no numbers
-# across a call, and what is read through a pointer may be in any memory.
+# whose functions are called spill less, but took 1.1 to 3 times as long on an H200: registers hold no numbers across a
+# call, and what is read through a pointer may be in any memory.
 LARGEST_SPILLS, LARGEST_STACK = 1600, 500
 BY = {"item": BY_ITEM, "group": BY_GROUP, "part": BY_PART}
 

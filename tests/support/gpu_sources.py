@@ -13,13 +13,13 @@ from support.repository import ROOT
 _KERNELS = ROOT / "plugin_src" / "platforms" / "common" / "kernels"
 _HOST = ROOT / "plugin_src" / "platforms" / "common" / "src" / "CommonCylinderChains.cpp"
 
-USUAL = ("BENDING_InscribedCircle", "STRETCHING_Harmonic")
+USUAL = ("BENDING_InscribedCircle=1", "STRETCHING_Harmonic=1")
 """Defines of most filaments."""
 
 OTHERS = {
-    "single": ("BENDING_Quadratic", "STRETCHING_Harmonic"),
-    "mixed": ("BENDING_KratkyPorod", "STRETCHING_FENE", "PLANAR"),
-    "double": ("BENDING_BondDifference", "STRETCHING_Harmonic", "CLOSED"),
+    "single": ("BENDING_Quadratic=1", "STRETCHING_Harmonic=1"),
+    "mixed": ("BENDING_KratkyPorod=1", "STRETCHING_FENE=1", "PLANAR=1"),
+    "double": ("BENDING_BondDifference=1", "STRETCHING_Harmonic=1", "CLOSED=1"),
 }
 """Defines of others, by the precisions in which they are compiled."""
 
@@ -29,7 +29,7 @@ BY_ITEM = ("ITEMS_OF_CHAIN=1",)
 
 def _by_group(items, chains, local_fields):
     return (
-        "CHAIN_BY_GROUP",
+        "CHAIN_BY_GROUP=1",
         f"ITEMS_OF_CHAIN={items}",
         f"CHAINS_OF_GROUP={chains}",
         "NUM_PLACES=72",
@@ -81,7 +81,7 @@ def source_of(platform, defines=(), precision="double", program="programFor", *m
         switch[precision]
         + types
         + _text_of_openmm(platform, b"#define KERNEL extern")
-        + "".join("#define {} {}\n".format(*(define.split("=") if "=" in define else (define, 1))) for define in defines)
+        + "".join(f"#define {define.replace('=', ' ')}\n" for define in defines)
         + _text_of_openmm(platform, b"inline __device__ double3 make_double3(double a)")
         + parts
     )
