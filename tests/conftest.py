@@ -11,7 +11,11 @@ from support.platforms import COMPILED_PLATFORMS, ENGINES, NOT_TESTED, PLATFORMS
 
 
 def pytest_configure():
-    """Fail early if a platform that must be tested is missing, rather than test less in silence."""
+    """Fail early if a platform that must be tested is missing, rather than test less in silence.
+
+    Where a test names no platform, it gets the processor, whatever others have turned on before in the same process.
+    """
+    os.environ["OPENMM_DEFAULT_PLATFORM"] = "CPU"
     required = filter(None, os.environ.get("OPENMM_CYLCHAIN_TEST_PLATFORMS", "").split(","))
     missing = set(required) - set(PLATFORMS)
     if missing:

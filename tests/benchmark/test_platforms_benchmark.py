@@ -118,7 +118,6 @@ def test_benchmark_without_a_gpu(monkeypatch, tmp_path, capsys):
 @pytest.mark.slow
 @pytest.mark.skipif(not GPU_CASES, reason="no platform for GPUs is here")
 def test_benchmark_in_all_precisions(monkeypatch, tmp_path):
-    monkeypatch.setenv("OPENMM_DEFAULT_PLATFORM", "CPU")
     content, rows = _run(monkeypatch, tmp_path)
     for size in SMALL:
         for case in GPU_CASES:

@@ -1,6 +1,5 @@
 """Filaments on OpenMM's platforms for GPUs follow the trajectory of the Reference platform, noise and all."""
 
-import os
 from dataclasses import replace
 
 import numpy as np
@@ -37,8 +36,7 @@ pytestmark = pytest.mark.skipif(not GPU_NAMES, reason=str(NOT_TESTED))
 
 @pytest.fixture(params=GPU_NAMES, scope="module")
 def gpu(request):
-    """A platform for GPUs. Where later tests name none, the processor is still what they get."""
-    os.environ["OPENMM_DEFAULT_PLATFORM"] = "CPU"
+    """A platform for GPUs."""
     openmm_cylchain.enable_platform(request.param)
     return request.param
 

@@ -59,8 +59,7 @@ def _cases():
 
 @pytest.fixture(params=GPU_NAMES, scope="module")
 def gpu(request):
-    """A platform for GPUs. Where later tests name none, the processor is still what they get."""
-    os.environ["OPENMM_DEFAULT_PLATFORM"] = "CPU"
+    """A platform for GPUs."""
     openmm_cylchain.enable_platform(request.param)
     return request.param
 
@@ -234,7 +233,7 @@ def _launches(gpu, steps, folder):
     done = subprocess.run(
         [sys.executable, "-c", _COUNT_LAUNCHES.format(folder=str(Path(__file__).parents[1]), gpu=gpu), str(steps)],
         check=True,
-        env={**os.environ, "POCL_TRACING": "text", "POCL_TRACING_OPT": str(file), "OPENMM_DEFAULT_PLATFORM": "CPU"},
+        env={**os.environ, "POCL_TRACING": "text", "POCL_TRACING_OPT": str(file)},
         cwd=folder,
         stdout=subprocess.PIPE,
         text=True,

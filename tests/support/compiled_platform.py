@@ -44,8 +44,7 @@ class CompiledPlatform:
         return {} if self.precision is None else {"Precision": self.precision}
 
     def enable(self):
-        """Load the plugin of a platform for GPUs. Where later tests name none, the processor is still what they get."""
+        """Load the plugin of a platform for GPUs, and say how many work-items it takes for a filament."""
         if self.name in GPU_PLATFORMS:
-            os.environ["OPENMM_DEFAULT_PLATFORM"] = "CPU"
             os.environ["CYLCHAIN_WORK_ITEMS"] = "" if self.items is None else str(self.items)
             openmm_cylchain.enable_platform(self.name)
