@@ -7,7 +7,8 @@ import sys
 import openmm
 import pytest
 
-from support.platforms import COMPILED_PLATFORMS, ENGINES, NOT_TESTED, PLATFORMS
+import openmm_cylchain
+from support.platforms import COMPILED_PLATFORMS, ENGINES, GPU_NAMES, NOT_TESTED, PLATFORMS
 
 
 def pytest_configure():
@@ -59,6 +60,13 @@ def platform(request):
 def reference():
     """The Reference platform: slow, but in double precision throughout."""
     return openmm.Platform.getPlatformByName("Reference")
+
+
+@pytest.fixture(params=GPU_NAMES, scope="module")
+def gpu(request):
+    """Every platform for GPUs on which filaments are tested here, turned on."""
+    openmm_cylchain.enable_platform(request.param)
+    return request.param
 
 
 @pytest.fixture(params=ENGINES)

@@ -11,11 +11,12 @@ ChainPlaces::ChainPlaces(const vector<Chain>& chains, const vector<BeamChain>& b
         packOfChain(chains.size()+beams.size(), -1), laneOfChain(chains.size()+beams.size(), -1) {
     firstNodes.push_back(0);
     for (const Chain& chain : chains) {
+        const int number = lengths.size();
         double length = 0;
         for (const Segment& segment : chain.segments)
             length += segment.restLength;
         for (size_t node = 0; node < chain.nodes.size(); node++) {
-            chainOfParticle[chain.nodes[node]] = lengths.size();
+            chainOfParticle[chain.nodes[node]] = number;
             nodeOfParticle[chain.nodes[node]] = node;
             // Places at the last node are on the segment before it.
             const Segment& segment = chain.segments[min(node, chain.segments.size()-1)];

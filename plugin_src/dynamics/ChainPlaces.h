@@ -92,7 +92,7 @@ public:
     }
     /** Whether a chain is one of beam elements. */
     bool isBeam(int chain) const {
-        return chain >= (int) chains.size() && !isParticle(chain);
+        return !isStraight(chain) && !isParticle(chain);
     }
     /** A chain of beam elements, by its number among all chains. */
     const BeamChain& getBeam(int chain) const {

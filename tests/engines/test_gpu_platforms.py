@@ -7,7 +7,6 @@ import openmm
 import pytest
 from openmm import app, unit
 
-import openmm_cylchain
 from openmm_cylchain import (
     Crosslinker,
     Crosslinks,
@@ -32,13 +31,6 @@ TOLERANCES = {case.precision: case.path_tolerance for case in GPU_CASES}
 EXACT_TOLERANCES = {"double": 1e-9, "mixed": 1e-6, "single": 5e-3}
 
 pytestmark = pytest.mark.skipif(not GPU_NAMES, reason=str(NOT_TESTED))
-
-
-@pytest.fixture(params=GPU_NAMES, scope="module")
-def gpu(request):
-    """A platform for GPUs."""
-    openmm_cylchain.enable_platform(request.param)
-    return request.param
 
 
 @pytest.fixture(params=WORK_ITEMS)

@@ -10,7 +10,6 @@ import numpy as np
 import openmm
 import pytest
 
-import openmm_cylchain
 from openmm_cylchain import Filaments
 from openmm_cylchain.engines.compiled import plugin
 from support.contexts import energy_of, new_context, positions_of
@@ -55,13 +54,6 @@ def _cases():
                                 id=f"{precision}-{variant}-{scheme}-by {items}-{flow}",
                                 marks=_marks(precision, variant, scheme, items, flow),
                             )
-
-
-@pytest.fixture(params=GPU_NAMES, scope="module")
-def gpu(request):
-    """A platform for GPUs."""
-    openmm_cylchain.enable_platform(request.param)
-    return request.param
 
 
 def _context(variant, scheme, platform, precision=None, flow=None, positions=None, temperature=None):

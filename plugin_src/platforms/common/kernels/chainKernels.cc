@@ -120,6 +120,7 @@ KERNEL void advanceChains(int numChains, int places, int count, int flags, doubl
         GLOBAL int* RESTRICT taken, GLOBAL mm_ulong* RESTRICT summary) {
 #ifdef CHAIN_BY_GROUP
     LOCAL double exchanged[CHAINS_OF_GROUP*NUM_EXCHANGED*ITEMS_OF_CHAIN], middle[CHAINS_OF_GROUP*SIZE_OF_MIDDLE];
+    // There are no empty arrays.
     LOCAL double localMemory[CHAINS_OF_GROUP*NUM_LOCAL_FIELDS*NUM_PLACES+1];
 #endif
     // There are no more groups than chains, and one step is taken at least.

@@ -2,8 +2,15 @@
  * The numbers that the host and the kernels exchange, in their order. Both include this file.
  */
 
-/** Numbers of the equations that are left between the two ends of a chain: see solverOfGroup.cc. */
-enum {SIZE_OF_MIDDLE_OF_OPEN_CHAIN = 2*9*(9+2), SIZE_OF_MIDDLE_OF_RING = 2*16*(17+2)};
+/**
+ * The equations that are left between the two ends of a chain, the numbers from one row of their matrix to the next, and
+ * all numbers of both ends: see solverOfGroup.cc. Rows are an odd number apart, so that work-items read columns from
+ * different banks.
+ */
+enum {NUMBERS_LEFT_OF_OPEN_CHAIN = 9, ROW_LENGTH_OF_OPEN_CHAIN = 9,
+        SIZE_OF_MIDDLE_OF_OPEN_CHAIN = 2*NUMBERS_LEFT_OF_OPEN_CHAIN*(ROW_LENGTH_OF_OPEN_CHAIN+2),
+        NUMBERS_LEFT_OF_RING = 16, ROW_LENGTH_OF_RING = 17,
+        SIZE_OF_MIDDLE_OF_RING = 2*NUMBERS_LEFT_OF_RING*(ROW_LENGTH_OF_RING+2)};
 /** Numbers that each work-item of a chain has for the others. */
 enum {NUM_EXCHANGED = 6};
 

@@ -17,22 +17,22 @@
 #ifdef CLOSED
 #define FIRST_INNER_NODE 2
 #define NODES_LEFT 4
-#define NUMBERS_LEFT 16
-#define ROW_LENGTH 17
+#define NUMBERS_LEFT NUMBERS_LEFT_OF_RING
+#define ROW_LENGTH ROW_LENGTH_OF_RING
 #define SIZE_OF_MIDDLE SIZE_OF_MIDDLE_OF_RING
 #else
 #define FIRST_INNER_NODE 0
 #define NODES_LEFT 2
-#define NUMBERS_LEFT 9
-#define ROW_LENGTH 9
+#define NUMBERS_LEFT NUMBERS_LEFT_OF_OPEN_CHAIN
+#define ROW_LENGTH ROW_LENGTH_OF_OPEN_CHAIN
 #define SIZE_OF_MIDDLE SIZE_OF_MIDDLE_OF_OPEN_CHAIN
 #endif
 #define TENSION_OF_END (3*NODES_LEFT)
 #define TENSION_BETWEEN (3*NODES_LEFT+2)
 #define TENSION_OF_BORDER (3*NODES_LEFT+3)
 /**
- * Numbers of either end for what is left: the matrix, with rows an odd number apart, so that work-items read columns
- * from different banks; right sides; and what is found. Those of end 0 become those of both.
+ * Numbers of either end for what is left: the matrix, right sides, and what is found. Those of end 0 become those of
+ * both.
  */
 #define LEFT_OF_END(end) (step->middle+(end)*(SIZE_OF_MIDDLE/2))
 #define LEFT_MATRIX(left, i, j) (left)[(i)*ROW_LENGTH+(j)]

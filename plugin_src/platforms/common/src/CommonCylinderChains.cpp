@@ -219,7 +219,8 @@ unique_ptr<CommonCylinderChains::Batch> CommonCylinderChains::makeBatch(const ve
     const ChainTable& table = batch->table;
     const bool isRing = description.getChains()[members[0]].closed;
     batch->itemsOfChain = items;
-    batch->chainsOfGroup = items > 1 ? (groups.waitInParts ? GROUP_SIZE/items : 1) : cc.getIsCPU() ? 1 : GROUP_SIZE;
+    const bool fillsGroup = items > 1 ? groups.waitInParts : !cc.getIsCPU();
+    batch->chainsOfGroup = fillsGroup ? GROUP_SIZE/items : 1;
     batch->groupSize = batch->chainsOfGroup*items;
     batch->placesOfMemory = table.numPlaces;
     batch->localFields = 0;
