@@ -59,14 +59,9 @@ public:
             stiffness += 6;
         }
     }
-    void advance(const double* forces, double share, bool* unfinished) override {
-        terms.spread(forces, pack.nodes, ofPlaces);
-        step->respond(ofPlaces, moved);
-        Six* const change = step->getChange();
-        for (int node = 0; node < pack.nodes; node++) {
-            change[node].position = change[node].position+moved[node].position;
-            change[node].control = change[node].control+moved[node].control;
-        }
+    void advance(const double* forces, double share, bool* unfinished, double* moves) override {
+        if (forces != NULL)
+            addForces(forces, moves);
         if (!joints.empty())
             softenJoints();
         step->advance(y, iteration, active*splat<Real>(share));
@@ -106,6 +101,16 @@ private:
     std::vector<CouplingTerm> joints;
     int iteration;
 
+    void addForces(const double* forces, double* moves) {
+        terms.spread(forces, pack.nodes, ofPlaces);
+        step->respond(ofPlaces, moved);
+        Six* const change = step->getChange();
+        for (int node = 0; node < pack.nodes; node++) {
+            change[node].position = change[node].position+moved[node].position;
+            change[node].control = change[node].control+moved[node].control;
+        }
+        terms.gather(change, moves);
+    }
     template <class Number> void respondAs(const Number* forces, Number* moves) {
         terms.spread(forces, pack.nodes, ofPlaces);
         step->respond(ofPlaces, moved);

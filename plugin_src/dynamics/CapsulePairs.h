@@ -14,6 +14,8 @@ struct PairContact {
     ContactRest rest;
     /** By how much its gap has changed while one of its packs took no part. */
     double drift;
+    /** What isLastChange() takes for its change in the iteration before. */
+    double changeBefore;
     /** Whether it touched in the last iteration. */
     bool touched;
 };

@@ -6,6 +6,7 @@
  * function of one is used by another, and for up to CYLCHAIN_LANES lanes.
  */
 
+#include "dynamics/LastChange.h"
 #include "dynamics/ModePack.h"
 #include "dynamics/PackPlaces.h"
 #include "dynamics/PackStep.h"

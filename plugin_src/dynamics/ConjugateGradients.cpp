@@ -31,7 +31,7 @@ template <class Real> const GradientKernels<Real>& kernels() {
 template <class Real> double ConjugateGradients<Real>::begin(const CoupledTerms& all, int pack,
             const vector<double>& change) {
     const int first = all.first[pack], last = all.first[pack+1], end = first+all.count[pack];
-    for (vector<Real>* values : {&residual, &response, &force, &direction, &ownFound, &ownChange})
+    for (vector<Real>* values : {&residual, &response, &force, &imageOfDirection, &ownFound})
         fill(values->begin()+3*first, values->begin()+3*last, Real(0));
     double energy = 0;
     for (int i = first; i < last; i++) {
@@ -40,14 +40,15 @@ template <class Real> double ConjugateGradients<Real>::begin(const CoupledTerms&
                 prefetch(&change[TermBlocks::place(all.partners[i+AHEAD], coordinate)]);
         Real* const k = &stiffness[6*(i-i%TermBlocks::SIZE)+i%TermBlocks::SIZE];
         const bool joined = i < end && all.partners[i] >= 0;
-        partners[i] = joined ? all.partners[i] : i;
+        const int partner = joined ? all.partners[i] : i;
+        partners[i] = TermBlocks::place(partner, 0);
         for (int entry = 0; entry < 6; entry++)
             k[TermBlocks::SIZE*entry] = joined ? all.terms[i].stiffness[entry] : 0;
         if (!joined)
             continue;
         double ofPartner[3], pull[3];
         for (int coordinate = 0; coordinate < 3; coordinate++)
-            ofPartner[coordinate] = change[TermBlocks::place(partners[i], coordinate)];
+            ofPartner[coordinate] = change[TermBlocks::place(partner, coordinate)];
         multiply(all.terms[i].stiffness, ofPartner, pull);
         for (int coordinate = 0; coordinate < 3; coordinate++) {
             residual[TermBlocks::place(i, coordinate)] = pull[coordinate];
@@ -58,17 +59,17 @@ template <class Real> double ConjugateGradients<Real>::begin(const CoupledTerms&
 }
 
 template <class Real> bool ConjugateGradients<Real>::solve(const vector<PackStep*>& packs, const CoupledTerms& all,
-            double tolerance, double leastEnergy, vector<double>& change, vector<double>& found, const Loop& loop) {
+            double tolerance, double leastEnergy, const vector<double>& change, vector<double>& found,
+            const Loop& loop) {
     const GradientKernels<Real>& kernel = kernels<Real>();
     const size_t count = all.getNumTerms();
-    for (vector<Real>* values : {&residual, &response, &force, &direction, &image, &ownFound, &ownChange})
+    for (vector<Real>* values : {&residual, &response, &image, &force, &imageOfDirection, &ownFound})
         values->resize(3*count);
     stiffness.resize(6*count);
-    shown.resize(count);
     partners.resize(count);
     sums.assign(packs.size(), 0.0);
-    const GradientVectors<Real> vectors = {residual.data(), response.data(), force.data(), direction.data(),
-            image.data(), ownFound.data(), ownChange.data(), shown.data(), stiffness.data(), partners.data()};
+    const GradientVectors<Real> vectors = {residual.data(), response.data(), image.data(), force.data(),
+            imageOfDirection.data(), ownFound.data(), stiffness.data(), partners.data()};
     auto forCoupled = [&] (auto function) {
         loop(packs.size(), [&] (int pack) {
             if (all.coupled[pack])
@@ -87,7 +88,7 @@ template <class Real> bool ConjugateGradients<Real>::solve(const vector<PackStep
                 packs[pack+1]->prefetchElimination();
             function(first, last);
             packs[pack]->respond(&residual[3*first], &response[3*first]);
-            sums[pack] = kernel.show(vectors, first, last);
+            sums[pack] = kernel.findEnergy(vectors, first, last);
         });
         iterations++;
     };
@@ -101,30 +102,34 @@ template <class Real> bool ConjugateGradients<Real>::solve(const vector<PackStep
     double energy = total();
     const double least = max(tolerance*energy, leastEnergy);
     const double largest = LARGEST_GROWTH*energy;
-    Real ratio = 0;
+    double ratio = 0, step = 0;
     while (energy > least && iterations < LARGEST_NUMBER_OF_ITERATIONS) {
         forCoupled([&] (int pack, int first, int last) {
-            sums[pack] = kernel.turn(vectors, first, last, ratio);
+            sums[pack] = kernel.findImages(vectors, first, last);
         });
-        const Real step = energy/total();
+        // The product of the direction and its image.
+        const double product = total()-(iterations > 1 ? ratio*energy/step : 0);
+        step = energy/product;
         respondAfter([&] (int first, int last) {
-            kernel.move(vectors, first, last, step);
+            kernel.move(vectors, first, last, ratio, step);
         });
         const double before = energy;
         energy = total();
         ratio = energy/before;
         // Written so that NaN is too large.
-        if (is_same<Real, float>::value && !(energy >= -least && energy < largest))
+        if (is_same<Real, float>::value && !(product > 0 && energy >= -least && energy < largest))
             return false;
     }
     if (is_same<Real, float>::value && energy > least)
         return false;
-    forCoupled([&] (int, int first, int last) {
-        for (int place = 3*first; place < 3*last; place++) {
-            found[place] = ownFound[place];
-            change[place] += ownChange[place];
-        }
-    });
+    if (hasFound())
+        loop(packs.size(), [&] (int pack) {
+            const int first = 3*all.first[pack], last = 3*all.first[pack+1];
+            if (all.coupled[pack])
+                copy(ownFound.begin()+first, ownFound.begin()+last, found.begin()+first);
+            else
+                fill(found.begin()+first, found.begin()+last, 0.0);
+        });
     return true;
 }
 

@@ -27,9 +27,11 @@ struct CoupledTerms {
  * Conjugate gradients for the equations of an iteration of an implicit step: see CoupledEquations.
  *
  * With the preconditioner P and the rest X of the matrix A = P-X, residuals are forces r on places, and their responses
- * P^-1 r. Of P times a direction, the method needs no more than forces f = r+beta f; of X, which joins places of
- * different terms, the product is that of K with the partner's direction. So an iteration is a substitution along
- * chains, and two passes over the terms.
+ * u = P^-1 r. X joins places of different terms: its product is that of K with the partner's vector. Directions p =
+ * u+beta p are not needed, but their forces P p = r+beta P p are, whose sum is the solution, and their images A p =
+ * A u+beta A p, with A u = r-X u. So an iteration is a substitution along chains, and two passes over the terms, and
+ * partners look at responses alone. The step along p follows from r.u and u.A u: Chronopoulos and Gear, J. Comput.
+ * Appl. Math. 1989, 25, 153.
  */
 template <class Real> class ConjugateGradients {
 public:
@@ -37,20 +39,23 @@ public:
      * Solve the equations until what is left of the energy r P^-1 r is less than a part of it, or than some energy.
      *
      * @param packs   they have eliminated their nodes
-     * @param change  how places move without X, in blocks; the rest of their moves is added
-     * @param found   receives the forces on places that make up for X, in blocks
+     * @param change  how places move without X, in blocks
+     * @param found   receives the forces on places that make up for X, in blocks, if hasFound()
      * @return false where numbers in single precision do not get there: then nothing is found
      */
     bool solve(const std::vector<PackStep*>& packs, const CoupledTerms& terms, double tolerance, double least,
-            std::vector<double>& change, std::vector<double>& found, const Loop& loop);
+            const std::vector<double>& change, std::vector<double>& found, const Loop& loop);
     /** The number of substitutions that the last call of solve() took. */
     int getNumIterations() const {
         return iterations;
     }
+    /** Whether it has found forces: there are none where the first substitution shows that little is left. */
+    bool hasFound() const {
+        return iterations > 1;
+    }
 private:
     double begin(const CoupledTerms& terms, int pack, const std::vector<double>& change);
-    std::vector<Real> residual, response, force, direction, image, ownFound, ownChange, stiffness;
-    std::vector<ShownTerm<Real> > shown;
+    std::vector<Real> residual, response, image, force, imageOfDirection, ownFound, stiffness;
     std::vector<int> partners;
     std::vector<double> sums;
     int iterations = 0;

@@ -1,8 +1,10 @@
 #include "dynamics/ContactEquations.h"
+#include "dynamics/LastChange.h"
 #include "mechanics/SymmetricMatrices.h"
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 
 using namespace cylchain;
 using namespace std;
@@ -45,8 +47,8 @@ template <class Function> bool ContactEquations::markPairs(bool all, Function fi
     return any;
 }
 
-/** Look for pairs of capsules that have moved far, which no search has seen; false if none are new. */
-bool ContactEquations::findNewPairs(const double* moved) {
+/** Look for pairs of capsules that have moved far, which no search has seen. */
+void ContactEquations::findNewPairs(const double* moved) {
     const PairFilter known = [&] (int a, int b) {return pairs.isKnown(a, b);};
     const bool most = motion.getMovers().size() > SHARE_OF_MOVERS*places.size();
     try {
@@ -57,11 +59,11 @@ bool ContactEquations::findNewPairs(const double* moved) {
     }
     catch (const NarrowBoxError&) {
         movesTooFar = true;
-        return false;
+        return;
     }
     catch (const EndlessMotionError&) {
         movesTooFar = isEndless = true;
-        return false;
+        return;
     }
     if (most)
         motion.beginAgain(moved, *loop);
@@ -69,10 +71,28 @@ bool ContactEquations::findNewPairs(const double* moved) {
         motion.beginAgain(motion.getMovers(), moved);
     const int numBefore = pairs.getNumPairs();
     for (const ContactPair& pair : found)
-        if (pairs.add(pair))
-            mark(pairs.getNumPairs()-1);
+        pairs.add(pair);
     selection.addFrom(numBefore, pairs);
-    return pairs.getNumPairs() > numBefore;
+}
+
+/** Find pairs that were left out and may touch now, and new ones that may, from a number on. */
+void ContactEquations::findNear(int firstNew, int run, Part& part) {
+    const double tolerance = TOLERANCE_OF_GAPS*sqrt(kT/stiffness)+LEAST_CHANGE*reach;
+    Looks& looks = Looks::ofThread();
+    selection.forPairs(pairs, selection.hasAll(), run, [&] (int i) {
+        const CapsulePairs::Watch& watch = pairs.getWatch(i);
+        const bool left = watch.due > 0 && motion.getWay(watch.a, watch.b) > watch.due+tolerance;
+        if (!left && i < firstNew)
+            return;
+        search->prefetchMotion(watch.a, watch.b);
+        looks.numbers.push_back(i);
+        looks.due.push_back(&pairs.getPair(i));
+    });
+    looks.outlooks.resize(looks.due.size());
+    search->findOutlooks(looks.due.data(), looks.due.size(), looks.outlooks.data());
+    for (size_t i = 0; i < looks.due.size(); i++)
+        if (!isApart(looks.numbers[i], looks.outlooks[i], tolerance))
+            part.pairs.push_back(looks.numbers[i]);
 }
 
 /** Whether pairs that were left out may touch, or new ones: they take part from now on. */
@@ -88,23 +108,22 @@ bool ContactEquations::anyComeNear(const double* moved) {
         });
     if (iterations < 2)
         return true;
-    const double tolerance = TOLERANCE_OF_GAPS*sqrt(kT/stiffness)+LEAST_CHANGE*reach;
-    // Those that are not selected have not moved.
-    bool any = markPairs(selection.hasAll(), [&] (int run, Part& part) {
-        selection.forPairs(pairs, selection.hasAll(), run, [&] (int i) {
-            const CapsulePairs::Watch& watch = pairs.getWatch(i);
-            if (watch.due > 0 && motion.getWay(watch.a, watch.b) > watch.due+tolerance)
-                part.pairs.push_back(i);
-        });
-    });
     // Pairs that no search has seen were out of reach: one of the two has moved by more than half of it.
-    if (!motion.exceedsReach())
-        return any;
+    const int numKnown = pairs.getNumPairs();
     bool waits = false;
-    if (iterations < FIRST_NEW_PAIRS)
-        for (int capsule : motion.getMovers())
-            waits |= markCapsule(capsule);
-    return waits || findNewPairs(moved) || any;
+    if (motion.exceedsReach()) {
+        if (iterations < FIRST_NEW_PAIRS)
+            for (int capsule : motion.getMovers())
+                waits |= markCapsule(capsule);
+        if (!waits)
+            findNewPairs(moved);
+        if (movesTooFar)
+            return false;
+    }
+    // Those that are not selected have not moved.
+    return markPairs(selection.hasAll(), [&] (int run, Part& part) {
+        findNear(numKnown, run, part);
+    }) || waits;
 }
 
 /** Whether a contact has moved too much in the last iteration, or by itself since one of its packs took part. */
@@ -120,7 +139,7 @@ bool ContactEquations::isUnfinished(int number, const double* move) {
         change /= ContactRest::STIFFENING;
     const double least = LEAST_CHANGE*LEAST_CHANGE*reach*reach*stiffness;
     const double tolerance = TOLERANCE_OF_GAPS*(iterations < PATIENT_ITERATIONS ? 1 : LATE);
-    if (!(change < tolerance*tolerance*kT+least))
+    if (!isLastChange(change, exchange(side.changeBefore, change), tolerance*tolerance*kT+least))
         return true;
     double& drift = side.drift;
     const double* n = side.contact.normal;

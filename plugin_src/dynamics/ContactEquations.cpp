@@ -179,6 +179,21 @@ bool ContactEquations::waits(int number, const PairOutlook& outlook) {
     return true;
 }
 
+/** The same for a pair that may have had contacts, where an iteration has led it, but for some overlap. */
+bool ContactEquations::isApart(int number, const PairOutlook& outlook, double overlap) {
+    if (!pairs.hasContacts(number))
+        return waits(number, outlook);
+    CapsulePairs::Watch& watch = pairs.getWatch(number);
+    double rest = watch.count > 0 ? -HUGE_VAL : LARGEST_GAP*outlook.radii+pairs.getLargestRestGap(number);
+    for (int i = 0; i < watch.count; i++)
+        rest = max(rest, restGapOf(pairs.getContact(number, i)));
+    const double gap = outlook.gap-rest;
+    if (outlook.mayCross || !(gap > -overlap))
+        return false;
+    watch.due = motion.getWay(watch.a, watch.b)+max(gap, 0.0);
+    return true;
+}
+
 /** Evaluate some pairs that may touch. */
 void ContactEquations::look(int run, bool first, Part& part) {
     Looks& looks = Looks::ofThread();
@@ -288,8 +303,10 @@ bool ContactEquations::addEquation(int number, int which, Part& part) {
     const bool touched = side.touched;
     // Contacts that open and close in turn would keep the iteration from ending.
     side.touched = side.rest.isBack() || overlap > 0 || (iterations >= HOLDING_ITERATIONS && touched);
-    if (!touched)
+    if (!touched) {
         side.drift = -overlap;
+        side.changeBefore = 0;
+    }
     if (!side.touched)
         return false;
     CouplingEquation equation;

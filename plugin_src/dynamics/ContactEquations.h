@@ -88,16 +88,18 @@ private:
     }
     bool isUnfinished(int equation, const double* move);
     void findPairs(const double* moved);
-    bool findNewPairs(const double* moved);
+    void findNewPairs(const double* moved);
     double restGapOf(const PairContact& contact) const;
     bool addEquation(int pair, int which, Part& part);
     double responseOf(int capsule, double fraction) const;
     double softnessOf(const ContactPair& pair, const Contact& contact) const;
     bool isLookedFor(int pair) const;
     bool waits(int pair, const PairOutlook& outlook);
+    bool isApart(int pair, const PairOutlook& outlook, double overlap);
     void look(int run, bool first, Part& part);
     void evaluate(int pair, bool first, const PairOutlook* outlook, Part& part);
     bool anyComeNear(const double* moved);
+    void findNear(int firstNew, int run, Part& part);
     bool anyCross();
     void findCrossed(bool all, int run, Part& part) const;
     int findFastest(const double* moved) const;

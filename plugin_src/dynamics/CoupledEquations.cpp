@@ -136,7 +136,6 @@ bool CoupledEquations::solve(const vector<PackStep*>& packs, const PackFlags& ac
         if (pack+1 < numPacks && active[pack+1])
             packs[pack+1]->prefetchStart();
         const int first = gathered.first[pack];
-        fill(found.begin()+3*first, found.begin()+3*gathered.first[pack+1], 0.0);
         if (active[pack])
             packs[pack]->eliminate(gathered.terms.data()+first, gathered.count[pack], change.data()+3*first);
     });
@@ -146,21 +145,12 @@ bool CoupledEquations::solve(const vector<PackStep*>& packs, const PackFlags& ac
     auto solveIn = [&] (auto& gradients) {
         const bool solved = gradients.solve(packs, gathered, tighter*demands.tolerance, least, change, found, loop);
         iterations = gradients.getNumIterations();
+        hasFound = gradients.hasFound();
         return solved;
     };
     const bool solved = trySingle && solveIn(single);
     if (!solved)
         solveIn(twice);
-    moves.resize(3*equations.size());
-    runInChunks(loop, equations.size(), CHUNK_OF_EQUATIONS, [&] (int i) {
-        for (int side = 0; side < 2 && i+AHEAD < (int) equations.size(); side++)
-            if (const int ahead = termOf[2*(i+AHEAD)+side]; ahead >= 0)
-                prefetch(&change[TermBlocks::place(ahead, 1)]);
-        const int first = termOf[2*i], second = termOf[2*i+1];
-        for (int k = 0; k < 3; k++)
-            moves[3*i+k] = (first >= 0 ? change[TermBlocks::place(first, k)] : 0)-
-                    (second >= 0 ? change[TermBlocks::place(second, k)] : 0);
-    });
     return solved || !trySingle;
 }
 
@@ -169,8 +159,21 @@ void CoupledEquations::advance(const vector<PackStep*>& packs, const PackFlags& 
     loop(packs.size(), [&] (int pack) {
         if (pack+1 < (int) packs.size() && active[pack+1])
             packs[pack+1]->prefetchElimination();
+        const int first = 3*gathered.first[pack];
         if (active[pack])
-            packs[pack]->advance(found.data()+3*gathered.first[pack], share, unfinished[pack].get());
+            packs[pack]->advance(hasFound ? found.data()+first : NULL, share, unfinished[pack].get(),
+                    change.data()+first);
+    });
+    const int numEquations = termOf.size()/2;
+    moves.resize(3*(size_t) numEquations);
+    runInChunks(loop, numEquations, CHUNK_OF_EQUATIONS, [&] (int i) {
+        for (int side = 0; side < 2 && i+AHEAD < numEquations; side++)
+            if (const int ahead = termOf[2*(i+AHEAD)+side]; ahead >= 0)
+                prefetch(&change[TermBlocks::place(ahead, 1)]);
+        const int first = termOf[2*i], second = termOf[2*i+1];
+        for (int k = 0; k < 3; k++)
+            moves[3*i+k] = (first >= 0 ? change[TermBlocks::place(first, k)] : 0)-
+                    (second >= 0 ? change[TermBlocks::place(second, k)] : 0);
     });
 }
 

@@ -56,13 +56,13 @@ public:
      */
     bool solve(const std::vector<PackStep*>& packs, const PackFlags& active,
             const std::vector<CouplingEquation>& equations, double kT, const Demands& demands, const Loop& loop);
-    /** For each equation, how much its first place moves against the second: three numbers. */
-    const std::vector<double>& getMoves() const {
-        return moves;
-    }
     /** End the iteration of the packs that take part, with a share of the changes. */
     void advance(const std::vector<PackStep*>& packs, const PackFlags& active, double share, LaneFlags& unfinished,
             const Loop& loop);
+    /** For each equation, how much its first place moved against the second with all of the changes: three numbers. */
+    const std::vector<double>& getMoves() const {
+        return moves;
+    }
     /**
      * Find how a force on each place of each equation moves that place: two symmetric matrices for each equation. What
      * couplings pass on from chain to chain is left out, but each couplings' own stiffness at its places is there.
@@ -93,8 +93,10 @@ private:
     };
     std::vector<SortedPlace> sortedPlaces;
     PackFlags activeOfTerms;
-    /** In blocks of terms: the solution, and the forces found. */
+    /** In blocks of terms: how places move without what joins them, and then with it, and the forces found. */
     std::vector<double> change, found;
+    /** Whether there are such forces. */
+    bool hasFound = false;
     ConjugateGradients<float> single;
     ConjugateGradients<double> twice;
     std::vector<double> moves, compliancesOfTerms, jointStiffness;

@@ -25,72 +25,64 @@ CYLCHAIN_INLINE double total(const Sums* sums) {
     return all[0]+all[1]+all[2]+all[3];
 }
 
-template <class Real> double turn(const GradientVectors<Real>& vectors, int first, int last, Real ratio) {
+template <class Real> double findEnergy(const GradientVectors<Real>& vectors, int first, int last) {
+    const GradientVectors<Real> v = vectors;
+    Sums sums[3] = {};
+    for (int term = first; term < last; term += SIZE)
+        for (int coordinate = 0; coordinate < 3; coordinate++) {
+            const int place = 3*term+SIZE*coordinate;
+            addProduct<Real>(loadFour(v.residual+place), loadFour(v.response+place), sums[coordinate]);
+        }
+    return total(sums);
+}
+
+template <class Real> double findImages(const GradientVectors<Real>& vectors, int first, int last) {
     // What is far from the processor's caches is asked for this many terms ahead.
     const int ahead = 16;
     const GradientVectors<Real> v = vectors;
     Sums sums[3] = {};
     for (int term = first; term < last; term += SIZE) {
-        FourOf<Real> partners[SIZE];
-        for (int i = 0; i < SIZE; i++) {
-            const ShownTerm<Real>& partner = v.shown[v.partners[term+i]];
-            partners[i] = loadFour(partner.response)+loadFour(partner.direction)*ratio;
-            if (term+ahead < last)
-                __builtin_prefetch(&v.shown[v.partners[term+ahead+i]]);
+        const int* const partners = v.partners+term;
+        if (term+ahead < last)
+            for (int i = 0; i < SIZE; i++)
+                __builtin_prefetch(v.response+partners[ahead+i]+SIZE);
+        FourOf<Real> ofPartners[3];
+        for (int coordinate = 0; coordinate < 3; coordinate++) {
+            const Real* const response = v.response+SIZE*coordinate;
+            ofPartners[coordinate] = FourOf<Real> {response[partners[0]], response[partners[1]], response[partners[2]],
+                    response[partners[3]]};
         }
-        transpose<Real>(partners);
         const Real* const k = v.stiffness+6*term;
         const FourOf<Real> xx = loadFour(k), xy = loadFour(k+SIZE), xz = loadFour(k+2*SIZE), yy = loadFour(k+3*SIZE);
         const FourOf<Real> yz = loadFour(k+4*SIZE), zz = loadFour(k+5*SIZE);
-        const FourOf<Real>&x = partners[0], &y = partners[1], &z = partners[2];
+        const FourOf<Real>&x = ofPartners[0], &y = ofPartners[1], &z = ofPartners[2];
         const FourOf<Real> pulls[] = {xx*x+xy*y+xz*z, xy*x+yy*y+yz*z, xz*x+yz*y+zz*z};
         for (int coordinate = 0; coordinate < 3; coordinate++) {
             const int place = 3*term+SIZE*coordinate;
-            const FourOf<Real> force = loadFour(v.residual+place)+loadFour(v.force+place)*ratio;
-            const FourOf<Real> direction = loadFour(v.response+place)+loadFour(v.direction+place)*ratio;
-            const FourOf<Real> image = force-pulls[coordinate];
-            storeFour(force, v.force+place);
-            storeFour(direction, v.direction+place);
+            const FourOf<Real> image = loadFour(v.residual+place)-pulls[coordinate];
             storeFour(image, v.image+place);
-            addProduct<Real>(direction, image, sums[coordinate]);
+            addProduct<Real>(loadFour(v.response+place), image, sums[coordinate]);
         }
     }
     return total(sums);
 }
 
-template <class Real> void move(const GradientVectors<Real>& vectors, int first, int last, Real step) {
+template <class Real> void move(const GradientVectors<Real>& vectors, int first, int last, Real ratio, Real step) {
     const GradientVectors<Real> v = vectors;
     for (int place = 3*first; place < 3*last; place += SIZE) {
-        storeFour(loadFour(v.found+place)+loadFour(v.force+place)*step, v.found+place);
-        storeFour(loadFour(v.change+place)+loadFour(v.direction+place)*step, v.change+place);
-        storeFour(loadFour(v.residual+place)-loadFour(v.image+place)*step, v.residual+place);
+        const FourOf<Real> residual = loadFour(v.residual+place);
+        const FourOf<Real> force = residual+loadFour(v.force+place)*ratio;
+        const FourOf<Real> image = loadFour(v.image+place)+loadFour(v.imageOfDirection+place)*ratio;
+        storeFour(force, v.force+place);
+        storeFour(image, v.imageOfDirection+place);
+        storeFour(loadFour(v.found+place)+force*step, v.found+place);
+        storeFour(residual-image*step, v.residual+place);
     }
-}
-
-template <class Real> double show(const GradientVectors<Real>& vectors, int first, int last) {
-    const GradientVectors<Real> v = vectors;
-    Sums sums[3] = {};
-    for (int term = first; term < last; term += SIZE) {
-        FourOf<Real> responses[SIZE] = {}, directions[SIZE] = {};
-        for (int coordinate = 0; coordinate < 3; coordinate++) {
-            const int place = 3*term+SIZE*coordinate;
-            responses[coordinate] = loadFour(v.response+place);
-            directions[coordinate] = loadFour(v.direction+place);
-            addProduct<Real>(loadFour(v.residual+place), responses[coordinate], sums[coordinate]);
-        }
-        transpose<Real>(responses);
-        transpose<Real>(directions);
-        for (int i = 0; i < SIZE; i++) {
-            storeFour(responses[i], v.shown[term+i].response);
-            storeFour(directions[i], v.shown[term+i].direction);
-        }
-    }
-    return total(sums);
 }
 
 static const GradientLoops LOOPS = {
-    {turn<float>, move<float>, show<float>},
-    {turn<double>, move<double>, show<double>}
+    {findEnergy<float>, findImages<float>, move<float>},
+    {findEnergy<double>, findImages<double>, move<double>}
 };
 
 } // namespace CYLCHAIN_LOOPS

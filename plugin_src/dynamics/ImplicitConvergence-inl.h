@@ -16,8 +16,8 @@ public:
     explicit ImplicitConvergence(const ImplicitState<W>& step) : step(step), pack(step.pack), kT(step.kT),
             change(step.change) {
     }
-    /** Whether any lane has not converged; those that have are taken out. NaN counts as not converged. */
-    bool anyUnfinished(Real& active) const {
+    /** Find the square of the largest change of the last iteration over its tolerance, for each lane. */
+    Real findLastChange() const {
         Real excess = Real{};
         const Real perEnergy = (pack.closed ? splat<Real>(1) : 1-loaded<Real>(pack.free, 0))*(1/(kT+TINY));
         const Scalar tighter = step.twoStages ? 1/(TOLERANCE_OF_STAGES*TOLERANCE_OF_STAGES) : 1;
@@ -31,6 +31,11 @@ public:
             excess = ratio < excess ? excess : ratio;
             Elements<W>::measure(step, s, square, perEnergy*tighter, excess);
         }
+        return excess;
+    }
+    /** Whether any lane has not converged; those that have are taken out. NaN counts as not converged. */
+    bool anyUnfinished(Real& active) const {
+        Real excess = findLastChange();
         bool any = false;
         for (int i = 0; i < W; i++) {
             if (lane(excess, i) < 1)

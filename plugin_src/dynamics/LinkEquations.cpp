@@ -1,4 +1,5 @@
 #include "dynamics/LinkEquations.h"
+#include "dynamics/LastChange.h"
 #include "dynamics/StageWeights.h"
 #include "lanes/Noise.h"
 #include "mechanics/Inline.h"
@@ -9,6 +10,7 @@
 #include <cstddef>
 #include <cstdlib>
 #include <new>
+#include <utility>
 
 using namespace cylchain;
 using namespace std;
@@ -228,6 +230,7 @@ void LinkEquations::beginStage(int stage, int numStages, const double* moved) {
     const bool first = numStages == 2 && stage == 0;
     shareOfMetricForces = first ? NOISE_OF_FIRST*NOISE_OF_FIRST : 1;
     for (State& state : states) {
+        state.changeBefore = 0;
         double before[3] = {state.coordinate, 0, 0}, ofStart, ofRandom;
         fill(state.drift, state.drift+3, 0.0);
         if (!state.turns)
@@ -417,27 +420,37 @@ bool LinkEquations::isUnfinished(State& state, const double* move, const double*
     state.change = state.response*dot(move, move);
     if (state.turns)
         state.multiplier = state.tension+state.slope*dot(state.direction, move);
-    if (isTooMuch(state, move, state.turns ? TOLERANCE_OF_TURNS : TOLERANCE_OF_LINKS, least))
+    const double fluctuation = kT/state.response;
+    const double tolerance = state.turns ? TOLERANCE_OF_TURNS : TOLERANCE_OF_LINKS;
+    const double last = findChange(state, move), before = exchange(state.changeBefore, last);
+    if (!isLastChange(last, before, tolerance*tolerance*fluctuation+least) || turnsTooMuch(state, move, least))
         return true;
     const int a = state.places[0].pack, b = state.places[1].pack;
     const bool oneSided = a >= 0 && b >= 0 && (*active)[a] != (*active)[b];
     for (int k = 0; k < 3; k++)
         state.drift[k] = oneSided ? state.drift[k]+move[k] : 0;
-    return isTooMuch(state, state.drift, TOLERANCE_OF_ONE_SIDE, least);
+    return !(findChange(state, state.drift) <= TOLERANCE_OF_ONE_SIDE*TOLERANCE_OF_ONE_SIDE*fluctuation+least) ||
+            turnsTooMuch(state, state.drift, least);
 }
 
-/** Whether a move changes a link by more than a tolerance, or than what counts as no change. */
-bool LinkEquations::isTooMuch(const State& state, const double* move, double tolerance, double least) const {
-    const double square = dot(move, move), fluctuation = kT/state.response, thermal = tolerance*tolerance*fluctuation;
-    // Written so that NaN is too much.
+/** The square of how much a move changes what the energy of a link is of. */
+double LinkEquations::findChange(const State& state, const double* move) const {
     if (!state.turns)
-        return !(square <= thermal+least);
+        return dot(move, move);
     const double along = dot(state.direction, move);
-    const double error = (square-along*along)/(2*LENGTH_TOLERANCE*max(state.length, LEAST));
-    bool result = !(along*along <= thermal+least);
-    result |= kT > 0 && !(error*error <= fluctuation+least);
-    result |= kT == 0 && !(square <= OF_TURN*OF_TURN*state.length*state.length+least);
-    return result;
+    return along*along;
+}
+
+/** Whether a move turns a link by more than it may, or than what counts as no change. */
+bool LinkEquations::turnsTooMuch(const State& state, const double* move, double least) const {
+    if (!state.turns)
+        return false;
+    const double square = dot(move, move);
+    // Written so that NaN is too much.
+    if (kT == 0)
+        return !(square <= OF_TURN*OF_TURN*state.length*state.length+least);
+    const double error = (square-findChange(state, move))/(2*LENGTH_TOLERANCE*max(state.length, LEAST));
+    return !(error*error <= kT/state.response+least);
 }
 
 bool LinkEquations::finishIteration(const double* moves, const double* moved) {

@@ -80,8 +80,8 @@ private:
         double implicit, constant[3];
         /** Of the last iteration: the vector from place to place with which it began, and its response. */
         double now[3], response;
-        /** The squared change of the last iteration, times the response. */
-        double change;
+        /** The squared change of the last iteration, times the response, and what isLastChange() takes for it. */
+        double change, changeBefore;
         /** How its places have moved while one of their packs took no part. */
         double drift[3];
         /** Where a stage begins. */
@@ -103,7 +103,8 @@ private:
     void select();
     void linearise(State& state, const double* moved, CouplingEquation& equation) const;
     bool isUnfinished(State& state, const double* move, const double* moved) const;
-    bool isTooMuch(const State& state, const double* move, double tolerance, double least) const;
+    double findChange(const State& state, const double* move) const;
+    bool turnsTooMuch(const State& state, const double* move, double least) const;
     bool hasFailed(std::size_t number, const double* moved) const;
     static void turnResponse(const State& state, double* response);
     double describeMetric(const State& state, const double* r, double* force) const;

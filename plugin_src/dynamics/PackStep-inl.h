@@ -32,6 +32,7 @@ public:
         for (int node = 0; node < pack.nodes; node++)
             y[node] = y[node]*active;
         iteration = 0;
+        changeBefore = Real{};
     }
     void eliminate(const CouplingTerm* newTerms, int count, double* moves) override {
         terms = newTerms;
@@ -61,19 +62,25 @@ public:
     void findCompliances(double* compliances) override {
         step->getEquations().findResponses(UseOfResponses<W, CLOSED, true>(terms, numTerms, compliances));
     }
-    void advance(const double* forces, double share, bool* unfinished) override {
+    void advance(const double* forces, double share, bool* unfinished, double* moves) override {
         takeWorkspace();
-        spreadForces(forces);
-        step->getEquations().setForcesOfOthers(forcesOnNodes);
-        step->getEquations().addForcesOfOthers();
+        if (forces != NULL && numTerms > 0) {
+            spreadForces(forces);
+            step->getEquations().setForcesOfOthers(forcesOnNodes);
+            step->getEquations().addForcesOfOthers();
+            gatherMoves(step->getChange(), moves);
+        }
         step->advance(y, iteration, active*splat<Real>(share));
         step->getEquations().setForcesOfOthers(NULL);
         iteration++;
-        Real still = active;
-        if (iteration >= step->leastIterations())
-            step->getConvergence().anyUnfinished(still);
         for (int i = 0; i < W; i++)
-            unfinished[i] = lane(still, i) != 0;
+            unfinished[i] = lane(active, i) != 0;
+        if (iteration < step->leastIterations())
+            return;
+        Real change = step->getConvergence().findLastChange();
+        for (int i = 0; i < W; i++)
+            unfinished[i] &= !isLastChange(lane(change, i), lane(changeBefore, i), 1);
+        changeBefore = change;
     }
     void findExcessiveChanges(bool* failed) const override {
         for (int i = 0; i < W; i++)
@@ -100,6 +107,8 @@ private:
     Vec *y, *forcesOnNodes, *movesOfNodes;
     Record* records;
     mutable Real active;
+    /** What findLastChange() has found in the iteration before. */
+    Real changeBefore;
     typename ImplicitStep<W, CLOSED>::Memory memory;
     std::unique_ptr<ImplicitStep<W, CLOSED> > step;
     const CouplingTerm* terms;
@@ -183,6 +192,8 @@ private:
         }
     }
     template <class Number> void gatherMoves(const Vec* ofNodes, Number* moves) {
+        if (numTerms == 0)
+            return;
         for (int node = 0; node < pack.nodes; node++)
             toRecords(ofNodes[node], records+W*node);
         std::fill(records+W*pack.nodes, records+W*(pack.nodes+2), Record {});

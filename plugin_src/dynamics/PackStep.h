@@ -75,11 +75,12 @@ public:
     /**
      * End the iteration: add what forces on the places of the terms do, and move the nodes.
      *
-     * @param forces      on the places of the terms
+     * @param forces      on the places of the terms, or NULL if there are none
      * @param share       how much of the change of nodes to make
      * @param unfinished  receives, for each lane, whether another iteration is needed
+     * @param moves       receives the change of each term's place with these forces, if there are any
      */
-    virtual void advance(const double* forces, double share, bool* unfinished) = 0;
+    virtual void advance(const double* forces, double share, bool* unfinished, double* moves) = 0;
     /** Find lanes a segment of which changes by too much, so that the step must be divided. */
     virtual void findExcessiveChanges(bool* failed) const = 0;
     /** Write where the nodes of the lanes that take the step are, if they began at some positions. */

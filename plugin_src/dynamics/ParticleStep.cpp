@@ -97,6 +97,11 @@ void ParticleStep::eliminate(const CouplingTerm* newTerms, int count, double* mo
         invert(matrix, &inverse[6*i]);
         solve(i, &right[3*i], &change[3*i]);
     }
+    gatherMoves(moves);
+}
+
+/** Find how places move from the changes of particles. */
+void ParticleStep::gatherMoves(double* moves) const {
     for (int i = 0; i < numTerms; i++)
         for (int k = 0; k < 3; k++)
             moves[TermBlocks::place(i, k)] = change[3*terms[i].lane+k];
@@ -133,16 +138,22 @@ void ParticleStep::findCompliances(double* compliances) {
         copy_n(&inverse[6*terms[i].lane], 6, compliances+6*i);
 }
 
-void ParticleStep::advance(const double* onPlaces, double share, bool* unfinished) {
-    gatherForces(onPlaces);
+void ParticleStep::advance(const double* onPlaces, double share, bool* unfinished, double* moves) {
+    if (onPlaces != NULL)
+        gatherForces(onPlaces);
+    else
+        fill(right.begin(), right.end(), 0.0);
     for (size_t i = 0; i < particles.size(); i++) {
         // The equations are linear: couplings decide whether another iteration is needed.
         unfinished[i] = false;
         double added[3];
         solve(i, &right[3*i], added);
+        for (int k = 0; k < 3; k++)
+            change[3*i+k] += added[k];
         for (int k = 0; k < 3 && taken[i]; k++)
-            moved[3*i+k] += share*(change[3*i+k]+added[k]);
+            moved[3*i+k] += share*change[3*i+k];
     }
+    gatherMoves(moves);
 }
 
 void ParticleStep::findExcessiveChanges(bool* failed) const {

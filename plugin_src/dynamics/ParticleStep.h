@@ -29,13 +29,14 @@ public:
     void respond(const double* forces, double* moves) override;
     void respond(const float* forces, float* moves) override;
     void findCompliances(double* compliances) override;
-    void advance(const double* forces, double share, bool* unfinished) override;
+    void advance(const double* forces, double share, bool* unfinished, double* moves) override;
     void findExcessiveChanges(bool* failed) const override;
     void getPositions(const double* start, double* positions) const override;
     void getDisplacements(double* displacements) const override;
 private:
     void solve(int particle, const double* force, double* move) const;
     template <class Number> void gatherForces(const Number* onPlaces);
+    void gatherMoves(double* moves) const;
     template <class Number> void respondAs(const Number* forces, Number* moves);
     const std::vector<CoupledParticle> particles;
     StepSettings settings = {};

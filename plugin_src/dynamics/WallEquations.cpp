@@ -1,10 +1,12 @@
 #include "dynamics/WallEquations.h"
+#include "dynamics/LastChange.h"
 #include "dynamics/PlaceResponses.h"
 #include "dynamics/StageWeights.h"
 #include "mechanics/SymmetricMatrices.h"
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 
 using namespace cylchain;
 using namespace std;
@@ -165,12 +167,15 @@ void WallEquations::finishPart(int number, const double* moves, const double* mo
         if (!takesPart(state.particle))
             continue;
         const double depth = findDepthAt(state, moved), b = state.restGap.get(), beyond = depth+b;
-        if (state.equation < 0)
+        if (state.equation < 0) {
             state.unfinished = beyond > tolerance;
+            state.changeBefore = 0;
+        }
         else {
             const double *g = state.gradient, *move = moves+3*state.equation;
             const double change = g[0]*move[0]+g[1]*move[1]+g[2]*move[2];
-            state.unfinished = !(fabs(change) <= tolerance && beyond >= -tolerance);
+            const double before = exchange(state.changeBefore, change*change);
+            state.unfinished = !isLastChange(change*change, before, tolerance*tolerance) || !(beyond >= -tolerance);
         }
         state.force = implicit*system->stiffness*max(0.0, beyond);
         // The particle may be beyond a curved face, but not beyond its tangent plane elsewhere.

@@ -50,6 +50,8 @@ private:
         double gradient[3] = {}, offset = 0;
         /** The number of its equation in the last iteration, or -1. */
         int equation = -1;
+        /** What isLastChange() takes for the change of its depth in the iteration before. */
+        double changeBefore = 0;
         /** The force that the last iteration has found, times grad d, and the second derivative of d across grad d. */
         double force = 0, curvature = 0;
         /** Whether another iteration is needed for it. */
