@@ -17,7 +17,6 @@ void CapsulePairs::clear() {
     pairs.clear();
     watches.clear();
     slots.clear();
-    contacts.clear();
     lastAdded.clear();
     addedBefore.clear();
 }
@@ -35,9 +34,9 @@ void CapsulePairs::begin(vector<ContactPair>& found, int numCapsules) {
     for (int i = 0; i < numCapsules; i++)
         firstPairs[i+1] += firstPairs[i];
     slots.assign(pairs.size(), -1);
-    contacts.resize(getNumChunks());
     for (vector<Contacts>& ofChunk : contacts)
         ofChunk.clear();
+    makeChunks();
     lastAdded.assign(numCapsules, -1);
     addedBefore.clear();
 }
@@ -60,8 +59,14 @@ bool CapsulePairs::add(const ContactPair& pair) {
     pairs.push_back(pair);
     watches.push_back({pair.a, pair.b, -HUGE_VAL, 0, -1, pair.clearance});
     slots.push_back(-1);
-    contacts.resize(getNumChunks());
+    makeChunks();
     return true;
+}
+
+/** Chunks keep their memory from step to step. */
+void CapsulePairs::makeChunks() {
+    if ((int) contacts.size() < getNumChunks())
+        contacts.resize(getNumChunks());
 }
 
 double CapsulePairs::getLargestRestGap(int number) const {

@@ -87,6 +87,7 @@ public:
         return search->getSegments(pairs[number], atEnd);
     }
 private:
+    void makeChunks();
     /** The contacts of a pair. */
     struct Contacts {
         PairContact of[2];

@@ -15,6 +15,12 @@ const int LARGEST_NUMBER_OF_ITERATIONS = 1000;
 /** Where energies grow by more, single precision has rounded away what matters: in stiff links of free particles. */
 const double LARGEST_GROWTH = 1e6;
 
+/** Let values have room for as many as needed. Their number changes with each iteration of a step. */
+template <class Value> void makeRoom(size_t count, vector<Value>& values) {
+    if (values.size() < count)
+        values.resize(count);
+}
+
 template <class Real> const GradientKernels<Real>& kernels() {
     if constexpr (is_same<Real, float>::value)
         return gradientLoops().single;
@@ -31,7 +37,7 @@ template <class Real> const GradientKernels<Real>& kernels() {
 template <class Real> double ConjugateGradients<Real>::begin(const CoupledTerms& all, int pack,
             const vector<double>& change) {
     const int first = all.first[pack], last = all.first[pack+1], end = first+all.count[pack];
-    for (vector<Real>* values : {&residual, &response, &force, &imageOfDirection, &ownFound})
+    for (vector<Real>* values : {&residual, &response})
         fill(values->begin()+3*first, values->begin()+3*last, Real(0));
     double energy = 0;
     for (int i = first; i < last; i++) {
@@ -64,9 +70,9 @@ template <class Real> bool ConjugateGradients<Real>::solve(const vector<PackStep
     const GradientKernels<Real>& kernel = kernels<Real>();
     const size_t count = all.getNumTerms();
     for (vector<Real>* values : {&residual, &response, &image, &force, &imageOfDirection, &ownFound})
-        values->resize(3*count);
-    stiffness.resize(6*count);
-    partners.resize(count);
+        makeRoom(3*count, *values);
+    makeRoom(6*count, stiffness);
+    makeRoom(count, partners);
     sums.assign(packs.size(), 0.0);
     const GradientVectors<Real> vectors = {residual.data(), response.data(), image.data(), force.data(),
             imageOfDirection.data(), ownFound.data(), stiffness.data(), partners.data()};
@@ -108,10 +114,13 @@ template <class Real> bool ConjugateGradients<Real>::solve(const vector<PackStep
             sums[pack] = kernel.findImages(vectors, first, last);
         });
         // The product of the direction and its image.
-        const double product = total()-(iterations > 1 ? ratio*energy/step : 0);
+        const double product = total()-(ratio == 0 ? 0 : ratio*energy/step);
         step = energy/product;
         respondAfter([&] (int first, int last) {
-            kernel.move(vectors, first, last, ratio, step);
+            if (ratio == 0)
+                kernel.moveFirst(vectors, first, last, step);
+            else
+                kernel.move(vectors, first, last, step, ratio);
         });
         const double before = energy;
         energy = total();

@@ -67,7 +67,18 @@ template <class Real> double findImages(const GradientVectors<Real>& vectors, in
     return total(sums);
 }
 
-template <class Real> void move(const GradientVectors<Real>& vectors, int first, int last, Real ratio, Real step) {
+template <class Real> void moveFirst(const GradientVectors<Real>& vectors, int first, int last, Real step) {
+    const GradientVectors<Real> v = vectors;
+    for (int place = 3*first; place < 3*last; place += SIZE) {
+        const FourOf<Real> residual = loadFour(v.residual+place), image = loadFour(v.image+place);
+        storeFour(residual, v.force+place);
+        storeFour(image, v.imageOfDirection+place);
+        storeFour(residual*step, v.found+place);
+        storeFour(residual-image*step, v.residual+place);
+    }
+}
+
+template <class Real> void move(const GradientVectors<Real>& vectors, int first, int last, Real step, Real ratio) {
     const GradientVectors<Real> v = vectors;
     for (int place = 3*first; place < 3*last; place += SIZE) {
         const FourOf<Real> residual = loadFour(v.residual+place);
@@ -81,8 +92,8 @@ template <class Real> void move(const GradientVectors<Real>& vectors, int first,
 }
 
 static const GradientLoops LOOPS = {
-    {findEnergy<float>, findImages<float>, move<float>},
-    {findEnergy<double>, findImages<double>, move<double>}
+    {findEnergy<float>, findImages<float>, moveFirst<float>, move<float>},
+    {findEnergy<double>, findImages<double>, moveFirst<double>, move<double>}
 };
 
 } // namespace CYLCHAIN_LOOPS

@@ -25,8 +25,10 @@ template <class Real> struct GradientKernels {
      * @return the sum of the products of responses and images
      */
     double (*findImages)(const GradientVectors<Real>& vectors, int first, int last);
+    /** Take residuals for the forces of the first directions, and make a step along them. */
+    void (*moveFirst)(const GradientVectors<Real>& vectors, int first, int last, Real step);
     /** Turn the directions, with a part of the last ones, and make a step along them. */
-    void (*move)(const GradientVectors<Real>& vectors, int first, int last, Real ratio, Real step);
+    void (*move)(const GradientVectors<Real>& vectors, int first, int last, Real step, Real ratio);
 };
 
 /** The loops of an instruction set, in both precisions. */
