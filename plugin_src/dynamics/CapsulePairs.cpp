@@ -51,16 +51,15 @@ bool CapsulePairs::isKnown(int a, int b) const {
     return false;
 }
 
-bool CapsulePairs::add(const ContactPair& pair) {
+void CapsulePairs::add(const ContactPair& pair) {
     if (isKnown(pair.a, pair.b))
-        return false;
+        return;
     addedBefore.push_back(lastAdded[pair.a]);
     lastAdded[pair.a] = pairs.size();
     pairs.push_back(pair);
     watches.push_back({pair.a, pair.b, -HUGE_VAL, 0, -1, pair.clearance});
     slots.push_back(-1);
     makeChunks();
-    return true;
 }
 
 /** Chunks keep their memory from step to step. */

@@ -46,8 +46,8 @@ public:
     void begin(std::vector<ContactPair>& found, int numCapsules);
     /** Get whether a pair is there. The number of a is less than that of b. */
     bool isKnown(int a, int b) const;
-    /** Add a pair that another search has found; false if it was known. */
-    bool add(const ContactPair& pair);
+    /** Add a pair that another search has found, if it is not there. */
+    void add(const ContactPair& pair);
     int getNumPairs() const {
         return pairs.size();
     }

@@ -47,6 +47,30 @@ template <class Function> bool ContactEquations::markPairs(bool all, Function fi
     return any;
 }
 
+/**
+ * Find pairs by a first look at them.
+ *
+ * @param isDue    tells from the number of a pair, its watch and its way whether it is looked at
+ * @param isFound  tells from its number and its outlook whether it is one of those
+ */
+template <class Due, class Found> void ContactEquations::findByOutlook(bool all, int run, Part& part, Due isDue,
+            Found isFound) const {
+    Looks& looks = Looks::ofThread();
+    selection.forPairs(pairs, all, run, [&] (int i) {
+        const CapsulePairs::Watch& watch = pairs.getWatch(i);
+        if (!isDue(i, watch, motion.getWay(watch.a, watch.b)))
+            return;
+        search->prefetchMotion(watch.a, watch.b);
+        looks.numbers.push_back(i);
+        looks.due.push_back(&pairs.getPair(i));
+    });
+    looks.outlooks.resize(looks.due.size());
+    search->findOutlooks(looks.due.data(), looks.due.size(), looks.outlooks.data());
+    for (size_t i = 0; i < looks.due.size(); i++)
+        if (isFound(looks.numbers[i], looks.outlooks[i]))
+            part.pairs.push_back(looks.numbers[i]);
+}
+
 /** Look for pairs of capsules that have moved far, which no search has seen. */
 void ContactEquations::findNewPairs(const double* moved) {
     const PairFilter known = [&] (int a, int b) {return pairs.isKnown(a, b);};
@@ -78,21 +102,11 @@ void ContactEquations::findNewPairs(const double* moved) {
 /** Find pairs that were left out and may touch now, and new ones that may, from a number on. */
 void ContactEquations::findNear(int firstNew, int run, Part& part) {
     const double tolerance = TOLERANCE_OF_GAPS*sqrt(kT/stiffness)+LEAST_CHANGE*reach;
-    Looks& looks = Looks::ofThread();
-    selection.forPairs(pairs, selection.hasAll(), run, [&] (int i) {
-        const CapsulePairs::Watch& watch = pairs.getWatch(i);
-        const bool left = watch.due > 0 && motion.getWay(watch.a, watch.b) > watch.due+tolerance;
-        if (!left && i < firstNew)
-            return;
-        search->prefetchMotion(watch.a, watch.b);
-        looks.numbers.push_back(i);
-        looks.due.push_back(&pairs.getPair(i));
+    findByOutlook(selection.hasAll(), run, part, [&] (int i, const CapsulePairs::Watch& watch, double way) {
+        return i >= firstNew || (watch.due > 0 && way > watch.due+tolerance);
+    }, [&] (int i, const PairOutlook& outlook) {
+        return !isApart(i, outlook, tolerance);
     });
-    looks.outlooks.resize(looks.due.size());
-    search->findOutlooks(looks.due.data(), looks.due.size(), looks.outlooks.data());
-    for (size_t i = 0; i < looks.due.size(); i++)
-        if (!isApart(looks.numbers[i], looks.outlooks[i], tolerance))
-            part.pairs.push_back(looks.numbers[i]);
 }
 
 /** Whether pairs that were left out may touch, or new ones: they take part from now on. */
@@ -201,20 +215,11 @@ void ContactEquations::mark(int pair) {
 
 /** Find pairs that cross. */
 void ContactEquations::findCrossed(bool all, int run, Part& part) const {
-    Looks& looks = Looks::ofThread();
-    selection.forPairs(pairs, all, run, [&] (int i) {
-        const CapsulePairs::Watch& watch = pairs.getWatch(i);
-        if (motion.getWay(watch.a, watch.b) < watch.clearance)
-            return;
-        search->prefetchMotion(watch.a, watch.b);
-        looks.numbers.push_back(i);
-        looks.due.push_back(&pairs.getPair(i));
+    findByOutlook(all, run, part, [&] (int, const CapsulePairs::Watch& watch, double way) {
+        return !(way < watch.clearance);
+    }, [&] (int i, const PairOutlook& outlook) {
+        return outlook.mayCross && search->crosses(pairs.getPair(i));
     });
-    looks.outlooks.resize(looks.due.size());
-    search->findOutlooks(looks.due.data(), looks.due.size(), looks.outlooks.data());
-    for (size_t i = 0; i < looks.due.size(); i++)
-        if (looks.outlooks[i].mayCross && search->crosses(*looks.due[i]))
-            part.pairs.push_back(looks.numbers[i]);
 }
 
 /** Whether pairs cross elsewhere than where they were last seen to touch: they are looked at again. */

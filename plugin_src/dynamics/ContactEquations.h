@@ -99,6 +99,8 @@ private:
     void look(int run, bool first, Part& part);
     void evaluate(int pair, bool first, const PairOutlook* outlook, Part& part);
     bool anyComeNear(const double* moved);
+    template <class Due, class Found> void findByOutlook(bool all, int run, Part& part, Due isDue,
+            Found isFound) const;
     void findNear(int firstNew, int run, Part& part);
     bool anyCross();
     void findCrossed(bool all, int run, Part& part) const;

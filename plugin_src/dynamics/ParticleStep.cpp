@@ -139,21 +139,22 @@ void ParticleStep::findCompliances(double* compliances) {
 }
 
 void ParticleStep::advance(const double* onPlaces, double share, bool* unfinished, double* moves) {
-    if (onPlaces != NULL)
+    if (onPlaces != NULL) {
         gatherForces(onPlaces);
-    else
-        fill(right.begin(), right.end(), 0.0);
+        for (size_t i = 0; i < particles.size(); i++) {
+            double added[3];
+            solve(i, &right[3*i], added);
+            for (int k = 0; k < 3; k++)
+                change[3*i+k] += added[k];
+        }
+        gatherMoves(moves);
+    }
     for (size_t i = 0; i < particles.size(); i++) {
         // The equations are linear: couplings decide whether another iteration is needed.
         unfinished[i] = false;
-        double added[3];
-        solve(i, &right[3*i], added);
-        for (int k = 0; k < 3; k++)
-            change[3*i+k] += added[k];
         for (int k = 0; k < 3 && taken[i]; k++)
             moved[3*i+k] += share*change[3*i+k];
     }
-    gatherMoves(moves);
 }
 
 void ParticleStep::findExcessiveChanges(bool* failed) const {
