@@ -9,7 +9,7 @@
 
 static const double TOLERANCE = 0.1;
 
-/** Change a number from some distance from its limit, by Newton's method or the like; returns what is left at the end. */
+/** Change a number from some distance to its limit, by Newton's method or the like; returns what is left at the end. */
 template <class Function> static double findRest(double distance, Function next) {
     double before = 0;
     for (int iteration = 0; iteration < 100; iteration++) {
