@@ -1,4 +1,5 @@
 #include "kinetics/LinkerKinetics.h"
+#include "mechanics/Prefetch.h"
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -12,7 +13,7 @@ using namespace std;
 namespace {
 
 /** Linkers that a thread looks at together. */
-const int CHUNK = 256;
+const int CHUNK = 512;
 /** Of linkers of a type that come out of their concentration in a step. */
 const int MOST_NEW_LINKERS = 10000000;
 /** The random numbers of when linkers come out of a concentration belong to this, less the number of the type. */
@@ -341,6 +342,11 @@ int LinkerKinetics::pieceOf(const Watch& watch) const {
     return watch.where < cells.getNumPieces() ? watch.where : watch.where-cells.getNumPieces();
 }
 
+/** Whether the piece of a linker says if it walks beyond that. */
+bool LinkerKinetics::looksAtPiece(const Watch& watch) const {
+    return anyBinding && kinds[watch.kind].walks && !kinds[watch.kind].pulls;
+}
+
 /** Hands of a linker walk that do not bind to sites. */
 void LinkerKinetics::walkAll(Linker& linker, const KineticStep& step, Watch& own, Count& count) const {
     const Kind& kind = kinds[own.kind];
@@ -371,6 +377,8 @@ void LinkerKinetics::advanceChunk(LinkerState& state, const KineticStep& step, i
     competing[chunk].clear();
     const int* const around = cells.getNumbersAround();
     for (int i = first; i < last; i++) {
+        if (i+AHEAD < last && looksAtPiece(watches[i+AHEAD]))
+            prefetch(&cells.getPiece(pieceOf(watches[i+AHEAD])));
         Watch& own = watches[i];
         // Of most linkers, nothing else is looked at.
         const Kind& kind = kinds[own.kind];
@@ -438,8 +446,11 @@ long long LinkerKinetics::advance(LinkerState& state, const KineticStep& step, c
     else if (links != nullptr) {
         links->clear();
         for (const vector<int>& own : pulling)
-            for (int i : own)
-                addLink(state.linkers[i], *links);
+            for (size_t k = 0; k < own.size(); k++) {
+                if (k+AHEAD < own.size())
+                    prefetch(&state.linkers[own[k+AHEAD]]);
+                addLink(state.linkers[own[k]], *links);
+            }
     }
     long long failed = -1;
     for (const Count& one : counts) {

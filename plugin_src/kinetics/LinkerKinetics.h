@@ -125,6 +125,7 @@ private:
     void know(LinkerState& state);
     Watch watch(const Linker& linker) const;
     int pieceOf(const Watch& watch) const;
+    bool looksAtPiece(const Watch& watch) const;
     void addLink(const Linker& linker, std::vector<Link>& links) const;
     int countAround(const Watch& watch, const KineticStep& step) const;
     double findRate(const Watch& watch, const KineticStep& step) const;
@@ -132,7 +133,8 @@ private:
     void advanceChunk(LinkerState& state, const KineticStep& step, int chunk);
     void removeUnbound(LinkerState& state);
     void takeTogether(LinkerState& state, const KineticStep& step, Count& count);
-    SegmentCells::Around lookAround(const Linker& linker, int side, const KineticStep& step) const;
+    const SegmentCells::Around& lookAround(const Linker& linker, int side, const KineticStep& step,
+            SegmentCells::Around& ofAnchor) const;
     bool proposePlace(const Linker& linker, int side, const KineticStep& step, RandomNumbers& random,
             const Sites* sites, HandPlace& found) const;
     bool captureAnywhere(const Linker& linker, int side, RandomNumbers& random, const Sites* sites,

@@ -221,13 +221,15 @@ double LinkerKinetics::proposalRate(const Hand& hand) const {
     return hand.bindingRate*cells.getLongest();
 }
 
-/** Look around what a side of a linker holds. */
-SegmentCells::Around LinkerKinetics::lookAround(const Linker& linker, int side, const KineticStep& step) const {
+/** Look around what a side of a linker holds. What is around an anchor is written to the last argument. */
+const SegmentCells::Around& LinkerKinetics::lookAround(const Linker& linker, int side, const KineticStep& step,
+        SegmentCells::Around& ofAnchor) const {
     const HandPlace& hand = linker.hands[side];
     if (!hand.isBound()) {
         double place[3];
         locate(placeOf(linker, side), step.positions, step.boxes.segments, place);
-        return cells.lookAround(place);
+        ofAnchor = cells.lookAround(place);
+        return ofAnchor;
     }
     const int segment = contours.findSegment(hand.chain, hand.position);
     return cells.lookAround(cells.findPiece(contours, segment, hand.position-contours.getStart(segment)));
@@ -240,7 +242,8 @@ bool LinkerKinetics::proposePlace(const Linker& linker, int side, const KineticS
     const int number = type.hands[side];
     const Hand& hand = system.hands[number];
     const double which = random.uniform(), where = random.uniform(), accepted = random.uniform();
-    const SegmentCells::Around around = lookAround(linker, 1-side, step);
+    SegmentCells::Around ofAnchor;
+    const SegmentCells::Around& around = lookAround(linker, 1-side, step, ofAnchor);
     if (around.numPieces == 0)
         return false;
     const int chosen = min(around.numPieces-1, static_cast<int>(which*around.numPieces));

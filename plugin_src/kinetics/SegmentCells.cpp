@@ -93,7 +93,7 @@ int SegmentCells::addCell(const int* coordinates, int chain) {
         if (equal(coordinates, coordinates+3, cells[slots[slot]].coordinates))
             return slots[slot];
     slots[slot] = static_cast<int>(cells.size());
-    cells.push_back({{coordinates[0], coordinates[1], coordinates[2]}, 0, 0, chain, chain, 0, false});
+    cells.push_back({{coordinates[0], coordinates[1], coordinates[2]}, 0, 0, chain, chain, false});
     mark(held, markOf(coordinates));
     return slots[slot];
 }
@@ -108,8 +108,8 @@ unsigned SegmentCells::readRow(const int* coordinates) const {
     return word&7;
 }
 
-SegmentCells::Around SegmentCells::gather(const int* coordinates) const {
-    Around around;
+/** Call a function with each cell around some coordinates that holds something. */
+template <class Function> void SegmentCells::forCellsAround(const int* coordinates, Function function) const {
     int x[3] = {}, y[3] = {}, z[3] = {};
     const int numX = findNeighbours(coordinates[0], 0, x), numY = findNeighbours(coordinates[1], 1, y);
     const int numZ = findNeighbours(coordinates[2], 2, z);
@@ -124,19 +124,20 @@ SegmentCells::Around SegmentCells::gather(const int* coordinates) const {
                     continue;
                 other[0] = x[i];
                 const int cell = findCell(other);
-                if (cell >= 0) {
-                    around.cells[around.numCells++] = cell;
-                    around.numPieces += cells[cell].count;
-                }
+                if (cell >= 0)
+                    function(cell);
             }
         }
-    return around;
 }
 
 SegmentCells::Around SegmentCells::lookAround(const double* point) const {
     int coordinates[3];
     findCoordinates(point, coordinates);
-    return gather(coordinates);
+    Around found;
+    forCellsAround(coordinates, [&] (int cell) {
+        addTo(found, cell);
+    });
+    return found;
 }
 
 uint32_t SegmentCells::findMark(const double* point) const {
@@ -254,13 +255,13 @@ void SegmentCells::build(const Contours& contours, const double* positions, doub
         }
     }
     held.back() = held.front();
-    countAll();
+    sortAll();
     if (forPoints)
         markAround();
 }
 
-/** Sort pieces into cells, and count those around each cell. */
-void SegmentCells::countAll() {
+/** Sort pieces into cells, and find what is around each cell. */
+void SegmentCells::sortAll() {
     int next = 0;
     for (Cell& cell : cells) {
         cell.first = next;
@@ -272,39 +273,35 @@ void SegmentCells::countAll() {
         sorted[cell.first+cell.count++] = static_cast<int>(i);
     }
     const bool small = find_if(numCells, numCells+3, [] (int n) {return n == 1 || n == 2;}) != numCells+3;
-    for (Cell& cell : cells) {
-        cell.around = small ? 0 : cell.count;
-        cell.several = cell.lastChain != cell.firstChain;
-    }
-    for (size_t i = 0; i < cells.size(); i++) {
-        if (!small) {
-            lookAhead(static_cast<int>(i));
-            continue;
+    const int numFound = static_cast<int>(cells.size());
+    around.assign(numFound, Around());
+    for (int i = 0; i < numFound; i++)
+        cells[i].several = cells[i].lastChain != cells[i].firstChain;
+    for (int i = 0; i < numFound; i++)
+        if (small)
+            forCellsAround(cells[i].coordinates, [&] (int other) {
+                see(i, other);
+            });
+        else {
+            addTo(around[i], i);
+            lookAhead(i);
         }
-        const Around around = gather(cells[i].coordinates);
-        cells[i].around = around.numPieces;
-        for (int j = 0; j < around.numCells; j++)
-            cells[i].several = cells[i].several || cells[around.cells[j]].firstChain != cells[i].firstChain ||
-                    cells[around.cells[j]].lastChain != cells[i].firstChain;
-    }
     for (size_t i = 0; i < pieces.size(); i++) {
-        const Cell& cell = cells[cellOf[i]];
-        numAround[i] = cell.around;
-        numAround[pieces.size()+i] = cell.several ? cell.around : 0;
+        const int cell = cellOf[i];
+        numAround[i] = around[cell].numPieces;
+        numAround[pieces.size()+i] = cells[cell].several ? around[cell].numPieces : 0;
     }
 }
 
-/** Count what two cells beside each other have for each other. */
-void SegmentCells::meet(int cell, int other) {
-    Cell &a = cells[cell], &b = cells[other];
-    a.around += b.count;
-    b.around += a.count;
-    const bool one = a.firstChain == b.firstChain && a.lastChain == b.lastChain && a.firstChain == a.lastChain;
-    a.several = a.several || !one;
-    b.several = b.several || !one;
+/** Let a cell know of one around it. */
+void SegmentCells::see(int cell, int other) {
+    Cell& own = cells[cell];
+    const Cell& there = cells[other];
+    addTo(around[cell], other);
+    own.several = own.several || there.firstChain != own.firstChain || there.lastChain != own.firstChain;
 }
 
-/** Count for a cell and those of the half of its neighbours that come after it. */
+/** Find those of the half of the neighbours of a cell that come after it. */
 void SegmentCells::lookAhead(int cell) {
     const int coordinates[3] = {cells[cell].coordinates[0], cells[cell].coordinates[1], cells[cell].coordinates[2]};
     int x[3] = {}, y[3] = {}, z[3] = {};
@@ -323,8 +320,10 @@ void SegmentCells::lookAhead(int cell) {
             if ((found&1) != 0) {
                 other[0] = x[i];
                 const int known = findCell(other);
-                if (known >= 0)
-                    meet(cell, known);
+                if (known >= 0) {
+                    see(cell, known);
+                    see(known, cell);
+                }
             }
     }
 }
@@ -345,9 +344,9 @@ void SegmentCells::markAround() {
     }
 }
 
-const SegmentPiece& SegmentCells::getAround(const Around& around, int number) const {
+const SegmentPiece& SegmentCells::getAround(const Around& found, int number) const {
     int i = 0;
-    for (; i+1 < around.numCells && number >= cells[around.cells[i]].count; i++)
-        number -= cells[around.cells[i]].count;
-    return pieces[sorted[cells[around.cells[i]].first+number]];
+    for (; i+1 < found.numCells && number >= found.cells[i].count; i++)
+        number -= found.cells[i].count;
+    return pieces[sorted[found.cells[i].first+number]];
 }

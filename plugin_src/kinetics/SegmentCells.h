@@ -23,10 +23,12 @@ struct SegmentPiece {
  */
 class SegmentCells {
 public:
-    /** The cells around a place that hold something, and the number of pieces in them. */
+    /** The cells around a place that hold something, where their pieces are as they are sorted, and how many these are. */
     struct Around {
-        int cells[27];
         int numCells = 0, numPieces = 0;
+        struct {
+            int first, count;
+        } cells[27];
     };
     /**
      * Cut segments and curves into pieces that are no longer than the reach, or a thousandth of the segment, and sort
@@ -63,12 +65,12 @@ public:
     double getLongest() const {
         return longest;
     }
-    Around lookAround(int piece) const {
-        return gather(cells[cellOf[piece]].coordinates);
+    const Around& lookAround(int piece) const {
+        return around[cellOf[piece]];
     }
     Around lookAround(const double* point) const;
     /** The piece of a number among those around a place. */
-    const SegmentPiece& getAround(const Around& around, int number) const;
+    const SegmentPiece& getAround(const Around& found, int number) const;
     /** A number of the cell of a point, for isNear(), until getGridNumber() is another one. */
     std::uint32_t findMark(const double* point) const;
     /** Whether there may be pieces around a point: if not, there are none. */
@@ -83,8 +85,7 @@ private:
         int coordinates[3];
         /** The pieces in it, as they are sorted; the chains of the first and the last. */
         int first, count, firstChain, lastChain;
-        /** How many are around it, and whether all that are belong to its first chain. */
-        int around;
+        /** Whether those around it, itself among them, belong to several chains. */
         bool several;
     };
     double findVectors(const Contours& contours, const double* positions, const double* segmentBox);
@@ -101,10 +102,14 @@ private:
     void mark(std::vector<std::uint64_t>& bits, std::uint32_t number) const {
         bits[number>>6] |= static_cast<std::uint64_t>(1)<<(number&63);
     }
-    Around gather(const int* coordinates) const;
+    template <class Function> void forCellsAround(const int* coordinates, Function function) const;
+    void addTo(Around& found, int cell) const {
+        found.cells[found.numCells++] = {cells[cell].first, cells[cell].count};
+        found.numPieces += cells[cell].count;
+    }
     void lookAhead(int cell);
-    void meet(int cell, int other);
-    void countAll();
+    void see(int cell, int other);
+    void sortAll();
     void markAround();
     /** The vectors that take a point to its coordinates in cells, and how many there are along axes of a box, or 0. */
     double toCells[9] = {};
@@ -118,6 +123,8 @@ private:
     std::vector<int> cellOf, sorted;
     std::vector<int> numAround = std::vector<int>(1, 0);
     std::vector<Cell> cells;
+    /** Of each cell, itself among them. */
+    std::vector<Around> around;
     /** Where cells are by their coordinates: -1 where none is. */
     std::vector<int> slots;
     /** A bit for each cell, and for each one beside a cell; others may have the same. */
