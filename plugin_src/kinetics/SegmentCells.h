@@ -23,7 +23,7 @@ struct SegmentPiece {
  */
 class SegmentCells {
 public:
-    /** The cells around a place that hold something, where their pieces are as they are sorted, and how many these are. */
+    /** The cells around a place that hold something: where their sorted pieces are, and how many these are. */
     struct Around {
         int numCells = 0, numPieces = 0;
         struct {

@@ -181,7 +181,7 @@ template <class Real> int testProblem(const Problem& problem, double tolerance, 
             for (int i = 0; i < problem.terms.count[pack]; i++)
                 for (int k = 0; k < 3; k++) {
                     const int place = TermBlocks::place(problem.terms.first[pack]+i, k);
-                    checkClose(problem.solution[place], problem.change[place]+moves[place], 1, error, "moves of places");
+                    checkClose(problem.solution[place], problem.change[place]+moves[place], 1, error, "moves there");
                     checkClose(problem.found[place], found[place], max(1.0, largest), error, "forces on places");
                 }
         }
