@@ -12,7 +12,7 @@ using namespace std;
 
 namespace {
 
-/** Linkers that a thread looks at together. */
+/** Linkers that a thread looks at together: enough of them pull for what is asked for AHEAD. */
 const int CHUNK = 512;
 /** Of linkers of a type that come out of their concentration in a step. */
 const int MOST_NEW_LINKERS = 10000000;
@@ -342,7 +342,7 @@ int LinkerKinetics::pieceOf(const Watch& watch) const {
     return watch.where < cells.getNumPieces() ? watch.where : watch.where-cells.getNumPieces();
 }
 
-/** Whether the piece of a linker says if it walks beyond that. */
+/** Whether a step asks if the only hand of a linker that is bound has walked beyond its piece. */
 bool LinkerKinetics::looksAtPiece(const Watch& watch) const {
     return anyBinding && kinds[watch.kind].walks && !kinds[watch.kind].pulls;
 }
