@@ -62,11 +62,13 @@ void CylinderChainIntegrator::initialize(ContextImpl& contextRef) {
     if (owner != NULL && &contextRef.getOwner() != owner)
         throw OpenMMException("This Integrator is already bound to a context");
     const System& system = contextRef.getSystem();
-    chains = &findChains(contextRef);
-    checkSystem(system, *chains);
+    CylinderChainForceImpl& found = findChains(contextRef);
+    checkSystem(system, found);
+    // A Context that is refused here does not exist afterwards.
+    stepper.reset(new CylinderChainStepper(contextRef, *this, found));
+    chains = &found;
     context = &contextRef;
     owner = &contextRef.getOwner();
-    stepper.reset(new CylinderChainStepper(contextRef, *this, *chains));
     chainsAreAlone = (contextRef.getForceImpls().size() == 1);
     noiseSeed = (uint32_t) (randomNumberSeed == 0 ? osrngseed() : randomNumberSeed);
     noiseLevel = pathLevel;
