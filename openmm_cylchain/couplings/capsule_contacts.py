@@ -28,7 +28,11 @@ _EXCLUDED_DIAMETERS = 2.0
 
 def default_capsule_stiffness(diameter: Scalar, temperature: Scalar) -> float:
     """Stiffness of a contact that two filaments cross for 40 k_B T: k = 80 k_B T/d^2, in kJ/(mol nm^2)."""
-    return 2.0 * CAPSULE_BARRIER * thermal_energy(temperature) / positive(diameter, LENGTH, "diameter") ** 2
+    diameter = positive(diameter, LENGTH, "diameter")
+    square = diameter * diameter
+    if not 0.0 < square < math.inf:
+        raise InputError(f"A contact diameter of {diameter:g} nm is none of filaments: check its unit.")
+    return 2.0 * CAPSULE_BARRIER * thermal_energy(temperature) / square
 
 
 def contact_spacing(filament_type: ChainType, diameter: Scalar, temperature: Scalar) -> float:
@@ -104,7 +108,8 @@ def capsule_contact_force(
     InputError
         If the compiled engine is missing, a particle does not exist or is one of the filaments', a diameter or
         stiffness is not positive, the box is narrower than twice a segment with its diameter, or a filament of beam
-        elements has no beads.
+        elements has no beads. Implicit schemes need a box as wide as twice a segment with two diameters: a Context with
+        a narrower one is refused.
 
     Warns
     -----

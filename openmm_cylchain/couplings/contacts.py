@@ -15,7 +15,16 @@ import openmm
 from ..errors import ContactWarning, InputError
 from ..filaments.attachments import SAME_PLACE
 from ..filaments.collection import FilamentCollection
-from ..units.quantities import LENGTH, STIFFNESS, in_units_of, non_negative, positive, thermal_energy, whole_number
+from ..units.quantities import (
+    LENGTH,
+    STIFFNESS,
+    in_units_of,
+    non_negative,
+    positive,
+    shown,
+    thermal_energy,
+    whole_number,
+)
 from ..units.types import FloatArray, Indices, IntArray, Numbers, Scalar
 
 CONTACT_NAME = "Contact"
@@ -324,14 +333,16 @@ def _positive_array(value, count, name):
 def particle_diameters(particles: Indices, particle_diameter: Numbers | None) -> FloatArray:
     """Contact diameters in nm of particles outside filaments."""
     if particle_diameter is None:
-        if len(particles):
+        if np.size(particles):
             raise InputError("particles need a particle_diameter.")
         return np.zeros(0)
-    return _positive_array(particle_diameter, len(particles), "particle_diameter")
+    return _positive_array(particle_diameter, np.size(particles), "particle_diameter")
 
 
 def outside_particles(filaments: FilamentCollection, system: openmm.System, particles: Indices) -> IntArray:
     """Particles that take part in contacts, which are none of the filaments'; an InputError if they are not there."""
+    if np.ndim(particles) != 1:
+        raise InputError(f"particles must be a sequence of particle indices, but is {shown(particles)}.")
     count = system.getNumParticles()
     filled = [*filaments.node_indices, *filaments.control_point_indices, filaments.attachment_indices]
     own = set(np.concatenate(filled).tolist())

@@ -58,7 +58,7 @@ def in_units_of(value: Numbers, target: unit.Unit, name: str) -> FloatOrArray:
         array = np.asarray(value)
     except ValueError:
         array = np.asarray(None)
-    if array.dtype.kind not in "iuf" and array.size and value is not None:
+    if array.dtype.kind not in "iuf" and array.size:
         raise InputError(f"{name} must be a number or an array of numbers, but is {shown(value)}.")
     array = array.astype(float)
     if not np.all(np.isfinite(array)):

@@ -478,6 +478,10 @@ def test_bad_input_is_refused(monkeypatch):
         (lambda: capsule_contact_force(filaments, system, 30, particles=[node]), "to a filament"),
         (lambda: capsule_contact_force(filaments, system, 30, excluded_neighbors=-1), "excluded_neighbors"),
         (lambda: capsule_contact_force(filaments, system, 30, excluded_neighbors=1.5), "excluded_neighbors"),
+        (lambda: capsule_contact_force(filaments, system, 30, particles=5), "must be a sequence .* but is 5"),
+        (lambda: capsule_contact_force(filaments, system, None), "diameter must be a number .* but is None"),
+        (lambda: capsule_contact_force(filaments, system, 1e300), "1e.300 nm is none of filaments"),
+        (lambda: capsule_contact_force(filaments, system, 1e-300), "1e-300 nm is none of filaments"),
         (lambda: capsule_contact_force(cold, cold_system, 30), "needs a stiffness"),
         (lambda: capsule_contact_force(narrow, narrow_system, 30), "255 nm wide .* need 260 nm"),
     ):
@@ -500,6 +504,32 @@ def test_bad_input_is_refused(monkeypatch):
     with pytest.raises(InputError, match="compiled engine is missing"):
         capsule_contact_force(filaments, system, 30)
     assert as_capsule_contact_force(force) is None
+
+
+def test_a_refused_context_leaves_its_integrator_free():
+    filaments, _, system, positions = _filaments(([0, 0, 0], [1, 0, 0]), ([0, 0, 60], [0, 1, 0]), box=300 * np.eye(3))
+    system.addForce(capsule_contact_force(filaments, system, 30))
+    integrator = filaments.create_integrator(system, 1e4)
+    with pytest.raises(openmm.OpenMMException, match="300 nm wide .* in implicit steps|in implicit steps.* 320 nm"):
+        new_context(system, positions, integrator=integrator)
+    with pytest.raises(openmm.OpenMMException, match="not bound to a context"):
+        integrator.step(1)
+    system.setDefaultPeriodicBoxVectors(*(321 * np.eye(3)))
+    context = new_context(system, positions, integrator=integrator)
+    integrator.step(2)
+    assert context.getStepCount() == 2
+
+
+def test_exclusions_cannot_be_added_to_a_context():
+    filaments, _, system, positions = _filaments(([0, 0, 0], [1, 0, 0]), ([0, 0, 60], [0, 1, 0]))
+    force = capsule_contact_force(filaments, system, 30)
+    force.addExclusion(0, 0, 1, 0)
+    system.addForce(force)
+    context = new_context(system, positions)
+    force.updateParametersInContext(context)
+    force.addExclusion(0, 1, 1, 0)
+    with pytest.raises(openmm.OpenMMException, match="Exclusions cannot be added to a Context"):
+        force.updateParametersInContext(context)
 
 
 def test_bad_input_of_the_force_is_refused():

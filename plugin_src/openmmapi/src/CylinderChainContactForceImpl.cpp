@@ -128,6 +128,8 @@ void CylinderChainContactForceImpl::updateParametersInContext(ContextImpl& conte
         capsules += getNumSegments(chain);
     if (capsules != (int) search->getSystem().capsules.size())
         throw OpenMMException("CylinderChainContactForce: Chains and spheres cannot be added to a Context");
+    if (owner.getNumExclusions() != (int) search->getSystem().exclusions.size())
+        throw OpenMMException("CylinderChainContactForce: Exclusions cannot be added to a Context");
     stiffness = owner.getStiffness();
     int capsule = 0;
     for (int chain = 0; chain < owner.getNumChains(); chain++)
