@@ -93,7 +93,7 @@ class Crosslinks:
     def __init__(
         self, stiffness: Scalar, rest_length: Scalar, model: str = "harmonic", maximum_extension: Scalar | None = None
     ) -> None:
-        if model not in STRETCHING_POTENTIALS:
+        if not isinstance(model, str) or model not in STRETCHING_POTENTIALS:
             raise InputError(f"model must be one of {', '.join(STRETCHING_POTENTIALS)}, but is {model!r}.")
         if (model == "fene") != (maximum_extension is not None):
             raise InputError("maximum_extension must be given for model 'fene', and only for it.")
@@ -169,7 +169,8 @@ class Crosslinks:
         self._initial.places.check(self._initial.numbers, system.getNumParticles())
         periodic = system.usesPeriodicBoundaryConditions() if periodic is None else bool(periodic)
         if periodic:
-            self._check_rest_lengths(system)
+            box = np.array([vector.value_in_unit(unit.nanometer) for vector in system.getDefaultPeriodicBoxVectors()])
+            _check_rest_lengths(self._initial.numbers, self._initial.rest_length, box)
         kind: Any = NativeLinks if is_of_compiled_engine(system) else PortableLinks
         store, force = kind.make_for(system, self._model, self._initial, periodic, self._defaults)
         force.setName(CROSSLINKS_NAME)
@@ -177,18 +178,6 @@ class Crosslinks:
         system.addForce(force)
         self._store = store
         return force
-
-    def _check_rest_lengths(self, system):
-        # No point is farther from the nearest image of another one than half of all the box's vectors together.
-        box = system.getDefaultPeriodicBoxVectors()
-        farthest = 0.5 * sum(np.linalg.norm(vector.value_in_unit(unit.nanometer)) for vector in box)
-        too_long = np.flatnonzero(self._initial.rest_length > farthest)
-        if len(too_long):
-            raise InputError(
-                f"Crosslink {self._initial.numbers[too_long[0]]} has a rest length of "
-                f"{self._initial.rest_length[too_long[0]]:.6g} nm, but in the periodic box, nearest images are never "
-                f"more than {farthest:.6g} nm apart. Give it a shorter one, or take a larger box."
-            )
 
     def add(
         self,
@@ -218,7 +207,8 @@ class Crosslinks:
         Raises
         ------
         InputError
-            For a particle that does not exist, a crosslink of a place to itself, or a bad parameter.
+            For a particle that does not exist, a crosslink of a place to itself, a bad parameter, or a rest length that
+            nearest images can never have.
         """
         return int(self.add_many(context, [(first, second)], stiffness, rest_length, maximum_extension)[0])
 
@@ -265,6 +255,7 @@ class Crosslinks:
         if store is None:
             self._initial = self._initial.with_links(places, *parameters)
         elif len(places):
+            _check_in_context(store, context, numbers[:1], np.array([parameters[1]]))
             store.add(context, places, parameters)
         return numbers
 
@@ -410,6 +401,11 @@ class Crosslinks:
         extension = self._default_extension()
         return self._defaults[1], float("inf") if extension is None else extension
 
+    @property
+    def default_stiffness(self) -> float:
+        """Stiffness k, in kJ/(mol nm^2), of a crosslink that is given none."""
+        return self._defaults[0]
+
     def thermal_stiffness(self, table: CrosslinkTable | None, temperature: Scalar) -> FloatOrArray:
         """Stiffness of crosslinks where thermal motion takes them, in kJ/(mol nm^2).
 
@@ -460,6 +456,7 @@ class Crosslinks:
         if store is None:
             self._initial = table
         else:
+            _check_in_context(store, context, table.numbers, table.rest_length)
             store.replace(context, table)
 
     def _default_extension(self):
@@ -472,6 +469,25 @@ class Crosslinks:
             positive(stiffness, STIFFNESS, f"{label} stiffness"),
             non_negative(rest_length, LENGTH, f"{label} rest_length"),
             np.inf if maximum_extension is None else positive(maximum_extension, LENGTH, f"{label} maximum_extension"),
+        )
+
+
+def _check_in_context(store, context, numbers, rest_lengths):
+    if np.any(rest_lengths > 0.0):
+        box, _ = store.boxes(context, context.getState())
+        if box is not None:
+            _check_rest_lengths(numbers, rest_lengths, box)
+
+
+def _check_rest_lengths(numbers, rest_lengths, box):
+    # The nearest image of a point is in the brick around the other one that has the widths of the box along the axes.
+    farthest = 0.5 * float(np.linalg.norm(np.diagonal(box)))
+    too_long = np.flatnonzero(rest_lengths > farthest)
+    if len(too_long):
+        raise InputError(
+            f"Crosslink {numbers[too_long[0]]} has a rest length of {rest_lengths[too_long[0]]:.6g} nm, but in the "
+            f"periodic box, nearest images are never more than {farthest:.6g} nm apart. Give it a shorter one, or take "
+            "a larger box."
         )
 
 

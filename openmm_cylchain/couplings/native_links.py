@@ -31,7 +31,7 @@ def is_link_force(force: openmm.Force) -> bool:
 
 def table_of_force(force: Any) -> CrosslinkTable:
     """The links of a CylinderChainLinkForce, with which Contexts begin."""
-    return _as_table(force.getLinks())
+    return _as_table(load_plugin().CylinderChainLinkForce.cast(force).getLinks())
 
 
 class NativeLinks(LinkStore):

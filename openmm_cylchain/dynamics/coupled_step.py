@@ -3,8 +3,9 @@
 Their stiffness does not bound it. What they join or keep apart does: two places that diffuse with the frictions z1 and
 z2 move against each other by the mean square 2 k_B T dt (1/z1 + 1/z2) along each axis in a step. That should stay below
 (0.6 d)^2, where d is the rest length of a link, whose direction a step would lose otherwise, or the distance at which
-two filaments touch, which would often be predicted on the wrong sides of each other. Links of rest length zero have no
-direction, and do not bind.
+two filaments touch, which would often be predicted on the wrong sides of each other. Harmonic links of rest length zero
+have no direction, and do not bind. FENE links always have one: d of those of rest length zero is their length in
+equilibrium, (3 k_B T/k)^(1/2), or their maximum extension if that is less.
 
 A place in contact moves as a segment does, or as the end of a filament that is short: that of a rod of n segments has
 the mobility (1/zeta + l0^2/(4 zeta_r))/n across it, with the friction zeta and zeta_r of a segment that moves and
@@ -21,10 +22,10 @@ import openmm
 
 from ..couplings.capsule_contacts import as_capsule_contact_force
 from ..couplings.crosslinks import Crosslinks
-from ..couplings.native_links import is_link_force
 from ..filaments.collection import FilamentCollection
 from ..units.quantities import thermal_energy
 from ..units.types import FloatArray, Numbers
+from .coupled_forces import CoupledForces
 from .other_particles import describe_other_particles
 from .time_step import TimeStep
 
@@ -37,11 +38,6 @@ _END_OF_ELEMENT = 4.0
 _REASON = (
     "{what}: the two may diffuse against each other by {share:g} of {distance}, {value:.3g} nm, in an implicit step"
 )
-
-
-def is_coupled(force: openmm.Force) -> bool:
-    """Whether implicit schemes of the compiled engine have a force in their equations: native links and contacts."""
-    return is_link_force(force) or as_capsule_contact_force(force) is not None
 
 
 def steps_of_couplings(
@@ -66,7 +62,8 @@ def steps_of_couplings(
     -------
     list of TimeStep
     """
-    coupled = [(index, force) for index, force in enumerate(system.getForces()) if is_coupled(force)]
+    forces = CoupledForces(system, filaments)
+    coupled = [(index, force) for index, force in enumerate(system.getForces()) if forces.includes(force)]
     kT = thermal_energy(temperature)
     if not coupled or kT == 0.0:
         return []
@@ -76,7 +73,10 @@ def steps_of_couplings(
     for index, force in coupled:
         label = f"{force.getName()} (force {index})"
         capsules = as_capsule_contact_force(force)
-        found = _contacts(capsules, mobility_in_contact) if capsules is not None else _links(force, filaments, mobility)
+        if capsules is not None:
+            found = _contacts(capsules, mobility_in_contact)
+        else:
+            found = _links(force, filaments, mobility, kT)
         if found is None:
             continue
         distance, total, what, of_what = found
@@ -135,27 +135,33 @@ def _contacts(force, mobility):
     return distance.ravel()[worst], total.ravel()[worst], "segments in contact", "the contact distance"
 
 
-def _links(force, filaments, mobility):
+def _links(force, filaments, mobility, kT):
     links = Crosslinks.of_force(force)
     if links is None:
         return None
     table = links.table(None)
     numbers = table.numbers
     if len(table):
-        rest, extension, places = table.rest_length, table.maximum_extension, table.places
+        rest, extension, stiffness = table.rest_length, table.maximum_extension, table.stiffness
+        places = table.places
         first, second = (np.where(places.pairs[:, side] >= 0, mobility[places.pairs[:, side]], 0.0) for side in (0, 1))
     else:
         # Those to come may join any two.
-        rest, extension = (np.array([value]) for value in links.default_lengths)
+        rest, extension, stiffness = (np.array([value]) for value in (*links.default_lengths, links.default_stiffness))
         largest = np.sort([mobility[nodes[0]] for nodes in filaments.node_indices])[::-1]
         first, second = largest[:1], largest[-1:] if len(largest) == 1 else largest[1:2]
-    # The distance of a FENE link is never zero for long.
-    distance = np.where((rest == 0.0) & np.isfinite(extension), extension, rest)
+    # A FENE link has a direction: without a rest length, it is as long as it is in equilibrium.
+    thermal = np.sqrt(3.0 * kT / stiffness)
+    of_fene = (rest == 0.0) & np.isfinite(extension)
+    distance = np.where(of_fene, np.minimum(extension, thermal), rest)
     worst = _worst(distance, first + second)
     if worst is None:
         return None
     what = f"crosslink {numbers[worst]}" if len(table) else "a crosslink to come"
-    return distance[worst], (first + second)[worst], what, "its rest length"
+    of_what = "its rest length"
+    if of_fene[worst]:
+        of_what = "its length in equilibrium" if thermal[worst] < extension[worst] else "its maximum extension"
+    return distance[worst], (first + second)[worst], what, of_what
 
 
 def _worst(distance, total):

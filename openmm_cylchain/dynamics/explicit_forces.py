@@ -31,7 +31,7 @@ from ..filaments.collection import FilamentCollection
 from ..kinetics.binding_force import find_binding_force, is_binding_force
 from ..units.types import FloatArray, Indices, IntArray, Numbers
 from .beam_response import BeamResponse
-from .coupled_step import is_coupled
+from .coupled_forces import CoupledForces
 from .mobility import FilamentResponse, PlaceResponse
 from .other_particles import describe_other_particles
 from .schemes import EXPLICIT_SCHEMES, IMPLICIT_SCHEMES
@@ -126,6 +126,7 @@ class ExplicitForces:
         self._filaments = filaments
         self._scheme = scheme
         self._other_friction = self._frictions(particle_friction)
+        self._coupled = CoupledForces(system, filaments)
         self._responses: dict[Any, PlaceResponse] = {}
         # Places between two particles that have none of their own, with numbers behind those of all particles.
         self._between: dict[tuple[int, int, float], int] = {}
@@ -411,8 +412,11 @@ class ExplicitForces:
 
     def _read(self, force, label):
         # A list of Springs, or None where the stiffness is not known.
-        if self._scheme in IMPLICIT_SCHEMES and is_coupled(force):
-            return []
+        if self._scheme in IMPLICIT_SCHEMES and self._coupled.may_include(force):
+            outside = self._coupled.place_outside(force)
+            if outside is None:
+                return []
+            label = f"{label}, explicit because of {outside}"
         capsules = as_capsule_contact_force(force)
         if capsules is not None:
             return self._between_capsules(label, capsules)
@@ -442,10 +446,11 @@ class ExplicitForces:
 
     def _at_wall(self, label, wall):
         particles = [wall.getParticle(index) for index in range(wall.getNumParticles())]
-        # Implicit steps have the wall in their equations, unless a virtual site is at it that is on no curve.
-        sites = set(filter(self._system.isVirtualSite, particles))
-        if self._scheme in IMPLICIT_SCHEMES and sites.issubset(self._on_curves if sites else ()):
-            return []
+        if self._scheme in IMPLICIT_SCHEMES:
+            outside = self._coupled.particle_outside(particles)
+            if outside is None:
+                return []
+            label = f"{label}, explicit because of {outside}"
         return [Springs.at_points(label, "entry", particles, wall.getStiffness()._value)]
 
     def _crosslinks(self, links, label):
@@ -462,9 +467,11 @@ class ExplicitForces:
         stiffness = max((linkers.getLinkerTypeParameters(kind)[3] for kind in kinds), default=0.0)
         anchors = np.unique([linkers.getAnchor(index)[0] for index in range(linkers.getNumAnchors())]).astype(int)
         anchors = anchors[anchors != _NOWHERE]
-        # Implicit steps have linkers in their equations, unless a virtual site is an anchor.
-        if self._scheme in IMPLICIT_SCHEMES and not any(map(self._system.isVirtualSite, anchors.tolist())):
-            return []
+        if self._scheme in IMPLICIT_SCHEMES:
+            outside = self._coupled.particle_outside(anchors)
+            if outside is None:
+                return []
+            label = f"{label}, explicit because of {outside}"
         found = [self._to_come(label, "linker", stiffness)]
         if len(anchors):
             first, last = (int(self._filaments.node_indices[number][number]) for number in (0, -1))

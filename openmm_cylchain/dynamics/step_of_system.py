@@ -11,6 +11,7 @@ from ..filaments.attachments import BEAD_NAME
 from ..filaments.collection import FilamentCollection
 from ..mechanics.flow import Flow
 from ..units.types import Numbers, Scalar
+from .coupled_forces import CoupledForces
 from .coupled_step import steps_of_couplings
 from .explicit_forces import ExplicitForces
 from .kinetic_step import steps_of_kinetics
@@ -89,9 +90,10 @@ def _step_of_contacts(filaments, diameter, stiffness, confidence):
 def _steps_of_diffusion(filaments, system, temperature, confidence, scheme):
     # Of filaments that a contact force of the System keeps apart, unless it is in the equations of the step.
     found = {}
+    coupled = CoupledForces(system, filaments)
     for force in system.getForces():
-        capsules = None if scheme in IMPLICIT_SCHEMES else as_capsule_contact_force(force)
-        if capsules is not None:
+        capsules = as_capsule_contact_force(force)
+        if capsules is not None and not (scheme in IMPLICIT_SCHEMES and coupled.includes(force)):
             owners = {int(nodes[0]): filament for filament, nodes in zip(filaments, filaments.node_indices)}
             for chain in range(capsules.getNumChains()):
                 filament = owners.get(capsules.getChainParticles(chain)[0])

@@ -17,6 +17,7 @@ from openmm_cylchain import F_ACTIN, Filaments, InputError, InstabilityError
 from openmm_cylchain.couplings import crosslink_tables
 from openmm_cylchain.couplings.crosslink_tables import CrosslinkTable
 from openmm_cylchain.couplings.crosslinks import Crosslinks
+from openmm_cylchain.couplings.link_places import as_places
 from openmm_cylchain.engines.gpu_platforms import GPU_PLATFORMS
 from openmm_cylchain.output.reporters import CrosslinkReporter
 from support.contexts import energy_of, forces_of, new_context, new_simulation, positions_of
@@ -507,6 +508,35 @@ def test_reporter(tmp_path):
         reporter["energy"]
 
 
+@pytest.mark.parametrize("engine", ["compiled", "portable"])
+def test_rest_lengths_that_nearest_images_never_have_are_refused(engine):
+    # A point is farthest from another one's images where it is in the middle between eight of them.
+    box = np.array([[500.0, 0.0, 0.0], [200.0, 480.0, 0.0], [-100.0, 150.0, 600.0]])
+    farthest = 0.5 * np.sqrt(500.0**2 + 480.0**2 + 600.0**2)
+    filaments = Filaments(VISCOSITY, TEMPERATURE, engine=engine)
+    for y in (0.0, 40.0):
+        filaments.add_straight(F_ACTIN.with_segment_length(100.0), 3, [0.0, y, 0.0], [1.0, 0.0, 0.0])
+    _, system, positions = filaments.build(box_vectors=box)
+    message = f"rest length of .* never more than {farthest:.6g} nm apart"
+    too_long = Crosslinks(0.1, farthest + 1.0)
+    too_long.add(None, 0, 4)
+    with pytest.raises(InputError, match=message):
+        too_long.add_to(system, periodic=True)
+    links = Crosslinks(0.1, 10.0)
+    links.add_to(system, periodic=True)
+    context = new_context(system, positions)
+    table = links.table(context).with_links(as_places([(0, 4)]), 0.1, farthest + 1.0, np.inf)
+    for change in (
+        lambda: links.add(context, 0, 4, rest_length=farthest + 1.0),
+        lambda: links.add_many(context, [(0, 4), (1, 5)], rest_length=farthest + 1.0),
+        lambda: links.set_table(context, table),
+    ):
+        with pytest.raises(InputError, match=message):
+            change()
+        assert len(links.table(context)) == 0
+    links.add(context, 0, 4, rest_length=farthest - 1.0)
+
+
 def test_bad_input_is_refused():
     for arguments, message in (
         ((0, 1), "stiffness must be positive"),
@@ -516,6 +546,8 @@ def test_bad_input_is_refused():
         ((1, -1), "rest_length cannot be negative"),
         ((1, 1 * unit.kelvin), "rest_length has the unit"),
         ((1, 1, "spring"), "model must be one of harmonic, fene, but is 'spring'"),
+        ((1, 1, ["fene"]), "model must be one of harmonic, fene, but is"),
+        ((None, 1), "stiffness must be a number"),
         ((1, 1, "fene"), "maximum_extension must be given for model 'fene'"),
         ((1, 1, "harmonic", 1), "maximum_extension must be given for model 'fene', and only for it"),
         ((1, 1, "fene", 0), "maximum_extension must be positive"),
@@ -575,7 +607,7 @@ def test_bad_input_is_refused():
     longer = Crosslinks(1, 1e4)
     longer.add(None, 0, 1)
     with pytest.raises(
-        InputError, match="Crosslink 0 has a rest length of 10000 nm, but .* never more than 4.56419 nm apart"
+        InputError, match="Crosslink 0 has a rest length of 10000 nm, but .* never more than 2.59904 nm apart"
     ):
         longer.add_to(_particles(), periodic=True)
     longer.add_to(_particles(), periodic=False)

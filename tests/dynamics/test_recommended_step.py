@@ -362,6 +362,40 @@ def test_crosslinks_in_the_equations_bind_by_their_rest_length(first_only, model
     assert filaments.recommended_time_step(scheme, system=system).step == free.step
 
 
+@pytest.mark.parametrize("scheme", IMPLICIT_SCHEMES)
+@pytest.mark.parametrize("stiffness", [3.0, 100.0])
+def test_fene_links_without_a_rest_length_bind_by_their_length_in_equilibrium(stiffness, scheme):
+    count, extension = 100, 60.0
+    filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
+    kind = F_ACTIN.with_segment_length(100.0)
+    for pair in range(count):
+        for y in (0.0, 0.5):
+            filaments.add_straight(kind, 3, [0.0, y, 500.0 * pair], [1.0, 0.0, 0.0])
+    _, system, positions = filaments.build()
+    links = Crosslinks(stiffness, 0.0, "fene", extension)
+    for pair in range(count):
+        ends = (filaments.segment_place(2 * pair + k, segment=1) for k in (0, 1))
+        links.add(None, *ends)
+    links.add_to(system)
+    step = filaments.recommended_time_step(scheme, system=system)
+    assert "its length in equilibrium" in step.reason
+    friction = kind.segment_friction(VISCOSITY, TEMPERATURE, 3).perpendicular
+    assert step.step == pytest.approx(0.36 * 3 * KT / stiffness / (2 * KT * 2 / friction))
+    integrator = filaments.create_integrator(system, step, scheme, random_seed=1)
+    context = new_context(system, positions, integrator, "CPU")
+    integrator.step(100)
+    squares = np.empty((400, count))
+    for row in squares:
+        integrator.step(3)
+        row[:] = links.lengths(context) ** 2
+    assert integrator.getNumDividedSteps() <= 1e-4 * count * 1300
+    # The mean of u^2 with the weight (1-u^2)^(b/2) u^2, b = k D^2/k_B T.
+    ratio = squares.mean(axis=0) / (3.0 * extension**2 / (stiffness * extension**2 / KT + 5.0))
+    error = ratio.std(ddof=1) / np.sqrt(count)
+    assert error < 0.01
+    assert abs(ratio.mean() - 1.0) < 0.01 + SIGMAS * error
+
+
 def test_tethers_bind_where_they_are_explicit():
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
     filaments.add_straight(F_ACTIN, 4, [0, 0, 0], [1, 0, 0])
