@@ -286,7 +286,8 @@ class Ellipsoid(Shape):
     """The inside of an ellipsoid with axes along x, y and z.
 
     With s^2 the sum of (x_i/a_i)^2, the depth is taken as (s-1)/|grad s|, which is the distance from the surface to
-    first order.
+    first order. Where its rim is so sharp that a node moves by more than the radius of curvature in a step, steps are
+    divided.
 
     Parameters
     ----------

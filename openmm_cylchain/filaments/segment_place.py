@@ -14,6 +14,9 @@ class SegmentPlace:
     Where the two are neighbouring nodes of a filament of beam elements, it is on the curve between them, at the
     parameter ``fraction``: that share of the arc length where the element is as long as at rest.
 
+    Any two particles may be its ends. A force at a place between two that are not neighbours on a filament is explicit,
+    with all else that is in the same Force.
+
     ``Filaments.segment_place`` finds that of a filament, a segment and a fraction.
 
     Attributes
