@@ -131,14 +131,28 @@ def test_wrong_unit_names_the_quantity_and_both_units(value, target):
         in_units_of(value, target, "my quantity")
 
 
-@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, [1.0, math.nan], math.nan * unit.nanometer, None])
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, [1.0, math.nan], math.nan * unit.nanometer])
 def test_not_finite(value):
     with pytest.raises(InputError, match="my length must be finite"):
         in_units_of(value, quantities.LENGTH, "my length")
 
 
 @pytest.mark.parametrize(
-    "value", ["long", "1.5", True, [1.0, "2"], [True, False], {"a": 1}, object(), [[1, 2], [3]], 1j, np.array([1j])]
+    "value",
+    [
+        None,
+        [1.0, None],
+        "long",
+        "1.5",
+        True,
+        [1.0, "2"],
+        [True, False],
+        {"a": 1},
+        object(),
+        [[1, 2], [3]],
+        1j,
+        np.array([1j]),
+    ],
 )
 def test_not_a_number(value):
     with pytest.raises(InputError, match="my length"):
