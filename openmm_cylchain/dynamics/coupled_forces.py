@@ -47,7 +47,7 @@ class CoupledForces:
         contacts = as_capsule_contact_force(force)
         if contacts is None:
             places = table_of_force(force).places
-            return next(filter(None, (self._outside(*self._on_segments(places, side)) for side in (0, 1))), None)
+            return self._outside(*self._on_segments(places, 0)) or self._outside(*self._on_segments(places, 1))
         first, second = [], []
         for chain in range(contacts.getNumChains()):
             particles = np.array(contacts.getChainParticles(chain), dtype=int)
