@@ -7,6 +7,7 @@ move accordingly.
 
 import math
 import warnings
+from collections.abc import Collection
 
 import numpy as np
 import numpy.typing as npt
@@ -269,7 +270,8 @@ def contact_force(
     diameters = np.zeros(system.getNumParticles())
     for indices, value in zip(beads, filament_diameters(diameter, len(filaments))):
         diameters[indices] = value
-    diameters[outside_particles(filaments, system, particles)] = particle_diameters(particles, particle_diameter)
+    spheres = outside_particles(filaments, system, particles)
+    diameters[spheres] = particle_diameters(particles, particle_diameter)
     if stiffness is None:
         if filaments.temperature == 0.0:
             raise InputError("At a temperature of zero, a contact needs a stiffness.")
@@ -333,15 +335,15 @@ def _positive_array(value, count, name):
 def particle_diameters(particles: Indices, particle_diameter: Numbers | None) -> FloatArray:
     """Contact diameters in nm of particles outside filaments."""
     if particle_diameter is None:
-        if np.size(particles):
+        if len(particles):
             raise InputError("particles need a particle_diameter.")
         return np.zeros(0)
-    return _positive_array(particle_diameter, np.size(particles), "particle_diameter")
+    return _positive_array(particle_diameter, len(particles), "particle_diameter")
 
 
 def outside_particles(filaments: FilamentCollection, system: openmm.System, particles: Indices) -> IntArray:
     """Particles that take part in contacts, which are none of the filaments'; an InputError if they are not there."""
-    if np.ndim(particles) != 1:
+    if not isinstance(particles, Collection):
         raise InputError(f"particles must be a sequence of particle indices, but is {shown(particles)}.")
     count = system.getNumParticles()
     filled = [*filaments.node_indices, *filaments.control_point_indices, filaments.attachment_indices]
