@@ -8,13 +8,13 @@ particles that are not the ends of a segment, makes its force explicit: all of i
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 import openmm
 
 from ..couplings.capsule_contacts import as_capsule_contact_force
 from ..couplings.native_links import is_link_force, table_of_force
+from ..couplings.walls import as_filament_wall_force
 from ..filaments.collection import FilamentCollection
-from ..units.types import Indices, IntArray
+from ..kinetics.binding_force import find_binding_force, is_binding_force
 
 _NOWHERE = -1
 _SAME_WEIGHT = 1e-12
@@ -33,35 +33,37 @@ class CoupledForces:
     def __init__(self, system: openmm.System, filaments: FilamentCollection) -> None:
         self._system = system
         self._filaments = filaments
+        self._known: dict[int, str | None] = {}
 
-    def may_include(self, force: openmm.Force) -> bool:
-        """Whether a force is one of links or contacts that implicit schemes have in their equations if they can."""
-        return is_link_force(force) or as_capsule_contact_force(force) is not None
+    def may_include(self, index: int) -> bool:
+        """Whether a force, by its index, is one of links, contacts, walls or linkers: in the equations if it can be."""
+        force = self._system.getForce(index)
+        kinds = (as_capsule_contact_force(force), as_filament_wall_force(force))
+        return is_link_force(force) or is_binding_force(force) or any(kind is not None for kind in kinds)
 
-    def includes(self, force: openmm.Force) -> bool:
-        """Whether a force of links or contacts is in the equations of implicit schemes."""
-        return self.may_include(force) and self.place_outside(force) is None
+    def includes(self, index: int) -> bool:
+        """Whether a force, by its index, is in the equations of implicit schemes."""
+        return self.may_include(index) and self.place_outside(index) is None
 
-    def place_outside(self, force: openmm.Force) -> str | None:
-        """What makes a force of links or contacts explicit, in words; None if nothing does."""
-        contacts = as_capsule_contact_force(force)
-        if contacts is None:
+    def place_outside(self, index: int) -> str | None:
+        """What makes a force that may be included explicit, in words; None if nothing does."""
+        if index not in self._known:
+            self._known[index] = self._find_outside(self._system.getForce(index))
+        return self._known[index]
+
+    def _find_outside(self, force):
+        if is_link_force(force):
             places = table_of_force(force).places
             return self._outside(*self._on_segments(places, 0)) or self._outside(*self._on_segments(places, 1))
-        first, second = [], []
-        for chain in range(contacts.getNumChains()):
-            particles = np.array(contacts.getChainParticles(chain), dtype=int)
-            last = len(particles) - (0 if contacts.isChainClosed(chain) else 1)
-            first.append(particles[:last])
-            second.append(np.roll(particles, -1)[:last])
-        first.append(np.array([contacts.getSphereParticle(i) for i in range(contacts.getNumSpheres())], dtype=int))
-        second.append(np.full(len(first[-1]), _NOWHERE))
-        return self._outside(np.concatenate(first), np.concatenate(second))
-
-    def particle_outside(self, particles: Indices) -> str | None:
-        """The first of some particles at walls, or with anchors of linkers, that makes their force explicit."""
-        first = np.asarray(particles, dtype=int)
-        return self._outside(first, np.full(len(first), _NOWHERE))
+        contacts, wall = as_capsule_contact_force(force), as_filament_wall_force(force)
+        if contacts is not None:
+            return self._outside(*_capsules(contacts))
+        if wall is not None:
+            particles = [wall.getParticle(particle) for particle in range(wall.getNumParticles())]
+        else:
+            linkers = find_binding_force(self._system)
+            particles = [linkers.getAnchor(anchor)[0] for anchor in range(linkers.getNumAnchors())]
+        return self._outside(*_alone(particles))
 
     @cached_property
     def _is_virtual(self):
@@ -79,23 +81,28 @@ class CoupledForces:
 
     @cached_property
     def _is_on_curve(self):
-        result = np.zeros(self._system.getNumParticles(), dtype=bool)
-        for particle, one in zip(self._filaments.attachment_indices, self._filaments.attachments):
-            result[particle] = self._filaments[one.filament].type.has_beam_elements
-        return result
+        attachments = zip(self._filaments.attachment_indices, self._filaments.attachments)
+        return self._flags(particle for particle, one in attachments if self._has_beams(one.filament))
 
     @cached_property
     def _is_of_beam(self):
-        result = np.zeros(self._system.getNumParticles(), dtype=bool)
-        for filament, nodes in zip(self._filaments, self._filaments.node_indices):
-            result[nodes] = filament.type.has_beam_elements
-        return result
+        nodes = enumerate(self._filaments.node_indices)
+        return self._flags(particle for number, own in nodes if self._has_beams(number) for particle in own)
 
     @cached_property
     def _is_control_point(self):
+        return self._flags(particle for own in self._filaments.control_point_indices for particle in own)
+
+    @cached_property
+    def _is_node(self):
+        return self._flags(particle for own in self._filaments.node_indices for particle in own)
+
+    def _has_beams(self, filament):
+        return self._filaments[filament].type.has_beam_elements
+
+    def _flags(self, particles):
         result = np.zeros(self._system.getNumParticles(), dtype=bool)
-        for particles in self._filaments.control_point_indices:
-            result[particles] = True
+        result[np.fromiter(particles, dtype=int)] = True
         return result
 
     def _on_segments(self, places, side):
@@ -117,7 +124,7 @@ class CoupledForces:
         between = abs(sum(weights) - 1.0) < _SAME_WEIGHT and 0.0 <= weights[1] <= 1.0
         return ends if between and not np.any(self._is_of_beam[list(ends)]) else None
 
-    def _outside(self, first: IntArray, second: npt.NDArray[np.int64]) -> str | None:
+    def _outside(self, first, second):
         # Of particles (first), places between two, and points (-1).
         particle, between = (first >= 0) & (second < 0), second >= 0
         on_curve = self._is_on_curve[first] & (~between | self._is_on_curve[second])
@@ -133,7 +140,21 @@ class CoupledForces:
         return None
 
     def _is_fixed(self, particle):
-        nodes = self._filaments.node_indices
-        is_node = any(particle in own for own in (*nodes, *self._filaments.control_point_indices))
-        massless = self._system.getParticleMass(particle)._value == 0.0
-        return massless and not is_node and not self._is_virtual[particle]
+        moves = self._is_node[particle] or self._is_control_point[particle] or self._is_virtual[particle]
+        return not moves and self._system.getParticleMass(particle)._value == 0.0
+
+
+def _alone(particles):
+    first = np.array(particles, dtype=int)
+    return first, np.full(len(first), _NOWHERE)
+
+
+def _capsules(contacts):
+    # Segments between two particles, and spheres.
+    columns = [_alone([contacts.getSphereParticle(sphere) for sphere in range(contacts.getNumSpheres())])]
+    for chain in range(contacts.getNumChains()):
+        particles = np.array(contacts.getChainParticles(chain), dtype=int)
+        last = len(particles) - (0 if contacts.isChainClosed(chain) else 1)
+        columns.append((particles[:last], np.roll(particles, -1)[:last]))
+    first, second = zip(*columns)
+    return np.concatenate(first), np.concatenate(second)

@@ -45,6 +45,7 @@ def steps_of_couplings(
     system: openmm.System,
     temperature: float,
     particle_friction: Numbers | None = None,
+    coupled_forces: CoupledForces | None = None,
 ) -> list[TimeStep]:
     """The TimeSteps of the links and contacts of a System; none where they do not bind.
 
@@ -57,13 +58,15 @@ def steps_of_couplings(
         Of the bath, in K.
     particle_friction : energy*time/length^2, or array of them, optional
         As for ``Filaments.create_integrator``.
+    coupled_forces : CoupledForces, optional
+        Of the System, if it is known.
 
     Returns
     -------
     list of TimeStep
     """
-    forces = CoupledForces(system, filaments)
-    coupled = [(index, force) for index, force in enumerate(system.getForces()) if forces.includes(force)]
+    forces = coupled_forces or CoupledForces(system, filaments)
+    coupled = [(index, force) for index, force in enumerate(system.getForces()) if forces.includes(index)]
     kT = thermal_energy(temperature)
     if not coupled or kT == 0.0:
         return []

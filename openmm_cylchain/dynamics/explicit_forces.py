@@ -107,6 +107,8 @@ class ExplicitForces:
         Tethers are among these forces where it is explicit.
     particle_friction : energy*time/length^2, or array of them, optional
         As for ``Filaments.create_integrator``.
+    coupled_forces : CoupledForces, optional
+        Of the System, if it is known.
 
     Attributes
     ----------
@@ -121,19 +123,20 @@ class ExplicitForces:
         filaments: FilamentCollection,
         scheme: str,
         particle_friction: Numbers | None = None,
+        coupled_forces: CoupledForces | None = None,
     ) -> None:
         self._system = system
         self._filaments = filaments
         self._scheme = scheme
         self._other_friction = self._frictions(particle_friction)
-        self._coupled = CoupledForces(system, filaments)
         self._responses: dict[Any, PlaceResponse] = {}
         # Places between two particles that have none of their own, with numbers behind those of all particles.
         self._between: dict[tuple[int, int, float], int] = {}
         self.springs: list[Springs] = []
         unknown: list[str] = []
+        coupled = coupled_forces or CoupledForces(system, filaments)
         for index, force in enumerate(system.getForces()):
-            found = self._read(force, f"{force.getName()} (force {index})")
+            found = self._read(force, f"{force.getName()} (force {index})", index, coupled)
             if found is None:
                 unknown.append(f"{force.getName()} (force {index})")
             else:
@@ -361,7 +364,8 @@ class ExplicitForces:
         if self._filaments[number].type.has_beam_elements:
             # The line between two nodes is not on the curve.
             return None
-        if number != other or (minus + 1) % nodes != plus or not 0.0 <= weights[1] <= 1.0:
+        closes = self._filaments[number].closed and minus + 1 == nodes
+        if number != other or plus != (0 if closes else minus + 1) or not 0.0 <= weights[1] <= 1.0:
             return None
         return (number, minus, weights[1])
 
@@ -410,10 +414,10 @@ class ExplicitForces:
 
     # Forces
 
-    def _read(self, force, label):
+    def _read(self, force, label, index, coupled):
         # A list of Springs, or None where the stiffness is not known.
-        if self._scheme in IMPLICIT_SCHEMES and self._coupled.may_include(force):
-            outside = self._coupled.place_outside(force)
+        if self._scheme in IMPLICIT_SCHEMES and coupled.may_include(index):
+            outside = coupled.place_outside(index)
             if outside is None:
                 return []
             label = f"{label}, explicit because of {outside}"
@@ -422,7 +426,8 @@ class ExplicitForces:
             return self._between_capsules(label, capsules)
         wall = as_filament_wall_force(force)
         if wall is not None:
-            return self._at_wall(label, wall)
+            particles = [wall.getParticle(particle) for particle in range(wall.getNumParticles())]
+            return [Springs.at_points(label, "entry", particles, wall.getStiffness()._value)]
         links = Crosslinks.of_force(force)
         if links is not None or is_link_force(force):
             return None if links is None else self._crosslinks(links, label)
@@ -444,15 +449,6 @@ class ExplicitForces:
                 return []
         return None
 
-    def _at_wall(self, label, wall):
-        particles = [wall.getParticle(index) for index in range(wall.getNumParticles())]
-        if self._scheme in IMPLICIT_SCHEMES:
-            outside = self._coupled.particle_outside(particles)
-            if outside is None:
-                return []
-            label = f"{label}, explicit because of {outside}"
-        return [Springs.at_points(label, "entry", particles, wall.getStiffness()._value)]
-
     def _crosslinks(self, links, label):
         table = links.table(None)
         if len(table):
@@ -467,11 +463,6 @@ class ExplicitForces:
         stiffness = max((linkers.getLinkerTypeParameters(kind)[3] for kind in kinds), default=0.0)
         anchors = np.unique([linkers.getAnchor(index)[0] for index in range(linkers.getNumAnchors())]).astype(int)
         anchors = anchors[anchors != _NOWHERE]
-        if self._scheme in IMPLICIT_SCHEMES:
-            outside = self._coupled.particle_outside(anchors)
-            if outside is None:
-                return []
-            label = f"{label}, explicit because of {outside}"
         found = [self._to_come(label, "linker", stiffness)]
         if len(anchors):
             first, last = (int(self._filaments.node_indices[number][number]) for number in (0, -1))

@@ -42,11 +42,12 @@ def recommended_step_of(
     elif contact_stiffness is not None:
         raise InputError("A contact_stiffness needs a contact_diameter.")
     if system is not None:
-        steps += _steps_of_diffusion(filaments, system, temperature, confidence, scheme)
+        coupled = CoupledForces(system, filaments)
+        steps += _steps_of_diffusion(filaments, system, temperature, confidence, scheme, coupled)
         if scheme in IMPLICIT_SCHEMES:
-            steps += steps_of_couplings(filaments, system, temperature, particle_friction)
+            steps += steps_of_couplings(filaments, system, temperature, particle_friction, coupled)
         steps += steps_of_kinetics(filaments, system, scheme, temperature, particle_friction)
-        steps.append(ExplicitForces(system, filaments, scheme, particle_friction).recommended_step())
+        steps.append(ExplicitForces(system, filaments, scheme, particle_friction, coupled).recommended_step())
     return shortest(steps)
 
 
@@ -87,13 +88,12 @@ def _step_of_contacts(filaments, diameter, stiffness, confidence):
     return shortest(steps)
 
 
-def _steps_of_diffusion(filaments, system, temperature, confidence, scheme):
+def _steps_of_diffusion(filaments, system, temperature, confidence, scheme, coupled):
     # Of filaments that a contact force of the System keeps apart, unless it is in the equations of the step.
     found = {}
-    coupled = CoupledForces(system, filaments)
-    for force in system.getForces():
+    for index, force in enumerate(system.getForces()):
         capsules = as_capsule_contact_force(force)
-        if capsules is not None and not (scheme in IMPLICIT_SCHEMES and coupled.includes(force)):
+        if capsules is not None and not (scheme in IMPLICIT_SCHEMES and coupled.includes(index)):
             owners = {int(nodes[0]): filament for filament, nodes in zip(filaments, filaments.node_indices)}
             for chain in range(capsules.getNumChains()):
                 filament = owners.get(capsules.getChainParticles(chain)[0])

@@ -64,6 +64,7 @@ PLACES = {
     ),
     "segment that closes a ring": (SegmentPlace(4, 0, 0.5), {"closed": True}, None),
     "place off the segments": (SegmentPlace(0, 3, 0.5), {}, "the place between particles 0 and 3"),
+    "place from end to end": (SegmentPlace(4, 0, 0.5), {}, "the place between particles 4 and 0"),
     "place across a ring": (SegmentPlace(3, 0, 0.5), {"closed": True}, "the place between particles 3 and 0"),
     "virtual site off the segments": (10, {"sites": [(0, 3, 0.5)]}, "the place between particles 0 and 3"),
     "virtual site beyond a segment": (10, {"sites": [(1, 2, 1.5)]}, "virtual site 10"),
@@ -81,8 +82,8 @@ def test_a_stiff_link_is_as_stable_as_it_is_said_to_be(name):
     filaments, system, positions = two_filaments(**arguments)
     links = Crosslinks(STIFF, 0.0)
     links.add(None, 7, place)
-    force = links.add_to(system)
-    assert CoupledForces(system, filaments).place_outside(force) == outside
+    links.add_to(system)
+    assert CoupledForces(system, filaments).place_outside(system.getNumForces() - 1) == outside
     springs = ExplicitForces(system, filaments, "implicit").springs
     assert len(springs) == (0 if outside is None else 1)
     if outside is not None:
@@ -110,7 +111,7 @@ def test_one_place_makes_all_links_of_a_force_explicit_and_their_step_is_right()
     for pair in range(count):
         ends = (filaments.segment_place(2 * pair + k, segment=4) for k in (0, 1))
         links.add(None, *ends)
-    force = links.add_to(system)
+    links.add_to(system)
     alone = filaments.recommended_time_step(system=system)
     system.removeForce(system.getNumForces() - 1)
     again = Crosslinks(0.4, 0.0)
@@ -144,7 +145,7 @@ def test_spheres_at_virtual_sites_make_contacts_explicit():
     for particles, outside in (([10], None), ([12], "virtual site 12")):
         force = capsule_contact_force(filaments, system, 30.0, particles=particles, particle_diameter=30.0)
         index = system.addForce(force)
-        assert CoupledForces(system, filaments).place_outside(system.getForce(index)) == outside
+        assert CoupledForces(system, filaments).place_outside(index) == outside
         step = filaments.recommended_time_step(system=system)
         if outside is None:
             assert step.step == free.step
