@@ -59,12 +59,12 @@ public:
             stiffness += 6;
         }
     }
-    void advance(const double* forces, double share, bool* unfinished, double* moves) override {
+    void advance(const double* forces, const ShareOfChange& share, bool* unfinished, double* moves) override {
         if (forces != NULL)
             addForces(forces, moves);
         if (!joints.empty())
             softenJoints();
-        step->advance(y, iteration, active*splat<Real>(share));
+        step->advance(y, iteration, active*splat<Real>(share.part));
         iteration++;
         Real still = active;
         if (iteration >= LEAST_BEAM_ITERATIONS)

@@ -16,28 +16,6 @@ const double LEAST_DIFFERENCE = 1e-10;
 /** Capsules whose motion is noted together. */
 const int CHUNK_OF_MOTIONS = 512;
 
-/**
- * Whether capsules may pass through each other: from the distance of their axes at the end, or that and how much they
- * are apart at the start at least, and the sum of radii.
- */
-bool mayPass(const SegmentPair& start, const SegmentPair& end, double distance, double radii) {
-    return distance <= largestMotion(start, end)+(hasSphere(start) ? DEEP*radii : 0);
-}
-
-/** The gap of two capsules, signed if they have crossed. */
-double findGap(const SegmentPair& start, const SegmentPair& end, double radii) {
-    const double distance = sqrt(findNearestPoints(end).squared);
-    if (!mayPass(start, end, distance, radii))
-        return distance-radii;
-    Passage passage;
-    if (hasSphere(start))
-        return (findPassage(start, end, radii, passage) ? passage.distance : distance)-radii;
-    Crossing crossings[2];
-    if (findCrossings(start, end, crossings) > 0)
-        return end.between(crossings[0].s, crossings[0].t).dot(crossings[0].normal)-radii;
-    return distance-radii;
-}
-
 /** Where two segments touch: where they are nearest, or if they are nearly parallel at both ends of their overlap. */
 struct Places {
     bool parallel;

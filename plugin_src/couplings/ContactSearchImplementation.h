@@ -111,12 +111,6 @@ struct Candidates {
     }
 };
 
-/** By how much a point of one segment moves against one of the other, at most. */
-inline double largestMotion(const SegmentPair& start, const SegmentPair& end) {
-    const Vec3d dw = end.w-start.w, dp = end.p-start.p, dq = end.q-start.q;
-    return std::sqrt(largestOf(dw.squared(), (dw+dp).squared(), (dw-dq).squared(), (dw+dp-dq).squared()));
-}
-
 struct ContactSearch::Implementation {
     /** Where capsules are at both ends of a step: positions or, without them, what setMotion() has taken note of. */
     struct Ends {

@@ -290,6 +290,34 @@ inline bool findPassage(const SegmentPair& start, const SegmentPair& end, double
     return true;
 }
 
+/** By how much a point of one segment moves against one of the other, at most. */
+inline double largestMotion(const SegmentPair& start, const SegmentPair& end) {
+    const Vec3d dw = end.w-start.w, dp = end.p-start.p, dq = end.q-start.q;
+    return std::sqrt(std::max({dw.squared(), (dw+dp).squared(), (dw-dq).squared(), (dw+dp-dq).squared()}));
+}
+
+/**
+ * Whether capsules may pass through each other: from the distance of their axes at the end, or that and how much they
+ * are apart at the start at least, and the sum of radii.
+ */
+inline bool mayPass(const SegmentPair& start, const SegmentPair& end, double distance, double radii) {
+    return distance <= largestMotion(start, end)+(hasSphere(start) ? DEEP*radii : 0);
+}
+
+/** The gap of two capsules at the end, signed if they have crossed. */
+inline double findGap(const SegmentPair& start, const SegmentPair& end, double radii) {
+    const double distance = std::sqrt(findNearestPoints(end).squared);
+    if (!mayPass(start, end, distance, radii))
+        return distance-radii;
+    Passage passage;
+    if (hasSphere(start))
+        return (findPassage(start, end, radii, passage) ? passage.distance : distance)-radii;
+    Crossing crossings[2];
+    if (findCrossings(start, end, crossings) > 0)
+        return end.between(crossings[0].s, crossings[0].t).dot(crossings[0].normal)-radii;
+    return distance-radii;
+}
+
 } // namespace cylchain
 
 #endif /*CYLCHAIN_CROSSINGS_H_*/

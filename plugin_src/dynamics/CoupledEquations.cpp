@@ -37,6 +37,11 @@ const int CHUNK_OF_EQUATIONS = 256;
 
 } // namespace
 
+/** Whether an equation holds its places. */
+static bool isStiff(const CouplingEquation& equation) {
+    return equation.stiffness[0] != 0 || equation.stiffness[3] != 0 || equation.stiffness[5] != 0;
+}
+
 /** Whether the terms of the last iteration had the same places but for their fractions. */
 bool CoupledEquations::hasSamePlaces(const vector<CouplingEquation>& equations, const PackFlags& active,
             const Loop& loop) {
@@ -87,13 +92,14 @@ void CoupledEquations::sortPlaces(const vector<CouplingEquation>& equations, con
     gathered.terms.resize(count);
     gathered.partners.resize(count);
     gathered.coupled.assign(numPacks, 0);
+    joins = false;
     change.resize(3*count);
     found.resize(3*count);
     termOf.assign(2*equations.size(), -1);
     forPlaces([&] (const PlaceOnChain& place, size_t i, int side) {
         termOf[2*i+side] = firstOfNode[firstOfPack[place.pack]+place.node]++;
-        if (termOf[2*i+1-side] >= 0)
-            gathered.coupled[place.pack] = gathered.coupled[equations[i].places[1-side].pack] = 1;
+        if (termOf[2*i+1-side] >= 0 && isStiff(equations[i]))
+            gathered.coupled[place.pack] = gathered.coupled[equations[i].places[1-side].pack] = joins = true;
     });
     activeOfTerms = active;
     sortedPlaces.resize(termOf.size());
@@ -115,7 +121,7 @@ void CoupledEquations::gatherTerms(const vector<CouplingEquation>& equations, co
         const int i = number/2, side = number%2;
         const PlaceOnChain& place = equations[i].places[side];
         CouplingTerm& term = gathered.terms[termOf[number]];
-        gathered.partners[termOf[number]] = termOf[2*i+1-side];
+        gathered.partners[termOf[number]] = isStiff(equations[i]) ? termOf[2*i+1-side] : -1;
         term.node = place.node;
         term.lane = place.lane;
         term.fraction = place.fraction;
@@ -125,26 +131,15 @@ void CoupledEquations::gatherTerms(const vector<CouplingEquation>& equations, co
     });
 }
 
-bool CoupledEquations::solve(const vector<PackStep*>& packs, const PackFlags& active,
-            const vector<CouplingEquation>& equations, double kT, const Demands& demands, const Loop& loop) {
-    const int numPacks = packs.size();
-    const bool stiff = demands.demandingStiffness > STIFF;
-    const double tighter = min({demands.forTensions ? OF_TENSIONS : 1, stiff ? OF_STIFF/demands.demandingStiffness : 1,
-            OF_STIFF/max(OF_STIFF, demands.stiffness)});
-    gatherTerms(equations, active, loop);
-    loop(numPacks, [&] (int pack) {
-        if (pack+1 < numPacks && active[pack+1])
-            packs[pack+1]->prefetchStart();
-        const int first = gathered.first[pack];
-        if (active[pack])
-            packs[pack]->eliminate(gathered.terms.data()+first, gathered.count[pack], change.data()+3*first);
-    });
-    const double least = tighter*LEAST_ENERGY*kT*(stiff ? 1 : count(active.begin(), active.end(), 1));
+/** Find the forces on places that make up for what joins them, where they move so without; false if single precision
+ * was asked for, and did not do. */
+bool CoupledEquations::findForces(const vector<PackStep*>& packs, const Demands& demands,
+            const vector<double>& ofPlaces, vector<double>& forces, const Loop& loop) {
     // What is stiff, or must be right in tensions, needs more digits.
-    const bool trySingle = demands.single && !demands.forTensions && !stiff;
+    const bool trySingle = demands.single && !demands.forTensions && !(demands.demandingStiffness > STIFF);
     auto solveIn = [&] (auto& gradients) {
-        const bool solved = gradients.solve(packs, gathered, tighter*demands.tolerance, least, change, found, loop);
-        iterations = gradients.getNumIterations();
+        const bool solved = gradients.solve(packs, gathered, tighter*demands.tolerance, least, ofPlaces, forces, loop);
+        iterations += gradients.getNumIterations();
         hasFound = gradients.hasFound();
         return solved;
     };
@@ -154,7 +149,94 @@ bool CoupledEquations::solve(const vector<PackStep*>& packs, const PackFlags& ac
     return solved || !trySingle;
 }
 
-void CoupledEquations::advance(const vector<PackStep*>& packs, const PackFlags& active, double share,
+/** Add how forces on places move them. */
+void CoupledEquations::addResponses(const vector<PackStep*>& packs, const vector<double>& forces,
+            vector<double>& ofPlaces, const Loop& loop) const {
+    loop(packs.size(), [&] (int pack) {
+        if (gathered.count[pack] == 0)
+            return;
+        static thread_local vector<double> move;
+        const int first = 3*gathered.first[pack], last = 3*gathered.first[pack+1];
+        move.resize(last-first);
+        packs[pack]->respond(forces.data()+first, move.data());
+        for (int i = first; i < last; i++)
+            ofPlaces[i] += move[i-first];
+    });
+}
+
+/** Find how the first places of equations from a number on move against the second ones. */
+void CoupledEquations::findMoves(size_t firstEquation, const vector<double>& ofPlaces, vector<double>& result,
+            const Loop& loop) const {
+    const int numEquations = termOf.size()/2-firstEquation;
+    result.resize(3*(size_t) numEquations);
+    runInChunks(loop, numEquations, CHUNK_OF_EQUATIONS, [&] (int i) {
+        const int* const own = &termOf[2*(firstEquation+i)];
+        for (int side = 0; side < 2 && i+AHEAD < numEquations; side++)
+            if (const int ahead = own[2*AHEAD+side]; ahead >= 0)
+                prefetch(&ofPlaces[TermBlocks::place(ahead, 1)]);
+        const int first = own[0], second = own[1];
+        for (int k = 0; k < 3; k++)
+            result[3*i+k] = (first >= 0 ? ofPlaces[TermBlocks::place(first, k)] : 0)-
+                    (second >= 0 ? ofPlaces[TermBlocks::place(second, k)] : 0);
+    });
+}
+
+bool CoupledEquations::solve(const vector<PackStep*>& packs, const PackFlags& active,
+            const vector<CouplingEquation>& equations, double kT, const Demands& demands, const Loop& loop) {
+    const int numPacks = packs.size();
+    const bool stiff = demands.demandingStiffness > STIFF;
+    tighter = min({demands.forTensions ? OF_TENSIONS : 1, stiff ? OF_STIFF/demands.demandingStiffness : 1,
+            OF_STIFF/max(OF_STIFF, demands.stiffness)});
+    gatherTerms(equations, active, loop);
+    loop(numPacks, [&] (int pack) {
+        if (pack+1 < numPacks && active[pack+1])
+            packs[pack+1]->prefetchStart();
+        const int first = gathered.first[pack];
+        if (active[pack])
+            packs[pack]->eliminate(gathered.terms.data()+first, gathered.count[pack], change.data()+3*first);
+    });
+    least = tighter*LEAST_ENERGY*kT*(stiff ? 1 : count(active.begin(), active.end(), 1));
+    iterations = 0;
+    return findForces(packs, demands, change, found, loop);
+}
+
+void CoupledEquations::predictMoves(const vector<PackStep*>& packs, size_t first, const Loop& loop) {
+    if (!hasFound) {
+        findMoves(first, change, moves, loop);
+        return;
+    }
+    pushed = change;
+    addResponses(packs, found, pushed, loop);
+    findMoves(first, pushed, moves, loop);
+}
+
+void CoupledEquations::push(const vector<PackStep*>& packs, size_t firstEquation, const vector<double>& loads,
+            const Demands& demands, const Loop& loop) {
+    vector<double> ownForces(change.size(), 0.0);
+    for (size_t i = firstEquation; 2*i < termOf.size(); i++)
+        for (int side = 0; side < 2; side++)
+            for (int k = 0; k < 3 && termOf[2*i+side] >= 0; k++)
+                ownForces[TermBlocks::place(termOf[2*i+side], k)] = (side == 0 ? 1 : -1)*loads[3*(i-firstEquation)+k];
+    pushed.assign(change.size(), 0.0);
+    addResponses(packs, ownForces, pushed, loop);
+    if (!exchange(hasFound, true))
+        fill(found.begin(), found.end(), 0.0);
+    if (joins) {
+        foundByPush.resize(change.size());
+        findForces(packs, demands, pushed, foundByPush, loop);
+        if (hasFound) {
+            addResponses(packs, foundByPush, pushed, loop);
+            for (size_t i = 0; i < found.size(); i++)
+                found[i] += foundByPush[i];
+        }
+        hasFound = true;
+    }
+    for (size_t i = 0; i < found.size(); i++)
+        found[i] += ownForces[i];
+    findMoves(firstEquation, pushed, pushedMoves, loop);
+}
+
+void CoupledEquations::advance(const vector<PackStep*>& packs, const PackFlags& active, const ShareOfChange& share,
             LaneFlags& unfinished, const Loop& loop) {
     loop(packs.size(), [&] (int pack) {
         if (pack+1 < (int) packs.size() && active[pack+1])
@@ -164,17 +246,7 @@ void CoupledEquations::advance(const vector<PackStep*>& packs, const PackFlags& 
             packs[pack]->advance(hasFound ? found.data()+first : NULL, share, unfinished[pack].get(),
                     change.data()+first);
     });
-    const int numEquations = termOf.size()/2;
-    moves.resize(3*(size_t) numEquations);
-    runInChunks(loop, numEquations, CHUNK_OF_EQUATIONS, [&] (int i) {
-        for (int side = 0; side < 2 && i+AHEAD < numEquations; side++)
-            if (const int ahead = termOf[2*(i+AHEAD)+side]; ahead >= 0)
-                prefetch(&change[TermBlocks::place(ahead, 1)]);
-        const int first = termOf[2*i], second = termOf[2*i+1];
-        for (int k = 0; k < 3; k++)
-            moves[3*i+k] = (first >= 0 ? change[TermBlocks::place(first, k)] : 0)-
-                    (second >= 0 ? change[TermBlocks::place(second, k)] : 0);
-    });
+    findMoves(0, change, moves, loop);
 }
 
 void CoupledEquations::findCompliancesOfTerms(const vector<PackStep*>& packs, const Loop& loop) {

@@ -56,10 +56,39 @@ public:
      */
     bool solve(const std::vector<PackStep*>& packs, const PackFlags& active,
             const std::vector<CouplingEquation>& equations, double kT, const Demands& demands, const Loop& loop);
+    /** Find how the places of equations from a number on will move against each other, before advance(). */
+    void predictMoves(const std::vector<PackStep*>& packs, std::size_t first, const Loop& loop);
+    /**
+     * Add forces on the places of some equations, which join no places, to those of the equations that have been solved.
+     *
+     * @param first  the first of these equations; they are the last ones
+     * @param loads  the force on the first place of each, opposite to that on the second: three numbers
+     */
+    void push(const std::vector<PackStep*>& packs, std::size_t first, const std::vector<double>& loads,
+            const Demands& demands, const Loop& loop);
+    /** For each of these equations, how much more its first place moves against the second with them. */
+    const std::vector<double>& getPushedMoves() const {
+        return pushedMoves;
+    }
+    /** The terms of a pack: the first of them, and how many there are. */
+    int firstTerm(int pack) const {
+        return gathered.first[pack];
+    }
+    int countTerms(int pack) const {
+        return gathered.count[pack];
+    }
+    /** The term of an equation's side. */
+    int getTerm(std::size_t equation, int side) const {
+        return termOf[2*equation+side];
+    }
+    /** Whether any equation joins two places. */
+    bool joinsPlaces() const {
+        return joins;
+    }
     /** End the iteration of the packs that take part, with a share of the changes. */
-    void advance(const std::vector<PackStep*>& packs, const PackFlags& active, double share, LaneFlags& unfinished,
+    void advance(const std::vector<PackStep*>& packs, const PackFlags& active, const ShareOfChange& share, LaneFlags& unfinished,
             const Loop& loop);
-    /** For each equation, how much its first place moved against the second with all of the changes: three numbers. */
+    /** For each equation, how much its first place moves against the second with all of the changes: three numbers. */
     const std::vector<double>& getMoves() const {
         return moves;
     }
@@ -82,6 +111,12 @@ private:
     void sortPlaces(const std::vector<CouplingEquation>& equations, const PackFlags& active);
     void gatherTerms(const std::vector<CouplingEquation>& equations, const PackFlags& active,
             const Loop& loop);
+    bool findForces(const std::vector<PackStep*>& packs, const Demands& demands, const std::vector<double>& ofPlaces,
+            std::vector<double>& forces, const Loop& loop);
+    void addResponses(const std::vector<PackStep*>& packs, const std::vector<double>& forces,
+            std::vector<double>& ofPlaces, const Loop& loop) const;
+    void findMoves(std::size_t first, const std::vector<double>& ofPlaces, std::vector<double>& result,
+            const Loop& loop) const;
     void findCompliancesOfTerms(const std::vector<PackStep*>& packs, const Loop& loop);
     /** One for each place on a chain. */
     CoupledTerms gathered;
@@ -94,12 +129,13 @@ private:
     std::vector<SortedPlace> sortedPlaces;
     PackFlags activeOfTerms;
     /** In blocks of terms: how places move without what joins them, and then with it, and the forces found. */
-    std::vector<double> change, found;
-    /** Whether there are such forces. */
-    bool hasFound = false;
+    std::vector<double> change, found, pushed, foundByPush;
+    /** Whether there are such forces, and whether any equation joins two places. */
+    bool hasFound = false, joins = false;
+    double least = 0, tighter = 1;
     ConjugateGradients<float> single;
     ConjugateGradients<double> twice;
-    std::vector<double> moves, compliancesOfTerms, jointStiffness;
+    std::vector<double> moves, pushedMoves, compliancesOfTerms, jointStiffness;
     std::vector<int> firstOfPack, firstOfNode;
     int iterations = 0;
 };

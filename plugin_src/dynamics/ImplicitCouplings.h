@@ -1,7 +1,7 @@
 #ifndef CYLCHAIN_IMPLICIT_COUPLINGS_H_
 #define CYLCHAIN_IMPLICIT_COUPLINGS_H_
 
-#include "dynamics/CoupledEquations.h"
+#include "dynamics/ReflectedGaps.h"
 #include <utility>
 #include <vector>
 
@@ -42,14 +42,16 @@ public:
     /** Describe the start of a step, and draw its noise. */
     virtual void begin(const CoupledStart& start, const Loop& loop) = 0;
     /** Begin a stage, see PackStep. The end of the stage before is where particles have been moved to. */
-    virtual void beginStage(int stage, int numStages, const double* moved) = 0;
+    virtual void beginStage(int, int, const double*) {
+    }
     /**
      * Add the equations of an iteration, linearised where particles have been moved to. Those between packs that take
      * no part may be left out.
      *
      * @param moved  positions after the last iteration, three doubles for each particle
      */
-    virtual void linearise(int iteration, const double* moved, std::vector<CouplingEquation>& equations) = 0;
+    virtual void linearise(int, const double*, std::vector<CouplingEquation>&) {
+    }
     /** Whether setCompliances() is to be called after the first iteration has been solved. */
     virtual bool needsCompliances() const {
         return false;
@@ -80,7 +82,18 @@ public:
      * @param moved  where particles are now
      * @return whether another iteration is needed
      */
-    virtual bool finishIteration(const double* moves, const double* moved) = 0;
+    virtual bool finishIteration(const double*, const double*) {
+        return false;
+    }
+    /**
+     * Add gaps that may be closed where an iteration has led, and find where those that are known are now.
+     *
+     * @param settled  whether chains and other couplings have converged, and gaps where they are known
+     * @return whether another iteration is needed, whatever the gaps are
+     */
+    virtual bool findGaps(int, bool, const double*, ReflectedGaps&) {
+        return false;
+    }
     /**
      * Whether packs that have converged may rest while others go on. It is worthwhile where few packs go on for long,
      * and wrong where couplings are so stiff that one of their places must not move alone.

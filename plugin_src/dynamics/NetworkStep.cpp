@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <cstddef>
 #include <numeric>
+#include <cstdio>
+#include <cstdlib>
 
 using namespace cylchain;
 using namespace std;
@@ -17,6 +19,8 @@ const int NEWTON_ITERATIONS_OF_TURNING_LINKS = 50;
  */
 const int UNDAMPED_ITERATIONS = 14;
 const double DAMPING = 0.6;
+/** How far an iteration turns segments, in rad, with forces that are found where they have not turned. */
+const double LARGEST_TURN = 0.25;
 /** A step is divided into at most two to this power. */
 const int LARGEST_DIVISION = 10;
 
@@ -58,14 +62,14 @@ void NetworkStep::setForces(const CoupledForces& forces, const double* box) {
         const CoupledForces::Contacts& own = forces.contacts[i];
         if (!contacts[i])
             contacts[i].reset(new ContactEquations());
-        contacts[i]->setContacts(own.search, own.stiffness, own.periodic ? box : NULL, *own.onCurves);
+        contacts[i]->setContacts(own.search, own.stiffness, own.periodic ? box : NULL, *own.onCurves, i);
         couplings.push_back(contacts[i].get());
     }
     walls.resize(max(walls.size(), forces.walls.size()));
     for (size_t i = 0; i < forces.walls.size(); i++) {
         if (!walls[i])
             walls[i].reset(new WallEquations());
-        walls[i]->setWalls(forces.walls[i]);
+        walls[i]->setWalls(forces.walls[i], forces.contacts.size()+i);
         couplings.push_back(walls[i].get());
     }
 }
@@ -155,6 +159,7 @@ bool NetworkStep::attempt(const Attempt& attempt, double* displacements, vector<
     const CoupledStart start = {attempt.positions, attempt.settings, places, attempt.taken, active};
     for (ImplicitCouplings* own : couplings)
         own->begin(start, attempt.loop);
+    gaps.begin(attempt.settings, places);
     copy(attempt.positions, attempt.positions+moved.size(), moved.begin());
     const int numStages = steps.empty() ? 0 : steps[0]->getNumStages();
     bool solved = true;
@@ -173,6 +178,14 @@ bool NetworkStep::attempt(const Attempt& attempt, double* displacements, vector<
     }
     for (const ImplicitCouplings* own : couplings)
         own->findFailures(moved.data(), failed);
+    gaps.findFailures(failed);
+    if (getenv("GAPDEBUG")) {
+        vector<bool> a(failed.size()), b(failed.size());
+        for (const ImplicitCouplings* own : couplings) own->findFailures(moved.data(), a);
+        gaps.findFailures(b);
+        int c = 0; for (size_t i = 0; i < failed.size(); i++) c += failed[i];
+        if (c) { fprintf(stderr, "level %d solved %d its %d failed %d by couplings %d gaps %d\n", attempt.settings.level, solved, iterations, c, (int) count(a.begin(), a.end(), true), (int) count(b.begin(), b.end(), true)); gaps.dump(); }
+    }
     // Where couplings alone have not converged, nobody knows whose they are.
     if (!solved && find(failed.begin(), failed.end(), true) == failed.end())
         failed = attempt.taken;
@@ -211,6 +224,7 @@ bool NetworkStep::iterate(const Attempt& attempt, int stage) {
             couplings[i]->linearise(iteration, moved.data(), equations);
         }
         first[couplings.size()] = equations.size();
+        gaps.addEquations(equations);
         // What the first stage takes for taut segments stays as it is for the second one.
         demands.forTensions = iteration == 0 && stage == 0 && steps[0]->getNumStages() > 1;
         if (!coupled.solve(stepsOfPacks, active, equations, attempt.settings.kT, demands, attempt.loop))
@@ -225,7 +239,11 @@ bool NetworkStep::iterate(const Attempt& attempt, int stage) {
                         couplings[i]->setCompliances(compliances.data()+12*first[i]);
             }
         }
-        const double share = iteration < UNDAMPED_ITERATIONS ? 1 : DAMPING;
+        gaps.push(stepsOfPacks, coupled, demands, attempt.loop);
+        ShareOfChange share;
+        share.part = iteration < UNDAMPED_ITERATIONS ? 1 : DAMPING;
+        if (gaps.size() > 0)
+            share.largestTurn = LARGEST_TURN;
         coupled.advance(stepsOfPacks, active, share, unfinished, attempt.loop);
         iterations++;
         attempt.loop(numPacks, [&] (int pack) {
@@ -233,7 +251,15 @@ bool NetworkStep::iterate(const Attempt& attempt, int stage) {
                 steps[pack]->getPositions(attempt.positions, moved.data());
         });
         placeSites(moved.data());
-        if (!finishIteration(first))
+        const bool any = finishIteration(first);
+        auto findGaps = [&] (bool settled) {
+            bool more = false;
+            for (ImplicitCouplings* own : couplings)
+                more |= own->findGaps(iteration, settled, moved.data(), gaps);
+            return more;
+        };
+        const bool more = findGaps(false), unfinished = gaps.anyUnfinished();
+        if (!any && !unfinished && (!more || (!findGaps(true) && !gaps.anyUnfinished())))
             return true;
     }
     return false;

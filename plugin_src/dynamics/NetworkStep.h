@@ -76,6 +76,7 @@ private:
     std::vector<std::unique_ptr<PackStep> > steps;
     std::vector<PackStep*> stepsOfPacks;
     CoupledEquations coupled;
+    ReflectedGaps gaps;
     std::vector<CouplingEquation> equations;
     /** Where those of each kind of couplings begin. */
     std::vector<std::size_t> firstEquations;

@@ -62,7 +62,7 @@ public:
     void findCompliances(double* compliances) override {
         step->getEquations().findResponses(UseOfResponses<W, CLOSED, true>(terms, numTerms, compliances));
     }
-    void advance(const double* forces, double share, bool* unfinished, double* moves) override {
+    void advance(const double* forces, const ShareOfChange& share, bool* unfinished, double* moves) override {
         takeWorkspace();
         if (forces != NULL && numTerms > 0) {
             spreadForces(forces);
@@ -70,7 +70,7 @@ public:
             step->getEquations().addForcesOfOthers();
             gatherMoves(step->getChange(), moves);
         }
-        step->advance(y, iteration, active*splat<Real>(share));
+        step->advance(y, iteration, active*shareOf(share));
         step->getEquations().setForcesOfOthers(NULL);
         iteration++;
         for (int i = 0; i < W; i++)
@@ -130,6 +130,20 @@ private:
                 function(3*particle+2, lane(y[node].z, i));
             }
         });
+    }
+    Real shareOf(const ShareOfChange& share) {
+        const Real part = splat<Real>(share.part);
+        if (iteration == 0 || !(share.largestTurn < HUGE_VAL))
+            return part;
+        const Vec* const change = step->getChange();
+        Real largest = Real{};
+        for (int s = 0; s < pack.segments; s++) {
+            const Vec difference = change[s+1]-change[s];
+            const Real inverse = property<Real>(pack, s, Pack::InverseRestLength);
+            largest = larger<Real>(largest, difference.dot(difference)*(inverse*inverse));
+        }
+        const Real turn = splat<Real>(share.largestTurn);
+        return part*(turn/larger<Real>(root(largest), turn));
     }
     /** Use memory that the packs of a thread share: it stays in the nearest cache. */
     void takeWorkspace() {

@@ -3,6 +3,7 @@
 
 #include "dynamics/ChainEngine.h"
 #include "dynamics/TermBlocks.h"
+#include <cmath>
 
 namespace cylchain {
 
@@ -16,6 +17,11 @@ struct CouplingTerm {
     /** Of the segment; of a beam element, see ElementPlace.h. */
     double fraction;
     double force[3], stiffness[6];
+};
+
+/** How much of its change an iteration makes: a part, or less where that would turn a segment by more than so far. */
+struct ShareOfChange {
+    double part = 1, largestTurn = HUGE_VAL;
 };
 
 /**
@@ -76,11 +82,11 @@ public:
      * End the iteration: add what forces on the places of the terms do, and move the nodes.
      *
      * @param forces      on the places of the terms, or NULL if there are none
-     * @param share       how much of the change of nodes to make
+     * @param share       how much of the change of nodes to make, and how far it may turn a segment
      * @param unfinished  receives, for each lane, whether another iteration is needed
      * @param moves       receives the change of each term's place with these forces, if there are any
      */
-    virtual void advance(const double* forces, double share, bool* unfinished, double* moves) = 0;
+    virtual void advance(const double* forces, const ShareOfChange& share, bool* unfinished, double* moves) = 0;
     /** Find lanes a segment of which changes by too much, so that the step must be divided. */
     virtual void findExcessiveChanges(bool* failed) const = 0;
     /** Write where the nodes of the lanes that take the step are, if they began at some positions. */

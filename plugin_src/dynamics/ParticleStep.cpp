@@ -138,7 +138,7 @@ void ParticleStep::findCompliances(double* compliances) {
         copy_n(&inverse[6*terms[i].lane], 6, compliances+6*i);
 }
 
-void ParticleStep::advance(const double* onPlaces, double share, bool* unfinished, double* moves) {
+void ParticleStep::advance(const double* onPlaces, const ShareOfChange& share, bool* unfinished, double* moves) {
     if (onPlaces != NULL) {
         gatherForces(onPlaces);
         for (size_t i = 0; i < particles.size(); i++) {
@@ -153,7 +153,7 @@ void ParticleStep::advance(const double* onPlaces, double share, bool* unfinishe
         // The equations are linear: couplings decide whether another iteration is needed.
         unfinished[i] = false;
         for (int k = 0; k < 3 && taken[i]; k++)
-            moved[3*i+k] += share*change[3*i+k];
+            moved[3*i+k] += share.part*change[3*i+k];
     }
 }
 

@@ -29,7 +29,7 @@ public:
     void respond(const double* forces, double* moves) override;
     void respond(const float* forces, float* moves) override;
     void findCompliances(double* compliances) override;
-    void advance(const double* forces, double share, bool* unfinished, double* moves) override;
+    void advance(const double* forces, const ShareOfChange& share, bool* unfinished, double* moves) override;
     void findExcessiveChanges(bool* failed) const override;
     void getPositions(const double* start, double* positions) const override;
     void getDisplacements(double* displacements) const override;

@@ -1,0 +1,81 @@
+#include "dynamics/Gap.h"
+#include <algorithm>
+#include <cmath>
+
+using namespace cylchain;
+using namespace std;
+
+namespace {
+
+/** From this depth on, over the thermal one, a gap is held by a spring. */
+const double DEEP_GAP = 6;
+/** Chains of links and linkers are numbers of forces: with this bit, the numbers are those of gaps. */
+const uint32_t OF_GAPS = 0x80000000u;
+/** The draws of four words each: the first has depths, then come those of reflections and of normal numbers. */
+const int FIRST_REFLECTIONS = 1, FIRST_NORMALS = 64;
+
+double uniformOf(uint32_t word) {
+    return (word+0.5)/4294967296.0;
+}
+
+} // namespace
+
+uint32_t GapNoise::drawWord(const Gap& gap, int number) const {
+    const uint32_t chain = gap.key[0] | OF_GAPS, part = gap.key[1];
+    uint32_t words[4];
+    drawWords(step, NoiseKind::Link, number/4, &chain, &part, 1, words);
+    return words[number%4];
+}
+
+double GapNoise::drawDepth(const Gap& gap) const {
+    return -log(uniformOf(drawWord(gap, 0)));
+}
+
+double GapNoise::drawFirstReflection(const Gap& gap) const {
+    return -log(uniformOf(drawWord(gap, 4*FIRST_REFLECTIONS)));
+}
+
+void GapNoise::draw(const Gap* gaps, int count, int parts, double* reflections, double* normals) const {
+    vector<uint32_t> chains(count), keys(count), words(4*(size_t) count);
+    for (int i = 0; i < count; i++) {
+        chains[i] = gaps[i].key[0] | OF_GAPS;
+        keys[i] = gaps[i].key[1];
+    }
+    auto drawFour = [&] (int draw) {
+        drawWords(step, NoiseKind::Link, draw, chains.data(), keys.data(), count, words.data());
+    };
+    for (int part = 0; part < parts; part += 4) {
+        drawFour(FIRST_REFLECTIONS+part/4);
+        for (int i = 0; i < count; i++)
+            for (int k = 0; k < min(4, parts-part); k++)
+                reflections[i*parts+part+k] = -log(uniformOf(words[4*i+k]));
+    }
+    // One draw has the numbers of two parts for both places.
+    for (int part = 0; part < parts; part += 2) {
+        drawFour(FIRST_NORMALS+part/2);
+        for (int i = 0; i < count; i++)
+            for (int side = 0; side < 2; side++) {
+                const uint32_t* const own = &words[4*i+2*side];
+                double* const to = &normals[(2*i+side)*parts+part];
+                const double size = sqrt(-2*log(uniformOf(own[0]))), angle = 2*M_PI*uniformOf(own[1]);
+                to[0] = size*cos(angle);
+                if (part+1 < parts)
+                    to[1] = size*sin(angle);
+            }
+    }
+}
+
+double cylchain::placeHardSurface(double kT, double variate, double begun, Gap& gap) {
+    const double variance = kT/gap.stiffness, inside = min(begun, 0.0);
+    double depth = 0;
+    if (kT == 0)
+        gap.law = GapLaw::SpringBehind;
+    else if (inside*inside > DEEP_GAP*DEEP_GAP*variance)
+        gap.law = GapLaw::Spring;
+    else {
+        gap.law = GapLaw::Reflection;
+        depth = sqrt(inside*inside+2*variance*variate);
+    }
+    gap.start = begun+depth;
+    return depth;
+}

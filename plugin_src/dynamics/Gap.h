@@ -1,0 +1,96 @@
+#ifndef CYLCHAIN_GAP_H_
+#define CYLCHAIN_GAP_H_
+
+#include "dynamics/ChainPlaces.h"
+#include "lanes/Noise.h"
+#include <cstdint>
+#include <vector>
+
+namespace cylchain {
+
+/** How a gap is held open in a step: see ReflectedGaps. */
+enum class GapLaw {
+    /** By a hard surface at a random depth behind the soft one. */
+    Reflection,
+    /** By a spring on both sides of the surface: what begins deep behind it stays there. */
+    Spring,
+    /** By the same spring behind the surface alone, where nothing moves thermally. */
+    SpringBehind
+};
+
+/** Where a force on a gap acts: on the first place along the gradient, and on the second one against it. */
+struct GapLever {
+    PlaceOnChain places[2];
+    /** How the gap changes when the first place moves against the second, times the share of the force. */
+    double gradient[3] = {};
+};
+
+/** The gap of a contact, or of a particle before a wall, in a step. */
+struct Gap {
+    /** One lever half-way through the step, or two, at its start and its end, each with half of the force. */
+    GapLever levers[2];
+    int numLevers = 1;
+    /** At the start, and where the last iteration has led, from where the surface is hard. */
+    double start = 0, end = 0;
+    /** The stiffness of the surface. */
+    double stiffness = 0;
+    /** About how far a force on the gap moves it, or more. */
+    double response = 0;
+    GapLaw law = GapLaw::Reflection;
+    /** Whether it is a gap in this iteration: capsules may come to touch elsewhere. */
+    bool present = true;
+    /** What its random numbers belong to. */
+    std::uint32_t key[2] = {};
+    /** How a force along the gradient turns with the first place: a symmetric matrix for a unit force, or zero. */
+    double turning[6] = {};
+    /** The pack of one of the chains of which it is a gap, by side, or -1. */
+    int packOf(int side) const {
+        return levers[0].places[side].pack;
+    }
+    int chainOf(int side) const {
+        return levers[0].places[side].chain;
+    }
+};
+
+/** The random numbers of gaps in a step. */
+class GapNoise {
+public:
+    GapNoise() = default;
+    explicit GapNoise(const NoiseKey& step) : step(step) {
+    }
+    /** Draw the exponential variate, of mean one, by which the depth of the hard surface is found. */
+    double drawDepth(const Gap& gap) const;
+    /** Draw the exponential variate of the first part. */
+    double drawFirstReflection(const Gap& gap) const;
+    /**
+     * Draw numbers for the parts of a step, one after the other for each gap.
+     *
+     * @param gaps         some gaps
+     * @param reflections  receives exponential variates, of mean one
+     * @param normals      receives normal numbers, first for the one place of each gap and then for the other
+     */
+    void draw(const Gap* gaps, int count, int parts, double* reflections, double* normals) const;
+private:
+    std::uint32_t drawWord(const Gap& gap, int number) const;
+    NoiseKey step = {};
+};
+
+/**
+ * Decide how a gap is held open, and measure its start from there.
+ *
+ * The potential k g^2/2 of a gap g < 0 is that of hard surfaces: exp(-k g^2/2 k_B T) is the chance that a surface at the
+ * depth D with k D^2/2 k_B T > E' for an exponential variate E' is not reached. So one is drawn that is consistent with
+ * the start, D^2 = min(g, 0)^2+2 k_B T E'/k, and the start is g+D from it. What begins more than DEEP_GAP times
+ * (k_B T/k)^(1/2) behind the surface is held by the spring itself: that far from zero, both are the same in equilibrium,
+ * and what nothing presses comes out.
+ *
+ * @param variate  E'
+ * @param begun    g at the start
+ * @param gap      its stiffness is known; receives its law and start
+ * @return D: by how much gaps are longer from the hard surface
+ */
+double placeHardSurface(double kT, double variate, double begun, Gap& gap);
+
+} // namespace cylchain
+
+#endif /*CYLCHAIN_GAP_H_*/

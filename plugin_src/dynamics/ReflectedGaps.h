@@ -1,0 +1,119 @@
+#ifndef CYLCHAIN_REFLECTED_GAPS_H_
+#define CYLCHAIN_REFLECTED_GAPS_H_
+
+#include "dynamics/CoupledEquations.h"
+#include "dynamics/Gap.h"
+#include <cstddef>
+#include <vector>
+
+namespace cylchain {
+
+/**
+ * The forces of contacts and walls in an implicit step.
+ *
+ * Let the step without them be linear and reversible, with the equilibrium k_B T K^-1, and C its response to a force that
+ * acts during the step. Gaps n with gradients N then keep the equilibrium of hard surfaces at n = 0 exactly, whatever the
+ * step and the load, if their forces F are the local times at the end of the step of Brownian motion with the
+ * covariance 2 k_B T G, G = N^T C N, that goes from the gaps a at the start to the gaps b at the end without forces and is
+ * reflected at zero along G: the end is n = b+G F. All terms of the probability of a step with loads and with modes that
+ * relax in it are symmetric in start and end, and the law of reflected motion is exp(-F.n/k_B T) times what is symmetric
+ * in a and n. See Harrison and Reiman, Ann. Probab. 1981, 9, 302.
+ *
+ * For one gap, the motion between a and b has gone to the minimum
+ *
+ *     m = ((a+b)-((a-b)^2+4 k_B T G E)^(1/2))/2,      F = max(0, -m)/G
+ *
+ * with an exponential variate E of mean one. Gaps that share chains are found in parts of the step: in each, the ends
+ * move on by a share of b-a and by a bridge of Brownian motion with the covariance 2 k_B T G, and every gap takes the
+ * law of one, with what others push in this part half at its start and whole at its end. That is of second order in the
+ * parts, and exact where gaps share no chains. The equations of a part are those of the least value of a convex
+ * function, so that going through the gaps in turn finds their solution.
+ *
+ * Soft surfaces are hard ones at random depths: see placeHardSurface().
+ */
+class ReflectedGaps {
+public:
+    /** Begin a step without gaps. */
+    void begin(const StepSettings& settings, const ChainPlaces& places);
+    /** The number of particles of the System. */
+    int getNumParticles() const {
+        return numParticles;
+    }
+    /** What gaps are drawn with. */
+    const GapNoise& getNoise() const {
+        return noise;
+    }
+    /** Add a gap; returns its number. */
+    int add(const Gap& gap);
+    Gap& get(int number) {
+        return gaps[number];
+    }
+    int size() const {
+        return gaps.size();
+    }
+    /** Add an equation for each gap: it has no force yet, but places. */
+    void addEquations(std::vector<CouplingEquation>& equations);
+    /** Find the forces, and let the equations of an iteration take them, which have been solved without. */
+    void push(const std::vector<PackStep*>& packs, CoupledEquations& coupled, const CoupledEquations::Demands& demands,
+            const Loop& loop);
+    /** Whether a gap is not where the equations have led it, after its end has been found there. */
+    bool isUnfinished(int number) const;
+    bool anyUnfinished();
+    void dump();
+    /** Mark the chains of gaps that are unfinished. */
+    void findFailures(std::vector<bool>& failed) const;
+    /** The force of a gap, the mean over the step: per length if its gradient is one. */
+    double getForce(int number) const {
+        return forces[number];
+    }
+private:
+    /** A place of a gap on a chain that moves. */
+    struct Port {
+        int gap, side;
+    };
+    /** The ports of a chain, which follow each other; their responses to each other are a square matrix. */
+    struct PortsOfChain {
+        int chain, first, count;
+        std::size_t matrix;
+    };
+    bool hasSamePorts() const;
+    void findPorts();
+    void findResponses(const std::vector<PackStep*>& packs, const CoupledEquations& coupled, const Loop& loop);
+    int chooseParts() const;
+    void drawNumbers(const Loop& loop);
+    void findBridges();
+    void findPushes();
+    void findPushesOfPart(int part);
+    double findPush(int gap, int part) const;
+    void move(int gap, double push);
+    double scaleOf(int gap) const;
+    bool wouldPush(const Gap& gap) const;
+    std::vector<Gap> gaps;
+    GapNoise noise;
+    double kT = 0;
+    int parts = 1, numParticles = 0, numChains = 0;
+    std::size_t firstEquation = 0;
+    /**
+     * For each gap: the force and its share in each part; the end without forces, and that which is predicted; how a
+     * force moves it, and how much more or less the network lets it move than its chains alone do.
+     */
+    std::vector<double> forces, pushes, free, predicted, corrections, own, networks;
+    /** The first equation of each gap among those of all. */
+    std::vector<int> equationOf;
+    /** For each gap and part: exponential variates, a bridge of Brownian motion, and the normal numbers of both sides. */
+    std::vector<double> reflections, bridges, normals;
+    /** Of a part: where gaps begin, and where they would end. */
+    std::vector<double> starts, ends, ofPart;
+    /** The ports of all chains, that of each gap and side or -1, and how far each is moved in a part. */
+    std::vector<Port> ports;
+    std::vector<int> portOf, chainOf, firstPort;
+    std::vector<double> moved;
+    std::vector<PortsOfChain> chains;
+    std::vector<double> responses, roots;
+    /** Whether the responses of a chain are known for the present iteration. */
+    std::vector<char> known;
+};
+
+} // namespace cylchain
+
+#endif /*CYLCHAIN_REFLECTED_GAPS_H_*/
