@@ -114,11 +114,13 @@ def contact_distances(between, p, q):
     within = (s > 0.0) & (s < determinant) & (t > 0.0) & (t < determinant)
     divisor = np.where(within, determinant, 1.0)
     least = np.where(within, square(s / divisor, t / divisor), least)
+    # Of lines that cross: what is left of rounding.
+    least[least < 1e-9] = 0.0
     distances = np.zeros((3, *least.shape))
     distances[0] = np.sqrt(np.maximum(least, 0.0))
     parallel = determinant < LARGEST_PARALLEL * a * e
     if parallel.any():
-        a, b, c, e, f, g = (value[parallel] for value in (a, b, c, e, f, g))
+        a, b, c, e, f, g = (np.broadcast_to(value, parallel.shape)[parallel] for value in (a, b, c, e, f, g))
         ends = np.sort([-c / a, (b - c) / a], axis=0)
         lower, upper = np.maximum(ends[0], 0.0), np.minimum(ends[1], 1.0)
         for number, s in enumerate((lower, upper), 1):
@@ -150,6 +152,7 @@ class RodMonteCarlo:
         self.accepted = 0.0
         self._dimensions = 2 if system.planar else 3
         self._distribution = length_distribution(system.length, system.stretching, self._dimensions)
+        self._longest = max(self._distribution[1][-1], np.linalg.norm(self.along, axis=-1).max())
 
     def _random_vectors(self):
         vectors = self.generator.normal(size=(len(self.middles), 3))
@@ -161,11 +164,13 @@ class RodMonteCarlo:
         system = self.system
         energies = np.zeros(len(middle))
         if system.contact:
-            others = np.arange(system.rods) != rod
-            distances = system.contact_distances(
-                middle[:, None], along[:, None], self.middles[:, others], self.along[:, others]
-            )
-            energies += system.contact_energies(*distances).sum(axis=1)
+            between = system.nearest_image(middle[:, None] - self.middles)
+            reach = 0.5 * (self._longest + np.linalg.norm(along, axis=1)) + system.diameter
+            near = np.einsum("crk,crk->cr", between, between) < reach[:, None] ** 2
+            near[:, rod] = False
+            copy, other = np.nonzero(near)
+            distances = contact_distances(between[copy, other], along[copy], self.along[copy, other])
+            energies += np.bincount(copy, system.contact_energies(*distances), minlength=len(middle))
         if system.wall:
             energies += system.wall_energies(middle, along)
         if system.links:

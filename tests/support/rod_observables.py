@@ -70,3 +70,37 @@ def means_of(system, values, weights=None):
     rows = len(values)
     errors = np.sqrt(((share[:, None] * deviations) ** 2).sum(axis=0) * rows / max(rows - 1, 1))
     return means, errors
+
+
+# By how much steps in time may differ, relative to what is exact; an order that is nearly zero by SMALL_ORDER.
+ALLOWED = {"pairs": 0.05, "energy": 0.05, "energy of walls": 0.02, "force of walls": 0.02, "near pairs": 0.05}
+ALLOWED_OTHERS = 0.03
+SMALL_ORDER = 0.0015
+
+
+def allowed_difference(name, exact):
+    """Absolute, for an observable of this name."""
+    relative = ALLOWED.get(name, ALLOWED.get(name.split()[0], ALLOWED_OTHERS))
+    if name.startswith(("order", "P2", "cos2")):
+        return max(relative * abs(exact), SMALL_ORDER)
+    return relative * abs(exact)
+
+
+def check(system, rows, exact, exact_errors, seen=0.05):
+    """Assert that rows are as is exact, within what is allowed and four standard errors.
+
+    All of those whose error is below a quarter of ``seen`` of the mean count, and they must be there: energies and
+    distances from the soft layer outwards. It shows all of them otherwise.
+    """
+    means, errors = means_of(system, rows)
+    errors = np.hypot(errors, exact_errors)
+    lines, wrong, sure = [], [], []
+    for name, mean, error, expected in zip(observable_names(system), means, errors, exact):
+        off = abs(mean - expected) > allowed_difference(name, expected) + 4 * error
+        lines.append(f"{name}: {mean / expected:.4f} +- {abs(error / expected):.4f} of {expected:.5g}{' wrong' * off}")
+        wrong += [name] * off
+        sure += [name] * (4 * error < seen * abs(expected))
+    assert not wrong, "\n".join(lines)
+    needed = [name for name in observable_names(system) if name.startswith(("energy", "force"))]
+    needed += ["pairs 26-28 nm", "pairs 28-30 nm", "pairs 30-32 nm", "pairs 32-34 nm"] if system.contact else []
+    assert set(needed) <= set(sure), "too few samples:\n" + "\n".join(lines)

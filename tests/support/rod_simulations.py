@@ -42,35 +42,34 @@ class RodSimulation:
             self._origins[:, 0, :2] = APART * np.array(list(np.ndindex(side, side)))[:copies]
         kind = replace(F_ACTIN, stretching_stiffness=system.stretching * KT).with_segment_length(system.length)
         filaments = Filaments(VISCOSITY, TEMPERATURE)
-        nodes = (middles + self._origins)[:, :, None] + np.array([-0.5, 0.5])[:, None] * along[:, :, None]
-        for own in nodes.reshape(-1, 2, 3):
+        for own in self._positions(middles, along).reshape(-1, 2, 3):
             filaments.add_nodes(kind, own, planar=system.planar)
         box = None if system.box is None else np.diag(system.box)
         _, openmm_system, positions = filaments.build(box_vectors=box)
-        forces = {}
+        # Of forces, for their energies.
+        self.groups = {"contacts": {1}, "walls": {2}, "links": {3}}
+        periodic = box is not None
         if system.contact:
-            forces["contacts"] = capsule_contact_force(
-                filaments, openmm_system, system.diameter, system.contact * KT, periodic=box is not None
-            )
-        if system.wall:
-            for name, height, normal in (("lower wall", 0.0, 1.0), ("upper wall", system.height, -1.0)):
-                plane = Plane([0.0, 0.0, height], [0.0, 0.0, normal])
-                forces[name] = filament_wall_force(filaments, openmm_system, plane, system.wall * KT)
-        self.groups = {}
-        for group, (name, force) in enumerate(forces.items(), 1):
-            force.setForceGroup(group)
+            stiffness = system.contact * KT
+            force = capsule_contact_force(filaments, openmm_system, system.diameter, stiffness, periodic=periodic)
+            force.setForceGroup(1)
             openmm_system.addForce(force)
-            self.groups[name] = group
+        if system.wall:
+            for height, normal in ((0.0, 1.0), (system.height, -1.0)):
+                plane = Plane([0.0, 0.0, height], [0.0, 0.0, normal])
+                force = filament_wall_force(filaments, openmm_system, plane, system.wall * KT)
+                force.setForceGroup(2)
+                openmm_system.addForce(force)
         if system.links:
             links = Crosslinks(1.0, 0.0)
             for link in system.links:
-                pairs = [
-                    [filaments.segment_place(copy * system.rods + i, segment=0, fraction=f) for i, f in (link.first, link.second)]
-                    for copy in range(copies)
-                ]
-                links.add_many(None, pairs, link.stiffness * KT, link.rest_length)
-            self.groups["links"] = len(forces) + 1
-            links.add_to(openmm_system, force_group=self.groups["links"], periodic=box is not None)
+                for first in range(0, copies * system.rods, system.rods):
+                    places = [
+                        filaments.segment_place(first + rod, segment=0, fraction=fraction)
+                        for rod, fraction in (link.first, link.second)
+                    ]
+                    links.add(None, *places, link.stiffness * KT, link.rest_length)
+            links.add_to(openmm_system, force_group=3, periodic=periodic)
         self.recommended = filaments.recommended_time_step(scheme, system=openmm_system)
         self.step = (step if step is not None else self.recommended.step * factor / 1e6) * 1e6
         self.integrator = filaments.create_integrator(
@@ -78,6 +77,13 @@ class RodSimulation:
         )
         self._nodes = np.array(filaments.node_indices).reshape(copies, system.rods, 2)
         self.context = new_context(openmm_system, positions, self.integrator, "CPU", {"Threads": "1"})
+
+    def _positions(self, middles, along):
+        ends = (middles + self._origins)[:, :, None] + np.array([-0.5, 0.5])[:, None] * along[:, :, None]
+        return ends.reshape(-1, 3)
+
+    def set_configuration(self, middles, along):
+        self.context.setPositions(self._positions(middles, along))
 
     def configuration(self):
         """Middles and along, as RodMonteCarlo has them."""

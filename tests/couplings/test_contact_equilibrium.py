@@ -1,0 +1,134 @@
+"""Rods that touch each other, walls and links: distances, energies, forces and order beside Monte Carlo and quadrature.
+
+References are of the same energies by means that know nothing of the package (``support.rod_monte_carlo``). Those that
+take minutes are in ``support/rod_references.json``; a slow test computes them again.
+"""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from support import rod_cases
+from support.contexts import energy_of
+from support.rod_cases import CASES, LOOP, PAIR, RODS_IN_A_PLANE, RODS_IN_A_SLAB, rods_between_walls
+from support.rod_monte_carlo import RodMonteCarlo, linked_pair, random_rods
+from support.rod_observables import check, means_of, observe
+from support.rod_simulations import RodSimulation
+from support.solvent import KT
+
+REFERENCES = json.loads((Path(rod_cases.__file__).parent / "rod_references.json").read_text())
+MICROSECOND = 1e6
+
+
+def _in_equilibrium(system, copies, sweeps):
+    sampler = RodMonteCarlo(system, *random_rods(system, copies, 1), seed=2)
+    sampler.sweep(sweeps)
+    return sampler.middles, sampler.along
+
+
+def _run(system, middles, along, factor, samples, interval, blocks=1):
+    """Rows of ``observe``: samples so many us apart, after an eighth of them."""
+    simulation = RodSimulation(system, middles, along, factor)
+    steps = max(1, round(interval * MICROSECOND / simulation.step))
+    simulation.integrator.step(samples // 8 * steps)
+    return simulation.rows(observe, samples, steps, blocks)
+
+
+@pytest.mark.filterwarnings("ignore::openmm_cylchain.errors.ContactWarning")
+@pytest.mark.parametrize("name", ["loop", "slab", "plane"])
+def test_energies_of_the_package_are_those_of_monte_carlo(name):
+    """Of rods at random, and of rods that are nearly parallel, which touch at two places."""
+    system = {"loop": LOOP, "slab": RODS_IN_A_SLAB, "plane": RODS_IN_A_PLANE}[name]
+    dimensions = 2 if system.planar else 3
+    simulation, totals = None, {}
+    for seed in range(3 if system.rods > 3 else 10):
+        middles, along = random_rods(system, 1, seed)
+        generator = np.random.default_rng(seed)
+        for rod in range(0, system.rods - 1, 2):
+            for vectors, spread in ((along, 1.0), (middles, 15.0)):
+                vectors[0, rod + 1] = vectors[0, rod]
+                vectors[0, rod + 1, :dimensions] += generator.normal(0, spread, dimensions)
+        if system.wall:
+            middles[..., 2] *= 1.3
+        simulation = simulation or RodSimulation(system, middles, along)
+        simulation.set_configuration(middles, along)
+        distances, parallel = system.pairs(middles, along)
+        totals["parallel"] = totals.get("parallel", 0) + parallel.sum()
+        expected = {"contacts": system.contact_energies(distances, parallel).sum()}
+        if system.wall:
+            expected["walls"] = system.wall_energies(middles, along).sum()
+        if system.links:
+            expected["links"] = system.link_energies(middles, along).sum()
+        for kind, value in expected.items():
+            totals[kind] = totals.get(kind, 0.0) + value
+            assert energy_of(simulation.context, simulation.groups[kind]) / KT == pytest.approx(value, rel=1e-9)
+    assert min(totals.values()) > 1
+
+
+def test_monte_carlo_of_a_pair_is_that_of_draws():
+    middles, along, weights = linked_pair(PAIR, 300000, 1)
+    exact, exact_errors = means_of(PAIR, observe(PAIR, middles, along), weights)
+    sampler = RodMonteCarlo(PAIR, middles[:1000], along[:1000], 2)
+    sampler.sweep(100)
+    means, errors = means_of(PAIR, sampler.means(observe, 50, 8))
+    errors = np.hypot(errors, exact_errors)
+    assert (4 * errors[2:7] < 0.1 * exact[2:7]).all()
+    assert (np.abs(means - exact) < 4 * errors + 1e-12).all()
+
+
+FACTORS = [1.0, pytest.param(0.1, marks=pytest.mark.slow), pytest.param(0.01, marks=pytest.mark.slow)]
+
+
+@pytest.mark.parametrize("factor", FACTORS)
+def test_a_pair_of_rods_on_a_spring(factor):
+    middles, along, weights = linked_pair(PAIR, 3000, 7)
+    kept = np.random.default_rng(8).random(len(weights)) < weights
+    rows = _run(PAIR, middles[kept][:400], along[kept][:400], factor, 600, 4.0)
+    check(PAIR, rows, *np.transpose(list(REFERENCES["pair"].values())))
+
+
+@pytest.mark.parametrize("factor", FACTORS)
+def test_three_rods_in_a_loop(factor):
+    rows = _run(LOOP, *_in_equilibrium(LOOP, 200, 300), factor, 500, 4.0)
+    check(LOOP, rows, *np.transpose(list(REFERENCES["loop"].values())))
+
+
+@pytest.mark.parametrize("factor", [1.0, pytest.param(0.1, marks=pytest.mark.slow)])
+def test_rods_between_walls_with_contacts(factor):
+    """Twenty-four of 100 nm, between walls 100 nm apart."""
+    system = RODS_IN_A_SLAB
+    rows = _run(system, *_in_equilibrium(system, 1, 300), factor, 12000, 6.0, blocks=20)
+    check(system, rows, *np.transpose(list(REFERENCES["slab"].values())))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("factor", [1.0, 0.1])
+@pytest.mark.parametrize("name", ["space", "plane"])
+def test_dense_rods(name, factor):
+    system = CASES[name]
+    rows = _run(system, *_in_equilibrium(system, 1, 300), factor, 4000, 12.0, blocks=20)
+    check(system, rows, *np.transpose(list(REFERENCES[name].values())))
+
+
+@pytest.mark.parametrize("stiffness", [0.05, 0.5, 5.0])
+@pytest.mark.parametrize("factor", FACTORS)
+def test_rods_between_walls(stiffness, factor):
+    system = rods_between_walls(stiffness)
+    rows = _run(system, *_in_equilibrium(system, 400, 300), factor, 1000, 4.0)
+    exact = rod_cases.quadrature_between_walls(system)
+    check(system, rows, exact, np.zeros(len(exact)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CASES)
+def test_references_are_those_of_monte_carlo(name):
+    """Within what a minute can see."""
+    system = CASES[name]
+    copies = max(20, 600 // system.rods)
+    sampler = RodMonteCarlo(system, *random_rods(system, copies, 11), seed=12)
+    sampler.sweep(300)
+    means, errors = means_of(system, sampler.means(observe, 60000 // (copies * system.rods) + 100, 3))
+    exact, exact_errors = np.transpose(list(REFERENCES[name].values()))
+    assert (np.abs(means - exact) < 4 * np.hypot(errors, exact_errors) + 1e-9).all()
