@@ -99,7 +99,7 @@ def test_three_rods_in_a_loop(factor):
 def test_rods_between_walls_with_contacts(factor):
     """Twenty-four of 100 nm, between walls 100 nm apart."""
     system = RODS_IN_A_SLAB
-    rows = _run(system, *_in_equilibrium(system, 1, 300), factor, 12000, 6.0, blocks=20)
+    rows = _run(system, *_in_equilibrium(system, 1, 300), factor, 4000, 6.0, blocks=20)
     check(system, rows, *np.transpose(list(REFERENCES["slab"].values())))
 
 
