@@ -12,7 +12,15 @@ import pytest
 
 from support import rod_cases
 from support.contexts import energy_of
-from support.rod_cases import CASES, LOOP, PAIR, RODS_IN_A_PLANE, RODS_IN_A_SLAB, rods_between_walls
+from support.rod_cases import (
+    CASES,
+    LOOP,
+    PAIR,
+    RODS_IN_A_PLANE,
+    RODS_IN_A_SLAB,
+    RODS_IN_A_WIDE_SLAB,
+    rods_between_walls,
+)
 from support.rod_monte_carlo import RodMonteCarlo, linked_pair, random_rods
 from support.rod_observables import check, means_of, observe
 from support.rod_simulations import RodSimulation
@@ -109,6 +117,16 @@ def test_rods_between_walls_with_contacts(factor):
 def test_dense_rods(name, factor):
     system = CASES[name]
     rows = _run(system, *_in_equilibrium(system, 1, 300), factor, 4000, 12.0, blocks=20)
+    check(system, rows, *np.transpose(list(REFERENCES[name].values())))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("factor", [1.0, 0.1])
+@pytest.mark.parametrize("name", RODS_IN_A_WIDE_SLAB)
+def test_equation_of_state(name, factor):
+    """Forces of walls on rods that touch each other: their pressure at a density."""
+    system = CASES[name]
+    rows = _run(system, *_in_equilibrium(system, 1, 300), factor, 30000, 4.0, blocks=20)
     check(system, rows, *np.transpose(list(REFERENCES[name].values())))
 
 

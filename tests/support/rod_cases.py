@@ -10,12 +10,18 @@ LOOP = rod_system(3, links=[((i, 0.8), ((i + 1) % 3, 0.2), 0.25, 35.0) for i in 
 RODS_IN_SPACE = rod_system(100, box=(400.0, 400.0, 400.0))
 RODS_IN_A_PLANE = rod_system(40, box=(650.0, 650.0, 1000.0), planar=True)
 RODS_IN_A_SLAB = rod_system(24, box=(340.0, 340.0, 1000.0), height=100.0, wall=0.5)
+# Volume fractions of 0.02, 0.05 and 0.1 between walls 400 nm apart.
+RODS_IN_A_WIDE_SLAB = {
+    f"{percent} %": rod_system(rods, box=(400.0, 400.0, 1200.0), height=400.0, wall=0.5)
+    for percent, rods in ((2, 15), (5, 38), (10, 75))
+}
 CASES = {
     "pair": PAIR,
     "loop": LOOP,
     "space": RODS_IN_SPACE,
     "plane": RODS_IN_A_PLANE,
     "slab": RODS_IN_A_SLAB,
+    **RODS_IN_A_WIDE_SLAB,
 }
 
 
