@@ -93,7 +93,7 @@ class RodSimulation:
     def rows(self, observe, samples, interval, blocks=1):
         """Means of ``observe`` over samples, each after so many steps: rows for all blocks and copies."""
         rows = []
-        for block in range(blocks):
+        for _ in range(blocks):
             total, count = 0.0, samples // blocks
             for _ in range(count):
                 self.integrator.step(interval)
