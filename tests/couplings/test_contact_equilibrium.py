@@ -9,9 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from openmm import unit
+from scipy.optimize import brentq, minimize
 
+from openmm_cylchain import Filaments, FilamentType, Sphere, filament_wall_force
 from support import rod_cases
-from support.contexts import energy_of
+from support.contexts import energy_of, new_context, positions_of
 from support.rod_cases import (
     CASES,
     LOOP,
@@ -23,7 +26,7 @@ from support.rod_cases import (
 )
 from support.rod_monte_carlo import RodMonteCarlo, linked_pair, random_rods
 from support.rod_observables import check, means_of, observe
-from support.rod_simulations import RodSimulation
+from support.rod_simulations import PICONEWTON_PER_NANOMETER, RodSimulation
 from support.solvent import KT
 
 REFERENCES = json.loads((Path(rod_cases.__file__).parent / "rod_references.json").read_text())
@@ -150,3 +153,60 @@ def test_references_are_those_of_monte_carlo(name):
     means, errors = means_of(system, sampler.means(observe, 60000 // (copies * system.rods) + 100, 3))
     exact, exact_errors = np.transpose(list(REFERENCES[name].values()))
     assert (np.abs(means - exact) < 4 * np.hypot(errors, exact_errors) + 1e-9).all()
+
+
+def _force_of_bent_filament(segments, length, rigidity, stretching, radius, wall):
+    """On each end of a filament that a sphere bends: what is least of its energy, of half of it in a plane."""
+    half = segments // 2
+    joint = rigidity / length
+
+    def depth(values):
+        angles, lengths = values[:half], length + values[half:]
+        return (lengths * np.cos(angles)).sum() - radius
+
+    def energy(values):
+        angles = values[:half]
+        bends = np.append(np.diff(angles), 2 * angles[0])
+        tangents = 2 * joint * np.tan(0.5 * bends) ** 2
+        tangents[-1] *= 0.5
+        return tangents.sum() + 0.5 * wall * max(depth(values), 0) ** 2 + 0.5 * stretching * (values[half:] ** 2).sum()
+
+    values = np.concatenate([0.9 * np.sin(np.pi * (np.arange(half) + 0.5) / segments), np.zeros(half)])
+    for _ in range(3):
+        values = minimize(energy, values, method="BFGS", options={"gtol": 1e-5, "maxiter": 20000}).x
+    return wall * depth(values)
+
+
+@pytest.mark.parametrize("step", [5000.0, 1000.0, pytest.param(100.0, marks=pytest.mark.slow)])
+def test_a_filament_that_a_sphere_bends(step):
+    """Twelve um in a sphere of 5 um radius: walls and bends balance. Thermal motion is a small part of the force."""
+    rigidity, modulus, wall = 20e6, 10000.0, 0.2
+    exact = _force_of_bent_filament(24, 500.0, rigidity, modulus / 500.0, 5000.0, wall)
+    assert exact == pytest.approx(1.498, abs=0.001)
+    kind = FilamentType(
+        name="MT", diameter=25, segment_length=500, bending_rigidity=rigidity * PICONEWTON_PER_NANOMETER,
+        stretching_modulus=modulus * PICONEWTON_PER_NANOMETER, extension_relaxation_time=1000.0,
+        friction_length="filament",
+    )  # fmt: skip
+    filaments = Filaments(0.02 * unit.pascal * unit.second, 304.2)
+    # An arc of a circle whose chord is the diameter of the sphere.
+    angle = brentq(lambda half: np.sin(half) / half - 10 / 12, 0.1, 2.0)
+    angles = np.linspace(-angle, angle, 25)
+    for _ in range(8):
+        filaments.add_nodes(kind, 6000.0 / angle * np.column_stack([np.sin(angles), np.cos(angles) - 1, 0 * angles]))
+    _, system, positions = filaments.build()
+    stiffness = wall * PICONEWTON_PER_NANOMETER
+    system.addForce(filament_wall_force(filaments, system, Sphere([0, 0, 0], 5000.0), stiffness))
+    integrator = filaments.create_integrator(system, step * MICROSECOND, random_seed=2, checks=False)
+    context = new_context(system, positions, integrator, "CPU", {"Threads": "1"})
+    ends = np.array(filaments.node_indices)[:, [0, -1]]
+    steps = 4000 if step >= 1000 else 20000
+    integrator.step(steps // 4)
+    depths = []
+    for _ in range(steps):
+        integrator.step(1)
+        depths.append(np.maximum(np.linalg.norm(positions_of(context)[ends], axis=2) - 5000.0, 0.0).mean(axis=1))
+    forces = wall * np.mean(depths, axis=0)
+    error = forces.std(ddof=1) / np.sqrt(len(forces))
+    assert 4 * error < 0.05 * exact
+    assert forces.mean() == pytest.approx(exact, abs=0.02 * exact + 4 * error)
