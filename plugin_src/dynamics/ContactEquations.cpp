@@ -20,6 +20,8 @@ const double SLACK = 0.25;
 const double NARROWER[] = {1, 0.6, 0.35, 0.2};
 /** The number of iterations that look where capsules touch. */
 const int SEARCHING_ITERATIONS = 3;
+/** Capsules that have travelled less, over the sum of the radii, touch where they did. */
+const double SAME_PLACE = 0.01;
 /** The number of iterations in which places and normals move. */
 const int MOVING_ITERATIONS = 3;
 /** The least sine of the angle of lines. */
@@ -248,9 +250,62 @@ void ContactEquations::selectNear(int firstNew, const double* moved) {
         }
 }
 
-/** Find where a pair touches half-way. */
-void ContactEquations::placeContacts(NearPair& own) const {
-    own.count = search->evaluate(pairs.get(own.pair), own.contacts);
+/** Find where a pair touches half-way, and its gaps there; or where these have moved to, once iterations move it little. */
+void ContactEquations::follow(NearPair& own) const {
+    const ContactPair& pair = pairs.get(own.pair);
+    const double way = motion.getWay(pair.a, pair.b);
+    const bool hasGaps = own.gaps[0] >= 0 || own.gaps[1] >= 0;
+    own.hasMoved = own.count < 0 || (way-own.way > SAME_PLACE*radiiOf(pair) && (!hasGaps || iterations <= MOVING_ITERATIONS));
+    if (!own.hasMoved) {
+        const SegmentPair end = interpolate(search->getSegments(pair, false), search->getSegments(pair, true), 2);
+        for (int which = 0; which < own.count; which++)
+            if (own.gaps[which] >= 0)
+                own.found[which].end = own.offsets[which]+findEnd(own, which, end);
+        return;
+    }
+    own.way = way;
+    if (!hasGaps && !mayTouch(own)) {
+        own.count = 0;
+        return;
+    }
+    if (own.count < 0 || iterations <= SEARCHING_ITERATIONS || !hasGaps)
+        own.count = search->evaluate(pair, own.contacts);
+    for (int which = 0; which < own.count; which++)
+        own.found[which] = gapOf(own, which);
+}
+
+/** Get whether any gap of a pair may be closed, from its distances at the start and at the end. */
+bool ContactEquations::mayTouch(NearPair& own) const {
+    const ContactPair& pair = pairs.get(own.pair);
+    const SegmentPair start = search->getSegments(pair, false), half = search->getSegments(pair, true);
+    const double before = sqrt(findNearestPoints(start).squared)-radiiOf(pair);
+    const double after = sqrt(findNearestPoints(interpolate(start, half, 2)).squared)-radiiOf(pair);
+    if (!(before > 0 && after > 0))
+        return true;
+    double least = HUGE_VAL;
+    for (int which = 0; which < 2; which++)
+        least = min(least, variateOf(own, which));
+    const double depth = kT > 0 ? sqrt(2*kT/stiffness*least) : 0;
+    return (before+depth)*(after+depth) < LARGEST_EXPONENT*kT*(places[pair.a].response+places[pair.b].response) ||
+            search->crosses(pair);
+}
+
+/** Name a gap of a pair. */
+void ContactEquations::setKey(const NearPair& own, int which, Gap& gap) const {
+    const ContactPair& pair = pairs.get(own.pair);
+    gap.key[0] = (uint32_t) force*0x9E3779B1u+pair.a;
+    gap.key[1] = 2*(uint32_t) pair.b+which;
+}
+
+/** The exponential variate of the depth of the surface of a gap. */
+double ContactEquations::variateOf(NearPair& own, int which) const {
+    double& variate = own.variates[which];
+    if (variate < 0) {
+        Gap gap;
+        setKey(own, which, gap);
+        variate = all->getNoise().drawDepth(gap);
+    }
+    return variate;
 }
 
 /** How far the places of the levers of a gap are apart along its gradients. */
@@ -289,8 +344,7 @@ Gap ContactEquations::gapOf(NearPair& own, int which) const {
     Gap gap;
     gap.stiffness = contact.weight*stiffness;
     gap.response = places[pair.a].response+places[pair.b].response;
-    gap.key[0] = (uint32_t) force*0x9E3779B1u+pair.a;
-    gap.key[1] = 2*(uint32_t) pair.b+which;
+    setKey(own, which, gap);
     auto setLever = [&] (int number, double s, double t, const Vec3d& gradient) {
         GapLever& lever = gap.levers[number];
         lever.places[0] = placeOf(pair.a, clampToUnit(s));
@@ -301,11 +355,6 @@ Gap ContactEquations::gapOf(NearPair& own, int which) const {
         own.fractions[which][number][0] = clampToUnit(s);
         own.fractions[which][number][1] = clampToUnit(t);
     };
-    if (iterations > MOVING_ITERATIONS && own.gaps[which] >= 0) {
-        Gap gap = own.found[which];
-        gap.end = own.offsets[which]+findEnd(own, which, end);
-        return gap;
-    }
     double before, after;
     const LinePair lines[] = {findLines(start), findLines(half), findLines(end)};
     const bool cross = own.count == 1 && all_of(lines, lines+3, [&] (const LinePair& line) {
@@ -326,10 +375,7 @@ Gap ContactEquations::gapOf(NearPair& own, int which) const {
         setLever(0, first.s, first.t, first.normal*0.5);
         setLever(1, last.s, last.t, last.normal*0.5);
     }
-    double& variate = own.variates[which];
-    if (variate < 0)
-        variate = all->getNoise().drawDepth(gap);
-    gap.end = placeHardSurface(kT, variate, before-radii, gap)+after-radii;
+    gap.end = placeHardSurface(kT, variateOf(own, which), before-radii, gap)+after-radii;
     own.found[which] = gap;
     own.offsets[which] = gap.end-findEnd(own, which, end);
     return gap;
@@ -369,11 +415,7 @@ bool ContactEquations::findGaps(int iteration, bool settled, const double* moved
         return false;
     selectNear(firstNew, moved);
     runInChunks(*loop, near.size(), CHUNK_OF_CONTACTS, [&] (int i) {
-        NearPair& own = near[i];
-        if (iteration <= SEARCHING_ITERATIONS || own.count < 0)
-            placeContacts(own);
-        for (int which = 0; which < own.count; which++)
-            own.found[which] = gapOf(own, which);
+        follow(near[i]);
     });
     for (NearPair& own : near)
         for (int which = 0; which < 2; which++) {
@@ -382,9 +424,13 @@ bool ContactEquations::findGaps(int iteration, bool settled, const double* moved
                 if (number >= 0)
                     gaps.get(number).present = false;
             }
-            else if (number >= 0)
-                gaps.get(number) = own.found[which];
-            else if (mayClose(own.found[which], kT))
+            else if (number >= 0) {
+                if (own.hasMoved)
+                    gaps.get(number) = own.found[which];
+                else
+                    gaps.get(number).end = own.found[which].end;
+            }
+            else if (own.hasMoved && mayClose(own.found[which], kT))
                 number = gaps.add(own.found[which]);
         }
     return motion.exceedsReach() && !settled;

@@ -59,6 +59,9 @@ private:
         Gap found[2];
         /** Where their levers are, and what these lack of the gaps. */
         double fractions[2][2][2] = {}, offsets[2] = {};
+        /** How far the capsules had travelled when they were found, and whether that was in the last iteration. */
+        double way = 0;
+        bool hasMoved = true;
         /** The numbers of their gaps, or -1. */
         int gaps[2] = {-1, -1};
         /** The exponential variates of the depths of their surfaces. */
@@ -71,7 +74,10 @@ private:
     void findNewPairs(const double* moved);
     bool isNear(int pair, const double* moved, bool isNew, double& room) const;
     void selectNear(int firstNew, const double* moved);
-    void placeContacts(NearPair& near) const;
+    void follow(NearPair& near) const;
+    bool mayTouch(NearPair& near) const;
+    void setKey(const NearPair& near, int which, Gap& gap) const;
+    double variateOf(NearPair& near, int which) const;
     double findEnd(const NearPair& near, int which, const SegmentPair& end) const;
     bool areOnSegments(const ContactPair& pair, double s, double t) const;
     Gap gapOf(NearPair& near, int which) const;

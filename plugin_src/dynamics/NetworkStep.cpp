@@ -2,8 +2,6 @@
 #include <algorithm>
 #include <cstddef>
 #include <numeric>
-#include <cstdio>
-#include <cstdlib>
 
 using namespace cylchain;
 using namespace std;
@@ -179,13 +177,6 @@ bool NetworkStep::attempt(const Attempt& attempt, double* displacements, vector<
     for (const ImplicitCouplings* own : couplings)
         own->findFailures(moved.data(), failed);
     gaps.findFailures(failed);
-    if (getenv("GAPDEBUG")) {
-        vector<bool> a(failed.size()), b(failed.size());
-        for (const ImplicitCouplings* own : couplings) own->findFailures(moved.data(), a);
-        gaps.findFailures(b);
-        int c = 0; for (size_t i = 0; i < failed.size(); i++) c += failed[i];
-        if (c) { fprintf(stderr, "level %d solved %d its %d failed %d by couplings %d gaps %d\n", attempt.settings.level, solved, iterations, c, (int) count(a.begin(), a.end(), true), (int) count(b.begin(), b.end(), true)); gaps.dump(); }
-    }
     // Where couplings alone have not converged, nobody knows whose they are.
     if (!solved && find(failed.begin(), failed.end(), true) == failed.end())
         failed = attempt.taken;

@@ -7,7 +7,6 @@
 using namespace cylchain;
 using namespace std;
 
-static long sweepsDone = 0;
 namespace {
 
 /** How far a gap moves in a part, (2 k_B T G)^(1/2), over the thermal depth, where it shares chains with others. */
@@ -18,10 +17,12 @@ const int MOST_PARTS = 32;
 const int MOST_SWEEPS = 200;
 /** What the last sweep may change a gap by, and the last iteration, over the thermal scale. */
 const double OF_SWEEPS = 0.01, OF_ITERATIONS = 0.1;
+/** A change that is less than this share of that is not made. */
+const double LEAST_SHARE = 0.1;
 /** The same in nm, where nothing moves thermally. */
 const double LEAST_CHANGE = 1e-7;
 /** By which factor the network may change the response of a gap. */
-const double LEAST_FACTOR = 1e-3, LARGEST_FACTOR = 3;
+const double LEAST_FACTOR = 1e-3, LARGEST_FACTOR = 1e3;
 /** With several parts, the exponential variate of one is taken for this at least. */
 const double LARGE_REFLECTION = 4;
 /** Gaps that a thread looks at together. */
@@ -305,6 +306,10 @@ void ReflectedGaps::move(int i, double push) {
     }
 }
 
+/**
+ * Go through the gaps of a part in turn, forwards and backwards, until no force changes: those that are pushed, and now
+ * and then all.
+ */
 void ReflectedGaps::findPushesOfPart(int part) {
     const int count = gaps.size();
     moved.assign(ports.size(), 0.0);
@@ -313,19 +318,32 @@ void ReflectedGaps::findPushesOfPart(int part) {
         if (ofPart[i] != 0)
             move(i, ofPart[i]);
     }
-    bool changes = true;
-    for (int sweep = 0; changes && sweep < MOST_SWEEPS; sweep++) {sweepsDone++;
-        changes = false;
-        for (int number = 0; number < count; number++) {
-            const int i = sweep%2 == 0 ? number : count-1-number;
-            if (!(own[i] > 0))
-                continue;
-            const double push = findPush(i, part), change = push-ofPart[i];
-            if (change == 0)
-                continue;
-            ofPart[i] = push;
-            move(i, change);
-            changes |= fabs(change)*networks[i]*own[i] > OF_SWEEPS*scaleOf(i)+0.1*LEAST_CHANGE;
+    pushed.clear();
+    auto update = [&] (int i) {
+        const double push = findPush(i, part), change = push-ofPart[i];
+        const double way = fabs(change)*networks[i]*own[i];
+        // Written so that NaN is no change.
+        if (!(way > LEAST_SHARE*tolerances[i]))
+            return false;
+        ofPart[i] = push;
+        move(i, change);
+        return way > tolerances[i];
+    };
+    for (int sweeps = 0; sweeps < MOST_SWEEPS; sweeps++) {
+        bool changes = false;
+        pushed.clear();
+        for (int i = 0; i < count; i++)
+            if (own[i] > 0) {
+                changes |= update(i);
+                if (ofPart[i] != 0)
+                    pushed.push_back(i);
+            }
+        if (!changes)
+            break;
+        while (changes && ++sweeps < MOST_SWEEPS) {
+            changes = false;
+            for (size_t k = 0; k < pushed.size(); k++)
+                changes |= update(pushed[sweeps%2 == 0 ? k : pushed.size()-1-k]);
         }
     }
     for (int i = 0; i < count; i++)
@@ -339,8 +357,11 @@ void ReflectedGaps::findPushes() {
     starts.resize(count);
     ends.resize(count);
     forces.assign(count, 0.0);
-    for (int i = 0; i < count; i++)
+    tolerances.resize(count);
+    for (int i = 0; i < count; i++) {
         predicted[i] = gaps[i].start;
+        tolerances[i] = OF_SWEEPS*scaleOf(i)+0.1*LEAST_CHANGE;
+    }
     for (int part = 0; part < parts; part++) {
         for (int i = 0; i < count; i++) {
             starts[i] = predicted[i];
@@ -359,11 +380,6 @@ void ReflectedGaps::findPushes() {
     }
 }
 
-#include <chrono>
-#include <cstdio>
-struct Tmr { double t[8]={}; long n=0, gaps=0, ports=0, sweeps=0, parts=0, active=0, big=0; ~Tmr(){ fprintf(stderr,"calls %ld gaps %.0f ports %.0f parts %.1f active %.0f sweeps/part %.1f | us: ports %.0f resp %.0f noise %.0f predict %.0f pushes %.0f coupled %.0f\n", n, 1.*gaps/n, 1.*ports/n, 1.*parts/n, 1.*active/n, 1.*sweeps/parts, t[0]/n,t[1]/n,t[2]/n,t[3]/n,t[4]/n,t[5]/n);} };
-static Tmr tmr;
-static double now() { return 1e-3*chrono::duration_cast<chrono::nanoseconds>(chrono::steady_clock::now().time_since_epoch()).count(); }
 void ReflectedGaps::push(const vector<PackStep*>& packs, CoupledEquations& coupled,
         const CoupledEquations::Demands& demands, const Loop& loop) {
     const size_t count = gaps.size();
@@ -372,13 +388,10 @@ void ReflectedGaps::push(const vector<PackStep*>& packs, CoupledEquations& coupl
     networks.resize(count, 1.0);
     free.resize(count);
     predicted.resize(count);
-    double t0=now();
     if (!hasSamePorts())
         findPorts();
-    double t1=now(); tmr.t[0]+=t1-t0;
     if (find(known.begin(), known.end(), 0) != known.end()) {
         findResponses(packs, coupled, loop);
-        double t2=now(); tmr.t[1]+=t2-t1;
         const int needed = max(parts, chooseParts());
         if (needed != parts) {
             pushes.clear();
@@ -389,9 +402,7 @@ void ReflectedGaps::push(const vector<PackStep*>& packs, CoupledEquations& coupl
         pushes.resize(count*parts, 0.0);
         drawNumbers(loop);
         findBridges();
-        tmr.t[2]+=now()-t2;
     }
-    double t3=now();
     auto endMove = [&] (size_t i, const vector<double>& moves) {
         double sum = 0;
         for (int lever = 0; lever < gaps[i].numLevers; lever++)
@@ -402,26 +413,43 @@ void ReflectedGaps::push(const vector<PackStep*>& packs, CoupledEquations& coupl
     corrections.resize(count, 0.0);
     for (size_t i = 0; i < count; i++)
         free[i] = gaps[i].end+endMove(i, coupled.getMoves())+corrections[i];
-    double t4=now(); tmr.t[3]+=t4-t3;
     findPushes();
-    double t5=now(); tmr.t[4]+=t5-t4;
-    tmr.n++; tmr.gaps+=count; tmr.ports+=ports.size(); tmr.parts+=parts; tmr.sweeps=sweepsDone; for (double f : forces) tmr.active+=f>0;
     vector<double> loads(3*equationOf[count]);
     for (size_t i = 0; i < count; i++)
         for (int lever = 0; lever < gaps[i].numLevers; lever++)
             for (int k = 0; k < 3; k++)
                 loads[3*(equationOf[i]+lever)+k] = forces[i]*gaps[i].levers[lever].gradient[k];
-    static long nanCount = 0;
-    for (size_t i = 0; i < count; i++)
-        if (!(fabs(forces[i]) < 1e3) && nanCount++ < 20)
-            fprintf(stderr, "NAN? gap %zu F %g a %g end %g free %g corr %g own %g chains %d %d levers %d parts %d pack %d\n", i, forces[i], gaps[i].start, gaps[i].end, free[i], corrections[i], own[i], gaps[i].chainOf(0), gaps[i].chainOf(1), gaps[i].numLevers, parts, gaps[i].packOf(0));
     coupled.push(packs, firstEquation, loads, demands, loop);
-    tmr.t[5]+=now()-t5;
-    for (size_t i = 0; i < count; i++) {
-        const double expected = predicted[i]-free[i], pushed = endMove(i, coupled.getPushedMoves());
-        predicted[i] = free[i]-corrections[i]+pushed;
-        corrections[i] = coupled.joinsPlaces() ? pushed-expected : 0;
+    networkChanges.assign(count, 0);
+    if (coupled.joinsPlaces()) {
+        moved.assign(ports.size(), 0.0);
+        for (size_t i = 0; i < count; i++)
+            if (forces[i] != 0)
+                move(i, forces[i]);
     }
+    for (size_t i = 0; i < count; i++) {
+        const double pushed = endMove(i, coupled.getPushedMoves());
+        if (coupled.joinsPlaces())
+            followNetwork(i, pushed);
+        predicted[i] = free[i]-corrections[i]+pushed;
+    }
+}
+
+/**
+ * Take note of how forces have moved a gap in a network: c is what the network lets it move by, and what others have
+ * pushed through the network moves its end.
+ */
+void ReflectedGaps::followNetwork(int i, double pushed) {
+    double ofChains = 0;
+    for (int side = 0; side < 2; side++)
+        if (portOf[2*i+side] >= 0)
+            ofChains += moved[portOf[2*i+side]];
+    const double before = networks[i];
+    if (forces[i] > 0 && ofChains > 0)
+        networks[i] = clamp(pushed/ofChains, LEAST_FACTOR, LARGEST_FACTOR);
+    const double correction = pushed-networks[i]*ofChains;
+    networkChanges[i] = fabs(correction-corrections[i])+fabs(networks[i]-before)*own[i]*forces[i];
+    corrections[i] = correction;
 }
 
 /** Whether a gap that no iteration knows of yet may be pushed. */
@@ -437,7 +465,7 @@ bool ReflectedGaps::isUnfinished(int i) const {
         return false;
     if (i >= (int) predicted.size())
         return wouldPush(gaps[i]);
-    return !(fabs(gaps[i].end-predicted[i]) <= OF_ITERATIONS*scaleOf(i)+LEAST_CHANGE);
+    return !(max(fabs(gaps[i].end-predicted[i]), networkChanges[i]) <= OF_ITERATIONS*scaleOf(i)+LEAST_CHANGE);
 }
 
 bool ReflectedGaps::anyUnfinished() {
@@ -454,10 +482,6 @@ bool ReflectedGaps::anyUnfinished() {
     return any;
 }
 
-void ReflectedGaps::dump() {
-    for (size_t i = 0; i < gaps.size(); i++) if (isUnfinished(i) && i < predicted.size()) fprintf(stderr, "  gap %zu chains %d %d law %d a %.3f end %.4f pred %.4f free %.4f F %.4f c %.3f scale %.3f k %.3f parts %d\n", i, gaps[i].chainOf(0), gaps[i].chainOf(1), (int) gaps[i].law, gaps[i].start, gaps[i].end, predicted[i], free[i], forces[i], own[i], scaleOf(i), gaps[i].stiffness, parts);
-        else if (isUnfinished(i)) fprintf(stderr, "  gap %zu new a %.3f end %.3f\n", i, gaps[i].start, gaps[i].end);
-}
 void ReflectedGaps::findFailures(vector<bool>& failed) const {
     for (size_t i = 0; i < gaps.size(); i++)
         for (int side = 0; side < 2 && isUnfinished(i); side++)

@@ -59,7 +59,6 @@ public:
     /** Whether a gap is not where the equations have led it, after its end has been found there. */
     bool isUnfinished(int number) const;
     bool anyUnfinished();
-    void dump();
     /** Mark the chains of gaps that are unfinished. */
     void findFailures(std::vector<bool>& failed) const;
     /** The force of a gap, the mean over the step: per length if its gradient is one. */
@@ -83,6 +82,7 @@ private:
     void drawNumbers(const Loop& loop);
     void findBridges();
     void findPushes();
+    void followNetwork(int gap, double pushed);
     void findPushesOfPart(int part);
     double findPush(int gap, int part) const;
     void move(int gap, double push);
@@ -97,13 +97,15 @@ private:
      * For each gap: the force and its share in each part; the end without forces, and that which is predicted; how a
      * force moves it, and how much more or less the network lets it move than its chains alone do.
      */
-    std::vector<double> forces, pushes, free, predicted, corrections, own, networks;
+    std::vector<double> forces, pushes, free, predicted, corrections, own, networks, networkChanges;
     /** The first equation of each gap among those of all. */
     std::vector<int> equationOf;
     /** For each gap and part: exponential variates, a bridge of Brownian motion, and the normal numbers of both sides. */
     std::vector<double> reflections, bridges, normals;
     /** Of a part: where gaps begin, and where they would end. */
-    std::vector<double> starts, ends, ofPart;
+    std::vector<double> starts, ends, ofPart, tolerances;
+    /** The gaps that are pushed in a part. */
+    std::vector<int> pushed;
     /** The ports of all chains, that of each gap and side or -1, and how far each is moved in a part. */
     std::vector<Port> ports;
     std::vector<int> portOf, chainOf, firstPort;
