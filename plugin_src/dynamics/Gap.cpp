@@ -7,8 +7,8 @@ using namespace std;
 
 namespace {
 
-/** From this depth on, over the thermal one, a gap is held by a spring. */
-const double DEEP_GAP = 6;
+/** The limits of the depth of hard surfaces, over the thermal one. */
+const double LEAST_LIMIT = 3, LARGEST_LIMIT = 9;
 /** Chains of links and linkers are numbers of forces: with this bit, the numbers are those of gaps. */
 const uint32_t OF_GAPS = 0x80000000u;
 /** The draws of four words each: the first has depths, then come those of reflections and of normal numbers. */
@@ -20,19 +20,21 @@ double uniformOf(uint32_t word) {
 
 } // namespace
 
-uint32_t GapNoise::drawWord(const Gap& gap, int number) const {
+void GapNoise::drawFour(const Gap& gap, int draw, uint32_t* words) const {
     const uint32_t chain = gap.key[0] | OF_GAPS, part = gap.key[1];
-    uint32_t words[4];
-    drawWords(step, NoiseKind::Link, number/4, &chain, &part, 1, words);
-    return words[number%4];
+    drawWords(step, NoiseKind::Link, draw, &chain, &part, 1, words);
 }
 
-double GapNoise::drawDepth(const Gap& gap) const {
-    return -log(uniformOf(drawWord(gap, 0)));
+SurfaceVariates GapNoise::drawSurface(const Gap& gap) const {
+    uint32_t words[4];
+    drawFour(gap, 0, words);
+    return {-log(uniformOf(words[0])), uniformOf(words[1])};
 }
 
 double GapNoise::drawFirstReflection(const Gap& gap) const {
-    return -log(uniformOf(drawWord(gap, 4*FIRST_REFLECTIONS)));
+    uint32_t words[4];
+    drawFour(gap, FIRST_REFLECTIONS, words);
+    return -log(uniformOf(words[0]));
 }
 
 void GapNoise::draw(const Gap* gaps, int count, int parts, double* reflections, double* normals) const {
@@ -65,17 +67,21 @@ void GapNoise::draw(const Gap* gaps, int count, int parts, double* reflections, 
     }
 }
 
-double cylchain::placeHardSurface(double kT, double variate, double begun, Gap& gap) {
-    const double variance = kT/gap.stiffness, inside = min(begun, 0.0);
-    double depth = 0;
-    if (kT == 0)
+double cylchain::placeHardSurface(double kT, const SurfaceVariates& variates, double begun, Gap& gap) {
+    gap.start = begun;
+    if (kT == 0) {
         gap.law = GapLaw::SpringBehind;
-    else if (inside*inside > DEEP_GAP*DEEP_GAP*variance)
-        gap.law = GapLaw::Spring;
-    else {
-        gap.law = GapLaw::Reflection;
-        depth = sqrt(inside*inside+2*variance*variate);
+        return 0;
     }
+    const double variance = kT/gap.stiffness, inside = min(begun, 0.0);
+    const double limit = sqrt(variance)*(LEAST_LIMIT+(LARGEST_LIMIT-LEAST_LIMIT)*variates.uniform);
+    if (begun < -limit) {
+        gap.law = GapLaw::Spring;
+        gap.ceiling = -limit;
+        return 0;
+    }
+    gap.law = GapLaw::Reflection;
+    const double depth = min(sqrt(inside*inside+2*variance*variates.exponential), limit);
     gap.start = begun+depth;
     return depth;
 }

@@ -12,7 +12,7 @@ namespace cylchain {
 enum class GapLaw {
     /** By a hard surface at a random depth behind the soft one. */
     Reflection,
-    /** By a spring on both sides of the surface: what begins deep behind it stays there. */
+    /** By the spring of the soft surface, and a hard surface on the other side, at a depth that it stays behind. */
     Spring,
     /** By the same spring behind the surface alone, where nothing moves thermally. */
     SpringBehind
@@ -32,6 +32,8 @@ struct Gap {
     int numLevers = 1;
     /** At the start, and where the last iteration has led, from where the surface is hard. */
     double start = 0, end = 0;
+    /** How deep a gap that is held by the spring stays. */
+    double ceiling = 0;
     /** The stiffness of the surface. */
     double stiffness = 0;
     /** About how far a force on the gap moves it, or more. */
@@ -52,14 +54,19 @@ struct Gap {
     }
 };
 
+/** What the hard surface of a gap is drawn with: an exponential variate of mean one, and a uniform one. */
+struct SurfaceVariates {
+    double exponential = -1, uniform = 0;
+};
+
 /** The random numbers of gaps in a step. */
 class GapNoise {
 public:
     GapNoise() = default;
     explicit GapNoise(const NoiseKey& step) : step(step) {
     }
-    /** Draw the exponential variate, of mean one, by which the depth of the hard surface is found. */
-    double drawDepth(const Gap& gap) const;
+    /** Draw what the hard surface of a gap is found with. */
+    SurfaceVariates drawSurface(const Gap& gap) const;
     /** Draw the exponential variate of the first part. */
     double drawFirstReflection(const Gap& gap) const;
     /**
@@ -71,7 +78,7 @@ public:
      */
     void draw(const Gap* gaps, int count, int parts, double* reflections, double* normals) const;
 private:
-    std::uint32_t drawWord(const Gap& gap, int number) const;
+    void drawFour(const Gap& gap, int draw, std::uint32_t* words) const;
     NoiseKey step = {};
 };
 
@@ -80,16 +87,19 @@ private:
  *
  * The potential k g^2/2 of a gap g < 0 is that of hard surfaces: exp(-k g^2/2 k_B T) is the chance that a surface at the
  * depth D with k D^2/2 k_B T > E' for an exponential variate E' is not reached. So one is drawn that is consistent with
- * the start, D^2 = min(g, 0)^2+2 k_B T E'/k, and the start is g+D from it. What begins more than DEEP_GAP times
- * (k_B T/k)^(1/2) behind the surface is held by the spring itself: that far from zero, both are the same in equilibrium,
- * and what nothing presses comes out.
+ * the start, D^2 = min(g, 0)^2+2 k_B T E'/k, and the start is g+D from it.
  *
- * @param variate  E'
+ * From one step to the next that changes a deep gap by little, and would not let it out where nothing presses. So D is at
+ * most d, a limit between 3 and 9 times (k_B T/k)^(1/2) that is drawn afresh in each step, and what begins deeper than d
+ * stays so, held by the spring of the soft surface: both parts keep their equilibrium, whatever d is, and a gap passes
+ * from one to the other as d changes.
+ *
+ * @param variates  of E' and d
  * @param begun    g at the start
  * @param gap      its stiffness is known; receives its law and start
  * @return D: by how much gaps are longer from the hard surface
  */
-double placeHardSurface(double kT, double variate, double begun, Gap& gap);
+double placeHardSurface(double kT, const SurfaceVariates& variates, double begun, Gap& gap);
 
 } // namespace cylchain
 

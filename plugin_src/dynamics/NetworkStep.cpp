@@ -56,17 +56,23 @@ void NetworkStep::setForces(const CoupledForces& forces, const double* box) {
         couplings.push_back(links[i].get());
     }
     contacts.resize(max(contacts.size(), forces.contacts.size()));
+    contactGaps.resize(contacts.size());
+    firstContacts = couplings.size();
+    numContacts = forces.contacts.size();
     for (size_t i = 0; i < forces.contacts.size(); i++) {
         const CoupledForces::Contacts& own = forces.contacts[i];
-        if (!contacts[i])
+        if (!contacts[i]) {
             contacts[i].reset(new ContactEquations());
-        contacts[i]->setContacts(own.search, own.stiffness, own.periodic ? box : NULL, *own.onCurves, i);
+            contactGaps[i].reset(new ContactGaps());
+        }
+        contacts[i]->setContacts(own.search, own.stiffness, own.periodic ? box : NULL, *own.onCurves);
+        contactGaps[i]->setContacts(own.search, own.stiffness, own.periodic ? box : NULL, *own.onCurves, i);
         couplings.push_back(contacts[i].get());
     }
     walls.resize(max(walls.size(), forces.walls.size()));
     for (size_t i = 0; i < forces.walls.size(); i++) {
         if (!walls[i])
-            walls[i].reset(new WallEquations());
+            walls[i].reset(new WallGaps());
         walls[i]->setWalls(forces.walls[i], forces.contacts.size()+i);
         couplings.push_back(walls[i].get());
     }
@@ -154,10 +160,7 @@ bool NetworkStep::attempt(const Attempt& attempt, double* displacements, vector<
             flags[pack][lane] = chains[lane] >= 0 && attempt.taken[chains[lane]];
         steps[pack]->begin(attempt.positions, attempt.forces, attempt.box, attempt.settings, flags[pack].get());
     });
-    const CoupledStart start = {attempt.positions, attempt.settings, places, attempt.taken, active};
-    for (ImplicitCouplings* own : couplings)
-        own->begin(start, attempt.loop);
-    gaps.begin(attempt.settings, places);
+    beginCouplings(attempt);
     copy(attempt.positions, attempt.positions+moved.size(), moved.begin());
     const int numStages = steps.empty() ? 0 : steps[0]->getNumStages();
     bool solved = true;
@@ -184,6 +187,19 @@ bool NetworkStep::attempt(const Attempt& attempt, double* displacements, vector<
         steps[pack]->getDisplacements(displacements);
     });
     return find(failed.begin(), failed.end(), true) == failed.end();
+}
+
+void NetworkStep::beginCouplings(const Attempt& attempt) {
+    const CoupledStart start = {attempt.positions, attempt.settings, places, attempt.taken, active};
+    gaps.begin(attempt.settings, places);
+    const bool oneStage = attempt.settings.scheme == Scheme::Implicit;
+    for (size_t i = 0; i < numContacts; i++) {
+        const bool resolves = oneStage && contactGaps[i]->resolves(start);
+        couplings[firstContacts+i] = resolves ? static_cast<ImplicitCouplings*>(contactGaps[i].get()) :
+                contacts[i].get();
+    }
+    for (ImplicitCouplings* own : couplings)
+        own->begin(start, attempt.loop);
 }
 
 bool NetworkStep::iterate(const Attempt& attempt, int stage) {

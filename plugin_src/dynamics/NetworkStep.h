@@ -3,11 +3,12 @@
 
 #include "dynamics/ChainEngine.h"
 #include "dynamics/ContactEquations.h"
+#include "dynamics/ContactGaps.h"
 #include "dynamics/CoupledForces.h"
 #include "dynamics/ImplicitCouplings.h"
 #include "dynamics/LinkEquations.h"
 #include "dynamics/PackStepSource.h"
-#include "dynamics/WallEquations.h"
+#include "dynamics/WallGaps.h"
 #include <cstddef>
 #include <memory>
 #include <vector>
@@ -55,6 +56,7 @@ private:
     struct Attempt;
     void setParticles(const std::vector<CoupledParticle>& particles);
     bool attempt(const Attempt& attempt, double* displacements, std::vector<bool>& failed);
+    void beginCouplings(const Attempt& attempt);
     bool iterate(const Attempt& attempt, int stage);
     bool finishIteration(const std::vector<std::size_t>& first);
     void placeSites(double* positions) const;
@@ -66,8 +68,11 @@ private:
     const PackStepSource& beamEngine;
     ChainPlaces places;
     std::vector<std::unique_ptr<LinkEquations> > links;
+    /** Contacts of steps that resolve them with parts, and of longer ones; and where they are among the couplings. */
+    std::vector<std::unique_ptr<ContactGaps> > contactGaps;
     std::vector<std::unique_ptr<ContactEquations> > contacts;
-    std::vector<std::unique_ptr<WallEquations> > walls;
+    std::size_t firstContacts = 0, numContacts = 0;
+    std::vector<std::unique_ptr<WallGaps> > walls;
     std::vector<ImplicitCouplings*> couplings;
     const std::vector<CurveSite>* sites = nullptr;
     std::vector<CoupledParticle> particles;

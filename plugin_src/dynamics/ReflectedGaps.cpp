@@ -34,6 +34,12 @@ double dot(const double* a, const double* b) {
     return a[0]*b[0]+a[1]*b[1]+a[2]*b[2];
 }
 
+/** The force that reflects the motion of a gap, with an exponential variate of the mean k_B T. */
+double reflect(double start, double end, double response, double variate) {
+    const double way = start-end;
+    return max(0.0, 0.5*(sqrt(way*way+4*response*variate)-(start+end)))/response;
+}
+
 /** Find the Cholesky factor of a matrix with n rows. */
 void findRoot(int n, const double* matrix, double* root) {
     for (int row = 0; row < n; row++)
@@ -66,6 +72,10 @@ void ReflectedGaps::begin(const StepSettings& settings, const ChainPlaces& place
     parts = 1;
     predicted.clear();
     corrections.clear();
+}
+
+bool ReflectedGaps::resolves(double stiffness, double response) {
+    return 2*stiffness*response <= MOST_PARTS*LARGEST_MOTION*LARGEST_MOTION;
 }
 
 int ReflectedGaps::add(const Gap& gap) {
@@ -280,16 +290,18 @@ double ReflectedGaps::findPush(int i, int part) const {
         if (portOf[2*i+side] >= 0)
             others += networks[i]*moved[portOf[2*i+side]];
     const double end = ends[i]+others;
-    if (gap.law == GapLaw::Reflection) {
-        const double start = starts[i]+0.5*others, way = start-end;
-        const double spread = 4*kT/parts*response*reflections[(size_t) i*parts+part];
-        return max(0.0, 0.5*(sqrt(way*way+spread)-(start+end)))/response;
-    }
+    if (gap.law == GapLaw::Reflection)
+        return reflect(starts[i]+0.5*others, end, response, kT/parts*reflections[(size_t) i*parts+part]);
     if (part < parts-1)
         return 0;
-    const double rest = gap.law == GapLaw::Spring ? normals[2*(size_t) i*parts]*sqrt(kT/gap.stiffness) : 0;
-    const double force = gap.stiffness*(rest-end)/(1+gap.stiffness*response);
-    return gap.law == GapLaw::Spring ? force : max(0.0, force);
+    const double softer = 1/(1+gap.stiffness*response);
+    if (gap.law == GapLaw::SpringBehind)
+        return max(0.0, -gap.stiffness*end*softer);
+    const double rest = normals[2*(size_t) i*parts]*sqrt(kT/gap.stiffness);
+    const double held = (end+gap.stiffness*response*rest)*softer, responseHeld = response*softer;
+    const double back = reflect(gap.ceiling-gap.start, gap.ceiling-held, responseHeld,
+            kT*reflections[(size_t) i*parts]);
+    return (held-responseHeld*back-end)/response;
 }
 
 /** Let a force on a gap move all ports of its chains. */

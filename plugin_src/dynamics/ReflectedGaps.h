@@ -35,6 +35,8 @@ class ReflectedGaps {
 public:
     /** Begin a step without gaps. */
     void begin(const StepSettings& settings, const ChainPlaces& places);
+    /** Whether a step has parts enough for gaps of a stiffness that a force moves by so much. */
+    static bool resolves(double stiffness, double response);
     /** The number of particles of the System. */
     int getNumParticles() const {
         return numParticles;

@@ -1,5 +1,5 @@
-#ifndef CYLCHAIN_WALL_EQUATIONS_H_
-#define CYLCHAIN_WALL_EQUATIONS_H_
+#ifndef CYLCHAIN_WALL_GAPS_H_
+#define CYLCHAIN_WALL_GAPS_H_
 
 #include "couplings/Walls.h"
 #include "dynamics/ImplicitCouplings.h"
@@ -11,7 +11,7 @@ namespace cylchain {
  * Walls in an implicit step: a gap between each particle and each face that it may reach. Gaps are those of the real
  * face at the start and at the end of the step; the force is along the gradient half-way between.
  */
-class WallEquations : public ImplicitCouplings {
+class WallGaps : public ImplicitCouplings {
 public:
     /**
      * Set the wall and its particles, which must exist while steps are taken.
@@ -55,6 +55,7 @@ private:
     const double* begun = nullptr;
     ReflectedGaps* all = nullptr;
     double kT = 0;
+    bool isLast = true;
     int numFaces = 0, force = 0;
     /**
      * For each particle of the wall: where it is, about how a force moves it, whether each face has a gap, and how far it
@@ -79,4 +80,4 @@ private:
 
 } // namespace cylchain
 
-#endif /*CYLCHAIN_WALL_EQUATIONS_H_*/
+#endif /*CYLCHAIN_WALL_GAPS_H_*/

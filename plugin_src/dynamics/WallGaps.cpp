@@ -1,4 +1,4 @@
-#include "dynamics/WallEquations.h"
+#include "dynamics/WallGaps.h"
 #include "dynamics/PlaceResponses.h"
 #include "mechanics/SymmetricMatrices.h"
 #include <algorithm>
@@ -35,13 +35,13 @@ void findTurning(const Wall& wall, const double* g, double distance, double* tur
 
 } // namespace
 
-void WallEquations::setWalls(const WallSystem* newSystem, int newForce) {
+void WallGaps::setWalls(const WallSystem* newSystem, int newForce) {
     system = newSystem;
     force = newForce;
     numFaces = countFaces(system->wall);
 }
 
-void WallEquations::begin(const CoupledStart& start, const Loop& newLoop) {
+void WallGaps::begin(const CoupledStart& start, const Loop& newLoop) {
     loop = &newLoop;
     begun = start.positions;
     kT = start.settings.kT;
@@ -59,13 +59,15 @@ void WallEquations::begin(const CoupledStart& start, const Loop& newLoop) {
     });
 }
 
-void WallEquations::beginStage(int, int, const double*) {
+void WallGaps::beginStage(int stage, int numStages, const double*) {
+    // The first of two stages knows of no walls: it is a part of the step alone.
+    isLast = stage == numStages-1;
     reached.assign(places.size(), 0);
     rooms.assign(places.size(), Room());
     states.clear();
 }
 
-WallEquations::Position WallEquations::positionOf(int particle, const double* positions) const {
+WallGaps::Position WallGaps::positionOf(int particle, const double* positions) const {
     const WallParticle& own = system->particles[particle];
     Position result;
     if (own.onCurve.isOnCurve())
@@ -76,7 +78,7 @@ WallEquations::Position WallEquations::positionOf(int particle, const double* po
 }
 
 /** Find where a gap is now, and its gradient half-way there. */
-void WallEquations::follow(const State& state, const double* moved, Gap& gap) const {
+void WallGaps::follow(const State& state, const double* moved, Gap& gap) const {
     const double radius = system->particles[state.particle].radius;
     const Position from = positionOf(state.particle, begun), to = positionOf(state.particle, moved);
     double middle[3], gradient[3];
@@ -90,7 +92,7 @@ void WallEquations::follow(const State& state, const double* moved, Gap& gap) co
 }
 
 /** Find gaps of a chunk of particles that may be closed. */
-void WallEquations::findNew(int number, const double* moved) {
+void WallGaps::findNew(int number, const double* moved) {
     Part& part = parts[number];
     part.states.clear();
     part.gaps.clear();
@@ -121,7 +123,7 @@ void WallEquations::findNew(int number, const double* moved) {
             gap.response = responses[i];
             gap.key[0] = (uint32_t) force*0x9E3779B1u+face;
             gap.key[1] = system->particles[i].particle;
-            State state = {i, face, -1, placeHardSurface(kT, all->getNoise().drawDepth(gap), before, gap)};
+            State state = {i, face, -1, placeHardSurface(kT, all->getNoise().drawSurface(gap), before, gap)};
             if (gap.law == GapLaw::Reflection && gap.start*(state.depth+after) >= least)
                 continue;
             reached[i] |= 1<<face;
@@ -137,8 +139,10 @@ void WallEquations::findNew(int number, const double* moved) {
     }
 }
 
-bool WallEquations::findGaps(int, bool, const double* moved, ReflectedGaps& gaps) {
+bool WallGaps::findGaps(int, bool, const double* moved, ReflectedGaps& gaps) {
     all = &gaps;
+    if (!isLast)
+        return false;
     for (const State& state : states)
         follow(state, moved, gaps.get(state.gap));
     (*loop)(parts.size(), [&] (int part) {
@@ -152,7 +156,7 @@ bool WallEquations::findGaps(int, bool, const double* moved, ReflectedGaps& gaps
     return false;
 }
 
-bool WallEquations::findCulprit(const double*, const CouplingEquation*, BrokenCoupling& culprit) const {
+bool WallGaps::findCulprit(const double*, const CouplingEquation*, BrokenCoupling& culprit) const {
     for (const State& state : states)
         if (all->isUnfinished(state.gap)) {
             culprit.kind = BrokenCoupling::Wall;

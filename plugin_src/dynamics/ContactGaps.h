@@ -1,0 +1,122 @@
+#ifndef CYLCHAIN_CONTACT_GAPS_H_
+#define CYLCHAIN_CONTACT_GAPS_H_
+
+#include "couplings/ContactSearch.h"
+#include "dynamics/CapsuleMotion.h"
+#include "dynamics/PairList.h"
+#include "dynamics/CurveSites.h"
+#include "dynamics/ImplicitCouplings.h"
+#include "dynamics/PlaceResponses.h"
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+namespace cylchain {
+
+/**
+ * Contacts of capsules in an implicit step: gaps between two capsules.
+ *
+ * Where they touch, with which share of the stiffness and along which normal is looked for half-way between the start
+ * and the end: so a step back has the same contacts. Gaps at the start and at the end are distances of the capsules
+ * then, less their radii, signed along that normal. Segments that have crossed in the end, which normals do not see
+ * where they turn far, fail.
+ */
+class ContactGaps : public ImplicitCouplings {
+public:
+    /**
+     * Set what touches, which must exist while steps are taken.
+     *
+     * @param stiffness  k_c
+     * @param box        the periodic box, if distances are those of nearest images, or NULL
+     * @param onCurves   capsules that end at virtual sites on curves of beam elements, whose positions are among those
+     *                   of all particles
+     * @param force      a number of the force that they belong to, for their noise
+     */
+    void setContacts(ContactSearch* search, double stiffness, const double* box,
+            const std::vector<CapsuleOnCurve>& onCurves, int force);
+    /** Whether a step has parts enough to resolve the contacts: see ReflectedGaps. */
+    bool resolves(const CoupledStart& start);
+    void begin(const CoupledStart& start, const Loop& loop) override;
+    bool findGaps(int iteration, bool settled, const double* moved, ReflectedGaps& gaps) override;
+    Rests getRests() const override {
+        return Rests::Wrong;
+    }
+    void findFailures(const double* moved, std::vector<bool>& failed) const override;
+    bool findCulprit(const double* moved, const CouplingEquation* equations, BrokenCoupling& culprit) const override;
+    void findNeighbours(std::vector<std::pair<int, int> >& neighbours) const override;
+private:
+    /** Where a capsule is: its place at fraction 0, and by how much the fraction grows along it. */
+    struct CapsulePlace {
+        PlaceOnChain place;
+        double direction;
+        /** About how far a force moves the place of it that it moves most. */
+        double response;
+    };
+    /** A pair whose gaps may be closed. */
+    struct NearPair {
+        int pair;
+        /** The number of its contacts half-way, and these, with their gaps as they are now. */
+        int count = -1;
+        Contact contacts[2];
+        Gap found[2];
+        /** Where their levers are, and what these lack of the gaps. */
+        double fractions[2][2][2] = {}, offsets[2] = {};
+        /** How far the capsules had travelled when they were found, and whether that was in the last iteration. */
+        double way = 0;
+        bool hasMoved = true;
+        /** The numbers of their gaps, or -1. */
+        int gaps[2] = {-1, -1};
+        /** What their hard surfaces are drawn with. */
+        SurfaceVariates variates[2];
+    };
+    struct Part {
+        std::vector<int> pairs;
+    };
+    void findPairs(const double* moved, const PairFilter& known);
+    void findNewPairs(const double* moved);
+    bool isNear(int pair, const double* moved, bool isNew, double& room) const;
+    void selectNear(int firstNew, const double* moved);
+    void follow(NearPair& near) const;
+    bool mayTouch(NearPair& near) const;
+    void setKey(const NearPair& near, int which, Gap& gap) const;
+    const SurfaceVariates& variatesOf(NearPair& near, int which) const;
+    double findEnd(const NearPair& near, int which, const SegmentPair& end) const;
+    bool areOnSegments(const ContactPair& pair, double s, double t) const;
+    Gap gapOf(NearPair& near, int which) const;
+    bool crosses(int pair, const double* moved) const;
+    double radiiOf(const ContactPair& pair) const {
+        const std::vector<Capsule>& capsules = search->getSystem().capsules;
+        return capsules[pair.a].radius+capsules[pair.b].radius;
+    }
+    bool isHeld(const ContactPair& pair) const {
+        return places[pair.a].place.pack < 0 && places[pair.b].place.pack < 0;
+    }
+    int findFastest(const double* moved) const;
+    PlaceOnChain placeOf(int capsule, double fraction) const;
+    ContactSearch* search = nullptr;
+    const ReflectedGaps* all = nullptr;
+    double stiffness = 0, kT = 0;
+    int force = 0, iterations = 0;
+    const Loop* loop = nullptr;
+    const double *begun = nullptr, *box = nullptr;
+    const std::vector<CapsuleOnCurve>* onCurves = nullptr;
+    PlaceResponses responses;
+    double slack = 0, reach = 0;
+    std::vector<CapsulePlace> places;
+    PairList pairs;
+    /** For each pair, how far both capsules must have travelled before their gap may be closed, or -1 if it is near. */
+    std::vector<double> rooms;
+    std::vector<NearPair> near;
+    /** Those of the last search. */
+    std::vector<ContactPair> found;
+    CapsuleMotion motion;
+    std::vector<Part> parts;
+    /** Where particles are half-way. */
+    std::vector<double> middle;
+    /** Whether capsules move too far to look for contacts, in the periodic box or anywhere: the step is divided. */
+    bool movesTooFar = false, isEndless = false;
+};
+
+} // namespace cylchain
+
+#endif /*CYLCHAIN_CONTACT_GAPS_H_*/
