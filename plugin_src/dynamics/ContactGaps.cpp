@@ -24,6 +24,8 @@ const int SEARCHING_ITERATIONS = 3;
 const double SAME_PLACE = 0.01;
 /** The number of iterations in which places and normals move. */
 const int MOVING_ITERATIONS = 3;
+/** The largest depth of a hard surface, over the sum of the radii: it is before the axes. */
+const double LARGEST_DEPTH = 0.95;
 /** The least sine of the angle of lines. */
 const double LEAST_SINE = 0.3;
 /** Capsules or pairs that a thread looks at together. */
@@ -393,7 +395,7 @@ Gap ContactGaps::gapOf(NearPair& own, int which) const {
         setLever(0, first.s, first.t, first.normal*0.5);
         setLever(1, last.s, last.t, last.normal*0.5);
     }
-    gap.end = placeHardSurface(kT, variatesOf(own, which), before-radii, gap)+after-radii;
+    gap.end = placeHardSurface(kT, variatesOf(own, which), LARGEST_DEPTH*radii, before-radii, gap)+after-radii;
     own.found[which] = gap;
     own.offsets[which] = gap.end-findEnd(own, which, end);
     return gap;

@@ -67,14 +67,16 @@ void GapNoise::draw(const Gap* gaps, int count, int parts, double* reflections, 
     }
 }
 
-double cylchain::placeHardSurface(double kT, const SurfaceVariates& variates, double begun, Gap& gap) {
+double cylchain::placeHardSurface(double kT, const SurfaceVariates& variates, double deepest, double begun,
+        Gap& gap) {
     gap.start = begun;
     if (kT == 0) {
         gap.law = GapLaw::SpringBehind;
         return 0;
     }
     const double variance = kT/gap.stiffness, inside = min(begun, 0.0);
-    const double limit = sqrt(variance)*(LEAST_LIMIT+(LARGEST_LIMIT-LEAST_LIMIT)*variates.uniform);
+    const double random = LEAST_LIMIT+(LARGEST_LIMIT-LEAST_LIMIT)*variates.uniform;
+    const double limit = min(deepest, random*sqrt(variance));
     if (begun < -limit) {
         gap.law = GapLaw::Spring;
         gap.ceiling = -limit;

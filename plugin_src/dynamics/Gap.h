@@ -95,11 +95,12 @@ private:
  * from one to the other as d changes.
  *
  * @param variates  of E' and d
- * @param begun    g at the start
- * @param gap      its stiffness is known; receives its law and start
+ * @param deepest   d is not more than this: no surface is beyond an axis
+ * @param begun     g at the start
+ * @param gap       its stiffness is known; receives its law and start
  * @return D: by how much gaps are longer from the hard surface
  */
-double placeHardSurface(double kT, const SurfaceVariates& variates, double begun, Gap& gap);
+double placeHardSurface(double kT, const SurfaceVariates& variates, double deepest, double begun, Gap& gap);
 
 } // namespace cylchain
 

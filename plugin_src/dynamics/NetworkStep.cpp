@@ -58,7 +58,6 @@ void NetworkStep::setForces(const CoupledForces& forces, const double* box) {
     contacts.resize(max(contacts.size(), forces.contacts.size()));
     contactGaps.resize(contacts.size());
     firstContacts = couplings.size();
-    numContacts = forces.contacts.size();
     for (size_t i = 0; i < forces.contacts.size(); i++) {
         const CoupledForces::Contacts& own = forces.contacts[i];
         if (!contacts[i]) {
@@ -70,10 +69,15 @@ void NetworkStep::setForces(const CoupledForces& forces, const double* box) {
         couplings.push_back(contacts[i].get());
     }
     walls.resize(max(walls.size(), forces.walls.size()));
+    wallGaps.resize(walls.size());
+    firstWalls = couplings.size();
     for (size_t i = 0; i < forces.walls.size(); i++) {
-        if (!walls[i])
-            walls[i].reset(new WallGaps());
-        walls[i]->setWalls(forces.walls[i], forces.contacts.size()+i);
+        if (!walls[i]) {
+            walls[i].reset(new WallEquations());
+            wallGaps[i].reset(new WallGaps());
+        }
+        walls[i]->setWalls(forces.walls[i]);
+        wallGaps[i]->setWalls(forces.walls[i], forces.contacts.size()+i);
         couplings.push_back(walls[i].get());
     }
 }
@@ -193,11 +197,14 @@ void NetworkStep::beginCouplings(const Attempt& attempt) {
     const CoupledStart start = {attempt.positions, attempt.settings, places, attempt.taken, active};
     gaps.begin(attempt.settings, places);
     const bool oneStage = attempt.settings.scheme == Scheme::Implicit;
-    for (size_t i = 0; i < numContacts; i++) {
-        const bool resolves = oneStage && contactGaps[i]->resolves(start);
-        couplings[firstContacts+i] = resolves ? static_cast<ImplicitCouplings*>(contactGaps[i].get()) :
-                contacts[i].get();
-    }
+    auto choose = [&] (auto& gapsOf, auto& equationsOf, size_t first, size_t last) {
+        for (size_t i = first; i < last; i++) {
+            ImplicitCouplings* const equations = equationsOf[i-first].get();
+            couplings[i] = oneStage && gapsOf[i-first]->resolves(start) ? gapsOf[i-first].get() : equations;
+        }
+    };
+    choose(contactGaps, contacts, firstContacts, firstWalls);
+    choose(wallGaps, walls, firstWalls, couplings.size());
     for (ImplicitCouplings* own : couplings)
         own->begin(start, attempt.loop);
 }

@@ -8,6 +8,7 @@
 #include "dynamics/ImplicitCouplings.h"
 #include "dynamics/LinkEquations.h"
 #include "dynamics/PackStepSource.h"
+#include "dynamics/WallEquations.h"
 #include "dynamics/WallGaps.h"
 #include <cstddef>
 #include <memory>
@@ -68,11 +69,12 @@ private:
     const PackStepSource& beamEngine;
     ChainPlaces places;
     std::vector<std::unique_ptr<LinkEquations> > links;
-    /** Contacts of steps that resolve them with parts, and of longer ones; and where they are among the couplings. */
+    /** Contacts and walls of steps that resolve them, and of longer ones; and where they are among the couplings. */
     std::vector<std::unique_ptr<ContactGaps> > contactGaps;
     std::vector<std::unique_ptr<ContactEquations> > contacts;
-    std::size_t firstContacts = 0, numContacts = 0;
-    std::vector<std::unique_ptr<WallGaps> > walls;
+    std::size_t firstContacts = 0, firstWalls = 0;
+    std::vector<std::unique_ptr<WallGaps> > wallGaps;
+    std::vector<std::unique_ptr<WallEquations> > walls;
     std::vector<ImplicitCouplings*> couplings;
     const std::vector<CurveSite>* sites = nullptr;
     std::vector<CoupledParticle> particles;

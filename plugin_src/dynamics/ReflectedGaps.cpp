@@ -12,7 +12,7 @@ namespace {
 /** How far a gap moves in a part, (2 k_B T G)^(1/2), over the thermal depth, where it shares chains with others. */
 const double LARGEST_MOTION = 1.5;
 /** The most parts. */
-const int MOST_PARTS = 32;
+const int MOST_PARTS = 16;
 /** How often all gaps are gone through at most. */
 const int MOST_SWEEPS = 200;
 /** What the last sweep may change a gap by, and the last iteration, over the thermal scale. */
@@ -291,7 +291,7 @@ double ReflectedGaps::findPush(int i, int part) const {
             others += networks[i]*moved[portOf[2*i+side]];
     const double end = ends[i]+others;
     if (gap.law == GapLaw::Reflection)
-        return reflect(starts[i]+0.5*others, end, response, kT/parts*reflections[(size_t) i*parts+part]);
+        return reflect(starts[i]+0.5*max(others, 0.0), end, response, kT/parts*reflections[(size_t) i*parts+part]);
     if (part < parts-1)
         return 0;
     const double softer = 1/(1+gap.stiffness*response);

@@ -25,8 +25,8 @@ namespace cylchain {
  *
  * with an exponential variate E of mean one. Gaps that share chains are found in parts of the step: in each, the ends
  * move on by a share of b-a and by a bridge of Brownian motion with the covariance 2 k_B T G, and every gap takes the
- * law of one, with what others push in this part half at its start and whole at its end. That is of second order in the
- * parts, and exact where gaps share no chains. The equations of a part are those of the least value of a convex
+ * law of one, with what others push in this part whole at its end and, where it opens the gap, half at its start. That is
+ * exact where gaps share no chains. The equations of a part are those of the least value of a convex
  * function, so that going through the gaps in turn finds their solution.
  *
  * Soft surfaces are hard ones at random depths: see placeHardSurface().

@@ -41,6 +41,18 @@ void WallGaps::setWalls(const WallSystem* newSystem, int newForce) {
     numFaces = countFaces(system->wall);
 }
 
+bool WallGaps::resolves(const CoupledStart& start) {
+    double largest = 0;
+    PlaceResponses found;
+    found.begin(start.places, start.settings.stepSize);
+    for (const WallParticle& particle : system->particles) {
+        PlaceOnChain place;
+        if (start.places.find(particle.getPlace(), place))
+            largest = max(largest, found.find(place));
+    }
+    return ReflectedGaps::resolves(system->stiffness, largest);
+}
+
 void WallGaps::begin(const CoupledStart& start, const Loop& newLoop) {
     loop = &newLoop;
     begun = start.positions;
@@ -59,9 +71,7 @@ void WallGaps::begin(const CoupledStart& start, const Loop& newLoop) {
     });
 }
 
-void WallGaps::beginStage(int stage, int numStages, const double*) {
-    // The first of two stages knows of no walls: it is a part of the step alone.
-    isLast = stage == numStages-1;
+void WallGaps::beginStage(int, int, const double*) {
     reached.assign(places.size(), 0);
     rooms.assign(places.size(), Room());
     states.clear();
@@ -123,7 +133,7 @@ void WallGaps::findNew(int number, const double* moved) {
             gap.response = responses[i];
             gap.key[0] = (uint32_t) force*0x9E3779B1u+face;
             gap.key[1] = system->particles[i].particle;
-            State state = {i, face, -1, placeHardSurface(kT, all->getNoise().drawSurface(gap), before, gap)};
+            State state = {i, face, -1, placeHardSurface(kT, all->getNoise().drawSurface(gap), HUGE_VAL, before, gap)};
             if (gap.law == GapLaw::Reflection && gap.start*(state.depth+after) >= least)
                 continue;
             reached[i] |= 1<<face;
@@ -141,8 +151,6 @@ void WallGaps::findNew(int number, const double* moved) {
 
 bool WallGaps::findGaps(int, bool, const double* moved, ReflectedGaps& gaps) {
     all = &gaps;
-    if (!isLast)
-        return false;
     for (const State& state : states)
         follow(state, moved, gaps.get(state.gap));
     (*loop)(parts.size(), [&] (int part) {

@@ -19,6 +19,8 @@ public:
      * @param force  a number of the force that they belong to, for their noise
      */
     void setWalls(const WallSystem* system, int force);
+    /** Whether a step has parts enough to resolve the wall: see ReflectedGaps. */
+    bool resolves(const CoupledStart& start);
     void begin(const CoupledStart& start, const Loop& loop) override;
     void beginStage(int stage, int numStages, const double* moved) override;
     bool findGaps(int iteration, bool settled, const double* moved, ReflectedGaps& gaps) override;
@@ -55,7 +57,6 @@ private:
     const double* begun = nullptr;
     ReflectedGaps* all = nullptr;
     double kT = 0;
-    bool isLast = true;
     int numFaces = 0, force = 0;
     /**
      * For each particle of the wall: where it is, about how a force moves it, whether each face has a gap, and how far it
