@@ -18,78 +18,59 @@ const double RESPONSE_MARGIN = 1.2;
 const double SLACK = 0.25;
 /** Parts of all this that pairs are looked for in where a periodic box is too narrow for more. */
 const double NARROWER[] = {1, 0.6, 0.35, 0.2};
-/** The number of iterations that look where capsules touch. */
-const int SEARCHING_ITERATIONS = 3;
 /** Capsules that have travelled less, over the sum of the radii, touch where they did. */
 const double SAME_PLACE = 0.01;
 /** The number of iterations in which places and normals move. */
 const int MOVING_ITERATIONS = 3;
 /** The largest depth of a hard surface, over the sum of the radii: it is before the axes. */
 const double LARGEST_DEPTH = 0.95;
-/** The least sine of the angle of lines. */
-const double LEAST_SINE = 0.3;
 /** Capsules or pairs that a thread looks at together. */
 const int CHUNK_OF_CONTACTS = 256;
 
-/** Where a pair touches at the start or at the end, and the distance there, signed if the two have crossed. */
-struct Touch {
-    double s, t, distance;
-    Vec3d normal;
+/** One gap for the energy of a pair, k gap^2/2 where it is negative: where forces on it act, and its gradients there. */
+struct PairGap {
+    double gap;
+    int count;
+    double s[2], t[2];
+    Vec3d gradients[2];
 };
 
-Touch touchAt(const SegmentPair& pair, const NearestPoints& nearest) {
+Vec3d normalOf(const Contact& contact) {
+    return {contact.normal[0], contact.normal[1], contact.normal[2]};
+}
+
+/** The gap of a pair from its contacts; of one whose contact is that of a neighbor, it is not closed. */
+PairGap findPairGap(const SegmentPair& pair, const Contact* contacts, int count, double radii) {
+    PairGap result = {};
+    double square = 0;
+    for (int i = 0; i < count; i++)
+        square += contacts[i].gap < 0 ? contacts[i].weight*contacts[i].gap*contacts[i].gap : 0;
+    if (square > 0) {
+        result.gap = -sqrt(square);
+        for (int i = 0; i < count; i++)
+            if (contacts[i].gap < 0) {
+                result.s[result.count] = contacts[i].s;
+                result.t[result.count] = contacts[i].t;
+                result.gradients[result.count++] = normalOf(contacts[i])*(contacts[i].weight*contacts[i].gap/result.gap);
+            }
+        return result;
+    }
+    result.count = 1;
+    if (count > 0) {
+        const Contact& contact = count == 2 && contacts[1].gap < contacts[0].gap ? contacts[1] : contacts[0];
+        result.gap = contact.gap;
+        result.s[0] = contact.s;
+        result.t[0] = contact.t;
+        result.gradients[0] = normalOf(contact);
+        return result;
+    }
+    const NearestPoints nearest = findNearestPoints(pair);
     const Vec3d r = pair.between(nearest.s, nearest.t);
     const double distance = sqrt(nearest.squared);
-    return {nearest.s, nearest.t, distance, distance > 0 ? r*(1/distance) : Vec3d {0, 0, 0}};
-}
-
-/** Where two capsules are nearest; for one of two contacts, at the end of a segment at which it is. */
-Touch findTouch(const SegmentPair& pair, const Contact& contact, bool only) {
-    NearestPoints nearest = {contact.s, contact.t, HUGE_VAL};
-    if (only)
-        nearest = findNearestPoints(pair);
-    else if (contact.s == 0 || contact.s == 1)
-        considerEndOfA(pair, contact.s, nearest);
-    else
-        considerEndOfB(pair, contact.t, nearest);
-    return touchAt(pair, nearest);
-}
-
-/** The same at the end, where two that have passed through each other are on the wrong side. */
-Touch findLastTouch(const SegmentPair& start, const SegmentPair& end, const Contact& contact, bool only, double radii) {
-    const Touch touch = findTouch(end, contact, only);
-    if (!mayPass(start, end, touch.distance, radii))
-        return touch;
-    if (hasSphere(start)) {
-        Passage passage;
-        if (!findPassage(start, end, radii, passage))
-            return touch;
-        return {passage.s, passage.t, passage.distance, passage.normal};
-    }
-    Crossing crossings[2];
-    if (findCrossings(start, end, crossings) == 0)
-        return touch;
-    const Crossing& first = crossings[0];
-    return {first.s, first.t, end.between(first.s, first.t).dot(first.normal), first.normal};
-}
-
-/** The lines of two segments: where they are nearest, their distance, signed as p x q is, and the sine of their angle. */
-struct LinePair {
-    double s, t, distance, sine;
-    Vec3d normal;
-};
-
-LinePair findLines(const SegmentPair& pair) {
-    const double a = pair.p.squared(), b = pair.p.dot(pair.q), e = pair.q.squared();
-    const double c = pair.p.dot(pair.w), f = pair.q.dot(pair.w), determinant = a*e-b*b;
-    LinePair result = {0, 0, 0, 0, {0, 0, 0}};
-    if (!(determinant > 0))
-        return result;
-    result.sine = sqrt(determinant/(a*e));
-    result.s = (b*f-c*e)/determinant;
-    result.t = (a*f-b*c)/determinant;
-    result.normal = pair.p.cross(pair.q)*(1/sqrt(determinant));
-    result.distance = result.normal.dot(pair.w);
+    result.gap = max(distance-radii, 0.0);
+    result.s[0] = nearest.s;
+    result.t[0] = nearest.t;
+    result.gradients[0] = distance > 0 ? r*(1/distance) : Vec3d {0, 0, 0};
     return result;
 }
 
@@ -220,7 +201,7 @@ void ContactGaps::findNewPairs(const double* moved) {
 }
 
 /** Get whether the gap of a pair may be closed; if not, how far its capsules may travel until it may. */
-bool ContactGaps::isNear(int number, const double* moved, bool isNew, double& room) const {
+bool ContactGaps::isNear(int number, bool isNew, double& room) const {
     const ContactPair& pair = pairs.get(number);
     const double least = LARGEST_EXPONENT*kT*(places[pair.a].response+places[pair.b].response), radii = radiiOf(pair);
     auto isFar = [&] (double before, double after) {
@@ -231,17 +212,16 @@ bool ContactGaps::isNear(int number, const double* moved, bool isNew, double& ro
         room = min(room, (double) pair.clearance);
         return false;
     }
-    const SegmentPair start = search->getSegments(pair, false), half = search->getSegments(pair, true);
-    const SegmentPair end = interpolate(start, half, 2);
+    const SegmentPair start = search->getSegments(pair, false), end = search->getSegments(pair, true);
     const double after = sqrt(findNearestPoints(end).squared);
     if (!isFar(sqrt(findNearestPoints(start).squared)-radii, after-radii))
         return true;
     room = min(room, after);
-    return search->crosses(pair, begun, moved);
+    return search->crosses(pair);
 }
 
 /** Find the pairs from a number on, or those that have travelled far enough, whose gaps may be closed. */
-void ContactGaps::selectNear(int firstNew, const double* moved) {
+void ContactGaps::selectNear(int firstNew) {
     const int count = pairs.size(), chunks = (count+CHUNK_OF_CONTACTS-1)/CHUNK_OF_CONTACTS;
     rooms.resize(count, 0.0);
     parts.resize(max(parts.size(), (size_t) chunks));
@@ -256,7 +236,7 @@ void ContactGaps::selectNear(int firstNew, const double* moved) {
                 continue;
             if (isHeld(pair))
                 rooms[i] = HUGE_VAL;
-            else if (isNear(i, moved, i >= firstNew, room))
+            else if (isNear(i, i >= firstNew, room))
                 own.push_back(i);
             else
                 rooms[i] = way+room;
@@ -270,140 +250,70 @@ void ContactGaps::selectNear(int firstNew, const double* moved) {
         }
 }
 
-/** Find where a pair touches half-way, and its gaps there; or where these have moved to, once iterations move it little. */
+/** Find the gap of a pair where an iteration has led, or how far it has moved once iterations move it little. */
 void ContactGaps::follow(NearPair& own) const {
     const ContactPair& pair = pairs.get(own.pair);
-    const double way = motion.getWay(pair.a, pair.b);
-    const bool hasGaps = own.gaps[0] >= 0 || own.gaps[1] >= 0;
-    own.hasMoved = own.count < 0 || (way-own.way > SAME_PLACE*radiiOf(pair) && (!hasGaps || iterations <= MOVING_ITERATIONS));
+    const double way = motion.getWay(pair.a, pair.b), radii = radiiOf(pair);
+    const bool isNew = own.way < 0;
+    own.hasMoved = isNew || (way-own.way > SAME_PLACE*radii && (own.number < 0 || iterations <= MOVING_ITERATIONS));
     if (!own.hasMoved) {
-        const SegmentPair end = interpolate(search->getSegments(pair, false), search->getSegments(pair, true), 2);
-        for (int which = 0; which < own.count; which++)
-            if (own.gaps[which] >= 0)
-                own.found[which].end = own.offsets[which]+findEnd(own, which, end);
+        if (own.number >= 0)
+            own.gap.end = own.offset+findEnd(own);
         return;
     }
     own.way = way;
-    if (!hasGaps && !mayTouch(own)) {
-        own.count = 0;
-        return;
+    if (isNew) {
+        own.gap.key[0] = (uint32_t) force*0x9E3779B1u+pair.a;
+        own.gap.key[1] = pair.b;
+        own.gap.stiffness = stiffness;
+        own.gap.response = places[pair.a].response+places[pair.b].response;
+        const SurfaceVariates variates = all->getNoise().drawSurface(own.gap);
+        own.numContacts = search->evaluate(pair, begun, begun, own.contacts);
+        const double before = findPairGap(search->getSegments(pair, false), own.contacts, own.numContacts, radii).gap;
+        own.depth = placeHardSurface(kT, variates, LARGEST_DEPTH*radii, before, own.gap);
     }
-    if (own.count < 0 || iterations <= SEARCHING_ITERATIONS || !hasGaps)
-        own.count = search->evaluate(pair, own.contacts);
-    for (int which = 0; which < own.count; which++)
-        own.found[which] = gapOf(own, which);
-}
-
-/** Get whether any gap of a pair may be closed, from its distances at the start and at the end. */
-bool ContactGaps::mayTouch(NearPair& own) const {
-    const ContactPair& pair = pairs.get(own.pair);
-    const SegmentPair start = search->getSegments(pair, false), half = search->getSegments(pair, true);
-    const double before = sqrt(findNearestPoints(start).squared)-radiiOf(pair);
-    const double after = sqrt(findNearestPoints(interpolate(start, half, 2)).squared)-radiiOf(pair);
-    if (!(before > 0 && after > 0))
-        return true;
-    double least = HUGE_VAL;
-    for (int which = 0; which < 2; which++)
-        least = min(least, variatesOf(own, which).exponential);
-    const double depth = kT > 0 ? sqrt(2*kT/stiffness*least) : 0;
-    return (before+depth)*(after+depth) < LARGEST_EXPONENT*kT*(places[pair.a].response+places[pair.b].response) ||
-            search->crosses(pair);
-}
-
-/** Name a gap of a pair. */
-void ContactGaps::setKey(const NearPair& own, int which, Gap& gap) const {
-    const ContactPair& pair = pairs.get(own.pair);
-    gap.key[0] = (uint32_t) force*0x9E3779B1u+pair.a;
-    gap.key[1] = 2*(uint32_t) pair.b+which;
-}
-
-/** What the hard surface of a gap is drawn with. */
-const SurfaceVariates& ContactGaps::variatesOf(NearPair& own, int which) const {
-    SurfaceVariates& variates = own.variates[which];
-    if (variates.exponential < 0) {
-        Gap gap;
-        setKey(own, which, gap);
-        variates = all->getNoise().drawSurface(gap);
+    const SegmentPair end = search->getSegments(pair, true);
+    if (own.number < 0) {
+        // Where they are nearest tells whether the rest is worth while.
+        own.gap.end = own.depth+sqrt(findNearestPoints(end).squared)-radii;
+        if (!mayClose(own.gap) && !search->crosses(pair))
+            return;
     }
-    return variates;
-}
-
-/** How far the places of the levers of a gap are apart along its gradients. */
-double ContactGaps::findEnd(const NearPair& own, int which, const SegmentPair& end) const {
-    const Gap& gap = own.found[which];
-    double sum = 0;
-    for (int lever = 0; lever < gap.numLevers; lever++) {
-        const Vec3d r = end.between(own.fractions[which][lever][0], own.fractions[which][lever][1]);
-        const double* const g = gap.levers[lever].gradient;
-        sum += r.x*g[0]+r.y*g[1]+r.z*g[2];
-    }
-    return sum;
-}
-
-/** Get whether lines are nearest on two segments, or on what continues them. */
-bool ContactGaps::areOnSegments(const ContactPair& pair, double s, double t) const {
-    auto isOn = [&] (int capsule, double fraction) {
-        return (fraction >= 0 || search->getNeighbor(capsule, false) >= 0) &&
-                (fraction <= 1 || search->getNeighbor(capsule, true) >= 0);
-    };
-    return isOn(pair.a, s) && isOn(pair.b, t);
-}
-
-/**
- * Find a gap of a pair: from where it starts, and where it is now.
- *
- * Two that cross at an angle are lines. Others have their distances at the start and at the end, and half of the force
- * where they are nearest at each: where they lie along each other, that may be at different ends.
- */
-Gap ContactGaps::gapOf(NearPair& own, int which) const {
-    const ContactPair& pair = pairs.get(own.pair);
-    const Contact& contact = own.contacts[which];
-    const SegmentPair start = search->getSegments(pair, false), half = search->getSegments(pair, true);
-    const SegmentPair end = interpolate(start, half, 2);
-    const double radii = radiiOf(pair);
-    Gap gap;
-    gap.stiffness = contact.weight*stiffness;
-    gap.response = places[pair.a].response+places[pair.b].response;
-    setKey(own, which, gap);
-    auto setLever = [&] (int number, double s, double t, const Vec3d& gradient) {
-        GapLever& lever = gap.levers[number];
-        lever.places[0] = placeOf(pair.a, clampToUnit(s));
-        lever.places[1] = placeOf(pair.b, clampToUnit(t));
-        lever.gradient[0] = gradient.x;
-        lever.gradient[1] = gradient.y;
-        lever.gradient[2] = gradient.z;
-        own.fractions[which][number][0] = clampToUnit(s);
-        own.fractions[which][number][1] = clampToUnit(t);
-    };
-    double before, after;
-    const LinePair lines[] = {findLines(start), findLines(half), findLines(end)};
-    const bool cross = own.count == 1 && all_of(lines, lines+3, [&] (const LinePair& line) {
-        return line.sine > LEAST_SINE && areOnSegments(pair, line.s, line.t);
-        });
-    if (cross) {
-        const double side = lines[0].distance < 0 ? -1 : 1;
-        before = side*lines[0].distance;
-        after = side*lines[2].distance;
-        setLever(0, lines[1].s, lines[1].t, lines[1].normal*side);
-    }
-    else {
-        const bool only = own.count == 1;
-        const Touch first = findTouch(start, contact, only), last = findLastTouch(start, end, contact, only, radii);
-        before = first.distance;
-        after = last.distance;
-        gap.numLevers = 2;
-        setLever(0, first.s, first.t, first.normal*0.5);
-        setLever(1, last.s, last.t, last.normal*0.5);
-    }
-    gap.end = placeHardSurface(kT, variatesOf(own, which), LARGEST_DEPTH*radii, before-radii, gap)+after-radii;
-    own.found[which] = gap;
-    own.offsets[which] = gap.end-findEnd(own, which, end);
-    return gap;
+    Contact contacts[2];
+    const int count = search->evaluate(pair, contacts);
+    const PairGap first = findPairGap(search->getSegments(pair, false), own.contacts, own.numContacts, radii);
+    const PairGap last = findPairGap(end, contacts, count, radii);
+    own.gap.numLevers = 0;
+    for (const PairGap* of : {&first, &last})
+        for (int i = 0; i < of->count; i++) {
+            GapLever& lever = own.gap.levers[own.gap.numLevers];
+            lever.places[0] = placeOf(pair.a, of->s[i]);
+            lever.places[1] = placeOf(pair.b, of->t[i]);
+            lever.gradient[0] = 0.5*of->gradients[i].x;
+            lever.gradient[1] = 0.5*of->gradients[i].y;
+            lever.gradient[2] = 0.5*of->gradients[i].z;
+            own.fractions[own.gap.numLevers][0] = of->s[i];
+            own.fractions[own.gap.numLevers++][1] = of->t[i];
+        }
+    own.gap.end = own.depth+last.gap;
+    own.offset = own.gap.end-findEnd(own);
 }
 
 /** Get whether a gap that is not one of those of the step yet is so likely to be closed that it becomes one. */
-static bool mayClose(const Gap& gap, double kT) {
+bool ContactGaps::mayClose(const Gap& gap) const {
     return gap.law != GapLaw::Reflection || !(gap.end > 0) || gap.start*gap.end < LARGEST_EXPONENT*kT*gap.response;
+}
+
+/** How far the places of the levers of a gap are apart along its gradients. */
+double ContactGaps::findEnd(const NearPair& own) const {
+    const SegmentPair end = search->getSegments(pairs.get(own.pair), true);
+    double sum = 0;
+    for (int lever = 0; lever < own.gap.numLevers; lever++) {
+        const Vec3d r = end.between(own.fractions[lever][0], own.fractions[lever][1]);
+        const double* const g = own.gap.levers[lever].gradient;
+        sum += r.x*g[0]+r.y*g[1]+r.z*g[2];
+    }
+    return sum;
 }
 
 bool ContactGaps::findGaps(int iteration, bool settled, const double* moved, ReflectedGaps& gaps) {
@@ -411,20 +321,16 @@ bool ContactGaps::findGaps(int iteration, bool settled, const double* moved, Ref
         return false;
     all = &gaps;
     iterations = iteration;
-    middle.resize(3*(size_t) gaps.getNumParticles());
-    const int numNumbers = middle.size();
-    for (int i = 0; i < numNumbers; i++)
-        middle[i] = 0.5*(begun[i]+moved[i]);
     int firstNew = 0;
     if (!motion.hasBegun()) {
         findPairs(moved, PairFilter());
         motion.begin(search->getSystem().capsules, moved, *loop);
         pairs.begin(found, places.size());
-        search->setMotion(begun, middle.data(), *loop);
+        search->setMotion(begun, moved, *loop);
     }
     else {
         motion.follow([] (int) {return true;}, moved, slack, *loop, [&] (const vector<int>& capsules) {
-            search->updateMotion(capsules, middle.data());
+            search->updateMotion(capsules, moved);
         });
         firstNew = pairs.size();
         // While much moves, it may come back.
@@ -433,26 +339,19 @@ bool ContactGaps::findGaps(int iteration, bool settled, const double* moved, Ref
     }
     if (movesTooFar)
         return false;
-    selectNear(firstNew, moved);
+    selectNear(firstNew);
     runInChunks(*loop, near.size(), CHUNK_OF_CONTACTS, [&] (int i) {
         follow(near[i]);
     });
     for (NearPair& own : near)
-        for (int which = 0; which < 2; which++) {
-            int& number = own.gaps[which];
-            if (which >= own.count) {
-                if (number >= 0)
-                    gaps.get(number).present = false;
-            }
-            else if (number >= 0) {
-                if (own.hasMoved)
-                    gaps.get(number) = own.found[which];
-                else
-                    gaps.get(number).end = own.found[which].end;
-            }
-            else if (own.hasMoved && mayClose(own.found[which], kT))
-                number = gaps.add(own.found[which]);
+        if (own.number < 0) {
+            if (own.hasMoved && own.gap.numLevers > 0 && mayClose(own.gap))
+                own.number = gaps.add(own.gap);
         }
+        else if (own.hasMoved)
+            gaps.get(own.number) = own.gap;
+        else
+            gaps.get(own.number).end = own.gap.end;
     return motion.exceedsReach() && !settled;
 }
 
@@ -508,11 +407,10 @@ bool ContactGaps::findCulprit(const double* moved, const CouplingEquation*, Brok
             return true;
         }
     for (const NearPair& own : near)
-        for (int number : own.gaps)
-            if (number >= 0 && all->isUnfinished(number)) {
-                name(own.pair);
-                return true;
-            }
+        if (own.number >= 0 && all->isUnfinished(own.number)) {
+            name(own.pair);
+            return true;
+        }
     return false;
 }
 

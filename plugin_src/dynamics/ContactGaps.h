@@ -16,10 +16,9 @@ namespace cylchain {
 /**
  * Contacts of capsules in an implicit step: gaps between two capsules.
  *
- * Where they touch, with which share of the stiffness and along which normal is looked for half-way between the start
- * and the end: so a step back has the same contacts. Gaps at the start and at the end are distances of the capsules
- * then, less their radii, signed along that normal. Segments that have crossed in the end, which normals do not see
- * where they turn far, fail.
+ * A pair has one gap for its energy at the start and at the end, each with the contacts that it has then: so a step back
+ * has the same gaps. Half of the force acts where they are nearest at the start, half where they are at the end. Segments
+ * that have crossed in the end, which gaps do not see where they turn far, fail.
  */
 class ContactGaps : public ImplicitCouplings {
 public:
@@ -52,37 +51,32 @@ private:
         /** About how far a force moves the place of it that it moves most. */
         double response;
     };
-    /** A pair whose gaps may be closed. */
+    /** A pair whose gap may be closed. */
     struct NearPair {
         int pair;
-        /** The number of its contacts half-way, and these, with their gaps as they are now. */
-        int count = -1;
-        Contact contacts[2];
-        Gap found[2];
-        /** Where their levers are, and what these lack of the gaps. */
-        double fractions[2][2][2] = {}, offsets[2] = {};
-        /** How far the capsules had travelled when they were found, and whether that was in the last iteration. */
-        double way = 0;
+        /** How far the capsules had travelled when it was found, and whether that was in the last iteration. */
+        double way = -1;
         bool hasMoved = true;
-        /** The numbers of their gaps, or -1. */
-        int gaps[2] = {-1, -1};
-        /** What their hard surfaces are drawn with. */
-        SurfaceVariates variates[2];
+        /** The contacts at the start. */
+        int numContacts = 0;
+        Contact contacts[2];
+        /** The gap, its number or -1, and by how much it is longer from the hard surface than from the soft one. */
+        Gap gap;
+        int number = -1;
+        double depth = 0;
+        /** Where its levers are, and what these lack of the gap. */
+        double fractions[4][2] = {}, offset = 0;
     };
     struct Part {
         std::vector<int> pairs;
     };
     void findPairs(const double* moved, const PairFilter& known);
     void findNewPairs(const double* moved);
-    bool isNear(int pair, const double* moved, bool isNew, double& room) const;
-    void selectNear(int firstNew, const double* moved);
+    bool isNear(int pair, bool isNew, double& room) const;
+    void selectNear(int firstNew);
     void follow(NearPair& near) const;
-    bool mayTouch(NearPair& near) const;
-    void setKey(const NearPair& near, int which, Gap& gap) const;
-    const SurfaceVariates& variatesOf(NearPair& near, int which) const;
-    double findEnd(const NearPair& near, int which, const SegmentPair& end) const;
-    bool areOnSegments(const ContactPair& pair, double s, double t) const;
-    Gap gapOf(NearPair& near, int which) const;
+    bool mayClose(const Gap& gap) const;
+    double findEnd(const NearPair& near) const;
     bool crosses(int pair, const double* moved) const;
     double radiiOf(const ContactPair& pair) const {
         const std::vector<Capsule>& capsules = search->getSystem().capsules;
@@ -111,8 +105,6 @@ private:
     std::vector<ContactPair> found;
     CapsuleMotion motion;
     std::vector<Part> parts;
-    /** Where particles are half-way. */
-    std::vector<double> middle;
     /** Whether capsules move too far to look for contacts, in the periodic box or anywhere: the step is divided. */
     bool movesTooFar = false, isEndless = false;
 };

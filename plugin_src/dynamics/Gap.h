@@ -27,9 +27,9 @@ struct GapLever {
 
 /** The gap of a contact, or of a particle before a wall, in a step. */
 struct Gap {
-    /** One lever half-way through the step, or two, at its start and its end, each with half of the force. */
-    GapLever levers[2];
-    int numLevers = 1;
+    /** One lever half-way through the step, or those of its start and its end, with half of the force each. */
+    GapLever levers[4];
+    int numLevers = 0;
     /** At the start, and where the last iteration has led, from where the surface is hard. */
     double start = 0, end = 0;
     /** How deep a gap that is held by the spring stays. */

@@ -129,6 +129,7 @@ void WallGaps::findNew(int number, const double* moved) {
             room = 0;
             Gap gap;
             gap.levers[0].places[0] = places[i];
+            gap.numLevers = 1;
             gap.stiffness = system->stiffness;
             gap.response = responses[i];
             gap.key[0] = (uint32_t) force*0x9E3779B1u+face;
