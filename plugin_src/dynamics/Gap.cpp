@@ -9,6 +9,8 @@ namespace {
 
 /** The limits of the depth of hard surfaces, over the thermal one. */
 const double LEAST_LIMIT = 3, LARGEST_LIMIT = 9;
+/** What is deeper than this, over the same, may come out in one step. */
+const double FREE_DEPTH = 10;
 /** Chains of links and linkers are numbers of forces: with this bit, the numbers are those of gaps. */
 const uint32_t OF_GAPS = 0x80000000u;
 /** The draws of four words each: the first has depths, then come those of reflections and of normal numbers. */
@@ -79,7 +81,7 @@ double cylchain::placeHardSurface(double kT, const SurfaceVariates& variates, do
     const double limit = min(deepest, random*sqrt(variance));
     if (begun < -limit) {
         gap.law = GapLaw::Spring;
-        gap.ceiling = -limit;
+        gap.ceiling = begun < -FREE_DEPTH*sqrt(variance) ? HUGE_VAL : -limit;
         return 0;
     }
     gap.law = GapLaw::Reflection;

@@ -92,7 +92,7 @@ private:
  * From one step to the next that changes a deep gap by little, and would not let it out where nothing presses. So D is at
  * most d, a limit between 3 and 9 times (k_B T/k)^(1/2) that is drawn afresh in each step, and what begins deeper than d
  * stays so, held by the spring of the soft surface: both parts keep their equilibrium, whatever d is, and a gap passes
- * from one to the other as d changes.
+ * from one to the other as d changes. What is much deeper than any d is not stopped on its way out.
  *
  * @param variates  of E' and d
  * @param deepest   d is not more than this: no surface is beyond an axis

@@ -12,7 +12,7 @@ namespace {
 /** How far a gap moves in a part, (2 k_B T G)^(1/2), over the thermal depth, where it shares chains with others. */
 const double LARGEST_MOTION = 1.5;
 /** The most parts. */
-const int MOST_PARTS = 16;
+const int MOST_PARTS = 8;
 /** How often all gaps are gone through at most. */
 const int MOST_SWEEPS = 200;
 /** What the last sweep may change a gap by, and the last iteration, over the thermal scale. */
@@ -299,8 +299,8 @@ double ReflectedGaps::findPush(int i, int part) const {
         return max(0.0, -gap.stiffness*end*softer);
     const double rest = normals[2*(size_t) i*parts]*sqrt(kT/gap.stiffness);
     const double held = (end+gap.stiffness*response*rest)*softer, responseHeld = response*softer;
-    const double back = reflect(gap.ceiling-gap.start, gap.ceiling-held, responseHeld,
-            kT*reflections[(size_t) i*parts]);
+    const double back = gap.ceiling < HUGE_VAL ? reflect(gap.ceiling-gap.start, gap.ceiling-held, responseHeld,
+            kT*reflections[(size_t) i*parts]) : 0;
     return (held-responseHeld*back-end)/response;
 }
 
