@@ -66,10 +66,11 @@ class Crosslinks:
     With an integrator of the compiled engine, checkpoints hold the crosslinks themselves, and so do States with
     ``integratorParameters=True`` (those of ``Simulation.saveState``): they restore them in any Context and process.
 
-    All other States and checkpoints hold a digest of the crosslinks. Going back to one restores those that the Context
-    had then, up to 256 changes ago. Elsewhere, any step or energy raises an error that asks for them: save
-    ``table(context)`` beside the checkpoint (``CrosslinkTable.save``) and give it to ``set_table``. It does not matter
-    whether this is done before or after the checkpoint is loaded.
+    All other checkpoints, and States with ``parameters=True``, hold a digest of the crosslinks. Going back to one
+    restores those that the Context had then, up to 256 changes ago. Elsewhere, any step or energy raises an error that
+    asks for them: save ``table(context)`` beside the checkpoint (``CrosslinkTable.save``) and give it to ``set_table``.
+    It does not matter whether this is done before or after the checkpoint is loaded. A State without parameters leaves
+    crosslinks as they are.
 
     Examples
     --------

@@ -80,7 +80,8 @@ STRETCHING_MODELS = _numbers(CylinderChainForce.getStretchingModelNames(), STRET
 SCHEMES = _numbers(CylinderChainIntegrator.getSchemeNames(), ALL_SCHEMES, "schemes")
 PRECISIONS = _numbers(CylinderChainIntegrator.getPrecisionNames(), ALL_PRECISIONS, "precisions")
 
-_OTHER_FRICTION = 1.0
+# Of particles outside filaments, over their mass: each has a friction of its own, or a Context is refused.
+_EACH_ITS_OWN = 0.0
 
 
 class CompiledEngine(Engine):
@@ -327,7 +328,7 @@ class NativeIntegrator(CylinderChainIntegrator):
         beam_labels=None,
     ):
         temperature = non_negative(temperature, TEMPERATURE, "temperature")
-        super().__init__(temperature, _OTHER_FRICTION, as_step(step_size))
+        super().__init__(temperature, _EACH_ITS_OWN, as_step(step_size))
         self.checks = checks
         # The engine numbers chains of beam elements behind all others.
         labels, beam_labels = labels or {}, beam_labels or {}

@@ -51,6 +51,10 @@ def flow_of_integrator(integrator):
     return flow_from_values(tuple(integrator.getGlobalVariableByName(name) for name in _INTEGRATOR_FLOW))
 
 
+def _mobile_particles(system):
+    return {index for index in range(system.getNumParticles()) if system.getParticleMass(index)._value != 0.0}
+
+
 class PortableIntegrator(openmm.CustomIntegrator):
     """Brownian dynamics of filaments, and of all other particles, on any OpenMM platform.
 
@@ -120,6 +124,7 @@ class PortableIntegrator(openmm.CustomIntegrator):
         self._recorder = WorkRecorder()
         self._work = ExplicitWork()
         check_redistribution(system, force_group)
+        self._mobile = _mobile_particles(system)
         self.addGlobalVariable(_INTEGRATOR_KT, 0.0)
         self.addGlobalVariable(_INTEGRATOR_SEED, 0.0)
         for name in (_INTEGRATOR_FLOWS, *_INTEGRATOR_FLOW):
@@ -178,10 +183,11 @@ class PortableIntegrator(openmm.CustomIntegrator):
         TimeStepError
             If the step is far too long for the forces.
         InputError
-            If forces added since the integrator was created stand in its way.
+            If forces added since the integrator was created stand in its way, or particles were added that can move.
         """
         if not self._checked:
             check_redistribution(self._system, self._force_group)
+            self._refuse_late_particles()
             self._checked = True
         # States and checkpoints carry variables of the integrator that wrote them; the seed is this one's own.
         if self.getGlobalVariableByName(_INTEGRATOR_SEED) != self._key:
@@ -205,6 +211,14 @@ class PortableIntegrator(openmm.CustomIntegrator):
     def setStepSize(self, size):
         """Set the time step: a time, or a TimeStep."""
         super().setStepSize(as_step(size))
+
+    def _refuse_late_particles(self):
+        late = _mobile_particles(self._system) - self._mobile
+        if late:
+            raise InputError(
+                f"Particle {min(late)} can move, but has no friction coefficient: it was added, or was given a mass, "
+                "after Filaments.create_integrator. Call that when the System is complete, with its particle_friction."
+            )
 
     def _advance(self, steps, recorder):
         with _STEPPING, recording(recorder):

@@ -264,7 +264,8 @@ class Filaments(FilamentsInContexts):
         particle_friction : energy*time/length^2, or array of them
             Friction coefficients of the particles outside filaments, in the order of their indices; a
             number holds for all of them. Values for massless particles are ignored: those do not move.
-            ``stokes_friction`` computes one.
+            ``stokes_friction`` computes one. A particle that is added later, and can move, has none: its Context is
+            refused (portable engine: its first step).
         random_seed : int
             0 draws a fresh seed from the operating system.
         flow : Flow, optional

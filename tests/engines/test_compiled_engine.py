@@ -373,7 +373,7 @@ def test_refused_arguments():
     for arguments, message in (
         ((-1, 1, 1), "Temperature cannot be negative"),
         ((np.nan, 1, 1), "Temperature cannot be negative"),
-        ((1, 0, 1), "Friction must be positive"),
+        ((1, -1, 1), "Friction cannot be negative"),
     ):
         with pytest.raises(openmm.OpenMMException, match=message):
             CylinderChainIntegrator(*arguments)

@@ -244,6 +244,28 @@ def test_integration_force_groups_leave_forces_out(engine):
     assert np.all(ends[0][3:, 0] > ends[1][3:, 0])
 
 
+@pytest.mark.parametrize("late", ["added", "given a mass"])
+def test_particles_that_can_move_after_the_integrator_was_created_are_refused(engine, late):
+    """They have no friction. The compiled engine refuses the Context, and the portable one its first step."""
+    filaments, system, positions = filaments_and_beads(engine)
+    integrator = integrator_of_both(filaments, system, random_seed=1)
+    particle = 1
+    if late == "added":
+        particle = system.addParticle(1.0)
+        positions = np.vstack([positions._value, np.zeros(3)])
+    else:
+        system.setParticleMass(particle, 1.0)
+    message = rf"Particle {particle} .*can move, but has no friction coefficient.*Filaments\.create_integrator"
+    if engine == "compiled":
+        with pytest.raises(openmm.OpenMMException, match=message):
+            new_context(system, positions, integrator)
+        return
+    context = new_context(system, positions, integrator)
+    with pytest.raises(InputError, match=message):
+        integrator.step(1)
+    assert np.array_equal(positions_of(context)[particle], np.asarray(positions)[particle])
+
+
 def test_massless_particles_stay_and_virtual_sites_follow(engine):
     topology, system, positions = bead_system()
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine=engine)

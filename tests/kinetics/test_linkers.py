@@ -326,6 +326,48 @@ def test_states_that_do_not_say_where_linkers_are_are_noticed():
     context.getIntegrator().step(1)
 
 
+@pytest.mark.parametrize("integrator_of", ["ours", "OpenMM's"])
+def test_states_without_parameters_are_noticed(integrator_of):
+    """They say nothing of linkers. A new Context begins with its own, wherever filaments are."""
+    filaments, first = network()
+    context, system = first, first.getSystem()
+    if integrator_of == "OpenMM's":
+        context = new_context(system, positions_of(first), openmm.LangevinIntegrator(300.0, 1.0, 0.01))
+    context.getIntegrator().step(10)
+    table, state = filaments.linkers_in(context), context.getState(positions=True, velocities=True)
+    # At once: nothing has changed.
+    context.setState(state)
+    context.getIntegrator().step(10)
+    context.setState(state)
+    with pytest.raises((InputError, openmm.OpenMMException), match="not known.*linkers_in"):
+        context.getIntegrator().step(1)
+    with pytest.raises(InputError, match="not known"):
+        filaments.linkers_in(context)
+    filaments.set_linkers(context, table)
+    context.getIntegrator().step(2)
+    assert context.getStepCount() == 12
+    # Given before the State comes.
+    filaments.set_linkers(context, table)
+    context.setState(state)
+    context.getIntegrator().step(2)
+
+
+def test_clocks_that_are_set_alone_say_nothing_of_linkers():
+    filaments, context = network()
+    context.getIntegrator().step(10)
+    context.setTime(0.0)
+    context.getIntegrator().step(1)
+    context.setStepCount(0)
+    context.getIntegrator().step(1)
+    context.setPositions(positions_of(context))
+    context.getIntegrator().step(1)
+    # Both look like a State, unless linkers are given.
+    filaments.set_linkers(context, filaments.linkers_in(context))
+    context.setTime(0.0)
+    context.setStepCount(0)
+    context.getIntegrator().step(1)
+
+
 def test_two_contexts_have_linkers_of_their_own():
     filaments, context = network()
     system = context.getSystem()

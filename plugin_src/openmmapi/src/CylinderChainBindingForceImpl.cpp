@@ -56,7 +56,7 @@ static void require(bool condition, const string& message) {
 
 CylinderChainBindingForceImpl::CylinderChainBindingForceImpl(const CylinderChainBindingForce& owner) :
         StepForceImpl(owner), owner(owner), context(NULL), seed(0), number(0), upToDate(false),
-        nearestParticles(false), wasExcluded(false) {
+        nearestParticles(false), wasExcluded(false), hasStepped(false), timeBefore(0), stepSize(0), countBefore(0) {
 }
 
 void CylinderChainBindingForceImpl::initialize(ContextImpl& context) {
@@ -162,14 +162,26 @@ vector<string> CylinderChainBindingForceImpl::getKernelNames() {
 }
 
 void CylinderChainBindingForceImpl::follow() const {
-    if (context->getParameter(parameter) == digestOf(state))
+    const bool isKnown = (context->getParameter(parameter) == digestOf(state));
+    if (isKnown && !isAtAnotherTime())
         return;
-    throw CylinderChainException(CylinderChainException::UnknownLinks, {},
-            "CylinderChainBindingForce: Where the linkers of this Context are is not known: it has got a State or "
-            "checkpoint of another time, or of another Context, that does not say it. Give it the linkers that belong "
-            "to it by setLinkersInContext(), or Filaments.set_linkers() in Python. The checkpoints of a "
+    string message = "CylinderChainBindingForce: Where the linkers of this Context are is not known: it has got a State "
+            "or checkpoint of another time, or of another Context, that does not say it. Give it the linkers that "
+            "belong to it by setLinkersInContext(), or Filaments.set_linkers() in Python. The checkpoints of a "
             "CylinderChainIntegrator, and States that hold its parameters (getState(integratorParameters=True)), "
-            "restore linkers themselves");
+            "restore linkers themselves";
+    if (isKnown)
+        message += ". If you have set both time and step count yourself, give it the linkers that it had before: "
+                "Filaments.set_linkers(context, linkers), with linkers = Filaments.linkers_in(context) of that time";
+    throw CylinderChainException(CylinderChainException::UnknownLinks, {}, message);
+}
+
+bool CylinderChainBindingForceImpl::isAtAnotherTime() const {
+    if (!hasStepped)
+        return false;
+    const long long count = context->getStepCount()-countBefore;
+    const double time = context->getTime()-timeBefore, rounding = 1e-6*stepSize;
+    return count != 0 && count != 1 && fabs(time) > rounding && fabs(time-stepSize) > rounding;
 }
 
 void CylinderChainBindingForceImpl::accept() {
@@ -179,8 +191,8 @@ void CylinderChainBindingForceImpl::accept() {
 
 void CylinderChainBindingForceImpl::updateContextState(ContextImpl& context, bool& forcesInvalid) {
     follow();
-    const double stepSize = context.getIntegrator().getStepSize();
-    if (!(stepSize > 0))
+    const double size = context.getIntegrator().getStepSize();
+    if (!(size > 0))
         return;
     checkReaches(context);
     require(state.nextNumber <= LAST_NUMBER, "Two thousand million linkers have come out of their concentrations, and "
@@ -188,8 +200,12 @@ void CylinderChainBindingForceImpl::updateContextState(ContextImpl& context, boo
             "getLinkersInContext(), and set them by setLinkersInContext()");
     const bool pulled = !getLinks().empty();
     const long long failed = linkerKernel.getAs<UpdateCylinderChainLinkersKernel>().execute(context, state,
-            BOLTZ*getTemperature(), stepSize, seed, number, links);
+            BOLTZ*getTemperature(), size, seed, number, links);
     accept();
+    hasStepped = true;
+    timeBefore = context.getTime();
+    countBefore = context.getStepCount();
+    stepSize = size;
     upToDate = true;
     require(failed >= -1, "More than ten million linkers of type "+to_string(-2-failed)+" come out of their "
             "concentration within a step: use a smaller step, or look at the concentration and the rates");
@@ -220,6 +236,7 @@ void CylinderChainBindingForceImpl::setState(const cylchain::LinkerState& replac
             replaced.clocks.end(), [] (double clock) {return isfinite(clock);}), "A linker has an illegal clock");
     require(replaced.events.size() <= system.types.size(), "There are events of a type of linkers that does not exist");
     state = replaced;
+    hasStepped = false;
     accept();
 }
 

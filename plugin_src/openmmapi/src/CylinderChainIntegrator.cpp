@@ -111,6 +111,11 @@ void CylinderChainIntegrator::checkSystem(const System& system, const CylinderCh
             throw OpenMMException("Particle "+to_string(entry.first)+
                     " is a node of a chain and cannot have a friction coefficient of its own");
     }
+    for (int particle = 0; particle < system.getNumParticles() && friction == 0; particle++)
+        if (!isNode[particle] && system.getParticleMass(particle) != 0.0 && particleFrictions.count(particle) == 0)
+            throw OpenMMException("CylinderChainIntegrator: Particle "+to_string(particle)+" is outside chains and can "
+                    "move, but has no friction coefficient. If it was added, or was given a mass, after "
+                    "Filaments.create_integrator, call that when the System is complete, with its particle_friction");
 }
 
 void CylinderChainIntegrator::setTemperature(double temp) {
@@ -120,8 +125,8 @@ void CylinderChainIntegrator::setTemperature(double temp) {
 }
 
 void CylinderChainIntegrator::setFriction(double coeff) {
-    if (!(coeff > 0 && isfinite(coeff)))
-        throw OpenMMException("Friction must be positive");
+    if (!(coeff >= 0 && isfinite(coeff)))
+        throw OpenMMException("Friction cannot be negative");
     friction = coeff;
 }
 

@@ -26,7 +26,8 @@ class CylinderChainStepper;
  * forces are correlated as the friction of the segments demands.
  *
  * All other particles move independently of each other.  The friction coefficient of a particle outside chains is its
- * mass times getFriction(), as BrownianIntegrator has it, unless setParticleFriction() gives it one of its own.
+ * mass times getFriction(), as BrownianIntegrator has it, unless setParticleFriction() gives it one of its own.  With a
+ * friction of zero, each of them must have one of its own: a Context is refused otherwise.
  *
  * The fluid may flow: see setFlow().  Friction is then relative to the fluid where each segment or particle is.
  *
@@ -103,7 +104,8 @@ public:
      * Create a CylinderChainIntegrator.
      *
      * @param temperature    the temperature of the heat bath (in Kelvin)
-     * @param frictionCoeff  the friction coefficient of particles outside chains, divided by their mass (in 1/ps)
+     * @param frictionCoeff  the friction coefficient of particles outside chains, divided by their mass (in 1/ps), or 0
+     *                       if each of them has one of its own
      * @param stepSize       the step size with which to integrate the system (in picoseconds)
      */
     CylinderChainIntegrator(double temperature, double frictionCoeff, double stepSize);
@@ -128,7 +130,7 @@ public:
     /**
      * Set the friction coefficient of particles outside chains, divided by their mass (in 1/ps).
      *
-     * @param coeff  the friction coefficient, measured in 1/ps
+     * @param coeff  the friction coefficient, measured in 1/ps, or 0 if each of them has one of its own
      */
     void setFriction(double coeff);
     /**

@@ -20,7 +20,7 @@ class CylinderChainIntegrator;
  *
  * A parameter of the Context has a digest of how many steps they have taken, and how often they have bound and unbound.
  * Where that is another one, because the Context has got a State or a checkpoint that does not say where linkers were,
- * there is nothing to go on with.
+ * there is nothing to go on with.  A State that holds no parameters leaves the digest alone, but sets time and step count.
  */
 class CylinderChainBindingForceImpl : public StepForceImpl {
 public:
@@ -79,6 +79,10 @@ private:
     void follow() const;
     void accept();
     /**
+     * Get whether time and step count are neither those before nor those behind the last step of the linkers.
+     */
+    bool isAtAnotherTime() const;
+    /**
      * Throw an exception if a hand reaches beyond half of the periodic box, which may have shrunk.
      */
     void checkReaches(ContextImpl& context) const;
@@ -98,6 +102,10 @@ private:
     std::uint32_t seed;
     int number;
     bool upToDate, nearestParticles, wasExcluded;
+    // Before the last step of the linkers, unless they were given since.
+    bool hasStepped;
+    double timeBefore, stepSize;
+    long long countBefore;
 };
 
 } // namespace OpenMM
