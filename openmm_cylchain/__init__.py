@@ -21,6 +21,7 @@ from .dynamics.time_step import TimeStep, effective_rate
 from .engine_choice import prepare_openmm
 from .engines.gpu_platforms import enable_platform
 from .errors import (
+    BoxWarning,
     ContactWarning,
     EngineWarning,
     EquilibrationWarning,
@@ -56,6 +57,7 @@ __all__ = [
     "Attachment",
     "BeadSpringType",
     "Box",
+    "BoxWarning",
     "ConstantVelocityPulling",
     "ContactWarning",
     "CrosslinkReporter",

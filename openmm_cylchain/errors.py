@@ -70,6 +70,10 @@ class TimeStepError(InstabilityError):
     """A time step that is far too long for what happens in it: the message says by what it shows and what to do."""
 
 
+class BoxWarning(UserWarning):
+    """Forces between filaments that do not take nearest images, though the System is periodic."""
+
+
 class ContactWarning(UserWarning):
     """Beads that are too far apart, or contacts too soft, to keep filaments from passing through each other."""
 

@@ -13,7 +13,8 @@ from ..filaments.chain_type import ChainType
 from ..filaments.collection import FilamentCollection
 from ..units.quantities import LENGTH, STIFFNESS, positive, thermal_energy, whole_number
 from ..units.types import Indices, Numbers, Scalar
-from .contacts import SAFE_BARRIER, filament_diameters, is_periodic, outside_particles, particle_diameters
+from .contacts import SAFE_BARRIER, filament_diameters, outside_particles, particle_diameters
+from .periodicity import is_periodic
 from .planar_crossings import find_planar_crossing
 
 CAPSULE_BARRIER = 40.0
@@ -94,8 +95,8 @@ def capsule_contact_force(
         Segments of one filament whose numbers differ by no more than this do not touch each other. If not given: those
         that are within two diameters along the contour; at least 1.
     periodic : bool, optional
-        Whether distances are those of nearest images. If not given: whether another force of the System says so, or a
-        box has been set.
+        Whether distances are those of nearest images. If not given: whether the System has a box, or another force
+        that is periodic.
 
     Returns
     -------

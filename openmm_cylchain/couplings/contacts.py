@@ -27,6 +27,7 @@ from ..units.quantities import (
     whole_number,
 )
 from ..units.types import FloatArray, Indices, IntArray, Numbers, Scalar
+from .periodicity import is_periodic
 
 CONTACT_NAME = "Contact"
 CONTACT_STIFFNESS = "contact_stiffness"
@@ -37,9 +38,6 @@ BARRIER = 20.0
 
 SAFE_BARRIER = 25.0
 """In k_B T: a network pays it in fewer than one of 1e10 encounters."""
-
-# The box that OpenMM gives to every System until another is set, in nm.
-_OPENMM_BOX = 2.0 * np.eye(3)
 
 _WITH_EXCLUSIONS = (openmm.NonbondedForce, openmm.CustomNonbondedForce, openmm.CustomGBForce)
 
@@ -244,8 +242,8 @@ def contact_force(
         Particles outside filaments that take part.
     particle_diameter : length, or array of lengths, one for each of ``particles``
     periodic : bool, optional
-        Whether distances are those of nearest images. If not given: whether another force of the System says so, or a
-        box has been set.
+        Whether distances are those of nearest images. If not given: whether the System has a box, or another force
+        that is periodic.
 
     Returns
     -------
@@ -355,12 +353,6 @@ def outside_particles(filaments: FilamentCollection, system: openmm.System, part
         if index in own:
             raise InputError(f"particles contains {index}, which belongs to a filament.")
     return np.array(indices, dtype=int)
-
-
-def is_periodic(system: openmm.System) -> bool:
-    """Whether a force of a System has periodic boundary conditions, or a box has been set."""
-    box = np.array([list(edge._value) for edge in system.getDefaultPeriodicBoxVectors()])
-    return system.usesPeriodicBoundaryConditions() or not np.array_equal(box, _OPENMM_BOX)
 
 
 def _set_cutoff(force, system, diameter, periodic):

@@ -30,6 +30,7 @@ from .crosslink_tables import CrosslinkTable
 from .link_places import as_places
 from .link_store import LinkStore
 from .native_links import NativeLinks, is_link_force, is_of_compiled_engine
+from .periodicity import is_periodic
 from .portable_links import PortableLinks
 
 CROSSLINKS_NAME = "Crosslinks"
@@ -149,8 +150,8 @@ class Crosslinks:
         system : openmm.System
         force_group : int
         periodic : bool, optional
-            Whether a crosslink joins the nearest images of its places; whether the System has another force that
-            does so if not given.
+            Whether a crosslink joins the nearest images of its places. If not given: whether the System has a box, or
+            another force that is periodic.
 
         Returns
         -------
@@ -168,7 +169,7 @@ class Crosslinks:
         if whole_number(force_group, 0, "force_group") > 31:
             raise InputError(f"force_group must be between 0 and 31, but is {force_group}.")
         self._initial.places.check(self._initial.numbers, system.getNumParticles())
-        periodic = system.usesPeriodicBoundaryConditions() if periodic is None else bool(periodic)
+        periodic = is_periodic(system) if periodic is None else bool(periodic)
         if periodic:
             box = np.array([vector.value_in_unit(unit.nanometer) for vector in system.getDefaultPeriodicBoxVectors()])
             _check_rest_lengths(self._initial.numbers, self._initial.rest_length, box)

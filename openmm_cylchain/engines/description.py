@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..couplings.periodicity import is_periodic
 from ..errors import InputError
 from ..mechanics.friction import SegmentFriction
 from ..mechanics.redistribution import ChainSet
@@ -9,7 +10,7 @@ from ..mechanics.redistribution import ChainSet
 
 def advice_after_blow_up(system):
     """What else to say of a chain that has blown up: in a periodic System it may have been torn by wrapping."""
-    if not system.usesPeriodicBoundaryConditions():
+    if not is_periodic(system):
         return ""
     return (
         " If positions were wrapped into the periodic box particle by particle, make filaments whole first with "

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..couplings.periodicity import is_periodic
 from ..dynamics.other_particles import describe_other_particles
 from ..errors import InputError
 from ..mechanics.geometry import joined
@@ -63,7 +64,7 @@ class PortableEngine(Engine):
             [filament_label(number, filament) for number, filament in enumerate(filaments)],
             *describe_other_particles(system, placed.nodes, settings.particle_friction),
             advice_after_blow_up(system),
-            system.usesPeriodicBoundaryConditions(),
+            is_periodic(system),
         )
         return PortableIntegrator(
             system,

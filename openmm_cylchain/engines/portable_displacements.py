@@ -14,6 +14,7 @@ from functools import lru_cache
 import numpy as np
 import openmm
 
+from ..couplings.periodicity import is_periodic
 from ..dynamics.schemes import EXPLICIT_SCHEMES
 from ..errors import InputError, InstabilityError, note_raised_in_force
 from ..mechanics.broken_segment import find_broken_segment
@@ -225,7 +226,7 @@ def add_redistribution(system, computation):
     """
     # A periodic PythonForce sees positions as they are stored. Otherwise, GPU platforms would shift the vectors that
     # are passed through the positions by the box vectors by which they have wrapped each molecule.
-    periodic = system.usesPeriodicBoundaryConditions()
+    periodic = is_periodic(system)
     fingerprint = f"{REDISTRIBUTION_NAME} {computation.fingerprint()} {'periodic' if periodic else 'open'}"
     taken = {}
     for force in system.getForces():
@@ -267,7 +268,7 @@ def check_redistribution(system, group):
                 f"Force {force.getName()!r} is in force group {group}, which the portable engine needs for itself: "
                 "give it another group, or add it before the integrator is created."
             )
-        if force.usesPeriodicBoundaryConditions() != system.usesPeriodicBoundaryConditions():
+        if force.usesPeriodicBoundaryConditions() != is_periodic(system):
             raise InputError(
                 "The System has become periodic since its filaments got an integrator: call "
                 "Filaments.create_integrator after all forces have been added."

@@ -85,7 +85,6 @@ def _built(configuration, engine, seed, linkers):
             spheres,
             2.0 * radii if len(spheres) else None,
             own.excluded_neighbors,
-            periodic=configuration.box is not None,
         )
         system.addForce(force)
     for own in configuration.walls:
@@ -339,7 +338,7 @@ def _add_links(configuration, filaments, system, seed):
                 rest = distance if own.rest_length is None else own.rest_length
                 links.add(None, one, other, own.stiffness, rest, own.maximum_extension)
             count += len(pairs)
-        links.add_to(system, periodic=configuration.box is not None)
+        links.add_to(system)
     return count
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import openmm
 from openmm import app, unit
 
+from ..couplings.periodicity import is_periodic
 from ..couplings.stiff_joints import warn_of_stiff_joints
 from ..dynamics.bead_spring_step import refuse_modes
 from ..dynamics.precision import check_precision, refuse_mixed_precision_of_beams
@@ -31,6 +32,7 @@ from .insertion import (
     check_target,
     set_box_vectors,
 )
+from .periodic_forces import warn_of_forces_without_images
 
 
 class Filaments(FilamentsInContexts):
@@ -67,7 +69,8 @@ class Filaments(FilamentsInContexts):
         Parameters
         ----------
         box_vectors : three (3,) lengths, optional
-            Periodic box vectors of the System and the Topology.
+            Periodic box vectors of the System and the Topology. Forces between filaments, and linkers, take nearest
+            images where a System has a box.
         stretching_force_group, bending_force_group : int
             Force groups of the chain's own forces. The compiled engine has one force for both, so they must
             not differ.
@@ -81,7 +84,8 @@ class Filaments(FilamentsInContexts):
         Raises
         ------
         InputError
-            For box vectors that are not three, not finite or not in the reduced form that OpenMM needs.
+            For box vectors that are not three, not finite or not in the reduced form that OpenMM needs; or the cube of
+            2 nm that every System has.
         """
         topology, system = app.Topology(), openmm.System()
         if box_vectors is not None:
@@ -113,6 +117,7 @@ class Filaments(FilamentsInContexts):
             Changed in place. NonbondedForce and CustomNonbondedForce, which ask for parameters of every
             particle, are given non-interacting entries for the nodes. (Where they use a long-range dispersion
             correction, its constant changes, because OpenMM averages it over all particles.)
+            Its box counts, if it is to have one: set it before.
         positions : (particles, 3) length
             Positions of the particles that are there.
         stretching_force_group, bending_force_group : int
@@ -143,7 +148,7 @@ class Filaments(FilamentsInContexts):
             names = [self._attachments[index].name for index in self._attachments_of[number]]
             add_to_topology(topology, filament, f"F{number}", names)
         add_noninteracting_entries(system, len(positions), self._coinciding())
-        self._periodic = topology.getPeriodicBoxVectors() is not None or system.usesPeriodicBoundaryConditions()
+        self._periodic = is_periodic(system)
         positions = np.concatenate(everything)
         placed = replace(self._placed(), positions=positions)
         self._engine.add_forces(system, placed, stretching_force_group, bending_force_group)
@@ -298,6 +303,8 @@ class Filaments(FilamentsInContexts):
             (``timestep.fene_steps``).
         JointWarning
             If a joint of filaments that are not linked where it is has more than 20 EI/h of an element.
+        BoxWarning
+            If the System is periodic, but crosslinks, contacts or linkers do not take nearest images.
 
         Raises
         ------
@@ -315,6 +322,7 @@ class Filaments(FilamentsInContexts):
             for number, filament in enumerate(self):
                 refuse_modes(filament, filament_label(number, filament))
         flow = as_flow(flow)
+        warn_of_forces_without_images(system)
         if scheme != "implicit":
             refuse_beams(self, f"scheme {scheme!r}")
         bath = self._bath(temperature)

@@ -7,6 +7,7 @@ import numpy as np
 import openmm
 from openmm import app
 
+from ..couplings.periodicity import has_box, is_periodic
 from ..errors import InputError
 from ..filaments.filament import CONTROL_POINT_NAME, NODE_NAME, Filament
 from ..units.quantities import LENGTH, in_units_of, shown, vector, whole_number
@@ -23,6 +24,12 @@ def check_target(topology: app.Topology, system: openmm.System, positions: Vecto
         positions = np.zeros((0, 3))
     if positions.shape != (count, 3):
         raise InputError(f"positions must have the shape ({count}, 3), but have {positions.shape}.")
+    if topology.getPeriodicBoxVectors() is not None and not is_periodic(system):
+        raise InputError(
+            "The Topology has a periodic box, but the System has none: give it the same, by "
+            "system.setDefaultPeriodicBoxVectors(*topology.getPeriodicBoxVectors()), or take it from the Topology, by "
+            "topology.setPeriodicBoxVectors(None)."
+        )
     for force in system.getForces():
         if force.getName().startswith("CylinderChain"):
             raise InputError("The System already holds filaments: add all of them through one Filaments object.")
@@ -118,4 +125,6 @@ def set_box_vectors(system: openmm.System, box_vectors: BoxVectors) -> list[open
             "box_vectors must be in the reduced form of OpenMM: the first along x, the second in the plane of x and y, "
             f"diagonal elements above zero, others at most half of these; but are {[tuple(own) for own in vectors]}."
         ) from None
+    if not has_box(system):
+        raise InputError("box_vectors are those that OpenMM gives to Systems without a box: take another size than 2 nm.")
     return vectors

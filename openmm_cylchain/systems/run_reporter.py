@@ -11,6 +11,7 @@ from openmm import app
 
 from ..couplings.crosslink_records import CrosslinkFile
 from ..couplings.crosslinks import Crosslinks
+from ..couplings.periodicity import is_periodic
 from ..couplings.walls import Shape
 from ..errors import InputError
 from ..output.linker_records import LinkerFile, measure_linkers
@@ -132,8 +133,7 @@ class RunReporter:
         if self._append:
             frames = size_of_lines(files.energies, step)[1]
         else:
-            periodic = system.usesPeriodicBoundaryConditions()
-            box = state.getPeriodicBoxVectors(asNumpy=True)._value if periodic else None
+            box = state.getPeriodicBoxVectors(asNumpy=True)._value if is_periodic(system) else None
             description = describe_system(
                 filaments,
                 system,

@@ -107,20 +107,6 @@ def test_crosslinks_differ_and_may_have_no_length():
     assert links.forces(context) == pytest.approx([0, 2 * 0.602214076])
 
 
-def test_the_nearest_image_is_taken_where_the_system_is_periodic():
-    for periodic in (False, True):
-        system = _stock([(4, 5)], "harmonic", periodic)
-        links = Crosslinks(1.0, 0.5)
-        links.add(None, 0, 1)
-        force = links.add_to(system)
-        assert force.usesPeriodicBoundaryConditions() == periodic
-        positions = np.zeros((6, 3))
-        positions[1] = [2.8, 0, 0]
-        context = new_context(system, positions)
-        assert links.lengths(context) == pytest.approx([0.2 if periodic else 2.8])
-        assert forces_of(context)[0, 0] == pytest.approx(0.3 if periodic else 2.3)
-
-
 def test_force_groups():
     links, system = Crosslinks(1.0, 0.0), _particles()
     links.add(None, 0, 1)

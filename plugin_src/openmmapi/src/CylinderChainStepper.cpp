@@ -39,12 +39,19 @@ static vector<int> findMobileParticles(const CylinderChainDescription& chains, c
     return mobile;
 }
 
+/** Whether a System has a periodic force, or another box than the cube of 2 nm that OpenMM gives to each. */
+static bool isPeriodic(const System& system) {
+    Vec3 box[3];
+    system.getDefaultPeriodicBoxVectors(box[0], box[1], box[2]);
+    return system.usesPeriodicBoundaryConditions() || box[0] != Vec3(2, 0, 0) || box[1] != Vec3(0, 2, 0) ||
+            box[2] != Vec3(0, 0, 2);
+}
+
 CylinderChainStepper::CylinderChainStepper(ContextImpl& context, const CylinderChainIntegrator& integrator,
         CylinderChainForceImpl& force) : context(context), integrator(integrator), chains(force.getDescription()),
         others(context.getSystem(), integrator, chains), couplings(context, chains, others),
         kernel(createKernel(context, force, others)),
-        explicitWork(getKernel().getLoop()), periodic(context.getSystem().usesPeriodicBoundaryConditions()),
-        recorded(false) {
+        explicitWork(getKernel().getLoop()), periodic(isPeriodic(context.getSystem())), recorded(false) {
     getKernel().refuseScheme(static_cast<Scheme>(integrator.getScheme()));
     if (isImplicit(static_cast<Scheme>(integrator.getScheme())))
         couplings.refuseNarrowBox(chains);

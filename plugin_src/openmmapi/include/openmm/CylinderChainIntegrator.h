@@ -187,8 +187,8 @@ public:
     /**
      * Set the flow of the fluid: its velocity at origin+r is velocity+(gradientX.r, gradientY.r, gradientZ.r).  It
      * carries segments along, turns them and stretches them, as far as forces let it.  If the System uses periodic
-     * boundary conditions, the velocity is that at the image of a particle which is nearest to the origin; for a chain,
-     * the image of its first node.
+     * boundary conditions, or its box was set, the velocity is that at the image of a particle which is nearest to the
+     * origin; for a chain, the image of its first node.
      *
      * @param velocity   the velocity at the origin of the flow, measured in nm/ps
      * @param gradientX  the derivatives of the x component of the velocity by x, y and z, measured in 1/ps
