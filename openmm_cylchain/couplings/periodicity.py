@@ -1,4 +1,4 @@
-"""Which Systems are periodic: the one rule for forces between filaments, linkers and flows, in whatever order of calls."""
+"""Which Systems are periodic: one rule for forces between filaments, linkers and flows, in any order of calls."""
 
 import numpy as np
 import openmm

@@ -21,9 +21,9 @@ class Flow:
     Filaments and other particles are dragged along: friction acts on their velocity relative to u. A segment feels u at
     its middle, and is turned and stretched by the gradient. Flows can be added.
 
-    In a System with a periodic box, u is that at the image of a particle which is nearest to the origin of the flow; for a
-    filament, at the image of its first node, and continued from there along the filament. So u has a jump half a box
-    away from the origin along directions in which it varies: keep particles from there, by walls for instance.
+    In a System with a periodic box, u is that at the image of a particle which is nearest to the origin of the flow;
+    for a filament, at the image of its first node, and continued from there along the filament. So u has a jump half a
+    box away from the origin along directions in which it varies: keep particles from there, by walls for instance.
 
     Parameters
     ----------

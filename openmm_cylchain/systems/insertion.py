@@ -126,5 +126,5 @@ def set_box_vectors(system: openmm.System, box_vectors: BoxVectors) -> list[open
             f"diagonal elements above zero, others at most half of these; but are {[tuple(own) for own in vectors]}."
         ) from None
     if not has_box(system):
-        raise InputError("box_vectors are those that OpenMM gives to Systems without a box: take another size than 2 nm.")
+        raise InputError("box_vectors are those of every System that has no box: take another size than 2 nm.")
     return vectors
