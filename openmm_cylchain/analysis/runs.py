@@ -21,6 +21,7 @@ from ..errors import InputError, PrecisionWarning
 from ..mechanics.geometry import joint_cosines, segment_vectors
 from ..output.dcd_frames import DCDFrames
 from ..output.linker_records import LINKER_RECORD
+from ..output.record_file import read_records
 from ..output.run_description import DescribedFilament, DescribedLinkers, RunDescription, read_run_description
 from ..output.run_files import RunFiles
 from ..units.quantities import VOLUME, positive, thermal_energy, whole_number
@@ -190,7 +191,7 @@ class Run:
         """
         if not self.linker_types:
             return [np.zeros(0, LINKER_RECORD)] * len(self)
-        records = np.load(self._files.linker_places, mmap_mode="r")
+        records = read_records(self._files.linker_places)
         begins, ends = (np.searchsorted(records["step"], self.steps, side) for side in ("left", "right"))
         return [records[begin:end] for begin, end in zip(begins, ends)]
 
@@ -216,7 +217,7 @@ class Run:
     @cached_property
     def _crosslink_records(self):
         path = self._files.crosslinks
-        return np.load(path, mmap_mode="r") if path.exists() else np.zeros(0, CROSSLINK_RECORD)
+        return read_records(path) if path.exists() else np.zeros(0, CROSSLINK_RECORD)
 
     def crosslinks(self, frame: int) -> CrosslinkFrame:
         """Crosslinks of a frame, of ``Crosslinks`` or ``[[link]]``: none if there are no such.
@@ -575,7 +576,7 @@ def _whole_frames(files, description):
         table = _read_table(files.linkers)
         kinds = len(description.linkers)
         frames = min(frames, len(table["step"]) // kinds)
-        recorded = np.load(files.linker_places, mmap_mode="r")["step"]
+        recorded = read_records(files.linker_places)["step"]
         held = (table["one hand bound"] + table["both hands bound"])[kinds * (frames - 1) : kinds * frames].sum()
         unfinished = held > 0 and (len(recorded) == 0 or recorded[-1] < expected[frames - 1])
         if frames < _frames_of(description) and unfinished:

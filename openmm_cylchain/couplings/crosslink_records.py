@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import openmm
 
-from ..output.record_file import RecordFile
+from ..output.record_file import RecordFile, read_records
 from ..units.types import BoolArray, FloatArray, IntArray
 from .beam_curves import BeamCurves
 from .crosslink_computation import lengths_and_vectors, slopes_of
@@ -57,7 +57,7 @@ class CrosslinkFile:
         self._written: Any = None
         count = None
         if append:
-            count = int(np.searchsorted(np.load(path, mmap_mode="r")["step"], step, "right"))
+            count = int(np.searchsorted(read_records(path)["step"], step, "right"))
         self._file = RecordFile(path, CROSSLINK_RECORD, "crosslinks", count)
 
     def write(self, context: openmm.Context, step: int) -> None:

@@ -29,7 +29,7 @@ class RecordFile:
     Raises
     ------
     InputError
-        If the file to continue is not there, has another content or fewer records.
+        If the file to continue is not there, has another content or fewer records, or has been cut off.
     """
 
     def __init__(self, path: Path, dtype: np.dtype[Any], content: str, count: int | None = None) -> None:
@@ -40,10 +40,12 @@ class RecordFile:
         self.count = 0
         if count is not None:
             written = self._read_count(path)
-            if count > written:
+            needed = written if count < 0 else count
+            there = min(written, (path.stat().st_size - _HEADER_SIZE) // dtype.itemsize)
+            if there < needed:
                 self._file.close()
-                raise InputError(f"{path} has {written} records, but had {count}: it cannot be continued.")
-            self.count = written if count < 0 else count
+                raise InputError(f"{path} has {there} whole records, but had {needed}: it cannot be continued.")
+            self.count = needed
         self._write_header()
         self._file.truncate(self._file.tell() + self.count * dtype.itemsize)
         self._file.seek(0, os.SEEK_END)
@@ -85,6 +87,17 @@ class RecordFile:
 
 
 _HEADER_SIZE = 512
+
+
+def read_records(path: Path) -> np.ndarray:
+    """The records of a RecordFile, or of one that is being written; InputError if it is missing or has been cut off."""
+    try:
+        records: np.ndarray = np.load(path, mmap_mode="r")
+    except FileNotFoundError:
+        raise InputError(f"{path} is missing.") from None
+    except (ValueError, EOFError):
+        raise InputError(f"{path} is damaged: it does not have all records that it should have.") from None
+    return records
 
 
 def _header(dtype, count):

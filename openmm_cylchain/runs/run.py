@@ -89,6 +89,7 @@ def run(configuration, output, resume=False):
             _write_crosslinks(directory, simulation)
         else:
             _restore(simulation.context, checkpoint, filaments.engine)
+            _check_crosslinks(directory, simulation, checkpoint.step)
             print(f"Resuming at step {checkpoint.step}, {format_time(checkpoint.step * settings.time_step)}.")
         try:
             _Recorder(configuration, filaments, simulation, directory, checkpoint).run_to_end()
@@ -240,6 +241,11 @@ def _write_crosslinks(directory, simulation):
         with contextlib.closing(CrosslinkFile(directory.crosslinks, simulation.system)) as file:
             file.write(simulation.context, 0)
             file.synchronise()
+
+
+def _check_crosslinks(directory, simulation, step):
+    if Crosslinks.from_system(simulation.system):
+        CrosslinkFile(directory.crosslinks, simulation.system, append=True, step=step).close()
 
 
 def _restore(context, checkpoint, engine):

@@ -14,6 +14,7 @@ from ..analysis.trajectories import filament_curves, joint_cosines, segment_leng
 from ..mechanics.geometry import unrolled
 from ..output.colors import FILAMENT_COLORS, LINKER_COLORS
 from ..output.files import write_atomically
+from ..output.record_file import read_records
 from ..units.quantities import thermal_energy
 from ..units.text import time_unit
 from .configuration import linker_labels
@@ -173,7 +174,7 @@ def _draw_scale_bar(axis):
 
 def _draw_linkers(axis, labels, path):
     # Those that join two places in the last frame, in front of the filaments.
-    records = np.load(path, mmap_mode="r")
+    records = read_records(path)
     last = records[records["step"] == records["step"][-1]] if len(records) else records
     for number in range(len(labels)):
         places = last["places"][last["type"] == number]

@@ -15,6 +15,7 @@ from ..couplings.periodicity import is_periodic
 from ..couplings.walls import Shape
 from ..errors import InputError
 from ..output.linker_records import LinkerFile, measure_linkers
+from ..output.record_file import read_records
 from ..output.run_files import RunFiles
 from ..output.run_tables import (
     ENERGY_COLUMNS,
@@ -168,7 +169,7 @@ class RunReporter:
                 self._linkers = opened(table(files.linkers, LINKER_TABLE_COLUMNS))
                 count = None
                 if self._append:
-                    count = int(np.searchsorted(np.load(files.linker_places, mmap_mode="r")["step"], step, "right"))
+                    count = int(np.searchsorted(read_records(files.linker_places)["step"], step, "right"))
                 self._places = opened(LinkerFile(files.linker_places, count))
             self._crosslinks = None
             if Crosslinks.from_system(system):

@@ -8,6 +8,7 @@ from openmm import unit
 
 from openmm_cylchain import F_ACTIN, Crosslinker, Filaments, Hand, InputError, LinkerReporter
 from openmm_cylchain.output.linker_records import LINKER_RECORD, LinkerFile
+from openmm_cylchain.output.record_file import read_records
 from support.contexts import new_simulation, positions_of
 from support.solvent import TEMPERATURE, VISCOSITY
 
@@ -141,8 +142,18 @@ def test_files_of_places_that_are_continued(tmp_path):
     file.write(records[:1])
     file.close()
     np.testing.assert_array_equal(np.load(path)["number"], [0, 1, 2, 0])
-    with pytest.raises(InputError, match="has 4 records, but had 7"):
+    with pytest.raises(InputError, match="has 4 whole records, but had 7"):
         LinkerFile(path, 7)
+    # Cut off, within the third record: it must not be filled up with zeros.
+    whole = path.read_bytes()
+    path.write_bytes(whole[: 512 + 5 * LINKER_RECORD.itemsize // 2])
+    for count, needed in ((3, 3), (-1, 4)):
+        with pytest.raises(InputError, match=f"has 2 whole records, but had {needed}"):
+            LinkerFile(path, count)
+    with pytest.raises(InputError, match=r"places.npy is damaged"):
+        read_records(path)
+    LinkerFile(path, 2).close()
+    np.testing.assert_array_equal(read_records(path)["number"], [0, 1])
     np.save(path, np.zeros(3))
     with pytest.raises(InputError, match="places.npy is not a file of places of linkers"):
         LinkerFile(path, 0)

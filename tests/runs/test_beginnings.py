@@ -12,6 +12,7 @@ from openmm_cylchain.runs.configuration import parse_configuration, read_configu
 from openmm_cylchain.runs.initial_state import build_system
 from openmm_cylchain.runs.run import run
 from openmm_cylchain.runs.run_directory import read_energies
+from support.checkpoints import resealed
 from support.commands import finish, start, wait_for_size
 from support.configurations import EVERYTHING
 
@@ -90,3 +91,22 @@ def test_run_with_everything_is_resumed_to_the_bit(tmp_path):
         begin = 276 if name.endswith("dcd") else 0
         contents = [(tmp_path / folder / name).read_bytes()[begin:] for folder in ("one", "two")]
         assert contents[0] == contents[1], name
+
+
+def test_runs_whose_files_were_cut_off_are_not_resumed(tmp_path, capsys):
+    """By a single byte, whichever of them: nothing is filled up. Whole again, they are."""
+    run(parse_configuration(EVERYTHING), tmp_path / "out")
+    arguments = ["run", str(tmp_path / "out" / "configuration.toml"), "--output", str(tmp_path / "out"), "--resume"]
+    checkpoint = tmp_path / "out" / "checkpoint.chk"
+    checkpoint.write_bytes(resealed(checkpoint.read_bytes(), step=190))
+    names = ("trajectory.dcd", "energies.csv", "linkers.csv", "linkers.npy", "pulling.csv", "crosslinks.npy")
+    for name in names:
+        path = tmp_path / "out" / name
+        whole = path.read_bytes()
+        path.write_bytes(whole[:-1])
+        assert main(arguments) == 2, name
+        errors = capsys.readouterr().err
+        assert errors.startswith("error: ") and name in errors and "Traceback" not in errors
+        assert path.read_bytes() == whole[:-1], name
+        path.write_bytes(whole)
+    assert main(arguments) == 0
