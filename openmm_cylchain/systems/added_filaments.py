@@ -129,7 +129,9 @@ class AddedFilaments:
 
         A clamped node alone is a hinge. Two neighbouring ones fix the direction there, too: the joint between a segment
         with both nodes clamped and one that is free is about twice as stiff as others, because only the half segment of
-        material on its free side can bend. The filament is then clamped exactly at that node.
+        material on its free side can bend. The filament is then clamped exactly at the node between these segments:
+        ``clamped=[0, 1]`` clamps it at node 1, and of its length L, L - l0 is free. Let it begin a segment earlier, or
+        take beam elements (``element="beam"``), which ``clamped=0, clamped_tangents=0`` clamps at the end itself.
 
         Parameters
         ----------
@@ -187,7 +189,8 @@ class AddedFilaments:
         positions : (n, 3) length
             At least two nodes, four for a ring.
         clamped : sequence of int
-            Nodes that do not move; negative numbers count from the end.
+            Nodes that do not move; negative numbers count from the end. ``[0, 1]`` is a clamp at
+            node 1: see ``add_straight``.
         closed : bool
             Make a ring: a last segment leads from the last node back to the first.
         tangents : (n, 3) array, optional
@@ -282,7 +285,8 @@ class AddedFilaments:
         direction : (3,) array, optional
             Direction of the first segment; drawn from the sphere, or from the plane's directions, if not given.
         clamped : sequence of int
-            Nodes that do not move; negative numbers count from the end.
+            Nodes that do not move; negative numbers count from the end. ``[0, 1]`` is a clamp at
+            node 1: see ``add_straight``.
         planar, propulsion, clamped_tangents
             See ``add_straight``.
 

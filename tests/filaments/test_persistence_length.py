@@ -3,6 +3,7 @@
 import copy
 import math
 import pickle
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,7 @@ from scipy.integrate import quad
 from openmm_cylchain import DSDNA, F_ACTIN, MICROTUBULE, EndCorrections, Filaments, FilamentType, InputError, theory
 from openmm_cylchain.filaments.equilibrium import JointAngleDistribution, PlanarJointAngleDistribution, draw_chain
 from openmm_cylchain.filaments.joint_calibration import calibrated_stiffness, tangent_decorrelation
+from openmm_cylchain.runs.reference import reference_page
 from support.bending_models import BENDING_MODELS
 from support.contexts import new_context, positions_of
 from support.solvent import TEMPERATURE, VISCOSITY
@@ -154,6 +156,27 @@ def test_joint_at_a_clamp_is_that_of_half_a_segment(model):
     filaments.add_straight(kind, 4, [0, 0, 0], [1, 0, 0], clamped=[0, 1])
     expected = [kind.clamped_joint_stiffness, kind.joint_stiffness, kind.joint_stiffness]
     assert list(filaments[0].joint_stiffnesses) == expected
+
+
+def test_a_filament_whose_first_segment_is_held_is_clamped_at_node_1():
+    """Under a small force at its tip it bends as a rod of the length L - l0, within 1/(2 n^2) of n free segments."""
+    kind = FilamentType(
+        name="ROD",
+        diameter=8.0,
+        segment_length=50.0,
+        bending_rigidity=4e4,
+        stretching_stiffness=1e3,
+        extension_relaxation_time=1.0,
+    )
+    filaments = Filaments(VISCOSITY, TEMPERATURE, engine="portable")
+    filaments.add_straight(kind, 21, [0, 0, 0], [1, 0, 0], clamped=[0, 1])
+    levers = 50.0 * np.arange(20, 0, -1)
+    compliance = np.sum(levers**2 / filaments[0].joint_stiffnesses)
+    assert compliance == pytest.approx(1000.0**3 / (3 * 4e4), rel=1.01 / (2 * 20**2))
+    assert compliance < 0.87 * 1050.0**3 / (3 * 4e4)
+    # The key and the docstring say so.
+    for text in (reference_page(), Filaments.add_straight.__doc__):
+        assert re.search(r"\[0, 1\].{0,40}node 1", text, re.DOTALL)
 
 
 @pytest.mark.parametrize("model", BENDING_MODELS)
