@@ -46,8 +46,8 @@ ACCURATE_ALONG_CONTACT = 0.5
 UNSTABLE = 2.0
 """lambda from which on the System is thrown apart."""
 
-TOO_STIFF = 1.0
-"""lambda from which on a System is warned of: variances may be twice as large as they should."""
+TOO_STIFF = 2.0 * (1.0 - 1.0 / 1.10)
+"""lambda from which on a System is warned of: variances may be 10 % too large."""
 
 _TOGETHER = "explicit forces together"
 _NOWHERE = -1
@@ -190,15 +190,16 @@ class ExplicitForces:
         return TimeStep(allowed[binding], reason, bounds, allowed, self.unknown)
 
     def warn_if_too_stiff(self, step: float) -> None:
-        """Issue a TimeStepWarning, naming the spring, if variances may be twice too large in a step in ps."""
+        """Issue a TimeStepWarning, naming the spring, if variances may be 10 % too large in a step in ps."""
         accurate = [one for one in self.springs if one.accurate == ACCURATE]
         if not accurate:
             return
         largest, name = self.eigenvalue(accurate, step)
         if largest > TOO_STIFF:
+            excess = 1.0 / (1.0 - 0.5 * largest) - 1.0 if largest < UNSTABLE else math.inf
+            what = f"fluctuations may be {100.0 * excess:.3g} % too large" if excess < 10.0 else "it is thrown apart"
             warnings.warn(
-                f"A time step of {step:.4g} ps is too long for forces that are explicit, most of all {name}: a spring "
-                f"moves what it acts on by {largest:.3g} of its extension in a step, and from 2 on it throws it apart. "
+                f"A time step of {step:.4g} ps is too long for forces that are explicit, most of all {name}: {what}. "
                 f"Recommended for these forces: {self.allowed_step(accurate, ACCURATE):.4g} ps.",
                 TimeStepWarning,
                 stacklevel=4,

@@ -298,7 +298,7 @@ class Filaments(FilamentsInContexts):
         -----
         TimeStepWarning
             If the step exceeds a bound of stability, or the recommended step of a filament more than four times; if
-            forces of the System are so stiff that variances double (k mu h > 1, see ``recommended_time_step``); if it
+            forces of the System are so stiff that variances may be 10 % too large (see ``recommended_time_step``); if it
             is too long for the flow or for self-propelled filaments; or if FENE lengths have too much energy at it
             (``timestep.fene_steps``).
         JointWarning
