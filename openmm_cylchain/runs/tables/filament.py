@@ -62,8 +62,8 @@ FILAMENT = TableKind(
             "clamped",
             Listing(Whole(-MOST_NODES, MOST_NODES, "0"), "node numbers", "[0]", 0),
             (),
-            "Nodes that do not move; -1 is the last one. One alone is a hinge. Of straight segments, [0, 1] is a clamp at "
-            "node 1: what is free is a segment shorter than the filament. For a clamp at its end take element = "
+            "Nodes that do not move; -1 is the last one. One alone is a hinge. Of straight segments, [0, 1] is a clamp "
+            "at node 1: what is free is a segment shorter than the filament. For a clamp at its end take element = "
             '"beam".',
         ),
         Key(
