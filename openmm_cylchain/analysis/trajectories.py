@@ -279,8 +279,13 @@ def _stacked(per_filament):
     return np.stack(per_filament, axis=1)
 
 
-def persistence_length(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> tuple[float, float]:
+def persistence_length(
+    trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None, planar: bool | None = None
+) -> tuple[float, float]:
     """Persistence length ``-<l>/ln<c>`` from the joint cosines c, with its standard error, in nm.
+
+    In a plane, tangents decorrelate over twice the persistence length, ``<t(0).t(s)> = exp(-s/2 l_p)``, so it is half
+    of that.
 
     In the free discrete chain joints are independent, so that neighbouring tangents hold all there is to know
     and larger distances add nothing. Compare it with ``theory.chain_persistence_length``. That of a FilamentType
@@ -292,6 +297,8 @@ def persistence_length(trajectory: mdtraj.Trajectory, filaments: int | Indices |
     trajectory : mdtraj.Trajectory
     filaments : int or list of int, optional
         The selected filaments must have one number of segments; they are pooled.
+    planar : bool, optional
+        Whether they bend in a plane alone; whether each keeps all of its nodes at one z if not given.
 
     Returns
     -------
@@ -302,7 +309,7 @@ def persistence_length(trajectory: mdtraj.Trajectory, filaments: int | Indices |
     ------
     InputError
         For filaments of a single segment or of different lengths, for rings, for a single sample, and if the mean
-        cosine is not between 0 and 1.
+        cosine is not between 0 and 1. If some of them are planar, and others are not.
 
     Warns
     -----
@@ -315,10 +322,19 @@ def persistence_length(trajectory: mdtraj.Trajectory, filaments: int | Indices |
     if not 0.0 < bend < 1.0:
         raise InputError(f"The mean cosine between segments is {1.0 - bend:g}: the persistence length is not defined.")
     length, length_error = mean_with_error(_stacked(segment_lengths(trajectory, filaments)).mean(axis=2))
-    logarithm = np.log1p(-bend)
+    logarithm = np.log1p(-bend) * (2.0 if _are_planar(trajectory, filaments, planar) else 1.0)
     value = -length / logarithm
-    relative_error = np.hypot(length_error / length, bend_error / ((1.0 - bend) * logarithm))
+    relative_error = np.hypot(length_error / length, bend_error / ((1.0 - bend) * np.log1p(-bend)))
     return float(value), float(value * relative_error)
+
+
+def _are_planar(trajectory, filaments, planar):
+    if planar is not None:
+        return bool(planar)
+    flat = {bool(np.all(nodes[..., 2] == nodes[0, 0, 2])) for nodes in node_positions(trajectory, filaments)}
+    if len(flat) > 1:
+        raise InputError("Some of the filaments are planar, and others are not: select those of one kind.")
+    return flat.pop()
 
 
 def bending_drift(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> float:

@@ -148,7 +148,9 @@ def bead_spring_bending_energies(
 def bead_spring_persistence_length(bead_type: BeadSpringType, temperature: Scalar, planar: bool = False) -> float:
     """Length over which <u_i.u_j> falls by 1/e in the middle of a long chain, in nm: so many bonds times a.
 
+    In a plane, half of it, since ``<t(0).t(s)> = exp(-s/2 l_p)`` there.
     From the largest eigenvalues of the transfer operator. It is shorter than l_p = kappa a^3/(k_B T), eq. (3), by the
     order of a: 112.7 a of ``DSDNA_BASE_PAIRS``, where l_p is 114.4 a.
     """
-    return bead_type.bead_spacing * _operator(bead_type, 1, temperature, planar).correlation_length()
+    length = bead_type.bead_spacing * _operator(bead_type, 1, temperature, planar).correlation_length()
+    return 0.5 * length if planar else length

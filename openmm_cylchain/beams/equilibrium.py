@@ -196,7 +196,7 @@ def _sinc(twice):
 
 @dataclass(frozen=True)
 class ElementAverages:
-    """Averages of an element in space with stiff lengths, with its chord c over h and unit tangents t, t' at its ends.
+    """Averages of an element with stiff lengths, with its chord c over h and unit tangents t, t' at its ends.
 
     Attributes
     ----------
@@ -222,12 +222,12 @@ def mean_cosine(bend: float) -> float:
 
 
 @lru_cache(maxsize=64)
-def element_averages(bend: float) -> ElementAverages:
-    """Averages of an element in space that is ``bend`` = h k_B T/EI long, by quadrature over its bends."""
+def element_averages(bend: float, planar: bool = False) -> ElementAverages:
+    """Averages of an element that is ``bend`` = h k_B T/EI long, in space or in a plane, by quadrature over bends."""
     radii, weights = np.polynomial.legendre.leggauss(48)
     largest = min(np.pi, _WIDEST_BEND * np.sqrt(bend))
     radii, weights = 0.5 * largest * (1.0 + radii), 0.5 * largest * weights
-    azimuths = np.pi * (np.arange(64) + 0.5) / 64
+    azimuths = np.array([0.0, np.pi]) if planar else np.pi * (np.arange(64) + 0.5) / 64
     a, b = radii[:, None, None], radii[None, :, None]
     cosine = np.cos(azimuths)
     total, apart = a**2 + b**2 + 2 * a * b * cosine, a**2 + b**2 - 2 * a * b * cosine
@@ -235,11 +235,11 @@ def element_averages(bend: float) -> ElementAverages:
     turn = 2.0 - 2.0 * ends
     scale = 1.0 + turn / 40.0 + turn**2 / 560.0 + apart / 84.0
     energy = (total + 4.0 / 3.0 * apart * scale**2) / (2.0 * bend)
-    density = np.exp(-energy) * np.sin(a) * np.sin(b)
+    density = np.exp(-energy) * (1.0 if planar else np.sin(a) * np.sin(b))
     # Of stiff lengths.
     square = 2.0 + 2.0 * ends
-    length, slope = middle_length(-1.5 * shortening_of(bend, False), np.cos(a) + np.cos(b), square, turn)
-    density *= length**2 * slope * weights[:, None, None] * weights[None, :, None]
+    length, slope = middle_length(-1.5 * shortening_of(bend, planar), np.cos(a) + np.cos(b), square, turn)
+    density *= length ** (1 if planar else 2) * slope * weights[:, None, None] * weights[None, :, None]
     along = (length * np.cos(a) + 0.25 * (1.0 + ends)) / 1.5
     chord = (length**2 + 0.5 * length * (np.cos(a) + np.cos(b)) + square / 16.0) / 2.25
     density /= np.sum(density)

@@ -142,7 +142,7 @@ def is_in_equilibrium(group):
     One clamped node, or one tether, leaves lengths and angles alone; several hold the chain, and linkers pull at it. So
     does a clamped tangent, whose length does not fluctuate.
     """
-    free = not (group.disturbed or group.planar or group.closed)
+    free = not (group.disturbed or group.closed)
     return free and group.start == "equilibrium" and len(group.clamped) <= 1 and not group.clamped_tangents
 
 
@@ -257,18 +257,18 @@ def _series(group, temperature, trajectory, members):
     if isinstance(kind, BeadSpringType):
         # Nothing is known of rings of beads.
         if not group.closed:
-            yield from _series_of_beads(kind, group.segments, temperature, trajectory, members)
+            yield from _series_of_beads(group, temperature, trajectory, members)
         return
     if group.has_beam_elements:
         yield from _series_of_beams(group, temperature, trajectory, members)
         return
     lengths = np.stack(segment_lengths(trajectory, members), axis=1)
-    distribution = SegmentLengthDistribution(kind, temperature)
+    distribution = SegmentLengthDistribution(kind, temperature, group.planar)
     yield (
         _STRETCHING,
         "kT",
         kind.stretching_energy(lengths).mean(axis=2) / kT,
-        theory.stretching_energy_mean(kind, temperature) / kT,
+        theory.stretching_energy_mean(kind, temperature, group.planar) / kT,
     )
     yield "segment length", "nm", lengths.mean(axis=2), float(distribution.mean(lambda length: length))
     if group.joints:
@@ -278,42 +278,43 @@ def _series(group, temperature, trajectory, members):
                 "bending energy per joint",
                 "kT",
                 kind.bending_energy(cosines).mean(axis=2) / kT,
-                theory.bending_energy_mean(kind, temperature) / kT,
+                theory.bending_energy_mean(kind, temperature, group.planar) / kT,
             )
-        yield "cosine of joint angle", "", cosines.mean(axis=2), theory.mean_joint_cosine(kind, temperature)
+        exact = theory.mean_joint_cosine(kind, temperature, group.planar)
+        yield "cosine of joint angle", "", cosines.mean(axis=2), exact
     if not group.closed:
-        yield from _end_to_end(kind, group.segments, temperature, trajectory, members)
+        yield from _end_to_end(group, temperature, trajectory, members)
 
 
 def _series_of_beams(group, temperature, trajectory, members):
     # Averages over all elements of a chain.
     kT = thermal_energy(temperature)
-    kind, exact = group.type, beam_elements.beam_averages(group.type, temperature)
+    kind, exact = group.type, beam_elements.beam_averages(group.type, temperature, group.planar)
     nodes, controls = node_positions(trajectory, members), control_point_positions(trajectory, members)
     element = kind.beam_element(temperature, group.planar)
     stretching, bending = element_energies(np.stack(nodes, axis=1), np.stack(controls, axis=1), element, group.closed)
-    theory_of_stretching = theory.beam_stretching_energy_mean(kind, group.segments, temperature) / kT
+    theory_of_stretching = theory.beam_stretching_energy_mean(kind, group.segments, temperature, group.planar) / kT
     yield _STRETCHING_OF_ELEMENTS, "kT", stretching.mean(axis=2) / kT, theory_of_stretching
     yield "bending energy per element", "kT", bending.mean(axis=2) / kT, exact.bending
     cosines = np.stack(joint_cosines(trajectory, members), axis=1)
     yield "cosine between ends of an element", "", cosines.mean(axis=2), exact.cosine
     if not group.closed:
-        yield from _end_to_end(kind, group.segments, temperature, trajectory, members)
+        yield from _end_to_end(group, temperature, trajectory, members)
 
 
-def _series_of_beads(kind, bonds, temperature, trajectory, members):
+def _series_of_beads(group, temperature, trajectory, members):
     # Averages over all bonds, or joints, of a chain, which are not alike.
-    kT = thermal_energy(temperature)
+    kT, kind = thermal_energy(temperature), group.type
     vectors = np.diff(np.stack(node_positions(trajectory, members), axis=1), axis=2)
     lengths = np.linalg.norm(vectors, axis=3)
-    free = kind, bonds, temperature
+    free = kind, group.segments, temperature, group.planar
     energies = kind.stretching_energies(lengths).mean(axis=2) / kT
     yield _STRETCHING, "kT", energies, theory.bead_spring_stretching_energies(*free).mean() / kT
     yield "segment length", "nm", lengths.mean(axis=2), theory.bead_spring_mean_lengths(*free).mean()
-    if bonds > 1:
+    if group.joints:
         energies = kind.bending_energies(vectors).mean(axis=2) / kT
         yield "bending energy per joint", "kT", energies, theory.bead_spring_bending_energies(*free).mean() / kT
-    yield from _end_to_end(kind, bonds, temperature, trajectory, members)
+    yield from _end_to_end(group, temperature, trajectory, members)
 
 
 def mean_energies(group, temperature):
@@ -321,24 +322,24 @@ def mean_energies(group, temperature):
 
     Of beam elements, those of an element.
     """
-    kind = group.type
+    kind, chain = group.type, (group.type, temperature, group.planar)
+    free = kind, group.segments, temperature, group.planar
     if group.has_beam_elements:
-        stretching = theory.beam_stretching_energy_mean(kind, group.segments, temperature)
-        return stretching, theory.beam_bending_energy_mean(kind, temperature)
+        return theory.beam_stretching_energy_mean(*free), theory.beam_bending_energy_mean(*chain)
     if not isinstance(kind, BeadSpringType):
-        return theory.stretching_energy_mean(kind, temperature), theory.bending_energy_mean(kind, temperature)
-    free = kind, group.segments, temperature
+        return theory.stretching_energy_mean(*chain), theory.bending_energy_mean(*chain)
     stretching, bending = theory.bead_spring_stretching_energies(*free), theory.bead_spring_bending_energies(*free)
     return stretching.mean(), bending.mean() if group.segments > 1 else 0.0
 
 
-def _end_to_end(kind, segments, temperature, trajectory, members):
+def _end_to_end(group, temperature, trajectory, members):
+    kind, segments, planar = group.type, group.segments, group.planar
     squares = np.sum(end_to_end_vectors(trajectory, members) ** 2, axis=2)
     name = "mean square end-to-end distance"
-    yield name, "nm^2", squares, theory.chain_mean_square_end_to_end(kind, segments, temperature)
+    yield name, "nm^2", squares, theory.chain_mean_square_end_to_end(kind, segments, temperature, planar)
     if kind.bending_rigidity > 0:
         wormlike = theory.wlc_mean_square_end_to_end(
-            segments * kind.segment_length, kind.persistence_length_at(temperature)
+            segments * kind.segment_length, kind.persistence_length_at(temperature), planar
         )
         yield _WORMLIKE, "nm^2", squares, float(wormlike)
 
@@ -361,24 +362,26 @@ def _persistence_length(group, temperature, trajectory, members, comparable):
         with warnings.catch_warnings():
             # The notes say it.
             warnings.simplefilter("ignore", EquilibrationWarning)
-            value, error = persistence_length(trajectory, members)
+            value, error = persistence_length(trajectory, members, group.planar)
     except InputError:
         # The mean cosine of a very flexible or unrelaxed chain need not define one.
         return []
-    exact = theory.chain_persistence_length(group.type, temperature)
+    exact = theory.chain_persistence_length(group.type, temperature, group.planar)
     return [_compared("persistence length", "nm", value, error, exact, comparable)]
 
 
 def _persistence_length_of_beams(group, temperature, trajectory, members, comparable):
-    # -h/ln<c> of the cosine c between tangents at the ends of an element, and its error. Rings bend all around.
+    # -h/ln<c> of the cosine c between tangents at the ends of an element, half of it in a plane, and its error. Rings
+    # bend all around.
     if group.closed:
         return []
     cosine, error = _mean_with_error(np.stack(joint_cosines(trajectory, members), axis=1).mean(axis=2))
-    exact = theory.beam_persistence_length(group.type, temperature)
+    exact = theory.beam_persistence_length(group.type, temperature, group.planar)
     if not 0.0 < cosine < 1.0:
         return []
-    value = -group.type.segment_length / math.log(cosine)
-    error *= value**2 / (group.type.segment_length * cosine)
+    length = group.type.segment_length / (2.0 if group.planar else 1.0)
+    value = -length / math.log(cosine)
+    error *= value**2 / (length * cosine)
     return [_compared("persistence length", "nm", value, error, exact, comparable)]
 
 
@@ -421,9 +424,8 @@ def _notes(configuration, group, members, trajectory, short, rounding):
     if group.disturbed:
         reasons = "; ".join(_DISTURBANCES[name] for name in group.disturbed)
         yield f"{reasons[0].upper()}{reasons[1:]}: the exact values are those of free chains, so they are not compared."
-    if group.closed or group.planar:
-        what = "rings" if group.closed else "planar"
-        yield f"They are {what}: the exact values are those of open chains in space, so they are not compared."
+    if group.closed:
+        yield "They are rings: the exact values are those of open chains, so they are not compared."
     if group.start == "file":
         yield "Started from a file: whether that is equilibrium is not known, so nothing is compared with it."
     if group.start == "nodes":

@@ -268,7 +268,7 @@ def _draw_tangent_correlation(axis, groups, temperature, trajectory):
     if not drawn:
         axis.text(0.5, 0.5, "single segments or rings", transform=axis.transAxes, ha="center", fontsize=_FONT_SIZE)
         return
-    exact: dict[float, tuple[float, str]] = {}
+    exact: dict[tuple[float, bool], tuple[float, str]] = {}
     for group, members, label, colour in drawn:
         correlation = tangent_correlation(trajectory, members)
         every = slice(None, None, max(1, len(correlation.lag) // 20))
@@ -283,21 +283,21 @@ def _draw_tangent_correlation(axis, groups, temperature, trajectory):
             linewidth=1.2,
             label=label,
         )
-        persistence = theory.chain_persistence_length(group.type, temperature)
+        theoretical = theory.chain_persistence_length(group.type, temperature, group.planar), group.planar
         length, own = group.segments * group.type.segment_length, colour
-        if persistence in exact:
-            length, own = max(length, exact[persistence][0]), _EXACT_COLOUR
-        exact[persistence] = length, own
-    for persistence, (length, colour) in exact.items():
+        if theoretical in exact:
+            length, own = max(length, exact[theoretical][0]), _EXACT_COLOUR
+        exact[theoretical] = length, own
+    for (persistence, planar), (length, colour) in exact.items():
         if persistence > 0:
             distance = np.linspace(0.0, length, 200)
             axis.plot(
                 distance / scale,
-                theory.wlc_tangent_correlation(distance, persistence),
+                theory.wlc_tangent_correlation(distance, persistence, planar),
                 color=colour,
                 linestyle="--",
                 linewidth=1.8,
-                label=f"exp(-s/lp), lp = {_format_length(persistence)}",
+                label=f"exp(-s/{'2' * planar}lp), lp = {_format_length(persistence)}",
             )
     axis.set_xlim(0.0, max(group.segments * group.type.segment_length for group, *_ in drawn) / scale)
     if len(drawn) == 1:
@@ -324,9 +324,10 @@ def _draw_joint_angles(axis, groups, temperature, trajectory):
             # no closed form.
             continue
         widest, own = angles.max(), colour
-        if (group.type, is_in_equilibrium(group)) in kinds:
-            widest, own = max(widest, kinds[group.type, is_in_equilibrium(group)][1]), _EXACT_COLOUR
-        kinds[group.type, is_in_equilibrium(group)] = group, widest, own
+        kind = group.type, group.planar, is_in_equilibrium(group)
+        if kind in kinds:
+            widest, own = max(widest, kinds[kind][1]), _EXACT_COLOUR
+        kinds[kind] = group, widest, own
     for group, widest, colour in kinds.values():
         _draw_exact_joint_angles(axis, group, temperature, widest, colour)
     axis.set_xlim(left=0.0)
@@ -338,7 +339,7 @@ def _draw_joint_angles(axis, groups, temperature, trajectory):
 
 def _draw_exact_joint_angles(axis, group, temperature, widest, colour):
     angle = np.linspace(0.0, np.pi, 20001)
-    density = np.sin(angle)
+    density = np.ones_like(angle) if group.planar else np.sin(angle)
     if group.type.bending_rigidity > 0:
         with np.errstate(divide="ignore"):
             density *= np.exp(-group.type.bending_energy(np.cos(angle)) / thermal_energy(temperature))
@@ -393,7 +394,7 @@ def _draw_segment_lengths(axis, groups, temperature, trajectory):
         width = 6.0 * np.sqrt(kT / group.type.segment_stiffness)
         length = np.linspace(max(0.0, group.type.segment_length - width), group.type.segment_length + width, 2001)
         energy = group.type.stretching_energy(length) / kT
-        density = length**2 * np.exp(-(energy - energy.min()))
+        density = length ** (1 if group.planar else 2) * np.exp(-(energy - energy.min()))
         density /= trapezoid(density, length)
         axis.plot(length, density, color=colour, linewidth=1.8, linestyle=_line(group), label=_exact_label(group))
     axis.set_xlabel("segment length (nm)")

@@ -31,7 +31,7 @@ def chain_tangent_correlation(
 ) -> FloatOrArray:
     """Correlation of tangents of the free discrete chain, ``<t(i).t(i+k)> = <c>^k``, exact.
 
-    Of beam elements, which there are in space alone, it is that of tangents at nodes: see ``beam_tangent_correlation``.
+    Of beam elements it is that of tangents at nodes: see ``beam_tangent_correlation``.
 
     Parameters
     ----------
@@ -42,26 +42,35 @@ def chain_tangent_correlation(
     planar : bool
         In a plane.
     """
-    if filament_type.has_beam_elements and not planar:
-        return beam_tangent_correlation(filament_type, lag, temperature)
+    if filament_type.has_beam_elements:
+        return beam_tangent_correlation(filament_type, lag, temperature, planar)
     return mean_joint_cosine(filament_type, temperature, planar) ** each_whole_number(lag, 0, "lag")
 
 
-def chain_persistence_length(filament_type: FilamentType | BeadSpringType, temperature: Scalar) -> float:
-    """Length over which tangents of the discrete chain decorrelate, ``-<l>/ln<c>``, in nm; exact.
+def chain_persistence_length(
+    filament_type: FilamentType | BeadSpringType, temperature: Scalar, planar: bool = False
+) -> float:
+    """Length over which tangents of the discrete chain decorrelate in space, ``-<l>/ln<c>``, in nm; exact.
 
-    Of a type given by its ``persistence_length`` it is that length at the temperature given with it, times <l>/l0. Of
-    one given by its ``bending_rigidity`` it tends to the a/(k_B T) of ``FilamentType.persistence_length_at`` for
-    segments that are short against it. A freely jointed chain has 0. Of beads and of
-    beam elements, see ``bead_spring_persistence_length`` and ``beam_persistence_length``.
+    In a plane they decorrelate over twice the persistence length, ``<t(0).t(s)> = exp(-s/2 l_p)``: it is
+    ``-<l>/(2 ln<c>)`` there, with the averages of a plane.
+
+    Of a type given by its ``persistence_length`` it is that length in space at the temperature given with it, times
+    <l>/l0. Of one given by its ``bending_rigidity`` it tends to the a/(k_B T) of ``FilamentType.persistence_length_at``
+    for segments that are short against it. A freely jointed chain has 0. Of beads and of beam elements, see
+    ``bead_spring_persistence_length`` and ``beam_persistence_length``.
     """
     if isinstance(filament_type, BeadSpringType):
-        return bead_spring_persistence_length(filament_type, temperature)
+        return bead_spring_persistence_length(filament_type, temperature, planar)
     if filament_type.has_beam_elements:
-        return beam_persistence_length(filament_type, temperature)
+        return beam_persistence_length(filament_type, temperature, planar)
     if filament_type.joint_stiffness == 0:
         return 0.0
-    length = SegmentLengthDistribution(filament_type, temperature).mean(lambda length: length)
+    length = SegmentLengthDistribution(filament_type, temperature, planar).mean(lambda length: length)
+    if planar:
+        angles = PlanarJointAngleDistribution(filament_type, temperature)
+        bend = angles.mean(lambda angle: 2.0 * np.sin(0.5 * angle) ** 2)
+        return float(-length / (2.0 * np.log1p(-bend)))
     bend = JointAngleDistribution(filament_type, temperature).mean(lambda cosine: 1.0 - cosine)
     return float(-length / np.log1p(-bend))
 
@@ -82,8 +91,7 @@ def chain_mean_square_end_to_end(
     """Mean square end-to-end distance of the free discrete chain in nm^2, exact at any stiffness.
 
     ``<R^2> = N <l^2> + 2 <l>^2 sum_k (N-k) <c>^k``, the averages over (19) and exp(-V_b/k_B T), or over what
-    they are in a plane. Of beads, by the transfer operator; of beam elements, which there are in space alone, see
-    ``beam_mean_square_end_to_end``.
+    they are in a plane. Of beads, by the transfer operator; of beam elements, see ``beam_mean_square_end_to_end``.
 
     Parameters
     ----------
@@ -95,8 +103,8 @@ def chain_mean_square_end_to_end(
     """
     if isinstance(filament_type, BeadSpringType):
         return bead_spring_mean_square_end_to_end(filament_type, segments, temperature, planar)
-    if filament_type.has_beam_elements and not planar:
-        return beam_mean_square_end_to_end(filament_type, segments, temperature)
+    if filament_type.has_beam_elements:
+        return beam_mean_square_end_to_end(filament_type, segments, temperature, planar)
     segments = whole_number(segments, 1, "segments")
     return float(_subchain_mean_square(filament_type, segments, temperature, planar)[-1])
 

@@ -152,6 +152,24 @@ def test_persistence_length_is_no_surer_for_frames_that_repeat(equilibrium):
     assert again[1] > 0.7 * once[1]
 
 
+def test_persistence_length_in_a_plane_is_half_of_what_tangents_decorrelate_over(flexible, equilibrium):
+    """By the angle's density exp(-K (1 - cos)/k_B T), or what the type has for it, summed over a grid."""
+    generator = np.random.default_rng(2)
+    chains = [[draw_chain(flexible, 120, TEMPERATURE, generator, planar=True) for _ in range(20)] for _ in range(15)]
+    trajectory = make_trajectory([np.array(frames) for frames in chains])
+    angle = np.linspace(-np.pi, np.pi, 20001)[1:-1]
+    weight = np.exp(-flexible.bending_energy(np.cos(angle)) / thermal_energy(TEMPERATURE))
+    exact = -10.0 / (2.0 * np.log(np.average(np.cos(angle), weights=weight)))
+    assert theory.chain_persistence_length(flexible, TEMPERATURE, planar=True) == pytest.approx(exact, rel=5e-3)
+    value, error = analysis.persistence_length(trajectory)
+    assert error < 0.0125 * exact and abs(value - exact) < 4 * error + 5e-3 * exact
+    in_space = analysis.persistence_length(trajectory, planar=False)
+    assert in_space == pytest.approx((2 * value, 2 * error))
+    mixed = make_trajectory([np.array(chains[0]), equilibrium.xyz[:, analysis.filament_nodes(equilibrium.topology)[0]]])
+    with pytest.raises(InputError, match="Some of the filaments are planar, and others are not"):
+        analysis.persistence_length(mixed)
+
+
 def test_persistence_length_needs_bends_of_less_than_a_right_angle():
     zigzag = np.array([[[0, 0, 0], [1, 0, 0], [0.5, 0.2, 0]], [[0, 0, 0], [1, 0, 0], [0.5, 0.3, 0]]])
     with pytest.raises(InputError, match="not defined"):

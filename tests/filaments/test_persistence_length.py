@@ -185,6 +185,8 @@ def test_in_a_plane_tangents_decorrelate_over_twice_the_length(model):
     for ratio, tolerance in ((0.1, 0.06), (0.001, 6e-4)):
         mean = PlanarJointAngleDistribution(chain(ratio, model), TEMPERATURE).mean(lambda angle: 1 - np.cos(angle))
         assert -math.log1p(-mean) == pytest.approx(ratio / 2, rel=tolerance)
+        length = theory.chain_persistence_length(chain(ratio, model), TEMPERATURE, planar=True)
+        assert length == pytest.approx(100.0 / ratio, rel=tolerance)
 
 
 # DNA cut into ever shorter segments

@@ -187,6 +187,34 @@ def test_equilibrium_run_agrees_with_theory(tmp_path):
     assert "24 × ACT, 6 segments" in format_summary(configuration, groups)
 
 
+@pytest.mark.parametrize(
+    ("kind", "bending", "per"),
+    [
+        ('type = "F_ACTIN"', 0.5, "joint"),
+        pytest.param('type = "F_ACTIN"\nelement = "beam"', 1.0, "element", marks=pytest.mark.slow),
+        pytest.param('type = "DSDNA_BASE_PAIRS"', None, "joint", marks=pytest.mark.slow),
+    ],
+)
+def test_planar_filaments_agree_with_theory_of_a_plane(tmp_path, kind, bending, per):
+    """As they are drawn, and after a few steps. Bends have half of the energy that they have in space."""
+    filaments = f"[[filament]]\n{kind}\nsegments = 24\ncount = 600\nplanar = true\n"
+    end = '[simulation]\ntime_step = "10 ns"\nduration = "40 ns"\nreport_interval = "20 ns"\n'
+    if "BASE_PAIRS" in kind:
+        end = end.replace(" ns", " ps").replace("10 ps", "1 ps")
+    config = configured(tmp_path, SHORT[: SHORT.index("[[")] + filaments + end)
+    configuration = read_configuration(config)
+    run(configuration, tmp_path / "out")
+    (group,) = summarise(configuration, load_trajectory(configuration, RunDirectory(tmp_path / "out")))
+    assert group.in_equilibrium
+    for own in group.observables:
+        assert own.standard_error < 0.0125 * own.theory, own
+        assert own.verdict == "reference" or abs(own.deviation) < 4.0, own
+    (energy,) = [own.theory for own in group.observables if own.name == f"bending energy per {per}"]
+    assert bending is None or energy == pytest.approx(bending, rel=0.03)
+    lengths = [own.theory for own in group.observables if own.name == "persistence length"]
+    assert len(lengths) == ("BASE_PAIRS" not in kind) and lengths == pytest.approx(len(lengths) * [17200.0], rel=0.03)
+
+
 def test_chains_of_beads_agree_with_theory(tmp_path, capsys):
     config = configured(
         tmp_path,
