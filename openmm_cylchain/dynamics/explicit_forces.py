@@ -115,6 +115,8 @@ class ExplicitForces:
     springs : list of Springs
     unknown : tuple of str
         Forces whose stiffness is not known.
+    constant_forces : dict of int to (3,) arrays
+        What external forces that do not change with positions add up to on each particle, in kJ/(mol nm).
     """
 
     def __init__(
@@ -133,6 +135,7 @@ class ExplicitForces:
         # Places between two particles that have none of their own, with numbers behind those of all particles.
         self._between: dict[tuple[int, int, float], int] = {}
         self.springs: list[Springs] = []
+        self.constant_forces: dict[int, FloatArray] = {}
         unknown: list[str] = []
         coupled = coupled_forces or CoupledForces(system, filaments)
         for index, force in enumerate(system.getForces()):
@@ -442,7 +445,7 @@ class ExplicitForces:
         if isinstance(force, openmm.CustomBondForce):
             return _custom_bonds(force, label)
         if isinstance(force, openmm.CustomExternalForce):
-            return _external(force, label)
+            return self._external(force, label)
         if is_contact_force(force):
             return self._contacts(force, label)
         if isinstance(force, openmm.PythonForce):
@@ -488,6 +491,27 @@ class ExplicitForces:
             place = (int(particles[row]), int(places.partners[row, side]), float(places.fractions[row, side]))
             particles[row] = self._between.setdefault(place, self._system.getNumParticles() + len(self._between))
         return particles
+
+    def _external(self, force, label):
+        particles = [force.getParticleParameters(index) for index in range(force.getNumParticles())]
+        indices = [index for index, _ in particles]
+        if is_constant_force(force) or not particles:
+            self._add_constant(particles)
+            return []
+        wall = _WALL.match(force.getEnergyFunction()) if force.getName().startswith(f"{WALL_NAME} (") else None
+        if wall:
+            return [Springs.at_points(label, "entry", indices, 2.0 * float(wall[1]))]
+        if len(particles) > _MOST_EVALUATED or force.usesPeriodicBoundaryConditions():
+            return None
+        stiffness, constants = _external_curvatures(force, [values for _, values in particles])
+        if any(one is None for one in stiffness):
+            return None
+        self._add_constant((index, one) for index, one in zip(indices, constants) if one is not None)
+        return [Springs.at_points(label, "entry", indices, stiffness)]
+
+    def _add_constant(self, forces):
+        for particle, force in forces:
+            self.constant_forces[particle] = self.constant_forces.get(particle, 0.0) + np.array(force)
 
     def _contacts(self, force, label):
         stiffness = next(
@@ -585,23 +609,9 @@ def _bond_curvatures(force, parameters):
     return [_constant(row) for row in curvatures]
 
 
-def _external(force, label):
-    particles = [force.getParticleParameters(index) for index in range(force.getNumParticles())]
-    indices = [index for index, _ in particles]
-    if is_constant_force(force) or not particles:
-        return []
-    wall = _WALL.match(force.getEnergyFunction()) if force.getName().startswith(f"{WALL_NAME} (") else None
-    if wall:
-        return [Springs.at_points(label, "entry", indices, 2.0 * float(wall[1]))]
-    if len(particles) > _MOST_EVALUATED or force.usesPeriodicBoundaryConditions():
-        return None
-    stiffness = _external_curvatures(force, [values for _, values in particles])
-    if any(one is None for one in stiffness):
-        return None
-    return [Springs.at_points(label, "entry", indices, stiffness)]
-
-
 def _external_curvatures(force, parameters):
+    # The curvature for each set of parameters, None where it is not the same everywhere; and the force, None where that
+    # is not.
     copy = openmm.CustomExternalForce(force.getEnergyFunction())
     _copy_globals(force, copy)
     for index in range(force.getNumPerParticleParameters()):
@@ -623,8 +633,11 @@ def _external_curvatures(force, parameters):
     widths = 0.01 * np.array([np.linalg.norm(origin) for origin in origins])
     hessians = (forces[..., 0, :] - forces[..., 1, :]) / widths[:, None, None]
     if not np.all(np.isfinite(hessians)):
-        return [None] * len(parameters)
-    return [_constant(row) for row in np.max(np.linalg.eigvalsh(hessians + np.swapaxes(hessians, -1, -2)), axis=-1) / 2]
+        return [None] * len(parameters), [None] * len(parameters)
+    curvatures = np.max(np.linalg.eigvalsh(hessians + np.swapaxes(hessians, -1, -2)), axis=-1) / 2
+    forces = forces.reshape(len(parameters), -1, 3)
+    spread = np.ptp(forces, axis=1).max(axis=1) <= 1e-9 * np.abs(forces).max(axis=(1, 2))
+    return [_constant(row) for row in curvatures], [own[0] if same else None for own, same in zip(forces, spread)]
 
 
 def _copy_globals(force, copy):

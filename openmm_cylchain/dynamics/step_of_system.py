@@ -10,7 +10,8 @@ from ..errors import InputError
 from ..filaments.attachments import BEAD_NAME
 from ..filaments.collection import FilamentCollection
 from ..mechanics.flow import Flow
-from ..units.types import Numbers, Scalar
+from ..units.types import FloatArray, Numbers, Scalar
+from .buckling_step import steps_of_buckling
 from .coupled_forces import CoupledForces
 from .coupled_step import steps_of_couplings
 from .explicit_forces import ExplicitForces
@@ -41,13 +42,17 @@ def recommended_step_of(
         steps.append(_step_of_contacts(filaments, contact_diameter, contact_stiffness, confidence))
     elif contact_stiffness is not None:
         raise InputError("A contact_stiffness needs a contact_diameter.")
+    constant_forces: dict[int, FloatArray] = {}
     if system is not None:
         coupled = CoupledForces(system, filaments)
         steps += _steps_of_diffusion(filaments, system, temperature, confidence, scheme, coupled)
         if scheme in IMPLICIT_SCHEMES:
             steps += steps_of_couplings(filaments, system, temperature, particle_friction, coupled)
         steps += steps_of_kinetics(filaments, system, scheme, temperature, particle_friction)
-        steps.append(ExplicitForces(system, filaments, scheme, particle_friction, coupled).recommended_step())
+        explicit = ExplicitForces(system, filaments, scheme, particle_friction, coupled)
+        steps.append(explicit.recommended_step())
+        constant_forces = explicit.constant_forces
+    steps += steps_of_buckling(filaments, scheme, constant_forces)
     return shortest(steps)
 
 

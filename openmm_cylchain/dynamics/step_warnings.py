@@ -1,6 +1,7 @@
 """Warnings of a time step that is too long, before it is taken."""
 
 import warnings
+from collections.abc import Sequence
 
 import openmm
 
@@ -10,6 +11,7 @@ from ..filaments.collection import FilamentCollection
 from ..mechanics.flow import Flow
 from ..mechanics.friction import SegmentFriction
 from ..units.types import Numbers, Scalar
+from .buckling_step import steps_of_buckling
 from .explicit_forces import ExplicitForces
 from .recommended_step import fene_steps, recommended_time_step
 from .schemes import EXPLICIT_SCHEMES, IMPLICIT_SCHEMES
@@ -39,7 +41,9 @@ def warn_of_long_step(
             friction = f.type.segment_friction(*solvent, f.segments)
             warn_if_far_above(f.type, solvent[0], temperature, step, f.segments, scheme, f.closed, friction)
             warn_if_fene_is_wrong(f.type, temperature, step, friction, scheme)
-    ExplicitForces(system, filaments, scheme, particle_friction).warn_if_too_stiff(step)
+    forces = ExplicitForces(system, filaments, scheme, particle_friction)
+    forces.warn_if_too_stiff(step)
+    warn_if_buckling_is_not_resolved(steps_of_buckling(filaments, scheme, forces.constant_forces), step)
 
 
 def warn_if_unstable(
@@ -154,3 +158,16 @@ def warn_if_driven_far(
             TimeStepWarning,
             stacklevel=4,
         )
+
+
+def warn_if_buckling_is_not_resolved(recommended: Sequence[TimeStep], step: Scalar | TimeStep) -> None:
+    """Issue a TimeStepWarning if ``step`` exceeds one of ``steps_of_buckling`` by more than a factor of four."""
+    step = as_step(step, "time step")
+    for one in recommended:
+        if step > _FAR_ABOVE * one.step:
+            warnings.warn(
+                f"A time step of {step:.4g} ps does not resolve how a filament buckles, which is too slow in it. "
+                f"Recommended: {one}.",
+                TimeStepWarning,
+                stacklevel=4,
+            )

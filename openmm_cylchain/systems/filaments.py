@@ -193,7 +193,8 @@ class Filaments(FilamentsInContexts):
         HarmonicBondForce, crosslinks, walls, contacts, constant forces, tethers, and CustomBondForce and
         CustomExternalForce that are harmonic; walls as if all their particles were in contact, and contacts of two
         filaments as if they crossed at their ends, or touched all along with an error of a third.
-        Other forces are listed in ``unknown_forces``.
+        Other forces are listed in ``unknown_forces``. Filaments that constant forces, tethers or propulsion compress
+        bind it by the rate with which they buckle (see ``buckling_step``).
 
         Parameters
         ----------
@@ -297,9 +298,10 @@ class Filaments(FilamentsInContexts):
         Warns
         -----
         TimeStepWarning
-            If the step exceeds a bound of stability, or the recommended step of a filament more than four times; if
-            forces of the System are so stiff that variances may be 10 % too large (see ``recommended_time_step``); if
-            it is too long for the flow or for self-propelled filaments; or if FENE lengths have too much energy at it
+            If the step exceeds a bound of stability, or the recommended step of a filament, or that of buckling, more
+            than four times; if forces of the System are so stiff that variances may be 10 % too large (see
+            ``recommended_time_step``); if it is too long for the flow or for self-propelled filaments; or if FENE
+            lengths have too much energy at it
             (``timestep.fene_steps``).
         JointWarning
             If a joint of filaments that are not linked where it is has more than 20 EI/h of an element.
