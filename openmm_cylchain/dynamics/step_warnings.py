@@ -13,6 +13,7 @@ from ..mechanics.friction import SegmentFriction
 from ..units.types import Numbers, Scalar
 from .buckling_step import steps_of_buckling
 from .explicit_forces import ExplicitForces
+from .kinetic_step import steps_of_hands
 from .recommended_step import fene_steps, recommended_time_step
 from .schemes import EXPLICIT_SCHEMES, IMPLICIT_SCHEMES
 from .stability import stability_bounds
@@ -43,6 +44,7 @@ def warn_of_long_step(
             warn_if_fene_is_wrong(f.type, temperature, step, friction, scheme)
     forces = ExplicitForces(system, filaments, scheme, particle_friction)
     forces.warn_if_too_stiff(step)
+    warn_if_hands_are_not_resolved(system, step)
     warn_if_buckling_is_not_resolved(steps_of_buckling(filaments, scheme, forces.constant_forces), step)
 
 
@@ -168,6 +170,19 @@ def warn_if_buckling_is_not_resolved(recommended: Sequence[TimeStep], step: Scal
             warnings.warn(
                 f"A time step of {step:.4g} ps does not resolve how a filament buckles, which is too slow in it. "
                 f"Recommended: {one}.",
+                TimeStepWarning,
+                stacklevel=4,
+            )
+
+
+def warn_if_hands_are_not_resolved(system: openmm.System, step: Scalar | TimeStep) -> None:
+    """Issue a TimeStepWarning if ``step`` exceeds one of ``steps_of_hands`` by more than a factor of four."""
+    step = as_step(step, "time step")
+    for what, allowed in steps_of_hands(system).items():
+        if step > _FAR_ABOVE * allowed:
+            warnings.warn(
+                f"A time step of {step:.4g} ps is {step / allowed:.3g} times as long as the recommended one of "
+                f"linkers: {what} in {allowed:.4g} ps.",
                 TimeStepWarning,
                 stacklevel=4,
             )

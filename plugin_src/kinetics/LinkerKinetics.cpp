@@ -170,6 +170,7 @@ void LinkerKinetics::apply(Linker& linker, const KineticStep& step, Pending& nex
  */
 void LinkerKinetics::takeTogether(LinkerState& state, const KineticStep& step, Count& count) {
     vector<Linker>& linkers = state.linkers;
+    const size_t before = linkers.size();
     const NoiseKey key = {step.seed, 0, state.steps};
     priority_queue<Pending, vector<Pending>, greater<Pending> > queue;
     auto add = [&] (size_t i, double time) {
@@ -220,6 +221,15 @@ void LinkerKinetics::takeTogether(LinkerState& state, const KineticStep& step, C
         }
         addSource(next);
     }
+    auto walkOne = [&] (size_t i) {
+        if (kinds[watches[i].kind].walks)
+            walkAll(linkers[i], step, watches[i], count);
+    };
+    for (const vector<int>& own : competing)
+        for (int i : own)
+            walkOne(i);
+    for (size_t i = before; i < linkers.size(); i++)
+        walkOne(i);
 }
 
 /** Find where the rates of linkers come from, by their types and what they hold. */
@@ -384,23 +394,22 @@ void LinkerKinetics::advanceChunk(LinkerState& state, const KineticStep& step, i
         const Kind& kind = kinds[own.kind];
         if (kind.rests && passes(state.clocks[i], kind.rate+kind.perPiece*around[own.where], step.stepSize))
             continue;
-        if (kind.walks)
-            walkAll(state.linkers[i], step, own, count);
-        const double rate = findRate(own, step);
-        if (kind.rests || !passes(state.clocks[i], rate, step.stepSize)) {
+        if (kind.rests || !passes(state.clocks[i], findRate(own, step), step.stepSize)) {
             Linker& linker = state.linkers[i];
-            if (kinds[own.kind].needsSites)
+            if (kind.needsSites) {
                 competing[chunk].push_back(i);
-            else {
-                Pending next = {0, RandomNumbers(key, step.force, linker.number), i, linker.type, {}, 0};
-                while (next.events <= MOST_EVENTS && draw(state, step, next)) {
-                    apply(linker, step, next, nullptr, count);
-                    own = watch(linker);
-                }
-                if (next.events > MOST_EVENTS)
-                    count.failed = linker.number;
+                continue;
             }
+            Pending next = {0, RandomNumbers(key, step.force, linker.number), i, linker.type, {}, 0};
+            while (next.events <= MOST_EVENTS && draw(state, step, next)) {
+                apply(linker, step, next, nullptr, count);
+                own = watch(linker);
+            }
+            if (next.events > MOST_EVENTS)
+                count.failed = linker.number;
         }
+        if (kinds[own.kind].walks)
+            walkAll(state.linkers[i], step, own, count);
         if (kinds[own.kind].pulls)
             pulling[chunk].push_back(i);
     }

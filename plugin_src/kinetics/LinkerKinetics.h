@@ -30,8 +30,10 @@ struct KineticStep {
 /**
  * Linkers that bind to chains, walk along them and unbind.
  *
- * In a step, hands that are bound walk first. Then each linker is a Markov process in continuous time, in which all
- * chains stand still: with c the rate of binding per length, the reach R, the volume v = (4 pi/3) (R_1 R_2)^(3/2), and
+ * In a step, each linker is a Markov process in continuous time, in which all chains stand still; then hands that are
+ * bound walk for as long as the step takes. A hand that has bound in the step walks as far as all others do, and as the
+ * chain will move: in the other order it would hold that back, which was slower by the share of hands that unbind in a
+ * step. With c the rate of binding per length, the reach R, the volume v = (4 pi/3) (R_1 R_2)^(3/2), and
  * U the energy of the spring between two places,
  *
  *     unbound -> one hand bound           c v/V for each length of chains, V the volume of unbound linkers,

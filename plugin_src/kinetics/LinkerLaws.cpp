@@ -11,8 +11,7 @@ namespace {
 
 /** Exponents of rates are at most this. */
 const double LARGEST_EXPONENT = 500;
-/** Hands walk in parts of a step: in each, they relax towards their stall force by this, unless there are most. */
-const double SHARE_OF_RELAXATION = 0.25;
+/** Hands do not pass where a load on chains that stand still would stop them, in parts of a step if need be: at most. */
 const double MOST_PARTS = 100;
 
 double boundedExp(double x) {
@@ -107,17 +106,23 @@ double LinkerKinetics::speedUnder(const Hand& hand, double pull) const {
     return size*min(2.0, max(hand.walksBackward ? -1.0 : 0.0, ratio));
 }
 
-/** Hands that are bound walk, those which bind to sites excepted. */
+/**
+ * Hands that are bound walk, those which bind to sites excepted, with the speed under the load at the start. Chains
+ * follow in the rest of the step, so that a load stays: walking against a spring that grows would be slower than that.
+ */
 void LinkerKinetics::walk(Linker& linker, const KineticStep& step, Count& count) const {
     const LinkerType& type = system.types[linker.type];
     double rate = 0;
+    int walking = 0;
     for (int side = 0; side < 2; side++)
         if (linker.hands[side].isBound()) {
             const Hand& hand = system.hands[type.hands[side]];
-            if (hand.siteSpacing == 0 && hand.stallForce > 0)
+            if (hand.siteSpacing == 0 && hand.speed != 0 && hand.stallForce > 0) {
                 rate = max(rate, type.stiffness*fabs(hand.speed)/hand.stallForce);
+                walking++;
+            }
         }
-    const double needed = linker.pulls() ? ceil(rate*step.stepSize/SHARE_OF_RELAXATION) : 1;
+    const double needed = linker.pulls() ? ceil(walking*rate*step.stepSize) : 1;
     const int parts = static_cast<int>(min(MOST_PARTS, max(1.0, needed)));
     for (int part = 0; part < parts; part++)
         walkPart(linker, step, step.stepSize/parts, count);

@@ -449,8 +449,10 @@ def test_recommended_steps_know_linkers():
     fast = replace(HAND, unbinding_rate=1e6 / SECOND)
     walking = replace(HAND, unbinding_rate=0.0, speed=1e-3, stall_force=1e4)
     stiff = replace(walking, speed=1e-6, stall_force=1e-4)
+    stepping = replace(fast, speed=1e-9, stall_force=None, site_spacing=8.0)
     for hand, rest, step, words in [
         (fast, 0.0, 0.2e6, "unbinds with the rate 1e+06/s"),
+        (stepping, 0.0, 0.1e6, "unbinds with the rate 1e+06/s"),
         (walking, 0.0, 0.2 * 60.0 / 1e-3, "a hand walks"),
         (stiff, 0.0, 0.2 * 1e-4 / (SPRING.stiffness * 1e-6), "stall force"),
         (HAND, 5.0, None, "diffuse against each other"),

@@ -1,12 +1,22 @@
 """Linkers on what moves: equilibrium of binding and motion together, whatever the step; motors that move filaments."""
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
 import openmm
 import pytest
 
-from openmm_cylchain import F_ACTIN, MICROTUBULE, Crosslinker, Crosslinks, Filaments, Hand
+from openmm_cylchain import (
+    F_ACTIN,
+    MICROTUBULE,
+    Crosslinker,
+    Crosslinks,
+    Filaments,
+    Hand,
+    TimeStepWarning,
+    constant_force,
+)
 from support.contexts import new_context
 from support.linker_contexts import PICONEWTON, SECOND, glide
 from support.solvent import KT, TEMPERATURE, VISCOSITY
@@ -89,6 +99,86 @@ def test_fixed_motors_make_a_filament_glide_at_their_speed():
     # Towards the plus end they walk, so the filament goes the other way.
     assert displacement[0] == pytest.approx(-1000.0, rel=0.03)
     assert np.linalg.norm(displacement[1:]) < 60.0
+
+
+def carried(number, segments, reach, unbinding, stall, anchors, load=0.0, planar=False):
+    """Microtubules along x with motors of 1000 nm/s on points, which pull at them against a load."""
+    filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
+    kind = MICROTUBULE.with_segment_length(1000.0)
+    for copy in range(number):
+        filaments.add_straight(kind, segments, (0.0, 4000.0 * copy, 0.0), (1.0, 0.0, 0.0), planar=planar)
+    hand = Hand(
+        binding_rate=4.0 * unbinding,
+        reach=reach,
+        unbinding_rate=unbinding,
+        speed=1000.0 / SECOND,
+        stall_force=stall,
+        walks_backward=True,
+        at_end="release",
+    )
+    points = np.concatenate([anchors + [0.0, 4000.0 * copy, 0.0] for copy in range(number)])
+    stiffness = 0.1 * PICONEWTON if unbinding else PICONEWTON
+    filaments.add_linkers(Crosslinker(hands=hand, stiffness=stiffness), anchors=points)
+    _, system, positions = filaments.build()
+    if load:
+        system.addForce(constant_force([int(nodes[-1]) for nodes in filaments.node_indices], [load, 0.0, 0.0]))
+    return filaments, system, positions
+
+
+@pytest.mark.parametrize("unbinding, milliseconds", [(5.0, 20.0), (40.0, 20.0)])
+def test_filaments_glide_as_fast_in_long_steps(unbinding, milliseconds):
+    """A hand walks by half its reach in a step, and unbinds with a rate of 0.1 or 0.8 over it."""
+    anchors = np.zeros((200, 3))
+    anchors[:, 0] = np.random.default_rng(1).uniform(-4000.0, 8000.0, 200)
+    filaments, system, positions = carried(6, 8, 40.0, unbinding / SECOND, 6.0 * PICONEWTON, anchors, planar=True)
+    step = milliseconds * 1e-3 * SECOND
+    context = new_context(system, positions, filaments.create_integrator(system, step, random_seed=2, checks=False))
+    places = []
+    for steps in (15, 100):
+        context.getIntegrator().step(steps)
+        positions = context.getState(positions=True).getPositions(asNumpy=True)._value
+        places.append([positions[nodes].mean(axis=0) for nodes in filaments.node_indices])
+    speeds = np.linalg.norm(np.array(places[1]) - places[0], axis=1) / (100 * milliseconds * 1e-3)
+    error = speeds.std(ddof=1) / np.sqrt(len(speeds))
+    assert 4.0 * error < 30.0
+    assert abs(speeds.mean() - 1000.0) < 4.0 * error + 5.0
+
+
+def test_a_motor_near_stall_has_the_speed_of_its_law():
+    """Of 5 of 6 pN, less the friction of the filament, at the recommended step and twice as long."""
+    number, segments, stall, load = 40, 20, 6.0 * PICONEWTON, 5.0 * PICONEWTON
+    anchors = np.array([[8000.0, 0.0, 0.0]])
+    filaments, system, positions = carried(number, segments, 40.0, 0.0, stall, anchors, load)
+    kind = MICROTUBULE.with_segment_length(1000.0)
+    friction = segments * kind.segment_friction(VISCOSITY, TEMPERATURE, segments).parallel
+    expected = 1000.0 * (1.0 - load / stall) / (1.0 + friction * 1000.0 / SECOND / stall)
+    recommended = 0.2 * stall / (PICONEWTON * 1000.0 / SECOND)
+    for factor in (1.0, 2.0):
+        step = factor * recommended
+        context = new_context(system, positions, filaments.create_integrator(system, step, random_seed=3, checks=False))
+        table = filaments.linkers_in(context)
+        bound, places = table.filaments.copy(), table.arc_lengths.copy()
+        bound[:, 1], places[:, 1] = np.arange(number), 8000.0
+        filaments.set_linkers(context, replace(table, filaments=bound, arc_lengths=places))
+        context.getIntegrator().step(50)
+        before = filaments.linkers_in(context).arc_lengths[:, 1]
+        context.getIntegrator().step(2000)
+        speeds = (filaments.linkers_in(context).arc_lengths[:, 1] - before) / (2000 * step / SECOND)
+        error = speeds.std(ddof=1) / np.sqrt(number)
+        assert 4.0 * error < 0.05 * expected
+        assert abs(speeds.mean() - expected) < 4.0 * error
+
+
+def test_steps_too_long_for_hands_are_warned_of():
+    filaments, system, _ = carried(1, 2, 40.0, 5.0 / SECOND, 6.0 * PICONEWTON, np.zeros((1, 3)))
+    # Of 0.2 of the reach.
+    allowed = 8e-3 * SECOND
+    for factor, warned in ((3.9, False), (4.1, True)):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            filaments.create_integrator(system, factor * allowed)
+        named = [one for one in caught if "one of linkers: Linkers: type 0, a hand walks by 0.2" in str(one.message)]
+        assert [one.category for one in named] == [TimeStepWarning] * warned
 
 
 def test_motors_with_two_hands_slide_antiparallel_filaments():
