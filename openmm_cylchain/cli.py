@@ -122,7 +122,7 @@ def _parser():
     timestep.add_argument(
         "--check",
         action="store_true",
-        help="run with the step of CONFIG and with half of it, and say what is wrong; exit code 3 if something is, "
+        help="run with the step of CONFIG and with a sixteenth of it, and say what is wrong; exit code 3 if something is, "
         "0 if all is right or not resolved",
     )
     timestep.add_argument(

@@ -150,7 +150,7 @@ def create_simulation(configuration):
 
 
 def check_step(configuration, seconds=20.0, say=lambda message: None):
-    """Run a configuration for a while with its step and with half of it: see ``step_check.check_time_step``.
+    """Run a configuration for a while with its step and a sixteenth of it: see ``step_check.check_time_step``.
 
     Parameters
     ----------

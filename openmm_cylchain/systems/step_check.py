@@ -1,36 +1,39 @@
-"""A run that checks its own step: averages with the step h beside those with h/2 on the same Brownian path.
+"""A run that checks its own step: averages with the step h beside those with h/16, on the same Brownian path.
 
-Both runs begin with the same positions and, with the compiled engine, follow one path (``setPathLevel``), so that what
-differs between their averages is the step, and little noise. With 16 segments of F-actin in the recommended step, error
-bars are 2 times (bending energy) to 18 times (end-to-end distance) as small as those of independent runs, 6 times for
-the slowest bending modes; for stretching, which is drawn anew in each step, 1.4 times. The runs are not brought
-together again on the way: that makes error bars hardly smaller, and would hide errors of averages that relax slowly.
+A step against half of it would prove little where both are wrong alike, so the reference is much shorter. What differs
+between the averages of the two is
 
-All schemes are of weak order one: an average is A(h) = A + c h + O(h^2), so that its error is
+    A(h) - A(h/n) = c (1 - 1/n) h + O(h^2),        n = 16,
 
-    A(h) - A = 2 (A(h) - A(h/2)) + O(h^2)                          two steps
-    A(h) - A = (2 A(h) + 6 A(h/2) - 8 A(h/4))/3 + O(h^3)           three steps
+since all schemes are of weak order one, and n/(n-1) of that is the error, relative to the average of the reference.
 
-It is given relative to the average with the shortest step. For a coordinate with an explicit harmonic force, whose
-variance is too large by 1/(1 - lambda h/2), the former is then exact. Where the error is of second order, as that of a
-symmetric drift may be, two steps show 3/2 of it.
+The runs are compared in 16 windows of time. In each both begin with the positions, and the linkers, that the reference
+has come to, and, with the compiled engine, follow one Brownian path (``setPathLevel``), so that what differs between
+them is the step, and less noise than in independent runs. The first quarter of a window is left out. Noise is not the
+same in any two windows, so that their differences are independent however slowly the system relaxes: the standard error
+is that of the mean of 16 of them, or of the mean over filaments of one kind where they are eight at least, whichever is
+larger, and the error bar four times that, or more by Student's t: 5.5 times for 16 windows. Blocks of one run, which
+are not independent where linkers bind and unbind slowly, had error bars several times too small. The rule, with the
+error e and its error bar b:
 
-The standard error comes from the differences, frame by frame: from their means over 16 and 32 blocks of time, and over
-filaments of one kind if there are eight at least. The largest of them counts, so that it is rather too large than too
-small, by a sixth or so. The rule, with the error e and its standard error s:
-
-    wrong           |e| - 4 s > 5 %, or |e| > 100: energies that grow without bound have no error bar
-    right           |e| <= 5 % and 4 s <= 5 %, within |e| + 4 s
+    wrong           |e| - b > 5 %, or |e| > 100: energies that grow without bound have no error bar
+    right           |e| <= 5 % and b <= 5 %, within |e| + b
     not resolved    anything else: a longer check is needed
 
-What the check cannot see: what relaxes more slowly than it lasts, and errors that do not depend on the step, such as
-those of scheme "euler" on chains. For the latter, free filaments that begin in equilibrium are held against exact
+Averages begin long after what is driven has grown. So before, both runs take twenty steps h from the start, again and
+again, and where bends of filaments grow beyond what they are in equilibrium and were at the start, the time that this
+takes is compared, too: unless they begin strained, with energies of forces far above what they are later.
+
+What the check cannot see: what relaxes more slowly than a window lasts, and errors that do not depend on the step, such
+as those of scheme "euler" on chains. For the latter, free filaments that begin in equilibrium are held against exact
 averages, too.
 """
 
+import math
 import time
 import warnings
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 import openmm
@@ -40,16 +43,24 @@ from ..dynamics.schemes import check_scheme
 from ..dynamics.time_step import TimeStep, as_step
 from ..engine_choice import default_scheme
 from ..errors import InputError, InstabilityError
+from ..kinetics.binding_force import find_binding_force
 from ..mechanics.flow import Flow
 from ..units.quantities import DIMENSIONLESS, positive, thermal_energy, whole_number
 from ..units.text import format_time
 from ..units.types import Numbers, Scalar, Vectors
 from .filaments import Filaments
-from .step_check_comparison import WEIGHTS, ExactAverages, compare
+from .step_check_comparison import ExactAverages, bends_grow, compare, compare_growth, find_strained
 from .step_check_observables import STEPS_PER_FRAME, Probe
 from .step_check_results import StepCheck
 
 _RELAXATIONS_OF_FEW = 20.0
+_WINDOWS = 16
+_LARGEST_PARTS = 1024
+# How many steps h are looked at one by one from the start, in how many runs, and in how many at most if bends grow.
+_STEPS_OF_START = 20
+_RUNS_FROM_START, _MOST_RUNS_FROM_START = 4, 64
+_SHARE_OF_START = 0.2
+_LOOKS_OF_REFERENCE = 4
 
 
 def check_time_step(
@@ -64,7 +75,7 @@ def check_time_step(
     flow: Flow | None = None,
     seconds: float = 20.0,
     frames: int | None = None,
-    levels: int = 2,
+    parts: int = 16,
     random_seed: int = 1,
     equilibrium: bool = False,
     platform: openmm.Platform | None = None,
@@ -72,13 +83,14 @@ def check_time_step(
     say: Callable[[str], object] = lambda message: None,
     stop: Callable[[], bool] = lambda: False,
 ) -> StepCheck:
-    """Run a System with a step and with half of it, and say whether the step is right.
+    """Run a System with a step and with a sixteenth of it, and say whether the step is right.
 
     Compared are, for each kind of filament, the mean energies of stretching (per segment) and bending (per joint), of
-    beams per element, the mean square end-to-end distance (of rings: the distance across), how far the three slowest
-    bending modes and the middle of a filament move in ten steps, and the mean energies of tethers and of each other
-    force of the System. The first quarter of the runs is left out. See ``step_check`` for errors, their standard
-    errors, the verdicts and what the check cannot see.
+    beams per element, the mean square end-to-end distance (of rings: the distance across), and how far the three
+    slowest bending modes and the middle of a filament move in ten steps; how far particles move in them, and from where
+    they began; the mean energies of tethers and of each other force of the System, such as walls, contacts and linkers;
+    how many hands are bound; and how long bends take to grow where filaments buckle. See ``step_check`` for
+    errors, their error bars, the verdicts and what the check cannot see.
 
     The System is copied. What is not part of it, such as crosslinks that a Crosslinks object adds and removes, stays as
     it is in the System.
@@ -99,9 +111,11 @@ def check_time_step(
     seconds : float
         Time that the check may take.
     frames : int, optional
-        Length of the runs in tens of steps h, in place of ``seconds``: the result is then the same each time.
-    levels : {2, 3}
-        Steps h and h/2, or h/4 as well: it takes 7/3 as long, and errors that are large are closer to the truth.
+        Length of the run in tens of steps h, all windows together, in place of ``seconds``: the result is then the same
+        each time.
+    parts : int
+        By which the step of the reference is shorter: a power of two from 2 to 1024. The check takes parts + 1 steps in
+        place of one.
     random_seed : int
         At least 1.
     equilibrium : bool
@@ -129,8 +143,9 @@ def check_time_step(
     bath = filaments.temperature if temperature is None else temperature
     if thermal_energy(bath) == 0.0:
         raise InputError("At a temperature of zero there are no averages to compare: check a warmer System.")
-    if levels not in WEIGHTS:
-        raise InputError(f"levels must be 2 or 3, but is {levels!r}.")
+    parts = whole_number(parts, 2, "parts")
+    if parts & (parts - 1) or parts > _LARGEST_PARTS:
+        raise InputError(f"parts must be a power of two up to {_LARGEST_PARTS}, but is {parts}.")
     random_seed = whole_number(random_seed, 1, "random_seed")
     if frames is None:
         seconds = positive(seconds, DIMENSIONLESS, "seconds")
@@ -139,57 +154,123 @@ def check_time_step(
     settings = {"scheme": scheme, "temperature": temperature, "particle_friction": particle_friction, "flow": flow}
     probe = Probe(filaments, system, bath)
     paired = filaments.engine == "compiled"
-    runs = [
-        _Run(filaments, probe, positions, step, level, random_seed, paired, settings, platform, properties)
-        for level in range(levels)
-    ]
+    arguments = (filaments, probe, positions, step, random_seed, paired, settings, platform, properties)
+    runs = [_Run(*arguments, level) for level in (0, parts.bit_length() - 1)]
     start = time.monotonic()
-    records, failure = _advance(runs, probe, seconds, frames, say, stop)
+    pair = _Pair(runs, probe, stop)
+    windows: list[list[Any]] = []
+    growing: list[Any] = []
+    failure = None
+    try:
+        growing = pair.from_start(math.inf if frames else _SHARE_OF_START * seconds)
+        if frames:
+            pair.take_windows(windows, frames, math.inf, say)
+        else:
+            pair.take_windows(windows, None, start + seconds, say)
+    except InstabilityError as error:
+        failure = str(error)
     elapsed = time.monotonic() - start
     relaxation = _slowest_relaxation(probe.kinds, filaments, bath)
     observables = []
-    if failure is None:
-        lasting = len(records) * STEPS_PER_FRAME * step >= _RELAXATIONS_OF_FEW * relaxation
+    strained: tuple[str, ...] = ()
+    per_window = len(windows[0]) if windows else 0
+    if failure is None and windows:
+        lasting = len(windows) * per_window * STEPS_PER_FRAME * step >= _RELAXATIONS_OF_FEW * relaxation
         exact = ExactAverages(filaments, system, flow, bath, equilibrium, lasting)
-        observables = compare(probe, records, exact, elapsed)
+        observables = compare(probe, windows, parts, exact, elapsed)
+        looks = min(parts, _LOOKS_OF_REFERENCE)
+        strained = find_strained(probe, windows, pair.energies)
+        if growing and not strained:
+            observables += compare_growth(probe, growing, step, looks, elapsed)
     return StepCheck(
         step=step,
         scheme=scheme,
-        steps=tuple(step / 2**level for level in range(levels)),
+        steps=(step, step / parts),
         paired=paired,
         observables=observables,
         divided=tuple(run.divided_share() for run in runs),
         failure=failure,
-        frames=len(records),
+        windows=len(windows),
+        frames=per_window,
         seconds=elapsed,
         relaxation=relaxation,
+        strained=strained,
     )
 
 
-def _advance(runs, probe, seconds, frames, say, stop):
-    # Values (levels, ...) of every frame but the first, and why it ended early.
-    start, records, told = time.monotonic(), [], 0
-    try:
-        for run in runs:
-            run.look(probe)
-        while True:
-            records.append([run.advance(probe) for run in runs])
-            share = len(records) / frames if frames else (time.monotonic() - start) / seconds
-            if share >= (told + 1) / 10.0:
-                told = int(10.0 * share)
-                say(f"{min(100, 10 * told)} %, {len(records) * STEPS_PER_FRAME} steps")
-            if share >= 1.0 or stop():
-                return records, None
-    except InstabilityError as error:
-        return records, str(error)
+class _Pair:
+    # A run with the step and one with that of the reference.
+
+    def __init__(self, runs, probe, stop):
+        self._runs, self._probe, self._stop = runs, probe, stop
+
+    def from_start(self, seconds):
+        # Amplitudes of bending modes of each run, each time from the start, after each of the first steps. Of the
+        # reference in between, too.
+        found = []
+        begun = time.monotonic()
+        start = self._runs[0].state()
+        self.energies = self._probe.energies(self._runs[0].context)
+        if not any(len(own) for own in self._probe.equilibrium_amplitudes()):
+            return found
+        while len(found) < _MOST_RUNS_FROM_START and not self._stop():
+            runs = []
+            for run in self._runs:
+                run.begin(start)
+                looks = min(run.steps, _LOOKS_OF_REFERENCE)
+                amplitudes = [self._probe.mode_amplitudes(run.context)]
+                for _ in range(_STEPS_OF_START * looks):
+                    run.advance(run.steps // looks)
+                    amplitudes.append(self._probe.mode_amplitudes(run.context))
+                runs.append(amplitudes)
+            found.append(runs)
+            if time.monotonic() - begun > seconds:
+                break
+            if len(found) == _RUNS_FROM_START and not bends_grow(self._probe, found):
+                break
+        for run in self._runs:
+            run.begin(start)
+        return found
+
+    def take_windows(self, windows, frames, end, say):
+        # Each of as many frames; of the first one, as many as fit in its share of the time.
+        begun, told = time.monotonic(), 0
+        first_end = begun + (end - begun) / _WINDOWS
+        length = None if frames is None else max(1, frames // _WINDOWS)
+        total = math.inf if frames is None else length * min(_WINDOWS, frames)
+        taken = 0
+        while taken < total:
+            window: list[Any] = []
+            for run in self._runs:
+                run.look(self._probe)
+            while len(window) != length:
+                window.append([run.frame(self._probe) for run in self._runs])
+                taken += 1
+                now = time.monotonic()
+                share = taken / total if frames else (now - begun) / max(end - begun, 1e-9)
+                if share >= (told + 1) / 10.0:
+                    told = int(10.0 * share)
+                    say(f"{min(100, 10 * told)} %, {taken * STEPS_PER_FRAME} steps")
+                over = now >= end or self._stop()
+                if over or (length is None and now >= first_end):
+                    break
+            length = length or len(window)
+            if len(window) == length:
+                windows.append(window)
+            if over:
+                return
+            reached = self._runs[-1].state()
+            for run in self._runs:
+                run.begin(reached)
 
 
 class _Run:
     # A Context with the step h/2^level.
 
-    def __init__(self, filaments, probe, positions, step, level, seed, paired, settings, platform, properties):
+    def __init__(self, filaments, probe, positions, step, seed, paired, settings, platform, properties, level):
+        self._filaments = filaments
         self._system = probe.grouped_system()
-        self._steps = STEPS_PER_FRAME * 2**level
+        self.steps = 2**level
         self._chains = len(filaments)
         self._taken = 0
         with warnings.catch_warnings():
@@ -214,13 +295,30 @@ class _Run:
         self.context.computeVirtualSites()
         self._before = None
 
+    def state(self):
+        # What a run can begin with: positions, the box, and linkers.
+        state = self.context.getState(positions=True)
+        linkers = None if find_binding_force(self._system) is None else self._filaments.linkers_in(self.context)
+        return state.getPositions(asNumpy=True), state.getPeriodicBoxVectors(), linkers
+
+    def begin(self, state):
+        positions, box, linkers = state
+        self.context.setPeriodicBoxVectors(*box)
+        self.context.setPositions(positions)
+        if linkers is not None:
+            self._filaments.set_linkers(self.context, linkers)
+        self._before = None
+
     def look(self, probe):
         values, self._before = probe.measure(self.context, self._before)
         return values
 
-    def advance(self, probe):
-        self._integrator.step(self._steps)
-        self._taken += self._steps
+    def advance(self, steps):
+        self._integrator.step(steps)
+        self._taken += steps
+
+    def frame(self, probe):
+        self.advance(STEPS_PER_FRAME * self.steps)
         values = self.look(probe)
         if not all(np.all(np.isfinite(one)) for one in values):
             step = format_time(self._integrator.getStepSize()._value, 3)

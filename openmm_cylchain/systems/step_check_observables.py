@@ -7,13 +7,18 @@ from typing import Any
 
 import numpy as np
 import openmm
+from scipy.fft import dct
 
 from ..beams.curve import BeamElement, element_energies
+from ..couplings.capsule_contacts import as_capsule_contact_force
 from ..couplings.pulling import is_constant_force
+from ..couplings.walls import as_filament_wall_force
 from ..filaments.collection import FilamentCollection
 from ..filaments.filament import Filament
+from ..kinetics.binding_force import find_binding_force
 from ..units.quantities import thermal_energy
 from ..units.types import FloatArray, IntArray, Scalar
+from .filaments_in_contexts import FilamentsInContexts
 
 STEPS_PER_FRAME = 10
 """Steps h between two looks at both runs."""
@@ -64,11 +69,16 @@ def _kinds(filaments, temperature):
 class Probe:
     """What is looked at in a Context: names, units, and values of one frame."""
 
-    def __init__(self, filaments: FilamentCollection, system: openmm.System, temperature: Scalar) -> None:
+    def __init__(self, filaments: FilamentsInContexts, system: openmm.System, temperature: Scalar) -> None:
         self._kT = thermal_energy(temperature)
         self._filaments = filaments
         self.kinds = _kinds(filaments, temperature)
         self._system = system
+        chains = [*filaments.node_indices, *filaments.control_point_indices]
+        outside = np.setdiff1d(np.arange(system.getNumParticles()), np.concatenate(chains))
+        mobile = [system.getParticleMass(int(index))._value != 0.0 for index in outside]
+        self._particles = outside[np.array(mobile, dtype=bool)]
+        self._has_linkers = find_binding_force(system) is not None
         self._groups: dict[int, tuple[str, list[int]]] = {}
         for count, (index, force) in enumerate(
             (index, force)
@@ -101,8 +111,13 @@ class Probe:
             for mode in range(1, self._modes(kind) + 1):
                 yield f"{kind.label} bending mode {mode}, change", "nm", kind, "mode"
             yield f"{kind.label} middle, displacement", "nm^2", kind, "middle"
+        if len(self._particles):
+            yield "particles, displacement", "nm^2", None, "particles"
+            yield "particles, from where they began", "nm^2", None, "particles"
         if self._filaments.tethers:
             yield "tethers", "k_B T", None, "tethers"
+        if self._has_linkers:
+            yield "hands that are bound", "", None, "linkers"
         for label, _ in self._groups.values():
             yield label, "k_B T", None, "force"
 
@@ -119,12 +134,49 @@ class Probe:
                 own, kept = self._measure_kind(kind, positions, None if before is None else before[index])
                 values += own
                 after.append(kept)
+            if len(self._particles):
+                own = positions[self._particles]
+                last, start = (own, own) if before is None else before[-1]
+                values += [np.sum((own - one) ** 2, axis=1) for one in (last, start)]
+                after.append((own, start))
             if self._filaments.tethers:
                 values.append(self._tether_energy(positions))
-        for group in self._groups:
-            energy = context.getState(energy=True, groups=1 << group).getPotentialEnergy()._value
-            values.append(np.array([energy / self._kT]))
-        return values, after
+            if self._has_linkers:
+                values.append(np.array([float(self._filaments.linkers_in(context).bound.sum())]))
+        return values + self.energies(context), after
+
+    def energies(self, context: openmm.Context) -> list[FloatArray]:
+        """Of the forces beside those of filaments, (1,) each: the last of the rows."""
+        states = (context.getState(energy=True, groups=1 << group) for group in self._groups)
+        return [np.array([state.getPotentialEnergy()._value / self._kT]) for state in states]
+
+    def mode_amplitudes(self, context: openmm.Context) -> list[FloatArray]:
+        """Of each kind of open filaments, the mean square amplitude in nm of every bending mode, from the first on."""
+        positions = context.getState(positions=True).getPositions(asNumpy=True)._value
+        found = []
+        for kind in self.kinds:
+            if not kind.filament.closed:
+                vectors = np.diff(positions[kind.nodes], axis=1)
+                tangents = vectors / np.linalg.norm(vectors, axis=2)[..., None]
+                # Twice the sum over cosines of the middles of segments.
+                amplitudes = 0.5 * dct(tangents, type=2, axis=1)[:, 1:] * self._scale(kind)
+                found.append(np.mean(np.sum(amplitudes**2, axis=2), axis=0))
+        return found
+
+    def equilibrium_amplitudes(self) -> list[FloatArray]:
+        """What those are for free filaments, 2 k_B T/(EI q^2) with the wave number q, or less where they are coils."""
+        found = []
+        for kind in self.kinds:
+            if not kind.filament.closed:
+                one, count = kind.filament.type, kind.filament.segments
+                waves = np.pi * np.arange(1, count) / (count * one.segment_length)
+                with np.errstate(divide="ignore"):
+                    stiff = 2.0 * self._kT / (one.bending_rigidity * waves**2)
+                found.append(np.minimum(stiff, 2.0 * one.segment_length * count))
+        return found
+
+    def _scale(self, kind):
+        return math.sqrt(2.0 * kind.filament.type.segment_length / kind.filament.segments)
 
     def _measure_kind(self, kind, positions, before):
         filament, one, nodes = kind.filament, kind.filament.type, positions[kind.nodes]
@@ -137,8 +189,7 @@ class Probe:
         middle = nodes[:, half]
         modes = np.arange(1, self._modes(kind) + 1)
         waves = np.cos(np.outer(modes, np.pi * (np.arange(filament.segments) + 0.5) / filament.segments))
-        scale = math.sqrt(2.0 * one.segment_length / filament.segments)
-        amplitudes = scale * np.einsum("ms,fsk->mfk", waves, tangents)
+        amplitudes = self._scale(kind) * np.einsum("ms,fsk->mfk", waves, tangents)
         moved = [amplitudes, middle] if before is None else [amplitudes - before[0], middle - before[1]]
         if kind.element is not None:
             energies = element_energies(nodes, positions[kind.control_points], kind.element, closed)
@@ -176,4 +227,6 @@ def _other_forces(system):
 
 
 def _is_chain_force(force):
+    if as_capsule_contact_force(force) is not None or as_filament_wall_force(force) is not None:
+        return False
     return force.getName().startswith("CylinderChain")

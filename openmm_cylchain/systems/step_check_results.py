@@ -6,7 +6,7 @@ from typing import Any, cast
 
 from ..dynamics.step_watch import LARGEST_DIVIDED_SHARE
 from ..units.text import format_time
-from .step_check_rule import DIVERGED, LARGEST_ERROR, SIGMAS, diverged, surely_large
+from .step_check_rule import DIVERGED, LARGEST_ERROR, diverged, sigmas, surely_large
 from .step_check_text import format_check, percent, two_digits
 
 
@@ -18,9 +18,9 @@ class ObservableCheck:
     ----------
     name, unit : str
     values : tuple of float
-        With h, h/2 and, of three, h/4.
+        With the step, and with that of the reference.
     error : float
-        Of the average with h, relative to that with the shortest step, extrapolated.
+        Of the average with the step, relative to the reference, extrapolated.
     standard_error : float
         Of ``error``.
     unpaired_standard_error : float
@@ -34,6 +34,8 @@ class ObservableCheck:
         Whether the deviation counts for the verdict: the filaments began in equilibrium.
     seconds : float
         Time that all of this took.
+    degrees : float
+        Degrees of freedom of the standard errors.
     """
 
     name: str
@@ -47,13 +49,19 @@ class ObservableCheck:
     deviation_standard_error: float | None
     judged_by_exact: bool
     seconds: float
+    degrees: float = math.inf
+
+    @property
+    def error_bar(self) -> float:
+        """Half of the range in which the true error is, but for 6 in 100 000: four standard errors that are known."""
+        return sigmas(self.degrees) * self.standard_error
 
     @property
     def verdict(self) -> str:
         """ "right", "wrong" or "not resolved", see ``step_check``."""
-        if surely_large(self.error, self.standard_error) or self.off_exact:
+        if surely_large(self.error, self.error_bar) or self.off_exact:
             return "wrong"
-        right = abs(self.error) <= LARGEST_ERROR and SIGMAS * self.standard_error <= LARGEST_ERROR
+        right = abs(self.error) <= LARGEST_ERROR and self.error_bar <= LARGEST_ERROR
         return "right" if right else "not resolved"
 
     @property
@@ -61,28 +69,28 @@ class ObservableCheck:
         """Whether the average with h differs from the exact one by more than 5 % for sure."""
         if not self.judged_by_exact:
             return False
-        return surely_large(cast(float, self.deviation), cast(float, self.deviation_standard_error))
+        deviation, standard_error = cast(float, self.deviation), cast(float, self.deviation_standard_error)
+        return surely_large(deviation, sigmas(self.degrees) * standard_error)
 
     @property
     def required_seconds(self) -> float:
         """About how long a check takes that resolves this error; infinite if nothing is known."""
-        bar = SIGMAS * self.standard_error
         room = LARGEST_ERROR
         if abs(self.error) > LARGEST_ERROR:
             room = min(room, max(abs(self.error) - LARGEST_ERROR, 0.2 * LARGEST_ERROR))
-        return self.seconds * max(1.0, (bar / room) ** 2)
+        return self.seconds * max(1.0, (self.error_bar / room) ** 2)
 
     def explanation(self) -> str:
         """The verdict in words."""
         if diverged(self.error):
             return "wrong: it grows without bound"
-        if surely_large(self.error, self.standard_error):
+        if surely_large(self.error, self.error_bar):
             return f"wrong by {percent(self.error)} +- {percent(self.standard_error)}"
         if self.off_exact:
             return f"wrong: {percent(cast(float, self.deviation), '+')} off the exact value"
         if self.verdict == "right":
-            return f"right within {percent(abs(self.error) + SIGMAS * self.standard_error)}"
-        bar = f"error bar {percent(SIGMAS * self.standard_error)}"
+            return f"right within {percent(abs(self.error) + self.error_bar)}"
+        bar = f"error bar {percent(self.error_bar)}"
         if not math.isfinite(self.standard_error):
             return "not resolved: too few steps, run longer"
         return f"not resolved: {bar}, run about {two_digits(self.required_seconds)} s"
@@ -98,7 +106,7 @@ class StepCheck:
         h in ps.
     scheme : str
     steps : tuple of float
-        h, h/2 and, of three, h/4.
+        h, and that of the reference.
     paired : bool
         Whether the runs followed one Brownian path.
     observables : list of ObservableCheck
@@ -106,12 +114,14 @@ class StepCheck:
         Shares of steps of filaments that had to be divided, by run.
     failure : str or None
         Why a run ended, if one blew up.
-    frames : int
-        Of ten steps h each.
+    windows, frames : int
+        In how many windows of time the runs were compared, and of how many frames of ten steps h these are.
     seconds : float
         Time that it took.
     relaxation : float
         Of the slowest bends of the filaments, in ps; zero where nothing bends.
+    strained : tuple of str
+        Forces whose energies at the start were far above what they became: what grows from there was not looked at.
     """
 
     step: float
@@ -121,9 +131,11 @@ class StepCheck:
     observables: list[ObservableCheck]
     divided: tuple[float, ...]
     failure: str | None
+    windows: int
     frames: int
     seconds: float
     relaxation: float
+    strained: tuple[str, ...] = ()
 
     @property
     def verdict(self) -> str:
@@ -147,7 +159,8 @@ class StepCheck:
             return f"The step of {step} is wrong: {self.failure}"
         wrong = [one for one in self.observables if one.verdict == "wrong"]
         if wrong:
-            worst = max(wrong, key=lambda one: abs(one.error))
+            # NaN comes first.
+            worst = max(wrong, key=lambda one: abs(one.error) if one.error == one.error else math.inf)
             others = f", and {len(wrong) - 1} more" if len(wrong) > 1 else ""
             text = f"The step of {step} is wrong: {worst.name}{others}."
             if LARGEST_ERROR < abs(worst.error) < DIVERGED:
@@ -173,7 +186,7 @@ class StepCheck:
         """Everything in numbers, texts, lists and dicts, for JSON; None in place of numbers that are not finite."""
         content = asdict(self)
         for entry, one in zip(content["observables"], self.observables):
-            entry.update(verdict=one.verdict, explanation=one.explanation())
+            entry.update(error_bar=one.error_bar, verdict=one.verdict, explanation=one.explanation())
         content.update(verdict=self.verdict, explanation=self.explanation())
         return _finite(content)
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from ..units.text import format_time
 from .step_check_observables import STEPS_PER_FRAME
-from .step_check_rule import DIVERGED, diverged, surely_large
+from .step_check_rule import DIVERGED, diverged, sigmas, surely_large
 
 _RELAXATIONS = 5.0
 
@@ -13,17 +13,19 @@ _RELAXATIONS = 5.0
 def format_check(check: Any) -> str:
     """A StepCheck as a table in ASCII, with its verdict below."""
     times = [format_time(step, 3) for step in check.steps]
-    simulated = check.frames * STEPS_PER_FRAME * check.step
+    window = check.frames * STEPS_PER_FRAME * check.step
+    simulated = check.windows * window
     path = "the same Brownian path" if check.paired else "independent paths: the portable engine has no common one"
     lines = [
         f"{' against '.join(times)} on {path}; scheme {check.scheme}",
-        f"{format_time(simulated, 3)} simulated in {check.seconds:.3g} s; changes and displacements are those in "
+        f"{format_time(simulated, 3)} simulated in {check.seconds:.3g} s, in {check.windows} windows of "
+        f"{format_time(window, 3)}, each from one start; changes and displacements are those in "
         f"{format_time(STEPS_PER_FRAME * check.step, 3)}; +- one standard error",
         "",
     ]
     if check.observables:
         lines += [*_table(check, times), ""]
-    lines += _notes(check, simulated)
+    lines += _notes(check, window)
     lines.append(check.explanation())
     return "\n".join(lines)
 
@@ -43,20 +45,25 @@ def _table(check, times):
         yield "  ".join(cells).rstrip()
 
 
-def _notes(check, simulated):
+def _notes(check, window):
     if check.divided[0] > 0.0:
         yield f"{percent(check.divided[0])} of the steps of filaments were divided."
-    if check.failure is None and simulated < _RELAXATIONS * check.relaxation:
+    if check.failure is None and window < _RELAXATIONS * check.relaxation:
         yield (
             f"The slowest bends relax in {format_time(check.relaxation, 3)}: what a longer run would show of them is "
             "not seen."
+        )
+    if check.strained:
+        yield (
+            f"The start is strained ({', '.join(check.strained)}): what grows from it is not looked at. Begin with "
+            "positions that have come to rest for that."
         )
     off = [
         one.name
         for one in check.observables
         if one.exact is not None
         and not one.judged_by_exact
-        and surely_large(one.deviation, one.deviation_standard_error)
+        and surely_large(one.deviation, sigmas(one.degrees) * one.deviation_standard_error)
     ]
     if off:
         yield (

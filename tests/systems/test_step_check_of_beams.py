@@ -18,10 +18,10 @@ def free_beams(kind, count, elements):
 
 
 def test_the_recommended_step_of_beams_is_right():
-    """All averages beside those of half the step, on one path, and the exact ones of free chains."""
+    """All averages beside those of a quarter of the step, on one path, and the exact ones of free chains."""
     filaments, system, positions = free_beams(BEAM, 100, 3)
     step = filaments.recommended_time_step()
-    check = check_time_step(filaments, system, positions, step, frames=300, equilibrium=True)
+    check = check_time_step(filaments, system, positions, step, frames=160, parts=4, equilibrium=True)
     assert check.verdict == "right", str(check)
     names = [one.name.removeprefix("BEAM ") for one in check.observables]
     assert names[:3] == ["stretching energy", "bending energy", "end to end, mean square"] and len(names) == 6
