@@ -60,10 +60,10 @@ def steps_of_buckling(
     for tether in filaments.tethers:
         tethers.setdefault(tether.filament, []).append(tether)
     fastest: dict[str, tuple[float, float, int]] = {}
-    # Without forces, filaments need not be in a System.
-    of_nodes = filaments.node_indices if constant_forces else [()] * len(filaments)
-    for number, (filament, nodes) in enumerate(zip(filaments, of_nodes)):
-        loads = {node: constant_forces[int(p)] for node, p in enumerate(nodes) if int(p) in constant_forces}
+    for number, filament in enumerate(filaments):
+        # Without forces, filaments need not be in a System.
+        nodes = filaments.node_indices[number].tolist() if constant_forces else []
+        loads = {node: constant_forces[one] for node, one in enumerate(nodes) if one in constant_forces}
         own = tethers.get(number, [])
         if filament.closed or not (loads or own or (filament.propulsion and filament.clamped)):
             continue

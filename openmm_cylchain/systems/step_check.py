@@ -207,7 +207,7 @@ class _Pair:
     def from_start(self, seconds):
         # Amplitudes of bending modes of each run, each time from the start, after each of the first steps. Of the
         # reference in between, too.
-        found = []
+        found: list[Any] = []
         begun = time.monotonic()
         start = self._runs[0].state()
         self.energies = self._probe.energies(self._runs[0].context)
