@@ -262,27 +262,31 @@ void ContactGaps::follow(NearPair& own) const {
         return;
     }
     own.way = way;
+    const SegmentPair start = search->getSegments(pair, false), end = search->getSegments(pair, true);
     if (isNew) {
         own.gap.key[0] = (uint32_t) force*0x9E3779B1u+pair.a;
         own.gap.key[1] = pair.b;
         own.gap.stiffness = stiffness;
         own.gap.response = places[pair.a].response+places[pair.b].response;
-        const SurfaceVariates variates = all->getNoise().drawSurface(own.gap);
-        own.numContacts = search->evaluate(pair, begun, begun, own.contacts);
-        const double before = findPairGap(search->getSegments(pair, false), own.contacts, own.numContacts, radii).gap;
-        own.depth = placeHardSurface(kT, variates, LARGEST_DEPTH*radii, before, own.gap);
+        own.variates = all->getNoise().drawSurface(own.gap);
     }
-    const SegmentPair end = search->getSegments(pair, true);
     if (own.number < 0) {
         // Where they are nearest tells whether the rest is worth while.
+        const double before = sqrt(findNearestPoints(start).squared)-radii;
+        own.depth = placeHardSurface(kT, own.variates, LARGEST_DEPTH*radii, before, own.gap);
         own.gap.end = own.depth+sqrt(findNearestPoints(end).squared)-radii;
         if (!mayClose(own.gap) && !search->crosses(pair))
             return;
     }
+    if (own.numContacts < 0)
+        own.numContacts = search->evaluate(pair, begun, begun, own.contacts);
     Contact contacts[2];
     const int count = search->evaluate(pair, contacts);
-    const PairGap first = findPairGap(search->getSegments(pair, false), own.contacts, own.numContacts, radii);
+    // What touches a neighbor at the start and at the end is no gap of this pair.
+    own.gap.present = count > 0 || own.numContacts > 0;
+    const PairGap first = findPairGap(start, own.contacts, own.numContacts, radii);
     const PairGap last = findPairGap(end, contacts, count, radii);
+    own.depth = placeHardSurface(kT, own.variates, LARGEST_DEPTH*radii, first.gap, own.gap);
     own.gap.numLevers = 0;
     for (const PairGap* of : {&first, &last})
         for (int i = 0; i < of->count; i++) {
@@ -345,7 +349,7 @@ bool ContactGaps::findGaps(int iteration, bool settled, const double* moved, Ref
     });
     for (NearPair& own : near)
         if (own.number < 0) {
-            if (own.hasMoved && own.gap.numLevers > 0 && mayClose(own.gap))
+            if (own.hasMoved && own.gap.numLevers > 0 && own.gap.present && mayClose(own.gap))
                 own.number = gaps.add(own.gap);
         }
         else if (own.hasMoved)

@@ -57,8 +57,10 @@ private:
         /** How far the capsules had travelled when it was found, and whether that was in the last iteration. */
         double way = -1;
         bool hasMoved = true;
-        /** The contacts at the start. */
-        int numContacts = 0;
+        /** What its hard surface is drawn with. */
+        SurfaceVariates variates;
+        /** The contacts at the start; -1 if they are not known. */
+        int numContacts = -1;
         Contact contacts[2];
         /** The gap, its number or -1, and by how much it is longer from the hard surface than from the soft one. */
         Gap gap;

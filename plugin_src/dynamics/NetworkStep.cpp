@@ -197,14 +197,20 @@ void NetworkStep::beginCouplings(const Attempt& attempt) {
     const CoupledStart start = {attempt.positions, attempt.settings, places, attempt.taken, active};
     gaps.begin(attempt.settings, places);
     const bool oneStage = attempt.settings.scheme == Scheme::Implicit;
-    auto choose = [&] (auto& gapsOf, auto& equationsOf, size_t first, size_t last) {
-        for (size_t i = first; i < last; i++) {
+    const size_t last = couplings.size();
+    bool resolves = oneStage;
+    for (size_t i = firstContacts; i < firstWalls; i++)
+        resolves = resolves && contactGaps[i-firstContacts]->resolves(start);
+    for (size_t i = firstWalls; i < last; i++)
+        resolves = resolves && wallGaps[i-firstWalls]->resolves(start);
+    auto choose = [&] (auto& gapsOf, auto& equationsOf, size_t first, size_t end) {
+        for (size_t i = first; i < end; i++) {
             ImplicitCouplings* const equations = equationsOf[i-first].get();
-            couplings[i] = oneStage && gapsOf[i-first]->resolves(start) ? gapsOf[i-first].get() : equations;
+            couplings[i] = resolves ? gapsOf[i-first].get() : equations;
         }
     };
     choose(contactGaps, contacts, firstContacts, firstWalls);
-    choose(wallGaps, walls, firstWalls, couplings.size());
+    choose(wallGaps, walls, firstWalls, last);
     for (ImplicitCouplings* own : couplings)
         own->begin(start, attempt.loop);
 }

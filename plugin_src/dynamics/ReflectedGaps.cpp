@@ -12,7 +12,7 @@ namespace {
 /** How far a gap moves in a part, (2 k_B T G)^(1/2), over the thermal depth, where it shares chains with others. */
 const double LARGEST_MOTION = 1.5;
 /** The most parts. */
-const int MOST_PARTS = 8;
+const int MOST_PARTS = 12;
 /** How often all gaps are gone through at most. */
 const int MOST_SWEEPS = 200;
 /** What the last sweep may change a gap by, and the last iteration, over the thermal scale. */
@@ -36,6 +36,8 @@ double dot(const double* a, const double* b) {
 
 /** The force that reflects the motion of a gap, with an exponential variate of the mean k_B T. */
 double reflect(double start, double end, double response, double variate) {
+    if (start+end > 0 && start*end >= response*variate)
+        return 0;
     const double way = start-end;
     return max(0.0, 0.5*(sqrt(way*way+4*response*variate)-(start+end)))/response;
 }
