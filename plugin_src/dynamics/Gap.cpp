@@ -13,8 +13,8 @@ const double LEAST_LIMIT = 3, LARGEST_LIMIT = 9;
 const double FREE_DEPTH = 10;
 /** Chains of links and linkers are numbers of forces: with this bit, the numbers are those of gaps. */
 const uint32_t OF_GAPS = 0x80000000u;
-/** The draws of four words each: the first has depths, then come those of reflections and of normal numbers. */
-const int FIRST_REFLECTIONS = 1, FIRST_NORMALS = 64;
+/** The first draw of those of parts. */
+const int FIRST_PART = 1;
 
 double uniformOf(uint32_t word) {
     return (word+0.5)/4294967296.0;
@@ -33,38 +33,21 @@ SurfaceVariates GapNoise::drawSurface(const Gap& gap) const {
     return {-log(uniformOf(words[0])), uniformOf(words[1])};
 }
 
-double GapNoise::drawFirstReflection(const Gap& gap) const {
-    uint32_t words[4];
-    drawFour(gap, FIRST_REFLECTIONS, words);
-    return -log(uniformOf(words[0]));
-}
-
-void GapNoise::draw(const Gap* gaps, int count, int parts, double* reflections, double* normals) const {
+void GapNoise::draw(const Gap* gaps, int count, int parts, double* bridges, double* reflections) const {
     vector<uint32_t> chains(count), keys(count), words(4*(size_t) count);
     for (int i = 0; i < count; i++) {
         chains[i] = gaps[i].key[0] | OF_GAPS;
         keys[i] = gaps[i].key[1];
     }
-    auto drawFour = [&] (int draw) {
-        drawWords(step, NoiseKind::Link, draw, chains.data(), keys.data(), count, words.data());
-    };
-    for (int part = 0; part < parts; part += 4) {
-        drawFour(FIRST_REFLECTIONS+part/4);
-        for (int i = 0; i < count; i++)
-            for (int k = 0; k < min(4, parts-part); k++)
-                reflections[i*parts+part+k] = -log(uniformOf(words[4*i+k]));
-    }
-    // One draw has the numbers of two parts for both places.
-    for (int part = 0; part < parts; part += 2) {
-        drawFour(FIRST_NORMALS+part/2);
+    // Each draw has two numbers for both places: one for the bridge, and one for the reflection.
+    for (int part = 0; part < parts; part++) {
+        drawWords(step, NoiseKind::Link, FIRST_PART+part, chains.data(), keys.data(), count, words.data());
         for (int i = 0; i < count; i++)
             for (int side = 0; side < 2; side++) {
                 const uint32_t* const own = &words[4*i+2*side];
-                double* const to = &normals[(2*i+side)*parts+part];
                 const double size = sqrt(-2*log(uniformOf(own[0]))), angle = 2*M_PI*uniformOf(own[1]);
-                to[0] = size*cos(angle);
-                if (part+1 < parts)
-                    to[1] = size*sin(angle);
+                bridges[(2*i+side)*parts+part] = size*cos(angle);
+                reflections[(2*i+side)*parts+part] = size*sin(angle);
             }
     }
 }

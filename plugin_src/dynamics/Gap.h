@@ -67,16 +67,14 @@ public:
     }
     /** Draw what the hard surface of a gap is found with. */
     SurfaceVariates drawSurface(const Gap& gap) const;
-    /** Draw the exponential variate of the first part. */
-    double drawFirstReflection(const Gap& gap) const;
     /**
      * Draw numbers for the parts of a step, one after the other for each gap.
      *
      * @param gaps         some gaps
-     * @param reflections  receives exponential variates, of mean one
-     * @param normals      receives normal numbers, first for the one place of each gap and then for the other
+     * @param bridges      receives normal numbers, first for the one place of each gap and then for the other
+     * @param reflections  receives others
      */
-    void draw(const Gap* gaps, int count, int parts, double* reflections, double* normals) const;
+    void draw(const Gap* gaps, int count, int parts, double* bridges, double* reflections) const;
 private:
     void drawFour(const Gap& gap, int draw, std::uint32_t* words) const;
     NoiseKey step = {};

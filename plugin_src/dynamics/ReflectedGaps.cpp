@@ -10,7 +10,7 @@ using namespace std;
 namespace {
 
 /** How far a gap moves in a part, (2 k_B T G)^(1/2), over the thermal depth, where it shares chains with others. */
-const double LARGEST_MOTION = 1.5;
+const double LARGEST_MOTION = 3;
 /** The most parts. */
 const int MOST_PARTS = 12;
 /** How often all gaps are gone through at most. */
@@ -23,8 +23,10 @@ const double LEAST_SHARE = 0.1;
 const double LEAST_CHANGE = 1e-7;
 /** By which factor the network may change the response of a gap. */
 const double LEAST_FACTOR = 1e-3, LARGEST_FACTOR = 1e3;
-/** With several parts, the exponential variate of one is taken for this at least. */
+/** A gap that has just been found is pushed if its exponential variate is less than this. */
 const double LARGE_REFLECTION = 4;
+/** Normal numbers are not so large that their chance would be less. */
+const double LEAST_CHANCE = 1e-300;
 /** Gaps that a thread looks at together. */
 const int CHUNK_OF_GAPS = 64;
 /** Pivots below this, over the diagonal, are those of ports that move as others do. */
@@ -66,8 +68,8 @@ void ReflectedGaps::begin(const StepSettings& settings, const ChainPlaces& place
     gaps.clear();
     forces.clear();
     pushes.clear();
-    reflections.clear();
-    normals.clear();
+    ofBridges.clear();
+    ofReflections.clear();
     networks.clear();
     portOf.clear();
     known.clear();
@@ -243,38 +245,48 @@ int ReflectedGaps::chooseParts() const {
 
 /** Draw the numbers of gaps that have none for so many parts. */
 void ReflectedGaps::drawNumbers(const Loop& loop) {
-    const size_t known = normals.size()/(2*parts), count = gaps.size();
-    reflections.resize(count*parts);
-    normals.resize(2*count*parts);
+    const size_t known = ofBridges.size()/(2*parts), count = gaps.size();
+    ofBridges.resize(2*count*parts);
+    ofReflections.resize(2*count*parts);
     loop((count-known+CHUNK_OF_GAPS-1)/CHUNK_OF_GAPS, [&] (int chunk) {
         const size_t i = known+chunk*CHUNK_OF_GAPS;
-        noise.draw(&gaps[i], min(count-i, (size_t) CHUNK_OF_GAPS), parts, &reflections[i*parts], &normals[2*i*parts]);
+        noise.draw(&gaps[i], min(count-i, (size_t) CHUNK_OF_GAPS), parts, &ofBridges[2*i*parts],
+                &ofReflections[2*i*parts]);
     });
 }
 
-/** Find bridges of Brownian motion with the covariance of the responses. */
-void ReflectedGaps::findBridges() {
-    const size_t count = gaps.size();
-    bridges.assign(count*parts, 0.0);
-    if (parts == 1)
-        return;
-    const double size = sqrt(2*kT/parts);
+/** Give numbers of ports the covariance of the responses, and sum them for each gap. */
+void ReflectedGaps::correlate(const vector<double>& normals, vector<double>& sums) const {
+    sums.assign(gaps.size()*parts, 0.0);
     for (const PortsOfChain& chain : chains)
         for (int row = 0; row < chain.count; row++) {
-            double* const bridge = &bridges[(size_t) ports[chain.first+row].gap*parts];
+            double* const sum = &sums[(size_t) ports[chain.first+row].gap*parts];
             const double* const root = &roots[chain.matrix+(size_t) row*chain.count];
             for (int column = 0; column <= row; column++) {
                 const Port& port = ports[chain.first+column];
                 const double* const own = &normals[(2*(size_t) port.gap+port.side)*parts];
                 for (int part = 0; part < parts; part++)
-                    bridge[part] += size*root[column]*own[part];
+                    sum[part] += root[column]*own[part];
             }
         }
-    for (size_t i = 0; i < count; i++) {
-        double* const bridge = &bridges[i*parts];
-        const double mean = accumulate(bridge, bridge+parts, 0.0)/parts;
-        for (int part = 0; part < parts; part++)
-            bridge[part] = (bridge[part]-mean)*sqrt(networks[i]);
+}
+
+/**
+ * Find bridges of Brownian motion, and exponential variates, that are correlated as the gaps move: those that move as one
+ * are reflected as one.
+ */
+void ReflectedGaps::findNoise() {
+    correlate(ofBridges, bridges);
+    correlate(ofReflections, reflections);
+    const double size = sqrt(2*kT/parts);
+    for (size_t i = 0; i < gaps.size(); i++) {
+        double *const bridge = &bridges[i*parts], *const reflection = &reflections[i*parts];
+        const double mean = accumulate(bridge, bridge+parts, 0.0)/parts, ofGap = size*sqrt(networks[i]);
+        const double perSize = own[i] > 0 ? M_SQRT1_2/sqrt(own[i]) : 0;
+        for (int part = 0; part < parts; part++) {
+            bridge[part] = (bridge[part]-mean)*ofGap;
+            reflection[part] = -log(max(LEAST_CHANCE, 0.5*erfc(reflection[part]*perSize)));
+        }
     }
 }
 
@@ -292,14 +304,19 @@ double ReflectedGaps::findPush(int i, int part) const {
         if (portOf[2*i+side] >= 0)
             others += networks[i]*moved[portOf[2*i+side]];
     const double end = ends[i]+others;
-    if (gap.law == GapLaw::Reflection)
-        return reflect(starts[i]+0.5*max(others, 0.0), end, response, kT/parts*reflections[(size_t) i*parts+part]);
+    if (gap.law == GapLaw::Reflection) {
+        double opening = -response*ofPart[i];
+        for (int side = 0; side < 2; side++)
+            if (portOf[2*i+side] >= 0)
+                opening += networks[i]*opened[portOf[2*i+side]];
+        return reflect(starts[i]+0.5*opening, end, response, kT/parts*reflections[(size_t) i*parts+part]);
+    }
     if (part < parts-1)
         return 0;
     const double softer = 1/(1+gap.stiffness*response);
     if (gap.law == GapLaw::SpringBehind)
         return max(0.0, -gap.stiffness*end*softer);
-    const double rest = normals[2*(size_t) i*parts]*sqrt(kT/gap.stiffness);
+    const double rest = ofBridges[2*(size_t) i*parts]*sqrt(kT/gap.stiffness);
     const double held = (end+gap.stiffness*response*rest)*softer, responseHeld = response*softer;
     const double back = gap.ceiling < HUGE_VAL ? reflect(gap.ceiling-gap.start, gap.ceiling-held, responseHeld,
             kT*reflections[(size_t) i*parts]) : 0;
@@ -317,6 +334,9 @@ void ReflectedGaps::move(int i, double push) {
         double* const to = &moved[chain.first];
         for (int k = 0; k < chain.count; k++)
             to[k] += push*row[k];
+        if (gaps[i].law == GapLaw::Reflection)
+            for (int k = 0; k < chain.count; k++)
+                opened[chain.first+k] += push*max(0.0, row[k]);
     }
 }
 
@@ -327,6 +347,7 @@ void ReflectedGaps::move(int i, double push) {
 void ReflectedGaps::findPushesOfPart(int part) {
     const int count = gaps.size();
     moved.assign(ports.size(), 0.0);
+    opened.assign(ports.size(), 0.0);
     for (int i = 0; i < count; i++) {
         ofPart[i] = own[i] > 0 ? pushes[(size_t) i*parts+part] : 0;
         if (ofPart[i] != 0)
@@ -409,13 +430,13 @@ void ReflectedGaps::push(const vector<PackStep*>& packs, CoupledEquations& coupl
         const int needed = max(parts, chooseParts());
         if (needed != parts) {
             pushes.clear();
-            reflections.clear();
-            normals.clear();
+            ofBridges.clear();
+            ofReflections.clear();
         }
         parts = needed;
         pushes.resize(count*parts, 0.0);
         drawNumbers(loop);
-        findBridges();
+        findNoise();
     }
     auto endMove = [&] (size_t i, const vector<double>& moves) {
         double sum = 0;
@@ -470,8 +491,7 @@ void ReflectedGaps::followNetwork(int i, double pushed) {
 bool ReflectedGaps::wouldPush(const Gap& gap) const {
     if (gap.law != GapLaw::Reflection)
         return gap.law == GapLaw::Spring || gap.end < 0;
-    const double reflection = noise.drawFirstReflection(gap);
-    return gap.end < 0 || gap.start*gap.end < kT*gap.response*(parts > 1 ? max(reflection, LARGE_REFLECTION) : reflection);
+    return gap.end < 0 || gap.start*gap.end < LARGE_REFLECTION*kT*gap.response;
 }
 
 bool ReflectedGaps::isUnfinished(int i) const {

@@ -82,7 +82,8 @@ private:
     void findResponses(const std::vector<PackStep*>& packs, const CoupledEquations& coupled, const Loop& loop);
     int chooseParts() const;
     void drawNumbers(const Loop& loop);
-    void findBridges();
+    void correlate(const std::vector<double>& normals, std::vector<double>& sums) const;
+    void findNoise();
     void findPushes();
     void followNetwork(int gap, double pushed);
     void findPushesOfPart(int part);
@@ -102,16 +103,19 @@ private:
     std::vector<double> forces, pushes, free, predicted, corrections, own, networks, networkChanges;
     /** The first equation of each gap among those of all. */
     std::vector<int> equationOf;
-    /** For each gap and part: exponential variates, a bridge of Brownian motion, and the normal numbers of both sides. */
-    std::vector<double> reflections, bridges, normals;
+    /** For each gap and part: exponential variates, a bridge of Brownian motion, and what both are made of. */
+    std::vector<double> reflections, bridges, ofReflections, ofBridges;
     /** Of a part: where gaps begin, and where they would end. */
     std::vector<double> starts, ends, ofPart, tolerances;
     /** The gaps that are pushed in a part. */
     std::vector<int> pushed;
-    /** The ports of all chains, that of each gap and side or -1, and how far each is moved in a part. */
+    /**
+     * The ports of all chains, that of each gap and side or -1, and how far each is moved in
+     * a part, and by pushes that open it alone.
+     */
     std::vector<Port> ports;
     std::vector<int> portOf, chainOf, firstPort;
-    std::vector<double> moved;
+    std::vector<double> moved, opened;
     std::vector<PortsOfChain> chains;
     std::vector<double> responses, roots;
     /** Whether the responses of a chain are known for the present iteration. */
