@@ -12,7 +12,7 @@ namespace {
 /** How far a gap moves in a part, (2 k_B T G)^(1/2), over the thermal depth, where it shares chains with others. */
 const double LARGEST_MOTION = 3;
 /** The most parts. */
-const int MOST_PARTS = 12;
+const int MOST_PARTS = 3;
 /** How often all gaps are gone through at most. */
 const int MOST_SWEEPS = 200;
 /** What the last sweep may change a gap by, and the last iteration, over the thermal scale. */
