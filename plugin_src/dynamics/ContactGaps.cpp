@@ -10,24 +10,20 @@ using namespace std;
 
 namespace {
 
-/** Gaps that are closed with a chance of less than exp(-this) are left out. */
-const double LARGEST_EXPONENT = 6;
-/** By how much responses that are found from lengths may be too small. */
-const double RESPONSE_MARGIN = 1.2;
 /** How much farther than needed pairs are looked for, over the diameter: further iterations move them. */
 const double SLACK = 0.25;
 /** Parts of all this that pairs are looked for in where a periodic box is too narrow for more. */
 const double NARROWER[] = {1, 0.6, 0.35, 0.2};
 /** Capsules that have travelled less, over the sum of the radii, touch where they did. */
-const double SAME_PLACE = 0.01;
+const double SAME_TOUCH = 0.01;
 /** The number of iterations in which places and normals move. */
 const int MOVING_ITERATIONS = 3;
 /** The largest depth of a hard surface, over the sum of the radii: it is before the axes. */
 const double LARGEST_DEPTH = 0.95;
 /** Capsules or pairs that a thread looks at together. */
-const int CHUNK_OF_CONTACTS = 256;
+const int CHUNK_OF_CAPSULES = 256;
 
-/** One gap for the energy of a pair, k gap^2/2 where it is negative: where forces on it act, and its gradients there. */
+/** One gap for the energy of a pair, k gap^2/2 where it is negative: where forces act, and its gradients there. */
 struct PairGap {
     double gap;
     int count;
@@ -35,7 +31,7 @@ struct PairGap {
     Vec3d gradients[2];
 };
 
-Vec3d normalOf(const Contact& contact) {
+Vec3d gradientOf(const Contact& contact) {
     return {contact.normal[0], contact.normal[1], contact.normal[2]};
 }
 
@@ -51,7 +47,8 @@ PairGap findPairGap(const SegmentPair& pair, const Contact* contacts, int count,
             if (contacts[i].gap < 0) {
                 result.s[result.count] = contacts[i].s;
                 result.t[result.count] = contacts[i].t;
-                result.gradients[result.count++] = normalOf(contacts[i])*(contacts[i].weight*contacts[i].gap/result.gap);
+                const double share = contacts[i].weight*contacts[i].gap/result.gap;
+                result.gradients[result.count++] = gradientOf(contacts[i])*share;
             }
         return result;
     }
@@ -61,7 +58,7 @@ PairGap findPairGap(const SegmentPair& pair, const Contact* contacts, int count,
         result.gap = contact.gap;
         result.s[0] = contact.s;
         result.t[0] = contact.t;
-        result.gradients[0] = normalOf(contact);
+        result.gradients[0] = gradientOf(contact);
         return result;
     }
     const NearestPoints nearest = findNearestPoints(pair);
@@ -116,9 +113,9 @@ void ContactGaps::begin(const CoupledStart& start, const Loop& newLoop) {
         own.response = 0;
         for (double fraction : {0, 1})
             if (own.place.pack >= 0)
-                own.response = max(own.response, RESPONSE_MARGIN*responses.find(placeOf(i, fraction)));
+                own.response = max(own.response, GAP_RESPONSE_MARGIN*responses.find(placeOf(i, fraction)));
     };
-    runInChunks(*loop, capsules.size(), CHUNK_OF_CONTACTS, [&] (int i) {
+    runInChunks(*loop, capsules.size(), CHUNK_OF_CAPSULES, [&] (int i) {
         const Capsule& capsule = capsules[i];
         Place place;
         place.first = capsule.first;
@@ -147,7 +144,7 @@ void ContactGaps::begin(const CoupledStart& start, const Loop& newLoop) {
         diameter = max(diameter, 2*capsules[i].radius);
         response = max(response, 2*places[i].response);
     }
-    reach = sqrt(LARGEST_EXPONENT*kT*response);
+    reach = sqrt(LARGEST_GAP_EXPONENT*kT*response);
     slack = SLACK*diameter;
     movesTooFar = isEndless = false;
     pairs.clear();
@@ -203,7 +200,7 @@ void ContactGaps::findNewPairs(const double* moved) {
 /** Get whether the gap of a pair may be closed; if not, how far its capsules may travel until it may. */
 bool ContactGaps::isNear(int number, bool isNew, double& room) const {
     const ContactPair& pair = pairs.get(number);
-    const double least = LARGEST_EXPONENT*kT*(places[pair.a].response+places[pair.b].response), radii = radiiOf(pair);
+    const double least = LARGEST_GAP_EXPONENT*kT*(places[pair.a].response+places[pair.b].response), radii = radiiOf(pair);
     auto isFar = [&] (double before, double after) {
         room = after-least/before;
         return before > 0 && room > 0;
@@ -222,13 +219,13 @@ bool ContactGaps::isNear(int number, bool isNew, double& room) const {
 
 /** Find the pairs from a number on, or those that have travelled far enough, whose gaps may be closed. */
 void ContactGaps::selectNear(int firstNew) {
-    const int count = pairs.size(), chunks = (count+CHUNK_OF_CONTACTS-1)/CHUNK_OF_CONTACTS;
+    const int count = pairs.size(), chunks = (count+CHUNK_OF_CAPSULES-1)/CHUNK_OF_CAPSULES;
     rooms.resize(count, 0.0);
     parts.resize(max(parts.size(), (size_t) chunks));
     (*loop)(chunks, [&] (int chunk) {
         vector<int>& own = parts[chunk].pairs;
         own.clear();
-        for (int i = chunk*CHUNK_OF_CONTACTS; i < min(count, (chunk+1)*CHUNK_OF_CONTACTS); i++) {
+        for (int i = chunk*CHUNK_OF_CAPSULES; i < min(count, (chunk+1)*CHUNK_OF_CAPSULES); i++) {
             const ContactPair& pair = pairs.get(i);
             const double way = motion.getWay(pair.a, pair.b);
             double room;
@@ -255,7 +252,7 @@ void ContactGaps::follow(NearPair& own) const {
     const ContactPair& pair = pairs.get(own.pair);
     const double way = motion.getWay(pair.a, pair.b), radii = radiiOf(pair);
     const bool isNew = own.way < 0;
-    own.hasMoved = isNew || (way-own.way > SAME_PLACE*radii && (own.number < 0 || iterations <= MOVING_ITERATIONS));
+    own.hasMoved = isNew || (way-own.way > SAME_TOUCH*radii && (own.number < 0 || iterations <= MOVING_ITERATIONS));
     if (!own.hasMoved) {
         if (own.number >= 0)
             own.gap.end = own.offset+findEnd(own);
@@ -305,7 +302,7 @@ void ContactGaps::follow(NearPair& own) const {
 
 /** Get whether a gap that is not one of those of the step yet is so likely to be closed that it becomes one. */
 bool ContactGaps::mayClose(const Gap& gap) const {
-    return gap.law != GapLaw::Reflection || !(gap.end > 0) || gap.start*gap.end < LARGEST_EXPONENT*kT*gap.response;
+    return gap.law != GapLaw::Reflection || !(gap.end > 0) || gap.start*gap.end < LARGEST_GAP_EXPONENT*kT*gap.response;
 }
 
 /** How far the places of the levers of a gap are apart along its gradients. */
@@ -344,7 +341,7 @@ bool ContactGaps::findGaps(int iteration, bool settled, const double* moved, Ref
     if (movesTooFar)
         return false;
     selectNear(firstNew);
-    runInChunks(*loop, near.size(), CHUNK_OF_CONTACTS, [&] (int i) {
+    runInChunks(*loop, near.size(), CHUNK_OF_CAPSULES, [&] (int i) {
         follow(near[i]);
     });
     for (NearPair& own : near)

@@ -16,9 +16,9 @@ namespace cylchain {
 /**
  * Contacts of capsules in an implicit step: gaps between two capsules.
  *
- * A pair has one gap for its energy at the start and at the end, each with the contacts that it has then: so a step back
- * has the same gaps. Half of the force acts where they are nearest at the start, half where they are at the end. Segments
- * that have crossed in the end, which gaps do not see where they turn far, fail.
+ * A pair has one gap for its energy at the start and at the end, each with the contacts that it has then: so a step
+ * back has the same gaps. Half of the force acts where they are nearest at the start, half where they are at the end.
+ * Segments that have crossed in the end, which gaps do not see where they turn far, fail.
  */
 class ContactGaps : public ImplicitCouplings {
 public:

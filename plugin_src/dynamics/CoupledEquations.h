@@ -59,7 +59,8 @@ public:
     /** Find how the places of equations from a number on will move against each other, before advance(). */
     void predictMoves(const std::vector<PackStep*>& packs, std::size_t first, const Loop& loop);
     /**
-     * Add forces on the places of some equations, which join no places, to those of the equations that have been solved.
+     * Add forces on the places of some equations, which join no places, to those of the equations that have been
+     * solved.
      *
      * @param first  the first of these equations; they are the last ones
      * @param loads  the force on the first place of each, opposite to that on the second: three numbers
@@ -86,8 +87,8 @@ public:
         return joins;
     }
     /** End the iteration of the packs that take part, with a share of the changes. */
-    void advance(const std::vector<PackStep*>& packs, const PackFlags& active, const ShareOfChange& share, LaneFlags& unfinished,
-            const Loop& loop);
+    void advance(const std::vector<PackStep*>& packs, const PackFlags& active, const ShareOfChange& share,
+            LaneFlags& unfinished, const Loop& loop);
     /** For each equation, how much its first place moves against the second with all of the changes: three numbers. */
     const std::vector<double>& getMoves() const {
         return moves;

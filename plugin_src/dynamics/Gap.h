@@ -8,6 +8,11 @@
 
 namespace cylchain {
 
+/** Gaps that are closed with a chance of less than exp(-this) are left out. */
+const double LARGEST_GAP_EXPONENT = 6;
+/** By how much responses of gaps that are found from lengths may be too small. */
+const double GAP_RESPONSE_MARGIN = 1.2;
+
 /** How a gap is held open in a step: see ReflectedGaps. */
 enum class GapLaw {
     /** By a hard surface at a random depth behind the soft one. */
@@ -83,14 +88,14 @@ private:
 /**
  * Decide how a gap is held open, and measure its start from there.
  *
- * The potential k g^2/2 of a gap g < 0 is that of hard surfaces: exp(-k g^2/2 k_B T) is the chance that a surface at the
- * depth D with k D^2/2 k_B T > E' for an exponential variate E' is not reached. So one is drawn that is consistent with
- * the start, D^2 = min(g, 0)^2+2 k_B T E'/k, and the start is g+D from it.
+ * The potential k g^2/2 of a gap g < 0 is that of hard surfaces: exp(-k g^2/2 k_B T) is the chance that a surface at
+ * the depth D with k D^2/2 k_B T > E' for an exponential variate E' is not reached. So one is drawn that is consistent
+ * with the start, D^2 = min(g, 0)^2+2 k_B T E'/k, and the start is g+D from it.
  *
- * From one step to the next that changes a deep gap by little, and would not let it out where nothing presses. So D is at
- * most d, a limit between 3 and 9 times (k_B T/k)^(1/2) that is drawn afresh in each step, and what begins deeper than d
- * stays so, held by the spring of the soft surface: both parts keep their equilibrium, whatever d is, and a gap passes
- * from one to the other as d changes. What is much deeper than any d is not stopped on its way out.
+ * From one step to the next that changes a deep gap by little, and would not let it out where nothing presses. So D is
+ * at most d, a limit between 3 and 9 times (k_B T/k)^(1/2) that is drawn afresh in each step, and what begins deeper
+ * than d stays so, held by the spring of the soft surface: both parts keep their equilibrium, whatever d is, and a gap
+ * passes from one to the other as d changes. What is much deeper than any d is not stopped on its way out.
  *
  * @param variates  of E' and d
  * @param deepest   d is not more than this: no surface is beyond an axis

@@ -12,7 +12,7 @@ namespace {
 /** How far a gap moves in a part, (2 k_B T G)^(1/2), over the thermal depth, where it shares chains with others. */
 const double LARGEST_MOTION = 3;
 /** The most parts. */
-const int MOST_PARTS = 3;
+const int MOST_PARTS_OF_GAPS = 3;
 /** How often all gaps are gone through at most. */
 const int MOST_SWEEPS = 200;
 /** What the last sweep may change a gap by, and the last iteration, over the thermal scale. */
@@ -20,9 +20,9 @@ const double OF_SWEEPS = 0.01, OF_ITERATIONS = 0.1;
 /** A change that is less than this share of that is not made. */
 const double LEAST_SHARE = 0.1;
 /** The same in nm, where nothing moves thermally. */
-const double LEAST_CHANGE = 1e-7;
+const double LEAST_CHANGE_OF_GAPS = 1e-7;
 /** By which factor the network may change the response of a gap. */
-const double LEAST_FACTOR = 1e-3, LARGEST_FACTOR = 1e3;
+const double LEAST_SHARE_OF_NETWORK = 1e-3, LARGEST_SHARE_OF_NETWORK = 1e3;
 /** A gap that has just been found is pushed if its exponential variate is less than this. */
 const double LARGE_REFLECTION = 4;
 /** Normal numbers are not so large that their chance would be less. */
@@ -32,7 +32,7 @@ const int CHUNK_OF_GAPS = 64;
 /** Pivots below this, over the diagonal, are those of ports that move as others do. */
 const double LEAST_PIVOT = 1e-10;
 
-double dot(const double* a, const double* b) {
+double product(const double* a, const double* b) {
     return a[0]*b[0]+a[1]*b[1]+a[2]*b[2];
 }
 
@@ -61,7 +61,6 @@ void findRoot(int n, const double* matrix, double* root) {
 } // namespace
 
 void ReflectedGaps::begin(const StepSettings& settings, const ChainPlaces& places) {
-    numParticles = places.getNumParticles();
     numChains = places.getNumChains();
     kT = settings.kT;
     noise = GapNoise({(uint32_t) settings.seed, (uint32_t) settings.level, settings.step});
@@ -79,7 +78,7 @@ void ReflectedGaps::begin(const StepSettings& settings, const ChainPlaces& place
 }
 
 bool ReflectedGaps::resolves(double stiffness, double response) {
-    return 2*stiffness*response <= MOST_PARTS*LARGEST_MOTION*LARGEST_MOTION;
+    return 2*stiffness*response <= MOST_PARTS_OF_GAPS*LARGEST_MOTION*LARGEST_MOTION;
 }
 
 int ReflectedGaps::add(const Gap& gap) {
@@ -240,7 +239,7 @@ int ReflectedGaps::chooseParts() const {
         if (shares && gaps[i].law == GapLaw::Reflection)
             largest = max(largest, 2*own[i]*gaps[i].stiffness);
     }
-    return clamp((int) ceil(largest/(LARGEST_MOTION*LARGEST_MOTION)), 1, MOST_PARTS);
+    return clamp((int) ceil(largest/(LARGEST_MOTION*LARGEST_MOTION)), 1, MOST_PARTS_OF_GAPS);
 }
 
 /** Draw the numbers of gaps that have none for so many parts. */
@@ -272,8 +271,8 @@ void ReflectedGaps::correlate(const vector<double>& normals, vector<double>& sum
 }
 
 /**
- * Find bridges of Brownian motion, and exponential variates, that are correlated as the gaps move: those that move as one
- * are reflected as one.
+ * Find bridges of Brownian motion, and exponential variates, that are correlated as the gaps move: those that move as
+ * one are reflected as one.
  */
 void ReflectedGaps::findNoise() {
     correlate(ofBridges, bridges);
@@ -395,7 +394,7 @@ void ReflectedGaps::findPushes() {
     tolerances.resize(count);
     for (int i = 0; i < count; i++) {
         predicted[i] = gaps[i].start;
-        tolerances[i] = OF_SWEEPS*scaleOf(i)+0.1*LEAST_CHANGE;
+        tolerances[i] = OF_SWEEPS*scaleOf(i)+0.1*LEAST_CHANGE_OF_GAPS;
     }
     for (int part = 0; part < parts; part++) {
         for (int i = 0; i < count; i++) {
@@ -441,7 +440,7 @@ void ReflectedGaps::push(const vector<PackStep*>& packs, CoupledEquations& coupl
     auto endMove = [&] (size_t i, const vector<double>& moves) {
         double sum = 0;
         for (int lever = 0; lever < gaps[i].numLevers; lever++)
-            sum += dot(gaps[i].levers[lever].gradient, &moves[3*(equationOf[i]+lever)]);
+            sum += product(gaps[i].levers[lever].gradient, &moves[3*(equationOf[i]+lever)]);
         return sum;
     };
     coupled.predictMoves(packs, firstEquation, loop);
@@ -481,7 +480,7 @@ void ReflectedGaps::followNetwork(int i, double pushed) {
             ofChains += moved[portOf[2*i+side]];
     const double before = networks[i];
     if (forces[i] > 0 && ofChains > 0)
-        networks[i] = clamp(pushed/ofChains, LEAST_FACTOR, LARGEST_FACTOR);
+        networks[i] = clamp(pushed/ofChains, LEAST_SHARE_OF_NETWORK, LARGEST_SHARE_OF_NETWORK);
     const double correction = pushed-networks[i]*ofChains;
     networkChanges[i] = fabs(correction-corrections[i])+fabs(networks[i]-before)*own[i]*forces[i];
     corrections[i] = correction;
@@ -499,7 +498,7 @@ bool ReflectedGaps::isUnfinished(int i) const {
         return false;
     if (i >= (int) predicted.size())
         return wouldPush(gaps[i]);
-    return !(max(fabs(gaps[i].end-predicted[i]), networkChanges[i]) <= OF_ITERATIONS*scaleOf(i)+LEAST_CHANGE);
+    return !(max(fabs(gaps[i].end-predicted[i]), networkChanges[i]) <= OF_ITERATIONS*scaleOf(i)+LEAST_CHANGE_OF_GAPS);
 }
 
 bool ReflectedGaps::anyUnfinished() {

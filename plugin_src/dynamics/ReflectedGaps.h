@@ -11,13 +11,13 @@ namespace cylchain {
 /**
  * The forces of contacts and walls in an implicit step.
  *
- * Let the step without them be linear and reversible, with the equilibrium k_B T K^-1, and C its response to a force that
- * acts during the step. Gaps n with gradients N then keep the equilibrium of hard surfaces at n = 0 exactly, whatever the
- * step and the load, if their forces F are the local times at the end of the step of Brownian motion with the
- * covariance 2 k_B T G, G = N^T C N, that goes from the gaps a at the start to the gaps b at the end without forces and is
- * reflected at zero along G: the end is n = b+G F. All terms of the probability of a step with loads and with modes that
- * relax in it are symmetric in start and end, and the law of reflected motion is exp(-F.n/k_B T) times what is symmetric
- * in a and n. See Harrison and Reiman, Ann. Probab. 1981, 9, 302.
+ * Let the step without them be linear and reversible, with the equilibrium k_B T K^-1, and C its response to a force
+ * that acts during the step. Gaps n with gradients N then keep the equilibrium of hard surfaces at n = 0 exactly,
+ * whatever the step and the load, if their forces F are the local times at the end of the step of Brownian motion with
+ * the covariance 2 k_B T G, G = N^T C N, that goes from the gaps a at the start to the gaps b at the end without
+ * forces and is reflected at zero along G: the end is n = b+G F. All terms of the probability of a step with loads and
+ * with modes that relax in it are symmetric in start and end, and the law of reflected motion is exp(-F.n/k_B T) times
+ * what is symmetric in a and n. See Harrison and Reiman, Ann. Probab. 1981, 9, 302.
  *
  * For one gap, the motion between a and b has gone to the minimum
  *
@@ -25,9 +25,9 @@ namespace cylchain {
  *
  * with an exponential variate E of mean one. Gaps that share chains are found in parts of the step: in each, the ends
  * move on by a share of b-a and by a bridge of Brownian motion with the covariance 2 k_B T G, and every gap takes the
- * law of one, with what others push in this part whole at its end and, where it opens the gap, half at its start. That is
- * exact where gaps share no chains. The equations of a part are those of the least value of a convex
- * function, so that going through the gaps in turn finds their solution.
+ * law of one, with what others push in this part whole at its end and, where it opens the gap, half at its start. Gaps
+ * that move together have variates E that are correlated as their motion is: those that move as one are reflected as
+ * one. With one gap on each chain, all this is exact. Going through the gaps in turn finds the forces of a part.
  *
  * Soft surfaces are hard ones at random depths: see placeHardSurface().
  */
@@ -37,10 +37,6 @@ public:
     void begin(const StepSettings& settings, const ChainPlaces& places);
     /** Whether a step has parts enough for gaps of a stiffness that a force moves by so much. */
     static bool resolves(double stiffness, double response);
-    /** The number of particles of the System. */
-    int getNumParticles() const {
-        return numParticles;
-    }
     /** What gaps are drawn with. */
     const GapNoise& getNoise() const {
         return noise;
@@ -94,11 +90,12 @@ private:
     std::vector<Gap> gaps;
     GapNoise noise;
     double kT = 0;
-    int parts = 1, numParticles = 0, numChains = 0;
+    int parts = 1, numChains = 0;
     std::size_t firstEquation = 0;
     /**
-     * For each gap: the force and its share in each part; the end without forces, and that which is predicted; how a
-     * force moves it, and how much more or less the network lets it move than its chains alone do.
+     * For each gap: the force and its share in each part; the end without forces, that which is predicted, and what
+     * others push through the network; how a force moves it, how much more or less the network lets it move than its
+     * chains alone do, and how far both have changed in the last iteration.
      */
     std::vector<double> forces, pushes, free, predicted, corrections, own, networks, networkChanges;
     /** The first equation of each gap among those of all. */

@@ -10,23 +10,19 @@ using namespace std;
 
 namespace {
 
-/** Gaps that are closed with a chance of less than exp(-this) are left out. */
-const double LARGEST_EXPONENT = 6;
-/** By how much responses that are found from lengths may be too small. */
-const double RESPONSE_MARGIN = 1.2;
 /** The largest way beyond a curved face or back from it, over the way to the middle. */
-const double LARGEST_WAY_TO_FACE = 0.5;
+const double LEAST_WAY_TO_MIDDLE = 0.5;
 /** Particles that a thread looks at together. */
-const int CHUNK_OF_PARTICLES = 256;
+const int CHUNK_OF_WALL_GAPS = 256;
 
-/** How a unit force on a round face turns with it: 1-g g, or the plane across the axis of a cylinder, over the radius. */
+/** How a unit force on a round face turns with it: 1-g g, or across the axis of a cylinder, over the radius. */
 void findTurning(const Wall& wall, const double* g, double distance, double* turning) {
     if (wall.shape != WallShape::Sphere && wall.shape != WallShape::Cylinder)
         return;
     const double* axis = wall.vector;
     const double along = wall.shape == WallShape::Cylinder ? 1 : 0;
     // Where the middle is near, there would be more stiffness than steps can have.
-    const double curvature = 0.5/max(distance, LARGEST_WAY_TO_FACE*wall.length);
+    const double curvature = 0.5/max(distance, LEAST_WAY_TO_MIDDLE*wall.length);
     int entry = 0;
     for (int i = 0; i < 3; i++)
         for (int k = i; k < 3; k++)
@@ -62,10 +58,10 @@ void WallGaps::begin(const CoupledStart& start, const Loop& newLoop) {
     responses.resize(count);
     PlaceResponses found;
     found.begin(start.places, start.settings.stepSize);
-    parts.resize((count+CHUNK_OF_PARTICLES-1)/CHUNK_OF_PARTICLES);
-    runInChunks(*loop, count, CHUNK_OF_PARTICLES, [&] (int i) {
+    parts.resize((count+CHUNK_OF_WALL_GAPS-1)/CHUNK_OF_WALL_GAPS);
+    runInChunks(*loop, count, CHUNK_OF_WALL_GAPS, [&] (int i) {
         if (start.places.find(system->particles[i].getPlace(), places[i]) && start.taken[places[i].chain])
-            responses[i] = RESPONSE_MARGIN*found.find(places[i]);
+            responses[i] = GAP_RESPONSE_MARGIN*found.find(places[i]);
         else
             places[i] = PlaceOnChain();
     });
@@ -107,14 +103,14 @@ void WallGaps::findNew(int number, const double* moved) {
     part.states.clear();
     part.gaps.clear();
     const int count = places.size();
-    for (int i = number*CHUNK_OF_PARTICLES; i < min(count, (number+1)*CHUNK_OF_PARTICLES); i++) {
+    for (int i = number*CHUNK_OF_WALL_GAPS; i < min(count, (number+1)*CHUNK_OF_WALL_GAPS); i++) {
         if (places[i].pack < 0)
             continue;
         const double radius = system->particles[i].radius;
         const Position from = positionOf(i, begun), to = positionOf(i, moved);
         if (rooms[i].holds(to.at))
             continue;
-        const double least = LARGEST_EXPONENT*kT*responses[i];
+        const double least = LARGEST_GAP_EXPONENT*kT*responses[i];
         double room = HUGE_VAL;
         for (int face = 0; face < numFaces; face++) {
             if ((reached[i]>>face)&1)

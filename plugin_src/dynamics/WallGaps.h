@@ -59,8 +59,8 @@ private:
     double kT = 0;
     int numFaces = 0, force = 0;
     /**
-     * For each particle of the wall: where it is, about how a force moves it, whether each face has a gap, and how far it
-     * may go from where it was seen last before it may have another.
+     * For each particle of the wall: where it is, about how a force moves it, whether each face has a gap, and how far
+     * it may go from where it was seen last before it may have another.
      */
     std::vector<PlaceOnChain> places;
     std::vector<double> responses;

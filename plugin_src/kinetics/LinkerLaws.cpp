@@ -11,7 +11,7 @@ namespace {
 
 /** Exponents of rates are at most this. */
 const double LARGEST_EXPONENT = 500;
-/** Hands do not pass where a load on chains that stand still would stop them, in parts of a step if need be: at most. */
+/** Hands do not pass where a load on chains that stand still would stop them: in at most so many parts of a step. */
 const double MOST_PARTS = 100;
 
 double boundedExp(double x) {

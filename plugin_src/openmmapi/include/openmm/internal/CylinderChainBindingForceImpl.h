@@ -20,7 +20,8 @@ class CylinderChainIntegrator;
  *
  * A parameter of the Context has a digest of how many steps they have taken, and how often they have bound and unbound.
  * Where that is another one, because the Context has got a State or a checkpoint that does not say where linkers were,
- * there is nothing to go on with.  A State that holds no parameters leaves the digest alone, but sets time and step count.
+ * there is nothing to go on with.  A State that holds no parameters leaves the digest alone, but sets time and step
+ * count.
  */
 class CylinderChainBindingForceImpl : public StepForceImpl {
 public:
