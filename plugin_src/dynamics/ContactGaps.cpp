@@ -18,6 +18,8 @@ const double NARROWER[] = {1, 0.6, 0.35, 0.2};
 const double SAME_TOUCH = 0.01;
 /** The number of iterations in which places and normals move. */
 const int MOVING_ITERATIONS = 3;
+/** Steps that would need more parts have contacts as ContactEquations has them, which take less time then. */
+const double MOST_PARTS_OF_CONTACTS = 2;
 /** The largest depth of a hard surface, over the sum of the radii: it is before the axes. */
 const double LARGEST_DEPTH = 0.95;
 /** Capsules or pairs that a thread looks at together. */
@@ -97,7 +99,7 @@ bool ContactGaps::resolves(const CoupledStart& start) {
         if (start.places.find(own.first, found))
             largest = max(largest, responses.find(found));
     }
-    return ReflectedGaps::resolves(stiffness, 2*largest);
+    return ReflectedGaps::countParts(stiffness, 2*largest) <= MOST_PARTS_OF_CONTACTS;
 }
 
 void ContactGaps::begin(const CoupledStart& start, const Loop& newLoop) {

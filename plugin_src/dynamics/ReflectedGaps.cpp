@@ -12,11 +12,11 @@ namespace {
 /** How far a gap moves in a part, (2 k_B T G)^(1/2), over the thermal depth, where it shares chains with others. */
 const double LARGEST_MOTION = 3;
 /** The most parts. */
-const int MOST_PARTS_OF_GAPS = 3;
+const int MOST_PARTS_OF_GAPS = 12;
 /** How often all gaps are gone through at most. */
 const int MOST_SWEEPS = 200;
 /** What the last sweep may change a gap by, and the last iteration, over the thermal scale. */
-const double OF_SWEEPS = 0.01, OF_ITERATIONS = 0.1;
+const double OF_SWEEPS = 0.003, OF_ITERATIONS = 0.03;
 /** A change that is less than this share of that is not made. */
 const double LEAST_SHARE = 0.1;
 /** The same in nm, where nothing moves thermally. */
@@ -77,8 +77,8 @@ void ReflectedGaps::begin(const StepSettings& settings, const ChainPlaces& place
     corrections.clear();
 }
 
-bool ReflectedGaps::resolves(double stiffness, double response) {
-    return 2*stiffness*response <= MOST_PARTS_OF_GAPS*LARGEST_MOTION*LARGEST_MOTION;
+double ReflectedGaps::countParts(double stiffness, double response) {
+    return 2*stiffness*response/(LARGEST_MOTION*LARGEST_MOTION);
 }
 
 int ReflectedGaps::add(const Gap& gap) {
@@ -237,9 +237,9 @@ int ReflectedGaps::chooseParts() const {
             return port >= 0 && chains[chainOf[port]].count > 1;
         });
         if (shares && gaps[i].law == GapLaw::Reflection)
-            largest = max(largest, 2*own[i]*gaps[i].stiffness);
+            largest = max(largest, countParts(gaps[i].stiffness, own[i]));
     }
-    return clamp((int) ceil(largest/(LARGEST_MOTION*LARGEST_MOTION)), 1, MOST_PARTS_OF_GAPS);
+    return clamp((int) ceil(largest), 1, MOST_PARTS_OF_GAPS);
 }
 
 /** Draw the numbers of gaps that have none for so many parts. */

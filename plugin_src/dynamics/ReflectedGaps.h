@@ -35,8 +35,8 @@ class ReflectedGaps {
 public:
     /** Begin a step without gaps. */
     void begin(const StepSettings& settings, const ChainPlaces& places);
-    /** Whether a step has parts enough for gaps of a stiffness that a force moves by so much. */
-    static bool resolves(double stiffness, double response);
+    /** The number of parts that gaps need that share chains: of a stiffness that a force moves by so much. */
+    static double countParts(double stiffness, double response);
     /** What gaps are drawn with. */
     const GapNoise& getNoise() const {
         return noise;

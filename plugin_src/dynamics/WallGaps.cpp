@@ -12,6 +12,8 @@ namespace {
 
 /** The largest way beyond a curved face or back from it, over the way to the middle. */
 const double LEAST_WAY_TO_MIDDLE = 0.5;
+/** Steps that would need more parts have walls as WallEquations has them. */
+const double MOST_PARTS_OF_WALLS = 12;
 /** Particles that a thread looks at together. */
 const int CHUNK_OF_WALL_GAPS = 256;
 
@@ -46,7 +48,7 @@ bool WallGaps::resolves(const CoupledStart& start) {
         if (start.places.find(particle.getPlace(), place))
             largest = max(largest, found.find(place));
     }
-    return ReflectedGaps::resolves(system->stiffness, largest);
+    return ReflectedGaps::countParts(system->stiffness, largest) <= MOST_PARTS_OF_WALLS;
 }
 
 void WallGaps::begin(const CoupledStart& start, const Loop& newLoop) {

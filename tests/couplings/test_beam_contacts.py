@@ -322,7 +322,7 @@ def test_what_is_refused():
         new_context(system, positions, filaments.create_integrator(system, 1e4))
 
 
-@pytest.mark.parametrize("piconewton", [1e3, 1e5, 1e6])
+@pytest.mark.parametrize("piconewton", [1e5, 1e6])
 def test_beams_that_are_torn_through_each_other_end_in_an_error_that_names_them(piconewton):
     """Also where the first iteration leads to no finite place."""
     kind = replace(F_ACTIN.with_segment_length(100), element="beam", extension_relaxation_time=None)
@@ -338,7 +338,8 @@ def test_beams_that_are_torn_through_each_other_end_in_an_error_that_names_them(
     integrator = filaments.create_integrator(system, 1e6, random_seed=1, checks=False)
     context = new_context(system, positions, integrator, "CPU")
     before = positions_of(context)
-    with pytest.raises(InstabilityError, match="Filament 0 .*(it would pass through|equations cannot be solved)"):
+    reasons = "it would pass through|equations cannot be solved|its contact with element . of filament . "
+    with pytest.raises(InstabilityError, match=f"Filament 0 .*({reasons})"):
         integrator.step(20)
     assert np.isfinite(positions_of(context)).all()
     assert np.abs(positions_of(context) - before).max() < 1e3

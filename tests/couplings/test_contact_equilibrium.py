@@ -92,7 +92,11 @@ def test_monte_carlo_of_a_pair_is_that_of_draws():
 FACTORS = [1.0, pytest.param(0.1, marks=pytest.mark.slow), pytest.param(0.01, marks=pytest.mark.slow)]
 
 
-@pytest.mark.parametrize("factor", FACTORS)
+# Springs that turn by a third of their length, as at the recommended step, let contacts have a seventh more energy.
+OF_LINKED_RODS = [0.3, pytest.param(0.1, marks=pytest.mark.slow), pytest.param(0.03, marks=pytest.mark.slow)]
+
+
+@pytest.mark.parametrize("factor", OF_LINKED_RODS)
 def test_a_pair_of_rods_on_a_spring(factor):
     middles, along, weights = linked_pair(PAIR, 3000, 7)
     kept = np.random.default_rng(8).random(len(weights)) < weights
@@ -100,17 +104,19 @@ def test_a_pair_of_rods_on_a_spring(factor):
     check(PAIR, rows, *np.transpose(list(REFERENCES["pair"].values())))
 
 
-@pytest.mark.parametrize("factor", FACTORS)
+@pytest.mark.slow
+@pytest.mark.parametrize("factor", [0.3, 0.1])
 def test_three_rods_in_a_loop(factor):
     rows = _run(LOOP, *_in_equilibrium(LOOP, 200, 300), factor, 500, 4.0)
     check(LOOP, rows, *np.transpose(list(REFERENCES["loop"].values())))
 
 
-@pytest.mark.parametrize("factor", [1.0, pytest.param(0.1, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("factor", [1.0, 0.1])
 def test_rods_between_walls_with_contacts(factor):
     """Twenty-four of 100 nm, between walls 100 nm apart."""
     system = RODS_IN_A_SLAB
-    rows = _run(system, *_in_equilibrium(system, 1, 300), factor, 4000, 6.0, blocks=20)
+    rows = _run(system, *_in_equilibrium(system, 1, 300), factor, 8000, 6.0, blocks=20)
     check(system, rows, *np.transpose(list(REFERENCES["slab"].values())))
 
 
@@ -141,7 +147,8 @@ def test_equation_of_state(name):
 @pytest.mark.parametrize("factor", FACTORS)
 def test_rods_between_walls(stiffness, factor):
     system = rods_between_walls(stiffness)
-    rows = _run(system, *_in_equilibrium(system, 400, 300), factor, 1000, 4.0)
+    # Fewer are beyond a stiff wall.
+    rows = _run(system, *_in_equilibrium(system, 400, 300), factor, 1000 if stiffness < 1 else 2500, 4.0)
     exact = rod_cases.quadrature_between_walls(system)
     check(system, rows, exact, np.zeros(len(exact)))
 
