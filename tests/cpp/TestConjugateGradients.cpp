@@ -34,7 +34,7 @@ public:
     }
     void findCompliances(double*) override {
     }
-    void advance(const double*, double, bool*, double*) override {
+    void advance(const double*, const ShareOfChange&, bool*, double*) override {
     }
     void findExcessiveChanges(bool*) const override {
     }
