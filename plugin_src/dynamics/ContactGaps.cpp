@@ -19,7 +19,7 @@ const double SAME_TOUCH = 0.01;
 /** The number of iterations in which places and normals move. */
 const int MOVING_ITERATIONS = 3;
 /** Steps that would need more parts have contacts as ContactEquations has them, which take less time then. */
-const double MOST_PARTS_OF_CONTACTS = 2;
+const double MOST_PARTS_OF_CONTACTS = 8;
 /** The largest depth of a hard surface, over the sum of the radii: it is before the axes. */
 const double LARGEST_DEPTH = 0.95;
 /** Capsules or pairs that a thread looks at together. */

@@ -142,7 +142,16 @@ Instability NetworkStep::step(const double* positions, const double* forces, con
     const vector<bool> all(numChains, true);
     vector<bool> failed(numChains, false);
     Instability result;
-    if (attempt({positions, forces, box, settings, all, loop}, displacements, failed)) {
+    const Attempt whole = {positions, forces, box, settings, all, loop};
+    mayHaveGaps = true;
+    bool solved = attempt(whole, displacements, failed);
+    if (!solved && hasGaps) {
+        // What lies on top of each other, as filaments that are drawn at random do, comes apart without.
+        result.divided = count(failed.begin(), failed.end(), true);
+        mayHaveGaps = false;
+        solved = attempt(whole, displacements, failed);
+    }
+    if (solved) {
         result.iterations = iterations;
         return result;
     }
@@ -198,7 +207,7 @@ void NetworkStep::beginCouplings(const Attempt& attempt) {
     gaps.begin(attempt.settings, places);
     const bool oneStage = attempt.settings.scheme == Scheme::Implicit;
     const size_t last = couplings.size();
-    bool resolves = oneStage;
+    bool resolves = oneStage && mayHaveGaps;
     for (size_t i = firstContacts; i < firstWalls; i++)
         resolves = resolves && contactGaps[i-firstContacts]->resolves(start);
     for (size_t i = firstWalls; i < last; i++)
@@ -211,6 +220,7 @@ void NetworkStep::beginCouplings(const Attempt& attempt) {
     };
     choose(contactGaps, contacts, firstContacts, firstWalls);
     choose(wallGaps, walls, firstWalls, last);
+    hasGaps = resolves && last > firstContacts;
     for (ImplicitCouplings* own : couplings)
         own->begin(start, attempt.loop);
 }

@@ -73,6 +73,8 @@ private:
     std::vector<std::unique_ptr<ContactGaps> > contactGaps;
     std::vector<std::unique_ptr<ContactEquations> > contacts;
     std::size_t firstContacts = 0, firstWalls = 0;
+    /** Whether a step may have gaps, and whether the last attempt has had any. */
+    bool mayHaveGaps = true, hasGaps = false;
     std::vector<std::unique_ptr<WallGaps> > wallGaps;
     std::vector<std::unique_ptr<WallEquations> > walls;
     std::vector<ImplicitCouplings*> couplings;

@@ -10,9 +10,9 @@ using namespace std;
 namespace {
 
 /** How far a gap moves in a part, (2 k_B T G)^(1/2), over the thermal depth, where it shares chains with others. */
-const double LARGEST_MOTION = 3;
+const double LARGEST_MOTION = 1.5;
 /** The most parts. */
-const int MOST_PARTS_OF_GAPS = 12;
+const int MOST_PARTS_OF_GAPS = 32;
 /** How often all gaps are gone through at most. */
 const int MOST_SWEEPS = 200;
 /** What the last sweep may change a gap by, and the last iteration, over the thermal scale. */

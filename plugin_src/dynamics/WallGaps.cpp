@@ -13,7 +13,7 @@ namespace {
 /** The largest way beyond a curved face or back from it, over the way to the middle. */
 const double LEAST_WAY_TO_MIDDLE = 0.5;
 /** Steps that would need more parts have walls as WallEquations has them. */
-const double MOST_PARTS_OF_WALLS = 12;
+const double MOST_PARTS_OF_WALLS = 48;
 /** Particles that a thread looks at together. */
 const int CHUNK_OF_WALL_GAPS = 256;
 
