@@ -122,8 +122,8 @@ def _parser():
     timestep.add_argument(
         "--check",
         action="store_true",
-        help="run with the step of CONFIG and with a sixteenth of it, and say what is wrong; exit code 3 if something is, "
-        "0 if all is right or not resolved",
+        help="run with the step of CONFIG and with a sixteenth of it, and say what is wrong; exit code 3 if something "
+        "is, 0 if all is right or not resolved",
     )
     timestep.add_argument(
         "--seconds", type=float, metavar="N", help=f"how long the check may take, {_SECONDS_OF_CHECK:g} if not given"
