@@ -300,8 +300,8 @@ class Filaments(FilamentsInContexts):
         TimeStepWarning
             If the step exceeds a bound of stability, or the recommended step of a filament, or that of buckling, more
             than four times, or that of hands of linkers; if forces of the System are so stiff that variances may be
-            10 % too large (see ``recommended_time_step``); if it is too long for the flow or for self-propelled filaments;
-            or if FENE lengths have too much energy at it (``timestep.fene_steps``).
+            10 % too large (see ``recommended_time_step``); if it is too long for the flow or for self-propelled
+            filaments; or if FENE lengths have too much energy at it (``timestep.fene_steps``).
         JointWarning
             If a joint of filaments that are not linked where it is has more than 20 EI/h of an element.
         BoxWarning
