@@ -202,7 +202,8 @@ void ContactGaps::findNewPairs(const double* moved) {
 /** Get whether the gap of a pair may be closed; if not, how far its capsules may travel until it may. */
 bool ContactGaps::isNear(int number, bool isNew, double& room) const {
     const ContactPair& pair = pairs.get(number);
-    const double least = LARGEST_GAP_EXPONENT*kT*(places[pair.a].response+places[pair.b].response), radii = radiiOf(pair);
+    const double radii = radiiOf(pair);
+    const double least = LARGEST_GAP_EXPONENT*kT*(places[pair.a].response+places[pair.b].response);
     auto isFar = [&] (double before, double after) {
         room = after-least/before;
         return before > 0 && room > 0;

@@ -308,7 +308,7 @@ double ReflectedGaps::findPush(int i, int part) const {
         for (int side = 0; side < 2; side++)
             if (portOf[2*i+side] >= 0)
                 opening += networks[i]*opened[portOf[2*i+side]];
-        return reflect(starts[i]+0.5*opening, end, response, kT/parts*reflections[(size_t) i*parts+part]);
+        return reflect(starts[i]+1.0/3*opening, end, response, kT/parts*reflections[(size_t) i*parts+part]);
     }
     if (part < parts-1)
         return 0;
@@ -374,7 +374,7 @@ void ReflectedGaps::findPushesOfPart(int part) {
             }
         if (!changes)
             break;
-        while (changes && ++sweeps < MOST_SWEEPS) {
+        for (int inner = 0; changes && inner < 8 && ++sweeps < MOST_SWEEPS; inner++) {
             changes = false;
             for (size_t k = 0; k < pushed.size(); k++)
                 changes |= update(pushed[sweeps%2 == 0 ? k : pushed.size()-1-k]);

@@ -312,7 +312,8 @@ static void testTwelveGaps() {
     for (int i = 0; i < 12; i++)
         surroundings.planes.push_back({{cos(i*M_PI/6), sin(i*M_PI/6), 0}, -2.5});
     const Lattice lattice(surroundings, 15, 1200, false);
-    checkEquilibrium(surroundings, lattice, Run {1, 4000, 24}, 0.05, "twelve gaps");
+    for (const Run& run : {Run {1, 4000, 24}, Run {3, 6000, 12}})
+        checkEquilibrium(surroundings, lattice, run, 0.05, "twelve gaps");
 }
 
 /** What is pressed in the cold comes to rest where the surface balances it, and what is not comes to the surface. */

@@ -166,8 +166,8 @@ void CylinderChainBindingForceImpl::follow() const {
     if (isKnown && !isAtAnotherTime())
         return;
     string message = "CylinderChainBindingForce: Where the linkers of this Context are is not known: it has got a "
-            "State or checkpoint of another time, or of another Context, that does not say it. Give it the linkers that "
-            "belong to it by setLinkersInContext(), or Filaments.set_linkers() in Python. The checkpoints of a "
+            "State or checkpoint of another time, or of another Context, that does not say it. Give it the linkers "
+            "that belong to it by setLinkersInContext(), or Filaments.set_linkers() in Python. The checkpoints of a "
             "CylinderChainIntegrator, and States that hold its parameters (getState(integratorParameters=True)), "
             "restore linkers themselves";
     if (isKnown)
