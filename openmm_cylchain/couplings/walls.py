@@ -389,9 +389,9 @@ def filament_wall_force(
 
     Of a filament of beam elements, it is around its beads, which are places on its curve (``Filaments.add_beads``), or
     around its nodes if it has none. The energy is ``(k/2) d^2`` for the depth d to which a node, or a sphere around it,
-    gets beyond the wall: that of ``wall_force`` at a radius of zero. Schemes "implicit" and "implicit-second-order"
-    take the wall at the end of the step and bring back what would get into it, so that its stiffness does not limit
-    their steps. In other schemes, and in other Integrators, it is explicit.
+    gets beyond the wall: that of ``wall_force`` at a radius of zero. Scheme "implicit" has the wall in its equations, so
+    that its stiffness does not limit the step; "implicit-second-order" refuses it. In other schemes, and in other
+    Integrators, it is explicit.
 
     Parameters
     ----------

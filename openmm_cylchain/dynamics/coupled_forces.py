@@ -13,6 +13,7 @@ import openmm
 from ..couplings.capsule_contacts import as_capsule_contact_force
 from ..couplings.native_links import is_link_force, table_of_force
 from ..couplings.walls import as_filament_wall_force
+from ..errors import InputError
 from ..filaments.collection import FilamentCollection
 from ..kinetics.binding_force import find_binding_force, is_binding_force
 
@@ -44,6 +45,21 @@ class CoupledForces:
     def includes(self, index: int) -> bool:
         """Whether a force, by its index, is in the equations of implicit schemes."""
         return self.may_include(index) and self.place_outside(index) is None
+
+    def refuse_in_two_stages(self, scheme: str) -> None:
+        """Raise InputError if scheme "implicit-second-order" has contacts or walls in its equations.
+
+        In its two stages, they would not keep their equilibrium.
+        """
+        if scheme != "implicit-second-order":
+            return
+        for index, force in enumerate(self._system.getForces()):
+            kinds = (as_capsule_contact_force(force), as_filament_wall_force(force))
+            if any(kind is not None for kind in kinds) and self.includes(index):
+                raise InputError(
+                    f'{force.getName()} (force {index}): contacts and walls need scheme="implicit": in the two stages '
+                    f"of {scheme!r} they would not keep their equilibrium."
+                )
 
     def place_outside(self, index: int) -> str | None:
         """What makes a force that may be included explicit, in words; None if nothing does."""

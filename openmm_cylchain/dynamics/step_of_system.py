@@ -45,6 +45,7 @@ def recommended_step_of(
     constant_forces: dict[int, FloatArray] = {}
     if system is not None:
         coupled = CoupledForces(system, filaments)
+        coupled.refuse_in_two_stages(scheme)
         steps += _steps_of_diffusion(filaments, system, temperature, confidence, scheme, coupled)
         if scheme in IMPLICIT_SCHEMES:
             steps += steps_of_couplings(filaments, system, temperature, particle_friction, coupled)

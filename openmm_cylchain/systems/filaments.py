@@ -9,6 +9,7 @@ from openmm import app, unit
 from ..couplings.periodicity import is_periodic
 from ..couplings.stiff_joints import warn_of_stiff_joints
 from ..dynamics.bead_spring_step import refuse_modes
+from ..dynamics.coupled_forces import CoupledForces
 from ..dynamics.precision import check_precision, refuse_mixed_precision_of_beams
 from ..dynamics.schemes import MODES, check_scheme
 from ..dynamics.step_of_system import recommended_step_of
@@ -221,7 +222,8 @@ class Filaments(FilamentsInContexts):
         Raises
         ------
         InputError
-            If there are no filaments, they are not in the System, or particles lack a friction.
+            If there are no filaments, they are not in the System, particles lack a friction, or contacts or walls are
+            in two stages.
         """
         if system is not None:
             self._refuse_if_not_in(system)
@@ -262,9 +264,10 @@ class Filaments(FilamentsInContexts):
         scheme : {"implicit", "implicit-second-order", "midpoint", "euler", "modes"}, optional
             "implicit", the compiled engine's default, takes stretching, bending and tethers at the end of the step,
             and steps a thousand times as long as explicit ones. "implicit-second-order" does so in two stages, with
-            decay of bends of second order in the step. "midpoint", the portable engine's default, is Fixman's
-            explicit scheme with the right drift on chains. "euler" is Section 4 of the paper, biased on chains. "modes"
-            moves open chains of beads alone, by their modes.
+            decay of bends of second order in the step, but not for ``capsule_contact_force`` and
+            ``filament_wall_force``. "midpoint", the portable engine's default, is Fixman's explicit scheme with the
+            right drift on chains. "euler" is Section 4 of the paper, biased on chains. "modes" moves open chains of
+            beads alone, by their modes.
         temperature : temperature, optional
             That of the filaments if not given.
         particle_friction : energy*time/length^2, or array of them
@@ -311,7 +314,7 @@ class Filaments(FilamentsInContexts):
         ------
         InputError
             If the engine does not have the scheme or the precision, all filaments have beam elements and the precision
-            is "mixed", or the System does not hold the filaments.
+            is "mixed", contacts or walls are in two stages, or the System does not hold the filaments.
         """
         step_size = as_step(step_size)
         check_precision(precision)
@@ -326,6 +329,7 @@ class Filaments(FilamentsInContexts):
         warn_of_forces_without_images(system)
         if scheme != "implicit":
             refuse_beams(self, f"scheme {scheme!r}")
+        CoupledForces(system, self).refuse_in_two_stages(scheme)
         bath = self._bath(temperature)
         if checks:
             warn_of_long_step(self, system, step_size, scheme, bath, particle_friction, flow)

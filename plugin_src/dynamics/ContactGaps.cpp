@@ -18,27 +18,20 @@ const double NARROWER[] = {1, 0.6, 0.35, 0.2};
 const double SAME_TOUCH = 0.01;
 /** The number of iterations in which places and normals move. */
 const int MOVING_ITERATIONS = 3;
-/** Steps that would need more parts have contacts as ContactEquations has them, which take less time then. */
-const double MOST_PARTS_OF_CONTACTS = 8;
 /** The largest depth of a hard surface, over the sum of the radii: it is before the axes. */
 const double LARGEST_DEPTH = 0.95;
 /** Capsules or pairs that a thread looks at together. */
 const int CHUNK_OF_CAPSULES = 256;
 
-/** One gap for the energy of a pair, k gap^2/2 where it is negative: where forces act, and its gradients there. */
-struct PairGap {
-    double gap;
-    int count;
-    double s[2], t[2];
-    Vec3d gradients[2];
-};
-
 Vec3d gradientOf(const Contact& contact) {
     return {contact.normal[0], contact.normal[1], contact.normal[2]};
 }
 
+} // namespace
+
 /** The gap of a pair from its contacts; of one whose contact is that of a neighbor, it is not closed. */
-PairGap findPairGap(const SegmentPair& pair, const Contact* contacts, int count, double radii) {
+ContactGaps::PairGap ContactGaps::findPairGap(const SegmentPair& pair, const Contact* contacts, int count,
+        double radii) {
     PairGap result = {};
     double square = 0;
     for (int i = 0; i < count; i++)
@@ -73,8 +66,6 @@ PairGap findPairGap(const SegmentPair& pair, const Contact* contacts, int count,
     return result;
 }
 
-} // namespace
-
 void ContactGaps::setContacts(ContactSearch* newSearch, double newStiffness, const double* newBox,
         const vector<CapsuleOnCurve>& newOnCurves, int newForce) {
     onCurves = &newOnCurves;
@@ -82,24 +73,6 @@ void ContactGaps::setContacts(ContactSearch* newSearch, double newStiffness, con
     stiffness = newStiffness;
     box = newBox;
     force = newForce;
-}
-
-bool ContactGaps::resolves(const CoupledStart& start) {
-    double largest = 0;
-    responses.begin(start.places, start.settings.stepSize);
-    for (const Capsule& capsule : search->getSystem().capsules) {
-        Place place;
-        place.first = capsule.first;
-        PlaceOnChain found;
-        if (start.places.find(place, found))
-            largest = max(largest, responses.find(found));
-    }
-    for (const CapsuleOnCurve& own : *onCurves) {
-        PlaceOnChain found;
-        if (start.places.find(own.first, found))
-            largest = max(largest, responses.find(found));
-    }
-    return ReflectedGaps::countParts(stiffness, 2*largest) <= MOST_PARTS_OF_CONTACTS;
 }
 
 void ContactGaps::begin(const CoupledStart& start, const Loop& newLoop) {
@@ -199,26 +172,55 @@ void ContactGaps::findNewPairs(const double* moved) {
         pairs.add(pair);
 }
 
-/** Get whether the gap of a pair may be closed; if not, how far its capsules may travel until it may. */
-bool ContactGaps::isNear(int number, bool isNew, double& room) const {
-    const ContactPair& pair = pairs.get(number);
-    const double radii = radiiOf(pair);
+/**
+ * Get whether the gap of a pair may be closed that begins and ends so; if not, how far its capsules may travel until it
+ * may.
+ */
+bool ContactGaps::mayClose(const ContactPair& pair, double before, double after, double& room) const {
     const double least = LARGEST_GAP_EXPONENT*kT*(places[pair.a].response+places[pair.b].response);
-    auto isFar = [&] (double before, double after) {
-        room = after-least/before;
-        return before > 0 && room > 0;
+    auto isFar = [&] (double depth) {
+        const double start = before+depth;
+        room = after+depth-least/start;
+        return start > 0 && room > 0;
     };
-    if (isNew && pair.clearance > 0 && isFar(pair.before-radii, pair.distance-radii)) {
-        room = min(room, (double) pair.clearance);
+    if (isFar(0))
         return false;
-    }
-    const SegmentPair start = search->getSegments(pair, false), end = search->getSegments(pair, true);
-    const double after = sqrt(findNearestPoints(end).squared);
-    if (!isFar(sqrt(findNearestPoints(start).squared)-radii, after-radii))
-        return true;
-    room = min(room, after);
-    return search->crosses(pair);
+    Gap gap = describeGap(pair);
+    const double depth = placeHardSurface(kT, all->getNoise().drawSurface(gap), LARGEST_DEPTH*radiiOf(pair), before,
+            gap);
+    return gap.law != GapLaw::Reflection || !isFar(depth);
 }
+
+/** What is known of the gap of a pair before its places are. */
+Gap ContactGaps::describeGap(const ContactPair& pair) const {
+    Gap gap;
+    gap.key[0] = (uint32_t) force*0x9E3779B1u+pair.a;
+    gap.key[1] = pair.b;
+    gap.stiffness = stiffness;
+    gap.response = places[pair.a].response+places[pair.b].response;
+    return gap;
+}
+
+/** Pairs that are looked at together, in memory of a thread. */
+struct ContactGaps::Looks {
+    vector<const ContactPair*> pairs;
+    vector<int> numbers;
+    vector<PairOutlook> outlooks;
+    static Looks& ofThread() {
+        static thread_local Looks memory;
+        memory.pairs.clear();
+        memory.numbers.clear();
+        return memory;
+    }
+    void add(int number, const ContactPair& pair) {
+        pairs.push_back(&pair);
+        numbers.push_back(number);
+    }
+    void look(const ContactSearch& search) {
+        outlooks.resize(pairs.size());
+        search.findOutlooks(pairs.data(), pairs.size(), outlooks.data());
+    }
+};
 
 /** Find the pairs from a number on, or those that have travelled far enough, whose gaps may be closed. */
 void ContactGaps::selectNear(int firstNew) {
@@ -226,20 +228,32 @@ void ContactGaps::selectNear(int firstNew) {
     rooms.resize(count, 0.0);
     parts.resize(max(parts.size(), (size_t) chunks));
     (*loop)(chunks, [&] (int chunk) {
-        vector<int>& own = parts[chunk].pairs;
-        own.clear();
+        Looks& looks = Looks::ofThread();
         for (int i = chunk*CHUNK_OF_CAPSULES; i < min(count, (chunk+1)*CHUNK_OF_CAPSULES); i++) {
             const ContactPair& pair = pairs.get(i);
-            const double way = motion.getWay(pair.a, pair.b);
+            const double way = motion.getWay(pair.a, pair.b), radii = radiiOf(pair);
             double room;
             if (rooms[i] < 0 || (i < firstNew && way < rooms[i]))
                 continue;
             if (isHeld(pair))
                 rooms[i] = HUGE_VAL;
-            else if (isNear(i, i >= firstNew, room))
-                own.push_back(i);
+            else if (i >= firstNew && pair.clearance > 0 && !mayClose(pair, pair.before-radii, pair.distance-radii, room))
+                rooms[i] = way+min(room, (double) pair.clearance);
             else
-                rooms[i] = way+room;
+                looks.add(i, pair);
+        }
+        looks.look(*search);
+        vector<int>& own = parts[chunk].pairs;
+        own.clear();
+        for (size_t k = 0; k < looks.pairs.size(); k++) {
+            const ContactPair& pair = *looks.pairs[k];
+            const PairOutlook& outlook = looks.outlooks[k];
+            double room;
+            if (mayClose(pair, pair.before-outlook.radii, outlook.gap, room) ||
+                    (outlook.mayCross && search->crosses(pair)))
+                own.push_back(looks.numbers[k]);
+            else
+                rooms[looks.numbers[k]] = motion.getWay(pair.a, pair.b)+room;
         }
     });
     for (int chunk = 0; chunk < chunks; chunk++)
@@ -262,33 +276,21 @@ void ContactGaps::follow(NearPair& own) const {
         return;
     }
     own.way = way;
-    const SegmentPair start = search->getSegments(pair, false), end = search->getSegments(pair, true);
-    if (isNew) {
-        own.gap.key[0] = (uint32_t) force*0x9E3779B1u+pair.a;
-        own.gap.key[1] = pair.b;
-        own.gap.stiffness = stiffness;
-        own.gap.response = places[pair.a].response+places[pair.b].response;
-        own.variates = all->getNoise().drawSurface(own.gap);
-    }
-    if (own.number < 0) {
-        // Where they are nearest tells whether the rest is worth while.
-        const double before = sqrt(findNearestPoints(start).squared)-radii;
-        own.depth = placeHardSurface(kT, own.variates, LARGEST_DEPTH*radii, before, own.gap);
-        own.gap.end = own.depth+sqrt(findNearestPoints(end).squared)-radii;
-        if (!mayClose(own.gap) && !search->crosses(pair))
-            return;
-    }
-    if (own.numContacts < 0)
-        own.numContacts = search->evaluate(pair, begun, begun, own.contacts);
     Contact contacts[2];
+    if (isNew) {
+        const int count = search->evaluate(pair, begun, begun, contacts);
+        own.touchedAtStart = count > 0;
+        own.start = findPairGap(search->getSegments(pair, false), contacts, count, radii);
+        own.gap = describeGap(pair);
+        own.depth = placeHardSurface(kT, all->getNoise().drawSurface(own.gap), LARGEST_DEPTH*radii, own.start.gap,
+                own.gap);
+    }
     const int count = search->evaluate(pair, contacts);
     // What touches a neighbor at the start and at the end is no gap of this pair.
-    own.gap.present = count > 0 || own.numContacts > 0;
-    const PairGap first = findPairGap(start, own.contacts, own.numContacts, radii);
-    const PairGap last = findPairGap(end, contacts, count, radii);
-    own.depth = placeHardSurface(kT, own.variates, LARGEST_DEPTH*radii, first.gap, own.gap);
+    own.gap.present = count > 0 || own.touchedAtStart;
+    PairGap end = findPairGap(search->getSegments(pair, true), contacts, count, radii);
     own.gap.numLevers = 0;
-    for (const PairGap* of : {&first, &last})
+    for (const PairGap* of : {&own.start, &end})
         for (int i = 0; i < of->count; i++) {
             GapLever& lever = own.gap.levers[own.gap.numLevers];
             lever.places[0] = placeOf(pair.a, of->s[i]);
@@ -299,7 +301,7 @@ void ContactGaps::follow(NearPair& own) const {
             own.fractions[own.gap.numLevers][0] = of->s[i];
             own.fractions[own.gap.numLevers++][1] = of->t[i];
         }
-    own.gap.end = own.depth+last.gap;
+    own.gap.end = own.depth+end.gap;
     own.offset = own.gap.end-findEnd(own);
 }
 
@@ -333,9 +335,8 @@ bool ContactGaps::findGaps(int iteration, bool settled, const double* moved, Ref
         search->setMotion(begun, moved, *loop);
     }
     else {
-        motion.follow([] (int) {return true;}, moved, slack, *loop, [&] (const vector<int>& capsules) {
-            search->updateMotion(capsules, moved);
-        });
+        motion.follow(moved, slack, *loop);
+        search->updateMotion(moved, *loop);
         firstNew = pairs.size();
         // While much moves, it may come back.
         if (motion.exceedsReach() && settled)
@@ -359,21 +360,40 @@ bool ContactGaps::findGaps(int iteration, bool settled, const double* moved, Ref
     return motion.exceedsReach() && !settled;
 }
 
-/** Find pairs that have passed through each other, although their gaps do not see it. */
-void ContactGaps::findFailures(const double* moved, vector<bool>& failed) const {
-    for (size_t i = 0; movesTooFar && i < places.size(); i++)
-        if (places[i].place.pack >= 0)
-            failed[places[i].place.chain] = true;
-    for (int i = 0; i < pairs.size(); i++)
-        if (crosses(i, moved))
-            for (int capsule : {pairs.get(i).a, pairs.get(i).b})
-                if (places[capsule].place.pack >= 0)
-                    failed[places[capsule].place.chain] = true;
+void ContactGaps::findFailures(const double*, vector<bool>& failed) {
+    if (movesTooFar)
+        for (const CapsulePlace& own : places)
+            if (own.place.pack >= 0)
+                failed[own.place.chain] = true;
+    findCrossed();
+    for (int i : crossed)
+        for (int capsule : {pairs.get(i).a, pairs.get(i).b})
+            if (places[capsule].place.pack >= 0)
+                failed[places[capsule].place.chain] = true;
 }
 
-bool ContactGaps::crosses(int i, const double* moved) const {
-    // Those that are not near have been looked at since they moved.
-    return rooms[i] < 0 && search->crosses(pairs.get(i), begun, moved);
+/** Find pairs that have passed through each other, although their gaps do not see it, or they have none. */
+void ContactGaps::findCrossed() {
+    crossed.clear();
+    if (movesTooFar)
+        return;
+    const int count = pairs.size(), chunks = (count+CHUNK_OF_CAPSULES-1)/CHUNK_OF_CAPSULES;
+    (*loop)(chunks, [&] (int chunk) {
+        Looks& looks = Looks::ofThread();
+        for (int i = chunk*CHUNK_OF_CAPSULES; i < min(count, (chunk+1)*CHUNK_OF_CAPSULES); i++) {
+            const ContactPair& pair = pairs.get(i);
+            if (!isHeld(pair) && !(motion.getWay(pair.a, pair.b) < pair.clearance))
+                looks.add(i, pair);
+        }
+        looks.look(*search);
+        vector<int>& own = parts[chunk].pairs;
+        own.clear();
+        for (size_t k = 0; k < looks.pairs.size(); k++)
+            if (looks.outlooks[k].mayCross && search->crosses(*looks.pairs[k]))
+                own.push_back(looks.numbers[k]);
+    });
+    for (int chunk = 0; chunk < chunks; chunk++)
+        crossed.insert(crossed.end(), parts[chunk].pairs.begin(), parts[chunk].pairs.end());
 }
 
 /** The capsule whose first particle has moved most. */
@@ -404,12 +424,11 @@ bool ContactGaps::findCulprit(const double* moved, const CouplingEquation*, Brok
         culprit.places[0] = describePlace(places[findFastest(moved)].place);
         return true;
     }
-    for (int i = 0; i < pairs.size(); i++)
-        if (crosses(i, moved)) {
-            culprit.reason = BrokenCoupling::Crosses;
-            name(i);
-            return true;
-        }
+    if (!crossed.empty()) {
+        culprit.reason = BrokenCoupling::Crosses;
+        name(crossed[0]);
+        return true;
+    }
     for (const NearPair& own : near)
         if (own.number >= 0 && all->isUnfinished(own.number)) {
             name(own.pair);

@@ -33,14 +33,12 @@ public:
      */
     void setContacts(ContactSearch* search, double stiffness, const double* box,
             const std::vector<CapsuleOnCurve>& onCurves, int force);
-    /** Whether a step has parts enough to resolve the contacts: see ReflectedGaps. */
-    bool resolves(const CoupledStart& start);
     void begin(const CoupledStart& start, const Loop& loop) override;
     bool findGaps(int iteration, bool settled, const double* moved, ReflectedGaps& gaps) override;
     Rests getRests() const override {
         return Rests::Wrong;
     }
-    void findFailures(const double* moved, std::vector<bool>& failed) const override;
+    void findFailures(const double* moved, std::vector<bool>& failed) override;
     bool findCulprit(const double* moved, const CouplingEquation* equations, BrokenCoupling& culprit) const override;
     void findNeighbours(std::vector<std::pair<int, int> >& neighbours) const override;
 private:
@@ -51,17 +49,22 @@ private:
         /** About how far a force moves the place of it that it moves most. */
         double response;
     };
+    /** One gap for the energy of a pair, k gap^2/2 where it is negative: where forces act, and its gradients there. */
+    struct PairGap {
+        double gap;
+        int count;
+        double s[2], t[2];
+        Vec3d gradients[2];
+    };
     /** A pair whose gap may be closed. */
     struct NearPair {
         int pair;
         /** How far the capsules had travelled when it was found, and whether that was in the last iteration. */
         double way = -1;
         bool hasMoved = true;
-        /** What its hard surface is drawn with. */
-        SurfaceVariates variates;
-        /** The contacts at the start; -1 if they are not known. */
-        int numContacts = -1;
-        Contact contacts[2];
+        /** At the start, and whether the pair has the contact then. */
+        PairGap start;
+        bool touchedAtStart = false;
         /** The gap, its number or -1, and by how much it is longer from the hard surface than from the soft one. */
         Gap gap;
         int number = -1;
@@ -72,14 +75,17 @@ private:
     struct Part {
         std::vector<int> pairs;
     };
+    struct Looks;
     void findPairs(const double* moved, const PairFilter& known);
     void findNewPairs(const double* moved);
-    bool isNear(int pair, bool isNew, double& room) const;
+    static PairGap findPairGap(const SegmentPair& pair, const Contact* contacts, int count, double radii);
+    bool mayClose(const ContactPair& pair, double before, double after, double& room) const;
+    Gap describeGap(const ContactPair& pair) const;
     void selectNear(int firstNew);
     void follow(NearPair& near) const;
     bool mayClose(const Gap& gap) const;
     double findEnd(const NearPair& near) const;
-    bool crosses(int pair, const double* moved) const;
+    void findCrossed();
     double radiiOf(const ContactPair& pair) const {
         const std::vector<Capsule>& capsules = search->getSystem().capsules;
         return capsules[pair.a].radius+capsules[pair.b].radius;
@@ -105,6 +111,8 @@ private:
     std::vector<NearPair> near;
     /** Those of the last search. */
     std::vector<ContactPair> found;
+    /** Those that have crossed in the end. */
+    std::vector<int> crossed;
     CapsuleMotion motion;
     std::vector<Part> parts;
     /** Whether capsules move too far to look for contacts, in the periodic box or anywhere: the step is divided. */

@@ -8,8 +8,8 @@
 
 namespace cylchain {
 
-/** Gaps that are closed with a chance of less than exp(-this) are left out. */
-const double LARGEST_GAP_EXPONENT = 6;
+/** Gaps that are closed with a chance of less than exp(-this) are left out: they have a thousandth of all forces. */
+const double LARGEST_GAP_EXPONENT = 4;
 /** By how much responses of gaps that are found from lengths may be too small. */
 const double GAP_RESPONSE_MARGIN = 1.2;
 

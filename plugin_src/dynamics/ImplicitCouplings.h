@@ -68,10 +68,6 @@ public:
     virtual double getDemandingStiffness() const {
         return 0;
     }
-    /** What solving the equations may leave of the energy of the error that it begins with. */
-    virtual double getRelativeTolerance() const {
-        return 0.05;
-    }
     /** Take note of how forces move the places of the equations: see CoupledEquations::findCompliances(). */
     virtual void setCompliances(const double*) {
     }
@@ -112,7 +108,7 @@ public:
     /**
      * Find chains by which the step has gone wrong when the equations are solved, so that it must be divided.
      */
-    virtual void findFailures(const double* moved, std::vector<bool>& failed) const = 0;
+    virtual void findFailures(const double* moved, std::vector<bool>& failed) = 0;
     /**
      * Find the coupling by which a step that cannot be divided any more has gone wrong: call it after findFailures().
      *

@@ -486,7 +486,7 @@ bool LinkEquations::hasFailed(size_t number, const double* moved) const {
     return !(fabs(sqrt(dot(r, r))-state.link->restLength) < state.link->maximumExtension);
 }
 
-void LinkEquations::findFailures(const double* moved, vector<bool>& failed) const {
+void LinkEquations::findFailures(const double* moved, vector<bool>& failed) {
     for (size_t i = 0; i < states.size(); i++)
         if (hasFailed(i, moved))
             for (const PlaceOnChain& place : states[i].places)

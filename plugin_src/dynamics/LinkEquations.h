@@ -59,7 +59,7 @@ public:
     bool finishIteration(const double* moves, const double* moved) override;
     Rests getRests() const override;
     bool markUnfinished(PackFlags& packs) const override;
-    void findFailures(const double* moved, std::vector<bool>& failed) const override;
+    void findFailures(const double* moved, std::vector<bool>& failed) override;
     bool findCulprit(const double* moved, const CouplingEquation* equations, BrokenCoupling& culprit) const override;
     void findNeighbours(std::vector<std::pair<int, int> >& pairs) const override;
 private:

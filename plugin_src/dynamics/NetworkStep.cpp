@@ -56,28 +56,18 @@ void NetworkStep::setForces(const CoupledForces& forces, const double* box) {
         couplings.push_back(links[i].get());
     }
     contacts.resize(max(contacts.size(), forces.contacts.size()));
-    contactGaps.resize(contacts.size());
-    firstContacts = couplings.size();
     for (size_t i = 0; i < forces.contacts.size(); i++) {
         const CoupledForces::Contacts& own = forces.contacts[i];
-        if (!contacts[i]) {
-            contacts[i].reset(new ContactEquations());
-            contactGaps[i].reset(new ContactGaps());
-        }
-        contacts[i]->setContacts(own.search, own.stiffness, own.periodic ? box : NULL, *own.onCurves);
-        contactGaps[i]->setContacts(own.search, own.stiffness, own.periodic ? box : NULL, *own.onCurves, i);
+        if (!contacts[i])
+            contacts[i].reset(new ContactGaps());
+        contacts[i]->setContacts(own.search, own.stiffness, own.periodic ? box : NULL, *own.onCurves, i);
         couplings.push_back(contacts[i].get());
     }
     walls.resize(max(walls.size(), forces.walls.size()));
-    wallGaps.resize(walls.size());
-    firstWalls = couplings.size();
     for (size_t i = 0; i < forces.walls.size(); i++) {
-        if (!walls[i]) {
-            walls[i].reset(new WallEquations());
-            wallGaps[i].reset(new WallGaps());
-        }
-        walls[i]->setWalls(forces.walls[i]);
-        wallGaps[i]->setWalls(forces.walls[i], forces.contacts.size()+i);
+        if (!walls[i])
+            walls[i].reset(new WallGaps());
+        walls[i]->setWalls(forces.walls[i], forces.contacts.size()+i);
         couplings.push_back(walls[i].get());
     }
 }
@@ -142,16 +132,7 @@ Instability NetworkStep::step(const double* positions, const double* forces, con
     const vector<bool> all(numChains, true);
     vector<bool> failed(numChains, false);
     Instability result;
-    const Attempt whole = {positions, forces, box, settings, all, loop};
-    mayHaveGaps = true;
-    bool solved = attempt(whole, displacements, failed);
-    if (!solved && hasGaps) {
-        // What lies on top of each other, as filaments that are drawn at random do, comes apart without.
-        result.divided = count(failed.begin(), failed.end(), true);
-        mayHaveGaps = false;
-        solved = attempt(whole, displacements, failed);
-    }
-    if (solved) {
+    if (attempt({positions, forces, box, settings, all, loop}, displacements, failed)) {
         result.iterations = iterations;
         return result;
     }
@@ -173,7 +154,10 @@ bool NetworkStep::attempt(const Attempt& attempt, double* displacements, vector<
             flags[pack][lane] = chains[lane] >= 0 && attempt.taken[chains[lane]];
         steps[pack]->begin(attempt.positions, attempt.forces, attempt.box, attempt.settings, flags[pack].get());
     });
-    beginCouplings(attempt);
+    const CoupledStart start = {attempt.positions, attempt.settings, places, attempt.taken, active};
+    gaps.begin(attempt.settings, places);
+    for (ImplicitCouplings* own : couplings)
+        own->begin(start, attempt.loop);
     copy(attempt.positions, attempt.positions+moved.size(), moved.begin());
     const int numStages = steps.empty() ? 0 : steps[0]->getNumStages();
     bool solved = true;
@@ -190,7 +174,7 @@ bool NetworkStep::attempt(const Attempt& attempt, double* displacements, vector<
             if (chains[lane] >= 0 && attempt.taken[chains[lane]] && (flags[pack][lane] || unfinished[pack][lane]))
                 failed[chains[lane]] = true;
     }
-    for (const ImplicitCouplings* own : couplings)
+    for (ImplicitCouplings* own : couplings)
         own->findFailures(moved.data(), failed);
     gaps.findFailures(failed);
     // Where couplings alone have not converged, nobody knows whose they are.
@@ -200,29 +184,6 @@ bool NetworkStep::attempt(const Attempt& attempt, double* displacements, vector<
         steps[pack]->getDisplacements(displacements);
     });
     return find(failed.begin(), failed.end(), true) == failed.end();
-}
-
-void NetworkStep::beginCouplings(const Attempt& attempt) {
-    const CoupledStart start = {attempt.positions, attempt.settings, places, attempt.taken, active};
-    gaps.begin(attempt.settings, places);
-    const bool oneStage = attempt.settings.scheme == Scheme::Implicit;
-    const size_t last = couplings.size();
-    bool resolves = oneStage && mayHaveGaps;
-    for (size_t i = firstContacts; i < firstWalls; i++)
-        resolves = resolves && contactGaps[i-firstContacts]->resolves(start);
-    for (size_t i = firstWalls; i < last; i++)
-        resolves = resolves && wallGaps[i-firstWalls]->resolves(start);
-    auto choose = [&] (auto& gapsOf, auto& equationsOf, size_t first, size_t end) {
-        for (size_t i = first; i < end; i++) {
-            ImplicitCouplings* const equations = equationsOf[i-first].get();
-            couplings[i] = resolves ? gapsOf[i-first].get() : equations;
-        }
-    };
-    choose(contactGaps, contacts, firstContacts, firstWalls);
-    choose(wallGaps, walls, firstWalls, last);
-    hasGaps = resolves && last > firstContacts;
-    for (ImplicitCouplings* own : couplings)
-        own->begin(start, attempt.loop);
 }
 
 bool NetworkStep::iterate(const Attempt& attempt, int stage) {
@@ -244,7 +205,6 @@ bool NetworkStep::iterate(const Attempt& attempt, int stage) {
     for (const ImplicitCouplings* own : couplings) {
         demands.stiffness = max(demands.stiffness, own->getStiffness());
         demands.demandingStiffness = max(demands.demandingStiffness, own->getDemandingStiffness());
-        demands.tolerance = min(demands.tolerance, own->getRelativeTolerance());
     }
     const int most = turns ? NEWTON_ITERATIONS_OF_TURNING_LINKS : NEWTON_ITERATIONS;
     for (int iteration = 0; iteration < most; iteration++) {

@@ -2,13 +2,11 @@
 #define CYLCHAIN_NETWORK_STEP_H_
 
 #include "dynamics/ChainEngine.h"
-#include "dynamics/ContactEquations.h"
 #include "dynamics/ContactGaps.h"
 #include "dynamics/CoupledForces.h"
 #include "dynamics/ImplicitCouplings.h"
 #include "dynamics/LinkEquations.h"
 #include "dynamics/PackStepSource.h"
-#include "dynamics/WallEquations.h"
 #include "dynamics/WallGaps.h"
 #include <cstddef>
 #include <memory>
@@ -57,7 +55,6 @@ private:
     struct Attempt;
     void setParticles(const std::vector<CoupledParticle>& particles);
     bool attempt(const Attempt& attempt, double* displacements, std::vector<bool>& failed);
-    void beginCouplings(const Attempt& attempt);
     bool iterate(const Attempt& attempt, int stage);
     bool finishIteration(const std::vector<std::size_t>& first);
     void placeSites(double* positions) const;
@@ -69,14 +66,8 @@ private:
     const PackStepSource& beamEngine;
     ChainPlaces places;
     std::vector<std::unique_ptr<LinkEquations> > links;
-    /** Contacts and walls of steps that resolve them, and of longer ones; and where they are among the couplings. */
-    std::vector<std::unique_ptr<ContactGaps> > contactGaps;
-    std::vector<std::unique_ptr<ContactEquations> > contacts;
-    std::size_t firstContacts = 0, firstWalls = 0;
-    /** Whether a step may have gaps, and whether the last attempt has had any. */
-    bool mayHaveGaps = true, hasGaps = false;
-    std::vector<std::unique_ptr<WallGaps> > wallGaps;
-    std::vector<std::unique_ptr<WallEquations> > walls;
+    std::vector<std::unique_ptr<ContactGaps> > contacts;
+    std::vector<std::unique_ptr<WallGaps> > walls;
     std::vector<ImplicitCouplings*> couplings;
     const std::vector<CurveSite>* sites = nullptr;
     std::vector<CoupledParticle> particles;

@@ -10,15 +10,23 @@ using namespace std;
 namespace {
 
 /** How far a gap moves in a part, (2 k_B T G)^(1/2), over the thermal depth, where it shares chains with others. */
-const double LARGEST_MOTION = 1.5;
+const double LARGEST_MOTION = 2.2;
 /** The most parts. */
 const int MOST_PARTS_OF_GAPS = 32;
 /** How often all gaps are gone through at most. */
-const int MOST_SWEEPS = 200;
-/** What the last sweep may change a gap by, and the last iteration, over the thermal scale. */
-const double OF_SWEEPS = 0.003, OF_ITERATIONS = 0.03;
+const int MOST_SWEEPS = 2000;
+/** How often those that are pushed are gone through before all are again. */
+const int SWEEPS_OF_PUSHED = 50;
+/** The share of what others push a gap open by that counts at the start of a part. */
+const double SHARE_AT_START = 1.0/3;
+/** What sweeps may leave to change of a gap, and the last iteration may change, over the thermal scale. */
+const double OF_SWEEPS = 0.01, OF_ITERATIONS = 0.03;
+/** Gaps that end farther than this from where the equations have led them have turned: others keep their responses. */
+const double OF_RESPONSES = 0.3;
 /** A change that is less than this share of that is not made. */
-const double LEAST_SHARE = 0.1;
+const double LEAST_SHARE = 0.01;
+/** Sweeps are taken to change by this factor at most from one to the next. */
+const double LARGEST_RATE = 0.995;
 /** The same in nm, where nothing moves thermally. */
 const double LEAST_CHANGE_OF_GAPS = 1e-7;
 /** By which factor the network may change the response of a gap. */
@@ -30,7 +38,7 @@ const double LEAST_CHANCE = 1e-300;
 /** Gaps that a thread looks at together. */
 const int CHUNK_OF_GAPS = 64;
 /** Pivots below this, over the diagonal, are those of ports that move as others do. */
-const double LEAST_PIVOT = 1e-10;
+const double LEAST_PIVOT = 1e-6;
 
 double product(const double* a, const double* b) {
     return a[0]*b[0]+a[1]*b[1]+a[2]*b[2];
@@ -75,10 +83,6 @@ void ReflectedGaps::begin(const StepSettings& settings, const ChainPlaces& place
     parts = 1;
     predicted.clear();
     corrections.clear();
-}
-
-double ReflectedGaps::countParts(double stiffness, double response) {
-    return 2*stiffness*response/(LARGEST_MOTION*LARGEST_MOTION);
 }
 
 int ReflectedGaps::add(const Gap& gap) {
@@ -157,57 +161,80 @@ void ReflectedGaps::findPorts() {
 }
 
 /** Find how a force at each port of a chain moves all ports of it: a substitution for a port of each lane of a pack. */
-void ReflectedGaps::findResponses(const vector<PackStep*>& packs, const CoupledEquations& coupled, const Loop& loop) {
+void ReflectedGaps::findResponses(const vector<PackStep*>& packs, const CoupledEquations& coupled, bool single,
+        const Loop& loop) {
     vector<vector<int> > chainsOfPack(packs.size());
     for (size_t i = 0; i < chains.size(); i++)
-        chainsOfPack[gaps[ports[chains[i].first].gap].packOf(ports[chains[i].first].side)].push_back(i);
-    loop(packs.size(), [&] (int pack) {
+        if (!known[i])
+            chainsOfPack[gaps[ports[chains[i].first].gap].packOf(ports[chains[i].first].side)].push_back(i);
+    auto findOfPack = [&] (int pack, auto number) {
+        typedef decltype(number) Number;
         const vector<int>& own = chainsOfPack[pack];
-        if (all_of(own.begin(), own.end(), [&] (int chain) {return known[chain] != 0;}))
+        if (own.empty())
             return;
-        static thread_local vector<double> force, move;
-        const size_t size = 3*(size_t) TermBlocks::fill(coupled.countTerms(pack));
-        move.resize(size);
-        int rounds = 0;
-        for (int i : own)
-            rounds = max(rounds, chains[i].count);
-        // Call a function with the term of each lever of a port, its number, and the gradient at it.
-        auto forLevers = [&] (int port, auto function) {
-            const Gap& gap = gaps[ports[port].gap];
-            for (int lever = 0; lever < gap.numLevers; lever++)
-                function(coupled.getTerm(firstEquation+equationOf[ports[port].gap]+lever, ports[port].side)-
-                        coupled.firstTerm(pack), gap.levers[lever].gradient);
+        /** A term of a port, and the gradient there. */
+        struct TermOfPort {
+            int place;
+            Number gradient[3];
         };
-        force.assign(size, 0.0);
-        for (int round = 0; round < rounds; round++) {
-            auto setForces = [&] (double factor) {
-                for (int i : own)
-                    if (round < chains[i].count) {
-                        const int port = chains[i].first+round;
-                        const double sign = ports[port].side == 0 ? factor : -factor;
-                        forLevers(port, [&] (int term, const double* gradient) {
-                            for (int k = 0; k < 3; k++)
-                                force[TermBlocks::place(term, k)] = sign*gradient[k];
-                        });
-                    }
-            };
-            setForces(1);
-            packs[pack]->respond(force.data(), move.data());
-            setForces(0);
-            for (int i : own) {
-                const PortsOfChain& chain = chains[i];
-                if (round >= chain.count)
-                    continue;
-                for (int other = 0; other < chain.count; other++) {
-                    const int port = chain.first+other;
-                    double sum = 0;
-                    forLevers(port, [&] (int term, const double* gradient) {
-                        for (int k = 0; k < 3; k++)
-                            sum += gradient[k]*move[TermBlocks::place(term, k)];
-                    });
-                    const double sign = ports[port].side == 0 ? 1 : -1;
-                    responses[chain.matrix+(size_t) round*chain.count+other] = sign*sum;
+        static thread_local vector<TermOfPort> terms;
+        static thread_local vector<int> firstTerms;
+        static thread_local vector<Number> force, move;
+        const size_t size = 3*(size_t) TermBlocks::fill(coupled.countTerms(pack));
+        force.assign(size, Number(0));
+        move.resize(size);
+        terms.clear();
+        firstTerms.clear();
+        int rounds = 0;
+        for (int i : own) {
+            rounds = max(rounds, chains[i].count);
+            for (int port = chains[i].first; port < chains[i].first+chains[i].count; port++) {
+                const int number = ports[port].gap, side = ports[port].side;
+                const Gap& gap = gaps[number];
+                const Number sign = side == 0 ? 1 : -1;
+                firstTerms.push_back(terms.size());
+                for (int lever = 0; lever < gap.numLevers; lever++) {
+                    const int term = coupled.getTerm(firstEquation+equationOf[number]+lever, side);
+                    const double* const gradient = gap.levers[lever].gradient;
+                    terms.push_back({TermBlocks::place(term-coupled.firstTerm(pack), 0), {sign*(Number) gradient[0],
+                            sign*(Number) gradient[1], sign*(Number) gradient[2]}});
                 }
+            }
+        }
+        firstTerms.push_back(terms.size());
+        constexpr int STRIDE = TermBlocks::SIZE;
+        for (int round = 0; round < rounds; round++) {
+            auto forTermsOfRound = [&] (auto function) {
+                int first = 0;
+                for (int i : own) {
+                    for (int k = firstTerms[first+round]; round < chains[i].count && k < firstTerms[first+round+1]; k++)
+                        function(terms[k]);
+                    first += chains[i].count;
+                }
+            };
+            forTermsOfRound([&] (const TermOfPort& term) {
+                for (int k = 0; k < 3; k++)
+                    force[term.place+STRIDE*k] = term.gradient[k];
+            });
+            packs[pack]->respond(force.data(), move.data());
+            forTermsOfRound([&] (const TermOfPort& term) {
+                for (int k = 0; k < 3; k++)
+                    force[term.place+STRIDE*k] = 0;
+            });
+            int first = 0;
+            for (int i : own) {
+                const int count = chains[i].count;
+                double* const row = &responses[chains[i].matrix+(size_t) round*count];
+                for (int other = 0; round < count && other < count; other++) {
+                    Number sum = 0;
+                    for (int k = firstTerms[first+other]; k < firstTerms[first+other+1]; k++) {
+                        const Number* const at = &move[terms[k].place];
+                        const Number* const gradient = terms[k].gradient;
+                        sum += gradient[0]*at[0]+gradient[1]*at[STRIDE]+gradient[2]*at[2*STRIDE];
+                    }
+                    row[other] = sum;
+                }
+                first += count;
             }
         }
         for (int i : own) {
@@ -219,6 +246,12 @@ void ReflectedGaps::findResponses(const vector<PackStep*>& packs, const CoupledE
             findRoot(n, matrix, &roots[chains[i].matrix]);
             known[i] = 1;
         }
+    };
+    loop(packs.size(), [&] (int pack) {
+        if (single)
+            findOfPack(pack, float());
+        else
+            findOfPack(pack, double());
     });
     own.assign(gaps.size(), 0.0);
     for (size_t i = 0; i < ports.size(); i++) {
@@ -237,9 +270,9 @@ int ReflectedGaps::chooseParts() const {
             return port >= 0 && chains[chainOf[port]].count > 1;
         });
         if (shares && gaps[i].law == GapLaw::Reflection)
-            largest = max(largest, countParts(gaps[i].stiffness, own[i]));
+            largest = max(largest, gaps[i].stiffness*own[i]);
     }
-    return clamp((int) ceil(largest), 1, MOST_PARTS_OF_GAPS);
+    return clamp((int) ceil(2*largest/(LARGEST_MOTION*LARGEST_MOTION)), 1, MOST_PARTS_OF_GAPS);
 }
 
 /** Draw the numbers of gaps that have none for so many parts. */
@@ -294,25 +327,12 @@ double ReflectedGaps::scaleOf(int i) const {
     return min(sqrt(kT/gaps[i].stiffness), sqrt(kT*networks[i]*own[i]));
 }
 
-/** The force of a gap in a part, with what others push. */
-double ReflectedGaps::findPush(int i, int part) const {
+/** The force in a part of the step on a gap that a spring holds, which would end there. */
+double ReflectedGaps::findPushOfSpring(int i, int part, double end) const {
     const Gap& gap = gaps[i];
-    const double response = networks[i]*own[i];
-    double others = -response*ofPart[i];
-    for (int side = 0; side < 2; side++)
-        if (portOf[2*i+side] >= 0)
-            others += networks[i]*moved[portOf[2*i+side]];
-    const double end = ends[i]+others;
-    if (gap.law == GapLaw::Reflection) {
-        double opening = -response*ofPart[i];
-        for (int side = 0; side < 2; side++)
-            if (portOf[2*i+side] >= 0)
-                opening += networks[i]*opened[portOf[2*i+side]];
-        return reflect(starts[i]+1.0/3*opening, end, response, kT/parts*reflections[(size_t) i*parts+part]);
-    }
     if (part < parts-1)
         return 0;
-    const double softer = 1/(1+gap.stiffness*response);
+    const double response = networks[i]*own[i], softer = 1/(1+gap.stiffness*response);
     if (gap.law == GapLaw::SpringBehind)
         return max(0.0, -gap.stiffness*end*softer);
     const double rest = ofBridges[2*(size_t) i*parts]*sqrt(kT/gap.stiffness);
@@ -322,20 +342,30 @@ double ReflectedGaps::findPush(int i, int part) const {
     return (held-responseHeld*back-end)/response;
 }
 
+/** The force of a gap in a part of the step, with what others push. */
+double ReflectedGaps::findPush(int i, int part) const {
+    const GapInPart& gap = inPart[i];
+    const MotionOfPort &one = motions[gap.ports[0]], &other = motions[gap.ports[1]];
+    const double end = gap.end+gap.network*(one.all+other.all)-gap.response*gap.push;
+    if (!gap.isReflected)
+        return findPushOfSpring(i, part, end);
+    const double opening = gap.network*(one.opening+other.opening)-gap.response*gap.push;
+    return reflect(gap.start+SHARE_AT_START*opening, end, gap.response, gap.variate);
+}
+
 /** Let a force on a gap move all ports of its chains. */
-void ReflectedGaps::move(int i, double push) {
-    for (int side = 0; side < 2; side++) {
-        const int port = portOf[2*i+side];
+void ReflectedGaps::move(int i, double push, bool opens) {
+    for (int port : {portOf[2*i], portOf[2*i+1]}) {
         if (port < 0)
             continue;
         const PortsOfChain& chain = chains[chainOf[port]];
         const double* const row = &responses[chain.matrix+(size_t) (port-chain.first)*chain.count];
-        double* const to = &moved[chain.first];
-        for (int k = 0; k < chain.count; k++)
-            to[k] += push*row[k];
-        if (gaps[i].law == GapLaw::Reflection)
-            for (int k = 0; k < chain.count; k++)
-                opened[chain.first+k] += push*max(0.0, row[k]);
+        MotionOfPort* const to = &motions[chain.first];
+        for (int k = 0; k < chain.count; k++) {
+            const double way = push*row[k];
+            to[k].all += way;
+            to[k].opening += opens && row[k] > 0 ? way : 0;
+        }
     }
 }
 
@@ -345,70 +375,78 @@ void ReflectedGaps::move(int i, double push) {
  */
 void ReflectedGaps::findPushesOfPart(int part) {
     const int count = gaps.size();
-    moved.assign(ports.size(), 0.0);
-    opened.assign(ports.size(), 0.0);
+    motions.assign(ports.size()+1, MotionOfPort());
     for (int i = 0; i < count; i++) {
-        ofPart[i] = own[i] > 0 ? pushes[(size_t) i*parts+part] : 0;
-        if (ofPart[i] != 0)
-            move(i, ofPart[i]);
+        inPart[i].push = own[i] > 0 ? pushes[(size_t) i*parts+part] : 0;
+        if (inPart[i].push != 0)
+            move(i, inPart[i].push, inPart[i].isReflected);
     }
-    pushed.clear();
+    // The change of a gap, over what it may be.
     auto update = [&] (int i) {
-        const double push = findPush(i, part), change = push-ofPart[i];
-        const double way = fabs(change)*networks[i]*own[i];
+        GapInPart& gap = inPart[i];
+        const double push = findPush(i, part), change = push-gap.push, way = fabs(change)*gap.response/gap.tolerance;
         // Written so that NaN is no change.
-        if (!(way > LEAST_SHARE*tolerances[i]))
-            return false;
-        ofPart[i] = push;
-        move(i, change);
-        return way > tolerances[i];
+        if (!(way > LEAST_SHARE))
+            return 0.0;
+        gap.push = push;
+        move(i, change, gap.isReflected);
+        return way;
     };
+    bool converged = false;
     for (int sweeps = 0; sweeps < MOST_SWEEPS; sweeps++) {
-        bool changes = false;
+        double largest = 0;
         pushed.clear();
         for (int i = 0; i < count; i++)
             if (own[i] > 0) {
-                changes |= update(i);
-                if (ofPart[i] != 0)
+                largest = max(largest, update(i));
+                if (inPart[i].push != 0)
                     pushed.push_back(i);
             }
-        if (!changes)
+        if (largest == 0 || (converged && largest <= 1))
             break;
-        for (int inner = 0; changes && inner < 8 && ++sweeps < MOST_SWEEPS; inner++) {
-            changes = false;
+        converged = false;
+        for (int i = 0; i < SWEEPS_OF_PUSHED && !converged && ++sweeps < MOST_SWEEPS; i++) {
+            const double before = largest;
+            largest = 0;
             for (size_t k = 0; k < pushed.size(); k++)
-                changes |= update(pushed[sweeps%2 == 0 ? k : pushed.size()-1-k]);
+                largest = max(largest, update(pushed[sweeps%2 == 0 ? k : pushed.size()-1-k]));
+            // All that is left to change, if each sweep changes as much less than the one before.
+            const double rate = min(largest/before, LARGEST_RATE);
+            converged = largest*rate <= 1-rate;
         }
     }
     for (int i = 0; i < count; i++)
-        pushes[(size_t) i*parts+part] = ofPart[i];
+        pushes[(size_t) i*parts+part] = inPart[i].push;
 }
 
 /** Find the forces of all gaps from their starts, and their ends without forces. */
 void ReflectedGaps::findPushes() {
-    const int count = gaps.size();
-    ofPart.resize(count);
-    starts.resize(count);
-    ends.resize(count);
+    const int count = gaps.size(), none = ports.size();
+    inPart.resize(count);
     forces.assign(count, 0.0);
-    tolerances.resize(count);
     for (int i = 0; i < count; i++) {
+        GapInPart& gap = inPart[i];
         predicted[i] = gaps[i].start;
-        tolerances[i] = OF_SWEEPS*scaleOf(i)+0.1*LEAST_CHANGE_OF_GAPS;
+        gap.isReflected = gaps[i].law == GapLaw::Reflection;
+        gap.network = networks[i];
+        gap.response = networks[i]*own[i];
+        gap.tolerance = OF_SWEEPS*scaleOf(i)+0.1*LEAST_CHANGE_OF_GAPS;
+        for (int side = 0; side < 2; side++)
+            gap.ports[side] = portOf[2*i+side] >= 0 ? portOf[2*i+side] : none;
     }
     for (int part = 0; part < parts; part++) {
         for (int i = 0; i < count; i++) {
-            starts[i] = predicted[i];
-            ends[i] = starts[i]+(free[i]-gaps[i].start)/parts+bridges[(size_t) i*parts+part];
+            GapInPart& gap = inPart[i];
+            gap.start = predicted[i];
+            gap.end = gap.start+(free[i]-gaps[i].start)/parts+bridges[(size_t) i*parts+part];
+            gap.variate = kT/parts*reflections[(size_t) i*parts+part];
         }
         findPushesOfPart(part);
         for (int i = 0; i < count; i++) {
-            forces[i] += ofPart[i];
-            predicted[i] = ends[i];
-            for (int side = 0; side < 2; side++)
-                if (portOf[2*i+side] >= 0)
-                    predicted[i] += networks[i]*moved[portOf[2*i+side]];
-            if (gaps[i].law == GapLaw::Reflection && part < parts-1)
+            const GapInPart& gap = inPart[i];
+            forces[i] += gap.push;
+            predicted[i] = gap.end+gap.network*(motions[gap.ports[0]].all+motions[gap.ports[1]].all);
+            if (gap.isReflected && part < parts-1)
                 predicted[i] = max(predicted[i], 0.0);
         }
     }
@@ -425,7 +463,7 @@ void ReflectedGaps::push(const vector<PackStep*>& packs, CoupledEquations& coupl
     if (!hasSamePorts())
         findPorts();
     if (find(known.begin(), known.end(), 0) != known.end()) {
-        findResponses(packs, coupled, loop);
+        findResponses(packs, coupled, demands.single, loop);
         const int needed = max(parts, chooseParts());
         if (needed != parts) {
             pushes.clear();
@@ -454,35 +492,29 @@ void ReflectedGaps::push(const vector<PackStep*>& packs, CoupledEquations& coupl
             for (int k = 0; k < 3; k++)
                 loads[3*(equationOf[i]+lever)+k] = forces[i]*gaps[i].levers[lever].gradient[k];
     coupled.push(packs, firstEquation, loads, demands, loop);
-    networkChanges.assign(count, 0);
-    if (coupled.joinsPlaces()) {
-        moved.assign(ports.size(), 0.0);
-        for (size_t i = 0; i < count; i++)
-            if (forces[i] != 0)
-                move(i, forces[i]);
-    }
+    changes.resize(count);
+    motions.assign(ports.size()+1, MotionOfPort());
+    for (size_t i = 0; i < count; i++)
+        if (forces[i] != 0)
+            move(i, forces[i], false);
     for (size_t i = 0; i < count; i++) {
         const double pushed = endMove(i, coupled.getPushedMoves());
-        if (coupled.joinsPlaces())
-            followNetwork(i, pushed);
         predicted[i] = free[i]-corrections[i]+pushed;
+        correct(i, pushed, coupled.joinsPlaces());
     }
 }
 
 /**
- * Take note of how forces have moved a gap in a network: c is what the network lets it move by, and what others have
- * pushed through the network moves its end.
+ * Take note of how far forces have moved a gap beyond what responses say: these may be those of an iteration before,
+ * and others push through a network. There, c is what the network lets the gap move by.
  */
-void ReflectedGaps::followNetwork(int i, double pushed) {
-    double ofChains = 0;
-    for (int side = 0; side < 2; side++)
-        if (portOf[2*i+side] >= 0)
-            ofChains += moved[portOf[2*i+side]];
+void ReflectedGaps::correct(int i, double pushed, bool isInNetwork) {
+    const double ofChains = motions[inPart[i].ports[0]].all+motions[inPart[i].ports[1]].all;
     const double before = networks[i];
-    if (forces[i] > 0 && ofChains > 0)
+    if (isInNetwork && forces[i] > 0 && ofChains > 0)
         networks[i] = clamp(pushed/ofChains, LEAST_SHARE_OF_NETWORK, LARGEST_SHARE_OF_NETWORK);
     const double correction = pushed-networks[i]*ofChains;
-    networkChanges[i] = fabs(correction-corrections[i])+fabs(networks[i]-before)*own[i]*forces[i];
+    changes[i] = fabs(correction-corrections[i])+fabs(networks[i]-before)*own[i]*forces[i];
     corrections[i] = correction;
 }
 
@@ -494,11 +526,16 @@ bool ReflectedGaps::wouldPush(const Gap& gap) const {
 }
 
 bool ReflectedGaps::isUnfinished(int i) const {
+    return deviates(i, OF_ITERATIONS);
+}
+
+/** Whether a gap is farther from where the equations have led it than a share of its thermal scale. */
+bool ReflectedGaps::deviates(int i, double share) const {
     if (!gaps[i].present)
         return false;
     if (i >= (int) predicted.size())
         return wouldPush(gaps[i]);
-    return !(max(fabs(gaps[i].end-predicted[i]), networkChanges[i]) <= OF_ITERATIONS*scaleOf(i)+LEAST_CHANGE_OF_GAPS);
+    return !(max(fabs(gaps[i].end-predicted[i]), changes[i]) <= share*scaleOf(i)+LEAST_CHANGE_OF_GAPS);
 }
 
 bool ReflectedGaps::anyUnfinished() {
@@ -507,8 +544,8 @@ bool ReflectedGaps::anyUnfinished() {
         if (!isUnfinished(i))
             continue;
         any = true;
-        // Its chains have turned so far that their responses have changed.
-        for (int side = 0; side < 2 && i < predicted.size(); side++)
+        // Its chains may have turned so far that their responses have changed.
+        for (int side = 0; side < 2 && i < predicted.size() && deviates(i, OF_RESPONSES); side++)
             if (portOf[2*i+side] >= 0)
                 known[chainOf[portOf[2*i+side]]] = 0;
     }

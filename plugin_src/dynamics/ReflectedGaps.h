@@ -25,7 +25,8 @@ namespace cylchain {
  *
  * with an exponential variate E of mean one. Gaps that share chains are found in parts of the step: in each, the ends
  * move on by a share of b-a and by a bridge of Brownian motion with the covariance 2 k_B T G, and every gap takes the
- * law of one, with what others push in this part whole at its end and, where it opens the gap, half at its start. Gaps
+ * law of one, with what others push in this part whole at its end and, where it opens the gap, by a third at its start.
+ * Gaps
  * that move together have variates E that are correlated as their motion is: those that move as one are reflected as
  * one. With one gap on each chain, all this is exact. Going through the gaps in turn finds the forces of a part.
  *
@@ -35,8 +36,6 @@ class ReflectedGaps {
 public:
     /** Begin a step without gaps. */
     void begin(const StepSettings& settings, const ChainPlaces& places);
-    /** The number of parts that gaps need that share chains: of a stiffness that a force moves by so much. */
-    static double countParts(double stiffness, double response);
     /** What gaps are drawn with. */
     const GapNoise& getNoise() const {
         return noise;
@@ -75,18 +74,21 @@ private:
     };
     bool hasSamePorts() const;
     void findPorts();
-    void findResponses(const std::vector<PackStep*>& packs, const CoupledEquations& coupled, const Loop& loop);
+    void findResponses(const std::vector<PackStep*>& packs, const CoupledEquations& coupled, bool single,
+            const Loop& loop);
     int chooseParts() const;
     void drawNumbers(const Loop& loop);
     void correlate(const std::vector<double>& normals, std::vector<double>& sums) const;
     void findNoise();
     void findPushes();
-    void followNetwork(int gap, double pushed);
+    void correct(int gap, double pushed, bool isInNetwork);
     void findPushesOfPart(int part);
     double findPush(int gap, int part) const;
-    void move(int gap, double push);
+    double findPushOfSpring(int gap, int part, double end) const;
+    void move(int gap, double push, bool opens);
     double scaleOf(int gap) const;
     bool wouldPush(const Gap& gap) const;
+    bool deviates(int gap, double share) const;
     std::vector<Gap> gaps;
     GapNoise noise;
     double kT = 0;
@@ -97,22 +99,29 @@ private:
      * others push through the network; how a force moves it, how much more or less the network lets it move than its
      * chains alone do, and how far both have changed in the last iteration.
      */
-    std::vector<double> forces, pushes, free, predicted, corrections, own, networks, networkChanges;
+    std::vector<double> forces, pushes, free, predicted, corrections, own, networks, changes;
     /** The first equation of each gap among those of all. */
     std::vector<int> equationOf;
     /** For each gap and part: exponential variates, a bridge of Brownian motion, and what both are made of. */
     std::vector<double> reflections, bridges, ofReflections, ofBridges;
-    /** Of a part: where gaps begin, and where they would end. */
-    std::vector<double> starts, ends, ofPart, tolerances;
+    /** A gap in a part of the step: where it begins and would end without forces, and the force that is found. */
+    struct GapInPart {
+        double start, end, response, network, variate, tolerance, push;
+        /** Those that it does not have are behind all others, and do not move. */
+        int ports[2];
+        bool isReflected;
+    };
+    std::vector<GapInPart> inPart;
     /** The gaps that are pushed in a part. */
     std::vector<int> pushed;
-    /**
-     * The ports of all chains, that of each gap and side or -1, and how far each is moved in
-     * a part, and by pushes that open it alone.
-     */
+    /** The ports of all chains, and that of each gap and side or -1. */
     std::vector<Port> ports;
     std::vector<int> portOf, chainOf, firstPort;
-    std::vector<double> moved, opened;
+    /** How far forces move a port in a part, and those that open its gap alone. */
+    struct MotionOfPort {
+        double all = 0, opening = 0;
+    };
+    std::vector<MotionOfPort> motions;
     std::vector<PortsOfChain> chains;
     std::vector<double> responses, roots;
     /** Whether the responses of a chain are known for the present iteration. */

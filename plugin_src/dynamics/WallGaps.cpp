@@ -12,8 +12,6 @@ namespace {
 
 /** The largest way beyond a curved face or back from it, over the way to the middle. */
 const double LEAST_WAY_TO_MIDDLE = 0.5;
-/** Steps that would need more parts have walls as WallEquations has them. */
-const double MOST_PARTS_OF_WALLS = 48;
 /** Particles that a thread looks at together. */
 const int CHUNK_OF_WALL_GAPS = 256;
 
@@ -37,18 +35,6 @@ void WallGaps::setWalls(const WallSystem* newSystem, int newForce) {
     system = newSystem;
     force = newForce;
     numFaces = countFaces(system->wall);
-}
-
-bool WallGaps::resolves(const CoupledStart& start) {
-    double largest = 0;
-    PlaceResponses found;
-    found.begin(start.places, start.settings.stepSize);
-    for (const WallParticle& particle : system->particles) {
-        PlaceOnChain place;
-        if (start.places.find(particle.getPlace(), place))
-            largest = max(largest, found.find(place));
-    }
-    return ReflectedGaps::countParts(system->stiffness, largest) <= MOST_PARTS_OF_WALLS;
 }
 
 void WallGaps::begin(const CoupledStart& start, const Loop& newLoop) {

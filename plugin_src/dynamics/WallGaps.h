@@ -19,15 +19,13 @@ public:
      * @param force  a number of the force that they belong to, for their noise
      */
     void setWalls(const WallSystem* system, int force);
-    /** Whether a step has parts enough to resolve the wall: see ReflectedGaps. */
-    bool resolves(const CoupledStart& start);
     void begin(const CoupledStart& start, const Loop& loop) override;
     void beginStage(int stage, int numStages, const double* moved) override;
     bool findGaps(int iteration, bool settled, const double* moved, ReflectedGaps& gaps) override;
     Rests getRests() const override {
         return Rests::Wrong;
     }
-    void findFailures(const double*, std::vector<bool>&) const override {
+    void findFailures(const double*, std::vector<bool>&) override {
         // A wall has no other side: its gaps tell.
     }
     bool findCulprit(const double* moved, const CouplingEquation* equations, BrokenCoupling& culprit) const override;

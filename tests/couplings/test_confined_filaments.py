@@ -57,8 +57,7 @@ def _bends_in_steps(step, steps, count):
     ("milliseconds", "steps"), [(5.0, 200), (1.0, 300), pytest.param(0.2, 1500, marks=pytest.mark.slow)]
 )
 def test_bends_between_walls(milliseconds, steps):
-    """Against draws from equilibrium, which NumPy makes. Steps of any length are within 8 % of it: what a wall does to
-    a filament that bends in a step is not exact, see RestGap.h."""
+    """Against draws from equilibrium, which NumPy makes. Steps of any length are within 8 % of it."""
     drawn = _modes(draw_heights(SEGMENTS, LENGTH, RIGIDITY / KT, THICKNESS, STIFFNESS / KT, 40000, seed=3))
     found, errors = _bends_in_steps(1e9 * milliseconds, steps, 200)
     # The fourth is the mean of all modes but three.

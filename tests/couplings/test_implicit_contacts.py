@@ -24,14 +24,13 @@ from support.solvent import KT, TEMPERATURE, VISCOSITY
 ACTIN = F_ACTIN.with_segment_length(100)
 DIAMETER = 30.0
 STIFFNESS = 80 * KT / DIAMETER**2
-SCHEMES = ["implicit", "implicit-second-order"]
 PICONEWTON = 0.60221408
 # In a step of 10 us two segments diffuse against each other by 0.6 diameters.
 LARGEST_STEP = 1e7
 
 
-def _context(filaments, system, positions, step, scheme="implicit", threads=1, seed=1, **options):
-    integrator = filaments.create_integrator(system, step, scheme=scheme, random_seed=seed, checks=False, **options)
+def _context(filaments, system, positions, step, threads=1, seed=1, **options):
+    integrator = filaments.create_integrator(system, step, random_seed=seed, checks=False, **options)
     return new_context(system, positions, integrator, "CPU", {"Threads": str(threads)})
 
 
@@ -64,10 +63,9 @@ def _grow_step(context, step):
     integrator.step(50)
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_dense_filaments_do_not_cross_at_the_largest_step(scheme):
+def test_dense_filaments_do_not_cross_at_the_largest_step():
     filaments, system, positions, box = _dense()
-    context = _context(filaments, system, positions, LARGEST_STEP, scheme)
+    context = _context(filaments, system, positions, LARGEST_STEP)
     _grow_step(context, LARGEST_STEP)
     assert _count_crossings(filaments, context, 600, box) == 0
     # Below 1 %.
@@ -103,17 +101,16 @@ def _mixed():
     return filaments, system, positions
 
 
-def _mixed_context(scheme, threads=1, step=2e6):
+def _mixed_context(threads=1, step=2e6):
     filaments, system, positions = _mixed()
     flow = Flow.shear(1e-8)
-    return _context(filaments, system, positions, step, scheme, threads, flow=flow, particle_friction=4e5)
+    return _context(filaments, system, positions, step, threads, flow=flow, particle_friction=4e5)
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_threads_change_no_bit(scheme):
+def test_threads_change_no_bit():
     results, divided = [], []
     for threads in (1, 2, 3):
-        context = _mixed_context(scheme, threads)
+        context = _mixed_context(threads)
         context.getIntegrator().step(60)
         results.append(positions_of(context))
         divided.append(context.getIntegrator().getNumDividedSteps())
@@ -122,9 +119,8 @@ def test_threads_change_no_bit(scheme):
     assert np.isfinite(results[0]).all()
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_restarts_and_two_contexts_change_no_bit(scheme):
-    context, other = _mixed_context(scheme), _mixed_context(scheme)
+def test_restarts_and_two_contexts_change_no_bit():
+    context, other = _mixed_context(), _mixed_context()
     for one in (context, other):
         one.getIntegrator().step(20)
     checkpoint = context.createCheckpoint()
@@ -141,9 +137,8 @@ def test_restarts_and_two_contexts_change_no_bit(scheme):
     assert np.array_equal(positions_of(context), expected)
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_systems_and_integrators_from_xml_change_no_bit(scheme):
-    context = _mixed_context(scheme)
+def test_systems_and_integrators_from_xml_change_no_bit():
+    context = _mixed_context()
     copied = [
         openmm.XmlSerializer.deserialize(openmm.XmlSerializer.serialize(one))
         for one in (context.getSystem(), context.getIntegrator())
@@ -154,8 +149,7 @@ def test_systems_and_integrators_from_xml_change_no_bit(scheme):
     assert np.array_equal(positions_of(context), positions_of(restored))
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_contacts_that_nothing_touches_change_little(scheme):
+def test_contacts_that_nothing_touches_change_little():
     """Far from each other, filaments move as without contacts but for where Newton's method ends."""
     results = []
     for contacts in (False, True):
@@ -165,7 +159,7 @@ def test_contacts_that_nothing_touches_change_little(scheme):
         _, system, positions = filaments.build()
         if contacts:
             system.addForce(capsule_contact_force(filaments, system, DIAMETER, STIFFNESS))
-        context = _context(filaments, system, positions, LARGEST_STEP, scheme, precision="double")
+        context = _context(filaments, system, positions, LARGEST_STEP, precision="double")
         context.getIntegrator().step(5)
         results.append(positions_of(context))
     assert np.abs(results[0] - results[1]).max() < 0.02
@@ -174,9 +168,8 @@ def test_contacts_that_nothing_touches_change_little(scheme):
 # Where steps go wrong
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("force", [2, 5, 10])
-def test_a_filament_that_is_dropped_onto_another_stays_above(scheme, force):
+def test_a_filament_that_is_dropped_onto_another_stays_above(force):
     """Forces in pN, below the 11.4 pN with which a contact pushes back at most."""
     filaments = Filaments(VISCOSITY, TEMPERATURE)
     filaments.add_straight(ACTIN, 20, [-1000, 0, 0], [1, 0, 0], clamped=[0, 1, 19, 20])
@@ -187,19 +180,18 @@ def test_a_filament_that_is_dropped_onto_another_stays_above(scheme, force):
     for node in filaments.node_indices[1]:
         weight.addParticle(int(node))
     system.addForce(weight)
-    context = _context(filaments, system, positions, LARGEST_STEP, scheme)
+    context = _context(filaments, system, positions, LARGEST_STEP)
     assert _count_crossings(filaments, context, 200) == 0
     # It hangs there.
     assert positions_of(context)[filaments.node_indices[1], 2].min() < -100
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("step", [LARGEST_STEP, 10 * LARGEST_STEP])
 @pytest.mark.parametrize(
     "start, direction",
     [([0, 0, 0], [1, 0, 0]), ([500, 0, 0], [-1, 0, 0]), ([30, 0, 0], [1, 0, 0]), ([0, 5, 0], [1, 0, 0])],
 )
-def test_filaments_on_top_of_each_other_come_apart(scheme, step, start, direction):
+def test_filaments_on_top_of_each_other_come_apart(step, start, direction):
     filaments = Filaments(VISCOSITY, TEMPERATURE)
     filaments.add_straight(ACTIN, 5, [0, 0, 0], [1, 0, 0])
     filaments.add_straight(ACTIN, 5, start, direction)
@@ -207,7 +199,7 @@ def test_filaments_on_top_of_each_other_come_apart(scheme, step, start, directio
     contacts = capsule_contact_force(filaments, system, DIAMETER, STIFFNESS)
     contacts.setForceGroup(1)
     system.addForce(contacts)
-    context = _context(filaments, system, positions, step, scheme)
+    context = _context(filaments, system, positions, step)
     context.getIntegrator().step(50)
     energy = context.getState(energy=True, groups={1}).getPotentialEnergy().value_in_unit(unit.kilojoule_per_mole)
     assert np.isfinite(positions_of(context)).all()
@@ -303,10 +295,9 @@ def test_a_box_that_is_too_narrow_for_implicit_steps_is_refused():
     context.getIntegrator().step(1)
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_steps_are_divided_where_segments_move_too_far_for_the_box(scheme):
+def test_steps_are_divided_where_segments_move_too_far_for_the_box():
     filaments, system, positions = _in_a_narrow_box(320.0)
-    context = _context(filaments, system, positions, 6 * LARGEST_STEP, scheme)
+    context = _context(filaments, system, positions, 6 * LARGEST_STEP)
     context.getIntegrator().step(100)
     assert context.getIntegrator().getNumDividedSteps() > 0
     assert context.getStepCount() == 100
@@ -341,7 +332,6 @@ def test_a_sphere_does_not_pass_through_a_row_of_rods():
             assert positions_of(context)[sphere, 2] > 0, step
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("coupling", ["contacts", "links"])
 @pytest.mark.parametrize(
     "planar, clamped, fixed",
@@ -350,7 +340,7 @@ def test_a_sphere_does_not_pass_through_a_row_of_rods():
         (True, [], [(node, 2) for node in range(5)]),
     ],
 )
-def test_nodes_that_do_not_move_are_not_moved_by_couplings(scheme, coupling, planar, clamped, fixed):
+def test_nodes_that_do_not_move_are_not_moved_by_couplings(coupling, planar, clamped, fixed):
     """Clamped nodes, and the height of those of planar filaments."""
     filaments = Filaments(VISCOSITY, TEMPERATURE)
     filaments.add_straight(ACTIN, 4, [0, 0, 0], [1, 0, 0], clamped=clamped, planar=planar)
@@ -362,7 +352,7 @@ def test_nodes_that_do_not_move_are_not_moved_by_couplings(scheme, coupling, pla
         links = Crosslinks(stiffness=0.1, rest_length=0.0)
         links.add(None, SegmentPlace(1, 2, 0.5), [150, 0, 50])
         links.add_to(system)
-    context = _context(filaments, system, positions, LARGEST_STEP, scheme)
+    context = _context(filaments, system, positions, LARGEST_STEP)
     context.getIntegrator().step(20)
     moved = positions_of(context) - positions._value
     assert np.abs(moved).max() > 1
@@ -391,8 +381,7 @@ def _intersections(filaments, positions, edge):
     return count
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_planar_filaments_stay_beside_each_other(scheme):
+def test_planar_filaments_stay_beside_each_other():
     """Rows of filaments in one plane, 120 nm apart: they diffuse, and do not lie across each other."""
     edge = 1200.0
     filaments = Filaments(VISCOSITY, TEMPERATURE)
@@ -400,15 +389,14 @@ def test_planar_filaments_stay_beside_each_other(scheme):
         filaments.add_straight(ACTIN, 4, [100 + 600 * column, 30 + 120 * row, 0], [1, 0, 0], planar=True)
     _, system, positions = filaments.build(box_vectors=edge * np.eye(3))
     system.addForce(capsule_contact_force(filaments, system, DIAMETER, STIFFNESS))
-    context = _context(filaments, system, positions, LARGEST_STEP, scheme, seed=1)
+    context = _context(filaments, system, positions, LARGEST_STEP, seed=1)
     for _ in range(4):
         context.getIntegrator().step(50)
         assert _intersections(filaments, positions_of(context), edge) == 0
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("force", [0.5, 1.0])
-def test_a_bead_that_is_pushed_does_not_go_through_a_taut_filament(scheme, force):
+def test_a_bead_that_is_pushed_does_not_go_through_a_taut_filament(force):
     """Forces in pN. The bead is held above the filament sideways, by more than what would let it slip off."""
     filaments = Filaments(VISCOSITY, TEMPERATURE)
     held = [node for node in range(21) if node != 10]
@@ -421,7 +409,7 @@ def test_a_bead_that_is_pushed_does_not_go_through_a_taut_filament(scheme, force
     push = openmm.CustomExternalForce(f"{force * PICONEWTON}*z+0.075*(x^2+y^2)")
     push.addParticle(sphere)
     system.addForce(push)
-    context = _context(filaments, system, positions, LARGEST_STEP, scheme, particle_friction=2.9e6)
+    context = _context(filaments, system, positions, LARGEST_STEP, particle_friction=2.9e6)
     heights = []
     for _ in range(400):
         context.getIntegrator().step(1)

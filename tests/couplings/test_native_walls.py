@@ -234,7 +234,7 @@ def test_walls_bind_no_implicit_steps_but_those_of_virtual_sites():
     assert "CylinderChainWallForce" in springs.force
 
 
-def _with_particles(heights, friction, step, wall, scheme):
+def _with_particles(heights, friction, step, wall):
     """A Context with particles at heights, and an integrator; a filament is far away."""
     filaments = Filaments(VISCOSITY, TEMPERATURE)
     filaments.add_straight(ACTIN, 2, [0, 0, 1e5], [1, 0, 0])
@@ -243,18 +243,17 @@ def _with_particles(heights, friction, step, wall, scheme):
     points = np.column_stack([np.zeros((len(heights), 2)), heights])
     system.addForce(filament_wall_force(filaments, system, wall, 20.0, particles=particles))
     integrator = filaments.create_integrator(
-        system, step, scheme=scheme, random_seed=5, particle_friction=friction, checks=False
+        system, step, random_seed=5, particle_friction=friction, checks=False
     )
     return new_context(system, np.vstack([positions._value, points]), integrator), integrator, len(positions)
 
 
-@pytest.mark.parametrize("scheme", ["implicit", "implicit-second-order"])
-def test_pressure_of_free_particles(scheme):
+def test_pressure_of_free_particles():
     """Before a wall, the density n has the pressure n k_B T, in steps much longer than its depth."""
     friction, step, count, depth = 3.4e5, 8e7, 8000, 160.0
     heights = (np.arange(count) + 0.5) / count * depth
     pushes = []
-    near, far = (_with_particles(heights, friction, step, Plane([0, 0, at], [0, 0, 1]), scheme) for at in (0.0, -1e5))
+    near, far = (_with_particles(heights, friction, step, Plane([0, 0, at], [0, 0, 1])) for at in (0.0, -1e5))
     for _ in range(40):
         moved = []
         for context, integrator, first in (near, far):
@@ -329,9 +328,8 @@ def test_rods_between_walls_are_where_they_should_be(stiffness):
         assert abs(values.mean() - exact) < 0.03 * exact
 
 
-@pytest.mark.parametrize("scheme", ["implicit", "implicit-second-order"])
 @pytest.mark.parametrize("times", [1, 10])
-def test_filaments_stay_in_a_sphere(scheme, times):
+def test_filaments_stay_in_a_sphere(times):
     radius, stiffness = 500.0, 1.0
     filaments = Filaments(VISCOSITY, TEMPERATURE)
     generator = np.random.default_rng(1)
@@ -340,8 +338,8 @@ def test_filaments_stay_in_a_sphere(scheme, times):
         filaments.add_straight(ACTIN, 8, generator.uniform(-100, 100, 3) - 360 * direction, direction)
     _, system, positions = filaments.build()
     system.addForce(filament_wall_force(filaments, system, Sphere([0, 0, 0], radius), stiffness))
-    step = times * filaments.recommended_time_step(scheme=scheme).step
-    integrator = filaments.create_integrator(system, step, scheme=scheme, random_seed=1, checks=False)
+    step = times * filaments.recommended_time_step().step
+    integrator = filaments.create_integrator(system, step, random_seed=1, checks=False)
     context = new_context(system, positions, integrator)
     integrator.step(20)
     distances = []

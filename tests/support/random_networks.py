@@ -54,7 +54,10 @@ class RandomNetwork:
         recommended = self.filaments.recommended_time_step(system=self.system, particle_friction=self._friction)
         self.factor = float(self._generator.choice([0.1, 1, 1, 1, 3, 10]))
         self.step = self.factor * recommended.step
+        # Contacts and walls are for "implicit".
         self._scheme = _some(self._generator, 0.67, "implicit", "implicit-second-order")
+        if self._groups & {1, 3}:
+            self._scheme = "implicit"
         self._precision = _some(self._generator, 0.5, "automatic", "double")
 
     def context(self, share):
