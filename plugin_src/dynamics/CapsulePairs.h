@@ -76,6 +76,9 @@ public:
     PairContact& getContact(int number, int which) {
         return contacts[number/CHUNK][slots[number]].of[which];
     }
+    const PairContact& getContact(int number, int which) const {
+        return contacts[number/CHUNK][slots[number]].of[which];
+    }
     /** The gap below which a pair may push before it comes near: that of its contacts which the step resolves. */
     double getLargestRestGap(int number) const;
     /** Find the gaps of a pair's contacts where they were. */

@@ -356,3 +356,29 @@ void ContactEquations::linearise(int iteration, const double* moved, vector<Coup
         contactsOfEquations.insert(contactsOfEquations.end(), part.contacts.begin(), part.contacts.end());
     }
 }
+
+void ContactEquations::findPushes(const double*, vector<Push>& pushes) const {
+    for (int number = 0; number < pairs.getNumPairs(); number++) {
+        if (!pairs.hasContacts(number))
+            continue;
+        const ContactPair& pair = pairs.getPair(number);
+        for (int i = 0; i < pairs.getWatch(number).count; i++) {
+            const PairContact& own = pairs.getContact(number, i);
+            if (!own.touched)
+                continue;
+            const double s = own.contact.s, t = own.contact.t, stiff = own.contact.weight*stiffness;
+            const Vec3d now = pairs.getSegments(number, true).between(s, t);
+            double size = 1, force[3], projection[6];
+            if (own.rest.isBack())
+                own.rest.findForce(now, stiff, force, projection);
+            else {
+                const double* const n = own.contact.normal;
+                size = stiff*(restGapOf(own)-(now.x*n[0]+now.y*n[1]+now.z*n[2]-pairs.radiiOf(pair)));
+                copy_n(n, 3, force);
+            }
+            pushes.push_back(pushOfContact(search->getSystem(), pair.a, pair.b, s, t, size, force));
+            pushes.back().chains[0] = places[pair.a].place.chain;
+            pushes.back().chains[1] = places[pair.b].place.chain;
+        }
+    }
+}

@@ -50,6 +50,7 @@ public:
     bool markUnfinished(PackFlags& packs) const override;
     void findFailures(const double* moved, std::vector<bool>& failed) const override;
     bool findCulprit(const double* moved, const CouplingEquation* equations, BrokenCoupling& culprit) const override;
+    void findPushes(const double* moved, std::vector<Push>& pushes) const override;
     void findNeighbours(std::vector<std::pair<int, int> >& neighbours) const override;
 private:
     /**

@@ -261,3 +261,14 @@ bool WallEquations::findCulprit(const double*, const CouplingEquation*, BrokenCo
             }
     return false;
 }
+
+void WallEquations::findPushes(const double* moved, vector<Push>& pushes) const {
+    for (const Part& part : parts)
+        for (const State& state : part.states) {
+            if (state.equation < 0)
+                continue;
+            const double force = system->stiffness*(findDepthAt(state, moved)+state.restGap.get());
+            pushes.push_back(pushOfWall(*system, state.particle, state.face, force, state.gradient));
+            pushes.back().chains[0] = places[state.particle].chain;
+        }
+}

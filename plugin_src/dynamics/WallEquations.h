@@ -36,6 +36,7 @@ public:
     /** A wall has no other side that a step could get to: chains fail if iterations end before a depth has settled. */
     void findFailures(const double* moved, std::vector<bool>& failed) const override;
     bool findCulprit(const double* moved, const CouplingEquation* equations, BrokenCoupling& culprit) const override;
+    void findPushes(const double* moved, std::vector<Push>& pushes) const override;
     void findNeighbours(std::vector<std::pair<int, int> >&) const override {
         // Walls join no chains.
     }
