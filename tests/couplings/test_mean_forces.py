@@ -7,7 +7,6 @@ from openmm import unit
 
 from openmm_cylchain import (
     F_ACTIN,
-    Box,
     Filaments,
     InputError,
     Plane,
@@ -118,6 +117,33 @@ def test_walls_have_the_mean_force_of_quadrature(share, duration, allowed):
     assert np.mean(means) == pytest.approx(exact, abs=4 * error + allowed * exact)
 
 
+def test_contacts_have_the_mean_force_of_overlaps():
+    """Of dense rods between walls: mean forces of contacts and walls over steps, over those of overlaps at their ends."""
+    simulation = _rods_in_a_slab(threads=1)
+    contacts = plugin.CylinderChainContactForce.cast(simulation.context.getSystem().getForce(1))
+    simulation.integrator.step(1000)
+    ratios = []
+    for _ in range(16):
+        contact_forces(simulation.context)
+        overlaps = 0.0
+        for _ in range(50):
+            simulation.integrator.step(4)
+            overlaps += sum(contacts.getContacts(simulation.context)[3]._value) / 50
+        ratios.append(contact_forces(simulation.context)[0].loads._value.sum() / overlaps)
+    error = np.std(ratios, ddof=1) / 4
+    assert 4 * error < 0.08
+    assert np.mean(ratios) == pytest.approx(1.0, abs=0.03 + 4 * error)
+
+
+def _rods_in_a_slab(threads):
+    system = RODS_IN_A_SLAB
+    rng = np.random.default_rng(2)
+    middles = rng.uniform(0, 1, (1, system.rods, 3)) * [340.0, 340.0, 60.0] + [0, 0, 20.0]
+    along = rng.normal(size=middles.shape) * [1, 1, 0.1]
+    along *= system.length / np.linalg.norm(along, axis=-1, keepdims=True)
+    return RodSimulation(system, middles, along, threads=threads)
+
+
 @pytest.mark.parametrize("scheme", ["implicit", "implicit-second-order"])
 @pytest.mark.parametrize("step", [1e4, 1e6])
 def test_without_noise_forces_are_what_moves_filaments(scheme, step):
@@ -134,6 +160,39 @@ def test_without_noise_forces_are_what_moves_filaments(scheme, step):
         moved = (positions_of(context) - before)[:, 2].mean()
         found = wall_forces(context)[0].sums._value[0, 2]
         assert found == pytest.approx(2 * load + friction * moved / step, abs=2e-3 * load)
+
+
+@pytest.mark.parametrize(
+    ("scheme", "load", "step", "divides"),
+    [
+        ("implicit", 1.0, 1e6, False),
+        ("implicit", 50.0, 4e5, True),
+        ("implicit-second-order", 1.0, 1e5, False),
+    ],
+)
+def test_without_noise_contacts_are_what_moves_filaments(scheme, load, step, divides):
+    """Two rods across each other that a load in pN presses together, in steps that are divided, too."""
+    filaments = Filaments(VISCOSITY, 0.0)
+    filaments.add_straight(F_ACTIN.with_segment_length(100), 1, [-50, 0, 12], [1, 0, 0])
+    filaments.add_straight(F_ACTIN.with_segment_length(100), 1, [0, -50, 0], [0, 1, 0])
+    _, system, positions = filaments.build()
+    nodes = np.concatenate(filaments.node_indices)
+    system.addForce(capsule_contact_force(filaments, system, 20.0, PICONEWTON))
+    presses = 0.5 * load * PICONEWTON * np.array([[0, 0, -1], [0, 0, -1], [0, 0, 1], [0, 0, 1]])
+    system.addForce(constant_force(nodes, presses))
+    context = _context(filaments, system, np.array(positions._value), step, scheme)
+    friction = plugin.CylinderChainForce.cast(system.getForce(0)).getSegmentParameters(0, 0)[4]._value
+    for _ in range(4):
+        before = positions_of(context)
+        _steps(context, 1)
+        moved = (positions_of(context) - before)[:2, 2].mean()
+        (found,) = contact_forces(context)
+        expected = load * PICONEWTON + friction * moved / step
+        assert expected > 0.1
+        np.testing.assert_allclose(found.on_filaments(filaments)._value[:, 2], [expected, -expected], rtol=1e-9)
+        np.testing.assert_allclose(found.loads._value, [expected], rtol=1e-9)
+        assert found.pairs.tolist() == [[0, 1]]
+    assert (context.getIntegrator().getNumDividedSteps() > 0) == divides
 
 
 # Where nothing is summed up
@@ -162,7 +221,7 @@ def test_explicit_steps_have_forces_at_their_starts(scheme):
 
 
 @ON_COMPILED_PLATFORMS
-@pytest.mark.parametrize("shape", [*SHAPES, Box([-1, -2, -1], [1, 2, 3])], ids=lambda shape: type(shape).__name__)
+@pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: type(shape).__name__)
 def test_without_steps_forces_are_those_at_the_positions(shape, platform):
     """Of both kinds of walls: those that OpenMM has of them, in the sum of faces."""
     filaments, system, _ = _rods(10, segments=3)
@@ -261,12 +320,7 @@ def test_forces_do_not_depend_on_threads():
     """To the bit, of rods with contacts between walls, whose steps are long."""
     found = []
     for threads in (1, 2, 3):
-        system = RODS_IN_A_SLAB
-        rng = np.random.default_rng(2)
-        middles = rng.uniform(0, 1, (1, system.rods, 3)) * [340.0, 340.0, 60.0] + [0, 0, 20.0]
-        along = rng.normal(size=middles.shape) * [1, 1, 0.1]
-        along *= system.length / np.linalg.norm(along, axis=-1, keepdims=True)
-        simulation = RodSimulation(system, middles, along, threads=threads)
+        simulation = _rods_in_a_slab(threads)
         simulation.integrator.step(60)
         forces = [*contact_forces(simulation.context), *wall_forces(simulation.context)]
         found.append([part._value for own in forces for part in (own.forces, own.loads, own.sums)])
