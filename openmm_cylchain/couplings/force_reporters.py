@@ -36,12 +36,12 @@ def rows_of_contacts(contacts: list[ContactForces], filaments: FilamentCollectio
 class WallForceReporter(TableReporter):
     """Reports the force of every face of every wall: its mean over the steps since the report before.
 
-    A line for each wall, in the order of ``wall_forces``, and face. Columns: ``duration_ps``, of the steps that the mean
-    is taken over, 0 for a force at the present positions (see ``wall_forces``); ``load``, the sum of the sizes of the
-    forces, which is the pressure over the area of the face; ``force_x``, ``force_y``, ``force_z`` of the wall on what
-    it keeps in; all of them in kJ/(mol nm), of which 0.602214 are 1 pN. ``reporter["load"]`` is an array (reports,
-    faces of all walls), and ``reporter.places`` says which. A run that goes on from a checkpoint and a step that has
-    been reported, as from a State, has its next mean from there on.
+    A line for each wall, in the order of ``wall_forces``, and face. Columns: ``duration_ps``, of the steps that the
+    mean is taken over, 0 for a force at the present positions (see ``wall_forces``); ``load``, the sum of the sizes of
+    the forces, which over the area of the face is the pressure; ``force_x``, ``force_y``, ``force_z`` of the wall on
+    what it keeps in; all of them in kJ/(mol nm), of which 0.602214 are 1 pN. ``reporter["load"]`` is an array (reports,
+    faces of all walls), and ``reporter.places`` says which. Where a script goes on from a checkpoint between two
+    reports, the next mean is that of the steps from there on.
 
     Parameters
     ----------

@@ -22,9 +22,9 @@ class ForceTables:
     """
 
     def __init__(self, files: RunFiles, walls: bool, contacts: bool, sizes: Sequence[int] | None = None) -> None:
-        sizes = (None, None) if sizes is None else sizes
-        self._walls = ReportTable(files.wall_forces, WALL_FORCE_COLUMNS, sizes[0]) if walls else None
-        self._contacts = ReportTable(files.contact_forces, CONTACT_FORCE_COLUMNS, sizes[1]) if contacts else None
+        of_walls, of_contacts = (None, None) if sizes is None else sizes
+        self._walls = ReportTable(files.wall_forces, WALL_FORCE_COLUMNS, of_walls) if walls else None
+        self._contacts = ReportTable(files.contact_forces, CONTACT_FORCE_COLUMNS, of_contacts) if contacts else None
 
     def write(
         self,

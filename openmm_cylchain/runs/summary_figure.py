@@ -263,8 +263,9 @@ def _draw_forces(axes, configuration, directory, times):
 
 
 def _face_label(wall, number, face):
-    label = f"wall {number}, {type(wall.shape).__name__.lower()}"
-    faces = len(wall.shape.faces)
+    # As files name shapes.
+    kind = type(wall.shape).__name__.lower().replace("slab", "slit")
+    label, faces = f"wall {number}, {kind}", len(wall.shape.faces)
     if faces == 6:
         return f"{label}, {('lower', 'upper')[face % 2]} {'xyz'[face // 2]}"
     return f"{label}, {('upper', 'lower')[face]} face" if faces == 2 else label

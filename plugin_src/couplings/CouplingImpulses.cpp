@@ -6,6 +6,9 @@
 using namespace cylchain;
 using namespace std;
 
+/** The most pairs whose sums are kept for nobody. */
+static const size_t MOST_PAIRS_UNASKED = 100000;
+
 Push cylchain::pushOfWall(const WallSystem& system, int particle, int face, double force, const double* gradient) {
     Push push;
     push.particles[0] = system.particles[particle].particle;
@@ -92,7 +95,7 @@ void CouplingImpulses::Sums::clear() {
 
 CouplingImpulses::CouplingImpulses(int numParticles) {
     latest.particles.assign(3*(size_t) numParticles, 0.0);
-    addReader();
+    readers.push_back(latest);
 }
 
 void CouplingImpulses::finishStep(double stepSize) {
@@ -100,9 +103,12 @@ void CouplingImpulses::finishStep(double stepSize) {
         latest.add(part.push, part.duration);
     ofStep.clear();
     latest.time += stepSize;
+    if (!asked && latest.loads.size() > MOST_PAIRS_UNASKED)
+        latest.clear();
 }
 
 int CouplingImpulses::addReader() {
+    asked = true;
     for (Sums& own : readers)
         own.add(latest);
     latest.clear();
@@ -111,6 +117,7 @@ int CouplingImpulses::addReader() {
 }
 
 CouplingImpulses::Sums CouplingImpulses::take(int reader) {
+    asked = true;
     for (Sums& own : readers)
         own.add(latest);
     latest.clear();
@@ -128,6 +135,7 @@ void CouplingImpulses::clear() {
 
 void CouplingImpulses::restore(const Sums& newLatest, const vector<Sums>& newReaders) {
     clear();
+    asked = true;
     latest = newLatest;
     const Sums none = readers[0];
     const size_t count = max(readers.size(), newReaders.size());

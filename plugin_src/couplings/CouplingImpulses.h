@@ -39,7 +39,8 @@ Push pushOfContact(const CapsuleSystem& system, int a, int b, double s, double t
 /**
  * The impulses of a force, which are its integral over time, of the steps since somebody has asked for them.
  *
- * Several may ask in turn: each of these readers has the sums since it has asked last.
+ * Several may ask in turn: each of these readers has the sums since it has asked last. Until somebody asks, sums begin
+ * again where there are too many pairs of what pushes each other.
  */
 class CouplingImpulses {
 public:
@@ -92,6 +93,7 @@ private:
     std::vector<Part> ofStep;
     Sums latest;
     std::vector<Sums> readers;
+    bool asked = false;
 };
 
 } // namespace cylchain

@@ -325,8 +325,8 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
     val = [val[0], val[1], unit.Quantity(val[2], _LENGTH), unit.Quantity(val[3], _FORCE), val[4]]
 %}
 %define %unitsOfMeanForces(Class)
-%pythonappend OpenMM::Class::takeMeanForces(Context&, int, std::vector<double>&, std::vector<int>&, std::vector<double>&,
-        std::vector<double>&) %{
+%pythonappend OpenMM::Class::takeMeanForces(Context&, int, std::vector<double>&, std::vector<int>&,
+        std::vector<double>&, std::vector<double>&) %{
     val = [unit.Quantity(val[0], unit.picosecond), unit.Quantity(val[1], _FORCE), val[2],
            *(unit.Quantity(v, _FORCE) for v in val[3:])]
 %}

@@ -11,7 +11,6 @@ from openmm_cylchain import (
     InputError,
     Plane,
     Slab,
-    Sphere,
     capsule_contact_force,
     constant_force,
     contact_forces,
@@ -118,7 +117,7 @@ def test_walls_have_the_mean_force_of_quadrature(share, duration, allowed):
 
 
 def test_contacts_have_the_mean_force_of_overlaps():
-    """Of dense rods between walls: mean forces of contacts and walls over steps, over those of overlaps at their ends."""
+    """Of dense rods between walls: means over steps, over the forces of overlaps at the ends of steps."""
     simulation = _rods_in_a_slab(threads=1)
     contacts = plugin.CylinderChainContactForce.cast(simulation.context.getSystem().getForce(1))
     simulation.integrator.step(1000)
@@ -280,9 +279,10 @@ def test_readers_do_not_shorten_what_others_have_the_mean_of():
     context = _pressed()
     readers = [ForceReaders(context), ForceReaders(context)]
     told = np.zeros((3, 4, 3))
+    asks = (5, lambda: wall_forces(context)), (3, readers[0].wall_forces), (30, readers[1].wall_forces)
     for count in range(1, 31):
         _steps(context, 1)
-        for number, every, ask in ((0, 5, lambda: wall_forces(context)), (1, 3, readers[0].wall_forces), (2, 30, readers[1].wall_forces)):
+        for number, (every, ask) in enumerate(asks):
             if count % every == 0:
                 (found,) = ask()
                 assert found.duration._value == pytest.approx(every * 2e5)

@@ -87,7 +87,8 @@ def test_run_with_everything_is_resumed_to_the_bit(tmp_path):
     process.kill()
     assert finish(process)[0] == -signal.SIGKILL
     run(configuration, output, resume=True)
-    for name in ("trajectory.dcd", "energies.csv", "linkers.csv", "linkers.npy", "wall_forces.csv", "contact_forces.csv"):
+    tables = ("energies.csv", "linkers.csv", "linkers.npy", "wall_forces.csv", "contact_forces.csv")
+    for name in ("trajectory.dcd", *tables):
         begin = 276 if name.endswith("dcd") else 0
         contents = [(tmp_path / folder / name).read_bytes()[begin:] for folder in ("one", "two")]
         assert contents[0] == contents[1], name

@@ -117,8 +117,7 @@ def test_the_figure_has_panels_of_forces(unbroken, monkeypatch):
     summary_figure._draw(configuration, files, load_trajectory(configuration, files))
     walls, contacts = drawn[0].axes[-2:]
     assert walls.get_title() == "Forces of walls, by faces"
-    assert [line.get_label() for line in walls.lines] == ["wall 0, slab, upper face", "wall 0, slab, lower face"]
+    assert [line.get_label() for line in walls.lines] == ["wall 0, slit, upper face", "wall 0, slit, lower face"]
     table = analysis.load(unbroken).contact_forces["load (kJ/mol/nm)"][1:] / 0.602214076
     np.testing.assert_allclose(contacts.lines[0].get_ydata(), table.mean(axis=1))
     np.testing.assert_allclose(contacts.lines[1].get_ydata(), table.max(axis=1))
-

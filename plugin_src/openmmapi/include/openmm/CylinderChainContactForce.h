@@ -183,7 +183,8 @@ public:
      * @param[out] forces  on all particles of the System, three numbers for each, measured in kJ/mol/nm
      * @param[out] numbers two for each pair of bodies that have touched: the numbers of chains, and those of
      *                     spheres behind them
-     * @param[out] sums    of these, the sum of the forces on the first one, three numbers for each, measured in kJ/mol/nm
+     * @param[out] sums    of these, the sum of the forces on the first one, three numbers for each, measured in
+     *                     kJ/mol/nm
      * @param[out] loads   and the sum of the sizes of the forces, measured in kJ/mol/nm
      * @return how long the steps have taken together, measured in ps, or 0 for the present positions
      */

@@ -11,7 +11,8 @@
 namespace OpenMM {
 
 /**
- * This is the implementation of a Force of contacts or walls, whose mean over steps of CylinderChainIntegrator is known.
+ * This is the implementation of a Force of contacts or walls, whose mean over steps of CylinderChainIntegrator is
+ * known.
  */
 class PushForceImpl : public StepForceImpl {
 public:
