@@ -28,12 +28,12 @@ class WallForces:
         Of the steps over which forces are means; 0 for those at the present positions.
     forces : (particles, 3) force
         On each particle of the System, those that the wall does not touch among them.
-    loads : (faces,) force
-        The sum of the sizes of the forces of a face: over its area, it is the pressure. A ``Slab`` has two faces, of
+    loads : (n,) force
+        The sum of the sizes of the forces of each face: over its area, it is the pressure. A ``Slab`` has two faces, of
         which the first is the one that its normal points at, a ``Box`` six (lower x, upper x, lower y, ...), other
         shapes have one.
-    sums : (faces, 3) force
-        The sum of the forces of a face on what it keeps in.
+    sums : (n, 3) force
+        The sum of the forces of each face on what it keeps in.
     """
 
     force: int
