@@ -11,7 +11,9 @@ from .couplings.contact_frames import find_contacts
 from .couplings.contacts import add_exclusions, contact_force, crossing_barrier, excluded_pairs, share_exclusions
 from .couplings.crosslink_tables import CrosslinkTable
 from .couplings.crosslinks import Crosslinks
+from .couplings.force_reporters import ContactForceReporter, WallForceReporter
 from .couplings.joints import Joints
+from .couplings.mean_forces import ContactForces, WallForces, contact_forces, wall_forces
 from .couplings.pulling import ConstantVelocityPulling, change_constant_force, constant_force, constant_tension
 from .couplings.wall_points import random_points_on
 from .couplings.walls import Box, Cylinder, Ellipsoid, Plane, Slab, Sphere, filament_wall_force, wall_force
@@ -59,6 +61,8 @@ __all__ = [
     "Box",
     "BoxWarning",
     "ConstantVelocityPulling",
+    "ContactForceReporter",
+    "ContactForces",
     "ContactWarning",
     "CrosslinkReporter",
     "CrosslinkTable",
@@ -105,6 +109,8 @@ __all__ = [
     "TimeStep",
     "TimeStepError",
     "TimeStepWarning",
+    "WallForceReporter",
+    "WallForces",
     "__version__",
     "add_exclusions",
     "analysis",
@@ -115,6 +121,7 @@ __all__ = [
     "constant_force",
     "constant_tension",
     "contact_force",
+    "contact_forces",
     "crossing_barrier",
     "effective_rate",
     "enable_platform",
@@ -132,6 +139,7 @@ __all__ = [
     "theory",
     "time_step_bounds",
     "wall_force",
+    "wall_forces",
     "write_lammps_data",
     "write_psf",
 ]

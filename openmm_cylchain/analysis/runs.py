@@ -208,9 +208,24 @@ class Run:
     def pulling(self) -> dict[str, FloatArray]:
         """Points, forces and extensions of tethers that move: (frames, tethers) arrays by the headers of
         ``pulling.csv``, empty without such."""
-        if not self._files.pulling.exists():
+        return self._by_frame(self._files.pulling)
+
+    @cached_property
+    def wall_forces(self) -> dict[str, FloatArray]:
+        """Forces of walls, means over the steps between frames: (frames, faces of all walls) arrays by the headers of
+        ``wall_forces.csv``, empty without walls."""
+        return self._by_frame(self._files.wall_forces)
+
+    @cached_property
+    def contact_forces(self) -> dict[str, FloatArray]:
+        """Forces of contacts, means over the steps between frames: (frames, filaments) arrays by the headers of
+        ``contact_forces.csv``, empty without contacts."""
+        return self._by_frame(self._files.contact_forces)
+
+    def _by_frame(self, path):
+        if not path.exists():
             return {}
-        table = _read_table(self._files.pulling)
+        table = _read_table(path)
         count = int(np.sum(table["step"] == table["step"][0]))
         return {name: values[: count * len(self)].reshape(-1, count) for name, values in table.items()}
 
@@ -581,8 +596,10 @@ def _whole_frames(files, description):
         unfinished = held > 0 and (len(recorded) == 0 or recorded[-1] < expected[frames - 1])
         if frames < _frames_of(description) and unfinished:
             frames -= 1
-    if files.pulling.exists():
-        steps = _read_table(files.pulling)["step"]
+    for path in (files.pulling, files.wall_forces, files.contact_forces):
+        if not path.exists():
+            continue
+        steps = _read_table(path)["step"]
         first = np.sum(steps == steps[0]) if len(steps) else 1
         frames = min(frames, len(steps) // int(first))
     return frames, energies

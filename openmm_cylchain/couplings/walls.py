@@ -5,7 +5,9 @@ A wall pushes back what is beyond it, with the energy ``(k/2) d^2`` for the dept
 """
 
 import math
+import re
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -56,6 +58,30 @@ class Shape(ABC):
     def square_depth(self, positions: npt.ArrayLike) -> FloatOrArray:
         """The square of the depth, in nm^2, for positions (..., 3); zero inside."""
 
+    @property
+    def faces(self) -> "tuple[Face, ...]":
+        """What the wall is made of: planes of a slab or box, in the order of the compiled engine, or itself."""
+        raise NotImplementedError
+
+
+class Face(Shape):
+    """A region with one face."""
+
+    @property
+    def faces(self) -> "tuple[Face, ...]":
+        return (self,)
+
+    @abstractmethod
+    def depths(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Depths beyond the face in nm, negative inside, and their gradients, for positions (n, 3)."""
+
+
+def _radial(vectors, radius):
+    # Depths and gradients of what is so far from a centre or an axis; in the middle, there is no gradient.
+    distances = np.linalg.norm(vectors, axis=-1)
+    scale = np.divide(1.0, distances, out=np.zeros_like(distances), where=distances > 0.0)
+    return distances - radius, vectors * scale[:, None]
+
 
 def _number(value):
     return f"({float(value)!r})"
@@ -71,7 +97,7 @@ def _beyond(expression):
 
 
 @dataclass(frozen=True)
-class Plane(Shape):
+class Plane(Face):
     """The half space to which a normal points.
 
     Parameters
@@ -107,6 +133,10 @@ class Plane(Shape):
 
     def square_depth(self, positions: npt.ArrayLike) -> FloatOrArray:
         return np.maximum(0.0, -((np.asarray(positions) - self.point) @ self.normal)) ** 2
+
+    def depths(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+        depths = -((positions - self.point) @ self.normal)
+        return depths, np.broadcast_to(-self.normal, (len(depths), 3))
 
 
 @dataclass(frozen=True)
@@ -150,9 +180,14 @@ class Slab(Shape):
         height = np.abs((np.asarray(positions) - self.point) @ self.normal)
         return np.maximum(0.0, height - 0.5 * self.thickness) ** 2
 
+    @property
+    def faces(self) -> tuple[Face, ...]:
+        half = 0.5 * self.thickness * self.normal
+        return Plane(self.point + half, -self.normal), Plane(self.point - half, self.normal)
+
 
 @dataclass(frozen=True)
-class Sphere(Shape):
+class Sphere(Face):
     """The inside of a sphere.
 
     Parameters
@@ -189,9 +224,12 @@ class Sphere(Shape):
         distance = np.linalg.norm(np.asarray(positions) - self.center, axis=-1)
         return np.maximum(0.0, distance - self.radius) ** 2
 
+    def depths(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return _radial(positions - self.center, self.radius)
+
 
 @dataclass(frozen=True)
-class Cylinder(Shape):
+class Cylinder(Face):
     """The inside of a cylinder without ends.
 
     Parameters
@@ -238,6 +276,10 @@ class Cylinder(Shape):
         across = (np.asarray(positions) - self.point) @ np.transpose(self._across())
         return np.maximum(0.0, np.linalg.norm(across, axis=-1) - self.radius) ** 2
 
+    def depths(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+        relative = positions - self.point
+        return _radial(relative - (relative @ self.axis)[:, None] * self.axis, self.radius)
+
 
 @dataclass(frozen=True)
 class Box(Shape):
@@ -280,9 +322,14 @@ class Box(Shape):
         beyond = np.maximum(0.0, np.maximum(self.lower - positions, positions - self.upper))
         return np.sum(beyond**2, axis=-1)
 
+    @property
+    def faces(self) -> tuple[Face, ...]:
+        sides = (self.lower, 1.0), (self.upper, -1.0)
+        return tuple(Plane(corner, sign * axis) for axis in np.eye(3) for corner, sign in sides)
+
 
 @dataclass(frozen=True)
-class Ellipsoid(Shape):
+class Ellipsoid(Face):
     """The inside of an ellipsoid with axes along x, y and z.
 
     With s^2 the sum of (x_i/a_i)^2, the depth is taken as (s-1)/|grad s|, which is the distance from the surface to
@@ -335,6 +382,16 @@ class Ellipsoid(Shape):
         s = np.sqrt(np.sum((relative / self.semi_axes) ** 2, axis=-1))
         steepness = np.sum(relative**2 / self.semi_axes**4, axis=-1)
         return np.maximum(0.0, s - 1.0) ** 2 * s**2 / np.maximum(steepness, self._least_steepness)
+
+    def depths(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+        relative, squares = positions - self.center, self.semi_axes**2
+        s = np.sqrt(np.sum(relative**2 / squares, axis=-1))
+        steepness = np.maximum(np.sum(relative**2 / squares**2, axis=-1), self._least_steepness)
+        depths = (s - 1.0) * s / np.sqrt(steepness)
+        # Of the square of s, and of the steepness; inside, the gradient is of no use.
+        of_square, of_steepness = 2.0 * relative / squares, 2.0 * relative / squares**2
+        rise = (1.0 - 0.5 / np.maximum(s, 0.5)) / np.sqrt(steepness)
+        return depths, rise[:, None] * of_square - (0.5 * depths / steepness)[:, None] * of_steepness
 
 
 def _set(instance, name, value):
@@ -461,3 +518,37 @@ def as_filament_wall_force(force: openmm.Force) -> Any | None:
     if not plugin.CylinderChainWallForce.isinstance(force):
         return None
     return plugin.CylinderChainWallForce.cast(force)
+
+
+def shape_of_wall(force: openmm.Force) -> tuple[Shape, float] | None:
+    """The shape and the stiffness, in kJ/(mol nm^2), of a ``wall_force``; None of another force."""
+    if not isinstance(force, openmm.CustomExternalForce):
+        return None
+    expression = force.getEnergyFunction()
+    stiffness, *numbers = map(float, _NUMBER.findall(expression) or [0.0])
+    for name, read in _READ.items():
+        if force.getName() != f"{WALL_NAME} ({name})":
+            continue
+        try:
+            shape = read(np.array(numbers))
+        except (InputError, IndexError, ValueError):
+            return None
+        # Of another formula, numbers mean something else.
+        alike = wall_force(shape, 2.0 * stiffness, []).getEnergyFunction()
+        if _NUMBER.sub("", alike) == _NUMBER.sub("", expression):
+            return shape, 2.0 * stiffness
+    return None
+
+
+# As _number() writes them.
+_NUMBER = re.compile(r"\((-?[0-9][-+.e0-9]*)\)")
+
+# Shapes from the numbers in their formulas. Of a cylinder, there are two directions across its axis.
+_READ: dict[str, Callable[[FloatArray], Shape]] = {
+    "plane": lambda v: Plane(v[1:6:2], v[0:6:2]),
+    "slab": lambda v: Slab(v[1:6:2], v[0:6:2], 2.0 * v[6]),
+    "sphere": lambda v: Sphere(v[:3], v[3]),
+    "cylinder": lambda v: Cylinder(v[1:6:2], np.cross(v[0:6:2], v[6:12:2]), v[12]),
+    "box": lambda v: Box(v[0:6:2], v[1:6:2]),
+    "ellipsoid": lambda v: Ellipsoid(v[1:7:2], v[2:7:2] ** -0.5),
+}

@@ -41,8 +41,8 @@ class MeasuredCrosslinks(Protocol):
     def measure(self, context: openmm.Context, state: openmm.State) -> tuple[Any, FloatArray, FloatArray]: ...
 
 
-class _TableReporter(ABC):
-    # What reporters of a table have in common: a line for each thing and report.
+class TableReporter(ABC):
+    """What reporters of a table have in common: a line for each thing and report."""
 
     _columns: tuple[str, ...] = ()
     _thing = ""
@@ -98,6 +98,13 @@ class _TableReporter(ABC):
         """The times of all reports so far, in ps."""
         return np.array([time for _, time in self._reports], dtype=float)
 
+    def __getitem__(self, column: str) -> FloatArray:
+        """An array (reports, things) of a column."""
+        if column not in self._columns:
+            raise InputError(f"There is no column {column!r}: known are {', '.join(self._columns)}.")
+        table = np.array(self._rows, dtype=float).reshape(len(self._rows), -1, len(self._columns))
+        return table[:, :, self._columns.index(column)]
+
     def close(self) -> None:
         """Close the file, if the reporter has opened it."""
         if getattr(self, "_owned", False) and self._file is not None:
@@ -128,7 +135,7 @@ def _check_filaments(filaments):
         raise InputError(f"filaments must be a Filaments object, but is {type(filaments).__name__}.")
 
 
-class FilamentsReporter(_TableReporter):
+class FilamentsReporter(TableReporter):
     """What reporters of things whose number does not change have in common: arrays (reports, things)."""
 
     def __init__(
@@ -138,13 +145,6 @@ class FilamentsReporter(_TableReporter):
         self._filaments = filaments
         self._nodes = filaments.node_indices
         super().__init__(file, reportInterval, append)
-
-    def __getitem__(self, column: str) -> FloatArray:
-        """An array (reports, filaments or tethers) of a column."""
-        if column not in self._columns:
-            raise InputError(f"There is no column {column!r}: known are {', '.join(self._columns)}.")
-        table = np.array(self._rows, dtype=float).reshape(len(self._rows), -1, len(self._columns))
-        return table[:, :, self._columns.index(column)]
 
 
 class FilamentReporter(FilamentsReporter):
@@ -332,7 +332,7 @@ class TetherReporter(FilamentsReporter):
         return range(len(rows)), rows
 
 
-class CrosslinkReporter(_TableReporter):
+class CrosslinkReporter(TableReporter):
     """Reports the particles, length, extension and force of every crosslink that there is at a report.
 
     Columns: ``particle_1``, ``particle_2``, ``length`` d and ``extension`` d - d0 in nm, ``force`` dV/dd in

@@ -25,6 +25,8 @@ class RunFiles:
         self.linker_places = self.path / "linkers.npy"
         self.pulling = self.path / "pulling.csv"
         self.crosslinks = self.path / "crosslinks.npy"
+        self.wall_forces = self.path / "wall_forces.csv"
+        self.contact_forces = self.path / "contact_forces.csv"
         self.checkpoint = self.path / "checkpoint.chk"
         self.summary = self.path / "summary.json"
         self.figure = self.path / "summary.png"

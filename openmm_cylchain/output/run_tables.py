@@ -146,6 +146,21 @@ PULLING_TABLE_COLUMNS = (
 """A line per report and moving tether; the extension is that of the end-to-end vector that points to the tether."""
 
 
+_MEAN_FORCE_COLUMNS = (
+    "mean over (ps)",
+    "load (kJ/mol/nm)",
+    "force x (kJ/mol/nm)",
+    "force y (kJ/mol/nm)",
+    "force z (kJ/mol/nm)",
+)
+
+WALL_FORCE_COLUMNS = ("step", "time (ps)", "wall", "face", *_MEAN_FORCE_COLUMNS)
+"""A line per report and face of a wall: its force on what it keeps in, and the sum of the sizes of its forces."""
+
+CONTACT_FORCE_COLUMNS = ("step", "time (ps)", "filament", *_MEAN_FORCE_COLUMNS)
+"""A line per report and filament: the force of all contacts on it, and the sum of the sizes of their forces."""
+
+
 class ReportTable:
     """A table of comma-separated values that can be continued.
 

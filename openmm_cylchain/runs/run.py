@@ -11,6 +11,8 @@ from openmm import app, unit
 
 from ..couplings.crosslink_records import CrosslinkFile
 from ..couplings.crosslinks import Crosslinks
+from ..couplings.force_tables import ForceTables
+from ..couplings.mean_forces import contact_forces, wall_forces
 from ..dynamics.precision import PRECISIONS
 from ..engines.description import describe_lengths, filament_label
 from ..engines.gpu_platforms import GPU_PLATFORMS, enable_platform
@@ -53,7 +55,9 @@ def run(configuration, output, resume=False):
     ``topology.cif``, the same for VMD (``topology.psf``) and OVITO (``topology.data``), ``trajectory.dcd`` (the initial
     configuration and one frame per report interval), ``energies.csv`` and ``checkpoint.chk``; with linkers also
     ``linkers.csv`` (how many are bound, their tensions) and ``linkers.npy`` (where each one is, see
-    ``LinkerReporter``). A resumed run ends with the same files, to the bit, as one that was never interrupted.
+    ``LinkerReporter``); with walls ``wall_forces.csv``, and with contacts ``contact_forces.csv``: forces of each face,
+    and on each filament, means over the steps since the report before. A resumed run ends with the same files, to the
+    bit, as one that was never interrupted.
 
     Parameters
     ----------
@@ -275,6 +279,7 @@ class _Recorder:
         self._checkpoint = checkpoint
         self._step = 0 if checkpoint is None else checkpoint.step
         self._moving = MovingTethers(configuration, filaments)
+        self._has_forces = bool(configuration.walls), configuration.contacts is not None
 
     def run_to_end(self):
         settings, begun = self._settings, self._checkpoint
@@ -295,6 +300,8 @@ class _Recorder:
         if self._moving:
             self._pulling = ReportTable(self._directory.pulling, PULLING_TABLE_COLUMNS, begun and begun.pulling_size)
             files.append(self._pulling)
+        self._forces = ForceTables(self._directory, *self._has_forces, begun and begun.force_sizes)
+        files.append(self._forces)
         with contextlib.ExitStack() as stack, _Signals() as signals:
             for file in files:
                 stack.enter_context(contextlib.closing(file))
@@ -357,6 +364,9 @@ class _Recorder:
             for number, row in enumerate(rows):
                 self._linkers.write(self._step, (self._step * self._settings.time_step, number, *row))
             self._places.write(records)
+        if any(self._has_forces):
+            time, walls, contacts = self._step * self._settings.time_step, wall_forces(context), contact_forces(context)
+            self._forces.write(self._step, time, walls, contacts, self._filaments)
         for row in self._moving.rows(self._step, positions):
             self._pulling.write(self._step, row)
 
@@ -404,6 +414,7 @@ class _Recorder:
                 linkers_size=self._linkers.synchronise() if self._filaments.linkers else 0,
                 linker_records=self._places.synchronise() if self._filaments.linkers else 0,
                 pulling_size=self._pulling.synchronise() if self._moving else 0,
+                force_sizes=self._forces.synchronise(),
                 state=self._simulation.context.createCheckpoint(),
             )
         )

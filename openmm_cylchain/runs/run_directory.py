@@ -13,12 +13,17 @@ import numpy as np
 from ..errors import InputError
 from ..output.files import write_atomically
 from ..output.run_files import RunFiles, try_lock
-from ..output.run_tables import ENERGY_COLUMNS, LINKER_TABLE_COLUMNS
+from ..output.run_tables import (
+    CONTACT_FORCE_COLUMNS,
+    ENERGY_COLUMNS,
+    LINKER_TABLE_COLUMNS,
+    WALL_FORCE_COLUMNS,
+)
 from ..version import __version__
 from .configuration import changed_keys, read_configuration
 from .start_files import COPIES
 
-_MAGIC = "openmm-cylchain checkpoint 3"
+_MAGIC = "openmm-cylchain checkpoint 4"
 
 
 @dataclass(frozen=True)
@@ -34,6 +39,7 @@ class Checkpoint:
     linkers_size: int = 0
     linker_records: int = 0
     pulling_size: int = 0
+    force_sizes: tuple[int, int] = (0, 0)
 
 
 class RunDirectory(RunFiles):
@@ -115,6 +121,8 @@ class RunDirectory(RunFiles):
             self.linker_places,
             self.crosslinks,
             self.pulling,
+            self.wall_forces,
+            self.contact_forces,
         )
         for path in (*results, self.topology, self.summary, self.figure):
             if path.exists():
@@ -151,6 +159,7 @@ class RunDirectory(RunFiles):
             "linkers_size": checkpoint.linkers_size,
             "linker_records": checkpoint.linker_records,
             "pulling_size": checkpoint.pulling_size,
+            "force_sizes": checkpoint.force_sizes,
             "state_size": len(checkpoint.state),
         }
         header["digest"] = digest_of_checkpoint(header, checkpoint.state)
@@ -180,6 +189,7 @@ class RunDirectory(RunFiles):
                 linkers_size=header["linkers_size"],
                 linker_records=header["linker_records"],
                 pulling_size=header["pulling_size"],
+                force_sizes=tuple(header["force_sizes"]),
                 state=state,
             )
         except InputError:
@@ -220,3 +230,19 @@ def read_linkers(path):
     values = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
     types = int(values[:, LINKER_TABLE_COLUMNS.index("linkers")].max()) + 1
     return dict(zip(LINKER_TABLE_COLUMNS, np.moveaxis(values.reshape(-1, types, values.shape[1]), 2, 0)))
+
+
+def read_wall_forces(path):
+    """Read a table of forces of walls: a dict of arrays (reports, faces of all walls) by WALL_FORCE_COLUMNS."""
+    return _by_report(path, WALL_FORCE_COLUMNS)
+
+
+def read_contact_forces(path):
+    """Read a table of forces of contacts: a dict of arrays (reports, filaments) by CONTACT_FORCE_COLUMNS."""
+    return _by_report(path, CONTACT_FORCE_COLUMNS)
+
+
+def _by_report(path, columns):
+    values = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
+    things = int(np.sum(values[:, 0] == values[0, 0]))
+    return dict(zip(columns, np.moveaxis(values.reshape(-1, things, values.shape[1]), 2, 0)))

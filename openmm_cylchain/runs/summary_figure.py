@@ -18,7 +18,7 @@ from ..output.record_file import read_records
 from ..units.quantities import thermal_energy
 from ..units.text import time_unit
 from .configuration import linker_labels
-from .run_directory import read_energies, read_linkers
+from .run_directory import read_contact_forces, read_energies, read_linkers, read_wall_forces
 from .summary import (
     PICONEWTON,
     extensions,
@@ -52,7 +52,8 @@ def write_figure(configuration, directory, trajectory):
 
 
 def _draw(configuration, directory, trajectory):
-    rows = 3 if configuration.linkers else 2
+    has_forces = bool(configuration.walls or configuration.contacts)
+    rows = 2 + bool(configuration.linkers) + has_forces
     figure = Figure(figsize=(12, 4.75 * rows), layout="constrained")
     FigureCanvasAgg(figure)
     figure.get_layout_engine().set(w_pad=0.12, h_pad=0.12, hspace=0.03, wspace=0.03)
@@ -80,6 +81,8 @@ def _draw(configuration, directory, trajectory):
         _draw_linkers(axes[0, 0], labels, directory.linker_places)
         _draw_numbers_bound(axes[2, 0], labels, table)
         _draw_tensions(axes[2, 1], labels, table)
+    if has_forces:
+        _draw_forces(axes[-1], configuration, directory, trajectory.time)
     for axis in axes.flat:
         axis.title.set_fontsize(_FONT_SIZE + 1)
         axis.xaxis.label.set_fontsize(_FONT_SIZE)
@@ -229,6 +232,43 @@ def _draw_tensions(axis, labels, table):
     axis.set_ylabel("tension (pN)")
     axis.set_title("Tension of linkers with both hands bound")
     _legend_below(axis)
+
+
+def _draw_forces(axes, configuration, directory, times):
+    # Means between reports: at the first one, there are none.
+    name, length = _time_unit(times[-1])
+    if configuration.walls:
+        table = read_wall_forces(directory.wall_forces)
+        time, loads = table["time (ps)"][1:, 0] / length, table["load (kJ/mol/nm)"][1:] / PICONEWTON
+        faces = zip(table["wall"][0].astype(int), table["face"][0].astype(int))
+        for number, (wall, face) in enumerate(faces):
+            label = _face_label(configuration.walls[wall], wall, face)
+            axes[0].plot(time, loads[:, number], color=_COLOURS[number % len(_COLOURS)], linewidth=1.2, label=label)
+    if configuration.contacts:
+        table = read_contact_forces(directory.contact_forces)
+        time, loads = table["time (ps)"][1:, 0] / length, table["load (kJ/mol/nm)"][1:] / PICONEWTON
+        axes[1].plot(time, loads.mean(axis=1), color=_COLOURS[0], linewidth=1.5, label="mean over filaments")
+        axes[1].plot(time, loads.max(axis=1), ":", color=_COLOURS[0], linewidth=1.0, label="largest")
+    titles = "Forces of walls, by faces", "Forces of contacts on a filament"
+    for axis, there, title in zip(axes, (configuration.walls, configuration.contacts), titles):
+        if not there:
+            axis.set_axis_off()
+            continue
+        axis.set_xlim(0.0, times[-1] / length)
+        axis.set_ylim(bottom=min(0.0, axis.get_ylim()[0]))
+        axis.set_xlabel(f"time ({name})")
+        axis.set_ylabel("sum of forces (pN)")
+        axis.set_title(title)
+        _legend_below(axis)
+
+
+def _face_label(wall, number, face):
+    # As files name shapes.
+    kind = type(wall.shape).__name__.lower().replace("slab", "slit")
+    label, faces = f"wall {number}, {kind}", len(wall.shape.faces)
+    if faces == 6:
+        return f"{label}, {('lower', 'upper')[face % 2]} {'xyz'[face // 2]}"
+    return f"{label}, {('upper', 'lower')[face]} face" if faces == 2 else label
 
 
 def _draw_energies(axis, groups, temperature, energies):

@@ -11,6 +11,8 @@ from openmm import app
 
 from ..couplings.crosslink_records import CrosslinkFile
 from ..couplings.crosslinks import Crosslinks
+from ..couplings.force_tables import ForceTables
+from ..couplings.mean_forces import ForceReaders
 from ..couplings.periodicity import is_periodic
 from ..couplings.walls import Shape
 from ..errors import InputError
@@ -36,7 +38,8 @@ class RunReporter:
 
     ``analysis.load``, ``openmm-cylchain render`` and ``openmm-cylchain export`` take the directory. In it are the
     trajectory with its topology, energies, a description of filaments, periodic box, walls of ``filament_wall_force``
-    and contacts, and where linkers and crosslinks are, which may come and go. The configuration in which the
+    and contacts, their forces (means over the steps between frames), and where linkers and crosslinks are, which may
+    come and go. The configuration in which the
     Simulation starts is the first frame.
 
     Parameters
@@ -171,6 +174,13 @@ class RunReporter:
                 if self._append:
                     count = int(np.searchsorted(read_records(files.linker_places)["step"], step, "right"))
                 self._places = opened(LinkerFile(files.linker_places, count))
+            self._readers = ForceReaders(simulation.context)
+            there = bool(self._readers.wall_forces()), bool(self._readers.contact_forces())
+            sizes = None
+            if self._append:
+                paths = files.wall_forces, files.contact_forces
+                sizes = [size_of_lines(path, step)[0] if own else 0 for path, own in zip(paths, there)]
+            self._forces = opened(ForceTables(files, *there, sizes))
             self._crosslinks = None
             if Crosslinks.from_system(system):
                 self._crosslinks = opened(CrosslinkFile(files.crosslinks, system, self._append, step))
@@ -200,6 +210,8 @@ class RunReporter:
             for number, row in enumerate(rows):
                 self._linkers.write(step, (time, number, *row))
             self._places.write(records)
+        walls, contacts = self._readers.wall_forces(), self._readers.contact_forces()
+        self._forces.write(step, time, walls, contacts, self._filaments)
         self._energies.write(step, (time, *cells))
 
     def close(self) -> None:

@@ -17,7 +17,7 @@ struct Capsule {
     double radius = 0;
     /** The chain that it is a segment of, or -1. */
     int chain = -1;
-    /** The number of the segment in its chain. */
+    /** The number of the segment in its chain, or of the sphere. */
     int index = 0;
     int end() const {
         return second < 0 ? first : second;

@@ -444,3 +444,18 @@ void ContactGaps::findNeighbours(vector<pair<int, int> >& neighbours) const {
             neighbours.push_back(make_pair(a.chain, b.chain));
     }
 }
+
+void ContactGaps::findPushes(const double*, vector<Push>& pushes) const {
+    for (const NearPair& own : near) {
+        const double force = own.number < 0 ? 0 : all->getForce(own.number);
+        if (force == 0)
+            continue;
+        const ContactPair& pair = pairs.get(own.pair);
+        for (int lever = 0; lever < own.gap.numLevers; lever++) {
+            pushes.push_back(pushOfContact(search->getSystem(), pair.a, pair.b, own.fractions[lever][0],
+                    own.fractions[lever][1], force, own.gap.levers[lever].gradient));
+            pushes.back().chains[0] = places[pair.a].place.chain;
+            pushes.back().chains[1] = places[pair.b].place.chain;
+        }
+    }
+}

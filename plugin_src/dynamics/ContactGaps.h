@@ -40,6 +40,7 @@ public:
     }
     void findFailures(const double* moved, std::vector<bool>& failed) override;
     bool findCulprit(const double* moved, const CouplingEquation* equations, BrokenCoupling& culprit) const override;
+    void findPushes(const double* moved, std::vector<Push>& pushes) const override;
     void findNeighbours(std::vector<std::pair<int, int> >& neighbours) const override;
 private:
     /** Where a capsule is: its place at fraction 0, and by how much the fraction grows along it. */

@@ -2,6 +2,7 @@
 #define CYLCHAIN_COUPLED_FORCES_H_
 
 #include "couplings/ContactSearch.h"
+#include "couplings/CouplingImpulses.h"
 #include "couplings/Links.h"
 #include "couplings/Walls.h"
 #include "dynamics/CurveSites.h"
@@ -23,10 +24,16 @@ struct CoupledForces {
         bool periodic;
         /** Where capsules between places on curves of beam elements are. */
         const std::vector<CapsuleOnCurve>* onCurves;
+        /** Receives their forces. */
+        CouplingImpulses* impulses;
+    };
+    struct Walls {
+        const WallSystem* system;
+        CouplingImpulses* impulses;
     };
     std::vector<Links> links;
     std::vector<Contacts> contacts;
-    std::vector<const WallSystem*> walls;
+    std::vector<Walls> walls;
     /** The virtual sites on curves that move with them, at which capsules end. */
     std::vector<CurveSite> sites;
     /** The particles outside chains that these forces act on, in ascending order. */

@@ -1,6 +1,7 @@
 #ifndef CYLCHAIN_IMPLICIT_COUPLINGS_H_
 #define CYLCHAIN_IMPLICIT_COUPLINGS_H_
 
+#include "couplings/CouplingImpulses.h"
 #include "dynamics/ReflectedGaps.h"
 #include <utility>
 #include <vector>
@@ -117,6 +118,9 @@ public:
      * @return whether there is one
      */
     virtual bool findCulprit(const double* moved, const CouplingEquation* equations, BrokenCoupling& culprit) const = 0;
+    /** Add the forces in the step that has been solved: the means over it where they are known, or those at its end. */
+    virtual void findPushes(const double*, std::vector<Push>&) const {
+    }
     /** Add pairs of chains that these couplings join, so that a step is divided for both. */
     virtual void findNeighbours(std::vector<std::pair<int, int> >& pairs) const = 0;
 };

@@ -44,6 +44,7 @@ void NetworkStep::setForces(const CoupledForces& forces, const double* box) {
     setParticles(forces.particles);
     sites = &forces.sites;
     couplings.clear();
+    impulses.assign(forces.links.size(), nullptr);
     links.resize(max(links.size(), forces.links.size()));
     for (size_t i = 0; i < forces.links.size(); i++) {
         const CoupledForces::Links& own = forces.links[i];
@@ -62,13 +63,15 @@ void NetworkStep::setForces(const CoupledForces& forces, const double* box) {
             contacts[i].reset(new ContactGaps());
         contacts[i]->setContacts(own.search, own.stiffness, own.periodic ? box : NULL, *own.onCurves, i);
         couplings.push_back(contacts[i].get());
+        impulses.push_back(own.impulses);
     }
     walls.resize(max(walls.size(), forces.walls.size()));
     for (size_t i = 0; i < forces.walls.size(); i++) {
         if (!walls[i])
             walls[i].reset(new WallGaps());
-        walls[i]->setWalls(forces.walls[i], forces.contacts.size()+i);
+        walls[i]->setWalls(forces.walls[i].system, forces.contacts.size()+i);
         couplings.push_back(walls[i].get());
+        impulses.push_back(forces.walls[i].impulses);
     }
 }
 
@@ -133,11 +136,15 @@ Instability NetworkStep::step(const double* positions, const double* forces, con
     vector<bool> failed(numChains, false);
     Instability result;
     if (attempt({positions, forces, box, settings, all, loop}, displacements, failed)) {
+        addImpulses(all, settings.stepSize);
         result.iterations = iterations;
         return result;
     }
     const vector<bool> divided = findComponents(failed);
     result.divided = count(divided.begin(), divided.end(), true);
+    vector<bool> others = divided;
+    others.flip();
+    addImpulses(others, settings.stepSize);
     if (!divide({positions, forces, box, settings, divided, loop}, 1, displacements, failed)) {
         result.chain = find(failed.begin(), failed.end(), true)-failed.begin();
         result.coupling = culprit;
@@ -286,6 +293,19 @@ bool NetworkStep::finishIteration(const vector<size_t>& first) {
     return any;
 }
 
+/** Take note of the forces on chains that have taken a step, or a part of it. */
+void NetworkStep::addImpulses(const vector<bool>& taken, double stepSize) {
+    for (size_t i = 0; i < couplings.size(); i++) {
+        if (impulses[i] == nullptr)
+            continue;
+        pushes.clear();
+        couplings[i]->findPushes(moved.data(), pushes);
+        for (const Push& push : pushes)
+            if (any_of(push.chains, push.chains+2, [&] (int chain) {return chain >= 0 && taken[chain];}))
+                impulses[i]->add(push, stepSize);
+    }
+}
+
 bool NetworkStep::divide(const Attempt& whole, int division, double* displacements, vector<bool>& failed) {
     Attempt half = whole;
     half.settings.stepSize = 0.5*whole.settings.stepSize;
@@ -318,6 +338,8 @@ bool NetworkStep::divide(const Attempt& whole, int division, double* displacemen
             if (!divide(half, division+1, part.data(), failed))
                 return false;
         }
+        else
+            addImpulses(whole.taken, half.settings.stepSize);
         forTaken([&] (int k) {
             start[k] += part[k];
             total[k] += part[k];

@@ -58,6 +58,7 @@ private:
     bool iterate(const Attempt& attempt, int stage);
     bool finishIteration(const std::vector<std::size_t>& first);
     void placeSites(double* positions) const;
+    void addImpulses(const std::vector<bool>& taken, double stepSize);
     bool divide(const Attempt& whole, int division, double* displacements, std::vector<bool>& failed);
     BrokenCoupling findCulprit() const;
     std::vector<bool> findComponents(const std::vector<bool>& failed) const;
@@ -69,6 +70,9 @@ private:
     std::vector<std::unique_ptr<ContactGaps> > contacts;
     std::vector<std::unique_ptr<WallGaps> > walls;
     std::vector<ImplicitCouplings*> couplings;
+    /** What receives their forces, or NULL. */
+    std::vector<CouplingImpulses*> impulses;
+    std::vector<Push> pushes;
     const std::vector<CurveSite>* sites = nullptr;
     std::vector<CoupledParticle> particles;
     std::vector<int> packs;

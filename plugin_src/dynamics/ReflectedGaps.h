@@ -45,6 +45,9 @@ public:
     Gap& get(int number) {
         return gaps[number];
     }
+    const Gap& get(int number) const {
+        return gaps[number];
+    }
     int size() const {
         return gaps.size();
     }
@@ -60,7 +63,7 @@ public:
     void findFailures(std::vector<bool>& failed) const;
     /** The force of a gap, the mean over the step: per length if its gradient is one. */
     double getForce(int number) const {
-        return forces[number];
+        return number < (int) forces.size() ? forces[number] : 0;
     }
 private:
     /** A place of a gap on a chain that moves. */

@@ -158,3 +158,15 @@ bool WallGaps::findCulprit(const double*, const CouplingEquation*, BrokenCouplin
         }
     return false;
 }
+
+void WallGaps::findPushes(const double*, vector<Push>& pushes) const {
+    for (const State& state : states) {
+        const double force = all->getForce(state.gap);
+        if (force == 0)
+            continue;
+        const double* const towards = all->get(state.gap).levers[0].gradient;
+        const double gradient[] = {-towards[0], -towards[1], -towards[2]};
+        pushes.push_back(pushOfWall(*system, state.particle, state.face, force, gradient));
+        pushes.back().chains[0] = places[state.particle].chain;
+    }
+}

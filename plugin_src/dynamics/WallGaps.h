@@ -29,6 +29,7 @@ public:
         // A wall has no other side: its gaps tell.
     }
     bool findCulprit(const double* moved, const CouplingEquation* equations, BrokenCoupling& culprit) const override;
+    void findPushes(const double* moved, std::vector<Push>& pushes) const override;
     void findNeighbours(std::vector<std::pair<int, int> >&) const override {
         // Walls join no chains.
     }

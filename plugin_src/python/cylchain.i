@@ -206,7 +206,7 @@ static bool takeNumbers(PyObject* object, std::vector<T>& values) {
         const std::vector<int>& chains};
 %apply std::vector<double>& tensions {std::vector<double>& fractions, std::vector<double>& points,
         std::vector<double>& parameters, std::vector<double>& places, std::vector<double>& gaps,
-        std::vector<double>& forces};
+        std::vector<double>& forces, std::vector<double>& sums, std::vector<double>& loads};
 %apply const std::vector<double>& fractions {const std::vector<double>& points,
         const std::vector<double>& parameters, const std::vector<double>& places};
 
@@ -324,6 +324,15 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
         std::vector<double>&, std::vector<double>&, std::vector<Vec3>&) %{
     val = [val[0], val[1], unit.Quantity(val[2], _LENGTH), unit.Quantity(val[3], _FORCE), val[4]]
 %}
+%define %unitsOfMeanForces(Class)
+%pythonappend OpenMM::Class::takeMeanForces(Context&, int, std::vector<double>&, std::vector<int>&,
+        std::vector<double>&, std::vector<double>&) %{
+    val = [unit.Quantity(val[0], unit.picosecond), unit.Quantity(val[1], _FORCE), val[2],
+           *(unit.Quantity(v, _FORCE) for v in val[3:])]
+%}
+%enddef
+%unitsOfMeanForces(CylinderChainContactForce)
+%unitsOfMeanForces(CylinderChainWallForce)
 %pythonappend OpenMM::CylinderChainContactForce::getStiffness() const %{
     val = unit.Quantity(val, _STIFFNESS)
 %}

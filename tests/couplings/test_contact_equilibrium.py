@@ -12,7 +12,7 @@ import pytest
 from openmm import unit
 from scipy.optimize import brentq, minimize
 
-from openmm_cylchain import Filaments, FilamentType, Sphere, filament_wall_force
+from openmm_cylchain import Filaments, FilamentType, Sphere, filament_wall_force, wall_forces
 from support import rod_cases
 from support.contexts import energy_of, new_context, positions_of
 from support.rod_cases import (
@@ -213,6 +213,7 @@ def test_a_filament_that_a_sphere_bends(step):
     ends = np.array(filaments.node_indices)[:, [0, -1]]
     steps = 4000 if step >= 1000 else 20000
     integrator.step(steps // 4)
+    wall_forces(context)
     depths = []
     for _ in range(steps):
         integrator.step(1)
@@ -221,3 +222,6 @@ def test_a_filament_that_a_sphere_bends(step):
     error = forces.std(ddof=1) / np.sqrt(len(forces))
     assert 4 * error < 0.05 * exact
     assert forces.mean() == pytest.approx(exact, abs=0.02 * exact + 4 * error)
+    # The same from what the wall has pushed with over steps.
+    found = np.linalg.norm(wall_forces(context)[0].forces._value[ends], axis=2).mean(axis=1)
+    assert found.mean() / PICONEWTON_PER_NANOMETER == pytest.approx(exact, abs=0.02 * exact + 4 * error)

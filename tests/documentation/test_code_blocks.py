@@ -76,6 +76,11 @@ GIVEN = {
     ("docs/scans.md", "from concurrent.futures"): SCAN,
     ("docs/time_step.md", "step = filaments"): BUILT,
     ("docs/walls.md", "system.addForce"): BUILT,
+    ("docs/walls.md", "simulation.step"): """
+integrator = filaments.create_integrator(system, 1 * unit.microsecond)
+simulation = app.Simulation(topology, system, integrator, openmm.Platform.getPlatformByName("CPU"))
+simulation.context.setPositions(positions)
+""",
     ("docs/networks.md", "topology, system, positions"): FILAMENTS_IN_A_SYSTEM,
     ("docs/networks.md", "integrator.setTemperature"): """
 context = openmm.Context(system, integrator, openmm.Platform.getPlatformByName("CPU"))

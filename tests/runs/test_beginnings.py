@@ -87,7 +87,8 @@ def test_run_with_everything_is_resumed_to_the_bit(tmp_path):
     process.kill()
     assert finish(process)[0] == -signal.SIGKILL
     run(configuration, output, resume=True)
-    for name in ("trajectory.dcd", "energies.csv", "linkers.csv", "linkers.npy"):
+    tables = ("energies.csv", "linkers.csv", "linkers.npy", "wall_forces.csv", "contact_forces.csv")
+    for name in ("trajectory.dcd", *tables):
         begin = 276 if name.endswith("dcd") else 0
         contents = [(tmp_path / folder / name).read_bytes()[begin:] for folder in ("one", "two")]
         assert contents[0] == contents[1], name
@@ -100,6 +101,7 @@ def test_runs_whose_files_were_cut_off_are_not_resumed(tmp_path, capsys):
     checkpoint = tmp_path / "out" / "checkpoint.chk"
     checkpoint.write_bytes(resealed(checkpoint.read_bytes(), step=190))
     names = ("trajectory.dcd", "energies.csv", "linkers.csv", "linkers.npy", "pulling.csv", "crosslinks.npy")
+    names += ("wall_forces.csv", "contact_forces.csv")
     for name in names:
         path = tmp_path / "out" / name
         whole = path.read_bytes()

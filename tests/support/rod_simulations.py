@@ -26,9 +26,9 @@ def rod_system(rods, length=100.0, diameter=30.0, contact=80 * KT / 30.0**2, lin
 
 
 class RodSimulation:
-    """Copies of a RodSystem in one Context, on one thread. Only systems without a box have more than one copy."""
+    """Copies of a RodSystem in one Context. Only systems without a box have more than one copy."""
 
-    def __init__(self, system, middles, along, factor=1.0, step=None, scheme="implicit", seed=1, **options):
+    def __init__(self, system, middles, along, factor=1.0, step=None, scheme="implicit", seed=1, threads=1, **options):
         """With a step in us, or the recommended one times a factor."""
         copies = len(middles)
         assert copies == 1 or (system.box is None and not (system.wall and system.contact))
@@ -76,7 +76,7 @@ class RodSimulation:
             openmm_system, self.step, scheme=scheme, random_seed=seed, checks=False, **options
         )
         self._nodes = np.array(filaments.node_indices).reshape(copies, system.rods, 2)
-        self.context = new_context(openmm_system, positions, self.integrator, "CPU", {"Threads": "1"})
+        self.context = new_context(openmm_system, positions, self.integrator, "CPU", {"Threads": str(threads)})
 
     def _positions(self, middles, along):
         ends = (middles + self._origins)[:, :, None] + np.array([-0.5, 0.5])[:, None] * along[:, :, None]

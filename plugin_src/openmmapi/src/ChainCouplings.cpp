@@ -44,6 +44,9 @@ ChainCouplings::ChainCouplings(ContextImpl& context, const CylinderChainDescript
             }
         }
     for (ForceImpl* impl : context.getForceImpls()) {
+        PushForceImpl* pushes = dynamic_cast<PushForceImpl*>(impl);
+        if (pushes != NULL)
+            pushForces.push_back(pushes);
         CylinderChainLinkForceImpl* ofLinks = dynamic_cast<CylinderChainLinkForceImpl*>(impl);
         if (ofLinks != NULL)
             links.push_back({{ofLinks, false}, -1});
@@ -201,12 +204,14 @@ const CoupledForces& ChainCouplings::describe(int groups, double friction) {
         for (const Place& anchor : own.force->getAnchors())
             addParticle(anchor, particles);
     }
+    for (PushForceImpl* own : pushForces)
+        own->beginStep();
     for (const Contacts& own : contacts) {
         const vector<Capsule>& capsules = own.force->getSearch().getSystem().capsules;
         if (!own.isTaken(groups) || capsules.empty() || own.force->getStiffness() == 0)
             continue;
         forces.contacts.push_back({&own.force->getSearch(), own.force->getStiffness(),
-                own.force->usesPeriodicBoundaryConditions(), &own.force->getOnCurves()});
+                own.force->usesPeriodicBoundaryConditions(), &own.force->getOnCurves(), &own.force->getImpulses()});
         forces.sites.insert(forces.sites.end(), own.force->getSites().begin(), own.force->getSites().end());
         owners.push_back(&own.force->getOwner());
         for (const Capsule& capsule : capsules) {
@@ -220,7 +225,7 @@ const CoupledForces& ChainCouplings::describe(int groups, double friction) {
         const WallSystem& present = own.force->getWalls();
         if (!own.isTaken(groups) || present.particles.empty() || present.stiffness == 0)
             continue;
-        forces.walls.push_back(&present);
+        forces.walls.push_back({&present, &own.force->getImpulses()});
         owners.push_back(&own.force->getOwner());
         for (const WallParticle& wallParticle : present.particles) {
             Place place;
@@ -233,6 +238,15 @@ const CoupledForces& ChainCouplings::describe(int groups, double friction) {
     for (int particle : particles)
         forces.particles.push_back({particle, 1/others.getMobility(particle, friction)});
     return forces;
+}
+
+void ChainCouplings::finishStep(int groups, int integration, double stepSize) {
+    auto finish = [&] (const auto& all) {
+        for (const auto& own : all)
+            own.force->finishStep(own.isTaken(groups), own.force->isIn(integration), stepSize);
+    };
+    finish(contacts);
+    finish(walls);
 }
 
 const Force& ChainCouplings::getForce(const BrokenCoupling& coupling) const {

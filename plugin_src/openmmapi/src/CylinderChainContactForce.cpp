@@ -150,6 +150,16 @@ bool CylinderChainContactForce::usesPeriodicBoundaryConditions() const {
     return usePeriodic;
 }
 
+double CylinderChainContactForce::takeMeanForces(Context& context, int reader, std::vector<double>& forces,
+        std::vector<int>& numbers, std::vector<double>& sums, std::vector<double>& loads) {
+    return dynamic_cast<CylinderChainContactForceImpl&>(getImplInContext(context)).takeMeanForces(
+            getContextImpl(context), reader, forces, numbers, sums, loads);
+}
+
+int CylinderChainContactForce::addForceReader(Context& context) {
+    return dynamic_cast<CylinderChainContactForceImpl&>(getImplInContext(context)).addReader();
+}
+
 ForceImpl* CylinderChainContactForce::createImpl() const {
     return new CylinderChainContactForceImpl(*this);
 }

@@ -15,7 +15,7 @@ using namespace std;
 static const double SAME_PLACE = 1e-9;
 
 CylinderChainContactForceImpl::CylinderChainContactForceImpl(const CylinderChainContactForce& owner) :
-        StepForceImpl(owner), owner(owner), stiffness(owner.getStiffness()),
+        PushForceImpl(owner), owner(owner), stiffness(owner.getStiffness()),
         periodic(owner.usesPeriodicBoundaryConditions()) {
 }
 
@@ -45,7 +45,8 @@ void CylinderChainContactForceImpl::initialize(ContextImpl& context) {
     firstOfChain.push_back(capsules.capsules.size());
     for (int sphere = 0; sphere < owner.getNumSpheres(); sphere++) {
         checkParticle(owner.getSphereParticle(sphere));
-        capsules.capsules.push_back({owner.getSphereParticle(sphere), -1, 0.5*owner.getSphereDiameter(sphere), -1, 0});
+        capsules.capsules.push_back({owner.getSphereParticle(sphere), -1, 0.5*owner.getSphereDiameter(sphere), -1,
+                sphere});
     }
     for (int exclusion = 0; exclusion < owner.getNumExclusions(); exclusion++) {
         int chain1, segment1, chain2, segment2;
@@ -60,6 +61,8 @@ void CylinderChainContactForceImpl::initialize(ContextImpl& context) {
     findCurves(context.getSystem());
     kernel = context.getPlatform().createKernel(CalcCylinderChainContactForceKernel::Name(), context);
     kernel.getAs<CalcCylinderChainContactForceKernel>().initialize(context.getSystem(), *search, stiffness, periodic);
+    PushForceImpl::initialize(numParticles);
+    notesPushes = kernel.getAs<CalcCylinderChainContactForceKernel>().notePushes(present);
 }
 
 /**
@@ -141,8 +144,9 @@ void CylinderChainContactForceImpl::updateParametersInContext(ContextImpl& conte
     context.systemChanged();
 }
 
-void CylinderChainContactForceImpl::getContacts(ContextImpl& context, vector<int>& ends, vector<double>& fractions,
-        vector<double>& gaps, vector<double>& forces, vector<Vec3>& directions) const {
+/** Call a function with each contact at the present positions, and its pair. */
+template <class Function> void CylinderChainContactForceImpl::forContacts(ContextImpl& context,
+        Function function) const {
     vector<Vec3> positions;
     context.getPositions(positions);
     Vec3 box[3];
@@ -158,21 +162,30 @@ void CylinderChainContactForceImpl::getContacts(ContextImpl& context, vector<int
     catch (const invalid_argument& error) {
         throw OpenMMException(string("CylinderChainContactForce: ")+error.what());
     }
-    const vector<Capsule>& capsules = search->getSystem().capsules;
-    const int firstSphere = capsules.size()-owner.getNumSpheres();
     for (const ContactPair& pair : pairs) {
         Contact found[2];
         const int count = around.evaluate(pair, x, x, found, 0);
-        for (int i = 0; i < count; i++) {
-            for (int side : {pair.a, pair.b})
-                if (side < firstSphere)
-                    ends.insert(ends.end(), {capsules[side].chain, capsules[side].index});
-                else
-                    ends.insert(ends.end(), {-1, side-firstSphere});
-            fractions.insert(fractions.end(), {found[i].s, found[i].t});
-            gaps.push_back(found[i].gap);
-            forces.push_back(-found[i].weight*stiffness*found[i].gap);
-            directions.push_back(Vec3(found[i].normal[0], found[i].normal[1], found[i].normal[2]));
-        }
+        for (int i = 0; i < count; i++)
+            function(pair, found[i]);
     }
+}
+
+void CylinderChainContactForceImpl::getContacts(ContextImpl& context, vector<int>& ends, vector<double>& fractions,
+        vector<double>& gaps, vector<double>& forces, vector<Vec3>& directions) const {
+    const vector<Capsule>& capsules = search->getSystem().capsules;
+    forContacts(context, [&] (const ContactPair& pair, const Contact& contact) {
+        for (int side : {pair.a, pair.b})
+            ends.insert(ends.end(), {capsules[side].chain, capsules[side].index});
+        fractions.insert(fractions.end(), {contact.s, contact.t});
+        gaps.push_back(contact.gap);
+        forces.push_back(-contact.weight*stiffness*contact.gap);
+        directions.push_back(Vec3(contact.normal[0], contact.normal[1], contact.normal[2]));
+    });
+}
+
+void CylinderChainContactForceImpl::findPushes(ContextImpl& context, vector<Push>& pushes) const {
+    forContacts(context, [&] (const ContactPair& pair, const Contact& contact) {
+        pushes.push_back(pushOfContact(search->getSystem(), pair.a, pair.b, contact.s, contact.t,
+                -contact.weight*stiffness*contact.gap, contact.normal));
+    });
 }

@@ -289,7 +289,7 @@ uint64_t CylinderChainIntegrator::findNextStep() const {
 }
 
 void CylinderChainIntegrator::createCheckpoint(ostream& stream) const {
-    const int version = 7;
+    const int version = 8;
     stream.write((const char*) &version, sizeof(version));
     stream.write((const char*) &noiseLevel, sizeof(noiseLevel));
     stream.write((const char*) &noiseSeed, sizeof(noiseSeed));
@@ -299,6 +299,8 @@ void CylinderChainIntegrator::createCheckpoint(ostream& stream) const {
     stream.write((const char*) flow, sizeof(flow));
     writeLinks(stream, *context);
     writeLinkers(stream, *context);
+    for (const PushForceImpl* force : stepper->getCouplings().getPushForces())
+        force->writeForces(stream);
 }
 
 void CylinderChainIntegrator::loadCheckpoint(istream& stream) {
@@ -310,13 +312,18 @@ void CylinderChainIntegrator::loadCheckpoint(istream& stream) {
     stream.read((char*) &steps, sizeof(steps));
     Vec3 flow[5];
     stream.read((char*) flow, sizeof(flow));
-    if (!stream || version < 3 || version > 7 || level < 0 || level > getLargestPathLevel())
+    if (!stream || version < 3 || version > 8 || level < 0 || level > getLargestPathLevel())
         throw OpenMMException("loadCheckpoint: Checkpoint was not created with this version of "
                 "CylinderChainIntegrator");
     if (version > 3)
         readLinks(stream, *context);
     if (version > 4)
         readLinkers(stream, *context, version > 5, version > 6);
+    for (PushForceImpl* force : stepper->getCouplings().getPushForces())
+        if (version > 7)
+            force->readForces(stream);
+        else
+            force->getImpulses().clear();
     setFlow(flow[0], flow[1], flow[2], flow[3], flow[4]);
     noiseLevel = level;
     noiseSeed = seed;

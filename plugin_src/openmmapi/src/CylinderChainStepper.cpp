@@ -281,6 +281,7 @@ void CylinderChainStepper::step(uint64_t seed, int level, uint64_t step, bool fo
         explicitWork.finish(sums);
     }
     getKernel().move(context, settings);
+    couplings.finishStep(getCoupledGroups(), integrator.getIntegrationForceGroups(), settings.stepSize);
     explicitWork.endStep();
     recorded = (settings.segmentForces != NULL);
 }

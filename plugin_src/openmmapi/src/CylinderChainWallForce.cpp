@@ -95,6 +95,16 @@ void CylinderChainWallForce::updateParametersInContext(Context& context) {
             getContextImpl(context));
 }
 
+double CylinderChainWallForce::takeMeanForces(Context& context, int reader, std::vector<double>& forces,
+        std::vector<int>& numbers, std::vector<double>& sums, std::vector<double>& loads) {
+    return dynamic_cast<CylinderChainWallForceImpl&>(getImplInContext(context)).takeMeanForces(
+            getContextImpl(context), reader, forces, numbers, sums, loads);
+}
+
+int CylinderChainWallForce::addForceReader(Context& context) {
+    return dynamic_cast<CylinderChainWallForceImpl&>(getImplInContext(context)).addReader();
+}
+
 ForceImpl* CylinderChainWallForce::createImpl() const {
     return new CylinderChainWallForceImpl(*this);
 }

@@ -9,7 +9,7 @@ using namespace OpenMM;
 using namespace cylchain;
 using namespace std;
 
-CylinderChainWallForceImpl::CylinderChainWallForceImpl(const CylinderChainWallForce& owner) : StepForceImpl(owner),
+CylinderChainWallForceImpl::CylinderChainWallForceImpl(const CylinderChainWallForce& owner) : PushForceImpl(owner),
         owner(owner) {
 }
 
@@ -44,6 +44,14 @@ void CylinderChainWallForceImpl::initialize(ContextImpl& context) {
     walls = describe();
     kernel = context.getPlatform().createKernel(CalcCylinderChainWallForceKernel::Name(), context);
     kernel.getAs<CalcCylinderChainWallForceKernel>().initialize(context.getSystem(), walls);
+    PushForceImpl::initialize(system.getNumParticles());
+    notesPushes = kernel.getAs<CalcCylinderChainWallForceKernel>().notePushes(present);
+}
+
+void CylinderChainWallForceImpl::findPushes(ContextImpl& context, vector<Push>& pushes) const {
+    vector<Vec3> positions;
+    context.getPositions(positions);
+    cylchain::findPushes(walls, &positions[0][0], pushes);
 }
 
 double CylinderChainWallForceImpl::calcForcesAndEnergy(ContextImpl& context, bool includeForces, bool includeEnergy,

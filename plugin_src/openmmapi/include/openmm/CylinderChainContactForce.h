@@ -172,6 +172,30 @@ public:
     void getContacts(Context& context, std::vector<int>& ends, std::vector<double>& fractions,
             std::vector<double>& gaps, std::vector<double>& forces, std::vector<Vec3>& directions);
     /**
+     * Get the mean force of contacts over the steps of CylinderChainIntegrator since a reader has asked for it last, or
+     * since the Context was made.  Checkpoints hold the sums, States do not.  Implicit steps know the mean within them;
+     * explicit ones have the force at their start.  If there were no such steps, or on platforms for GPUs, it is the force at the present positions.
+     *
+     * @param context      a Context with this force
+     * @param reader       0, or a number of addForceReader().  Whoever asks for itself does not shorten what others
+     *                     have the mean of.
+     * @param[out] forces  on all particles of the System, three numbers for each, measured in kJ/mol/nm
+     * @param[out] numbers two for each pair of bodies that have touched: the numbers of chains, and those of
+     *                     spheres behind them
+     * @param[out] sums    of these, the sum of the forces on the first one, three numbers for each, measured in
+     *                     kJ/mol/nm
+     * @param[out] loads   and the sum of the sizes of the forces, measured in kJ/mol/nm
+     * @return how long the steps have taken together, measured in ps, or 0 for the present positions
+     */
+    double takeMeanForces(Context& context, int reader, std::vector<double>& forces, std::vector<int>& numbers,
+            std::vector<double>& sums, std::vector<double>& loads);
+    /**
+     * Add somebody who asks a Context for mean forces from now on.
+     *
+     * @return the number of the reader
+     */
+    int addForceReader(Context& context);
+    /**
      * Set whether the distances of segments and spheres are those of their nearest periodic images.  The positions of a
      * chain's particles are taken as they are, even in a periodic box.
      */

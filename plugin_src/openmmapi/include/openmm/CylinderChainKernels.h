@@ -2,6 +2,7 @@
 #define OPENMM_CYLINDERCHAINKERNELS_H_
 
 #include "couplings/ContactSearch.h"
+#include "couplings/CouplingImpulses.h"
 #include "couplings/Links.h"
 #include "couplings/Walls.h"
 #include "dynamics/ChainEngine.h"
@@ -130,6 +131,14 @@ public:
      */
     virtual double execute(ContextImpl& context, bool includeForces, bool includeEnergy) = 0;
     /**
+     * Have execute() take note of the forces that it computes, where it computes them: it replaces what stands here.
+     *
+     * @return whether this platform does so
+     */
+    virtual bool notePushes(std::vector<cylchain::Push>&) {
+        return false;
+    }
+    /**
      * Take over another stiffness, and other radii, which the search has already.
      *
      * @param context    the context to copy parameters to
@@ -165,6 +174,14 @@ public:
      * @return the potential energy due to the force
      */
     virtual double execute(ContextImpl& context, bool includeForces, bool includeEnergy) = 0;
+    /**
+     * Have execute() take note of the forces that it computes, where it computes them: it replaces what stands here.
+     *
+     * @return whether this platform does so
+     */
+    virtual bool notePushes(std::vector<cylchain::Push>&) {
+        return false;
+    }
     /**
      * Take over another region, stiffness and radii.
      *

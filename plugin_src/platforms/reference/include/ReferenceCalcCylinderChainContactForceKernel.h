@@ -20,6 +20,7 @@ public:
     ReferenceCalcCylinderChainContactForceKernel(std::string name, const Platform& platform, ContextImpl& context);
     void initialize(const System& system, cylchain::ContactSearch& search, double stiffness, bool periodic);
     double execute(ContextImpl& context, bool includeForces, bool includeEnergy);
+    bool notePushes(std::vector<cylchain::Push>& pushes);
     void copyParametersToContext(ContextImpl& context, double stiffness);
 private:
     struct Touching;
@@ -31,6 +32,7 @@ private:
     bool periodic, hasList;
     std::vector<int> particles;
     std::vector<cylchain::ContactPair> pairs;
+    std::vector<cylchain::Push>* noted;
     // Where particles were, and the box, when pairs were searched for.
 
     std::vector<Vec3> listPositions;

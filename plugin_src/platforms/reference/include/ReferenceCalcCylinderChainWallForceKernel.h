@@ -1,8 +1,9 @@
 #ifndef OPENMM_REFERENCECALCCYLINDERCHAINWALLFORCEKERNEL_H_
 #define OPENMM_REFERENCECALCCYLINDERCHAINWALLFORCEKERNEL_H_
 
-#include "couplings/Walls.h"
+#include "couplings/CouplingImpulses.h"
 #include "openmm/CylinderChainKernels.h"
+#include <vector>
 
 namespace OpenMM {
 
@@ -15,9 +16,11 @@ public:
     ReferenceCalcCylinderChainWallForceKernel(std::string name, const Platform& platform);
     void initialize(const System& system, const cylchain::WallSystem& walls);
     double execute(ContextImpl& context, bool includeForces, bool includeEnergy);
+    bool notePushes(std::vector<cylchain::Push>& pushes);
     void copyParametersToContext(ContextImpl& context, const cylchain::WallSystem& walls);
 private:
     cylchain::WallSystem walls;
+    std::vector<cylchain::Push>* noted;
 };
 
 } // namespace OpenMM

@@ -22,7 +22,7 @@ struct ReferenceCalcCylinderChainContactForceKernel::Touching {
 
 ReferenceCalcCylinderChainContactForceKernel::ReferenceCalcCylinderChainContactForceKernel(string name,
         const Platform& platform, ContextImpl& context) : CalcCylinderChainContactForceKernel(name, platform),
-        loop(context), search(NULL), stiffness(0), skin(0), periodic(false), hasList(false) {
+        loop(context), search(NULL), stiffness(0), skin(0), periodic(false), hasList(false), noted(NULL) {
 }
 
 void ReferenceCalcCylinderChainContactForceKernel::initialize(const System&, ContactSearch& search, double stiffness,
@@ -101,7 +101,8 @@ double ReferenceCalcCylinderChainContactForceKernel::execute(ContextImpl& contex
     // Those that touch are few, so one thread adds their forces, in the order of pairs.
 
     vector<Vec3>& forces = *extractData(context).forces;
-    const vector<Capsule>& capsules = search->getSystem().capsules;
+    if (includeForces && noted != NULL)
+        noted->clear();
     double energy = 0;
     for (const vector<Touching>& part : touching)
         for (const Touching& one : part) {
@@ -110,14 +111,19 @@ double ReferenceCalcCylinderChainContactForceKernel::execute(ContextImpl& contex
             energy += 0.5*k*contact.gap*contact.gap;
             if (!includeForces)
                 continue;
-            const Vec3 force = Vec3(contact.normal[0], contact.normal[1], contact.normal[2])*(-k*contact.gap);
-            const Capsule &a = capsules[pairs[one.pair].a], &b = capsules[pairs[one.pair].b];
-            forces[a.first] += force*(1-contact.s);
-            forces[a.end()] += force*contact.s;
-            forces[b.first] -= force*(1-contact.t);
-            forces[b.end()] -= force*contact.t;
+            const Push push = pushOfContact(search->getSystem(), pairs[one.pair].a, pairs[one.pair].b, contact.s,
+                    contact.t, -k*contact.gap, contact.normal);
+            for (int i = 0; i < 4; i++)
+                forces[push.particles[i]] += Vec3(push.force[0], push.force[1], push.force[2])*push.shares[i];
+            if (noted != NULL)
+                noted->push_back(push);
         }
     return energy;
+}
+
+bool ReferenceCalcCylinderChainContactForceKernel::notePushes(vector<Push>& pushes) {
+    noted = &pushes;
+    return true;
 }
 
 void ReferenceCalcCylinderChainContactForceKernel::copyParametersToContext(ContextImpl&, double stiffness) {

@@ -56,6 +56,20 @@ public:
      */
     const cylchain::CoupledForces& describe(int groups, double friction);
     /**
+     * Take note of the forces of contacts and walls in a step that has moved particles.
+     *
+     * @param groups       those of describe()
+     * @param integration  the force groups of the integrator
+     * @param stepSize     how long the step was
+     */
+    void finishStep(int groups, int integration, double stepSize);
+    /**
+     * Get the contacts and walls, the forces of which are summed up.
+     */
+    const std::vector<PushForceImpl*>& getPushForces() const {
+        return pushForces;
+    }
+    /**
      * Get the Force that a coupling of the last forces described belongs to.
      */
     const Force& getForce(const cylchain::BrokenCoupling& coupling) const;
@@ -89,6 +103,7 @@ private:
     std::vector<Linkers> linkers;
     std::vector<Contacts> contacts;
     std::vector<Walls> walls;
+    std::vector<PushForceImpl*> pushForces;
     cylchain::CoupledForces forces;
     // The Forces of the forces above: links, contacts, walls.
 

@@ -5,7 +5,7 @@
 #include "dynamics/CurveSites.h"
 #include "openmm/CylinderChainContactForce.h"
 #include "openmm/Kernel.h"
-#include "openmm/internal/StepForceImpl.h"
+#include "openmm/internal/PushForceImpl.h"
 #include <map>
 #include <memory>
 #include <string>
@@ -18,7 +18,7 @@ class System;
 /**
  * This is the internal implementation of CylinderChainContactForce.
  */
-class CylinderChainContactForceImpl : public StepForceImpl {
+class CylinderChainContactForceImpl : public PushForceImpl {
 public:
     explicit CylinderChainContactForceImpl(const CylinderChainContactForce& owner);
     void initialize(ContextImpl& context);
@@ -63,7 +63,10 @@ public:
     bool usesPeriodicBoundaryConditions() const {
         return periodic;
     }
+protected:
+    void findPushes(ContextImpl& context, std::vector<cylchain::Push>& pushes) const;
 private:
+    template <class Function> void forContacts(ContextImpl& context, Function function) const;
     int getNumSegments(int chain) const;
     const CylinderChainContactForce& owner;
     void findCurves(const System& system);

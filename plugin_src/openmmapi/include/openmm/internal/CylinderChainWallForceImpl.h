@@ -5,7 +5,7 @@
 #include "openmm/CylinderChainWallForce.h"
 #include "openmm/Kernel.h"
 #include "openmm/internal/PlaceResolver.h"
-#include "openmm/internal/StepForceImpl.h"
+#include "openmm/internal/PushForceImpl.h"
 #include <map>
 #include <memory>
 #include <string>
@@ -16,7 +16,7 @@ namespace OpenMM {
 /**
  * This is the internal implementation of CylinderChainWallForce.
  */
-class CylinderChainWallForceImpl : public StepForceImpl {
+class CylinderChainWallForceImpl : public PushForceImpl {
 public:
     explicit CylinderChainWallForceImpl(const CylinderChainWallForce& owner);
     void initialize(ContextImpl& context);
@@ -35,6 +35,8 @@ public:
     const cylchain::WallSystem& getWalls() const {
         return walls;
     }
+protected:
+    void findPushes(ContextImpl& context, std::vector<cylchain::Push>& pushes) const;
 private:
     cylchain::WallSystem describe() const;
     const CylinderChainWallForce& owner;

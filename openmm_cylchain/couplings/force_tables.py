@@ -1,0 +1,54 @@
+"""The tables of a run that have forces of walls and of contacts."""
+
+from collections.abc import Sequence
+
+from ..filaments.collection import FilamentCollection
+from ..output.run_files import RunFiles
+from ..output.run_tables import CONTACT_FORCE_COLUMNS, WALL_FORCE_COLUMNS, ReportTable
+from .force_reporters import rows_of_contacts, rows_of_walls
+from .mean_forces import ContactForces, WallForces
+
+
+class ForceTables:
+    """Files of forces of walls and of contacts, as far as a System has such.
+
+    Parameters
+    ----------
+    files : RunFiles
+    walls, contacts : bool
+        Whether there are such.
+    sizes : (int, int), optional
+        Of the files, where to continue; new files if not given.
+    """
+
+    def __init__(self, files: RunFiles, walls: bool, contacts: bool, sizes: Sequence[int] | None = None) -> None:
+        of_walls, of_contacts = (None, None) if sizes is None else sizes
+        self._walls = ReportTable(files.wall_forces, WALL_FORCE_COLUMNS, of_walls) if walls else None
+        self._contacts = ReportTable(files.contact_forces, CONTACT_FORCE_COLUMNS, of_contacts) if contacts else None
+
+    def write(
+        self,
+        step: int,
+        time: float,
+        walls: list[WallForces],
+        contacts: list[ContactForces],
+        filaments: FilamentCollection,
+    ) -> None:
+        """Append lines of a report at a time in ps."""
+        if self._walls is not None:
+            for place, row in zip(*rows_of_walls(walls)):
+                self._walls.write(step, (time, *place, *row))
+        if self._contacts is not None:
+            for number, row in enumerate(rows_of_contacts(contacts, filaments)):
+                self._contacts.write(step, (time, number, *row))
+
+    def synchronise(self) -> tuple[int, int]:
+        """Bring everything to disk and return the sizes of both files, 0 of one that is not there."""
+        walls, contacts = (0 if own is None else own.synchronise() for own in (self._walls, self._contacts))
+        return walls, contacts
+
+    def close(self) -> None:
+        """Close the files."""
+        for own in (self._walls, self._contacts):
+            if own is not None:
+                own.close()

@@ -1,0 +1,83 @@
+#ifndef OPENMM_PUSHFORCEIMPL_H_
+#define OPENMM_PUSHFORCEIMPL_H_
+
+#include "couplings/CouplingImpulses.h"
+#include "openmm/Vec3.h"
+#include "openmm/internal/ContextImpl.h"
+#include "openmm/internal/StepForceImpl.h"
+#include <iosfwd>
+#include <vector>
+
+namespace OpenMM {
+
+/**
+ * This is the implementation of a Force of contacts or walls, whose mean over steps of CylinderChainIntegrator is
+ * known.
+ */
+class PushForceImpl : public StepForceImpl {
+public:
+    /**
+     * Get what receives the forces of implicit steps.
+     */
+    cylchain::CouplingImpulses& getImpulses() {
+        return impulses;
+    }
+    /**
+     * Begin a step, the forces of which are not known.
+     */
+    void beginStep() {
+        impulses.beginStep();
+    }
+    /**
+     * Take note that particles have moved by a step.
+     *
+     * @param taken     whether the Force was in its equations
+     * @param acts      whether it acts in steps at all
+     * @param stepSize  how long it was
+     */
+    void finishStep(bool taken, bool acts, double stepSize) {
+        if (!taken && acts && !notesPushes)
+            return;
+        if (!taken && acts)
+            for (const cylchain::Push& push : present)
+                impulses.add(push, stepSize);
+        impulses.finishStep(stepSize);
+    }
+    /**
+     * See CylinderChainWallForce::addForceReader() and takeMeanForces().
+     */
+    int addReader() {
+        return impulses.addReader();
+    }
+    double takeMeanForces(ContextImpl& context, int reader, std::vector<double>& forces, std::vector<int>& numbers,
+            std::vector<double>& sums, std::vector<double>& loads);
+    /**
+     * Write the sums of forces to a checkpoint.
+     */
+    void writeForces(std::ostream& stream) const;
+    /**
+     * Go on from the sums of a checkpoint.
+     */
+    void readForces(std::istream& stream);
+protected:
+    explicit PushForceImpl(const Force& owner) : StepForceImpl(owner) {
+    }
+    void initialize(int numParticles) {
+        impulses = cylchain::CouplingImpulses(numParticles);
+    }
+    /**
+     * Find the forces at the present positions.
+     */
+    virtual void findPushes(ContextImpl& context, std::vector<cylchain::Push>& pushes) const = 0;
+    /**
+     * The forces where the kernel has computed them last, if it takes note of them.
+     */
+    std::vector<cylchain::Push> present;
+    bool notesPushes = false;
+private:
+    cylchain::CouplingImpulses impulses;
+};
+
+} // namespace OpenMM
+
+#endif /*OPENMM_PUSHFORCEIMPL_H_*/

@@ -1,0 +1,123 @@
+"""Tables of forces of walls and contacts in runs: of files and of a RunReporter, and their panels in the figure."""
+
+import os
+import signal
+
+import numpy as np
+import pytest
+
+from openmm_cylchain import RunReporter, analysis
+from openmm_cylchain.cli import main
+from openmm_cylchain.runs import run as run_module
+from openmm_cylchain.runs import summary_figure
+from openmm_cylchain.runs.configuration import parse_configuration
+from openmm_cylchain.runs.run import create_simulation
+from openmm_cylchain.runs.run_directory import RunDirectory
+from openmm_cylchain.runs.summarised_run import run_with_summary
+from openmm_cylchain.runs.summary import load_trajectory
+
+BETWEEN_WALLS = """
+[solvent]
+temperature = "310 K"
+viscosity = "1.71 mPa*s"
+[box]
+edges = ["0.4 um", "0.4 um", "1 um"]
+[[filament]]
+type = "F_ACTIN"
+segment_length = "100 nm"
+segments = 1
+count = 12
+[contacts]
+diameter = "20 nm"
+[[wall]]
+shape = "slit"
+point = ["0.2 um", "0.2 um", "0.5 um"]
+normal = [0, 0, 1]
+thickness = "60 nm"
+stiffness = "0.5 pN/nm"
+[simulation]
+time_step = "1 us"
+duration = "0.2 ms"
+report_interval = "20 us"
+checkpoint_interval = "40 us"
+seed = 5
+"""
+TABLES = ("wall_forces.csv", "contact_forces.csv")
+
+
+@pytest.fixture(scope="module")
+def unbroken(tmp_path_factory):
+    path = tmp_path_factory.mktemp("forces") / "out"
+    run_with_summary(parse_configuration(BETWEEN_WALLS), path)
+    return path
+
+
+def test_tables_have_means_between_reports(unbroken):
+    found = analysis.load(unbroken)
+    walls, contacts = found.wall_forces, found.contact_forces
+    assert walls["load (kJ/mol/nm)"].shape == (11, 2) and contacts["load (kJ/mol/nm)"].shape == (11, 12)
+    for table in (walls, contacts):
+        np.testing.assert_allclose(table["mean over (ps)"][:, 0], [0.0, *[2e7] * 10])
+        np.testing.assert_array_equal(table["time (ps)"][:, 0], found.times)
+    assert walls["face"][0].tolist() == [0, 1] and walls["load (kJ/mol/nm)"][1:].min() > 0.0
+    np.testing.assert_allclose(walls["force z (kJ/mol/nm)"][1:] * [-1, 1], walls["load (kJ/mol/nm)"][1:])
+    assert contacts["load (kJ/mol/nm)"].max() > 0.0
+    # They push each other.
+    sums = [contacts[f"force {axis} (kJ/mol/nm)"].sum(axis=1) for axis in "xyz"]
+    np.testing.assert_allclose(sums, 0.0, atol=1e-9)
+
+
+def test_a_run_that_is_resumed_between_reports_has_the_same_tables(unbroken, tmp_path, monkeypatch):
+    """A signal comes at 50 us, half-way between two reports: the next mean is that over all steps between them."""
+    take = run_module._Recorder._timed_steps
+
+    def signalled(recorder, steps):
+        result = take(recorder, min(steps, 50 - recorder._step))
+        if recorder._step == 50:
+            os.kill(os.getpid(), signal.SIGINT)
+        return result
+
+    (tmp_path / "input.toml").write_text(BETWEEN_WALLS)
+    command = ["run", str(tmp_path / "input.toml"), "--output", str(tmp_path / "out")]
+    monkeypatch.setattr(run_module._Recorder, "_timed_steps", signalled)
+    assert main(command) == 130
+    assert len((tmp_path / "out" / TABLES[0]).read_text().splitlines()) == 1 + 2 * 3
+    monkeypatch.setattr(run_module._Recorder, "_timed_steps", take)
+    assert main([*command, "--resume"]) == 0
+    for name in TABLES:
+        assert (tmp_path / "out" / name).read_text() == (unbroken / name).read_text(), name
+
+
+def test_a_run_reporter_writes_the_same_tables(unbroken, tmp_path):
+    simulation, built = create_simulation(parse_configuration(BETWEEN_WALLS))
+    simulation.context.setPositions(analysis.load(unbroken).positions(0))
+    simulation.reporters.append(RunReporter(tmp_path / "out", 20, built.filaments))
+    simulation.step(100)
+    found, exact = analysis.load(tmp_path / "out"), analysis.load(unbroken)
+    for one, other in ((found.wall_forces, exact.wall_forces), (found.contact_forces, exact.contact_forces)):
+        assert list(one) == list(other)
+        np.testing.assert_array_equal(one["step"], other["step"][:6])
+        # Positions of a trajectory are in single precision.
+        np.testing.assert_allclose(one["load (kJ/mol/nm)"], other["load (kJ/mol/nm)"][:6], atol=1e-2)
+
+
+def test_runs_without_walls_and_contacts_have_no_such_tables(tmp_path):
+    begin, end = BETWEEN_WALLS.index("[contacts]"), BETWEEN_WALLS.index("[simulation]")
+    run_with_summary(parse_configuration(BETWEEN_WALLS[:begin] + BETWEEN_WALLS[end:]), tmp_path / "out")
+    found = analysis.load(tmp_path / "out")
+    assert found.wall_forces == found.contact_forces == {}
+    assert not any((tmp_path / "out" / name).exists() for name in TABLES)
+
+
+def test_the_figure_has_panels_of_forces(unbroken, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(summary_figure.Figure, "savefig", lambda figure, *_, **__: drawn.append(figure))
+    configuration = parse_configuration(BETWEEN_WALLS)
+    files = RunDirectory(unbroken)
+    summary_figure._draw(configuration, files, load_trajectory(configuration, files))
+    walls, contacts = drawn[0].axes[-2:]
+    assert walls.get_title() == "Forces of walls, by faces"
+    assert [line.get_label() for line in walls.lines] == ["wall 0, slit, upper face", "wall 0, slit, lower face"]
+    table = analysis.load(unbroken).contact_forces["load (kJ/mol/nm)"][1:] / 0.602214076
+    np.testing.assert_allclose(contacts.lines[0].get_ydata(), table.mean(axis=1))
+    np.testing.assert_allclose(contacts.lines[1].get_ydata(), table.max(axis=1))
