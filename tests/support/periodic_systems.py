@@ -37,10 +37,13 @@ def crossing_filaments(engine, vectors):
         repulsion.addParticle([])
     repulsion.addInteractionGroup(range(BEADS), range(system.getNumParticles()))
     system.addForce(repulsion)
-    drift = openmm.CustomExternalForce("-10000*x")
+    # Ends have half of the friction, so that nothing is compressed.
+    ends = {int(end) for nodes in filaments.node_indices for end in nodes[[0, -1]]}
+    drift = openmm.CustomExternalForce("-force*x")
+    drift.addPerParticleParameter("force")
     for particle in range(system.getNumParticles()):
         if not system.isVirtualSite(particle):
-            drift.addParticle(particle, [])
+            drift.addParticle(particle, [5000.0 if particle in ends else 10000.0])
     system.addForce(drift)
     return filaments, topology, system, positions
 
