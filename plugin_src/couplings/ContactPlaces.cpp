@@ -199,29 +199,32 @@ void ContactSearch::setMotion(const double* x, const double* y, const Loop& run)
     search.moves = x != y;
     vector<MovingSegment>& moving = search.moving;
     moving.resize(capsules.size());
-    runInChunks(run, capsules.size(), CHUNK_OF_MOTIONS, [&] (int i) {
-        const Capsule& own = capsules[i];
-        const int next = search.next[i];
-        MovingSegment& segment = moving[i];
-        set(segment.first, position(x, own.first));
-        set(segment.along, search.along(own, x));
-        set(segment.laterFirst, position(y, own.first));
-        set(segment.laterAlong, search.along(own, y));
-        set(segment.laterNext, next < 0 ? Vec3d {0, 0, 0} : search.along(capsules[next], y));
-        segment.radius = own.radius;
+    const int count = capsules.size();
+    runParts(run, (count+CHUNK_OF_MOTIONS-1)/CHUNK_OF_MOTIONS, [&] (int chunk) {
+        for (int i = chunk*CHUNK_OF_MOTIONS; i < min(count, (chunk+1)*CHUNK_OF_MOTIONS); i++) {
+            const Capsule& own = capsules[i];
+            const int next = search.next[i];
+            MovingSegment& segment = moving[i];
+            set(segment.first, position(x, own.first));
+            set(segment.along, search.along(own, x));
+            set(segment.laterFirst, position(y, own.first));
+            set(segment.laterAlong, search.along(own, y));
+            set(segment.laterNext, next < 0 ? Vec3d {0, 0, 0} : search.along(capsules[next], y));
+            segment.radius = own.radius;
+        }
     });
 }
 
-void ContactSearch::updateMotion(const double* y, const Loop& run) {
+void ContactSearch::updateMotion(const vector<int>& numbers, const double* y) {
     Implementation& search = *implementation;
-    runInChunks(run, search.moving.size(), CHUNK_OF_MOTIONS, [&] (int i) {
+    for (int i : numbers) {
         const Capsule& own = search.system.capsules[i];
         const Vec3d along = search.along(own, y);
         set(search.moving[i].laterFirst, position(y, own.first));
         set(search.moving[i].laterAlong, along);
         if (search.previous[i] >= 0)
             set(search.moving[search.previous[i]].laterNext, along);
-    });
+    }
 }
 
 /** Whether a contact that is not parallel and has not crossed is surely not owned: see isOwned(). */
@@ -266,6 +269,15 @@ void ContactSearch::findOutlooks(const ContactPair* const* pairs, int count, Pai
             outlooks[start+i] = {distance[i]-radii, radii, mayCross,
                     isKnown && implementation->isOfNeighbor(pair, flags[i])};
         }
+    }
+}
+
+void ContactSearch::prefetchMotion(int a, int b) const {
+    for (int capsule : {a, b}) {
+        prefetch(&implementation->moving[capsule]);
+        prefetch(&implementation->system.capsules[capsule]);
+        prefetch(&implementation->next[capsule]);
+        prefetch(&implementation->previous[capsule]);
     }
 }
 

@@ -118,8 +118,12 @@ public:
             double limit = std::numeric_limits<double>::infinity()) const;
     /** Take note of x and y, for the functions below. */
     void setMotion(const double* x, const double* y, const Loop& run);
-    /** Take note of another y, with the same x. */
-    void updateMotion(const double* y, const Loop& run);
+    /**
+     * Take note of where some capsules are now. Several threads may do so at the same time, each with its own capsules.
+     */
+    void updateMotion(const std::vector<int>& capsules, const double* y);
+    /** Ask for what is known of two capsules, which is needed soon. */
+    void prefetchMotion(int a, int b) const;
     /**
      * Take a first look at some pairs, many at once. Several threads may do so at the same time.
      *

@@ -35,6 +35,13 @@ void CapsuleMotion::begin(const vector<Capsule>& newCapsules, const double* move
     motion.assign(capsules->size(), 0.0);
 }
 
+void CapsuleMotion::beginAgain(const double* moved, const Loop& loop) {
+    runInChunks(loop, capsules->size(), CHUNK_OF_MOTIONS, [&] (int i) {
+        takeNoteOf(i, moved);
+        motion[i] = 0;
+    });
+}
+
 void CapsuleMotion::beginAgain(const vector<int>& numbers, const double* moved) {
     for (int number : numbers) {
         takeNoteOf(number, moved);
@@ -63,18 +70,24 @@ double CapsuleMotion::followOne(int number, const double* moved) {
     return motion[number] = sqrt(inAll);
 }
 
-void CapsuleMotion::follow(const double* moved, double reach, const Loop& loop) {
+void CapsuleMotion::follow(const function<bool(int)>& takesPart, const double* moved, double reach, const Loop& loop,
+        const function<void(const vector<int>&)>& use) {
     const int count = capsules->size(), chunks = (count+CHUNK_OF_MOTIONS-1)/CHUNK_OF_MOTIONS;
     parts.resize(chunks);
     loop(chunks, [&] (int chunk) {
         Largest& part = parts[chunk];
         part.first = part.second = 0;
         part.movers.clear();
+        part.taken.clear();
         for (int i = chunk*CHUNK_OF_MOTIONS; i < min(count, (chunk+1)*CHUNK_OF_MOTIONS); i++) {
-            if (2*followOne(i, moved) > reach)
-                part.movers.push_back(i);
+            if (takesPart(i)) {
+                part.taken.push_back(i);
+                if (2*followOne(i, moved) > reach)
+                    part.movers.push_back(i);
+            }
             part.include(motion[i]);
         }
+        use(part.taken);
     });
     Largest all;
     movers.clear();

@@ -3,7 +3,9 @@
 
 #include "couplings/Capsules.h"
 #include "mechanics/Loop.h"
+#include "mechanics/Prefetch.h"
 #include <cstddef>
+#include <functional>
 #include <vector>
 
 namespace cylchain {
@@ -26,14 +28,23 @@ public:
      * @param moved     where particles are, three doubles for each
      */
     void begin(const std::vector<Capsule>& capsules, const double* moved, const Loop& loop);
-    /** The same after another search of some of them. */
+    /** The same after another search, of all capsules or of some. */
+    void beginAgain(const double* moved, const Loop& loop);
     void beginAgain(const std::vector<int>& numbers, const double* moved);
     /**
      * Follow capsules to where an iteration has led them.
      *
-     * @param reach  see getMovers()
+     * @param takesPart  whether a capsule took part in it; others have stayed
+     * @param reach      see getMovers()
+     * @param use        is called with capsules that took part, some at a time, perhaps on several threads
      */
-    void follow(const double* moved, double reach, const Loop& loop);
+    void follow(const std::function<bool(int)>& takesPart, const double* moved, double reach, const Loop& loop,
+            const std::function<void(const std::vector<int>&)>& use);
+    /** Ask for what getWay() needs soon. */
+    void prefetchWay(int a, int b) const {
+        prefetch(&travelled[a]);
+        prefetch(&travelled[b]);
+    }
     /** Get the length of the ways of two capsules in all iterations together. */
     double getWay(int a, int b) const {
         return travelled[a]+travelled[b];
@@ -50,7 +61,7 @@ private:
     /** The largest two motions of some capsules, and who has moved by more than half of the reach. */
     struct Largest {
         double first = 0, second = 0;
-        std::vector<int> movers;
+        std::vector<int> movers, taken;
         void include(double motion);
     };
     void takeNoteOf(int capsule, const double* moved);

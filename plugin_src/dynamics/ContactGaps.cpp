@@ -75,6 +75,24 @@ void ContactGaps::setContacts(ContactSearch* newSearch, double newStiffness, con
     force = newForce;
 }
 
+double ContactGaps::findLargestSoftness(const CoupledStart& start) {
+    double largest = 0;
+    responses.begin(start.places, start.settings.stepSize);
+    auto include = [&] (const Place& place) {
+        PlaceOnChain found;
+        if (start.places.find(place, found))
+            largest = max(largest, responses.find(found));
+    };
+    for (const Capsule& capsule : search->getSystem().capsules) {
+        Place place;
+        place.first = capsule.first;
+        include(place);
+    }
+    for (const CapsuleOnCurve& own : *onCurves)
+        include(own.first);
+    return 2*stiffness*largest;
+}
+
 void ContactGaps::begin(const CoupledStart& start, const Loop& newLoop) {
     loop = &newLoop;
     begun = start.positions;
@@ -124,6 +142,7 @@ void ContactGaps::begin(const CoupledStart& start, const Loop& newLoop) {
     movesTooFar = isEndless = false;
     pairs.clear();
     rooms.clear();
+    surfaces.clear();
     near.clear();
     motion.clear();
 }
@@ -176,7 +195,8 @@ void ContactGaps::findNewPairs(const double* moved) {
  * Get whether the gap of a pair may be closed that begins and ends so; if not, how far its capsules may travel until it
  * may.
  */
-bool ContactGaps::mayClose(const ContactPair& pair, double before, double after, double& room) const {
+bool ContactGaps::mayClose(int number, double before, double after, double& room) const {
+    const ContactPair& pair = pairs.get(number);
     const double least = LARGEST_GAP_EXPONENT*kT*(places[pair.a].response+places[pair.b].response);
     auto isFar = [&] (double depth) {
         const double start = before+depth;
@@ -185,20 +205,10 @@ bool ContactGaps::mayClose(const ContactPair& pair, double before, double after,
     };
     if (isFar(0))
         return false;
-    Gap gap = describeGap(pair);
-    const double depth = placeHardSurface(kT, all->getNoise().drawSurface(gap), LARGEST_DEPTH*radiiOf(pair), before,
-            gap);
-    return gap.law != GapLaw::Reflection || !isFar(depth);
-}
-
-/** What is known of the gap of a pair before its places are. */
-Gap ContactGaps::describeGap(const ContactPair& pair) const {
     Gap gap;
-    gap.key[0] = (uint32_t) force*0x9E3779B1u+pair.a;
-    gap.key[1] = pair.b;
     gap.stiffness = stiffness;
-    gap.response = places[pair.a].response+places[pair.b].response;
-    return gap;
+    const double depth = placeHardSurface(kT, surfaces[number], LARGEST_DEPTH*radiiOf(pair), before, gap);
+    return gap.law != GapLaw::Reflection || !isFar(depth);
 }
 
 /** Pairs that are looked at together, in memory of a thread. */
@@ -222,14 +232,31 @@ struct ContactGaps::Looks {
     }
 };
 
+/** Draw what the hard surfaces of some pairs are found with. */
+void ContactGaps::drawSurfaces(int first, int last) {
+    if (first >= last)
+        return;
+    static thread_local vector<uint32_t> keys, others;
+    keys.clear();
+    others.clear();
+    for (int i = first; i < last; i++) {
+        keys.push_back(keyOf(pairs.get(i)));
+        others.push_back(pairs.get(i).b);
+    }
+    all->getNoise().drawSurfaces(keys.data(), others.data(), last-first, &surfaces[first]);
+}
+
 /** Find the pairs from a number on, or those that have travelled far enough, whose gaps may be closed. */
 void ContactGaps::selectNear(int firstNew) {
     const int count = pairs.size(), chunks = (count+CHUNK_OF_CAPSULES-1)/CHUNK_OF_CAPSULES;
     rooms.resize(count, 0.0);
+    surfaces.resize(count);
     parts.resize(max(parts.size(), (size_t) chunks));
     (*loop)(chunks, [&] (int chunk) {
         Looks& looks = Looks::ofThread();
-        for (int i = chunk*CHUNK_OF_CAPSULES; i < min(count, (chunk+1)*CHUNK_OF_CAPSULES); i++) {
+        const int first = chunk*CHUNK_OF_CAPSULES, last = min(count, first+CHUNK_OF_CAPSULES);
+        drawSurfaces(max(first, firstNew), last);
+        for (int i = first; i < last; i++) {
             const ContactPair& pair = pairs.get(i);
             const double way = motion.getWay(pair.a, pair.b), radii = radiiOf(pair);
             double room;
@@ -237,7 +264,7 @@ void ContactGaps::selectNear(int firstNew) {
                 continue;
             if (isHeld(pair))
                 rooms[i] = HUGE_VAL;
-            else if (i >= firstNew && pair.clearance > 0 && !mayClose(pair, pair.before-radii, pair.distance-radii, room))
+            else if (i >= firstNew && pair.clearance > 0 && !mayClose(i, pair.before-radii, pair.distance-radii, room))
                 rooms[i] = way+min(room, (double) pair.clearance);
             else
                 looks.add(i, pair);
@@ -249,7 +276,7 @@ void ContactGaps::selectNear(int firstNew) {
             const ContactPair& pair = *looks.pairs[k];
             const PairOutlook& outlook = looks.outlooks[k];
             double room;
-            if (mayClose(pair, pair.before-outlook.radii, outlook.gap, room) ||
+            if (mayClose(looks.numbers[k], pair.before-outlook.radii, outlook.gap, room) ||
                     (outlook.mayCross && search->crosses(pair)))
                 own.push_back(looks.numbers[k]);
             else
@@ -281,9 +308,11 @@ void ContactGaps::follow(NearPair& own) const {
         const int count = search->evaluate(pair, begun, begun, contacts);
         own.touchedAtStart = count > 0;
         own.start = findPairGap(search->getSegments(pair, false), contacts, count, radii);
-        own.gap = describeGap(pair);
-        own.depth = placeHardSurface(kT, all->getNoise().drawSurface(own.gap), LARGEST_DEPTH*radii, own.start.gap,
-                own.gap);
+        own.gap.key[0] = keyOf(pair);
+        own.gap.key[1] = pair.b;
+        own.gap.stiffness = stiffness;
+        own.gap.response = places[pair.a].response+places[pair.b].response;
+        own.depth = placeHardSurface(kT, surfaces[own.pair], LARGEST_DEPTH*radii, own.start.gap, own.gap);
     }
     const int count = search->evaluate(pair, contacts);
     // What touches a neighbor at the start and at the end is no gap of this pair.
@@ -335,8 +364,9 @@ bool ContactGaps::findGaps(int iteration, bool settled, const double* moved, Ref
         search->setMotion(begun, moved, *loop);
     }
     else {
-        motion.follow(moved, slack, *loop);
-        search->updateMotion(moved, *loop);
+        motion.follow([] (int) {return true;}, moved, slack, *loop, [&] (const vector<int>& capsules) {
+            search->updateMotion(capsules, moved);
+        });
         firstNew = pairs.size();
         // While much moves, it may come back.
         if (motion.exceedsReach() && settled)

@@ -33,6 +33,8 @@ public:
      */
     void setContacts(ContactSearch* search, double stiffness, const double* box,
             const std::vector<CapsuleOnCurve>& onCurves, int force);
+    /** About the largest softness k c of a contact, see ContactRest: c is how far a force moves it in the step. */
+    double findLargestSoftness(const CoupledStart& start);
     void begin(const CoupledStart& start, const Loop& loop) override;
     bool findGaps(int iteration, bool settled, const double* moved, ReflectedGaps& gaps) override;
     Rests getRests() const override {
@@ -80,8 +82,12 @@ private:
     void findPairs(const double* moved, const PairFilter& known);
     void findNewPairs(const double* moved);
     static PairGap findPairGap(const SegmentPair& pair, const Contact* contacts, int count, double radii);
-    bool mayClose(const ContactPair& pair, double before, double after, double& room) const;
-    Gap describeGap(const ContactPair& pair) const;
+    bool mayClose(int pair, double before, double after, double& room) const;
+    void drawSurfaces(int first, int last);
+    /** What random numbers of a pair belong to, beside its second capsule. */
+    std::uint32_t keyOf(const ContactPair& pair) const {
+        return (std::uint32_t) force*0x9E3779B1u+pair.a;
+    }
     void selectNear(int firstNew);
     void follow(NearPair& near) const;
     bool mayClose(const Gap& gap) const;
@@ -109,6 +115,8 @@ private:
     PairList pairs;
     /** For each pair, how far both capsules must have travelled before their gap may be closed, or -1 if it is near. */
     std::vector<double> rooms;
+    /** For each pair, what its hard surface is found with. */
+    std::vector<SurfaceVariates> surfaces;
     std::vector<NearPair> near;
     /** Those of the last search. */
     std::vector<ContactPair> found;

@@ -32,8 +32,6 @@ const double OF_TENSIONS = 2e-4;
  * The least energy is that of all packs then, because a single coupling may have it.
  */
 const double STIFF = 2e3, OF_STIFF = 10;
-/** What conjugate gradients may leave of the energy of the error that they begin with. */
-const double OF_ENERGY = 0.05;
 /** Equations that a thread looks at together. */
 const int CHUNK_OF_EQUATIONS = 256;
 
@@ -140,7 +138,7 @@ bool CoupledEquations::findForces(const vector<PackStep*>& packs, const Demands&
     // What is stiff, or must be right in tensions, needs more digits.
     const bool trySingle = demands.single && !demands.forTensions && !(demands.demandingStiffness > STIFF);
     auto solveIn = [&] (auto& gradients) {
-        const bool solved = gradients.solve(packs, gathered, tighter*OF_ENERGY, least, ofPlaces, forces, loop);
+        const bool solved = gradients.solve(packs, gathered, tighter*demands.tolerance, least, ofPlaces, forces, loop);
         iterations += gradients.getNumIterations();
         hasFound = gradients.hasFound();
         return solved;

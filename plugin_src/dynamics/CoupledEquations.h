@@ -43,8 +43,8 @@ public:
     struct Demands {
         /** Whether tensions of segments must be right, not moves alone. */
         bool forTensions = false;
-        /** See ImplicitCouplings::getStiffness() and getDemandingStiffness(). */
-        double stiffness = 0, demandingStiffness = 0;
+        /** See ImplicitCouplings::getStiffness(), getDemandingStiffness() and getRelativeTolerance(). */
+        double stiffness = 0, demandingStiffness = 0, tolerance = 1;
         /** Whether the vectors of the method may be in single precision, as those of packs are. */
         bool single = false;
     };

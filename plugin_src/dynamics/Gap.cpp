@@ -13,8 +13,10 @@ const double LEAST_LIMIT = 3, LARGEST_LIMIT = 9;
 const double FREE_DEPTH = 10;
 /** Chains of links and linkers are numbers of forces: with this bit, the numbers are those of gaps. */
 const uint32_t OF_GAPS = 0x80000000u;
-/** The first draw of those of parts. */
-const int FIRST_PART = 1;
+/** What sets apart the numbers of each part. */
+const uint32_t OF_PARTS = 0x85EBCA6Bu;
+/** The draw that normal numbers are not made of. */
+const int OF_SURFACES = 1;
 
 double uniformOf(uint32_t word) {
     return (word+0.5)/4294967296.0;
@@ -22,32 +24,35 @@ double uniformOf(uint32_t word) {
 
 } // namespace
 
-void GapNoise::drawFour(const Gap& gap, int draw, uint32_t* words) const {
-    const uint32_t chain = gap.key[0] | OF_GAPS, part = gap.key[1];
-    drawWords(step, NoiseKind::Link, draw, &chain, &part, 1, words);
-}
-
-SurfaceVariates GapNoise::drawSurface(const Gap& gap) const {
-    uint32_t words[4];
-    drawFour(gap, 0, words);
-    return {-log(uniformOf(words[0])), uniformOf(words[1])};
+void GapNoise::drawSurfaces(const uint32_t* first, const uint32_t* second, int count,
+        SurfaceVariates* variates) const {
+    static thread_local vector<uint32_t> chains, words;
+    chains.resize(count);
+    words.resize(4*(size_t) count);
+    for (int i = 0; i < count; i++)
+        chains[i] = first[i] | OF_GAPS;
+    drawWords(step, NoiseKind::Link, OF_SURFACES, chains.data(), second, count, words.data());
+    for (int i = 0; i < count; i++)
+        variates[i] = {-log(uniformOf(words[4*i])), uniformOf(words[4*i+1])};
 }
 
 void GapNoise::draw(const Gap* gaps, int count, int parts, double* bridges, double* reflections) const {
-    vector<uint32_t> chains(count), keys(count), words(4*(size_t) count);
-    for (int i = 0; i < count; i++) {
-        chains[i] = gaps[i].key[0] | OF_GAPS;
-        keys[i] = gaps[i].key[1];
-    }
-    // Each draw has two numbers for both places: one for the bridge, and one for the reflection.
+    static thread_local vector<uint32_t> chains, keys;
+    static thread_local vector<double> normals;
+    chains.resize(count);
+    keys.resize(count);
+    normals.resize(4*(size_t) count);
     for (int part = 0; part < parts; part++) {
-        drawWords(step, NoiseKind::Link, FIRST_PART+part, chains.data(), keys.data(), count, words.data());
+        for (int i = 0; i < count; i++) {
+            chains[i] = (gaps[i].key[0]+part*OF_PARTS) | OF_GAPS;
+            keys[i] = gaps[i].key[1];
+        }
+        drawNormals(step, NoiseKind::Link, chains.data(), keys.data(), count, normals.data());
+        // Both places have two: one for the bridge, and one for the reflection.
         for (int i = 0; i < count; i++)
             for (int side = 0; side < 2; side++) {
-                const uint32_t* const own = &words[4*i+2*side];
-                const double size = sqrt(-2*log(uniformOf(own[0]))), angle = 2*M_PI*uniformOf(own[1]);
-                bridges[(2*i+side)*parts+part] = size*cos(angle);
-                reflections[(2*i+side)*parts+part] = size*sin(angle);
+                bridges[(2*i+side)*parts+part] = normals[4*i+2*side];
+                reflections[(2*i+side)*parts+part] = normals[4*i+2*side+1];
             }
     }
 }

@@ -70,8 +70,14 @@ public:
     GapNoise() = default;
     explicit GapNoise(const NoiseKey& step) : step(step) {
     }
-    /** Draw what the hard surface of a gap is found with. */
-    SurfaceVariates drawSurface(const Gap& gap) const;
+    /** Draw what the hard surfaces of gaps are found with, from their keys. */
+    void drawSurfaces(const std::uint32_t* first, const std::uint32_t* second, int count,
+            SurfaceVariates* variates) const;
+    SurfaceVariates drawSurface(const Gap& gap) const {
+        SurfaceVariates variates;
+        drawSurfaces(&gap.key[0], &gap.key[1], 1, &variates);
+        return variates;
+    }
     /**
      * Draw numbers for the parts of a step, one after the other for each gap.
      *
@@ -81,7 +87,6 @@ public:
      */
     void draw(const Gap* gaps, int count, int parts, double* bridges, double* reflections) const;
 private:
-    void drawFour(const Gap& gap, int draw, std::uint32_t* words) const;
     NoiseKey step = {};
 };
 

@@ -69,6 +69,10 @@ public:
     virtual double getDemandingStiffness() const {
         return 0;
     }
+    /** What solving the equations may leave of the energy of the error that it begins with. */
+    virtual double getRelativeTolerance() const {
+        return 0.05;
+    }
     /** Take note of how forces move the places of the equations: see CoupledEquations::findCompliances(). */
     virtual void setCompliances(const double*) {
     }

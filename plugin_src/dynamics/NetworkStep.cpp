@@ -19,6 +19,8 @@ const int UNDAMPED_ITERATIONS = 14;
 const double DAMPING = 0.6;
 /** How far an iteration turns segments, in rad, with forces that are found where they have not turned. */
 const double LARGEST_TURN = 0.25;
+/** Where contacts are softer than this in a step, they are hard ones, which take less time: see ContactRest. */
+const double LARGEST_SOFTNESS = 12;
 /** A step is divided into at most two to this power. */
 const int LARGEST_DIVISION = 10;
 
@@ -57,18 +59,28 @@ void NetworkStep::setForces(const CoupledForces& forces, const double* box) {
         couplings.push_back(links[i].get());
     }
     contacts.resize(max(contacts.size(), forces.contacts.size()));
+    hardContacts.resize(contacts.size());
+    firstContacts = couplings.size();
     for (size_t i = 0; i < forces.contacts.size(); i++) {
         const CoupledForces::Contacts& own = forces.contacts[i];
-        if (!contacts[i])
+        if (!contacts[i]) {
             contacts[i].reset(new ContactGaps());
+            hardContacts[i].reset(new ContactEquations());
+        }
+        hardContacts[i]->setContacts(own.search, own.stiffness, own.periodic ? box : NULL, *own.onCurves);
         contacts[i]->setContacts(own.search, own.stiffness, own.periodic ? box : NULL, *own.onCurves, i);
         couplings.push_back(contacts[i].get());
         impulses.push_back(own.impulses);
     }
+    firstWalls = couplings.size();
     walls.resize(max(walls.size(), forces.walls.size()));
+    wallsOfHardContacts.resize(walls.size());
     for (size_t i = 0; i < forces.walls.size(); i++) {
-        if (!walls[i])
+        if (!walls[i]) {
             walls[i].reset(new WallGaps());
+            wallsOfHardContacts[i].reset(new WallEquations());
+        }
+        wallsOfHardContacts[i]->setWalls(forces.walls[i].system);
         walls[i]->setWalls(forces.walls[i].system, forces.contacts.size()+i);
         couplings.push_back(walls[i].get());
         impulses.push_back(forces.walls[i].impulses);
@@ -163,6 +175,7 @@ bool NetworkStep::attempt(const Attempt& attempt, double* displacements, vector<
     });
     const CoupledStart start = {attempt.positions, attempt.settings, places, attempt.taken, active};
     gaps.begin(attempt.settings, places);
+    chooseCouplings(start);
     for (ImplicitCouplings* own : couplings)
         own->begin(start, attempt.loop);
     copy(attempt.positions, attempt.positions+moved.size(), moved.begin());
@@ -193,6 +206,20 @@ bool NetworkStep::attempt(const Attempt& attempt, double* displacements, vector<
     return find(failed.begin(), failed.end(), true) == failed.end();
 }
 
+/** Steps that do not resolve contacts have hard ones, and walls that go with them. */
+void NetworkStep::chooseCouplings(const CoupledStart& start) {
+    bool resolves = true;
+    for (size_t i = firstContacts; i < firstWalls; i++)
+        resolves = resolves && contacts[i-firstContacts]->findLargestSoftness(start) <= LARGEST_SOFTNESS;
+    auto choose = [&] (size_t i, ImplicitCouplings& soft, ImplicitCouplings& hard) {
+        couplings[i] = resolves ? &soft : &hard;
+    };
+    for (size_t i = firstContacts; i < firstWalls; i++)
+        choose(i, *contacts[i-firstContacts], *hardContacts[i-firstContacts]);
+    for (size_t i = firstWalls; i < couplings.size(); i++)
+        choose(i, *walls[i-firstWalls], *wallsOfHardContacts[i-firstWalls]);
+}
+
 bool NetworkStep::iterate(const Attempt& attempt, int stage) {
     const int numPacks = steps.size();
     attempt.loop(numPacks, [&] (int pack) {
@@ -212,6 +239,7 @@ bool NetworkStep::iterate(const Attempt& attempt, int stage) {
     for (const ImplicitCouplings* own : couplings) {
         demands.stiffness = max(demands.stiffness, own->getStiffness());
         demands.demandingStiffness = max(demands.demandingStiffness, own->getDemandingStiffness());
+        demands.tolerance = min(demands.tolerance, own->getRelativeTolerance());
     }
     const int most = turns ? NEWTON_ITERATIONS_OF_TURNING_LINKS : NEWTON_ITERATIONS;
     for (int iteration = 0; iteration < most; iteration++) {

@@ -2,11 +2,13 @@
 #define CYLCHAIN_NETWORK_STEP_H_
 
 #include "dynamics/ChainEngine.h"
+#include "dynamics/ContactEquations.h"
 #include "dynamics/ContactGaps.h"
 #include "dynamics/CoupledForces.h"
 #include "dynamics/ImplicitCouplings.h"
 #include "dynamics/LinkEquations.h"
 #include "dynamics/PackStepSource.h"
+#include "dynamics/WallEquations.h"
 #include "dynamics/WallGaps.h"
 #include <cstddef>
 #include <memory>
@@ -55,6 +57,7 @@ private:
     struct Attempt;
     void setParticles(const std::vector<CoupledParticle>& particles);
     bool attempt(const Attempt& attempt, double* displacements, std::vector<bool>& failed);
+    void chooseCouplings(const CoupledStart& start);
     bool iterate(const Attempt& attempt, int stage);
     bool finishIteration(const std::vector<std::size_t>& first);
     void placeSites(double* positions) const;
@@ -67,8 +70,12 @@ private:
     const PackStepSource& beamEngine;
     ChainPlaces places;
     std::vector<std::unique_ptr<LinkEquations> > links;
+    /** Contacts and walls, and those of steps that do not resolve contacts; and where they are among the couplings. */
     std::vector<std::unique_ptr<ContactGaps> > contacts;
     std::vector<std::unique_ptr<WallGaps> > walls;
+    std::vector<std::unique_ptr<ContactEquations> > hardContacts;
+    std::vector<std::unique_ptr<WallEquations> > wallsOfHardContacts;
+    std::size_t firstContacts = 0, firstWalls = 0;
     std::vector<ImplicitCouplings*> couplings;
     /** What receives their forces, or NULL. */
     std::vector<CouplingImpulses*> impulses;

@@ -22,6 +22,10 @@ void PlaceResponses::begin(const ChainPlaces& newPlaces, double newStepSize) {
         beam.length = places->getLength(i);
         beam.segments = chain.segments.size();
         beam.closed = chain.closed;
+        double largest = 0;
+        for (const Segment& one : chain.segments)
+            largest = max(largest, one.perpendicular);
+        beam.least = stepSize/(chain.nodeFriction+largest);
         describe(segment.perpendicular/segment.restLength,
                 chain.joints.empty() ? 0 : chain.joints[0]*segment.restLength, beam);
     }
@@ -30,6 +34,7 @@ void PlaceResponses::begin(const ChainPlaces& newPlaces, double newStepSize) {
         beams[i].segments = chain.numElements();
         beams[i].closed = chain.closed;
         beams[i].length = beams[i].segments*chain.elementLength;
+        beams[i].least = stepSize/(chain.elementLength*chain.perpendicularFriction);
         describe(chain.perpendicularFriction, chain.bendingRigidity, beams[i]);
     }
 }
@@ -40,10 +45,11 @@ void PlaceResponses::describe(double friction, double rigidity, Beam& beam) cons
     beam.wave = M_SQRT2*pow(rigidity*stepSize/friction, 0.25);
     beam.bending = 0.5*stepSize/(friction*beam.wave);
     beam.whole = stepSize/(friction*beam.length);
+    beam.least = min(beam.least, max(beam.bending, beam.whole));
 }
 
-double PlaceResponses::find(const PlaceOnChain& place) const {
-    const double alone = stepSize/places->getLateralFriction(place);
+double PlaceResponses::find(const PlaceOnChain& place, const LateralFriction& friction) const {
+    const double alone = stepSize/friction.at(place.fraction);
     if (place.chain >= (int) beams.size() || !(beams[place.chain].wave > 0))
         return alone;
     const Beam& beam = beams[place.chain];
@@ -59,4 +65,22 @@ double PlaceResponses::find(const PlaceOnChain& place) const {
         whole = beam.whole*(1+12*off*off);
     }
     return min(alone, cbrt(bending*bending*bending+whole*whole*whole));
+}
+
+double PlaceResponses::findLeast(int chain) const {
+    if (chain < (int) beams.size())
+        return beams[chain].least;
+    PlaceOnChain particle;
+    particle.chain = chain;
+    return find(particle);
+}
+
+bool PlaceResponses::moveTogether(int chain) const {
+    if (chain >= (int) beams.size())
+        return false;
+    if (places->isBeam(chain))
+        return true;
+    const Beam& beam = beams[chain];
+    const double segment = beam.length/beam.segments;
+    return segment < min(beam.wave, 0.25*beam.length);
 }

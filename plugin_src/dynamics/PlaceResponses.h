@@ -21,11 +21,24 @@ class PlaceResponses {
 public:
     /** Set chains, which must exist while responses are found, and the length of the step. */
     void begin(const ChainPlaces& places, double stepSize);
-    double find(const PlaceOnChain& place) const;
+    double find(const PlaceOnChain& place) const {
+        return find(place, places->findLateralFriction(place));
+    }
+    /** The same where the friction of the segment is at hand: see ChainPlaces::findLateralFriction(). */
+    double find(const PlaceOnChain& place, const LateralFriction& friction) const;
+    /** Find what no place of a chain, or a particle, responds less than. It takes less time. */
+    double findLeast(int chain) const;
+    /**
+     * Get whether places of a chain at neighbouring nodes are moved together by what moves one of them. Those of beam
+     * elements are: several of them are on one element.
+     */
+    bool moveTogether(int chain) const;
 private:
     /** A chain, as a beam and as a rod. */
     struct Beam {
         double length = 0, wave = 0, bending = 0, whole = 0;
+        /** The least response of a place. */
+        double least = 0;
         int segments = 0;
         bool closed = false;
     };
