@@ -30,6 +30,7 @@ from .errors import (
     JointWarning,
     LinkerWarning,
     PrecisionWarning,
+    SegmentLengthWarning,
     TimeStepError,
     TimeStepWarning,
 )
@@ -95,6 +96,7 @@ __all__ = [
     "PrecisionWarning",
     "RunReporter",
     "SegmentFriction",
+    "SegmentLengthWarning",
     "SegmentPlace",
     "Slab",
     "Sphere",

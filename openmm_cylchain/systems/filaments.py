@@ -302,6 +302,9 @@ class Filaments(FilamentsInContexts):
             than four times, or that of hands of linkers; if forces of the System are so stiff that variances may be
             10 % too large (see ``recommended_time_step``); if it is too long for the flow or for self-propelled
             filaments; or if FENE lengths have too much energy at it (``timestep.fene_steps``).
+        SegmentLengthWarning
+            If constant forces, or tethers, pull a filament so much that the chain of segments has the extension of the
+            wormlike chain at a force that is a tenth off (see ``theory.wlc_share_of_force``).
         JointWarning
             If a joint of filaments that are not linked where it is has more than 20 EI/h of an element.
         BoxWarning
