@@ -15,7 +15,8 @@ A link that joins places which contacts or a wall push moves their gaps within t
 two are springs in series, k and kc: energies of contacts come out too large by some 0.05 of (mu_1 + mu_2) dt k kc/(k +
 kc), with the mobilities of the places as in contact. Measured for pairs of rods on a link with a rest length, over
 draws of the same energies: 0.046 to 0.052 for rods of 100 nm with k from 0.25 to 5 and kc of 0.1 or 0.38 pN/nm, links
-of 35 nm; 0.034 for rods of 200 nm; the length of the link is of no account. The product may be 1.2.
+of 35 nm; 0.034 for rods of 200 nm; the length of the link is of no account. The product may be 1.2. Longer steps, as those
+that networks of long filaments take, have hard contacts, of whose energies nothing is promised.
 
 Measured for F-actin in segments of 100 nm: the distribution of gaps beyond 10 nm is right to 5 % at that step, for
 contacts of 30 nm; beyond it, more and more steps must be divided.
@@ -41,6 +42,13 @@ RELATIVE_MOTION = 0.6
 
 LARGEST_LINKED_MOTION = 1.2
 """The largest product of a step, the mobility of two places, and the stiffness of a link in series with a contact."""
+
+_LARGEST_RESOLVED = 18.0
+"""Of the product of a step, the mobility of two segments that are alone and the stiffness of a contact.
+
+Steps resolve contacts up to 9 (``MOST_PARTS_OF_CONTACTS`` in ``plugin_src/dynamics/ContactGaps.cpp``), and in chains, which
+move less, somewhat further.
+"""
 
 _END_OF_ELEMENT = 4.0
 """How much more than all of an element that is alone its end moves, as that of a rod: elements are long."""
@@ -81,7 +89,7 @@ def steps_of_couplings(
     if not coupled or kT == 0.0:
         return []
     mobility = mobilities(filaments, system, particle_friction)
-    mobility_in_contact = _mobilities_in_contact(filaments, mobility)
+    mobility_in_contact = _mobilities_of_ends(filaments, mobility)
     steps = []
     for index, force in coupled:
         label = f"{force.getName()} (force {index})"
@@ -98,37 +106,53 @@ def steps_of_couplings(
         name = f"{label}: {what}"
         allowed = float(RELATIVE_MOTION**2 * bound)
         steps.append(TimeStep(allowed, f"{label}: {reason}", {name: float(bound)}, {name: allowed}))
-    pushing = [(index, force) for index, force in coupled if _pushes(force)]
-    for index, force in coupled:
-        if pushing and Crosslinks.of_force(force) is not None:
-            steps += _of_links_with_contacts(index, force, pushing, filaments, mobility_in_contact)
     return steps
 
 
-def _pushes(force):
-    return as_capsule_contact_force(force) is not None or as_filament_wall_force(force) is not None
+def steps_of_linked_contacts(
+    filaments: FilamentCollection,
+    system: openmm.System,
+    particle_friction: Numbers | None,
+    coupled_forces: CoupledForces,
+    longest: float,
+) -> list[TimeStep]:
+    """The TimeSteps of links that move the gaps of contacts and walls, with scheme "implicit".
 
-
-def _of_links_with_contacts(index, force, pushing, filaments, mobility):
-    # Of the link whose springs in series with a contact, or a wall, relax fastest.
-    links = Crosslinks.of_force(force)
-    numbers, stiffness, _, _, first, second = _rows_of(links, filaments, mobility)
-    kinds = [as_capsule_contact_force(one) or as_filament_wall_force(one) for _, one in pushing]
-    hardest = int(np.argmax([one.getStiffness()._value for one in kinds]))
-    contact = kinds[hardest].getStiffness()._value
-    rates = (first + second) * stiffness * contact / (stiffness + contact) if contact > 0.0 else np.zeros(1)
-    worst = int(np.argmax(rates))
-    if rates[worst] == 0.0:
+    None where steps of ``longest`` in ps, which all else allows, take contacts for hard ones: their energies do not
+    tell of links then.
+    """
+    coupled = [(index, force) for index, force in enumerate(system.getForces()) if coupled_forces.includes(index)]
+    links = [one for one in coupled if Crosslinks.of_force(one[1]) is not None]
+    pushing = [(index, force, _stiffness_of_surface(force)) for index, force in coupled]
+    index, pusher, contact = max(pushing, key=lambda one: one[2], default=(0, None, 0.0))
+    if not links or contact == 0.0:
         return []
+    mobility = mobilities(filaments, system, particle_friction)
+    if longest * contact * 2.0 * _mobilities_of_ends(filaments, mobility, alone=True).max() > _LARGEST_RESOLVED:
+        return []
+    ends = _mobilities_of_ends(filaments, mobility)
+    other = f"{pusher.getName()} (force {index})"
+    return [_step_with_contacts(*one, other, contact, filaments, ends) for one in links]
+
+
+def _stiffness_of_surface(force):
+    surface = as_capsule_contact_force(force) or as_filament_wall_force(force)
+    return 0.0 if surface is None else surface.getStiffness()._value
+
+
+def _step_with_contacts(index, force, other, contact, filaments, mobility):
+    # Of the link whose spring in series with that of a contact, or a wall, relaxes fastest.
+    numbers, stiffness, _, _, first, second = _rows_of(Crosslinks.of_force(force), filaments, mobility)
+    rates = (first + second) * stiffness * contact / (stiffness + contact)
+    worst = int(np.argmax(rates))
     what = f"{force.getName()} (force {index}): {_name_of(numbers, worst)}"
-    other = f"{pushing[hardest][1].getName()} (force {pushing[hardest][0]})"
     name = f"{what} with {other}"
-    bound = 1.0 / float(rates[worst])
+    bound = 1.0 / float(rates[worst]) if rates[worst] > 0.0 else math.inf
     reason = (
         f"{what}: beside contacts or walls, {other}, it moves their gaps within an implicit step, after which their "
         "energies may be 5 % off"
     )
-    return [TimeStep(LARGEST_LINKED_MOTION * bound, reason, {name: bound}, {name: LARGEST_LINKED_MOTION * bound})]
+    return TimeStep(LARGEST_LINKED_MOTION * bound, reason, {name: bound}, {name: LARGEST_LINKED_MOTION * bound})
 
 
 def mobilities(filaments: FilamentCollection, system: openmm.System, particle_friction: Numbers | None) -> FloatArray:
@@ -150,15 +174,16 @@ def mobilities(filaments: FilamentCollection, system: openmm.System, particle_fr
     return mobility
 
 
-def _mobilities_in_contact(filaments, mobility):
-    # Of ends of filaments that are as short as they can turn.
+def _mobilities_of_ends(filaments, mobility, alone=False):
+    # Of ends of filaments that are as short as they can turn; or of segments that are alone.
     result = mobility.copy()
     for filament, nodes in zip(filaments, filaments.node_indices):
         friction = filament.type.segment_friction(filaments.viscosity, filaments.temperature, filament.segments)
         if filament.closed or not (friction.perpendicular > 0.0 and friction.rotational > 0.0):
             continue
         length = filament.type.segment_lengths(filament.segments, filament.closed).max()
-        end = (1.0 / friction.perpendicular + length**2 / (4.0 * friction.rotational)) / filament.segments
+        end = 1.0 / friction.perpendicular + length**2 / (4.0 * friction.rotational)
+        end = end if alone else end / filament.segments
         result[nodes] = np.maximum(result[nodes], end)
     return result
 
