@@ -15,8 +15,8 @@ A link that joins places which contacts or a wall push moves their gaps within t
 two are springs in series, k and kc: energies of contacts come out too large by some 0.05 of (mu_1 + mu_2) dt k kc/(k +
 kc), with the mobilities of the places as in contact. Measured for pairs of rods on a link with a rest length, over
 draws of the same energies: 0.046 to 0.052 for rods of 100 nm with k from 0.25 to 5 and kc of 0.1 or 0.38 pN/nm, links
-of 35 nm; 0.034 for rods of 200 nm; the length of the link is of no account. The product may be 1.2. Longer steps, as those
-that networks of long filaments take, have hard contacts, of whose energies nothing is promised.
+of 35 nm; 0.034 for rods of 200 nm; the length of the link is of no account. The product may be 1.2. Longer steps, as
+those that networks of long filaments take, have hard contacts, of whose energies nothing is promised.
 
 Measured for F-actin in segments of 100 nm: the distribution of gaps beyond 10 nm is right to 5 % at that step, for
 contacts of 30 nm; beyond it, more and more steps must be divided.
@@ -44,10 +44,9 @@ LARGEST_LINKED_MOTION = 1.2
 """The largest product of a step, the mobility of two places, and the stiffness of a link in series with a contact."""
 
 _LARGEST_RESOLVED = 18.0
-"""Of the product of a step, the mobility of two segments that are alone and the stiffness of a contact.
+"""Of the product of a step, the mobility of two segments that are alone, and the stiffness of a contact.
 
-Steps resolve contacts up to 9 (``MOST_PARTS_OF_CONTACTS`` in ``plugin_src/dynamics/ContactGaps.cpp``), and in chains, which
-move less, somewhat further.
+Steps of rods resolve contacts up to half of that; in chains, segments move less.
 """
 
 _END_OF_ELEMENT = 4.0
@@ -124,9 +123,9 @@ def steps_of_linked_contacts(
     coupled = [(index, force) for index, force in enumerate(system.getForces()) if coupled_forces.includes(index)]
     links = [one for one in coupled if Crosslinks.of_force(one[1]) is not None]
     pushing = [(index, force, _stiffness_of_surface(force)) for index, force in coupled]
-    index, pusher, contact = max(pushing, key=lambda one: one[2], default=(0, None, 0.0))
-    if not links or contact == 0.0:
+    if not links or max(one[2] for one in pushing) == 0.0:
         return []
+    index, pusher, contact = max(pushing, key=lambda one: one[2])
     mobility = mobilities(filaments, system, particle_friction)
     if longest * contact * 2.0 * _mobilities_of_ends(filaments, mobility, alone=True).max() > _LARGEST_RESOLVED:
         return []

@@ -8,15 +8,16 @@ import math
 import warnings
 from collections.abc import Mapping
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
 
-from ..bead_spring.bead_spring_type import BeadSpringType
 from ..errors import SegmentLengthWarning
 from ..filaments.collection import FilamentCollection
+from ..filaments.filament import Tether
+from ..filaments.filament_type import FilamentType
 from ..theory.force_extension import marko_siggia_extension, wlc_share_of_force
-from ..units.quantities import thermal_energy
 from ..units.types import FloatArray
 from .buckling_step import displacements
 
@@ -28,7 +29,7 @@ _HELD = 1e6
 def warn_of_pulled_filaments(
     filaments: FilamentCollection, temperature: float, constant_forces: Mapping[int, FloatArray]
 ) -> None:
-    """Issue a SegmentLengthWarning, for each type, of the filament whose force is off by most, if by more than a tenth.
+    """Issue a SegmentLengthWarning, for each type, of the filament whose force is most off, if by more than a tenth.
 
     Parameters
     ----------
@@ -41,15 +42,14 @@ def warn_of_pulled_filaments(
     """
     if temperature == 0.0:
         return
-    worst: dict[str, tuple[float, float, int]] = {}
-    for number, force in _pulls(filaments, temperature, constant_forces).items():
-        kind = filaments[number].type
+    worst: dict[str, tuple[float, float, FilamentType, int]] = {}
+    for number, (kind, force) in _pulls(filaments, temperature, constant_forces).items():
         share = float(wlc_share_of_force(kind, force, temperature))
         if abs(math.log(share)) > abs(math.log(worst.get(kind.name, (1.0,))[0])):
-            worst[kind.name] = share, force, number
-    for name, (share, force, number) in worst.items():
+            worst[kind.name] = share, force, kind, number
+    for name, (share, force, kind, number) in worst.items():
         if abs(share - 1.0) > _LARGEST_ERROR:
-            _warn(filaments[number].type, name, number, share, force)
+            _warn(kind, name, number, share, force)
 
 
 def _warn(kind, name, number, share, force):
@@ -57,7 +57,7 @@ def _warn(kind, name, number, share, force):
     remedy = (
         "It is calibrated to another force."
         if kind.contour_per_segment is not None
-        else "Take shorter segments, or theory.calibrated_to_force (in a file: calibrated_to_force), which makes a type "
+        else "Take shorter segments and theory.calibrated_to_force (in a file: calibrated_to_force): it makes a type "
         "that is right at one force."
     )
     warnings.warn(
@@ -70,15 +70,15 @@ def _warn(kind, name, number, share, force):
 
 
 def _pulls(filaments, temperature, constant_forces):
-    # The largest tension of each filament that is pulled, by what is known of it.
-    tethers: dict[int, list] = {}
+    # The type and the largest tension of each filament that is pulled, by what is known of it.
+    tethers: dict[int, list[Tether]] = {}
     for tether in filaments.tethers:
         tethers.setdefault(tether.filament, []).append(tether)
-    known: dict[tuple, float] = {}
+    known: dict[Any, float] = {}
     pulls = {}
     for number, filament in enumerate(filaments):
         kind = filament.type
-        if isinstance(kind, BeadSpringType) or kind.has_beam_elements or kind.bending_rigidity == 0.0:
+        if not isinstance(kind, FilamentType) or kind.has_beam_elements or kind.bending_rigidity == 0.0:
             continue
         nodes = filaments.node_indices[number].tolist() if constant_forces else []
         loads = {node: constant_forces[one] for node, one in enumerate(nodes) if one in constant_forces}
@@ -87,7 +87,7 @@ def _pulls(filaments, temperature, constant_forces):
             continue
         tension = max(_of_loads(filament, loads, own), _of_held_nodes(filament, own, temperature, known))
         if tension > 0.0:
-            pulls[number] = tension
+            pulls[number] = kind, tension
     return pulls
 
 
@@ -130,10 +130,14 @@ def _of_held_nodes(filament, tethers, temperature, known):
         compliance = (second - first) / kind.segment_stiffness + soft + softer
         key = kind, length, round(distance, 6), compliance
         if key not in known:
-
-            def excess(force):
-                return length * marko_siggia_extension(force, bending, temperature) + force * compliance - distance
-
-            known[key] = brentq(excess, 0.0, distance / compliance) if distance > 0.0 else 0.0
+            known[key] = _force_at(distance, length, compliance, bending, temperature)
         largest = max(largest, known[key])
     return largest
+
+
+def _force_at(distance, length, compliance, bending, temperature):
+    # Of a wormlike chain behind a spring.
+    def excess(force):
+        return length * marko_siggia_extension(force, bending, temperature) + force * compliance - distance
+
+    return brentq(excess, 0.0, distance / compliance) if distance > 0.0 else 0.0

@@ -14,7 +14,6 @@ from ..units.quantities import DIMENSIONLESS, FORCE, LENGTH, STIFFNESS, in_units
 from ..units.types import FloatOrArray, Numbers, Scalar
 from .arguments import each_not_negative, require_straight_segments, thermal_energy_above_zero
 
-
 _PICONEWTON = 0.602214076
 
 

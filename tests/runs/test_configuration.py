@@ -5,7 +5,16 @@ import math
 import pytest
 from openmm import unit
 
-from openmm_cylchain import DSDNA, DSDNA_BASE_PAIRS, F_ACTIN, MICROTUBULE, EndCorrections, FilamentType, InputError, theory
+from openmm_cylchain import (
+    DSDNA,
+    DSDNA_BASE_PAIRS,
+    F_ACTIN,
+    MICROTUBULE,
+    EndCorrections,
+    FilamentType,
+    InputError,
+    theory,
+)
 from openmm_cylchain.dynamics.recommended_step import recommended_time_step
 from openmm_cylchain.engine_choice import default_scheme
 from openmm_cylchain.runs.configuration import changed_keys, parse_configuration, read_configuration

@@ -34,7 +34,8 @@ class Ring:
         along = np.roll(nodes, -1, axis=1) - nodes
         lengths = np.sqrt(np.einsum("cnk,cnk->cn", along, along))
         cosines = np.einsum("cnk,cnk->cn", along, np.roll(along, 1, axis=1)) / (lengths * np.roll(lengths, 1, axis=1))
-        return 2.0 * self.joint * (1.0 - cosines) / (1.0 + cosines), 0.5 * self.stretching * (lengths - self.length) ** 2
+        bends = 2.0 * self.joint * (1.0 - cosines) / (1.0 + cosines)
+        return bends, 0.5 * self.stretching * (lengths - self.length) ** 2
 
     def pairs(self, nodes):
         """First and second segments (pairs,), and what ``contact_distances`` has of them."""
