@@ -141,7 +141,13 @@ def _stiffness_of_surface(force):
 
 def _step_with_contacts(index, force, other, contact, filaments, mobility):
     # Of the link whose spring in series with that of a contact, or a wall, relaxes fastest.
-    numbers, stiffness, _, _, first, second = _rows_of(Crosslinks.of_force(force), filaments, mobility)
+    links = Crosslinks.of_force(force)
+    numbers, stiffness, _, _, first, second = _rows_of(links, filaments, mobility)
+    if len(numbers):
+        # Of all links on the same segment: three rods in a loop need the steps of twice the stiffness.
+        nodes = links.table(None).places.pairs[:, :2]
+        on_segment = np.bincount(nodes[nodes >= 0], np.repeat(stiffness, 2)[nodes.ravel() >= 0])
+        stiffness = np.where(nodes >= 0, on_segment[nodes], 0.0).max(axis=1)
     rates = (first + second) * stiffness * contact / (stiffness + contact)
     worst = int(np.argmax(rates))
     what = f"{force.getName()} (force {index}): {_name_of(numbers, worst)}"
