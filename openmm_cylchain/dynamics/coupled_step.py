@@ -23,6 +23,7 @@ contacts of 30 nm; beyond it, more and more steps must be divided.
 """
 
 import math
+from typing import cast
 
 import numpy as np
 import openmm
@@ -141,7 +142,7 @@ def _stiffness_of_surface(force):
 
 def _step_with_contacts(index, force, other, contact, filaments, mobility):
     # Of the link whose spring in series with that of a contact, or a wall, relaxes fastest.
-    links = Crosslinks.of_force(force)
+    links = cast(Crosslinks, Crosslinks.of_force(force))
     numbers, stiffness, _, _, first, second = _rows_of(links, filaments, mobility)
     if len(numbers):
         # Of all links on the same segment: three rods in a loop need the steps of twice the stiffness.
