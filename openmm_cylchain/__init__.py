@@ -32,6 +32,7 @@ from .errors import (
     JointWarning,
     LinkerWarning,
     PrecisionWarning,
+    SegmentLengthWarning,
     TimeStepError,
     TimeStepWarning,
 )
@@ -99,6 +100,7 @@ __all__ = [
     "PrecisionWarning",
     "RunReporter",
     "SegmentFriction",
+    "SegmentLengthWarning",
     "SegmentPlace",
     "Slab",
     "Sphere",

@@ -15,7 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from .engine_choice import ENGINES
-from .errors import InputError, InstabilityError, TimeStepWarning
+from .errors import InputError, InstabilityError, SegmentLengthWarning, TimeStepWarning
 from .export import command as export
 from .rendering import command as rendering
 from .runs.beginnings import START_NAMES
@@ -36,10 +36,12 @@ def main(arguments=None):
     """
     options = _parser().parse_args(arguments)
     with warnings.catch_warnings():
-        warnings.simplefilter("always", TimeStepWarning)
+        told = (SegmentLengthWarning, TimeStepWarning)
+        for category in told:
+            warnings.simplefilter("always", category)
         show = warnings.showwarning
         warnings.showwarning = lambda message, category, *rest: (
-            _say("warning", message) if issubclass(category, TimeStepWarning) else show(message, category, *rest)
+            _say("warning", message) if issubclass(category, told) else show(message, category, *rest)
         )
         try:
             options.command(options)

@@ -98,5 +98,9 @@ class PrecisionWarning(UserWarning):
     """Positions of a trajectory whose single precision is coarser than what is computed from them."""
 
 
+class SegmentLengthWarning(UserWarning):
+    """Segments that are too long for the force that pulls them: the message says by how much the force is off."""
+
+
 class TimeStepWarning(UserWarning):
     """A time step that is too long: above a bound, which the message names, or by what a run shows of it."""

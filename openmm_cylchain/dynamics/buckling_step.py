@@ -121,7 +121,7 @@ def _compression(filament: Filament, loads: Mapping[int, FloatArray], tethers: l
     forces[fixed] = 0.0
     held[fixed] = 1e6 * stiffness.max()
     if held.any():
-        moved = _displacements(stiffness, held, forces)
+        moved = displacements(stiffness, held, forces)
         tension = stiffness * np.diff(moved)
     else:
         friction = np.full(count, 1.0)
@@ -132,8 +132,11 @@ def _compression(filament: Filament, loads: Mapping[int, FloatArray], tethers: l
     return max(0.0, float(-tension.min())), float(max(ends))
 
 
-def _displacements(stiffness, held, forces):
-    # Of nodes along a straight chain of springs, at rest.
+def displacements(stiffness: FloatArray, held: FloatArray, forces: FloatArray) -> FloatArray:
+    """Of the nodes of a chain of springs along a line, at rest under forces (nodes,) or (nodes, 3).
+
+    ``held`` (nodes,) are the stiffnesses of springs that hold nodes.
+    """
     bands = np.zeros((2, len(held)))
     bands[0, 1:] = -stiffness
     bands[1] = held

@@ -13,7 +13,7 @@ from ..mechanics.flow import Flow
 from ..units.types import FloatArray, Numbers, Scalar
 from .buckling_step import steps_of_buckling
 from .coupled_forces import CoupledForces
-from .coupled_step import steps_of_couplings
+from .coupled_step import steps_of_couplings, steps_of_linked_contacts
 from .explicit_forces import ExplicitForces
 from .kinetic_step import steps_of_kinetics
 from .recommended_step import contact_diffusion_step, contact_time_step, recommended_time_step
@@ -54,6 +54,9 @@ def recommended_step_of(
         steps.append(explicit.recommended_step())
         constant_forces = explicit.constant_forces
     steps += steps_of_buckling(filaments, scheme, constant_forces)
+    if system is not None and scheme == "implicit":
+        longest = shortest(steps).step
+        steps += steps_of_linked_contacts(filaments, system, particle_friction, coupled, longest)
     return shortest(steps)
 
 

@@ -14,6 +14,7 @@ from ..units.types import Numbers, Scalar
 from .buckling_step import steps_of_buckling
 from .explicit_forces import ExplicitForces
 from .kinetic_step import steps_of_hands
+from .pulled_filaments import warn_of_pulled_filaments
 from .recommended_step import fene_steps, recommended_time_step
 from .schemes import EXPLICIT_SCHEMES, IMPLICIT_SCHEMES
 from .stability import stability_bounds
@@ -33,7 +34,10 @@ def warn_of_long_step(
     particle_friction: Numbers | None,
     flow: Flow,
 ) -> None:
-    """Warn (TimeStepWarning) of a step in ps that is too long for filaments, a flow or the forces of a System."""
+    """Warn (TimeStepWarning) of a step in ps that is too long for filaments, a flow or the forces of a System.
+
+    And (SegmentLengthWarning) of segments that are too long for forces that pull them.
+    """
     warn_if_strained(step, flow)
     solvent = filaments.viscosity, filaments.temperature
     for f in {(f.type, f.segments, f.propulsion, f.closed): f for f in filaments}.values():
@@ -46,6 +50,7 @@ def warn_of_long_step(
     forces.warn_if_too_stiff(step)
     warn_if_hands_are_not_resolved(system, step)
     warn_if_buckling_is_not_resolved(steps_of_buckling(filaments, scheme, forces.constant_forces), step)
+    warn_of_pulled_filaments(filaments, temperature, forces.constant_forces)
 
 
 def warn_if_unstable(

@@ -96,6 +96,9 @@ class FilamentType(ChainType):
         dimensions"; or a length over which the filament is straight and all of it drags the solvent along, and the
         segment's where that is longer. With "segment" the friction of a length of filament grows without end as it
         is cut into shorter segments; with the other two it converges.
+    contour_per_segment : length, optional
+        Length of the continuous filament that a segment stands for, if it is not segment_length:
+        ``theory.calibrated_to_force`` makes such types.
     mass_per_length : mass/length
         Only for the relaxation times of momenta, eq. (51), and for the masses that OpenMM asks for:
         the dynamics is overdamped and does not depend on it.
@@ -138,6 +141,7 @@ class FilamentType(ChainType):
     friction_length: str | float = "segment"
     mass_per_length: float = 3500.0
     element: str = "straight"
+    contour_per_segment: float | None = None
 
     if TYPE_CHECKING:  # What may be given; the attributes hold plain numbers.
 
@@ -161,6 +165,7 @@ class FilamentType(ChainType):
             friction_length: str | Scalar = "segment",
             mass_per_length: Scalar = 3500.0,
             element: str = "straight",
+            contour_per_segment: Scalar | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -168,6 +173,7 @@ class FilamentType(ChainType):
         for attribute, dimension in (
             ("diameter", LENGTH),
             ("segment_length", LENGTH),
+            ("contour_per_segment", LENGTH),
             ("mass_per_length", MASS / LENGTH),
             ("maximum_extension", LENGTH),
             ("extension_relaxation_time", TIME),
@@ -538,8 +544,11 @@ class FilamentType(ChainType):
         stiffness given for one segment (as Pesek et al. do in Table 3, so the filament as a whole
         becomes softer or stiffer), extension_relaxation_time, end corrections, friction_length, mass per length.
 
-        Raises InputError for segments too short for their friction, see ``friction_length``.
+        Raises InputError for segments too short for their friction, see ``friction_length``, and for a type that
+        ``theory.calibrated_to_force`` made: cut first, and calibrate then.
         """
+        if self.contour_per_segment is not None:
+            self._fail("it is calibrated to a force in segments of its own length: cut first, and calibrate then.")
         length = positive(segment_length, LENGTH, f"segment_length of filament type {self.name!r}")
         scale = length / self.segment_length
         return replace(
@@ -601,10 +610,11 @@ Science 1996, 271, 795 report, 1000 to 1200 pN depending on salt. Affine extensi
 660 Da per base pair of 0.34 nm. The flexibility holds at 310 K here; the paper does not say.
 
 Tangents decorrelate over 43.3 nm with segments of any length. A segment lengthens by 2 k_B T/EA = 0.008 nm on average
-as it fluctuates, however short it is: by 1 % with segments of 0.8 nm. The friction of a length of DNA is that of the
-paper's segments of 8 nm, or of longer ones, so that shorter segments, down to 1 nm and less, make up the same
-filament. It leaves out the flow that one segment makes at another. Of a whole rod, up to a persistence length or so,
-``friction_length="filament"`` is nearer to what is measured.
+as it fluctuates, however short it is: by 1 % with segments of 0.8 nm. Under forces above 1 pN the chain is longer than
+a wormlike chain, however it is cut: ``theory.calibrated_to_force`` has by how much, and makes a type that is not. The
+friction of a length of DNA is that of the paper's segments of 8 nm, or of longer ones, so that shorter segments, down
+to 1 nm and less, make up the same filament. It leaves out the flow that one segment makes at another. Of a whole rod,
+up to a persistence length or so, ``friction_length="filament"`` is nearer to what is measured.
 """
 
 MICROTUBULE = FilamentType(

@@ -187,13 +187,13 @@ class Filaments(FilamentsInContexts):
         It is that of the filament that allows the least (see ``timestep``), and, if a System is given, of its forces:
         crosslinks, joints and capsule contacts of the compiled engine are in the equations of its implicit schemes.
         Joints do not bind the step; the others do only as the places that they join or keep apart diffuse against each
-        other (see ``coupled_step``). All others act from the start of a step, and a spring of the stiffness k on a
-        place of the response mu h to a force
-        in a step h has a variance too large by 1/(1 - k mu h/2). mu h is that of the place on the straight filament
-        (see ``mobility``), or h/gamma of a particle. The step leaves 5 % at most, with all forces at once. Known are
-        HarmonicBondForce, crosslinks, walls, contacts, constant forces, tethers, and CustomBondForce and
-        CustomExternalForce that are harmonic; walls as if all their particles were in contact, and contacts of two
-        filaments as if they crossed at their ends, or touched all along with an error of a third.
+        other, and links as they move the gaps of contacts and walls (see ``coupled_step``). All others act from the
+        start of a step, and a spring of the stiffness k on a place of the response mu h to a force in a step h has a
+        variance too large by 1/(1 - k mu h/2). mu h is that of the place on the straight filament (see ``mobility``),
+        or h/gamma of a particle. The step leaves 5 % at most, with all forces at once. Known are HarmonicBondForce,
+        crosslinks, walls, contacts, constant forces, tethers, and CustomBondForce and CustomExternalForce that are
+        harmonic; walls as if all their particles were in contact, and contacts of two filaments as if they crossed at
+        their ends, or touched all along with an error of a third.
         Other forces are listed in ``unknown_forces``. Filaments that constant forces, tethers or propulsion compress
         bind it by the rate with which they buckle (see ``buckling_step``).
 
@@ -305,6 +305,9 @@ class Filaments(FilamentsInContexts):
             than four times, or that of hands of linkers; if forces of the System are so stiff that variances may be
             10 % too large (see ``recommended_time_step``); if it is too long for the flow or for self-propelled
             filaments; or if FENE lengths have too much energy at it (``timestep.fene_steps``).
+        SegmentLengthWarning
+            If constant forces, or tethers, pull a filament so much that the chain of segments has the extension of the
+            wormlike chain at a force that is a tenth off (see ``theory.wlc_share_of_force``).
         JointWarning
             If a joint of filaments that are not linked where it is has more than 20 EI/h of an element.
         BoxWarning

@@ -39,14 +39,18 @@ from .discrete_chain import (
 )
 from .energies import bending_energy_mean, bending_energy_variance, stretching_energy_mean, stretching_energy_variance
 from .force_extension import (
+    calibrated_to_force,
     chain_extension,
     crossover_force,
     effective_spring_constant,
     limiting_spring_constant,
     linear_force,
+    long_chain_extension,
     marko_siggia_extension,
     marko_siggia_force,
     marko_siggia_spring_constant,
+    wlc_relative_extension,
+    wlc_share_of_force,
 )
 from .free_segment import (
     free_segment_mean_square_displacement,
@@ -82,6 +86,7 @@ __all__ = [
     "bending_energy_mean",
     "bending_energy_variance",
     "bending_mode_variance",
+    "calibrated_to_force",
     "chain_bending_mode_variance",
     "chain_extension",
     "chain_mean_square_end_to_end",
@@ -96,6 +101,7 @@ __all__ = [
     "free_segment_mean_square_displacement",
     "limiting_spring_constant",
     "linear_force",
+    "long_chain_extension",
     "long_time_mean_square_displacement",
     "marko_siggia_extension",
     "marko_siggia_force",
@@ -106,5 +112,7 @@ __all__ = [
     "stretching_energy_mean",
     "stretching_energy_variance",
     "wlc_mean_square_end_to_end",
+    "wlc_relative_extension",
+    "wlc_share_of_force",
     "wlc_tangent_correlation",
 ]

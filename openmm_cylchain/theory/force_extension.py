@@ -1,8 +1,11 @@
 """Force and extension: of the wormlike chain, of the discrete chain, and spring constants of chains under tension."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
+from scipy.linalg import eigh
+from scipy.optimize import brentq
 
 from ..errors import InputError
 from ..filaments.equilibrium import JointAngleDistribution
@@ -10,6 +13,8 @@ from ..filaments.filament_type import FilamentType
 from ..units.quantities import DIMENSIONLESS, FORCE, LENGTH, STIFFNESS, in_units_of, positive, whole_number
 from ..units.types import FloatOrArray, Numbers, Scalar
 from .arguments import each_not_negative, require_straight_segments, thermal_energy_above_zero
+
+_PICONEWTON = 0.602214076
 
 
 def marko_siggia_force(relative_extension: Numbers, persistence_length: Scalar, temperature: Scalar) -> FloatOrArray:
@@ -114,7 +119,8 @@ def _cosine_nodes(least, alignment):
     return 1.0 - 2.0 * root**2, 2.0 * root * gauss_weight
 
 
-def _extension(filament_type, segments, force, kT, node, weight, bending):
+def _pulled_lengths(filament_type, force, kT, node):
+    # g(c) at the nodes and its derivative by F/k_B T, both over the same constant.
     width = math.sqrt(kT / filament_type.segment_stiffness)
     rest = filament_type.segment_length
     low, high = rest - 12.0 * width, rest + 12.0 * width + force * width**2 + 2.0 * width**2 / rest
@@ -126,8 +132,12 @@ def _extension(filament_type, segments, force, kT, node, weight, bending):
     with np.errstate(divide="ignore"):
         exponent = 2.0 * np.log(length) - filament_type.stretching_energy(length) / kT + np.outer(node, force * length)
     density = gauss_weight * np.exp(exponent - exponent.max())
+    return density.sum(axis=1), node * (density @ length)
+
+
+def _extension(filament_type, segments, force, kT, node, weight, bending):
     # Z and its derivative by F/k_B T together: one vector each, over the cosine of the segment reached.
-    pull, slope = density.sum(axis=1), node * (density @ length)
+    pull, slope = _pulled_lengths(filament_type, force, kT, node)
     partition, derivative = pull, slope
     for _ in range(segments - 1):
         partition, derivative = bending @ (weight * partition), bending @ (weight * derivative)
@@ -135,6 +145,192 @@ def _extension(filament_type, segments, force, kT, node, weight, bending):
         scale = partition.max()
         partition, derivative = partition / scale, derivative / scale
     return (weight @ derivative) / (weight @ partition)
+
+
+def long_chain_extension(filament_type: FilamentType, force: Numbers, temperature: Scalar) -> FloatOrArray:
+    """Mean extension in nm of a segment of a long discrete chain under a constant force F e; exact.
+
+    ``k_B T d ln lambda/dF`` for the largest eigenvalue lambda of the transfer of ``chain_extension``, which is what a
+    segment in the middle of a chain has that is long against the persistence length and k_B T/F.
+
+    Parameters
+    ----------
+    filament_type : FilamentType
+    force : force, number or array, not negative
+    temperature : temperature, above zero
+    """
+    require_straight_segments(filament_type)
+    kT = thermal_energy_above_zero(temperature)
+    forces = np.asarray(each_not_negative(force, FORCE, "force")) / kT
+    node, weight, bending = _bending_transfer(filament_type, temperature, float(np.max(forces, initial=0.0)))
+
+    def extension(each):
+        pull, slope = _pulled_lengths(filament_type, each, kT, node)
+        root = np.sqrt(weight * pull)
+        state = eigh(root[:, None] * bending * root, subset_by_index=[len(node) - 1] * 2)[1][:, 0]
+        used = pull > 0.0
+        return float(state[used] ** 2 @ (slope[used] / pull[used]))
+
+    return np.vectorize(extension, otypes=[float])(forces)[()]
+
+
+def wlc_relative_extension(
+    force: Numbers, persistence_length: Scalar, temperature: Scalar, stretching_modulus: Scalar | None = None
+) -> FloatOrArray:
+    """Relative extension <R.e>/L of a long WLC under a force, which may be extensible; exact.
+
+    ``k_B T dg/dF`` for g, the largest eigenvalue of
+
+        -L^2/(2 lp) + F c/k_B T + F^2 c^2/(2 EA k_B T)
+
+    with c, the cosine between the tangent and the force, and the square L^2 of the angular momentum, in Legendre
+    polynomials. The last term is what lengths of a continuous chain add, the energy of which is EA/2 of the square of
+    the strain per length. For k_B T/lp << F << EA it is ``1 - (k_B T/lp F)^(1/2)/2 + F/EA``, as Odijk, Macromolecules
+    1995, 28, 7016.
+
+    Parameters
+    ----------
+    force : force, number or array, not negative
+    persistence_length : length, above zero
+    temperature : temperature, above zero
+    stretching_modulus : force EA, optional
+        Inextensible if not given.
+    """
+    kT = thermal_energy_above_zero(temperature)
+    length = positive(persistence_length, LENGTH, "persistence_length")
+    forces = np.asarray(each_not_negative(force, FORCE, "force"))
+    softness = 0.0
+    if stretching_modulus is not None:
+        softness = 1.0 / positive(stretching_modulus, FORCE, "stretching_modulus")
+
+    def extension(each):
+        # The state has the width (k_B T/lp F)^(1/4) in angle.
+        order = np.arange(int(40 + 12.0 * (each * (1.0 + each * softness) * length / kT) ** 0.25))
+        beside = order[1:] / np.sqrt(4.0 * order[1:] ** 2 - 1.0)
+        cosine = np.diag(beside, 1) + np.diag(beside, -1)
+        square = cosine @ cosine
+        energy = np.diag(order * (order + 1) / (2.0 * length)) - each / kT * (cosine + 0.5 * each * softness * square)
+        state = eigh(energy, subset_by_index=[0, 0])[1][:, 0]
+        return float(state @ cosine @ state + each * softness * (state @ square @ state))
+
+    return np.vectorize(extension, otypes=[float])(forces)[()]
+
+
+def wlc_share_of_force(filament_type: FilamentType, force: Numbers, temperature: Scalar) -> FloatOrArray:
+    """The force that a long discrete chain needs for the extension of a WLC under a force F, over F.
+
+    Segments take two things from a wormlike chain. Bends between their ends are missing, so that a large force leaves
+    too little of them; and, since a length has the weight l^2, each is longer than l0 by 2 k_B T/k, which adds up as
+    they become shorter. With the length b of the WLC that a segment stands for, f = F lp/k_B T and EA = k b, a large
+    force leaves of the relative extension
+
+        WLC: 1 - 1/(2 sqrt(f)) + F/EA
+        chain: (l0/b + 2 k_B T/(EA l0)) (1 - 1/(2 sqrt(f + (F b/2 k_B T)^2))) + F/EA
+
+    and it is the force at which the second is what the first is at F. Good to 0.05 for DNA; ``long_chain_extension``
+    and ``wlc_relative_extension`` are exact.
+
+    Parameters
+    ----------
+    filament_type : FilamentType
+    force : force, number or array, not negative
+    temperature : temperature, above zero
+    """
+    require_straight_segments(filament_type)
+    kT = thermal_energy_above_zero(temperature)
+    rest, contour = filament_type.segment_length, _contour(filament_type)
+    rigidity, modulus = filament_type.bending_rigidity * contour / rest, filament_type.segment_stiffness * contour
+    longest = rest / contour + 2.0 * kT / (modulus * rest)
+
+    def extension(force):
+        stiff = math.sqrt(force * rigidity) / kT
+        return longest * (1.0 - 0.5 / math.hypot(stiff, 0.5 * force * contour / kT)) + force / modulus
+
+    def share(force):
+        if force == 0.0 or rigidity == 0.0:
+            return 1.0
+        target = 1.0 - 0.5 * kT / math.sqrt(force * rigidity) + force / modulus
+        return math.exp(brentq(lambda x: extension(force * math.exp(x)) - target, -30.0, 30.0))
+
+    return np.vectorize(share, otypes=[float])(each_not_negative(force, FORCE, "force"))[()]
+
+
+def calibrated_to_force(filament_type: FilamentType, force: Scalar, temperature: Scalar) -> FilamentType:
+    """A type whose long chain has, at one force, exactly the extension of the wormlike chain, and nearly so at others.
+
+    Segments are shorter at rest than the length b of the filament that each stands for, ``contour_per_segment``, so
+    that ``long_chain_extension(calibrated, F) = b wlc_relative_extension(F, lp, T, EA)``. They bend and stretch as
+    before: tangents decorrelate over lp = a/k_B T along the filament, and EA = k b. N segments are N b of it.
+
+    Of ``DSDNA``, the force for the extension of the wormlike chain, over the one that the wormlike chain needs, is
+
+    ======================== ====== ====== ====== ====== ====== ======
+    segments                 0.1 pN 1 pN   5 pN   10 pN  20 pN  40 pN
+    ======================== ====== ====== ====== ====== ====== ======
+    8 nm, not calibrated     0.99   0.96   0.80   0.72   0.67   0.71
+    2 nm, not calibrated     0.99   0.96   0.90   0.87   0.86   0.88
+    8 nm, calibrated at 20   1.04   1.13   1.10   1.04   1      1.00
+    8 nm, calibrated at 5    1.02   1.07   1      0.93   0.89   0.91
+    4 nm, calibrated at 20   1.02   1.06   1.07   1.04   1      0.97
+    2 nm, calibrated at 20   1.00   1.02   1.02   1.01   1      0.99
+    1 nm, calibrated at 20   1.00   1.00   1.00   1.00   1      1.00
+    ======================== ====== ====== ====== ====== ====== ======
+
+    Parameters
+    ----------
+    filament_type : FilamentType
+        Of straight segments with harmonic lengths, as it is cut.
+    force : force, above zero
+        F.
+    temperature : temperature, above zero
+
+    Returns
+    -------
+    FilamentType
+
+    Raises
+    ------
+    InputError
+        For beads, beam elements, FENE lengths, a type that does not bend or is calibrated already, or segments that
+        are too long or too soft: where the rest length would be less than half of b.
+    """
+    require_straight_segments(filament_type)
+    name = f"Filament type {filament_type.name!r}"
+    force = positive(force, FORCE, "force")
+    if filament_type.maximum_extension is not None or filament_type.bending_rigidity == 0.0:
+        raise InputError(f"{name}: FENE lengths, or joints that do not bend back, are those of no wormlike chain.")
+    if filament_type.contour_per_segment is not None:
+        raise InputError(f"{name} is calibrated to a force already: take the type that it was made of.")
+    contour, stiffness = filament_type.segment_length, filament_type.segment_stiffness
+    persistence_length = filament_type.persistence_length_at(temperature)
+    wanted = contour * wlc_relative_extension(force, persistence_length, temperature, stiffness * contour)
+
+    def shortened(share):
+        # With the same stiffnesses of joints and of lengths.
+        kept = {} if filament_type.stretching_modulus is None else {"stretching_modulus": stiffness * share * contour}
+        rigidity = filament_type.bending_rigidity * share
+        return replace(
+            filament_type,
+            segment_length=share * contour,
+            bending_rigidity=rigidity,
+            contour_per_segment=contour,
+            **kept,
+        )
+
+    def excess(share):
+        return long_chain_extension(shortened(share), force, temperature) - wanted
+
+    if excess(0.5) > 0.0:
+        raise InputError(
+            f"{name}: its segments of {contour:g} nm are too long, or too soft, for the extension of a wormlike chain "
+            f"at {force / _PICONEWTON:.3g} pN."
+        )
+    return shortened(brentq(excess, 0.5, 1.1, xtol=1e-9))
+
+
+def _contour(filament_type):
+    given = filament_type.contour_per_segment
+    return filament_type.segment_length if given is None else given
 
 
 def linear_force(extension: Numbers, contour_length: Scalar, segment_stiffness: Scalar, segments: int) -> FloatOrArray:

@@ -26,7 +26,7 @@ from support.rod_cases import (
 )
 from support.rod_monte_carlo import RodMonteCarlo, linked_pair, random_rods
 from support.rod_observables import check, means_of, observable_names, observe
-from support.rod_simulations import PICONEWTON_PER_NANOMETER, RodSimulation
+from support.rod_simulations import PICONEWTON_PER_NANOMETER, RodSimulation, rod_system
 from support.solvent import KT
 
 REFERENCES = json.loads((Path(rod_cases.__file__).parent / "rod_references.json").read_text())
@@ -92,11 +92,7 @@ def test_monte_carlo_of_a_pair_is_that_of_draws():
 FACTORS = [1.0, pytest.param(0.1, marks=pytest.mark.slow), pytest.param(0.01, marks=pytest.mark.slow)]
 
 
-# Springs that turn by a third of their length, as at the recommended step, let contacts have a seventh more energy.
-OF_LINKED_RODS = [0.3, pytest.param(0.1, marks=pytest.mark.slow), pytest.param(0.03, marks=pytest.mark.slow)]
-
-
-@pytest.mark.parametrize("factor", OF_LINKED_RODS)
+@pytest.mark.parametrize("factor", FACTORS)
 def test_a_pair_of_rods_on_a_spring(factor):
     middles, along, weights = linked_pair(PAIR, 3000, 7)
     kept = np.random.default_rng(8).random(len(weights)) < weights
@@ -105,7 +101,19 @@ def test_a_pair_of_rods_on_a_spring(factor):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("factor", [0.3, 0.1])
+@pytest.mark.parametrize("stiffness", [0.02, 1.0, 5.0])
+def test_contacts_of_rods_on_springs(stiffness):
+    """Of springs that are softer and stiffer than the contact, at the recommended step."""
+    system = rod_system(2, links=[((0, 0.5), (1, 0.5), stiffness, 35.0)])
+    middles, along, weights = linked_pair(system, 400000, 7)
+    exact, exact_errors = means_of(system, observe(system, middles, along), weights)
+    kept = np.random.default_rng(8).random(len(weights)) < weights
+    rows = _run(system, middles[kept][:400], along[kept][:400], 1.0, 600, 4.0)
+    check(system, rows, exact, exact_errors)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("factor", [1.0, 0.1])
 def test_three_rods_in_a_loop(factor):
     rows = _run(LOOP, *_in_equilibrium(LOOP, 200, 300), factor, 500, 4.0)
     check(LOOP, rows, *np.transpose(list(REFERENCES["loop"].values())))

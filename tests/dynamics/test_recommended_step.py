@@ -17,7 +17,10 @@ from openmm_cylchain import (
     Filaments,
     Flow,
     InputError,
+    Plane,
     TimeStepWarning,
+    capsule_contact_force,
+    filament_wall_force,
     recommended_time_step,
 )
 from openmm_cylchain.couplings import contacts, pulling
@@ -360,6 +363,38 @@ def test_crosslinks_in_the_equations_bind_by_their_rest_length(first_only, model
     filaments, system, _, label = system_with_crosslinks("harmonic", first_only, 0.0)
     free = filaments.recommended_time_step(scheme)
     assert filaments.recommended_time_step(scheme, system=system).step == free.step
+
+
+@pytest.mark.parametrize("rest_length", [0.0, 35.0])
+def test_links_of_filaments_that_touch_bind_by_both_stiffnesses(rest_length):
+    """The two springs in series, a wall or a contact; one alone does not bind."""
+    kind, link, contact, wall = F_ACTIN.with_segment_length(100.0), 0.15, 0.23, 0.4
+
+    def recommended(*forces):
+        filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
+        for y in (0.0, 40.0, 80.0):
+            filaments.add_straight(kind, 1, [0.0, y, 0.0], [1.0, 0.0, 0.0])
+        _, system, _ = filaments.build()
+        if "links" in forces:
+            links = Crosslinks(link, rest_length)
+            links.add(None, *(filaments.segment_place(number, segment=0) for number in (0, 1)))
+            links.add(None, filaments.segment_place(2, segment=0), [0.0, 80.0, 0.0], 2 * link)
+            links.add_to(system)
+        if "contacts" in forces:
+            system.addForce(capsule_contact_force(filaments, system, 30.0, contact))
+        if "wall" in forces:
+            system.addForce(filament_wall_force(filaments, system, Plane([0, -5, 0], [0, 1, 0]), wall))
+        return filaments.recommended_time_step("implicit", system=system)
+
+    friction = kind.segment_friction(VISCOSITY, TEMPERATURE)
+    end = 1 / friction.perpendicular + 100.0**2 / (4 * friction.rotational)
+    for forces, stiffness in ((["contacts"], contact), (["wall"], wall), (["contacts", "wall"], wall)):
+        step = recommended("links", *forces)
+        assert "crosslink 0: beside contacts or walls, " in step.reason
+        assert step.step == pytest.approx(1.2 / (2 * end * link * stiffness / (link + stiffness)))
+        for others in (["links"], forces):
+            assert "beside contacts" not in str(recommended(*others).allowed)
+            assert recommended(*others).step > 1.5 * step.step
 
 
 @pytest.mark.parametrize("scheme", IMPLICIT_SCHEMES)

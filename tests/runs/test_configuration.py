@@ -5,7 +5,16 @@ import math
 import pytest
 from openmm import unit
 
-from openmm_cylchain import DSDNA, DSDNA_BASE_PAIRS, F_ACTIN, MICROTUBULE, EndCorrections, FilamentType, InputError
+from openmm_cylchain import (
+    DSDNA,
+    DSDNA_BASE_PAIRS,
+    F_ACTIN,
+    MICROTUBULE,
+    EndCorrections,
+    FilamentType,
+    InputError,
+    theory,
+)
 from openmm_cylchain.dynamics.recommended_step import recommended_time_step
 from openmm_cylchain.engine_choice import default_scheme
 from openmm_cylchain.runs.configuration import changed_keys, parse_configuration, read_configuration
@@ -309,6 +318,18 @@ def test_mistakes_in_chains_of_beads_are_named(lines, fragment):
     with pytest.raises(InputError) as caught:
         beads(lines)
     assert fragment in str(caught.value)
+
+
+def test_a_type_that_is_calibrated_to_a_force():
+    lines = 'type = "DSDNA"\nsegment_length = "4 nm"\ncalibrated_to_force = "20 pN"\nsegments = 7\n'
+    (kind,) = {one.type for one in parse(filament="[[filament]]\n" + lines).filaments}
+    expected = theory.calibrated_to_force(DSDNA.with_segment_length(4.0), 20 * 0.602214076, 310.0)
+    assert kind == expected and kind.contour_per_segment == 4.0 and kind.segment_length < 4.0
+    for mistake in ("20 nm", "0 pN"):
+        with pytest.raises(InputError, match="calibrated_to_force"):
+            parse(filament="[[filament]]\n" + lines.replace("20 pN", mistake))
+    with pytest.raises(InputError, match="calibrated_to_force belongs to a chain of cylinders"):
+        beads('stretching_modulus = "1 pN"\ncalibrated_to_force = "20 pN"\n')
 
 
 def test_cylinders_have_no_beads():

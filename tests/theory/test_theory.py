@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from openmm import unit
 from scipy.integrate import quad
+from scipy.optimize import brentq
 
 from openmm_cylchain import theory
 from openmm_cylchain.errors import InputError
@@ -398,3 +399,83 @@ def test_moments_of_any_bending_model_by_quadrature(model, stiffness):
     accuracy = 1e-8 if stiffness < 1e6 else 1e-7
     assert mean * KT == pytest.approx(theory.bending_energy_mean(kind, TEMPERATURE), rel=accuracy)
     assert variance * KT**2 == pytest.approx(theory.bending_energy_variance(kind, TEMPERATURE), rel=accuracy)
+
+
+def test_long_chain_has_what_one_more_segment_adds():
+    forces = np.array([0.3, 3.0, 30.0]) * PICONEWTON
+    added = np.subtract(*(theory.chain_extension(DSDNA, segments, forces, TEMPERATURE) for segments in (121, 120)))
+    assert theory.long_chain_extension(DSDNA, forces, TEMPERATURE) == pytest.approx(added, rel=1e-8)
+
+
+def test_extension_of_the_wormlike_chain():
+    """Beside the interpolation of Bouchiat et al., Biophys. J. 1999, 76, 409, and at large and small forces."""
+    length, modulus = 43.3, 1100 * PICONEWTON
+    extensions = np.array([0.1, 0.3, 0.5, 0.7, 0.9, 0.97])
+    corrections = (-0.5164228, -2.737418, 16.07497, -38.87607, 39.49944, -14.17718)
+    forces = theory.marko_siggia_force(extensions, length, TEMPERATURE)
+    forces += KT / length * sum(a * extensions**power for power, a in enumerate(corrections, 2))
+    assert theory.wlc_relative_extension(forces, length, TEMPERATURE) == pytest.approx(extensions, abs=5e-4)
+    for force in (20 * PICONEWTON, 200 * PICONEWTON):
+        # By F of F + F^2/2EA - (k_B T (F + F^2/EA)/lp)^(1/2).
+        strain = force / modulus
+        expected = 1 + strain - 0.5 * math.sqrt(KT / (force * length * (1 + strain))) * (1 + 2 * strain)
+        assert theory.wlc_relative_extension(force, length, TEMPERATURE, modulus) == pytest.approx(expected, abs=1e-3)
+    weak = 1e-4 * KT / length
+    assert theory.wlc_relative_extension(weak, length, TEMPERATURE) == pytest.approx(2e-4 / 3, rel=1e-6)
+    assert theory.wlc_relative_extension(0.0, length, TEMPERATURE, modulus) == pytest.approx(0, abs=1e-12)
+
+
+def share_of_force(kind, contour, force):
+    wanted = contour * theory.wlc_relative_extension(force, 43.3, TEMPERATURE, 1100 * PICONEWTON)
+    return brentq(
+        lambda share: theory.long_chain_extension(kind, share * force, TEMPERATURE) - wanted, 0.3, 2.0, xtol=1e-6
+    )
+
+
+def test_force_of_dna_in_segments():
+    """Not of a wormlike chain, however it is cut; finer segments are longer by 2 k_B T/k each, from the weight l^2."""
+    for length, shares in {8.0: (0.956, 0.667), 2.0: (0.955, 0.862), 1.0: (0.916, 0.796)}.items():
+        kind = DSDNA.with_segment_length(length)
+        for newton, expected in zip((1, 20), shares):
+            exact = share_of_force(kind, length, newton * PICONEWTON)
+            assert exact == pytest.approx(expected, abs=2e-3)
+            closed = theory.wlc_share_of_force(kind, newton * PICONEWTON, TEMPERATURE)
+            assert closed == pytest.approx(exact, abs=0.05)
+
+
+@pytest.mark.parametrize("length, largest_error", [(8.0, 0.14), (4.0, 0.075), (2.0, 0.025), (1.0, 0.005)])
+def test_calibrated_dna_is_a_wormlike_chain(length, largest_error):
+    """Exactly at the force, and the more nearly so at others the finer it is cut."""
+    kind = theory.calibrated_to_force(DSDNA.with_segment_length(length), 20 * unit.piconewton, TEMPERATURE)
+    assert kind.contour_per_segment == length
+    assert share_of_force(kind, length, 20 * PICONEWTON) == pytest.approx(1, abs=1e-4)
+    errors = [abs(share_of_force(kind, length, force * PICONEWTON) - 1) for force in (0.1, 1.0, 5.0, 40.0)]
+    assert 0.3 * largest_error < max(errors) < largest_error
+    # Along the filament, bends and stretches are as before.
+    assert theory.mean_joint_cosine(kind, TEMPERATURE) == pytest.approx(math.exp(-length / 43.3), rel=1e-9)
+    assert kind.segment_stiffness == pytest.approx(1100 * PICONEWTON / length)
+    assert theory.wlc_share_of_force(kind, 20 * PICONEWTON, TEMPERATURE) == pytest.approx(1, abs=0.05)
+
+
+def test_calibration_keeps_a_stiffness_that_was_given_for_a_segment():
+    kind = theory.calibrated_to_force(F_ACTIN, 1 * unit.piconewton, TEMPERATURE)
+    assert kind.segment_stiffness == F_ACTIN.segment_stiffness
+    assert 0.9 < kind.segment_length / kind.contour_per_segment < 1.0
+
+
+def test_types_that_cannot_be_calibrated():
+    calibrated = theory.calibrated_to_force(DSDNA, 5 * unit.piconewton, TEMPERATURE)
+    fene = replace(DSDNA, stretching_model="fene", maximum_extension=1.0)
+    for kind, message in (
+        (calibrated, "calibrated to a force already"),
+        (fene, "FENE"),
+        (replace(DSDNA, bending_rigidity=0.0, temperature=None), "do not bend back"),
+        (replace(DSDNA, element="beam"), "beam elements"),
+        (DSDNA.with_segment_length(0.01), "too long, or too soft"),
+    ):
+        with pytest.raises(InputError, match=message):
+            theory.calibrated_to_force(kind, 5 * unit.piconewton, TEMPERATURE)
+    with pytest.raises(InputError, match="cut first"):
+        calibrated.with_segment_length(4.0)
+    with pytest.raises(InputError, match="force"):
+        theory.calibrated_to_force(DSDNA, 0.0, TEMPERATURE)

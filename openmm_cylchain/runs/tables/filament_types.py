@@ -6,6 +6,7 @@ from ...bead_spring.bead_spring_type import DSDNA_BASE_PAIRS, BeadSpringType
 from ...filaments.filament_type import DSDNA, F_ACTIN, MICROTUBULE, FilamentType
 from ...mechanics.friction import EndCorrections
 from ...mechanics.potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
+from ...theory import calibrated_to_force
 from ...units import quantities as units
 from ..keys import Choice, Inline, Key, Number, Quantity, Text, Whole, WordOrQuantity
 from ..table import TableKind
@@ -64,6 +65,13 @@ TYPE_KEYS = (
         "nu", Number("0.35"), None, "Of a chain of beads, with reduced_temperature: see `BeadSpringType.from_reduced`."
     ),
     Key("reduced_temperature", Number("0.034"), None, "See nu."),
+    Key(
+        "calibrated_to_force",
+        Quantity(units.FORCE),
+        None,
+        "At which the chain of segments has the extension of the wormlike chain: `theory.calibrated_to_force`. "
+        "segment_length is then the length of filament that a segment stands for.",
+    ),
     Key("coarse_graining", Whole(1, 10**6, "2"), 1, "Beads of the type that become one."),
 )
 """Of a [[filament]] table: what kind of filament it is."""
@@ -93,8 +101,14 @@ def read_filament_type(entries, solvent):
     preset = PRESETS[entries["type"]] if "type" in entries else None
     with entries.naming():
         if isinstance(preset, BeadSpringType) or (preset is None and "bead_spacing" in entries):
+            entries.refuse(("calibrated_to_force",), "belongs to a chain of cylinders, but this one has beads.")
             return _bead_spring_type(entries, solvent, preset)
-        return _cylinder_type(entries, solvent, preset)
+        kind = _cylinder_type(entries, solvent, preset)
+        if "calibrated_to_force" not in entries:
+            return kind
+        if solvent.temperature == 0.0:
+            raise entries.error("calibrated_to_force needs a temperature above zero.")
+        return calibrated_to_force(kind, entries["calibrated_to_force"], solvent.temperature)
 
 
 def _cylinder_type(entries, solvent, preset):
