@@ -75,7 +75,7 @@ class BoxWarning(UserWarning):
 
 
 class ContactWarning(UserWarning):
-    """Beads that are too far apart, or contacts too soft, to keep filaments from passing through each other."""
+    """Beads too far apart, or contacts too soft, to keep filaments apart; contacts that a step takes for hard ones."""
 
 
 class EngineWarning(UserWarning):

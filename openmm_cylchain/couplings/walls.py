@@ -446,8 +446,8 @@ def filament_wall_force(
 
     Of a filament of beam elements, it is around its beads, which are places on its curve (``Filaments.add_beads``), or
     around its nodes if it has none. The energy is ``(k/2) d^2`` for the depth d to which a node, or a sphere around it,
-    gets beyond the wall: that of ``wall_force`` at a radius of zero. Scheme "implicit" has the wall in its equations, so
-    that its stiffness does not limit the step; "implicit-second-order" refuses it. In other schemes, and in other
+    gets beyond the wall: that of ``wall_force`` at a radius of zero. Scheme "implicit" has the wall in its equations:
+    its stiffness does not limit the step. Scheme "implicit-second-order" refuses it. In other schemes, and in other
     Integrators, it is explicit.
 
     Parameters

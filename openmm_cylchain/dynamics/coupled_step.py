@@ -35,6 +35,7 @@ from ..filaments.collection import FilamentCollection
 from ..units.quantities import thermal_energy
 from ..units.types import FloatArray, Numbers
 from .coupled_forces import CoupledForces
+from .hard_contacts import longest_resolving_step
 from .other_particles import describe_other_particles
 from .time_step import TimeStep
 
@@ -43,12 +44,6 @@ RELATIVE_MOTION = 0.6
 
 LARGEST_LINKED_MOTION = 1.2
 """The largest product of a step, the mobility of two places, and the stiffness of a link in series with a contact."""
-
-_LARGEST_RESOLVED = 18.0
-"""Of the product of a step, the mobility of two segments that are alone, and the stiffness of a contact.
-
-Steps of rods resolve contacts up to half of that; in chains, segments move less.
-"""
 
 _END_OF_ELEMENT = 4.0
 """How much more than all of an element that is alone its end moves, as that of a rod: elements are long."""
@@ -127,9 +122,10 @@ def steps_of_linked_contacts(
     if not links or max(one[2] for one in pushing) == 0.0:
         return []
     index, pusher, contact = max(pushing, key=lambda one: one[2])
-    mobility = mobilities(filaments, system, particle_friction)
-    if longest * contact * 2.0 * _mobilities_of_ends(filaments, mobility, alone=True).max() > _LARGEST_RESOLVED:
+    capsules = [one for one in (as_capsule_contact_force(force) for _, force in coupled) if one is not None]
+    if any(longest > longest_resolving_step(filaments, system, one, particle_friction) for one in capsules):
         return []
+    mobility = mobilities(filaments, system, particle_friction)
     ends = _mobilities_of_ends(filaments, mobility)
     other = f"{pusher.getName()} (force {index})"
     return [_step_with_contacts(*one, other, contact, filaments, ends) for one in links]
@@ -180,16 +176,15 @@ def mobilities(filaments: FilamentCollection, system: openmm.System, particle_fr
     return mobility
 
 
-def _mobilities_of_ends(filaments, mobility, alone=False):
-    # Of ends of filaments that are as short as they can turn; or of segments that are alone.
+def _mobilities_of_ends(filaments, mobility):
+    # Of ends of filaments that are as short as they can turn.
     result = mobility.copy()
     for filament, nodes in zip(filaments, filaments.node_indices):
         friction = filament.type.segment_friction(filaments.viscosity, filaments.temperature, filament.segments)
         if filament.closed or not (friction.perpendicular > 0.0 and friction.rotational > 0.0):
             continue
         length = filament.type.segment_lengths(filament.segments, filament.closed).max()
-        end = 1.0 / friction.perpendicular + length**2 / (4.0 * friction.rotational)
-        end = end if alone else end / filament.segments
+        end = (1.0 / friction.perpendicular + length**2 / (4.0 * friction.rotational)) / filament.segments
         result[nodes] = np.maximum(result[nodes], end)
     return result
 

@@ -12,7 +12,9 @@ from ..mechanics.flow import Flow
 from ..mechanics.friction import SegmentFriction
 from ..units.types import Numbers, Scalar
 from .buckling_step import steps_of_buckling
+from .coupled_forces import CoupledForces
 from .explicit_forces import ExplicitForces
+from .hard_contacts import warn_of_hard_contacts
 from .kinetic_step import steps_of_hands
 from .pulled_filaments import warn_of_pulled_filaments
 from .recommended_step import fene_steps, recommended_time_step
@@ -36,7 +38,8 @@ def warn_of_long_step(
 ) -> None:
     """Warn (TimeStepWarning) of a step in ps that is too long for filaments, a flow or the forces of a System.
 
-    And (SegmentLengthWarning) of segments that are too long for forces that pull them.
+    And (SegmentLengthWarning) of segments that are too long for forces that pull them, and (ContactWarning) of contacts
+    that the step takes for hard ones.
     """
     warn_if_strained(step, flow)
     solvent = filaments.viscosity, filaments.temperature
@@ -51,6 +54,7 @@ def warn_of_long_step(
     warn_if_hands_are_not_resolved(system, step)
     warn_if_buckling_is_not_resolved(steps_of_buckling(filaments, scheme, forces.constant_forces), step)
     warn_of_pulled_filaments(filaments, temperature, forces.constant_forces)
+    warn_of_hard_contacts(filaments, system, step, scheme, particle_friction, CoupledForces(system, filaments))
 
 
 def warn_if_unstable(

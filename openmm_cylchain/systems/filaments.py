@@ -308,6 +308,8 @@ class Filaments(FilamentsInContexts):
         SegmentLengthWarning
             If constant forces, or tethers, pull a filament so much that the chain of segments has the extension of the
             wormlike chain at a force that is a tenth off (see ``theory.wlc_share_of_force``).
+        ContactWarning
+            If scheme "implicit" takes contacts for hard ones: energies and forces of contacts and walls are too small.
         JointWarning
             If a joint of filaments that are not linked where it is has more than 20 EI/h of an element.
         BoxWarning

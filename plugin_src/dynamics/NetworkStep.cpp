@@ -20,7 +20,7 @@ const double DAMPING = 0.6;
 /** How far an iteration turns segments, in rad, with forces that are found where they have not turned. */
 const double LARGEST_TURN = 0.25;
 /** Where contacts are softer than this in a step, they are hard ones, which take less time: see ContactRest. */
-const double LARGEST_SOFTNESS = 12;
+const double LARGEST_SOFTNESS = 18;
 /** A step is divided into at most two to this power. */
 const int LARGEST_DIVISION = 10;
 

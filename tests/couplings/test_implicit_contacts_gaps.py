@@ -77,9 +77,7 @@ def _check(segments, sphere, share_of_step, samples, pairs=400):
     allowed = filaments.recommended_time_step(system=system, particle_friction=friction).allowed
     # What contacts allow: filaments of several segments relax faster.
     step = share_of_step * next(value for name, value in allowed.items() if name.endswith("segments in contact"))
-    integrator = filaments.create_integrator(
-        system, step, random_seed=1, checks=False, particle_friction=friction
-    )
+    integrator = filaments.create_integrator(system, step, random_seed=1, checks=False, particle_friction=friction)
     context = new_context(system, positions, integrator, "CPU", {"Threads": "1"})
     integrator.step(int(1e9 / step))
     distances = []

@@ -242,9 +242,7 @@ def _with_particles(heights, friction, step, wall):
     particles = [system.addParticle(1.0) for _ in heights]
     points = np.column_stack([np.zeros((len(heights), 2)), heights])
     system.addForce(filament_wall_force(filaments, system, wall, 20.0, particles=particles))
-    integrator = filaments.create_integrator(
-        system, step, random_seed=5, particle_friction=friction, checks=False
-    )
+    integrator = filaments.create_integrator(system, step, random_seed=5, particle_friction=friction, checks=False)
     return new_context(system, np.vstack([positions._value, points]), integrator), integrator, len(positions)
 
 

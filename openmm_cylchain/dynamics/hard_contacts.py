@@ -1,0 +1,118 @@
+"""Steps that do not resolve contacts, and take them for hard ones.
+
+A force that lasts for an implicit step h moves a place by c. Steps with k c > 18 do not resolve a contact of the
+stiffness k, with c of both filaments together: of their ends, which move most. A filament with the rigidity EI and the
+friction zeta per length is moved at its end by 2^(1/2) h/(zeta w), w = (EI h/zeta)^(1/4), as a beam on a foundation,
+see M. Hetenyi, Beams on Elastic Foundation, 1946; a shorter one as a rod; no place farther than a segment that is
+alone.
+"""
+
+import math
+import warnings
+from typing import Any
+
+import numpy as np
+import openmm
+from scipy.optimize import brentq
+
+from ..couplings.capsule_contacts import as_capsule_contact_force
+from ..errors import ContactWarning
+from ..filaments.collection import FilamentCollection
+from ..units.types import Numbers
+from .coupled_forces import CoupledForces
+from .other_particles import describe_other_particles
+
+LARGEST_SOFTNESS = 18.0
+"""Of k c: contacts that are softer in a step are hard ones there."""
+
+_SHORTEST, _LONGEST = 1e-9, 1e18  # ps
+
+
+def longest_resolving_step(
+    filaments: FilamentCollection, system: openmm.System, contacts: Any, particle_friction: Numbers | None
+) -> float:
+    """The longest implicit step, in ps, in which a ``capsule_contact_force`` is not a hard one.
+
+    Parameters
+    ----------
+    filaments : Filaments
+        In the System.
+    system : openmm.System
+    contacts : CylinderChainContactForce
+        In the System.
+    particle_friction : energy*time/length^2, or array of them
+        As for ``Filaments.create_integrator``.
+    """
+    stiffness = contacts.getStiffness()._value
+    chains = _chains_in_contact(filaments, contacts)
+    mobility = _mobility_of_spheres(filaments, system, contacts, particle_friction)
+
+    def excess(logarithm: float) -> float:
+        step = math.exp(logarithm)
+        responses = [_response_of_end(filaments, step, *chain) for chain in chains]
+        return 2.0 * stiffness * max([*responses, mobility * step], default=0.0) - LARGEST_SOFTNESS
+
+    first, last = math.log(_SHORTEST), math.log(_LONGEST)
+    if excess(last) <= 0.0:
+        return math.inf
+    return math.exp(brentq(excess, first, last, xtol=1e-6)) if excess(first) < 0.0 else 0.0
+
+
+def warn_of_hard_contacts(
+    filaments: FilamentCollection,
+    system: openmm.System,
+    step: float,
+    scheme: str,
+    particle_friction: Numbers | None,
+    coupled_forces: CoupledForces,
+) -> None:
+    """Issue a ContactWarning for each contact force that an implicit step, in ps, takes for a hard one."""
+    if scheme != "implicit":
+        return
+    for index, force in enumerate(system.getForces()):
+        contacts = as_capsule_contact_force(force)
+        if contacts is None or not coupled_forces.includes(index):
+            continue
+        longest = longest_resolving_step(filaments, system, contacts, particle_friction)
+        if step > longest:
+            warnings.warn(
+                f"{force.getName()} (force {index}): a time step of {step:.4g} ps takes contacts, and walls beside "
+                "them, for hard ones: filaments keep their distances, but energies and forces of contacts and walls "
+                f"are too small, by up to a half. Steps of up to {longest:.3g} ps resolve them.",
+                ContactWarning,
+                stacklevel=4,
+            )
+
+
+def _chains_in_contact(filaments, contacts):
+    # Type, segments, and whether it is closed, of each kind of filament; beam elements touch at beads.
+    owners = {int(nodes[0]): filament for filament, nodes in zip(filaments, filaments.node_indices)}
+    for particle, attachment in zip(filaments.attachment_indices, filaments.attachments):
+        owners[int(particle)] = filaments[attachment.filament]
+    firsts = [contacts.getChainParticles(chain)[0] for chain in range(contacts.getNumChains())]
+    found = [owners[first] for first in firsts if first in owners]
+    return set((filament.type, filament.segments, filament.closed) for filament in found)
+
+
+def _mobility_of_spheres(filaments, system, contacts, particle_friction):
+    nodes = np.concatenate([*filaments.node_indices, *filaments.control_point_indices])
+    others, frictions = describe_other_particles(system, nodes, particle_friction)
+    mobility = dict(zip((int(one) for one in others), 1.0 / np.asarray(frictions, dtype=float)))
+    return max((mobility.get(contacts.getSphereParticle(i), 0.0) for i in range(contacts.getNumSpheres())), default=0.0)
+
+
+def _response_of_end(filaments, step, kind, segments, closed):
+    friction = kind.segment_friction(filaments.viscosity, filaments.temperature, segments)
+    length = kind.segment_length
+    arm = 0.25 * length**2 / friction.rotational if friction.rotational > 0.0 else math.inf
+    if kind.has_beam_elements:
+        arm = 3.0 / friction.perpendicular
+    of_segment = 1.0 / (1.0 / friction.perpendicular + arm) if friction.perpendicular > 0.0 else 0.0
+    alone = step / (of_segment + kind.node_friction)
+    per_length = friction.perpendicular / length
+    if not (per_length > 0.0 and kind.bending_rigidity > 0.0):
+        return alone
+    wave = math.sqrt(2.0) * (kind.bending_rigidity * step / per_length) ** 0.25
+    bending, whole = 0.5 * step / (per_length * wave), step / (per_length * length * segments)
+    bending, whole = (bending, 1.5 * whole) if closed else (4.0 * bending, 4.0 * whole)
+    return min(alone, (bending**3 + whole**3) ** (1.0 / 3.0))
