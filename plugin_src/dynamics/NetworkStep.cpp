@@ -147,7 +147,16 @@ Instability NetworkStep::step(const double* positions, const double* forces, con
     const vector<bool> all(numChains, true);
     vector<bool> failed(numChains, false);
     Instability result;
-    if (attempt({positions, forces, box, settings, all, loop}, displacements, failed)) {
+    const Attempt whole = {positions, forces, box, settings, all, loop};
+    mayBeSoft = true;
+    bool solved = attempt(whole, displacements, failed);
+    if (!solved && areSoft) {
+        // What lies on top of each other, as filaments that are drawn at random do, comes apart with hard contacts.
+        result.divided = count(failed.begin(), failed.end(), true);
+        mayBeSoft = false;
+        solved = attempt(whole, displacements, failed);
+    }
+    if (solved) {
         addImpulses(all, settings.stepSize);
         result.iterations = iterations;
         return result;
@@ -208,11 +217,11 @@ bool NetworkStep::attempt(const Attempt& attempt, double* displacements, vector<
 
 /** Steps that do not resolve contacts have hard ones, and walls that go with them. */
 void NetworkStep::chooseCouplings(const CoupledStart& start) {
-    bool resolves = true;
+    areSoft = mayBeSoft && couplings.size() > firstContacts;
     for (size_t i = firstContacts; i < firstWalls; i++)
-        resolves = resolves && contacts[i-firstContacts]->findLargestSoftness(start) <= LARGEST_SOFTNESS;
+        areSoft = areSoft && contacts[i-firstContacts]->findLargestSoftness(start) <= LARGEST_SOFTNESS;
     auto choose = [&] (size_t i, ImplicitCouplings& soft, ImplicitCouplings& hard) {
-        couplings[i] = resolves ? &soft : &hard;
+        couplings[i] = areSoft ? &soft : &hard;
     };
     for (size_t i = firstContacts; i < firstWalls; i++)
         choose(i, *contacts[i-firstContacts], *hardContacts[i-firstContacts]);

@@ -76,6 +76,8 @@ private:
     std::vector<std::unique_ptr<ContactEquations> > hardContacts;
     std::vector<std::unique_ptr<WallEquations> > wallsOfHardContacts;
     std::size_t firstContacts = 0, firstWalls = 0;
+    /** Whether contacts and walls may be those that a step resolves, and whether they are in this attempt. */
+    bool mayBeSoft = true, areSoft = false;
     std::vector<ImplicitCouplings*> couplings;
     /** What receives their forces, or NULL. */
     std::vector<CouplingImpulses*> impulses;

@@ -291,7 +291,7 @@ def test_a_box_that_is_too_narrow_for_implicit_steps_is_refused():
     with pytest.raises(openmm.OpenMMException, match="319 nm wide .* 2 diameters, 320 nm"):
         _context(filaments, system, positions, LARGEST_STEP)
     # Others need less.
-    context = _context(filaments, system, positions, 1e3, "midpoint")
+    context = _context(filaments, system, positions, 1e3, scheme="midpoint")
     context.getIntegrator().step(1)
 
 

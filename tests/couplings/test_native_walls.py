@@ -272,9 +272,7 @@ def test_density_of_free_particles_is_even():
     thickness, friction, step, count = 400.0, 3.4e5, 4e7, 3000
     generator = np.random.default_rng(3)
     heights = generator.uniform(-0.5, 0.5, count) * thickness
-    context, integrator, first = _with_particles(
-        heights, friction, step, Slab([0, 0, 0], [0, 0, 1], thickness), "implicit"
-    )
+    context, integrator, first = _with_particles(heights, friction, step, Slab([0, 0, 0], [0, 0, 1], thickness))
     counts = []
     for _ in range(60):
         integrator.step(10)

@@ -5,7 +5,7 @@ import warnings
 import numpy as np
 import pytest
 
-from openmm_cylchain import ContactWarning, InstabilityError, TimeStepError, TimeStepWarning
+from openmm_cylchain import ContactWarning, InstabilityError, SegmentLengthWarning, TimeStepError, TimeStepWarning
 from support.contexts import energy_of, positions_of
 from support.random_networks import GROUPS, RandomNetwork
 from support.solvent import KT
@@ -41,7 +41,7 @@ def _check(seed):
         warnings.simplefilter("always")
         network = RandomNetwork(seed)
         long, short = (_mean_energies(network, share) for share in (1, 0.1))
-    assert {warning.category for warning in caught} <= {ContactWarning, TimeStepWarning}
+    assert {warning.category for warning in caught} <= {ContactWarning, SegmentLengthWarning, TimeStepWarning}
     if long is None or short is None or caught:
         return False
     # Some networks still relax, and all fluctuate: what is wrong in silence is wrong by far more.

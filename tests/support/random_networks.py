@@ -56,7 +56,7 @@ class RandomNetwork:
         self.step = self.factor * recommended.step
         # Contacts and walls are for "implicit".
         self._scheme = _some(self._generator, 0.67, "implicit", "implicit-second-order")
-        if self._groups & {1, 3}:
+        if {force.getForceGroup() for force in self.system.getForces()} & {1, 3}:
             self._scheme = "implicit"
         self._precision = _some(self._generator, 0.5, "automatic", "double")
 

@@ -4,6 +4,7 @@
 #include "openmm/CylinderChainKernels.h"
 #include "openmm/OpenMMException.h"
 #include <algorithm>
+#include "openmm/internal/CheckpointValues.h"
 #include "openmm/internal/ContextImpl.h"
 #include "openmm/internal/CylinderChainForceImpl.h"
 #include "openmm/internal/CylinderChainStepper.h"
@@ -299,7 +300,9 @@ void CylinderChainIntegrator::createCheckpoint(ostream& stream) const {
     stream.write((const char*) flow, sizeof(flow));
     writeLinks(stream, *context);
     writeLinkers(stream, *context);
-    for (const PushForceImpl* force : stepper->getCouplings().getPushForces())
+    const vector<PushForceImpl*> pushing = stepper->getCouplings().getPushForces();
+    writeValue(stream, (int) pushing.size());
+    for (const PushForceImpl* force : pushing)
         force->writeForces(stream);
 }
 
@@ -319,8 +322,12 @@ void CylinderChainIntegrator::loadCheckpoint(istream& stream) {
         readLinks(stream, *context);
     if (version > 4)
         readLinkers(stream, *context, version > 5, version > 6);
-    for (PushForceImpl* force : stepper->getCouplings().getPushForces())
-        if (version > 7)
+    // Contacts and walls that have been added since then begin their sums.
+    const vector<PushForceImpl*> pushing = stepper->getCouplings().getPushForces();
+    const char* const within = "the forces of contacts and walls";
+    const bool areSame = version > 7 && readValue<int>(stream, within) == (int) pushing.size();
+    for (PushForceImpl* force : pushing)
+        if (areSame)
             force->readForces(stream);
         else
             force->getImpulses().clear();

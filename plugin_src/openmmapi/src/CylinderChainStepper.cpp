@@ -253,8 +253,8 @@ void CylinderChainStepper::step(uint64_t seed, int level, uint64_t step, bool fo
     getKernel().displaceOthers(context, settings, integrator.getFriction());
     const CoupledForces& coupled = couplings.describe(getCoupledGroups(), integrator.getFriction());
     if (settings.scheme == Scheme::ImplicitSecondOrder && !(coupled.contacts.empty() && coupled.walls.empty()))
-        throw OpenMMException("CylinderChainIntegrator: Contacts and walls are for scheme Implicit: in the two stages of "
-                "ImplicitSecondOrder they would not keep their equilibrium");
+        throw OpenMMException("CylinderChainIntegrator: Contacts and walls are for scheme Implicit: in the two stages "
+                "of ImplicitSecondOrder they would not keep their equilibrium");
     const Instability found = coupled.empty() ? getKernel().displaceChains(context, settings) :
             getKernel().displaceCoupledChains(context, settings, coupled);
     if (found.chain != -1 && found.coupling.kind != BrokenCoupling::None && areForcesFinite())
