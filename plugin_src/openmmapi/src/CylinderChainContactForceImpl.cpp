@@ -61,7 +61,7 @@ void CylinderChainContactForceImpl::initialize(ContextImpl& context) {
     findCurves(context.getSystem());
     kernel = context.getPlatform().createKernel(CalcCylinderChainContactForceKernel::Name(), context);
     kernel.getAs<CalcCylinderChainContactForceKernel>().initialize(context.getSystem(), *search, stiffness, periodic);
-    PushForceImpl::initialize(numParticles);
+    beginSums(numParticles);
     notesPushes = kernel.getAs<CalcCylinderChainContactForceKernel>().notePushes(present);
 }
 

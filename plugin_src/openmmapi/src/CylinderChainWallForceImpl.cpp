@@ -44,7 +44,7 @@ void CylinderChainWallForceImpl::initialize(ContextImpl& context) {
     walls = describe();
     kernel = context.getPlatform().createKernel(CalcCylinderChainWallForceKernel::Name(), context);
     kernel.getAs<CalcCylinderChainWallForceKernel>().initialize(context.getSystem(), walls);
-    PushForceImpl::initialize(system.getNumParticles());
+    beginSums(system.getNumParticles());
     notesPushes = kernel.getAs<CalcCylinderChainWallForceKernel>().notePushes(present);
 }
 

@@ -62,7 +62,7 @@ public:
 protected:
     explicit PushForceImpl(const Force& owner) : StepForceImpl(owner) {
     }
-    void initialize(int numParticles) {
+    void beginSums(int numParticles) {
         impulses = cylchain::CouplingImpulses(numParticles);
     }
     /**
