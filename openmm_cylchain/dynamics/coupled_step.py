@@ -15,8 +15,9 @@ A link that joins places which contacts or a wall push moves their gaps within t
 two are springs in series, k and kc: energies of contacts come out too large by some 0.05 of (mu_1 + mu_2) dt k kc/(k +
 kc), with the mobilities of the places as in contact. Measured for pairs of rods on a link with a rest length, over
 draws of the same energies: 0.046 to 0.052 for rods of 100 nm with k from 0.25 to 5 and kc of 0.1 or 0.38 pN/nm, links
-of 35 nm; 0.034 for rods of 200 nm; the length of the link is of no account. The product may be 1.2. Longer steps, as
-those that networks of long filaments take, have hard contacts, of whose energies nothing is promised.
+of 35 nm; 0.034 for rods of 200 nm; the length of the link is of no account. The product may be 0.6: at 1.2, links have
+5 % too much energy, and rods are too parallel. Longer steps, as those that networks of long filaments take, have hard
+contacts, of whose energies nothing is promised.
 
 Measured for F-actin in segments of 100 nm: the distribution of gaps beyond 10 nm is right to 5 % at that step, for
 contacts of 30 nm; beyond it, more and more steps must be divided.
@@ -42,7 +43,7 @@ from .time_step import TimeStep
 RELATIVE_MOTION = 0.6
 """The largest standard deviation of relative motion in a step, over the distance."""
 
-LARGEST_LINKED_MOTION = 1.2
+LARGEST_LINKED_MOTION = 0.6
 """The largest product of a step, the mobility of two places, and the stiffness of a link in series with a contact."""
 
 _END_OF_ELEMENT = 4.0

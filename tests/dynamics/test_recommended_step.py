@@ -391,7 +391,7 @@ def test_links_of_filaments_that_touch_bind_by_both_stiffnesses(rest_length):
     for forces, stiffness in ((["contacts"], contact), (["wall"], wall), (["contacts", "wall"], wall)):
         step = recommended("links", *forces)
         assert "crosslink 0: beside contacts or walls, " in step.reason
-        assert step.step == pytest.approx(1.2 / (2 * end * link * stiffness / (link + stiffness)))
+        assert step.step == pytest.approx(0.6 / (2 * end * link * stiffness / (link + stiffness)))
         for others in (["links"], forces):
             assert "beside contacts" not in str(recommended(*others).allowed)
             assert recommended(*others).step > 1.5 * step.step
