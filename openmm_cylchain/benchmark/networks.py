@@ -74,7 +74,7 @@ def _with_longest_steps(networks):
 
 
 FULL = NetworkEffort(NETWORKS, 300, 1e4, 30000, 300, 7, 0.7, ("contacts", "links_soft"))
-QUICK = NetworkEffort(_with_longest_steps(NETWORKS), 30, 1e3, 2000, 30, 3, 0.2)
+QUICK = NetworkEffort(_with_longest_steps(NETWORKS), 20, 3e2, 2000, 10, 3, 0.2)
 
 
 @dataclass(frozen=True)
