@@ -1,5 +1,6 @@
 """Reporters of the forces of walls and contacts, for ``simulation.reporters`` of OpenMM's app layer."""
 
+from abc import abstractmethod
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,6 @@ from ..filaments.collection import FilamentCollection
 from ..output.files import TextFile
 from ..output.reporters import FilamentsReporter, TableReporter
 from .mean_forces import ContactForces, ForceReaders, WallForces
-
-_COLUMNS = ("duration_ps", "load", "force_x", "force_y", "force_z")
 
 
 def rows_of_walls(walls: list[WallForces]) -> tuple[list[tuple[int, int]], list[tuple[float, ...]]]:
@@ -33,7 +32,26 @@ def rows_of_contacts(contacts: list[ContactForces], filaments: FilamentCollectio
     return [(duration, load, *total) for load, total in zip(loads.tolist(), sums.tolist())]
 
 
-class WallForceReporter(TableReporter):
+class _MeanForceReporter(TableReporter):
+    # Means begin when the first report is planned.
+
+    _columns = ("duration_ps", "load", "force_x", "force_y", "force_z")
+    _include = ()
+    _readers: ForceReaders | None = None
+
+    def describeNextReport(self, simulation: app.Simulation) -> dict[str, Any]:  # noqa: N802 - OpenMM's name
+        """When the next report is due; means begin when this is called for the first time."""
+        if self._readers is None:
+            self._readers = ForceReaders(simulation.context)
+            self._begin(self._readers)
+        return super().describeNextReport(simulation)
+
+    @abstractmethod
+    def _begin(self, readers: ForceReaders) -> None:
+        """Look at what there is to report; InputError if there is nothing."""
+
+
+class WallForceReporter(_MeanForceReporter):
     """Reports the force of every face of every wall: its mean over the steps since the report before.
 
     A line for each wall, in the order of ``wall_forces``, and face. Columns: ``duration_ps``, of the steps that the
@@ -62,24 +80,17 @@ class WallForceReporter(TableReporter):
     >>> simulation.reporters.append(WallForceReporter("wall_forces.csv", 100))  # doctest: +SKIP
     """
 
-    _columns = _COLUMNS
     _thing = "wall,face"
-    _include = ()
     places: list[tuple[int, int]]
 
     def __init__(self, file: TextFile | None, reportInterval: int, append: bool = False) -> None:  # noqa: N803 - OpenMM's name
         self.places = []
-        self._readers: ForceReaders | None = None
         super().__init__(file, reportInterval, append)
 
-    def describeNextReport(self, simulation: app.Simulation) -> dict[str, Any]:  # noqa: N802 - OpenMM's name
-        """When the next report is due; means begin when this is called for the first time."""
-        if self._readers is None:
-            self._readers = ForceReaders(simulation.context)
-            self.places, _ = rows_of_walls(self._readers.wall_forces())
-            if not self.places:
-                raise InputError("There are no walls to report: add a filament_wall_force or wall_force to the System.")
-        return super().describeNextReport(simulation)
+    def _begin(self, readers: ForceReaders) -> None:
+        self.places, _ = rows_of_walls(readers.wall_forces())
+        if not self.places:
+            raise InputError("There are no walls to report: add a filament_wall_force or wall_force to the System.")
 
     def _table(self, simulation: app.Simulation, state: openmm.State) -> tuple[list[str], list[tuple[float, ...]]]:
         assert self._readers is not None
@@ -87,7 +98,7 @@ class WallForceReporter(TableReporter):
         return [f"{wall},{face}" for wall, face in places], rows
 
 
-class ContactForceReporter(FilamentsReporter):
+class ContactForceReporter(_MeanForceReporter, FilamentsReporter):
     """Reports the force of contacts on every filament: its mean over the steps since the report before.
 
     Columns: ``duration_ps``, of the steps that the mean is taken over, 0 for a force at the present positions (see
@@ -115,23 +126,11 @@ class ContactForceReporter(FilamentsReporter):
     >>> simulation.reporters.append(ContactForceReporter("contact_forces.csv", 100, filaments))  # doctest: +SKIP
     """
 
-    _columns = _COLUMNS
     _thing = "filament"
-    _include = ()
 
-    def __init__(
-        self, file: TextFile | None, reportInterval: int, filaments: FilamentCollection, append: bool = False
-    ) -> None:  # noqa: N803 - OpenMM's name
-        self._readers: ForceReaders | None = None
-        super().__init__(file, reportInterval, filaments, append)
-
-    def describeNextReport(self, simulation: app.Simulation) -> dict[str, Any]:  # noqa: N802 - OpenMM's name
-        """When the next report is due; means begin when this is called for the first time."""
-        if self._readers is None:
-            self._readers = ForceReaders(simulation.context)
-            if not self._readers.contact_forces():
-                raise InputError("There are no contacts to report: add a capsule_contact_force to the System.")
-        return super().describeNextReport(simulation)
+    def _begin(self, readers: ForceReaders) -> None:
+        if not readers.contact_forces():
+            raise InputError("There are no contacts to report: add a capsule_contact_force to the System.")
 
     def _table(self, simulation: app.Simulation, state: openmm.State) -> tuple[range, list[tuple[float, ...]]]:
         assert self._readers is not None

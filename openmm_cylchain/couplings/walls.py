@@ -59,9 +59,9 @@ class Shape(ABC):
         """The square of the depth, in nm^2, for positions (..., 3); zero inside."""
 
     @property
+    @abstractmethod
     def faces(self) -> "tuple[Face, ...]":
         """What the wall is made of: planes of a slab or box, in the order of the compiled engine, or itself."""
-        raise NotImplementedError
 
 
 class Face(Shape):

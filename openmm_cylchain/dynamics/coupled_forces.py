@@ -39,8 +39,7 @@ class CoupledForces:
     def may_include(self, index: int) -> bool:
         """Whether a force, by its index, is one of links, contacts, walls or linkers: in the equations if it can be."""
         force = self._system.getForce(index)
-        kinds = (as_capsule_contact_force(force), as_filament_wall_force(force))
-        return is_link_force(force) or is_binding_force(force) or any(kind is not None for kind in kinds)
+        return is_link_force(force) or is_binding_force(force) or _is_contact_or_wall(force)
 
     def includes(self, index: int) -> bool:
         """Whether a force, by its index, is in the equations of implicit schemes."""
@@ -54,8 +53,7 @@ class CoupledForces:
         if scheme != "implicit-second-order":
             return
         for index, force in enumerate(self._system.getForces()):
-            kinds = (as_capsule_contact_force(force), as_filament_wall_force(force))
-            if any(kind is not None for kind in kinds) and self.includes(index):
+            if _is_contact_or_wall(force) and self.includes(index):
                 raise InputError(
                     f'{force.getName()} (force {index}): contacts and walls need scheme="implicit": in the two stages '
                     f"of {scheme!r} they would not keep their equilibrium."
@@ -158,6 +156,10 @@ class CoupledForces:
     def _is_fixed(self, particle):
         moves = self._is_node[particle] or self._is_control_point[particle] or self._is_virtual[particle]
         return not moves and self._system.getParticleMass(particle)._value == 0.0
+
+
+def _is_contact_or_wall(force):
+    return as_capsule_contact_force(force) is not None or as_filament_wall_force(force) is not None
 
 
 def _alone(particles):

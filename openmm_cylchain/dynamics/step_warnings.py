@@ -49,12 +49,13 @@ def warn_of_long_step(
             friction = f.type.segment_friction(*solvent, f.segments)
             warn_if_far_above(f.type, solvent[0], temperature, step, f.segments, scheme, f.closed, friction)
             warn_if_fene_is_wrong(f.type, temperature, step, friction, scheme)
-    forces = ExplicitForces(system, filaments, scheme, particle_friction)
+    coupled = CoupledForces(system, filaments)
+    forces = ExplicitForces(system, filaments, scheme, particle_friction, coupled)
     forces.warn_if_too_stiff(step)
     warn_if_hands_are_not_resolved(system, step)
     warn_if_buckling_is_not_resolved(steps_of_buckling(filaments, scheme, forces.constant_forces), step)
     warn_of_pulled_filaments(filaments, temperature, forces.constant_forces)
-    warn_of_hard_contacts(filaments, system, step, scheme, particle_friction, CoupledForces(system, filaments))
+    warn_of_hard_contacts(filaments, system, step, scheme, particle_friction, coupled)
 
 
 def warn_if_unstable(

@@ -26,9 +26,8 @@ namespace cylchain {
  * with an exponential variate E of mean one. Gaps that share chains are found in parts of the step: in each, the ends
  * move on by a share of b-a and by a bridge of Brownian motion with the covariance 2 k_B T G, and every gap takes the
  * law of one, with what others push in this part whole at its end and, where it opens the gap, by a third at its start.
- * Gaps
- * that move together have variates E that are correlated as their motion is: those that move as one are reflected as
- * one. With one gap on each chain, all this is exact. Going through the gaps in turn finds the forces of a part.
+ * Gaps that move together have variates E that are correlated as their motion is: those that move as one are reflected
+ * as one. With one gap on each chain, all this is exact. Going through the gaps in turn finds the forces of a part.
  *
  * Soft surfaces are hard ones at random depths: see placeHardSurface().
  */
