@@ -207,8 +207,13 @@ bool ContactGaps::mayClose(int number, double before, double after, double& room
         return false;
     Gap gap;
     gap.stiffness = stiffness;
-    const double depth = placeHardSurface(kT, surfaces[number], LARGEST_DEPTH*radiiOf(pair), before, gap);
+    const double depth = placeHardSurface(number, before, gap);
     return gap.law != GapLaw::Reflection || !isFar(depth);
+}
+
+double ContactGaps::placeHardSurface(int number, double begun, Gap& gap) const {
+    const double deepest = LARGEST_DEPTH*radiiOf(pairs.get(number));
+    return cylchain::placeHardSurface(kT, all->getNoise().getLimit(), surfaces[number], deepest, begun, gap);
 }
 
 /** Pairs that are looked at together, in memory of a thread. */
@@ -312,7 +317,7 @@ void ContactGaps::follow(NearPair& own) const {
         own.gap.key[1] = pair.b;
         own.gap.stiffness = stiffness;
         own.gap.response = places[pair.a].response+places[pair.b].response;
-        own.depth = placeHardSurface(kT, surfaces[own.pair], LARGEST_DEPTH*radii, own.start.gap, own.gap);
+        own.depth = placeHardSurface(own.pair, own.start.gap, own.gap);
     }
     const int count = search->evaluate(pair, contacts);
     // What touches a neighbor at the start and at the end is no gap of this pair.

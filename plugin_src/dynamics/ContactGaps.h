@@ -84,6 +84,7 @@ private:
     static PairGap findPairGap(const SegmentPair& pair, const Contact* contacts, int count, double radii);
     bool mayClose(int pair, double before, double after, double& room) const;
     void drawSurfaces(int first, int last);
+    double placeHardSurface(int pair, double begun, Gap& gap) const;
     /** What random numbers of a pair belong to, beside its second capsule. */
     std::uint32_t keyOf(const ContactPair& pair) const {
         return (std::uint32_t) force*0x9E3779B1u+pair.a;
@@ -115,8 +116,8 @@ private:
     PairList pairs;
     /** For each pair, how far both capsules must have travelled before their gap may be closed, or -1 if it is near. */
     std::vector<double> rooms;
-    /** For each pair, what its hard surface is found with. */
-    std::vector<SurfaceVariates> surfaces;
+    /** For each pair, the exponential variate that its hard surface is found with. */
+    std::vector<double> surfaces;
     std::vector<NearPair> near;
     /** Those of the last search. */
     std::vector<ContactPair> found;

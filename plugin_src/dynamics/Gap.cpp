@@ -1,6 +1,7 @@
 #include "dynamics/Gap.h"
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 using namespace cylchain;
 using namespace std;
@@ -15,8 +16,8 @@ const double FREE_DEPTH = 10;
 const uint32_t OF_GAPS = 0x80000000u;
 /** What sets apart the numbers of each part. */
 const uint32_t OF_PARTS = 0x85EBCA6Bu;
-/** The draw that normal numbers are not made of. */
-const int OF_SURFACES = 1;
+/** Draws that normal numbers are not made of. */
+const int OF_SURFACES = 1, OF_LIMITS = 2;
 
 double uniformOf(uint32_t word) {
     return (word+0.5)/4294967296.0;
@@ -24,8 +25,13 @@ double uniformOf(uint32_t word) {
 
 } // namespace
 
-void GapNoise::drawSurfaces(const uint32_t* first, const uint32_t* second, int count,
-        SurfaceVariates* variates) const {
+GapNoise::GapNoise(const NoiseKey& step) : step(step) {
+    uint32_t words[4];
+    drawWords(step, NoiseKind::Link, OF_LIMITS, &OF_GAPS, &OF_GAPS, 1, words);
+    limit = LEAST_LIMIT+(LARGEST_LIMIT-LEAST_LIMIT)*uniformOf(words[0]);
+}
+
+void GapNoise::drawSurfaces(const uint32_t* first, const uint32_t* second, int count, double* variates) const {
     static thread_local vector<uint32_t> chains, words;
     chains.resize(count);
     words.resize(4*(size_t) count);
@@ -33,7 +39,7 @@ void GapNoise::drawSurfaces(const uint32_t* first, const uint32_t* second, int c
         chains[i] = first[i] | OF_GAPS;
     drawWords(step, NoiseKind::Link, OF_SURFACES, chains.data(), second, count, words.data());
     for (int i = 0; i < count; i++)
-        variates[i] = {-log(uniformOf(words[4*i])), uniformOf(words[4*i+1])};
+        variates[i] = -log(uniformOf(words[4*i]));
 }
 
 void GapNoise::draw(const Gap* gaps, int count, int parts, double* bridges, double* reflections) const {
@@ -57,7 +63,7 @@ void GapNoise::draw(const Gap* gaps, int count, int parts, double* bridges, doub
     }
 }
 
-double cylchain::placeHardSurface(double kT, const SurfaceVariates& variates, double deepest, double begun,
+double cylchain::placeHardSurface(double kT, double limit, double variate, double deepest, double begun,
         Gap& gap) {
     gap.start = begun;
     if (kT == 0) {
@@ -65,15 +71,14 @@ double cylchain::placeHardSurface(double kT, const SurfaceVariates& variates, do
         return 0;
     }
     const double variance = kT/gap.stiffness, inside = min(begun, 0.0);
-    const double random = LEAST_LIMIT+(LARGEST_LIMIT-LEAST_LIMIT)*variates.uniform;
-    const double limit = min(deepest, random*sqrt(variance));
-    if (begun < -limit) {
+    const double largest = min(deepest, limit*sqrt(variance));
+    if (begun < -largest) {
         gap.law = GapLaw::Spring;
-        gap.ceiling = begun < -FREE_DEPTH*sqrt(variance) ? HUGE_VAL : -limit;
+        gap.ceiling = begun < -FREE_DEPTH*sqrt(variance) ? HUGE_VAL : -largest;
         return 0;
     }
     gap.law = GapLaw::Reflection;
-    const double depth = min(sqrt(inside*inside+2*variance*variates.exponential), limit);
+    const double depth = min(sqrt(inside*inside+2*variance*variate), largest);
     gap.start = begun+depth;
     return depth;
 }

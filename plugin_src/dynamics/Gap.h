@@ -4,7 +4,6 @@
 #include "dynamics/ChainPlaces.h"
 #include "lanes/Noise.h"
 #include <cstdint>
-#include <vector>
 
 namespace cylchain {
 
@@ -59,24 +58,17 @@ struct Gap {
     }
 };
 
-/** What the hard surface of a gap is drawn with: an exponential variate of mean one, and a uniform one. */
-struct SurfaceVariates {
-    double exponential = -1, uniform = 0;
-};
-
 /** The random numbers of gaps in a step. */
 class GapNoise {
 public:
     GapNoise() = default;
-    explicit GapNoise(const NoiseKey& step) : step(step) {
-    }
-    /** Draw what the hard surfaces of gaps are found with, from their keys. */
-    void drawSurfaces(const std::uint32_t* first, const std::uint32_t* second, int count,
-            SurfaceVariates* variates) const;
-    SurfaceVariates drawSurface(const Gap& gap) const {
-        SurfaceVariates variates;
-        drawSurfaces(&gap.key[0], &gap.key[1], 1, &variates);
-        return variates;
+    explicit GapNoise(const NoiseKey& step);
+    /** Draw the exponential variates that the hard surfaces of gaps are found with, from the keys of these. */
+    void drawSurfaces(const std::uint32_t* first, const std::uint32_t* second, int count, double* variates) const;
+    double drawSurface(const Gap& gap) const {
+        double variate;
+        drawSurfaces(&gap.key[0], &gap.key[1], 1, &variate);
+        return variate;
     }
     /**
      * Draw numbers for the parts of a step, one after the other for each gap.
@@ -86,29 +78,37 @@ public:
      * @param reflections  receives others
      */
     void draw(const Gap* gaps, int count, int parts, double* bridges, double* reflections) const;
+    /** The limit of the depths of hard surfaces in this step: see placeHardSurface(). */
+    double getLimit() const {
+        return limit;
+    }
 private:
     NoiseKey step = {};
+    double limit = 0;
 };
 
 /**
  * Decide how a gap is held open, and measure its start from there.
  *
- * The potential k g^2/2 of a gap g < 0 is that of hard surfaces: exp(-k g^2/2 k_B T) is the chance that a surface at
- * the depth D with k D^2/2 k_B T > E' for an exponential variate E' is not reached. So one is drawn that is consistent
- * with the start, D^2 = min(g, 0)^2+2 k_B T E'/k, and the start is g+D from it.
+ * The potential k g^2/2 of a gap g < 0 is that of hard surfaces: exp(-k g^2/2 k_B T) is the chance that a surface
+ * at the depth D with k D^2/2 k_B T > E' for an exponential variate E' is not reached. So one is drawn that is
+ * consistent with the start, D^2 = min(g, 0)^2+2 k_B T E'/k, and the start is g+D from it.
  *
- * From one step to the next that changes a deep gap by little, and would not let it out where nothing presses. So D is
- * at most d, a limit between 3 and 9 times (k_B T/k)^(1/2) that is drawn afresh in each step, and what begins deeper
- * than d stays so, held by the spring of the soft surface: both parts keep their equilibrium, whatever d is, and a gap
- * passes from one to the other as d changes. What is much deeper than any d is not stopped on its way out.
+ * From one step to the next that changes a deep gap by little, and would not let it out where nothing presses. So D
+ * is at most d, a limit between 3 and 9 times (k_B T/k)^(1/2) that is drawn afresh in each step, and what begins
+ * deeper than d stays so, held by the spring of the soft surface: both parts keep their equilibrium, whatever d is,
+ * and a gap passes from one to the other as d changes. All gaps have the same d: the contact of a segment may go on
+ * to the next one, which must not be kept out where this one is kept in. What is much deeper than any d is not
+ * stopped on its way out.
  *
- * @param variates  of E' and d
- * @param deepest   d is not more than this: no surface is beyond an axis
- * @param begun     g at the start
- * @param gap       its stiffness is known; receives its law and start
+ * @param limit    d over (k_B T/k)^(1/2)
+ * @param variate  E'
+ * @param deepest  d is not more than this: no surface is beyond an axis
+ * @param begun    g at the start
+ * @param gap      its stiffness is known; receives its law and start
  * @return D: by how much gaps are longer from the hard surface
  */
-double placeHardSurface(double kT, const SurfaceVariates& variates, double deepest, double begun, Gap& gap);
+double placeHardSurface(double kT, double limit, double variate, double deepest, double begun, Gap& gap);
 
 } // namespace cylchain
 

@@ -21,8 +21,8 @@ const double DAMPING = 0.6;
 const double LARGEST_TURN = 0.25;
 /** Where contacts are softer than this in a step, they are hard ones, which take less time: see ContactRest. */
 const double LARGEST_SOFTNESS = 18;
-/** A step is divided into at most two to this power. */
-const int LARGEST_DIVISION = 10;
+/** A step is divided into at most two to this power, and where contacts are soft, before they are hard ones. */
+const int LARGEST_DIVISION = 10, LARGEST_DIVISION_OF_SOFT_CONTACTS = 3;
 
 } // namespace
 
@@ -149,29 +149,36 @@ Instability NetworkStep::step(const double* positions, const double* forces, con
     Instability result;
     const Attempt whole = {positions, forces, box, settings, all, loop};
     mayBeSoft = true;
-    bool solved = attempt(whole, displacements, failed);
-    if (!solved && areSoft) {
+    bool taken = takeStep(whole, displacements, failed, result);
+    if (!taken && areSoft) {
         // What lies on top of each other, as filaments that are drawn at random do, comes apart with hard contacts.
-        result.divided = count(failed.begin(), failed.end(), true);
         mayBeSoft = false;
-        solved = attempt(whole, displacements, failed);
+        taken = takeStep(whole, displacements, failed, result);
     }
-    if (solved) {
-        addImpulses(all, settings.stepSize);
-        result.iterations = iterations;
-        return result;
-    }
-    const vector<bool> divided = findComponents(failed);
-    result.divided = count(divided.begin(), divided.end(), true);
-    vector<bool> others = divided;
-    others.flip();
-    addImpulses(others, settings.stepSize);
-    if (!divide({positions, forces, box, settings, divided, loop}, 1, displacements, failed)) {
+    if (!taken) {
         result.chain = find(failed.begin(), failed.end(), true)-failed.begin();
         result.coupling = culprit;
     }
+    for (const Impulse& impulse : received)
+        impulse.receiver->add(impulse.push, impulse.duration);
     result.iterations = iterations;
     return result;
+}
+
+/** Attempt a step, and divide it for those chains that it fails for; false if that fails as well. */
+bool NetworkStep::takeStep(const Attempt& whole, double* displacements, vector<bool>& failed, Instability& result) {
+    received.clear();
+    if (attempt(whole, displacements, failed)) {
+        addImpulses(whole.taken, whole.settings.stepSize);
+        return true;
+    }
+    const vector<bool> divided = findComponents(failed);
+    vector<bool> others = divided;
+    others.flip();
+    addImpulses(others, whole.settings.stepSize);
+    result.divided = count(divided.begin(), divided.end(), true);
+    return divide({whole.positions, whole.forces, whole.box, whole.settings, divided, whole.loop}, 1, displacements,
+            failed);
 }
 
 bool NetworkStep::attempt(const Attempt& attempt, double* displacements, vector<bool>& failed) {
@@ -339,7 +346,7 @@ void NetworkStep::addImpulses(const vector<bool>& taken, double stepSize) {
         couplings[i]->findPushes(moved.data(), pushes);
         for (const Push& push : pushes)
             if (any_of(push.chains, push.chains+2, [&] (int chain) {return chain >= 0 && taken[chain];}))
-                impulses[i]->add(push, stepSize);
+                received.push_back({impulses[i], push, stepSize});
     }
 }
 
@@ -367,7 +374,7 @@ bool NetworkStep::divide(const Attempt& whole, int division, double* displacemen
     };
     for (int i = 0; i < 2; i++, half.settings.step++) {
         if (!attempt(half, part.data(), failed)) {
-            if (division == LARGEST_DIVISION) {
+            if (division == (areSoft ? LARGEST_DIVISION_OF_SOFT_CONTACTS : LARGEST_DIVISION)) {
                 // Now, because couplings know positions that last as long as this.
                 culprit = findCulprit();
                 return false;

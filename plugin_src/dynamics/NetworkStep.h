@@ -56,6 +56,7 @@ public:
 private:
     struct Attempt;
     void setParticles(const std::vector<CoupledParticle>& particles);
+    bool takeStep(const Attempt& whole, double* displacements, std::vector<bool>& failed, Instability& result);
     bool attempt(const Attempt& attempt, double* displacements, std::vector<bool>& failed);
     void chooseCouplings(const CoupledStart& start);
     bool iterate(const Attempt& attempt, int stage);
@@ -82,6 +83,13 @@ private:
     /** What receives their forces, or NULL. */
     std::vector<CouplingImpulses*> impulses;
     std::vector<Push> pushes;
+    /** A force of a step, or of a part of it, until the step has been taken. */
+    struct Impulse {
+        CouplingImpulses* receiver;
+        Push push;
+        double duration;
+    };
+    std::vector<Impulse> received;
     const std::vector<CurveSite>* sites = nullptr;
     std::vector<CoupledParticle> particles;
     std::vector<int> packs;

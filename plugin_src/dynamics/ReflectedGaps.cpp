@@ -25,12 +25,16 @@ const double OF_SWEEPS = 0.01, OF_ITERATIONS = 0.03;
 const double OF_RESPONSES = 0.3;
 /** A change that is less than this share of that is not made. */
 const double LEAST_SHARE = 0.01;
+/** What responses lack may go back and forth between gaps that links move together: it changes by this share then. */
+const double DAMPING_OF_GAPS = 0.5;
+/** By how much less than this, over the way that is left and the thermal one, a ceiling pulls a gap back. */
+const double LARGEST_PULL = 5;
 /** Sweeps are taken to change by this factor at most from one to the next. */
 const double LARGEST_RATE = 0.995;
 /** The same in nm, where nothing moves thermally. */
 const double LEAST_CHANGE_OF_GAPS = 1e-7;
-/** By which factor the network may change the response of a gap. */
-const double LEAST_SHARE_OF_NETWORK = 1e-3, LARGEST_SHARE_OF_NETWORK = 1e3;
+/** What links between the two chains of a gap leave of its response at least. */
+const double LEAST_SHARE_OF_LINKS = 0.02;
 /** A gap that has just been found is pushed if its exponential variate is less than this. */
 const double LARGE_REFLECTION = 4;
 /** Normal numbers are not so large that their chance would be less. */
@@ -44,12 +48,15 @@ double product(const double* a, const double* b) {
     return a[0]*b[0]+a[1]*b[1]+a[2]*b[2];
 }
 
-/** The force that reflects the motion of a gap, with an exponential variate of the mean k_B T. */
-double reflect(double start, double end, double response, double variate) {
-    if (start+end > 0 && start*end >= response*variate)
+/**
+ * The force that reflects the motion of a gap, with an exponential variate of the mean k_B T: with its response G to a
+ * force, and the part L of it that the end does not have yet, so that the gap ends at end+L F.
+ */
+double reflect(double start, double end, double all, double part, double variate) {
+    if (start+end > 0 && start*end >= all*variate)
         return 0;
-    const double way = start-end;
-    return max(0.0, 0.5*(sqrt(way*way+4*response*variate)-(start+end)))/response;
+    const double before = start*part, after = end*all, way = before-after;
+    return max(0.0, 0.5*(sqrt(way*way+4*all*all*part*variate)-(before+after))/(all*part));
 }
 
 /** Find the Cholesky factor of a matrix with n rows. */
@@ -77,10 +84,10 @@ void ReflectedGaps::begin(const StepSettings& settings, const ChainPlaces& place
     pushes.clear();
     ofBridges.clear();
     ofReflections.clear();
-    networks.clear();
     portOf.clear();
     known.clear();
     parts = 1;
+    changes.clear();
     predicted.clear();
     corrections.clear();
 }
@@ -92,6 +99,8 @@ int ReflectedGaps::add(const Gap& gap) {
 
 void ReflectedGaps::addEquations(vector<CouplingEquation>& equations) {
     firstEquation = equations.size();
+    if (!gaps.empty())
+        links.setEquations(equations, numChains);
     equationOf.resize(gaps.size()+1);
     int count = 0;
     for (size_t i = 0; i < gaps.size(); i++) {
@@ -157,12 +166,21 @@ void ReflectedGaps::findPorts() {
     });
     responses.resize(matrix);
     roots.resize(matrix);
+    firstMoves.resize(ports.size());
+    size_t moves = 0;
+    for (size_t port = 0; port < ports.size(); port++) {
+        firstMoves[port] = moves;
+        const int chain = chains[chainOf[port]].chain;
+        moves += 3*(links.end(chain)-links.begin(chain));
+    }
+    movesOfLinks.resize(moves);
     known.assign(chains.size(), 0);
 }
 
 /** Find how a force at each port of a chain moves all ports of it: a substitution for a port of each lane of a pack. */
-void ReflectedGaps::findResponses(const vector<PackStep*>& packs, const CoupledEquations& coupled, bool single,
+void ReflectedGaps::findResponses(const vector<PackStep*>& packs, CoupledEquations& coupled, bool single,
         const Loop& loop) {
+    links.find(packs, coupled, loop);
     vector<vector<int> > chainsOfPack(packs.size());
     for (size_t i = 0; i < chains.size(); i++)
         if (!known[i])
@@ -234,10 +252,21 @@ void ReflectedGaps::findResponses(const vector<PackStep*>& packs, const CoupledE
                     }
                     row[other] = sum;
                 }
+                if (round < count) {
+                    double* to = &movesOfLinks[firstMoves[chains[i].first+round]];
+                    for (const LinkYielding::Side* side = links.begin(chains[i].chain);
+                            side != links.end(chains[i].chain); side++, to += 3) {
+                        const int term = coupled.getTerm(links.getLinks()[side->link].equation, side->side);
+                        const Number* const at = &move[TermBlocks::place(term-coupled.firstTerm(pack), 0)];
+                        for (int k = 0; k < 3; k++)
+                            to[k] = at[STRIDE*k];
+                    }
+                }
                 first += count;
             }
         }
         for (int i : own) {
+            yield(chains[i]);
             const int n = chains[i].count;
             double* const matrix = &responses[chains[i].matrix];
             for (int row = 0; row < n; row++)
@@ -253,12 +282,61 @@ void ReflectedGaps::findResponses(const vector<PackStep*>& packs, const CoupledE
         else
             findOfPack(pack, double());
     });
-    own.assign(gaps.size(), 0.0);
+    ofChains.assign(gaps.size(), 0.0);
     for (size_t i = 0; i < ports.size(); i++) {
         const PortsOfChain& chain = chains[chainOf[i]];
         const int local = i-chain.first;
-        own[ports[i].gap] += responses[chain.matrix+(size_t) local*chain.count+local];
+        ofChains[ports[i].gap] += responses[chain.matrix+(size_t) local*chain.count+local];
     }
+    own.resize(gaps.size());
+    for (size_t i = 0; i < gaps.size(); i++) {
+        const int one = portOf[2*i], other = portOf[2*i+1];
+        if (one >= 0 && other >= 0 && chainOf[one] == chainOf[other]) {
+            const PortsOfChain& chain = chains[chainOf[one]];
+            ofChains[i] += 2*responses[chain.matrix+(size_t) (one-chain.first)*chain.count+other-chain.first];
+        }
+        own[i] = max(ofChains[i]+yieldOf(i), LEAST_SHARE_OF_LINKS*ofChains[i]);
+    }
+}
+
+/** Add to the responses of a chain what the yielding of its links does. */
+void ReflectedGaps::yield(const PortsOfChain& chain) {
+    const LinkYielding::Side *const first = links.begin(chain.chain), *const last = links.end(chain.chain);
+    double* const matrix = &responses[chain.matrix];
+    for (int row = 0; row < chain.count && first != last; row++) {
+        const double* ofRow = &movesOfLinks[firstMoves[chain.first+row]];
+        size_t offset = 0;
+        for (const LinkYielding::Side* side = first; side != last; side++, offset += 3) {
+            const double* const m = links.getLinks()[side->link].ofPlace[side->side];
+            const double* const u = ofRow+offset;
+            const double pull[] = {u[0]*m[0]+u[1]*m[3]+u[2]*m[6], u[0]*m[1]+u[1]*m[4]+u[2]*m[7],
+                    u[0]*m[2]+u[1]*m[5]+u[2]*m[8]};
+            for (int column = 0; column < chain.count; column++)
+                matrix[(size_t) row*chain.count+column] +=
+                        product(pull, &movesOfLinks[firstMoves[chain.first+column]+offset]);
+        }
+    }
+}
+
+/** How much farther a force moves a gap because links join its two chains. */
+double ReflectedGaps::yieldOf(int i) const {
+    const int one = portOf[2*i], other = portOf[2*i+1];
+    if (one < 0 || other < 0 || chainOf[one] == chainOf[other])
+        return 0;
+    double sum = 0;
+    const int chain = chains[chainOf[one]].chain, second = chains[chainOf[other]].chain;
+    size_t offset = firstMoves[one];
+    for (const LinkYielding::Side* side = links.begin(chain); side != links.end(chain); side++, offset += 3) {
+        const LinkYielding::Link& link = links.getLinks()[side->link];
+        if (link.chains[1-side->side] != second)
+            continue;
+        const double* const v = &movesOfLinks[firstMoves[other]+3*(size_t) links.find(side->link, 1-side->side)];
+        const double *const u = &movesOfLinks[offset], *const first = side->side == 0 ? u : v,
+                *const last = side->side == 0 ? v : u, *const b = link.between;
+        for (int row = 0; row < 3; row++)
+            sum += 2*first[row]*product(b+3*row, last);
+    }
+    return sum;
 }
 
 int ReflectedGaps::chooseParts() const {
@@ -313,8 +391,9 @@ void ReflectedGaps::findNoise() {
     const double size = sqrt(2*kT/parts);
     for (size_t i = 0; i < gaps.size(); i++) {
         double *const bridge = &bridges[i*parts], *const reflection = &reflections[i*parts];
-        const double mean = accumulate(bridge, bridge+parts, 0.0)/parts, ofGap = size*sqrt(networks[i]);
-        const double perSize = own[i] > 0 ? M_SQRT1_2/sqrt(own[i]) : 0;
+        const double mean = accumulate(bridge, bridge+parts, 0.0)/parts;
+        const double ofGap = ofChains[i] > 0 ? size*sqrt(own[i]/ofChains[i]) : 0;
+        const double perSize = ofChains[i] > 0 ? M_SQRT1_2/sqrt(ofChains[i]) : 0;
         for (int part = 0; part < parts; part++) {
             bridge[part] = (bridge[part]-mean)*ofGap;
             reflection[part] = -log(max(LEAST_CHANCE, 0.5*erfc(reflection[part]*perSize)));
@@ -324,7 +403,7 @@ void ReflectedGaps::findNoise() {
 
 /** How far a gap moves without being noticed: thermally behind its surface, or in the step. */
 double ReflectedGaps::scaleOf(int i) const {
-    return min(sqrt(kT/gaps[i].stiffness), sqrt(kT*networks[i]*own[i]));
+    return min(sqrt(kT/gaps[i].stiffness), sqrt(kT*own[i]));
 }
 
 /** The force in a part of the step on a gap that a spring holds, which would end there. */
@@ -332,13 +411,13 @@ double ReflectedGaps::findPushOfSpring(int i, int part, double end) const {
     const Gap& gap = gaps[i];
     if (part < parts-1)
         return 0;
-    const double response = networks[i]*own[i], softer = 1/(1+gap.stiffness*response);
+    const double response = ofChains[i], softer = 1/(1+gap.stiffness*response);
     if (gap.law == GapLaw::SpringBehind)
         return max(0.0, -gap.stiffness*end*softer);
     const double rest = ofBridges[2*(size_t) i*parts]*sqrt(kT/gap.stiffness);
     const double held = (end+gap.stiffness*response*rest)*softer, responseHeld = response*softer;
     const double back = gap.ceiling < HUGE_VAL ? reflect(gap.ceiling-gap.start, gap.ceiling-held, responseHeld,
-            kT*reflections[(size_t) i*parts]) : 0;
+            responseHeld, kT*reflections[(size_t) i*parts]) : 0;
     return (held-responseHeld*back-end)/response;
 }
 
@@ -346,11 +425,11 @@ double ReflectedGaps::findPushOfSpring(int i, int part, double end) const {
 double ReflectedGaps::findPush(int i, int part) const {
     const GapInPart& gap = inPart[i];
     const MotionOfPort &one = motions[gap.ports[0]], &other = motions[gap.ports[1]];
-    const double end = gap.end+gap.network*(one.all+other.all)-gap.response*gap.push;
+    const double end = gap.end+one.all+other.all-gap.ofChains*gap.push;
     if (!gap.isReflected)
         return findPushOfSpring(i, part, end);
-    const double opening = gap.network*(one.opening+other.opening)-gap.response*gap.push;
-    return reflect(gap.start+SHARE_AT_START*opening, end, gap.response, gap.variate);
+    const double opening = one.opening+other.opening-gap.ofChains*gap.push;
+    return reflect(gap.start+SHARE_AT_START*opening, end, gap.response, gap.ofChains, gap.variate);
 }
 
 /** Let a force on a gap move all ports of its chains. */
@@ -384,7 +463,7 @@ void ReflectedGaps::findPushesOfPart(int part) {
     // The change of a gap, over what it may be.
     auto update = [&] (int i) {
         GapInPart& gap = inPart[i];
-        const double push = findPush(i, part), change = push-gap.push, way = fabs(change)*gap.response/gap.tolerance;
+        const double push = findPush(i, part), change = push-gap.push, way = fabs(change)*gap.ofChains/gap.tolerance;
         // Written so that NaN is no change.
         if (!(way > LEAST_SHARE))
             return 0.0;
@@ -428,8 +507,8 @@ void ReflectedGaps::findPushes() {
         GapInPart& gap = inPart[i];
         predicted[i] = gaps[i].start;
         gap.isReflected = gaps[i].law == GapLaw::Reflection;
-        gap.network = networks[i];
-        gap.response = networks[i]*own[i];
+        gap.ofChains = ofChains[i];
+        gap.response = own[i];
         gap.tolerance = OF_SWEEPS*scaleOf(i)+0.1*LEAST_CHANGE_OF_GAPS;
         for (int side = 0; side < 2; side++)
             gap.ports[side] = portOf[2*i+side] >= 0 ? portOf[2*i+side] : none;
@@ -445,7 +524,7 @@ void ReflectedGaps::findPushes() {
         for (int i = 0; i < count; i++) {
             const GapInPart& gap = inPart[i];
             forces[i] += gap.push;
-            predicted[i] = gap.end+gap.network*(motions[gap.ports[0]].all+motions[gap.ports[1]].all);
+            predicted[i] = gap.end+motions[gap.ports[0]].all+motions[gap.ports[1]].all;
             if (gap.isReflected && part < parts-1)
                 predicted[i] = max(predicted[i], 0.0);
         }
@@ -457,7 +536,6 @@ void ReflectedGaps::push(const vector<PackStep*>& packs, CoupledEquations& coupl
     const size_t count = gaps.size();
     if (count == 0)
         return;
-    networks.resize(count, 1.0);
     free.resize(count);
     predicted.resize(count);
     if (!hasSamePorts())
@@ -492,7 +570,7 @@ void ReflectedGaps::push(const vector<PackStep*>& packs, CoupledEquations& coupl
             for (int k = 0; k < 3; k++)
                 loads[3*(equationOf[i]+lever)+k] = forces[i]*gaps[i].levers[lever].gradient[k];
     coupled.push(packs, firstEquation, loads, demands, loop);
-    changes.resize(count);
+    changes.resize(count, 0.0);
     motions.assign(ports.size()+1, MotionOfPort());
     for (size_t i = 0; i < count; i++)
         if (forces[i] != 0)
@@ -500,22 +578,12 @@ void ReflectedGaps::push(const vector<PackStep*>& packs, CoupledEquations& coupl
     for (size_t i = 0; i < count; i++) {
         const double pushed = endMove(i, coupled.getPushedMoves());
         predicted[i] = free[i]-corrections[i]+pushed;
-        correct(i, pushed, coupled.joinsPlaces());
+        // Responses may be those of an iteration before, and others push through links.
+        const double correction = pushed-motions[inPart[i].ports[0]].all-motions[inPart[i].ports[1]].all;
+        const double change = correction-corrections[i];
+        corrections[i] += change*changes[i] < 0 ? DAMPING_OF_GAPS*change : change;
+        changes[i] = change;
     }
-}
-
-/**
- * Take note of how far forces have moved a gap beyond what responses say: these may be those of an iteration before,
- * and others push through a network. There, c is what the network lets the gap move by.
- */
-void ReflectedGaps::correct(int i, double pushed, bool isInNetwork) {
-    const double ofChains = motions[inPart[i].ports[0]].all+motions[inPart[i].ports[1]].all;
-    const double before = networks[i];
-    if (isInNetwork && forces[i] > 0 && ofChains > 0)
-        networks[i] = clamp(pushed/ofChains, LEAST_SHARE_OF_NETWORK, LARGEST_SHARE_OF_NETWORK);
-    const double correction = pushed-networks[i]*ofChains;
-    changes[i] = fabs(correction-corrections[i])+fabs(networks[i]-before)*own[i]*forces[i];
-    corrections[i] = correction;
 }
 
 /** Whether a gap that no iteration knows of yet may be pushed. */
@@ -535,7 +603,7 @@ bool ReflectedGaps::deviates(int i, double share) const {
         return false;
     if (i >= (int) predicted.size())
         return wouldPush(gaps[i]);
-    return !(max(fabs(gaps[i].end-predicted[i]), changes[i]) <= share*scaleOf(i)+LEAST_CHANGE_OF_GAPS);
+    return !(max(fabs(gaps[i].end-predicted[i]), fabs(changes[i])) <= share*scaleOf(i)+LEAST_CHANGE_OF_GAPS);
 }
 
 bool ReflectedGaps::anyUnfinished() {
@@ -552,9 +620,20 @@ bool ReflectedGaps::anyUnfinished() {
     return any;
 }
 
+/**
+ * Whether a gap that is held behind a ceiling is pulled back by much more than it would come out: where its contact has
+ * gone on to another gap, which is pushed out, both turn their chains against each other.
+ */
+bool ReflectedGaps::isTorn(int i) const {
+    const Gap& gap = gaps[i];
+    if (gap.law != GapLaw::Spring || !(gap.ceiling < HUGE_VAL) || !(getForce(i) < 0))
+        return false;
+    return -forces[i]*own[i] > LARGEST_PULL*(fabs(free[i]-gap.ceiling)+sqrt(kT*own[i]));
+}
+
 void ReflectedGaps::findFailures(vector<bool>& failed) const {
     for (size_t i = 0; i < gaps.size(); i++)
-        for (int side = 0; side < 2 && isUnfinished(i); side++)
+        for (int side = 0; side < 2 && (isUnfinished(i) || isTorn(i)); side++)
             if (gaps[i].packOf(side) >= 0)
                 failed[gaps[i].chainOf(side)] = true;
 }

@@ -3,6 +3,7 @@
 
 #include "dynamics/CoupledEquations.h"
 #include "dynamics/Gap.h"
+#include "dynamics/LinkYielding.h"
 #include <cstddef>
 #include <vector>
 
@@ -76,20 +77,21 @@ private:
     };
     bool hasSamePorts() const;
     void findPorts();
-    void findResponses(const std::vector<PackStep*>& packs, const CoupledEquations& coupled, bool single,
-            const Loop& loop);
+    void findResponses(const std::vector<PackStep*>& packs, CoupledEquations& coupled, bool single, const Loop& loop);
+    void yield(const PortsOfChain& chain);
+    double yieldOf(int gap) const;
     int chooseParts() const;
     void drawNumbers(const Loop& loop);
     void correlate(const std::vector<double>& normals, std::vector<double>& sums) const;
     void findNoise();
     void findPushes();
-    void correct(int gap, double pushed, bool isInNetwork);
     void findPushesOfPart(int part);
     double findPush(int gap, int part) const;
     double findPushOfSpring(int gap, int part, double end) const;
     void move(int gap, double push, bool opens);
     double scaleOf(int gap) const;
     bool wouldPush(const Gap& gap) const;
+    bool isTorn(int gap) const;
     bool deviates(int gap, double share) const;
     std::vector<Gap> gaps;
     GapNoise noise;
@@ -97,18 +99,18 @@ private:
     int parts = 1, numChains = 0;
     std::size_t firstEquation = 0;
     /**
-     * For each gap: the force and its share in each part; the end without forces, that which is predicted, and what
-     * others push through the network; how a force moves it, how much more or less the network lets it move than its
-     * chains alone do, and how far both have changed in the last iteration.
+     * For each gap: the force and its share in each part; the end without forces, that which is predicted, and how much
+     * farther forces have moved it than responses say, and by how much that has changed in the last iteration; how a
+     * force moves it, and how it would if no link joined its two chains.
      */
-    std::vector<double> forces, pushes, free, predicted, corrections, own, networks, changes;
+    std::vector<double> forces, pushes, free, predicted, corrections, changes, own, ofChains;
     /** The first equation of each gap among those of all. */
     std::vector<int> equationOf;
     /** For each gap and part: exponential variates, a bridge of Brownian motion, and what both are made of. */
     std::vector<double> reflections, bridges, ofReflections, ofBridges;
     /** A gap in a part of the step: where it begins and would end without forces, and the force that is found. */
     struct GapInPart {
-        double start, end, response, network, variate, tolerance, push;
+        double start, end, response, ofChains, variate, tolerance, push;
         /** Those that it does not have are behind all others, and do not move. */
         int ports[2];
         bool isReflected;
@@ -126,6 +128,10 @@ private:
     std::vector<MotionOfPort> motions;
     std::vector<PortsOfChain> chains;
     std::vector<double> responses, roots;
+    LinkYielding links;
+    /** For each port, from a number on, how a force on it moves the links of its chain, three numbers for each. */
+    std::vector<double> movesOfLinks;
+    std::vector<std::size_t> firstMoves;
     /** Whether the responses of a chain are known for the present iteration. */
     std::vector<char> known;
 };

@@ -118,7 +118,9 @@ void WallGaps::findNew(int number, const double* moved) {
             gap.response = responses[i];
             gap.key[0] = (uint32_t) force*0x9E3779B1u+face;
             gap.key[1] = system->particles[i].particle;
-            State state = {i, face, -1, placeHardSurface(kT, all->getNoise().drawSurface(gap), HUGE_VAL, before, gap)};
+            const GapNoise& noise = all->getNoise();
+            State state = {i, face, -1,
+                    placeHardSurface(kT, noise.getLimit(), noise.drawSurface(gap), HUGE_VAL, before, gap)};
             if (gap.law == GapLaw::Reflection && gap.start*(state.depth+after) >= least)
                 continue;
             reached[i] |= 1<<face;

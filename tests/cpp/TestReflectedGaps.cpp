@@ -100,7 +100,8 @@ public:
                 gap.stiffness = 1;
                 gap.key[0] = plane;
                 gap.key[1] = i;
-                depths.push_back(placeHardSurface(settings.kT, gaps.getNoise().drawSurface(gap), HUGE_VAL,
+                const GapNoise& noise = gaps.getNoise();
+                depths.push_back(placeHardSurface(settings.kT, noise.getLimit(), noise.drawSurface(gap), HUGE_VAL,
                         gapOf(i, plane), gap));
                 gap.end = gap.start;
                 gaps.add(gap);
@@ -250,23 +251,22 @@ static void checkEquilibrium(const Surroundings& surroundings, const Lattice& la
 static void testHardSurfaces() {
     Gap gap;
     gap.stiffness = 4;
-    auto place = [&] (double kT, double exponential, double uniform, double begun, double deepest = HUGE_VAL) {
-        return placeHardSurface(kT, {exponential, uniform}, deepest, begun, gap);
+    auto place = [&] (double kT, double variate, double limit, double begun, double deepest = HUGE_VAL) {
+        return placeHardSurface(kT, limit, variate, deepest, begun, gap);
     };
-    checkClose(0.7, place(2, 0.49, 0.5, 1.5), 1, 1e-14, "the depth from outside is that of the variate");
+    checkClose(0.7, place(2, 0.49, 6, 1.5), 1, 1e-14, "the depth from outside is that of the variate");
     check(gap.law == GapLaw::Reflection && fabs(gap.start-2.2) < 1e-14, "a start outside");
-    checkClose(sqrt(1.21+0.49), place(2, 0.49, 0.5, -1.1), 1, 1e-14, "from within, it is no less than the start");
+    checkClose(sqrt(1.21+0.49), place(2, 0.49, 6, -1.1), 1, 1e-14, "from within, it is no less than the start");
     check(gap.law == GapLaw::Reflection && fabs(gap.start-(sqrt(1.7)-1.1)) < 1e-14, "a start within");
-    // The limit is 3 to 9 times the square root of a half.
     const double limit = 6*sqrt(0.5);
-    checkClose(limit, place(2, 100, 0.5, -1.1), 1, 1e-14, "it is no more than the limit");
+    checkClose(limit, place(2, 100, 6, -1.1), 1, 1e-14, "it is no more than the limit");
     check(gap.law == GapLaw::Reflection && fabs(gap.start-(limit-1.1)) < 1e-14, "a start within, with the largest");
-    checkClose(0, place(2, 0.49, 0.5, -5), 1, 0, "what begins deeper has no hard surface behind it");
+    checkClose(0, place(2, 0.49, 6, -5), 1, 0, "what begins deeper has no hard surface behind it");
     check(gap.law == GapLaw::Spring && gap.start == -5 && fabs(gap.ceiling+limit) < 1e-14, "a spring holds it");
-    check(place(2, 0.49, 0.9, -5) > 5 && gap.law == GapLaw::Reflection, "another limit is deeper");
-    checkClose(2, place(2, 100, 0.5, -1.1, 2), 1, 1e-14, "no surface is deeper than it may be");
-    check(place(2, 0.49, 0.5, -400) == 0 && gap.law == GapLaw::Spring && isinf(gap.ceiling), "far behind");
-    checkClose(0, place(0, 0.49, 0.5, -0.1), 1, 0, "nor has what does not move thermally");
+    check(place(2, 0.49, 8.4, -5) > 5 && gap.law == GapLaw::Reflection, "another limit is deeper");
+    checkClose(2, place(2, 100, 6, -1.1, 2), 1, 1e-14, "no surface is deeper than it may be");
+    check(place(2, 0.49, 6, -400) == 0 && gap.law == GapLaw::Spring && isinf(gap.ceiling), "far behind");
+    checkClose(0, place(0, 0.49, 6, -0.1), 1, 0, "nor has what does not move thermally");
     check(gap.law == GapLaw::SpringBehind && gap.start == -0.1, "it is held by a spring behind the surface alone");
 }
 
