@@ -356,6 +356,22 @@ double ContactGaps::findEnd(const NearPair& own) const {
     return sum;
 }
 
+/**
+ * Get whether a contact may come from a neighbor that is held in by the spring of the surface: a hard one must not keep
+ * it out in the same step.
+ */
+bool ContactGaps::isOfNeighbor(const NearPair& own, const vector<const NearPair*>& deep) const {
+    const vector<Capsule>& capsules = search->getSystem().capsules;
+    auto areNeighbors = [&] (int a, int b) {
+        return a == b || capsules[a].first == capsules[b].second || capsules[a].second == capsules[b].first;
+    };
+    const ContactPair& pair = pairs.get(own.pair);
+    return !own.touchedAtStart && any_of(deep.begin(), deep.end(), [&] (const NearPair* other) {
+        const ContactPair& deeper = pairs.get(other->pair);
+        return areNeighbors(pair.a, deeper.a) && areNeighbors(pair.b, deeper.b);
+    });
+}
+
 bool ContactGaps::findGaps(int iteration, bool settled, const double* moved, ReflectedGaps& gaps) {
     if (movesTooFar)
         return false;
@@ -383,9 +399,14 @@ bool ContactGaps::findGaps(int iteration, bool settled, const double* moved, Ref
     runInChunks(*loop, near.size(), CHUNK_OF_CAPSULES, [&] (int i) {
         follow(near[i]);
     });
+    vector<const NearPair*> deep;
+    for (const NearPair& own : near)
+        if (own.touchedAtStart && own.gap.law == GapLaw::Spring)
+            deep.push_back(&own);
     for (NearPair& own : near)
         if (own.number < 0) {
-            if (own.hasMoved && own.gap.numLevers > 0 && own.gap.present && mayClose(own.gap))
+            if (own.hasMoved && own.gap.numLevers > 0 && own.gap.present && mayClose(own.gap) &&
+                    !isOfNeighbor(own, deep))
                 own.number = gaps.add(own.gap);
         }
         else if (own.hasMoved)

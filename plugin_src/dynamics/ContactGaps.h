@@ -92,6 +92,7 @@ private:
     void selectNear(int firstNew);
     void follow(NearPair& near) const;
     bool mayClose(const Gap& gap) const;
+    bool isOfNeighbor(const NearPair& own, const std::vector<const NearPair*>& deep) const;
     double findEnd(const NearPair& near) const;
     void findCrossed();
     double radiiOf(const ContactPair& pair) const {
