@@ -27,7 +27,7 @@ const double OF_RESPONSES = 0.3;
 const double LEAST_SHARE = 0.01;
 /** What responses lack may go back and forth between gaps that links move together: it changes by this share then. */
 const double DAMPING_OF_GAPS = 0.5;
-/** By how much less than this, over the way that is left and the thermal one, a ceiling pulls a gap back. */
+/** A ceiling pulls a gap back by less than this, over the way that it would go beyond and its thermal motion. */
 const double LARGEST_PULL = 10;
 /** Sweeps are taken to change by this factor at most from one to the next. */
 const double LARGEST_RATE = 0.995;

@@ -1,7 +1,6 @@
 #include "dynamics/WallEquations.h"
 #include "dynamics/LastChange.h"
 #include "dynamics/PlaceResponses.h"
-#include "dynamics/StageWeights.h"
 #include "mechanics/SymmetricMatrices.h"
 #include <algorithm>
 #include <cmath>
@@ -71,8 +70,7 @@ void WallEquations::begin(const CoupledStart& start, const Loop& newLoop) {
     });
 }
 
-void WallEquations::beginStage(int stage, int numStages, const double*) {
-    implicit = numStages == 2 && stage == 0 ? DIAGONAL : 1;
+void WallEquations::beginStage(int, int, const double*) {
     reached.assign(places.size(), 0);
     rooms.assign(places.size(), Room());
     for (Part& part : parts)
@@ -98,7 +96,7 @@ double WallEquations::findDepthAt(const State& state, const double* positions) c
 
 void WallEquations::linearise(int iteration, const double* moved, vector<CouplingEquation>& equations) {
     iterations = iteration;
-    const double own = implicit*system->stiffness;
+    const double own = system->stiffness;
     const size_t first = equations.size();
     for (Part& part : parts)
         for (State& state : part.states) {
@@ -140,7 +138,7 @@ RestGap WallEquations::findRestGap(int particle, int face, double depth) const {
     double gradient[3];
     const double before = findDepth(system->wall, face, positionOf(particle, begun).at, own.radius, gradient);
     const double largest = isFlat(system->wall) ? HUGE_VAL : LARGEST_WAY_TO_FACE*(getRoom(system->wall)-own.radius);
-    return RestGap(max(-largest, -depth), min(largest, -before), implicit*system->stiffness*responses[particle],
+    return RestGap(max(-largest, -depth), min(largest, -before), system->stiffness*responses[particle],
             wallDepth);
 }
 
@@ -177,7 +175,7 @@ void WallEquations::finishPart(int number, const double* moves, const double* mo
             const double before = exchange(state.changeBefore, change*change);
             state.unfinished = !isLastChange(change*change, before, tolerance*tolerance) || !(beyond >= -tolerance);
         }
-        state.force = implicit*system->stiffness*max(0.0, beyond);
+        state.force = system->stiffness*max(0.0, beyond);
         // The particle may be beyond a curved face, but not beyond its tangent plane elsewhere.
         const WallParticle& own = system->particles[state.particle];
         double gradient[3];

@@ -11,7 +11,7 @@ namespace cylchain {
 /**
  * Walls in an implicit step.
  *
- * The first two iterations of a stage know of none: one alone does not know how segments turn. Where they lead, y*, a
+ * The first two iterations know of none: one alone does not know how segments turn. Where they lead, y*, a
  * particle may be beyond a face, with the depth d(y*) > 0. The force is
  *
  *     -k (b+d(y)) grad d   where d(y) > -b
@@ -41,7 +41,7 @@ public:
         // Walls join no chains.
     }
 private:
-    /** A particle that has been beyond a face in this stage. */
+    /** A particle that has been beyond a face in this step. */
     struct State {
         /** Its number in the wall. */
         int particle;
@@ -80,7 +80,7 @@ private:
     const Loop* loop = nullptr;
     const PackFlags* active = nullptr;
     const double* begun = nullptr;
-    double stepSize = 0, tolerance = 0, wallDepth = 0, implicit = 1;
+    double stepSize = 0, tolerance = 0, wallDepth = 0;
     int numFaces = 0, iterations = 0;
     /**
      * For each particle of the wall: where it is, how a force moves it, whether it moves together with its neighbours,
