@@ -270,7 +270,7 @@ def _mean_in_trap(values, ends, point, stiffness):
     return mean, np.sqrt(np.sum(weight**2 * (values - mean) ** 2)) / weight.sum()
 
 
-@pytest.mark.parametrize("engine", ["compiled", pytest.param("portable", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("engine", ["compiled", pytest.param("portable", marks=pytest.mark.exhaustive)])
 def test_slow_pulling_measures_the_force_in_equilibrium(engine):
     """Chains of two free joints held at one end and in a trap at the other, against reweighted free chains."""
     kind, segments, chains, stiffness = FREELY_JOINTED, 2, 450, 6 * KT / 100**2

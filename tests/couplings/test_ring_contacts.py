@@ -1,6 +1,6 @@
 """A ring of DNA that touches itself: bends, contacts and distances beside Monte Carlo of the same energies.
 
-The reference is by ``support.ring_monte_carlo``, which knows nothing of the package; a slow test computes it again.
+The reference is by ``support.ring_monte_carlo``, which knows nothing of the package; an exhaustive test computes it again.
 """
 
 import numpy as np
@@ -71,7 +71,7 @@ def test_a_ring_that_touches_itself():
     """Energies of contacts are of few rings at a time: too few to be looked at."""
     simulation = RingSimulation(in_equilibrium(300, 3000, 3), 1.0, 5)
     interval = max(1, round(2e5 / simulation.step))
-    totals, samples = 0.0, 50
+    totals, samples = 0.0, 30
     for _ in range(samples):
         simulation.integrator.step(interval)
         totals = totals + RING.observe(simulation.nodes())
@@ -84,7 +84,7 @@ def test_a_ring_that_touches_itself():
     assert (4 * errors[2:] < 0.8 * REFERENCE[2:]).all(), "\n".join(lines)
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_reference_is_that_of_monte_carlo():
     """Within what a minute can see."""
     sampler = RingMonteCarlo(RING, regular_rings(RING, 1000), 11)

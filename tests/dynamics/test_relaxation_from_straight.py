@@ -11,7 +11,7 @@ from support.solvent import KT, TEMPERATURE, VISCOSITY
 
 CHAINS, SEGMENTS = 1600, 64
 # Of the trap, over that of a segment: where it is explicit, too, steps of 0.02 us resolve it.
-TRAP = 0.1
+TRAP = 0.05
 TIMES = (10, 20, 50, 100, 200)
 MICROSECOND = 1e6
 
