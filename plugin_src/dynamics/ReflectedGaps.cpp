@@ -581,7 +581,8 @@ void ReflectedGaps::push(const vector<PackStep*>& packs, CoupledEquations& coupl
         // Responses may be those of an iteration before, and others push through links.
         const double correction = pushed-motions[inPart[i].ports[0]].all-motions[inPart[i].ports[1]].all;
         const double change = correction-corrections[i];
-        corrections[i] += change*changes[i] < 0 ? DAMPING_OF_GAPS*change : change;
+        const bool isBack = coupled.joinsPlaces() && change*changes[i] < 0;
+        corrections[i] += isBack ? DAMPING_OF_GAPS*change : change;
         changes[i] = change;
     }
 }
