@@ -15,7 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from .engine_choice import ENGINES
-from .errors import InputError, InstabilityError, SegmentLengthWarning, TimeStepWarning
+from .errors import BoxWarning, ContactWarning, InputError, InstabilityError, SegmentLengthWarning, TimeStepWarning
 from .export import command as export
 from .rendering import command as rendering
 from .runs.beginnings import START_NAMES
@@ -36,7 +36,7 @@ def main(arguments=None):
     """
     options = _parser().parse_args(arguments)
     with warnings.catch_warnings():
-        told = (SegmentLengthWarning, TimeStepWarning)
+        told = (BoxWarning, ContactWarning, SegmentLengthWarning, TimeStepWarning)
         for category in told:
             warnings.simplefilter("always", category)
         show = warnings.showwarning

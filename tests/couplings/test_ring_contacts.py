@@ -1,6 +1,7 @@
 """A ring of DNA that touches itself: bends, contacts and distances beside Monte Carlo of the same energies.
 
-The reference is by ``support.ring_monte_carlo``, which knows nothing of the package; an exhaustive test computes it again.
+The reference is by ``support.ring_monte_carlo``, which knows nothing of the package. An exhaustive test computes it
+again.
 """
 
 import numpy as np
