@@ -32,7 +32,7 @@ const double OF_CHANGE = 1e-3, OF_CHANGE_WITH_NOISE = 1e-5, OF_LENGTH = 1e-7;
 const double OF_ROUNDING = 1e-11;
 /** The least length for metric forces, over the rest length. */
 const double LEAST_LENGTH = 0.05;
-/** The largest stiffness of a link that has a direction, over the friction of a place in a step. */
+/** The largest stiffness of a link that has a direction, or is beside gaps, over the friction of a place in a step. */
 const double LARGEST_RATE_IN_SINGLE_PRECISION = 1e3;
 /**
  * The largest stiffness of a link that turns, over the friction of a place in a step, if packs are to rest. Up to 300,
@@ -92,11 +92,11 @@ void LinkEquations::prefetchPlaces(const State& state, const double* positions) 
             prefetch(reinterpret_cast<const NeighbouringNodes*>(positions+3*particle));
 }
 
-bool LinkEquations::needDoublePrecision(const ChainPlaces& places, double stepSize) const {
+bool LinkEquations::needDoublePrecision(const ChainPlaces& places, double stepSize, bool besideGaps) const {
     for (const Link& link : *links) {
         const double rate = link.stiffness*stepSize;
         // Most are known to be soft without their places.
-        if (!turns(link) || !(rate > LARGEST_RATE_IN_SINGLE_PRECISION*places.getLeastFriction()))
+        if (!(turns(link) || besideGaps) || !(rate > LARGEST_RATE_IN_SINGLE_PRECISION*places.getLeastFriction()))
             continue;
         for (const Place& place : {link.first, link.second}) {
             PlaceOnChain found;

@@ -41,8 +41,9 @@ public:
     void setLinks(const std::vector<Link>* links, const LinkBoxes& boxes, int force);
     /**
      * Whether a link is so stiff in one direction that a step in single precision loses the digits of what lies across.
+     * Beside gaps, no link may be as stiff: how it yields is what its stiffness leaves of them.
      */
-    bool needDoublePrecision(const ChainPlaces& places, double stepSize) const;
+    bool needDoublePrecision(const ChainPlaces& places, double stepSize, bool besideGaps) const;
     void begin(const CoupledStart& start, const Loop& loop) override;
     void beginStage(int stage, int numStages, const double* moved) override;
     void linearise(int iteration, const double* moved, std::vector<CouplingEquation>& equations) override;

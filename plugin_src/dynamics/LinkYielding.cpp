@@ -7,8 +7,8 @@ using namespace std;
 
 namespace {
 
-/** What one minus the product of stiffness and compliances is at least: single precision knows no less. */
-const double LEAST_YIELDING = 1e-3;
+/** What one minus the product of stiffness and compliances is at least: steps in either precision know no less. */
+const double LEAST_YIELDING = 1e-13, LEAST_YIELDING_IN_SINGLE_PRECISION = 1e-5;
 
 /** Find the product of two matrices, row by row. */
 void multiplyMatrices(const double* a, const double* b, double* result) {
@@ -29,13 +29,16 @@ void transpose(const double* matrix, double* result) {
             result[3*row+column] = matrix[3*column+row];
 }
 
-void invertMatrix(const double* m, double* result) {
+/** Invert a matrix whose determinant is positive; where it is not, false. */
+bool invertMatrix(const double* m, double* result) {
     const double cofactors[] = {m[4]*m[8]-m[5]*m[7], m[2]*m[7]-m[1]*m[8], m[1]*m[5]-m[2]*m[4],
             m[5]*m[6]-m[3]*m[8], m[0]*m[8]-m[2]*m[6], m[2]*m[3]-m[0]*m[5],
             m[3]*m[7]-m[4]*m[6], m[1]*m[6]-m[0]*m[7], m[0]*m[4]-m[1]*m[3]};
     const double determinant = m[0]*cofactors[0]+m[1]*cofactors[3]+m[2]*cofactors[6];
     for (int k = 0; k < 9; k++)
         result[k] = cofactors[k]/determinant;
+    // Written so that NaN is not.
+    return determinant > 0;
 }
 
 } // namespace
@@ -70,9 +73,11 @@ void LinkYielding::setEquations(const vector<CouplingEquation>& equations, int n
         }
 }
 
-void LinkYielding::find(const vector<PackStep*>& packs, CoupledEquations& coupled, const Loop& loop) {
+void LinkYielding::find(const vector<PackStep*>& packs, CoupledEquations& coupled, Precision precision,
+        const Loop& loop) {
     if (links.empty())
         return;
+    const double least = precision == Precision::Double ? LEAST_YIELDING : LEAST_YIELDING_IN_SINGLE_PRECISION;
     coupled.findCompliances(packs, compliances, loop);
     for (Link& link : links) {
         double stiffness[9], byPlace[2][9], product[9], remaining[9], turned[9];
@@ -84,9 +89,11 @@ void LinkYielding::find(const vector<PackStep*>& packs, CoupledEquations& couple
         }
         multiplyMatrices(byPlace[1], byPlace[0], product);
         for (int k = 0; k < 9; k++)
-            remaining[k] = (k%4 == 0 ? 1+LEAST_YIELDING : 0)-product[k];
+            remaining[k] = (k%4 == 0 ? 1+least : 0)-product[k];
         double inverse[9];
-        invertMatrix(remaining, inverse);
+        // What rounding has left nothing of is as if the other place were held.
+        if (!invertMatrix(remaining, inverse))
+            fill_n(inverse, 9, 0.0);
         multiplyMatrices(inverse, stiffness, link.between);
         transpose(link.between, turned);
         multiplyMatrices(byPlace[1], turned, link.ofPlace[0]);

@@ -18,7 +18,8 @@ namespace cylchain {
  *     v.K C B v    to that of the other,
  *     u.B v        to that of one to a force on the other,      B = (1-K D K C)^-1 K.
  *
- * All this is exact for a single link of two chains. Of several, it is what each does as if the others were held.
+ * All this is exact for a single link of two chains. Of several, it is what each does as if the others were held. If
+ * both places are on one chain, all three are for that, as if a force on one place did not move the other.
  */
 class LinkYielding {
 public:
@@ -31,8 +32,8 @@ public:
     };
     /** Take note of the links among equations. */
     void setEquations(const std::vector<CouplingEquation>& equations, int numChains);
-    /** Find the matrices, after the equations have been solved. */
-    void find(const std::vector<PackStep*>& packs, CoupledEquations& coupled, const Loop& loop);
+    /** Find the matrices, after the equations have been solved in a step of some precision. */
+    void find(const std::vector<PackStep*>& packs, CoupledEquations& coupled, Precision precision, const Loop& loop);
     const std::vector<Link>& getLinks() const {
         return links;
     }

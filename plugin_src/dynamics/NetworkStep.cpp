@@ -139,7 +139,7 @@ Instability NetworkStep::step(const double* positions, const double* forces, con
             const StepSettings& given, double* displacements, const Loop& loop) {
     StepSettings settings = given;
     for (const unique_ptr<LinkEquations>& own : links)
-        if (own->needDoublePrecision(places, settings.stepSize))
+        if (own->needDoublePrecision(places, settings.stepSize, couplings.size() > firstContacts))
             settings.precision = Precision::Double;
     choosePacks(settings);
     iterations = substitutions = 0;
@@ -155,13 +155,14 @@ Instability NetworkStep::step(const double* positions, const double* forces, con
         mayBeSoft = false;
         taken = takeStep(whole, displacements, failed, result);
     }
+    result.iterations = iterations;
     if (!taken) {
         result.chain = find(failed.begin(), failed.end(), true)-failed.begin();
         result.coupling = culprit;
+        return result;
     }
     for (const Impulse& impulse : received)
         impulse.receiver->add(impulse.push, impulse.duration);
-    result.iterations = iterations;
     return result;
 }
 
@@ -374,7 +375,8 @@ bool NetworkStep::divide(const Attempt& whole, int division, double* displacemen
     };
     for (int i = 0; i < 2; i++, half.settings.step++) {
         if (!attempt(half, part.data(), failed)) {
-            if (division == (areSoft ? LARGEST_DIVISION_OF_SOFT_CONTACTS : LARGEST_DIVISION)) {
+            // Contacts may be hard ones in the step, and soft ones only after some divisions.
+            if (division >= (areSoft ? LARGEST_DIVISION_OF_SOFT_CONTACTS : LARGEST_DIVISION)) {
                 // Now, because couplings know positions that last as long as this.
                 culprit = findCulprit();
                 return false;

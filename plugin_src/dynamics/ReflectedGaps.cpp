@@ -78,6 +78,7 @@ void findRoot(int n, const double* matrix, double* root) {
 void ReflectedGaps::begin(const StepSettings& settings, const ChainPlaces& places) {
     numChains = places.getNumChains();
     kT = settings.kT;
+    precision = settings.precision;
     noise = GapNoise({(uint32_t) settings.seed, (uint32_t) settings.level, settings.step});
     gaps.clear();
     forces.clear();
@@ -180,7 +181,7 @@ void ReflectedGaps::findPorts() {
 /** Find how a force at each port of a chain moves all ports of it: a substitution for a port of each lane of a pack. */
 void ReflectedGaps::findResponses(const vector<PackStep*>& packs, CoupledEquations& coupled, bool single,
         const Loop& loop) {
-    links.find(packs, coupled, loop);
+    links.find(packs, coupled, precision, loop);
     vector<vector<int> > chainsOfPack(packs.size());
     for (size_t i = 0; i < chains.size(); i++)
         if (!known[i])
@@ -307,10 +308,18 @@ void ReflectedGaps::yield(const PortsOfChain& chain) {
         const double* ofRow = &movesOfLinks[firstMoves[chain.first+row]];
         size_t offset = 0;
         for (const LinkYielding::Side* side = first; side != last; side++, offset += 3) {
-            const double* const m = links.getLinks()[side->link].ofPlace[side->side];
+            const LinkYielding::Link& link = links.getLinks()[side->link];
+            const double* const m = link.ofPlace[side->side];
             const double* const u = ofRow+offset;
-            const double pull[] = {u[0]*m[0]+u[1]*m[3]+u[2]*m[6], u[0]*m[1]+u[1]*m[4]+u[2]*m[7],
+            double pull[] = {u[0]*m[0]+u[1]*m[3]+u[2]*m[6], u[0]*m[1]+u[1]*m[4]+u[2]*m[7],
                     u[0]*m[2]+u[1]*m[5]+u[2]*m[8]};
+            if (link.chains[0] == link.chains[1]) {
+                // What moves the other place pulls at this one.
+                const double* const v = ofRow+3*(size_t) links.find(side->link, 1-side->side);
+                const double* const b = link.between;
+                for (int k = 0; k < 3; k++)
+                    pull[k] += side->side == 0 ? product(b+3*k, v) : b[k]*v[0]+b[3+k]*v[1]+b[6+k]*v[2];
+            }
             for (int column = 0; column < chain.count; column++)
                 matrix[(size_t) row*chain.count+column] +=
                         product(pull, &movesOfLinks[firstMoves[chain.first+column]+offset]);
@@ -538,9 +547,11 @@ void ReflectedGaps::push(const vector<PackStep*>& packs, CoupledEquations& coupl
         return;
     free.resize(count);
     predicted.resize(count);
-    if (!hasSamePorts())
+    const bool same = hasSamePorts();
+    if (!same)
         findPorts();
-    if (find(known.begin(), known.end(), 0) != known.end()) {
+    // Where no gap is left, all responses are zero.
+    if (!same || find(known.begin(), known.end(), 0) != known.end()) {
         findResponses(packs, coupled, demands.single, loop);
         const int needed = max(parts, chooseParts());
         if (needed != parts) {

@@ -96,6 +96,7 @@ private:
     std::vector<Gap> gaps;
     GapNoise noise;
     double kT = 0;
+    Precision precision = Precision::Double;
     int parts = 1, numChains = 0;
     std::size_t firstEquation = 0;
     /**
