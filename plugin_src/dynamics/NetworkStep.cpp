@@ -22,7 +22,7 @@ const double LARGEST_TURN = 0.25;
 /** Where contacts are softer than this in a step, they are hard ones, which take less time: see ContactRest. */
 const double LARGEST_SOFTNESS = 18;
 /** A step is divided into at most two to this power, and where contacts are soft, before they are hard ones. */
-const int LARGEST_DIVISION = 10, LARGEST_DIVISION_OF_SOFT_CONTACTS = 3;
+const int LARGEST_DIVISION = 10, LARGEST_DIVISION_OF_SOFT_CONTACTS = 1;
 
 } // namespace
 

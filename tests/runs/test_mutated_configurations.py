@@ -11,7 +11,7 @@ from support.mutations import mutated, outcome
 
 # Without comments, so that there is something to change in every line, and with few filaments.
 SMALL = [
-    "\n".join(line.partition(" #")[0] for line in start_text(kind).splitlines() if line and line[0] != "#")
+    "\n".join(line.partition(" #")[0].rstrip() for line in start_text(kind).splitlines() if line and line[0] != "#")
     for kind in START_NAMES
 ]
 SMALL = [text.replace("count = 60\n", "count = 4\n").replace("count = 40\n", "count = 4\n") for text in SMALL]

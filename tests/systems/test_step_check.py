@@ -299,11 +299,13 @@ def test_right_steps_of_linkers_are_not_called_wrong(seeds):
     errors, bars = [], []
     for seed in range(1, seeds + 1):
         check = check_time_step(*crowd(), 2e7, frames=96, parts=4, random_seed=seed, platform=REFERENCE)
-        linkers = check["Linkers (force 1)"]
         assert check.verdict != "wrong", str(check)
         assert check["hands that are bound"].values[0] > 10.0
-        errors.append(linkers.error)
-        bars.append(linkers.standard_error)
+        # Where no linker has ever joined two filaments, there is nothing to compare.
+        for linkers in [one for one in check.observables if one.name == "Linkers (force 1)"]:
+            errors.append(linkers.error)
+            bars.append(linkers.standard_error)
+    assert len(errors) > seeds // 2
     assert np.sqrt(np.mean(np.square(errors) / np.square(bars))) < (1.7 if seeds > 3 else 3.0)
 
 
