@@ -242,7 +242,7 @@ ALL += [(k, joint, (0,)) for k in (1e2, 1e11) for joint in (0, 10, 1000)]
 FREE = [each if each in QUICK else slow(*each) for each in ALL]
 
 
-@pytest.mark.sample(r"^(?!100\.0-10+-clamped1[34]|100000000\.0)")
+@pytest.mark.sample(r"^(?!100\.0-1000-clamped2|100\.0-10+-clamped1[34]|100000000\.0)")
 @pytest.mark.parametrize("stiffness, joint, clamped", FREE)
 def test_energies_of_chains_of_any_stiffness(stiffness, joint, clamped):
     kind = chain_of(stiffness, joint)
@@ -259,7 +259,7 @@ def test_energies_of_chains_of_any_stiffness(stiffness, joint, clamped):
 HELD = [(stiffness, joint) for stiffness in STIFFNESSES for joint in (0, 10, 1000)]
 
 
-@pytest.mark.sample(r"-100000\.0|held-100\.0-10$|ring-100\.0-0|100000000000\.0-1000")
+@pytest.mark.sample(r"-100000\.0-10?$|held-100\.0-10$|100000000000\.0-1000")
 @pytest.mark.slow
 @pytest.mark.parametrize("stiffness, joint", HELD)
 @pytest.mark.parametrize("shape", ["both ends held", "ring"])
