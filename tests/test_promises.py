@@ -259,7 +259,7 @@ def test_energies_of_chains_of_any_stiffness(stiffness, joint, clamped):
 HELD = [(stiffness, joint) for stiffness in STIFFNESSES for joint in (0, 10, 1000)]
 
 
-@pytest.mark.sample(r"-100000\.0-10?$|held-100\.0-10$|100000000000\.0-1000")
+@pytest.mark.sample(r"-100000\.0-10$|held-100\.0-10$|100000000000\.0-1000")
 @pytest.mark.slow
 @pytest.mark.parametrize("stiffness, joint", HELD)
 @pytest.mark.parametrize("shape", ["both ends held", "ring"])

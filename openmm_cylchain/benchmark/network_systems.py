@@ -75,8 +75,8 @@ def enlarged(system, factor):
     return replace(
         system,
         edge=system.edge * factor ** (1 / 3),
-        filaments=factor * system.filaments,
-        links=factor * system.links,
+        filaments=round(factor * system.filaments),
+        links=round(factor * system.links),
     )
 
 

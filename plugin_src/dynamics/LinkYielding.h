@@ -49,7 +49,7 @@ public:
         return sides.data()+firstSide[chain+1];
     }
     /** The number of a link among those of a chain. */
-    int find(int link, int side) const {
+    int getNumber(int link, int side) const {
         return numberOfSide[2*link+side];
     }
 private:

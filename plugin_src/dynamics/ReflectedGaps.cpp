@@ -1,5 +1,6 @@
 #include "dynamics/ReflectedGaps.h"
 #include "dynamics/TermBlocks.h"
+#include "mechanics/SymmetricMatrices.h"
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -43,10 +44,6 @@ const double LEAST_CHANCE = 1e-300;
 const int CHUNK_OF_GAPS = 64;
 /** Pivots below this, over the diagonal, are those of ports that move as others do. */
 const double LEAST_PIVOT = 1e-6;
-
-double product(const double* a, const double* b) {
-    return a[0]*b[0]+a[1]*b[1]+a[2]*b[2];
-}
 
 /**
  * The force that reflects the motion of a gap, with an exponential variate of the mean k_B T: with its response G to a
@@ -315,14 +312,14 @@ void ReflectedGaps::yield(const PortsOfChain& chain) {
                     u[0]*m[2]+u[1]*m[5]+u[2]*m[8]};
             if (link.chains[0] == link.chains[1]) {
                 // What moves the other place pulls at this one.
-                const double* const v = ofRow+3*(size_t) links.find(side->link, 1-side->side);
+                const double* const v = ofRow+3*(size_t) links.getNumber(side->link, 1-side->side);
                 const double* const b = link.between;
                 for (int k = 0; k < 3; k++)
-                    pull[k] += side->side == 0 ? product(b+3*k, v) : b[k]*v[0]+b[3+k]*v[1]+b[6+k]*v[2];
+                    pull[k] += side->side == 0 ? dot(b+3*k, v) : b[k]*v[0]+b[3+k]*v[1]+b[6+k]*v[2];
             }
             for (int column = 0; column < chain.count; column++)
                 matrix[(size_t) row*chain.count+column] +=
-                        product(pull, &movesOfLinks[firstMoves[chain.first+column]+offset]);
+                        dot(pull, &movesOfLinks[firstMoves[chain.first+column]+offset]);
         }
     }
 }
@@ -339,11 +336,11 @@ double ReflectedGaps::yieldOf(int i) const {
         const LinkYielding::Link& link = links.getLinks()[side->link];
         if (link.chains[1-side->side] != second)
             continue;
-        const double* const v = &movesOfLinks[firstMoves[other]+3*(size_t) links.find(side->link, 1-side->side)];
+        const double* const v = &movesOfLinks[firstMoves[other]+3*(size_t) links.getNumber(side->link, 1-side->side)];
         const double *const u = &movesOfLinks[offset], *const first = side->side == 0 ? u : v,
                 *const last = side->side == 0 ? v : u, *const b = link.between;
         for (int row = 0; row < 3; row++)
-            sum += 2*first[row]*product(b+3*row, last);
+            sum += 2*first[row]*dot(b+3*row, last);
     }
     return sum;
 }
@@ -567,7 +564,7 @@ void ReflectedGaps::push(const vector<PackStep*>& packs, CoupledEquations& coupl
     auto endMove = [&] (size_t i, const vector<double>& moves) {
         double sum = 0;
         for (int lever = 0; lever < gaps[i].numLevers; lever++)
-            sum += product(gaps[i].levers[lever].gradient, &moves[3*(equationOf[i]+lever)]);
+            sum += dot(gaps[i].levers[lever].gradient, &moves[3*(equationOf[i]+lever)]);
         return sum;
     };
     coupled.predictMoves(packs, firstEquation, loop);

@@ -302,10 +302,11 @@ def test_right_steps_of_linkers_are_not_called_wrong(seeds):
         assert check.verdict != "wrong", str(check)
         assert check["hands that are bound"].values[0] > 10.0
         # Where no linker has ever joined two filaments, there is nothing to compare.
-        for linkers in [one for one in check.observables if one.name == "Linkers (force 1)"]:
+        if "Linkers (force 1)" in [one.name for one in check.observables]:
+            linkers = check["Linkers (force 1)"]
             errors.append(linkers.error)
             bars.append(linkers.standard_error)
-    assert len(errors) > seeds // 2
+    assert len(errors) >= seeds - seeds // 12
     assert np.sqrt(np.mean(np.square(errors) / np.square(bars))) < (1.7 if seeds > 3 else 3.0)
 
 
