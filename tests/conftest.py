@@ -1,6 +1,11 @@
 """Hooks of pytest, and fixtures that several test files share."""
 
 import os
+
+# Tests run side by side: threads of each would wait for those of others. Libraries ask for this when they are loaded.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+# ruff: noqa: E402
 import re
 import sys
 

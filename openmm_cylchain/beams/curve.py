@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import CubicSpline
 
 from ..mechanics.geometry import unrolled
 from ..units.types import FloatArray
@@ -65,6 +64,9 @@ def natural_tangents(nodes: FloatArray, closed: bool = False) -> FloatArray:
 
     Of a ring, along the periodic one.
     """
+    # Most filaments have no beams, and this is slow to load.
+    from scipy.interpolate import CubicSpline
+
     if closed:
         around = unrolled(nodes)
         along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(around, axis=0), axis=1))])

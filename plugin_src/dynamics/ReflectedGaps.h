@@ -3,7 +3,7 @@
 
 #include "dynamics/CoupledEquations.h"
 #include "dynamics/Gap.h"
-#include "dynamics/LinkYielding.h"
+#include "dynamics/GapResponses.h"
 #include <cstddef>
 #include <vector>
 
@@ -66,20 +66,6 @@ public:
         return number < (int) forces.size() ? forces[number] : 0;
     }
 private:
-    /** A place of a gap on a chain that moves. */
-    struct Port {
-        int gap, side;
-    };
-    /** The ports of a chain, which follow each other; their responses to each other are a square matrix. */
-    struct PortsOfChain {
-        int chain, first, count;
-        std::size_t matrix;
-    };
-    bool hasSamePorts() const;
-    void findPorts();
-    void findResponses(const std::vector<PackStep*>& packs, CoupledEquations& coupled, bool single, const Loop& loop);
-    void yield(const PortsOfChain& chain);
-    double yieldOf(int gap) const;
     int chooseParts() const;
     void drawNumbers(const Loop& loop);
     void correlate(const std::vector<double>& normals, std::vector<double>& sums) const;
@@ -97,16 +83,15 @@ private:
     GapNoise noise;
     double kT = 0;
     Precision precision = Precision::Double;
-    int parts = 1, numChains = 0;
-    std::size_t firstEquation = 0;
+    int parts = 1;
     /**
      * For each gap: the force and its share in each part; the end without forces, that which is predicted, and how much
-     * farther forces have moved it than responses say, and by how much that has changed in the last iteration; how a
-     * force moves it, and how it would if no link joined its two chains.
+     * farther forces have moved it than responses say, and by how much that has changed in the last iteration.
      */
-    std::vector<double> forces, pushes, free, predicted, corrections, changes, own, ofChains;
-    /** The first equation of each gap among those of all. */
-    std::vector<int> equationOf;
+    std::vector<double> forces, pushes, free, predicted, corrections, changes;
+    /** The first equation of each gap, and one behind those of all. */
+    std::vector<std::size_t> firstEquations;
+    GapResponses responses;
     /** For each gap and part: exponential variates, a bridge of Brownian motion, and what both are made of. */
     std::vector<double> reflections, bridges, ofReflections, ofBridges;
     /** A gap in a part of the step: where it begins and would end without forces, and the force that is found. */
@@ -119,22 +104,11 @@ private:
     std::vector<GapInPart> inPart;
     /** The gaps that are pushed in a part. */
     std::vector<int> pushed;
-    /** The ports of all chains, and that of each gap and side or -1. */
-    std::vector<Port> ports;
-    std::vector<int> portOf, chainOf, firstPort;
     /** How far forces move a port in a part, and those that open its gap alone. */
     struct MotionOfPort {
         double all = 0, opening = 0;
     };
     std::vector<MotionOfPort> motions;
-    std::vector<PortsOfChain> chains;
-    std::vector<double> responses, roots;
-    LinkYielding links;
-    /** For each port, from a number on, how a force on it moves the links of its chain, three numbers for each. */
-    std::vector<double> movesOfLinks;
-    std::vector<std::size_t> firstMoves;
-    /** Whether the responses of a chain are known for the present iteration. */
-    std::vector<char> known;
 };
 
 } // namespace cylchain

@@ -94,6 +94,7 @@ FACTORS = [1.0, pytest.param(0.1, marks=pytest.mark.slow), pytest.param(0.01, ma
 
 
 @pytest.mark.sample("^1")
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", FACTORS)
 def test_a_pair_of_rods_on_a_spring(factor):
     middles, along, weights = linked_pair(PAIR, 3000, 7)

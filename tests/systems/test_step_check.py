@@ -118,6 +118,7 @@ def test_error_of_a_spring_is_that_of_theory(rate, parts):
     assert bond.standard_error < 0.02
 
 
+@pytest.mark.slow
 def test_standard_errors_are_right():
     filaments, system, positions = bound_particles(60)
     found = []
@@ -347,6 +348,7 @@ def test_walls_contacts_and_particles_are_looked_at():
     assert "particles, from where they began" in [one.name for one in right.observables]
 
 
+@pytest.mark.slow
 def test_filaments_that_buckle_too_slowly_are_wrong():
     """At 100 times Euler's load, with a step that is right for the filament without it."""
     kind, segments = F_ACTIN.with_segment_length(250), 24
