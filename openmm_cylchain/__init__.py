@@ -15,8 +15,9 @@ from .couplings.force_reporters import ContactForceReporter, WallForceReporter
 from .couplings.joints import Joints
 from .couplings.mean_forces import ContactForces, WallForces, contact_forces, wall_forces
 from .couplings.pulling import ConstantVelocityPulling, change_constant_force, constant_force, constant_tension
+from .couplings.shapes import Box, Cylinder, Ellipsoid, Plane, Slab, Sphere
 from .couplings.wall_points import random_points_on
-from .couplings.walls import Box, Cylinder, Ellipsoid, Plane, Slab, Sphere, filament_wall_force, wall_force
+from .couplings.walls import filament_wall_force, wall_force
 from .dynamics.recommended_step import fene_steps, recommended_time_step
 from .dynamics.stability import stability_bounds, time_step_bounds
 from .dynamics.time_step import TimeStep, effective_rate

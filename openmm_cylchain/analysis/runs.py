@@ -16,7 +16,7 @@ from ..beams.curve import BeamElement, arc_lengths, curve_points
 from ..couplings.beam_curves import BeamCurves
 from ..couplings.contact_frames import ContactFrame, DescribedContactFinder, joined_contacts
 from ..couplings.crosslink_records import CROSSLINK_RECORD, CrosslinkFrame, crosslinks_at
-from ..couplings.walls import Box, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere
+from ..couplings.shapes import Box, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere
 from ..errors import InputError, PrecisionWarning
 from ..mechanics.geometry import joint_cosines, segment_vectors
 from ..output.dcd_frames import DCDFrames

@@ -7,7 +7,7 @@ import numpy as np
 from ..errors import InputError
 from ..units.quantities import LENGTH, vector, whole_number
 from ..units.types import FloatArray, Vector
-from .walls import Box, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere
+from .shapes import Box, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere
 
 _MOST_DRAWS = 10**7
 """Points that may be drawn for one on a part of the wall."""

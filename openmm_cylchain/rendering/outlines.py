@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..analysis.runs import Run
-from ..couplings.walls import Box, Cylinder, Ellipsoid, Plane, Sphere
+from ..couplings.shapes import Box, Cylinder, Ellipsoid, Plane, Sphere
 from ..units.types import FloatArray
 
 _ROUND = 72

@@ -10,7 +10,8 @@ import openmm
 from openmm import app
 
 from ..couplings.capsule_contacts import as_capsule_contact_force
-from ..couplings.walls import Shape, as_filament_wall_force
+from ..couplings.shapes import Shape
+from ..couplings.walls import as_filament_wall_force
 from ..output.files import write_atomically
 from ..output.run_description import (
     DescribedContacts,

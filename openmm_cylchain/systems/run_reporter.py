@@ -14,7 +14,7 @@ from ..couplings.crosslinks import Crosslinks
 from ..couplings.force_tables import ForceTables
 from ..couplings.mean_forces import ForceReaders
 from ..couplings.periodicity import is_periodic
-from ..couplings.walls import Shape
+from ..couplings.shapes import Shape
 from ..errors import InputError
 from ..output.linker_records import LinkerFile, measure_linkers
 from ..output.record_file import read_records

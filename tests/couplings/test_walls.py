@@ -6,7 +6,8 @@ import pytest
 from openmm import unit
 
 from openmm_cylchain import F_ACTIN, Filaments, InputError
-from openmm_cylchain.couplings.walls import Box, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere, wall_force
+from openmm_cylchain.couplings.shapes import Box, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere
+from openmm_cylchain.couplings.walls import wall_force
 from support.contexts import new_context, positions_of
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 from support.wall_shapes import SHAPES

@@ -14,7 +14,7 @@ from openmm_cylchain import (
     capsule_contact_force,
     filament_wall_force,
 )
-from openmm_cylchain.couplings.walls import Plane
+from openmm_cylchain.couplings.shapes import Plane
 from openmm_cylchain.dynamics.coupled_forces import CoupledForces
 from openmm_cylchain.dynamics.explicit_forces import ExplicitForces
 from support.contexts import new_context

@@ -10,7 +10,7 @@ from PIL import Image
 
 from openmm_cylchain import InputError, Plane, Slab, Sphere, analysis
 from openmm_cylchain.cli import main
-from openmm_cylchain.couplings.walls import Box, Cylinder, Ellipsoid
+from openmm_cylchain.couplings.shapes import Box, Cylinder, Ellipsoid
 from openmm_cylchain.rendering.annotations import Margins, clock_text, margins, scale_bar_length
 from openmm_cylchain.rendering.camera import camera_on
 from openmm_cylchain.rendering.colors import filament_colors, linker_color

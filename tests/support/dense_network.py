@@ -11,7 +11,8 @@ from openmm_cylchain import F_ACTIN, Filaments
 from openmm_cylchain.analysis.crossings import CrossingCounter
 from openmm_cylchain.couplings.contacts import contact_force
 from openmm_cylchain.couplings.crosslinks import Crosslinks
-from openmm_cylchain.couplings.walls import Sphere, wall_force
+from openmm_cylchain.couplings.shapes import Sphere
+from openmm_cylchain.couplings.walls import wall_force
 from openmm_cylchain.filaments.equilibrium import draw_chain
 from support.contexts import new_context
 from support.solvent import TEMPERATURE, VISCOSITY

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...couplings.walls import Box, Cylinder, Ellipsoid, Plane, Slab, Sphere
+from ...couplings.shapes import Box, Cylinder, Ellipsoid, Plane, Slab, Sphere
 from ...units import quantities as units
 from ..keys import REQUIRED, Choice, Key, Quantity, direction, point
 from ..table import TableKind

@@ -1,0 +1,387 @@
+"""Shapes that walls have: planes, slabs, spheres, cylinders, boxes and ellipsoids."""
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import InputError
+from ..units.quantities import LENGTH, positive, unit_vector, vector
+from ..units.types import FloatArray, FloatOrArray, Scalar, Vector
+
+# In nm^2: keeps the derivative of a square root finite at its zero, in single precision as well.
+_TINY = "1e-30"
+
+
+Region = tuple[str, FloatArray, FloatArray, float]
+
+
+class Shape(ABC):
+    """A region that particles are kept in.
+
+    ``expression`` is the square of the depth d beyond the wall in OpenMM's syntax, a function of x, y and z in nm.
+    ``region`` is what a CylinderChainWallForce knows it by, and ``room`` the largest radius, exclusive, of a particle
+    that fits in.
+    """
+
+    @property
+    @abstractmethod
+    def expression(self) -> str:
+        """The square of the depth for OpenMM."""
+
+    @property
+    @abstractmethod
+    def region(self) -> Region:
+        """Name, point, vector and length for the compiled engine."""
+
+    @property
+    @abstractmethod
+    def room(self) -> float:
+        """In nm."""
+
+    @abstractmethod
+    def square_depth(self, positions: npt.ArrayLike) -> FloatOrArray:
+        """The square of the depth, in nm^2, for positions (..., 3); zero inside."""
+
+    @property
+    @abstractmethod
+    def faces(self) -> "tuple[Face, ...]":
+        """What the wall is made of: planes of a slab or box, in the order of the compiled engine, or itself."""
+
+
+class Face(Shape):
+    """A region with one face."""
+
+    @property
+    def faces(self) -> "tuple[Face, ...]":
+        return (self,)
+
+    @abstractmethod
+    def depths(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Depths beyond the face in nm, negative inside, and their gradients, for positions (n, 3)."""
+
+
+def _radial(vectors, radius):
+    # Depths and gradients of what is so far from a centre or an axis; in the middle, there is no gradient.
+    distances = np.linalg.norm(vectors, axis=-1)
+    scale = np.divide(1.0, distances, out=np.zeros_like(distances), where=distances > 0.0)
+    return distances - radius, vectors * scale[:, None]
+
+
+def number(value: float) -> str:
+    """A number as it stands in formulas."""
+    return f"({float(value)!r})"
+
+
+def _along(point, direction):
+    terms = (f"{number(n)}*({name}-{number(p)})" for name, n, p in zip("xyz", direction, point))
+    return f"({'+'.join(terms)})"
+
+
+def _beyond(expression):
+    return f"max(0, {expression})^2"
+
+
+@dataclass(frozen=True)
+class Plane(Face):
+    """The half space to which a normal points.
+
+    Parameters
+    ----------
+    point : (3,) length
+        On the plane.
+    normal : (3,) array
+        Need not be normalised.
+    """
+
+    point: FloatArray
+    normal: FloatArray
+
+    if TYPE_CHECKING:
+
+        def __init__(self, point: Vector, normal: Vector) -> None: ...
+
+    def __post_init__(self) -> None:
+        _set(self, "point", vector(self.point, LENGTH, "Plane: point"))
+        _set(self, "normal", unit_vector(self.normal, "Plane"))
+
+    @property
+    def expression(self) -> str:
+        return _beyond(f"-{_along(self.point, self.normal)}")
+
+    @property
+    def region(self) -> Region:
+        return ("plane", self.point, self.normal, 0.0)
+
+    @property
+    def room(self) -> float:
+        return math.inf
+
+    def square_depth(self, positions: npt.ArrayLike) -> FloatOrArray:
+        return np.maximum(0.0, -((np.asarray(positions) - self.point) @ self.normal)) ** 2
+
+    def depths(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+        depths = -((positions - self.point) @ self.normal)
+        return depths, np.broadcast_to(-self.normal, (len(depths), 3))
+
+
+@dataclass(frozen=True)
+class Slab(Shape):
+    """The space between two parallel planes.
+
+    Parameters
+    ----------
+    point : (3,) length
+        Half-way between the planes.
+    normal : (3,) array
+    thickness : length
+    """
+
+    point: FloatArray
+    normal: FloatArray
+    thickness: float
+
+    if TYPE_CHECKING:
+
+        def __init__(self, point: Vector, normal: Vector, thickness: Scalar) -> None: ...
+
+    def __post_init__(self) -> None:
+        _set(self, "point", vector(self.point, LENGTH, "Slab: point"))
+        _set(self, "normal", unit_vector(self.normal, "Slab"))
+        _set(self, "thickness", positive(self.thickness, LENGTH, "Slab: thickness"))
+
+    @property
+    def expression(self) -> str:
+        return _beyond(f"abs({_along(self.point, self.normal)})-{number(0.5 * self.thickness)}")
+
+    @property
+    def region(self) -> Region:
+        return ("slab", self.point, self.normal, self.thickness)
+
+    @property
+    def room(self) -> float:
+        return 0.5 * self.thickness
+
+    def square_depth(self, positions: npt.ArrayLike) -> FloatOrArray:
+        height = np.abs((np.asarray(positions) - self.point) @ self.normal)
+        return np.maximum(0.0, height - 0.5 * self.thickness) ** 2
+
+    @property
+    def faces(self) -> tuple[Face, ...]:
+        half = 0.5 * self.thickness * self.normal
+        return Plane(self.point + half, -self.normal), Plane(self.point - half, self.normal)
+
+
+@dataclass(frozen=True)
+class Sphere(Face):
+    """The inside of a sphere.
+
+    Parameters
+    ----------
+    center : (3,) length
+    radius : length
+    """
+
+    center: FloatArray
+    radius: float
+
+    if TYPE_CHECKING:
+
+        def __init__(self, center: Vector, radius: Scalar) -> None: ...
+
+    def __post_init__(self) -> None:
+        _set(self, "center", vector(self.center, LENGTH, "Sphere: center"))
+        _set(self, "radius", positive(self.radius, LENGTH, "Sphere: radius"))
+
+    @property
+    def expression(self) -> str:
+        squares = "+".join(f"({name}-{number(c)})^2" for name, c in zip("xyz", self.center))
+        return _beyond(f"sqrt({squares}+{_TINY})-{number(self.radius)}")
+
+    @property
+    def region(self) -> Region:
+        return ("sphere", self.center, np.zeros(3), self.radius)
+
+    @property
+    def room(self) -> float:
+        return self.radius
+
+    def square_depth(self, positions: npt.ArrayLike) -> FloatOrArray:
+        distance = np.linalg.norm(np.asarray(positions) - self.center, axis=-1)
+        return np.maximum(0.0, distance - self.radius) ** 2
+
+    def depths(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return _radial(positions - self.center, self.radius)
+
+
+@dataclass(frozen=True)
+class Cylinder(Face):
+    """The inside of a cylinder without ends.
+
+    Parameters
+    ----------
+    point : (3,) length
+        On the axis.
+    axis : (3,) array
+    radius : length
+    """
+
+    point: FloatArray
+    axis: FloatArray
+    radius: float
+
+    if TYPE_CHECKING:
+
+        def __init__(self, point: Vector, axis: Vector, radius: Scalar) -> None: ...
+
+    def __post_init__(self) -> None:
+        _set(self, "point", vector(self.point, LENGTH, "Cylinder: point"))
+        _set(self, "axis", unit_vector(self.axis, "Cylinder"))
+        _set(self, "radius", positive(self.radius, LENGTH, "Cylinder: radius"))
+
+    def _across(self):
+        # Two directions orthogonal to the axis and to each other.
+        first = np.cross(self.axis, np.eye(3)[np.argmin(np.abs(self.axis))])
+        first /= np.linalg.norm(first)
+        return first, np.cross(self.axis, first)
+
+    @property
+    def expression(self) -> str:
+        first, second = (_along(self.point, direction) for direction in self._across())
+        return _beyond(f"sqrt({first}^2+{second}^2+{_TINY})-{number(self.radius)}")
+
+    @property
+    def region(self) -> Region:
+        return ("cylinder", self.point, self.axis, self.radius)
+
+    @property
+    def room(self) -> float:
+        return self.radius
+
+    def square_depth(self, positions: npt.ArrayLike) -> FloatOrArray:
+        across = (np.asarray(positions) - self.point) @ np.transpose(self._across())
+        return np.maximum(0.0, np.linalg.norm(across, axis=-1) - self.radius) ** 2
+
+    def depths(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+        relative = positions - self.point
+        return _radial(relative - (relative @ self.axis)[:, None] * self.axis, self.radius)
+
+
+@dataclass(frozen=True)
+class Box(Shape):
+    """The inside of a box with edges along the axes; d is the distance from the box.
+
+    Parameters
+    ----------
+    lower, upper : (3,) length
+        Two opposite corners.
+    """
+
+    lower: FloatArray
+    upper: FloatArray
+
+    if TYPE_CHECKING:
+
+        def __init__(self, lower: Vector, upper: Vector) -> None: ...
+
+    def __post_init__(self) -> None:
+        _set(self, "lower", vector(self.lower, LENGTH, "Box: lower"))
+        _set(self, "upper", vector(self.upper, LENGTH, "Box: upper"))
+        if not np.all(self.lower < self.upper):
+            raise InputError(f"Box: upper must exceed lower along every axis, but they are {self.upper}, {self.lower}.")
+
+    @property
+    def expression(self) -> str:
+        pairs = zip("xyz", self.lower, self.upper)
+        return "+".join(f"max(0, max({number(a)}-{name}, {name}-{number(b)}))^2" for name, a, b in pairs)
+
+    @property
+    def region(self) -> Region:
+        return ("box", self.lower, self.upper, 0.0)
+
+    @property
+    def room(self) -> float:
+        return 0.5 * float(np.min(self.upper - self.lower))
+
+    def square_depth(self, positions: npt.ArrayLike) -> FloatOrArray:
+        positions = np.asarray(positions)
+        beyond = np.maximum(0.0, np.maximum(self.lower - positions, positions - self.upper))
+        return np.sum(beyond**2, axis=-1)
+
+    @property
+    def faces(self) -> tuple[Face, ...]:
+        sides = (self.lower, 1.0), (self.upper, -1.0)
+        return tuple(Plane(corner, sign * axis) for axis in np.eye(3) for corner, sign in sides)
+
+
+@dataclass(frozen=True)
+class Ellipsoid(Face):
+    """The inside of an ellipsoid with axes along x, y and z.
+
+    With s^2 the sum of (x_i/a_i)^2, the depth is taken as (s-1)/|grad s|, which is the distance from the surface to
+    first order. Where its rim is so sharp that a node moves by more than the radius of curvature in a step, steps are
+    divided.
+
+    Parameters
+    ----------
+    center : (3,) length
+    semi_axes : (3,) length
+    """
+
+    center: FloatArray
+    semi_axes: FloatArray
+
+    if TYPE_CHECKING:
+
+        def __init__(self, center: Vector, semi_axes: Vector) -> None: ...
+
+    def __post_init__(self) -> None:
+        _set(self, "center", vector(self.center, LENGTH, "Ellipsoid: center"))
+        _set(self, "semi_axes", vector(self.semi_axes, LENGTH, "Ellipsoid: semi_axes"))
+        if not np.all(self.semi_axes > 0):
+            raise InputError(f"Ellipsoid: semi_axes must be positive, but are {self.semi_axes}.")
+
+    @property
+    def expression(self) -> str:
+        def total(power):
+            terms = zip("xyz", self.center, self.semi_axes)
+            return "+".join(f"({name}-{number(c)})^2*{number(a**-power)}" for name, c, a in terms)
+
+        floor = number(self._least_steepness)
+        return f"max(0, s-1)^2*s^2/max(steepness, {floor}); s=sqrt({total(2.0)}+{_TINY}); steepness={total(4.0)}"
+
+    @property
+    def _least_steepness(self):
+        # Less than anywhere outside, for a quotient that is finite at the center.
+        return 0.25 / np.max(self.semi_axes) ** 2
+
+    @property
+    def region(self) -> Region:
+        return ("ellipsoid", self.center, self.semi_axes, 0.0)
+
+    @property
+    def room(self) -> float:
+        return float(np.min(self.semi_axes))
+
+    def square_depth(self, positions: npt.ArrayLike) -> FloatOrArray:
+        relative = np.asarray(positions) - self.center
+        s = np.sqrt(np.sum((relative / self.semi_axes) ** 2, axis=-1))
+        steepness = np.sum(relative**2 / self.semi_axes**4, axis=-1)
+        return np.maximum(0.0, s - 1.0) ** 2 * s**2 / np.maximum(steepness, self._least_steepness)
+
+    def depths(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+        relative, squares = positions - self.center, self.semi_axes**2
+        s = np.sqrt(np.sum(relative**2 / squares, axis=-1))
+        steepness = np.maximum(np.sum(relative**2 / squares**2, axis=-1), self._least_steepness)
+        depths = (s - 1.0) * s / np.sqrt(steepness)
+        # Of the square of s, and of the steepness; inside, the gradient is of no use.
+        of_square, of_steepness = 2.0 * relative / squares, 2.0 * relative / squares**2
+        rise = (1.0 - 0.5 / np.maximum(s, 0.5)) / np.sqrt(steepness)
+        return depths, rise[:, None] * of_square - (0.5 * depths / steepness)[:, None] * of_steepness
+
+
+def _set(instance, name, value):
+    object.__setattr__(instance, name, value)
