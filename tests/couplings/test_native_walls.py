@@ -286,6 +286,7 @@ def test_density_of_free_particles_is_even():
     np.testing.assert_allclose(shares, widths / widths.sum(), atol=4 * error + 0.002)
 
 
+@pytest.mark.sample("^20")
 @pytest.mark.slow
 @pytest.mark.parametrize("stiffness", [1.0, 20.0])
 def test_rods_between_walls_are_where_they_should_be(stiffness):

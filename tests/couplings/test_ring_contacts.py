@@ -67,7 +67,7 @@ def test_energies_of_contacts_are_those_of_monte_carlo():
     assert simulation.contact_energy() == pytest.approx(expected, rel=1e-6)
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_a_ring_that_touches_itself():
     """Energies of contacts are of few rings at a time: too few to be looked at."""
     simulation = RingSimulation(in_equilibrium(300, 3000, 3), 1.0, 5)

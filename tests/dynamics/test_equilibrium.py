@@ -38,14 +38,14 @@ def _check(name, engine, platform):
     assert max(deviations.values()) < SIGMAS, (deviations, measured, exact)
 
 
-@pytest.mark.sample("f-actin|fene|compiled-(freely|dna)")
+@pytest.mark.sample("f-actin|compiled")
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("engine", ENGINES_PORTABLE_SLOW)
 def test_midpoint_keeps_equilibrium(name, engine):
     _check(name, engine, "Reference")
 
 
-@pytest.mark.sample("compiled|f-actin-60nm-portable-CPU|freely-jointed-portable-OpenCL")
+@pytest.mark.sample("compiled|freely-jointed-portable-OpenCL")
 @pytest.mark.slow
 @pytest.mark.parametrize(("engine", "platform"), [pair for pair in ENGINE_PLATFORMS if pair[1] != "Reference"])
 @pytest.mark.parametrize("name", CASES)

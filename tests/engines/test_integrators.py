@@ -25,11 +25,8 @@ def periodic_force():
     return force
 
 
-@pytest.mark.sample("compiled|midpoint")
-@pytest.mark.parametrize(
-    ("engine", "scheme"),
-    [pytest.param(*each, marks=pytest.mark.slow if "portable" in each else []) for each in ENGINE_SCHEMES],
-)
+@pytest.mark.sample("compiled")
+@pytest.mark.parametrize(("engine", "scheme"), ENGINE_SCHEMES)
 def test_noise_covariance_between_all_degrees_of_freedom(engine, scheme):
     """Cov(dx) = 2 k_B T dt Z^-1 within each chain and for a free particle, zero across and between steps."""
     topology, system = app.Topology(), openmm.System()

@@ -70,11 +70,9 @@ def expected_on_soft_beams(weight, stiffness, rest_length, reach, anchor, shapes
     return weight * bound / (shapes * turns) * 60.0 / per_element, energies / bound, arc / bound
 
 
+@pytest.mark.sample("^25.0-0.1")
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("rest_length", "step"),
-    [(25.0, 0.1), pytest.param(0.0, 0.1, marks=pytest.mark.slow), pytest.param(25.0, 0.02, marks=pytest.mark.slow)],
-)
+@pytest.mark.parametrize(("rest_length", "step"), [(25.0, 0.1), (0.0, 0.1), (25.0, 0.02)])
 def test_binding_and_bending_are_in_equilibrium_together(rest_length, step):
     """Anchored hands and soft beams: how many are bound, with what energy, and where along the curve.
 

@@ -261,7 +261,7 @@ def dask(cluster):
     return ["--executor", "dask", "--scheduler", cluster.scheduler_address]
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_mpi_with_two_workers(tmp_path, unbroken):
     pytest.importorskip("mpi4py")
     launcher = shutil.which("mpiexec", path=f"{os.path.dirname(sys.executable)}:{os.environ['PATH']}")
