@@ -241,7 +241,7 @@ FREE += [(k, joint, (0,)) for k in (1e2, 1e11) for joint in (0, 10, 1000)]
 
 
 @pytest.mark.slow
-@pytest.mark.sample(r"^(?!100\.0-1000-clamped2|100\.0-10+-clamped1[34]|100000000\.0)")
+@pytest.mark.sample(r"^100000\.0-|^100000000000\.0-(0|1000)-|^100\.0-10-clamped1$")
 @pytest.mark.parametrize("stiffness, joint, clamped", FREE)
 def test_energies_of_chains_of_any_stiffness(stiffness, joint, clamped):
     kind = chain_of(stiffness, joint)
@@ -298,6 +298,7 @@ LONG = [(360.0, 64, 600, "implicit", 0.01), (360.0, 64, 1000, "implicit-second-o
 LONG += [(360.0, 256, 200, "implicit", 0.02), (120.0, 150, 200, "implicit-second-order", 0.03)]
 
 
+@pytest.mark.sample("implicit-0")
 @pytest.mark.slow
 @pytest.mark.parametrize("length, segments, chains, scheme, bound", LONG)
 def test_energies_of_long_filaments(length, segments, chains, scheme, bound):
@@ -387,6 +388,7 @@ def test_energies_of_fene_lengths(kind, extension):
     assert_energies(kind, filaments, exact_energies(kind), 0.05 if soft else 0.02, 360, bending_bound=0.05)
 
 
+@pytest.mark.sample("drawn|-3$")
 @pytest.mark.slow
 @pytest.mark.parametrize("nu", [10, 3, 1])
 @pytest.mark.parametrize("which", ["resolved", "drawn anew"])

@@ -22,11 +22,11 @@ def test_filaments_cross_only_without_contacts():
 def test_a_dense_crosslinked_network_for_long():
     """Two hundred crosslinked filaments of 0.5 um in a sphere of 1.2 um: no crossing, no memory that grows."""
     without, _ = crosslinked_network(200, 10, 600.0, links=200, contacts=False)
-    assert without.count_crossings(steps=1000, interval=20) > 300
+    assert without.count_crossings(steps=300, interval=20) > 100
     network, crosslinks = crosslinked_network(200, 10, 600.0, links=200)
-    crossings = network.count_crossings(steps=1000, interval=20)
+    crossings = network.count_crossings(steps=300, interval=20)
     memory, _ = resident_and_peak()
-    crossings += network.count_crossings(steps=2000, interval=20)
+    crossings += network.count_crossings(steps=700, interval=20)
     assert crossings == 0
     assert network.context.getIntegrator().getNumDividedSteps() < 100
     positions = network.positions()._value

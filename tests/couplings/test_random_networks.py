@@ -55,8 +55,7 @@ def test_random_networks_are_right_or_say_that_they_are_not(first):
     assert sum(_check(seed) for seed in range(first, first + 10)) >= 4
 
 
-@pytest.mark.sample("^140")
-@pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("first", range(140, 290, 50))
 def test_more_random_networks(first):
     assert sum(_check(seed) for seed in range(first, first + 50)) >= 25

@@ -80,7 +80,7 @@ def test_rotation_and_diffusion_of_728_segments(engine, scheme):
     assert abs(np.mean(fits) - TAU) < SIGMAS * error
 
 
-@pytest.mark.sample("compiled|midpoint")
+@pytest.mark.sample("compiled")
 @pytest.mark.slow
 @pytest.mark.parametrize(("engine", "scheme"), ENGINE_SCHEMES)
 def test_rotation_and_diffusion_to_a_percent(engine, scheme):

@@ -262,7 +262,7 @@ def test_draws_of_clamped_filaments(planar):
     _assert_means([_fluctuations(nodes)], _exact_fluctuations(STIFF, 6, planar))
 
 
-@pytest.mark.sample("compiled|True")
+@pytest.mark.sample("compiled")
 @pytest.mark.slow
 @pytest.mark.parametrize("planar", [False, True])
 @pytest.mark.parametrize("engine", ENGINES)

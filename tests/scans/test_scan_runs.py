@@ -181,7 +181,7 @@ def test_killed_halfway_and_started_again(tmp_path, unbroken):
     assert_same_runs(output, unbroken)
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_a_run_that_died_goes_on(tmp_path, unbroken):
     path, output, said = files_of(tmp_path, "20 ms"), tmp_path / "out", []
     with concurrent.futures.ThreadPoolExecutor(1) as pool:
@@ -238,7 +238,7 @@ def short_on_the_cpu(folder):
     return path
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_dask_with_two_workers(tmp_path, unbroken, monkeypatch):
     distributed = pytest.importorskip("distributed")
     path = files_of(tmp_path, "20 ms")
