@@ -21,18 +21,23 @@ const double ROOM_OF_ROWS = 0.25;
 
 } // namespace
 
-/** Make rows long enough for all ports. */
-void GapResponses::ChainPorts::grow() {
-    if (count() <= stride)
-        return;
-    const int longer = count()+(int) ceil(ROOM_OF_ROWS*count());
-    for (vector<double>* matrix : {&responses, &roots}) {
-        vector<double> grown((size_t) longer*longer);
-        for (int row = 0; row < known; row++)
-            copy_n(&(*matrix)[(size_t) row*stride], known, &grown[(size_t) row*longer]);
-        matrix->swap(grown);
-    }
-    stride = longer;
+/** Make rows long enough for all ports, and have one for each coordinate of each link. */
+void GapResponses::ChainPorts::grow(int newLinks) {
+    const int before = stride;
+    if (count() > stride)
+        stride = count()+(int) ceil(ROOM_OF_ROWS*count());
+    auto growRows = [&] (vector<double>& matrix, int rows, int knownRows) {
+        if (stride == before && matrix.size() >= (size_t) rows*stride)
+            return;
+        vector<double> grown((size_t) rows*stride);
+        for (int row = 0; row < knownRows; row++)
+            copy_n(&matrix[(size_t) row*before], known, &grown[(size_t) row*stride]);
+        matrix.swap(grown);
+    };
+    growRows(responses, stride, known);
+    growRows(roots, stride, known);
+    growRows(movesOfLinks, 3*newLinks, known > 0 ? 3*newLinks : 0);
+    links = newLinks;
 }
 
 /**
@@ -159,9 +164,7 @@ template <class Number> void GapResponses::findOfPack(const vector<Gap>& gaps, c
     int rounds = 0;
     for (int chain : chainsOfPack) {
         ChainPorts& own = chains[chain];
-        own.grow();
-        own.links = links.end(chain)-links.begin(chain);
-        own.movesOfLinks.resize(3*(size_t) own.count()*own.links);
+        own.grow(links.end(chain)-links.begin(chain));
         rounds = max(rounds, own.count()-own.known);
         firstOfChain.push_back(firstTerms.size());
         for (const Port& port : own.ports) {
@@ -202,7 +205,7 @@ template <class Number> void GapResponses::findOfPack(const vector<Gap>& gaps, c
             if (port >= own.count())
                 continue;
             double* const row = &own.responses[(size_t) port*own.stride];
-            for (int other = 0; other < own.count(); other++) {
+            for (int other = 0; other <= port; other++) {
                 const int* const first = &firstTerms[firstOfChain[i]+other];
                 Number sum = 0;
                 for (int k = first[0]; k < first[1]; k++) {
@@ -212,11 +215,11 @@ template <class Number> void GapResponses::findOfPack(const vector<Gap>& gaps, c
                 }
                 row[other] = sum;
             }
-            double* to = own.movesOfLinks.data()+3*(size_t) port*own.links;
-            for (const LinkYielding::Side* side = links.begin(chain); side != links.end(chain); side++, to += 3) {
+            double* to = &own.movesOfLinks[port];
+            for (const LinkYielding::Side* side = links.begin(chain); side != links.end(chain); side++) {
                 const Number* const at = &move[placeOf(links.getLinks()[side->link].equation, side->side)];
-                for (int k = 0; k < 3; k++)
-                    to[k] = at[STRIDE*k];
+                for (int k = 0; k < 3; k++, to += own.stride)
+                    *to = at[STRIDE*k];
             }
         }
     }
@@ -224,11 +227,8 @@ template <class Number> void GapResponses::findOfPack(const vector<Gap>& gaps, c
         ChainPorts& own = chains[chain];
         yield(chain);
         for (int row = own.known; row < own.count(); row++)
-            for (int column = 0; column < row; column++) {
-                double &one = own.responses[(size_t) row*own.stride+column];
-                double &other = own.responses[(size_t) column*own.stride+row];
-                one = other = column < own.known ? one : 0.5*(one+other);
-            }
+            for (int column = 0; column < row; column++)
+                own.responses[(size_t) column*own.stride+row] = own.responses[(size_t) row*own.stride+column];
         own.known = own.findRoot() ? own.count() : 0;
     }
     chainsOfPack.erase(remove_if(chainsOfPack.begin(), chainsOfPack.end(), [&] (int chain) {
@@ -238,27 +238,33 @@ template <class Number> void GapResponses::findOfPack(const vector<Gap>& gaps, c
 
 /** Add to the responses of a chain that have just been found what the yielding of its links does. */
 void GapResponses::yield(int chain) {
-    const LinkYielding::Side *const first = links.begin(chain), *const last = links.end(chain);
     ChainPorts& own = chains[chain];
-    const size_t size = 3*(size_t) own.links;
-    for (int port = own.known; port < own.count() && first != last; port++) {
-        const double* const moves = &own.movesOfLinks[port*size];
+    auto movesOf = [&] (int link) {
+        return &own.movesOfLinks[3*(size_t) link*own.stride];
+    };
+    for (int port = own.known; port < own.count(); port++) {
         double* const row = &own.responses[(size_t) port*own.stride];
-        size_t offset = 0;
-        for (const LinkYielding::Side* side = first; side != last; side++, offset += 3) {
-            const LinkYielding::Link& link = links.getLinks()[side->link];
-            const double *const m = link.ofPlace[side->side], *const u = moves+offset;
-            double pull[] = {u[0]*m[0]+u[1]*m[3]+u[2]*m[6], u[0]*m[1]+u[1]*m[4]+u[2]*m[7],
-                    u[0]*m[2]+u[1]*m[5]+u[2]*m[8]};
+        for (int number = 0; number < own.links; number++) {
+            const LinkYielding::Side& side = links.begin(chain)[number];
+            const LinkYielding::Link& link = links.getLinks()[side.link];
+            auto moveOf = [&] (int link, int coordinate) {
+                return movesOf(link)[(size_t) coordinate*own.stride+port];
+            };
+            double pull[3];
+            for (int k = 0; k < 3; k++) {
+                const double* const m = link.ofPlace[side.side]+k;
+                pull[k] = m[0]*moveOf(number, 0)+m[3]*moveOf(number, 1)+m[6]*moveOf(number, 2);
+            }
             if (link.chains[0] == link.chains[1]) {
                 // What moves the other place pulls at this one.
-                const double* const v = moves+3*(size_t) links.getNumber(side->link, 1-side->side);
-                const double* const b = link.between;
+                const int other = links.getNumber(side.link, 1-side.side);
                 for (int k = 0; k < 3; k++)
-                    pull[k] += side->side == 0 ? dot(b+3*k, v) : b[k]*v[0]+b[3+k]*v[1]+b[6+k]*v[2];
+                    for (int j = 0; j < 3; j++)
+                        pull[k] += link.between[side.side == 0 ? 3*k+j : 3*j+k]*moveOf(other, j);
             }
-            for (int other = 0; other < own.count(); other++)
-                row[other] += dot(pull, &own.movesOfLinks[other*size+offset]);
+            const double *const x = movesOf(number), *const y = x+own.stride, *const z = y+own.stride;
+            for (int other = 0; other <= port; other++)
+                row[other] += pull[0]*x[other]+pull[1]*y[other]+pull[2]*z[other];
         }
     }
 }
@@ -268,20 +274,20 @@ double GapResponses::yieldOf(int gap) const {
     const PlaceOfPort &one = places[2*gap], &other = places[2*gap+1];
     if (one.chain < 0 || other.chain < 0 || one.chain == other.chain)
         return 0;
-    auto movesOf = [&] (const PlaceOfPort& place) {
+    auto moveOf = [&] (const PlaceOfPort& place, int link, int coordinate) {
         const ChainPorts& ports = chains[place.chain];
-        return ports.movesOfLinks.data()+3*(size_t) place.port*ports.links;
+        return ports.movesOfLinks[(3*(size_t) link+coordinate)*ports.stride+place.port];
     };
     double sum = 0;
-    const double* u = movesOf(one);
-    for (const LinkYielding::Side* side = links.begin(one.chain); side != links.end(one.chain); side++, u += 3) {
-        const LinkYielding::Link& link = links.getLinks()[side->link];
-        if (link.chains[1-side->side] != other.chain)
+    for (int number = 0; number < chains[one.chain].links; number++) {
+        const LinkYielding::Side& side = links.begin(one.chain)[number];
+        const LinkYielding::Link& link = links.getLinks()[side.link];
+        if (link.chains[1-side.side] != other.chain)
             continue;
-        const double* const v = movesOf(other)+3*(size_t) links.getNumber(side->link, 1-side->side);
-        const double *const first = side->side == 0 ? u : v, *const last = side->side == 0 ? v : u;
-        for (int row = 0; row < 3; row++)
-            sum += 2*first[row]*dot(link.between+3*row, last);
+        const int partner = links.getNumber(side.link, 1-side.side);
+        for (int k = 0; k < 3; k++)
+            for (int j = 0; j < 3; j++)
+                sum += 2*link.between[side.side == 0 ? 3*k+j : 3*j+k]*moveOf(one, number, k)*moveOf(other, partner, j);
     }
     return sum;
 }

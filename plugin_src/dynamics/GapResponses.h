@@ -40,12 +40,12 @@ public:
         }
     private:
         friend class GapResponses;
-        void grow();
+        void grow(int newLinks);
         bool findRoot();
         /** How many ports have responses, how long rows are, and the number of links. */
         int known = 0, stride = 0, links = 0;
         std::vector<double> responses, roots;
-        /** How a force on each port moves the links of the chain, three numbers for each. */
+        /** How forces on all ports move the links of the chain: three rows for each link. */
         std::vector<double> movesOfLinks;
     };
     /** Begin a step without gaps. */
