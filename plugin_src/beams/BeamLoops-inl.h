@@ -24,19 +24,19 @@
 namespace cylchain {
 namespace CYLCHAIN_LOOPS {
 
-#include "beams/BeamElements-inl.h"
-#include "beams/BeamEquations-inl.h"
-#include "beams/BeamMetricForces-inl.h"
-#include "beams/BeamNoise-inl.h"
-#include "beams/BeamPackStep-inl.h"
-#include "beams/BeamPlaces-inl.h"
-#include "beams/BeamShape-inl.h"
-#include "beams/BeamStep-inl.h"
-#include "beams/BeamTerms-inl.h"
-#include "beams/DividedBeamStep-inl.h"
-#include "lanes/NoiseLanes-inl.h"
 #include "lanes/VectorLanes-inl.h"
+#include "lanes/NoiseLanes-inl.h"
 #include "mechanics/LaneFlow-inl.h"
+#include "beams/BeamShape-inl.h"
+#include "beams/BeamEquations-inl.h"
+#include "beams/BeamElements-inl.h"
+#include "beams/BeamNoise-inl.h"
+#include "beams/BeamMetricForces-inl.h"
+#include "beams/BeamTerms-inl.h"
+#include "beams/BeamStep-inl.h"
+#include "beams/BeamPlaces-inl.h"
+#include "beams/DividedBeamStep-inl.h"
+#include "beams/BeamPackStep-inl.h"
 
 template <int W> ChainEnergy addForcesTo(const BeamPack& pack, const double* positions, double* forces,
             const double* box, bool includeEnergy) {
