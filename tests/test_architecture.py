@@ -1,11 +1,12 @@
 """Folders of the package lie above each other; nothing imports upwards or in a circle, and no test imports a test."""
 
 import ast
+import re
 from graphlib import TopologicalSorter
 
 import pytest
 
-from support.repository import PACKAGE, TESTS
+from support.repository import PACKAGE, ROOT, TESTS
 
 # From the lowest to the highest. Modules on one line may import each other, but not in a circle.
 FLOORS = (
@@ -34,6 +35,10 @@ FLOORS = (
     ("cli",),
 )
 FLOOR = {name: floor for floor, names in enumerate(FLOORS) for name in names}
+# The same of plugin_src, where a file is included by its folder's name.
+CORE_FLOORS = ("mechanics", "lanes", "couplings", "dynamics", "networks", "beams", "kinetics")
+# Above these, what knows OpenMM includes by "openmm/..." and by names of files alone.
+API_FLOORS = ("openmmapi", "serialization", "platforms")
 # Written by the build.
 BUILT = {"plugin", "plugin_version"}
 
@@ -72,6 +77,20 @@ def test_there_is_no_circle_of_imports():
     graph = {module: [other for other in imports_of(module) if other in MODULES] for module in MODULES}
     assert len(graph) > 80
     TopologicalSorter(graph).prepare()
+
+
+def test_no_cpp_file_includes_upwards():
+    source, floors, included = ROOT / "plugin_src", [*CORE_FLOORS, *API_FLOORS], set()
+    for path in sorted(file for end in ("*.h", "*.cpp") for file in source.rglob(end)):
+        folder = path.relative_to(source).parts[0]
+        for name in re.findall(r'#include "(\w+)/[^"]+"', path.read_text()):
+            if name in floors:
+                assert floors.index(name) <= floors.index(folder), f"{path} includes {name}"
+                included.add((folder, name))
+        if folder in CORE_FLOORS:
+            assert '#include "openmm/' not in path.read_text(), path
+    assert len(included) > 20
+    assert {path.name for path in source.iterdir() if path.is_dir()} == {*floors, "python"}
 
 
 def test_no_module_imports_the_package_by_its_name():

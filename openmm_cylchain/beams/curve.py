@@ -2,7 +2,7 @@
 
 Node i has a position P and a control point Q. Element i of length h is the cubic curve with the Bezier points P_i, Q_i,
 2 P_(i+1) - Q_(i+1) and P_(i+1), so r' = 3 (Q - P)/h at a node. The last element of a ring, which is closed, leads from
-the last node to the first. The energy is that of ``plugin_src/beams/BeamChain.h``.
+the last node to the first. The energy is that of ``plugin_src/mechanics/BeamChain.h``.
 Axes in front of (nodes, 3) belong to several filaments or frames; everything is in OpenMM's units.
 """
 

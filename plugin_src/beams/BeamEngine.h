@@ -1,9 +1,9 @@
 #ifndef CYLCHAIN_BEAM_ENGINE_H_
 #define CYLCHAIN_BEAM_ENGINE_H_
 
-#include "beams/BeamChain.h"
 #include "dynamics/ChainEngine.h"
 #include "dynamics/PackStepSource.h"
+#include "mechanics/BeamChain.h"
 #include <memory>
 #include <vector>
 

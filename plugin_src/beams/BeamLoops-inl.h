@@ -6,10 +6,10 @@
  */
 
 #include "beams/BeamPack.h"
-#include "beams/ElementPlace.h"
 #include "dynamics/PackStep.h"
 #include "lanes/Noise.h"
 #include "mechanics/BackgroundFlow.h"
+#include "mechanics/ElementPlace.h"
 #include "mechanics/Inline.h"
 #include "mechanics/PeriodicBox.h"
 #include <algorithm>

@@ -1,9 +1,9 @@
 #ifndef CYLCHAIN_BEAM_PACK_H_
 #define CYLCHAIN_BEAM_PACK_H_
 
-#include "beams/BeamChain.h"
 #include "dynamics/ChainEngine.h"
 #include "dynamics/PackStep.h"
+#include "mechanics/BeamChain.h"
 #include <vector>
 
 namespace cylchain {

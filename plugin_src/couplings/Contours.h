@@ -1,8 +1,8 @@
 #ifndef CYLCHAIN_CONTOURS_H_
 #define CYLCHAIN_CONTOURS_H_
 
-#include "beams/BeamChain.h"
 #include "couplings/Place.h"
+#include "mechanics/BeamChain.h"
 #include "mechanics/Chain.h"
 #include <cstddef>
 #include <vector>

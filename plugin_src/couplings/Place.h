@@ -1,7 +1,7 @@
 #ifndef CYLCHAIN_PLACE_H_
 #define CYLCHAIN_PLACE_H_
 
-#include "beams/BezierWeights.h"
+#include "mechanics/BezierWeights.h"
 #include "mechanics/PeriodicBox.h"
 
 namespace cylchain {

@@ -4,8 +4,8 @@
  */
 
 #include "TestBeamChains.h"
-#include "beams/ElementPlace.h"
 #include "couplings/CapsuleGeometry.h"
+#include "mechanics/ElementPlace.h"
 #include <algorithm>
 
 static void testForces() {

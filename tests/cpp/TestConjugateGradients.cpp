@@ -5,7 +5,7 @@
  */
 
 #include "TestChains.h"
-#include "dynamics/ConjugateGradients.h"
+#include "networks/ConjugateGradients.h"
 #include <algorithm>
 #include <memory>
 #include <random>

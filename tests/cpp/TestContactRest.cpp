@@ -6,7 +6,7 @@
  */
 
 #include "TestChains.h"
-#include "dynamics/ContactRest.h"
+#include "networks/ContactRest.h"
 #include <algorithm>
 #include <random>
 

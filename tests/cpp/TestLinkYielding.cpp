@@ -6,7 +6,7 @@
 
 #include "TestChains.h"
 #include "couplings/CapsuleGeometry.h"
-#include "dynamics/ReflectedGaps.h"
+#include "networks/ReflectedGaps.h"
 #include <algorithm>
 #include <memory>
 

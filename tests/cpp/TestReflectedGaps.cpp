@@ -8,7 +8,7 @@
 
 #include "TestChains.h"
 #include "couplings/CapsuleGeometry.h"
-#include "dynamics/ReflectedGaps.h"
+#include "networks/ReflectedGaps.h"
 #include <algorithm>
 #include <memory>
 #include <numeric>

@@ -1,5 +1,5 @@
 #include "openmm/internal/PlaceResolver.h"
-#include "beams/BezierWeights.h"
+#include "mechanics/BezierWeights.h"
 #include "openmm/CylinderChainForce.h"
 #include <algorithm>
 #include <cmath>

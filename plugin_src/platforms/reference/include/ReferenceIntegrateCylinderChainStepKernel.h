@@ -3,7 +3,7 @@
 
 #include "ReferenceCalcCylinderChainForceKernel.h"
 #include "ReferenceParallelLoop.h"
-#include "dynamics/NetworkStep.h"
+#include "networks/NetworkStep.h"
 #include "openmm/CylinderChainKernels.h"
 #include <memory>
 #include <vector>

@@ -1,7 +1,7 @@
 #ifndef OPENMM_CHAINCOUPLINGS_H_
 #define OPENMM_CHAINCOUPLINGS_H_
 
-#include "dynamics/CoupledForces.h"
+#include "networks/CoupledForces.h"
 #include "openmm/internal/ContextImpl.h"
 #include "openmm/internal/CylinderChainBindingForceImpl.h"
 #include "openmm/internal/CylinderChainContactForceImpl.h"

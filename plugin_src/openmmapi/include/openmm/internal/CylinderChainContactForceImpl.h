@@ -2,7 +2,7 @@
 #define OPENMM_CYLINDERCHAINCONTACTFORCEIMPL_H_
 
 #include "couplings/ContactSearch.h"
-#include "dynamics/CurveSites.h"
+#include "networks/CurveSites.h"
 #include "openmm/CylinderChainContactForce.h"
 #include "openmm/Kernel.h"
 #include "openmm/internal/PushForceImpl.h"

@@ -1,7 +1,7 @@
 #ifndef OPENMM_CYLINDERCHAINDESCRIPTION_H_
 #define OPENMM_CYLINDERCHAINDESCRIPTION_H_
 
-#include "beams/BeamChain.h"
+#include "mechanics/BeamChain.h"
 #include "mechanics/Chain.h"
 #include "openmm/CylinderChainForce.h"
 #include "openmm/System.h"

@@ -1,8 +1,0 @@
-#include "dynamics/GradientLoops.h"
-#include "lanes/InstructionSet.h"
-
-using namespace cylchain;
-
-const GradientLoops& cylchain::gradientLoops() {
-    return loopsOfBest<baselineGradientLoops, avx2GradientLoops, avx512GradientLoops>();
-}

@@ -1,6 +1,0 @@
-#define CYLCHAIN_LOOPS avx512
-#include "dynamics/GradientLoops-inl.h"
-
-const cylchain::GradientLoops& cylchain::avx512GradientLoops() {
-    return avx512::LOOPS;
-}

@@ -1,0 +1,135 @@
+#ifndef CYLCHAIN_CONTACT_GAPS_H_
+#define CYLCHAIN_CONTACT_GAPS_H_
+
+#include "couplings/ContactSearch.h"
+#include "networks/CapsuleMotion.h"
+#include "networks/CurveSites.h"
+#include "networks/ImplicitCouplings.h"
+#include "networks/PairList.h"
+#include "networks/PlaceResponses.h"
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+namespace cylchain {
+
+/**
+ * Contacts of capsules in an implicit step: gaps between two capsules.
+ *
+ * A pair has one gap for its energy at the start and at the end, each with the contacts that it has then: so a step
+ * back has the same gaps. Half of the force acts where they are nearest at the start, half where they are at the end.
+ * Segments that have crossed in the end, which gaps do not see where they turn far, fail.
+ */
+class ContactGaps : public ImplicitCouplings {
+public:
+    /**
+     * Set what touches, which must exist while steps are taken.
+     *
+     * @param stiffness  k_c
+     * @param box        the periodic box, if distances are those of nearest images, or NULL
+     * @param onCurves   capsules that end at virtual sites on curves of beam elements, whose positions are among those
+     *                   of all particles
+     * @param force      a number of the force that they belong to, for their noise
+     */
+    void setContacts(ContactSearch* search, double stiffness, const double* box,
+            const std::vector<CapsuleOnCurve>& onCurves, int force);
+    /** About the largest softness k c of a contact, see ContactRest: c is how far a force moves it in the step. */
+    double findLargestSoftness(const CoupledStart& start);
+    void begin(const CoupledStart& start, const Loop& loop) override;
+    bool findGaps(int iteration, bool settled, const double* moved, ReflectedGaps& gaps) override;
+    Rests getRests() const override {
+        return Rests::Wrong;
+    }
+    void findFailures(const double* moved, std::vector<bool>& failed) override;
+    bool findCulprit(const double* moved, const CouplingEquation* equations, BrokenCoupling& culprit) const override;
+    void findPushes(const double* moved, std::vector<Push>& pushes) const override;
+    void findNeighbours(std::vector<std::pair<int, int> >& neighbours) const override;
+private:
+    /** Where a capsule is: its place at fraction 0, and by how much the fraction grows along it. */
+    struct CapsulePlace {
+        PlaceOnChain place;
+        double direction;
+        /** About how far a force moves the place of it that it moves most. */
+        double response;
+    };
+    /** One gap for the energy of a pair, k gap^2/2 where it is negative: where forces act, and its gradients there. */
+    struct PairGap {
+        double gap;
+        int count;
+        double s[2], t[2];
+        Vec3d gradients[2];
+    };
+    /** A pair whose gap may be closed. */
+    struct NearPair {
+        int pair;
+        /** How far the capsules had travelled when it was found, and whether that was in the last iteration. */
+        double way = -1;
+        bool hasMoved = true;
+        /** At the start, and whether the pair has the contact then. */
+        PairGap start;
+        bool touchedAtStart = false;
+        /** The gap, its number or -1, and by how much it is longer from the hard surface than from the soft one. */
+        Gap gap;
+        int number = -1;
+        double depth = 0;
+        /** Where its levers are, and what these lack of the gap. */
+        double fractions[4][2] = {}, offset = 0;
+    };
+    struct Part {
+        std::vector<int> pairs;
+    };
+    struct Looks;
+    void findPairs(const double* moved, const PairFilter& known);
+    void findNewPairs(const double* moved);
+    static PairGap findPairGap(const SegmentPair& pair, const Contact* contacts, int count, double radii);
+    bool mayClose(int pair, double before, double after, double& room) const;
+    void drawSurfaces(int first, int last);
+    double placeHardSurface(int pair, double begun, Gap& gap) const;
+    /** What random numbers of a pair belong to, beside its second capsule. */
+    std::uint32_t keyOf(const ContactPair& pair) const {
+        return (std::uint32_t) force*0x9E3779B1u+pair.a;
+    }
+    void selectNear(int firstNew);
+    void follow(NearPair& near) const;
+    bool mayClose(const Gap& gap) const;
+    bool isOfNeighbor(const NearPair& own, const std::vector<const NearPair*>& deep) const;
+    double findEnd(const NearPair& near) const;
+    void findCrossed();
+    double radiiOf(const ContactPair& pair) const {
+        const std::vector<Capsule>& capsules = search->getSystem().capsules;
+        return capsules[pair.a].radius+capsules[pair.b].radius;
+    }
+    bool isHeld(const ContactPair& pair) const {
+        return places[pair.a].place.pack < 0 && places[pair.b].place.pack < 0;
+    }
+    int findFastest(const double* moved) const;
+    PlaceOnChain placeOf(int capsule, double fraction) const;
+    ContactSearch* search = nullptr;
+    const ReflectedGaps* all = nullptr;
+    double stiffness = 0, kT = 0;
+    int force = 0, iterations = 0;
+    const Loop* loop = nullptr;
+    const double *begun = nullptr, *box = nullptr;
+    const std::vector<CapsuleOnCurve>* onCurves = nullptr;
+    PlaceResponses responses;
+    double slack = 0, reach = 0;
+    std::vector<CapsulePlace> places;
+    PairList pairs;
+    /** For each pair, how far both capsules must have travelled before their gap may be closed, or -1 if it is near. */
+    std::vector<double> rooms;
+    /** For each pair, the exponential variate that its hard surface is found with. */
+    std::vector<double> surfaces;
+    std::vector<NearPair> near;
+    /** Those of the last search. */
+    std::vector<ContactPair> found;
+    /** Those that have crossed in the end. */
+    std::vector<int> crossed;
+    CapsuleMotion motion;
+    std::vector<Part> parts;
+    /** Whether capsules move too far to look for contacts, in the periodic box or anywhere: the step is divided. */
+    bool movesTooFar = false, isEndless = false;
+};
+
+} // namespace cylchain
+
+#endif /*CYLCHAIN_CONTACT_GAPS_H_*/

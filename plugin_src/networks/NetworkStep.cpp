@@ -1,0 +1,443 @@
+#include "networks/NetworkStep.h"
+#include <algorithm>
+#include <cstddef>
+#include <numeric>
+
+using namespace cylchain;
+using namespace std;
+
+namespace {
+
+const int NEWTON_ITERATIONS = 30;
+/** The same where links turn, which several of them at one place do slowly. */
+const int NEWTON_ITERATIONS_OF_TURNING_LINKS = 50;
+/**
+ * Contacts that open and close in turn keep Newton's method from ending. After so many iterations, only this share of
+ * each change is made.
+ */
+const int UNDAMPED_ITERATIONS = 14;
+const double DAMPING = 0.6;
+/** How far an iteration turns segments, in rad, with forces that are found where they have not turned. */
+const double LARGEST_TURN = 0.25;
+/** Where contacts are softer than this in a step, they are hard ones, which take less time: see ContactRest. */
+const double LARGEST_SOFTNESS = 18;
+/** A step is divided into at most two to this power, and where contacts are soft, before they are hard ones. */
+const int LARGEST_DIVISION = 10, LARGEST_DIVISION_OF_SOFT_CONTACTS = 1;
+
+} // namespace
+
+/** A step, or a part of it, of some chains. */
+struct NetworkStep::Attempt {
+    const double *positions, *forces, *box;
+    StepSettings settings;
+    const vector<bool>& taken;
+    const Loop& loop;
+};
+
+NetworkStep::NetworkStep(const ChainEngine& engine, const vector<Chain>& chains, const PackStepSource& beamEngine,
+        const vector<BeamChain>& beams, int particles) : engine(engine), beamEngine(beamEngine),
+        places(chains, beams, particles), moved(3*(size_t) particles) {
+}
+
+NetworkStep::~NetworkStep() {
+}
+
+void NetworkStep::setForces(const CoupledForces& forces, const double* box) {
+    setParticles(forces.particles);
+    sites = &forces.sites;
+    couplings.clear();
+    impulses.assign(forces.links.size(), nullptr);
+    links.resize(max(links.size(), forces.links.size()));
+    for (size_t i = 0; i < forces.links.size(); i++) {
+        const CoupledForces::Links& own = forces.links[i];
+        if (!links[i])
+            links[i].reset(new LinkEquations());
+        LinkBoxes boxes;
+        boxes.distances = own.periodic ? box : NULL;
+        boxes.segments = own.nearestParticles ? box : NULL;
+        links[i]->setLinks(own.links, boxes, i);
+        couplings.push_back(links[i].get());
+    }
+    contacts.resize(max(contacts.size(), forces.contacts.size()));
+    hardContacts.resize(contacts.size());
+    firstContacts = couplings.size();
+    for (size_t i = 0; i < forces.contacts.size(); i++) {
+        const CoupledForces::Contacts& own = forces.contacts[i];
+        if (!contacts[i]) {
+            contacts[i].reset(new ContactGaps());
+            hardContacts[i].reset(new ContactEquations());
+        }
+        hardContacts[i]->setContacts(own.search, own.stiffness, own.periodic ? box : NULL, *own.onCurves);
+        contacts[i]->setContacts(own.search, own.stiffness, own.periodic ? box : NULL, *own.onCurves, i);
+        couplings.push_back(contacts[i].get());
+        impulses.push_back(own.impulses);
+    }
+    firstWalls = couplings.size();
+    walls.resize(max(walls.size(), forces.walls.size()));
+    wallsOfHardContacts.resize(walls.size());
+    for (size_t i = 0; i < forces.walls.size(); i++) {
+        if (!walls[i]) {
+            walls[i].reset(new WallGaps());
+            wallsOfHardContacts[i].reset(new WallEquations());
+        }
+        wallsOfHardContacts[i]->setWalls(forces.walls[i].system);
+        walls[i]->setWalls(forces.walls[i].system, forces.contacts.size()+i);
+        couplings.push_back(walls[i].get());
+        impulses.push_back(forces.walls[i].impulses);
+    }
+}
+
+void NetworkStep::setParticles(const vector<CoupledParticle>& newParticles) {
+    const bool same = newParticles.size() == particles.size() &&
+            equal(particles.begin(), particles.end(), newParticles.begin(),
+                    [] (const CoupledParticle& a, const CoupledParticle& b) {
+                        return a.particle == b.particle && a.friction == b.friction;
+                    });
+    if (same)
+        return;
+    particles = newParticles;
+    places.setParticles(particles);
+    steps.clear();
+}
+
+void NetworkStep::choosePacks(const StepSettings& settings) {
+    const vector<int> chosen = engine.getPacksOfStep(settings);
+    if (chosen == packs && !steps.empty())
+        return;
+    packs = chosen;
+    steps.clear();
+    chainsOfLanes.clear();
+    for (int pack : packs) {
+        steps.push_back(engine.createStep(pack));
+        chainsOfLanes.push_back(engine.getChainsOfLanes(pack));
+    }
+    for (int pack = 0; pack < beamEngine.getNumPacks(); pack++) {
+        steps.push_back(beamEngine.createStep(pack));
+        chainsOfLanes.push_back(beamEngine.getChainsOfLanes(pack));
+        for (int& chain : chainsOfLanes.back())
+            chain += places.getChains().size();
+    }
+    if (!particles.empty()) {
+        // They are numbered behind the chains.
+        vector<int> numbers(particles.size());
+        iota(numbers.begin(), numbers.end(), places.getNumFilaments());
+        steps.emplace_back(new ParticleStep(particles));
+        chainsOfLanes.push_back(numbers);
+    }
+    stepsOfPacks.clear();
+    unfinished.clear();
+    flags.clear();
+    for (size_t pack = 0; pack < steps.size(); pack++) {
+        stepsOfPacks.push_back(steps[pack].get());
+        unfinished.emplace_back(new bool[chainsOfLanes[pack].size()]);
+        flags.emplace_back(new bool[chainsOfLanes[pack].size()]);
+    }
+    places.setPacks(chainsOfLanes);
+}
+
+Instability NetworkStep::step(const double* positions, const double* forces, const double* box,
+            const StepSettings& given, double* displacements, const Loop& loop) {
+    StepSettings settings = given;
+    for (const unique_ptr<LinkEquations>& own : links)
+        if (own->needDoublePrecision(places, settings.stepSize, couplings.size() > firstContacts))
+            settings.precision = Precision::Double;
+    choosePacks(settings);
+    iterations = substitutions = 0;
+    const size_t numChains = places.getNumChains();
+    const vector<bool> all(numChains, true);
+    vector<bool> failed(numChains, false);
+    Instability result;
+    const Attempt whole = {positions, forces, box, settings, all, loop};
+    mayBeSoft = true;
+    bool taken = takeStep(whole, displacements, failed, result);
+    if (!taken && areSoft) {
+        // What lies on top of each other, as filaments that are drawn at random do, comes apart with hard contacts.
+        mayBeSoft = false;
+        taken = takeStep(whole, displacements, failed, result);
+    }
+    result.iterations = iterations;
+    if (!taken) {
+        result.chain = find(failed.begin(), failed.end(), true)-failed.begin();
+        result.coupling = culprit;
+        return result;
+    }
+    for (const Impulse& impulse : received)
+        impulse.receiver->add(impulse.push, impulse.duration);
+    return result;
+}
+
+/** Attempt a step, and divide it for those chains that it fails for; false if that fails as well. */
+bool NetworkStep::takeStep(const Attempt& whole, double* displacements, vector<bool>& failed, Instability& result) {
+    received.clear();
+    if (attempt(whole, displacements, failed)) {
+        addImpulses(whole.taken, whole.settings.stepSize);
+        return true;
+    }
+    const vector<bool> divided = findComponents(failed);
+    vector<bool> others = divided;
+    others.flip();
+    addImpulses(others, whole.settings.stepSize);
+    result.divided = count(divided.begin(), divided.end(), true);
+    return divide({whole.positions, whole.forces, whole.box, whole.settings, divided, whole.loop}, 1, displacements,
+            failed);
+}
+
+bool NetworkStep::attempt(const Attempt& attempt, double* displacements, vector<bool>& failed) {
+    const int numPacks = steps.size();
+    attempt.loop(numPacks, [&] (int pack) {
+        const vector<int>& chains = chainsOfLanes[pack];
+        for (size_t lane = 0; lane < chains.size(); lane++)
+            flags[pack][lane] = chains[lane] >= 0 && attempt.taken[chains[lane]];
+        steps[pack]->begin(attempt.positions, attempt.forces, attempt.box, attempt.settings, flags[pack].get());
+    });
+    const CoupledStart start = {attempt.positions, attempt.settings, places, attempt.taken, active};
+    gaps.begin(attempt.settings, places);
+    chooseCouplings(start);
+    for (ImplicitCouplings* own : couplings)
+        own->begin(start, attempt.loop);
+    copy(attempt.positions, attempt.positions+moved.size(), moved.begin());
+    const int numStages = steps.empty() ? 0 : steps[0]->getNumStages();
+    bool solved = true;
+    for (int stage = 0; stage < numStages && solved; stage++)
+        solved = iterate(attempt, stage);
+
+    // Who failed, and where the others are.
+
+    failed.assign(failed.size(), false);
+    for (int pack = 0; pack < numPacks; pack++) {
+        steps[pack]->findExcessiveChanges(flags[pack].get());
+        const vector<int>& chains = chainsOfLanes[pack];
+        for (size_t lane = 0; lane < chains.size(); lane++)
+            if (chains[lane] >= 0 && attempt.taken[chains[lane]] && (flags[pack][lane] || unfinished[pack][lane]))
+                failed[chains[lane]] = true;
+    }
+    for (ImplicitCouplings* own : couplings)
+        own->findFailures(moved.data(), failed);
+    gaps.findFailures(failed);
+    // Where couplings alone have not converged, nobody knows whose they are.
+    if (!solved && find(failed.begin(), failed.end(), true) == failed.end())
+        failed = attempt.taken;
+    attempt.loop(numPacks, [&] (int pack) {
+        steps[pack]->getDisplacements(displacements);
+    });
+    return find(failed.begin(), failed.end(), true) == failed.end();
+}
+
+/** Steps that do not resolve contacts have hard ones, and walls that go with them. */
+void NetworkStep::chooseCouplings(const CoupledStart& start) {
+    areSoft = mayBeSoft && couplings.size() > firstContacts;
+    for (size_t i = firstContacts; i < firstWalls; i++)
+        areSoft = areSoft && contacts[i-firstContacts]->findLargestSoftness(start) <= LARGEST_SOFTNESS;
+    auto choose = [&] (size_t i, ImplicitCouplings& soft, ImplicitCouplings& hard) {
+        couplings[i] = areSoft ? &soft : &hard;
+    };
+    for (size_t i = firstContacts; i < firstWalls; i++)
+        choose(i, *contacts[i-firstContacts], *hardContacts[i-firstContacts]);
+    for (size_t i = firstWalls; i < couplings.size(); i++)
+        choose(i, *walls[i-firstWalls], *wallsOfHardContacts[i-firstWalls]);
+}
+
+bool NetworkStep::iterate(const Attempt& attempt, int stage) {
+    const int numPacks = steps.size();
+    attempt.loop(numPacks, [&] (int pack) {
+        steps[pack]->beginStage(stage);
+    });
+    for (ImplicitCouplings* own : couplings)
+        own->beginStage(stage, steps[0]->getNumStages(), moved.data());
+    active.assign(numPacks, 1);
+    vector<size_t>& first = firstEquations;
+    first.resize(couplings.size()+1);
+    const bool turns = any_of(couplings.begin(), couplings.end(), [] (const ImplicitCouplings* own) {
+        return own->needsCompliances();
+    });
+    CoupledEquations::Demands demands;
+    // Beam elements have double precision alone.
+    demands.single = attempt.settings.precision != Precision::Double && beamEngine.getNumPacks() == 0;
+    for (const ImplicitCouplings* own : couplings) {
+        demands.stiffness = max(demands.stiffness, own->getStiffness());
+        demands.demandingStiffness = max(demands.demandingStiffness, own->getDemandingStiffness());
+        demands.tolerance = min(demands.tolerance, own->getRelativeTolerance());
+    }
+    const int most = turns ? NEWTON_ITERATIONS_OF_TURNING_LINKS : NEWTON_ITERATIONS;
+    for (int iteration = 0; iteration < most; iteration++) {
+        equations.clear();
+        for (size_t i = 0; i < couplings.size(); i++) {
+            first[i] = equations.size();
+            couplings[i]->linearise(iteration, moved.data(), equations);
+        }
+        first[couplings.size()] = equations.size();
+        gaps.addEquations(equations);
+        // What the first stage takes for taut segments stays as it is for the second one.
+        demands.forTensions = iteration == 0 && stage == 0 && steps[0]->getNumStages() > 1;
+        if (!coupled.solve(stepsOfPacks, active, equations, attempt.settings.kT, demands, attempt.loop))
+            demands.single = false;
+        substitutions += coupled.getNumIterations();
+        if (iteration == 0 && stage == 0) {
+            coupled.findJointStiffness(stepsOfPacks, attempt.loop);
+            if (turns) {
+                coupled.findCompliances(stepsOfPacks, compliances, attempt.loop);
+                for (size_t i = 0; i < couplings.size(); i++)
+                    if (couplings[i]->needsCompliances())
+                        couplings[i]->setCompliances(compliances.data()+12*first[i]);
+            }
+        }
+        gaps.push(stepsOfPacks, coupled, demands, attempt.loop);
+        ShareOfChange share;
+        share.part = iteration < UNDAMPED_ITERATIONS ? 1 : DAMPING;
+        if (gaps.size() > 0)
+            share.largestTurn = LARGEST_TURN;
+        coupled.advance(stepsOfPacks, active, share, unfinished, attempt.loop);
+        iterations++;
+        attempt.loop(numPacks, [&] (int pack) {
+            if (active[pack])
+                steps[pack]->getPositions(attempt.positions, moved.data());
+        });
+        placeSites(moved.data());
+        const bool any = finishIteration(first);
+        auto findGaps = [&] (bool settled) {
+            bool more = false;
+            for (ImplicitCouplings* own : couplings)
+                more |= own->findGaps(iteration, settled, moved.data(), gaps);
+            return more;
+        };
+        const bool more = findGaps(false), unfinished = gaps.anyUnfinished();
+        if (!any && !unfinished && (!more || (!findGaps(true) && !gaps.anyUnfinished())))
+            return true;
+    }
+    return false;
+}
+
+/** Let virtual sites on curves follow them. */
+void NetworkStep::placeSites(double* positions) const {
+    for (const CurveSite& site : *sites)
+        locate(site.place, positions, NULL, positions+3*site.particle);
+}
+
+/** Find the packs that need another iteration; false if there are none. */
+bool NetworkStep::finishIteration(const vector<size_t>& first) {
+    PackFlags next(active.size(), 0);
+    bool unknown = false;
+    for (size_t i = 0; i < couplings.size(); i++)
+        if (couplings[i]->finishIteration(coupled.getMoves().data()+3*first[i], moved.data()))
+            unknown |= !couplings[i]->markUnfinished(next);
+    for (size_t pack = 0; pack < active.size(); pack++) {
+        const size_t lanes = chainsOfLanes[pack].size();
+        next[pack] |= any_of(unfinished[pack].get(), unfinished[pack].get()+lanes, [] (bool flag) {return flag;});
+    }
+    const bool any = unknown || find(next.begin(), next.end(), 1) != next.end();
+    // Where no couplings take many iterations for a few packs, all packs end together, and rests would not pay.
+    auto anyHas = [&] (Rests rests) {
+        return any_of(couplings.begin(), couplings.end(), [&] (const ImplicitCouplings* own) {
+            return own->getRests() == rests;
+        });
+    };
+    const bool rests = anyHas(Rests::Worthwhile) && !anyHas(Rests::Wrong);
+    if (unknown || !rests)
+        next.assign(next.size(), 1);
+    active.swap(next);
+    return any;
+}
+
+/** Take note of the forces on chains that have taken a step, or a part of it. */
+void NetworkStep::addImpulses(const vector<bool>& taken, double stepSize) {
+    for (size_t i = 0; i < couplings.size(); i++) {
+        if (impulses[i] == nullptr)
+            continue;
+        pushes.clear();
+        couplings[i]->findPushes(moved.data(), pushes);
+        for (const Push& push : pushes)
+            if (any_of(push.chains, push.chains+2, [&] (int chain) {return chain >= 0 && taken[chain];}))
+                received.push_back({impulses[i], push, stepSize});
+    }
+}
+
+bool NetworkStep::divide(const Attempt& whole, int division, double* displacements, vector<bool>& failed) {
+    Attempt half = whole;
+    half.settings.stepSize = 0.5*whole.settings.stepSize;
+    half.settings.level++;
+    half.settings.step *= 2;
+    // Recorded forces are means over the halves.
+    vector<vector<SegmentForces> >* const recorded = whole.settings.segmentForces;
+    vector<vector<SegmentForces> > ofHalf;
+    if (recorded != NULL) {
+        ofHalf = *recorded;
+        half.settings.segmentForces = &ofHalf;
+    }
+    const size_t size = moved.size();
+    vector<double> start(whole.positions, whole.positions+size), total(size), part(size);
+    half.positions = start.data();
+    auto forTaken = [&] (auto function) {
+        for (int chain = 0; chain < places.getNumChains(); chain++)
+            if (whole.taken[chain])
+                for (int particle : places.getNodes(chain))
+                    for (int k = 3*particle; k < 3*particle+3; k++)
+                        function(k);
+    };
+    for (int i = 0; i < 2; i++, half.settings.step++) {
+        if (!attempt(half, part.data(), failed)) {
+            // Contacts may be hard ones in the step, and soft ones only after some divisions.
+            if (division >= (areSoft ? LARGEST_DIVISION_OF_SOFT_CONTACTS : LARGEST_DIVISION)) {
+                // Now, because couplings know positions that last as long as this.
+                culprit = findCulprit();
+                return false;
+            }
+            if (!divide(half, division+1, part.data(), failed))
+                return false;
+        }
+        else
+            addImpulses(whole.taken, half.settings.stepSize);
+        forTaken([&] (int k) {
+            start[k] += part[k];
+            total[k] += part[k];
+        });
+        placeSites(start.data());
+        for (size_t chain = 0; recorded != NULL && chain < recorded->size(); chain++)
+            for (size_t s = 0; whole.taken[chain] && s < ofHalf[chain].size(); s++) {
+                SegmentForces& mean = (*recorded)[chain][s];
+                if (i == 0)
+                    mean = SegmentForces();
+                mean.add(ofHalf[chain][s], 0.5);
+            }
+    }
+    forTaken([&] (int k) {
+        displacements[k] = total[k];
+    });
+    return true;
+}
+
+/** Find the coupling by which the last attempt has failed: one that is known to be wrong comes first. */
+BrokenCoupling NetworkStep::findCulprit() const {
+    BrokenCoupling result;
+    for (size_t i = 0; i < couplings.size(); i++) {
+        BrokenCoupling culprit;
+        if (!couplings[i]->findCulprit(moved.data(), equations.data()+firstEquations[i], culprit))
+            continue;
+        culprit.force = i;
+        if (result.kind == BrokenCoupling::None || (result.reason == BrokenCoupling::NotSolved &&
+                culprit.reason != BrokenCoupling::NotSolved))
+            result = culprit;
+    }
+    return result;
+}
+
+vector<bool> NetworkStep::findComponents(const vector<bool>& failed) const {
+    vector<pair<int, int> > pairs;
+    for (const ImplicitCouplings* own : couplings)
+        own->findNeighbours(pairs);
+    vector<int> root(failed.size());
+    iota(root.begin(), root.end(), 0);
+    auto rootOf = [&] (int chain) {
+        while (root[chain] != chain)
+            chain = root[chain] = root[root[chain]];
+        return chain;
+    };
+    for (const pair<int, int>& joined : pairs)
+        root[rootOf(joined.first)] = rootOf(joined.second);
+    vector<bool> ofRoot(failed.size()), result(failed.size());
+    for (size_t chain = 0; chain < failed.size(); chain++)
+        if (failed[chain])
+            ofRoot[rootOf(chain)] = true;
+    for (size_t chain = 0; chain < failed.size(); chain++)
+        result[chain] = ofRoot[rootOf(chain)];
+    return result;
+}

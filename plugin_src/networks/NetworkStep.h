@@ -1,0 +1,115 @@
+#ifndef CYLCHAIN_NETWORK_STEP_H_
+#define CYLCHAIN_NETWORK_STEP_H_
+
+#include "dynamics/ChainEngine.h"
+#include "dynamics/PackStepSource.h"
+#include "networks/ContactEquations.h"
+#include "networks/ContactGaps.h"
+#include "networks/CoupledForces.h"
+#include "networks/ImplicitCouplings.h"
+#include "networks/LinkEquations.h"
+#include "networks/WallEquations.h"
+#include "networks/WallGaps.h"
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+namespace cylchain {
+
+/**
+ * Implicit steps of chains that are coupled to each other.
+ *
+ * Newton's method for all chains at once: each iteration linearises chains and couplings, solves the linear equations
+ * (CoupledEquations) and moves the nodes, until all chains and all couplings have converged. Where that fails, or where
+ * something has gone wrong that couplings must prevent, the chains that are connected with the one that failed take the
+ * step again in two halves, which follow the same Brownian path, and these in halves if need be.
+ */
+class NetworkStep {
+public:
+    /**
+     * @param engine      the engine of the chains
+     * @param chains      they must exist as long as this object, and so must the engine
+     * @param beamEngine  the engine of chains of beam elements
+     * @param beams       these chains, which must exist as long
+     * @param particles   the number of particles of the System
+     */
+    NetworkStep(const ChainEngine& engine, const std::vector<Chain>& chains, const PackStepSource& beamEngine,
+            const std::vector<BeamChain>& beams, int particles);
+    ~NetworkStep();
+    /**
+     * Set the forces that steps have in their equations. What they point to must exist while steps are taken.
+     *
+     * @param box  the three vectors of the periodic box, for forces that are periodic, or NULL
+     */
+    void setForces(const CoupledForces& forces, const double* box);
+    /**
+     * Compute the displacements of all nodes and of the coupled particles in a step, as ChainEngine::step() does. Of
+     * the result, the chain by which the step has gone wrong may be one of beam elements, with a number behind those of
+     * segments, or a particle, behind those of all chains.
+     */
+    Instability step(const double* positions, const double* forces, const double* box, const StepSettings& settings,
+            double* displacements, const Loop& loop);
+    /** The number of substitutions along chains in the last step, beside those of its iterations. */
+    int getNumSubstitutions() const {
+        return substitutions;
+    }
+private:
+    struct Attempt;
+    void setParticles(const std::vector<CoupledParticle>& particles);
+    bool takeStep(const Attempt& whole, double* displacements, std::vector<bool>& failed, Instability& result);
+    bool attempt(const Attempt& attempt, double* displacements, std::vector<bool>& failed);
+    void chooseCouplings(const CoupledStart& start);
+    bool iterate(const Attempt& attempt, int stage);
+    bool finishIteration(const std::vector<std::size_t>& first);
+    void placeSites(double* positions) const;
+    void addImpulses(const std::vector<bool>& taken, double stepSize);
+    bool divide(const Attempt& whole, int division, double* displacements, std::vector<bool>& failed);
+    BrokenCoupling findCulprit() const;
+    std::vector<bool> findComponents(const std::vector<bool>& failed) const;
+    void choosePacks(const StepSettings& settings);
+    const ChainEngine& engine;
+    const PackStepSource& beamEngine;
+    ChainPlaces places;
+    std::vector<std::unique_ptr<LinkEquations> > links;
+    /** Contacts and walls, and those of steps that do not resolve contacts; and where they are among the couplings. */
+    std::vector<std::unique_ptr<ContactGaps> > contacts;
+    std::vector<std::unique_ptr<WallGaps> > walls;
+    std::vector<std::unique_ptr<ContactEquations> > hardContacts;
+    std::vector<std::unique_ptr<WallEquations> > wallsOfHardContacts;
+    std::size_t firstContacts = 0, firstWalls = 0;
+    /** Whether contacts and walls may be those that a step resolves, and whether they are in this attempt. */
+    bool mayBeSoft = true, areSoft = false;
+    std::vector<ImplicitCouplings*> couplings;
+    /** What receives their forces, or NULL. */
+    std::vector<CouplingImpulses*> impulses;
+    std::vector<Push> pushes;
+    /** A force of a step, or of a part of it, until the step has been taken. */
+    struct Impulse {
+        CouplingImpulses* receiver;
+        Push push;
+        double duration;
+    };
+    std::vector<Impulse> received;
+    const std::vector<CurveSite>* sites = nullptr;
+    std::vector<CoupledParticle> particles;
+    std::vector<int> packs;
+    std::vector<std::vector<int> > chainsOfLanes;
+    std::vector<std::unique_ptr<PackStep> > steps;
+    std::vector<PackStep*> stepsOfPacks;
+    CoupledEquations coupled;
+    ReflectedGaps gaps;
+    std::vector<CouplingEquation> equations;
+    /** Where those of each kind of couplings begin. */
+    std::vector<std::size_t> firstEquations;
+    std::vector<double> moved, compliances;
+    LaneFlags unfinished, flags;
+    /** The packs that take part in an iteration: the others have converged, and nothing holds them otherwise. */
+    PackFlags active;
+    /** The coupling by which a step that cannot be divided any more has gone wrong. */
+    BrokenCoupling culprit;
+    int iterations = 0, substitutions = 0;
+};
+
+} // namespace cylchain
+
+#endif /*CYLCHAIN_NETWORK_STEP_H_*/

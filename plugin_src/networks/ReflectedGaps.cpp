@@ -1,0 +1,398 @@
+#include "networks/ReflectedGaps.h"
+#include "mechanics/SymmetricMatrices.h"
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+using namespace cylchain;
+using namespace std;
+
+namespace {
+
+/** How far a gap moves in a part, (2 k_B T G)^(1/2), over the thermal depth, where it shares chains with others. */
+const double LARGEST_MOTION = 2.2;
+/** The most parts. */
+const int MOST_PARTS_OF_GAPS = 32;
+/** How often all gaps are gone through at most. */
+const int MOST_SWEEPS = 2000;
+/** How often those that are pushed are gone through before all are again. */
+const int SWEEPS_OF_PUSHED = 50;
+/** The share of what others push a gap open by that counts at the start of a part. */
+const double SHARE_AT_START = 1.0/3;
+/** What sweeps may leave to change of a gap, and the last iteration may change, over the thermal scale. */
+const double OF_SWEEPS = 0.01, OF_ITERATIONS = 0.03;
+/** Gaps that end farther than this from where the equations have led them have turned: others keep their responses. */
+const double OF_RESPONSES = 0.1;
+/** A change that is less than this share of that is not made. */
+const double LEAST_SHARE = 0.01;
+/** What responses lack may go back and forth between gaps that links move together: it changes by this share then. */
+const double DAMPING_OF_GAPS = 0.5;
+/** A ceiling pulls a gap back by less than this, over the way that it would go beyond and its thermal motion. */
+const double LARGEST_PULL = 10;
+/** Sweeps are taken to change by this factor at most from one to the next. */
+const double LARGEST_RATE = 0.995;
+/** The same in nm, where nothing moves thermally. */
+const double LEAST_CHANGE_OF_GAPS = 1e-7;
+/** A gap that has just been found is pushed if its exponential variate is less than this. */
+const double LARGE_REFLECTION = 4;
+/** Normal numbers are not so large that their chance would be less. */
+const double LEAST_CHANCE = 1e-300;
+/** Gaps that a thread looks at together. */
+const int CHUNK_OF_GAPS = 64;
+
+/**
+ * The force that reflects the motion of a gap, with an exponential variate of the mean k_B T: with its response G to a
+ * force, and the part L of it that the end does not have yet, so that the gap ends at end+L F.
+ */
+double reflect(double start, double end, double all, double part, double variate) {
+    if (start+end > 0 && start*end >= all*variate)
+        return 0;
+    const double before = start*part, after = end*all, way = before-after;
+    return max(0.0, 0.5*(sqrt(way*way+4*all*all*part*variate)-(before+after))/(all*part));
+}
+
+} // namespace
+
+void ReflectedGaps::begin(const StepSettings& settings, const ChainPlaces& places) {
+    responses.begin(places.getNumChains());
+    kT = settings.kT;
+    precision = settings.precision;
+    noise = GapNoise({(uint32_t) settings.seed, (uint32_t) settings.level, settings.step});
+    gaps.clear();
+    forces.clear();
+    pushes.clear();
+    bridges.clear();
+    ofBridges.clear();
+    ofReflections.clear();
+    parts = 1;
+    changes.clear();
+    predicted.clear();
+    corrections.clear();
+}
+
+int ReflectedGaps::add(const Gap& gap) {
+    gaps.push_back(gap);
+    return gaps.size()-1;
+}
+
+void ReflectedGaps::addEquations(vector<CouplingEquation>& equations) {
+    if (!gaps.empty())
+        responses.setLinks(equations);
+    firstEquations.resize(gaps.size()+1);
+    size_t next = equations.size();
+    for (size_t i = 0; i < gaps.size(); i++) {
+        firstEquations[i] = next;
+        next += gaps[i].numLevers;
+    }
+    firstEquations[gaps.size()] = next;
+    equations.resize(next);
+    for (size_t i = 0; i < gaps.size(); i++)
+        for (int lever = 0; lever < gaps[i].numLevers; lever++) {
+            CouplingEquation& equation = equations[firstEquations[i]+lever];
+            copy_n(gaps[i].levers[lever].places, 2, equation.places);
+            fill_n(equation.force, 3, 0.0);
+            const double force = i < forces.size() && gaps[i].present ? max(0.0, forces[i]) : 0;
+            for (int k = 0; k < 6; k++)
+                equation.stiffness[k] = force*gaps[i].turning[k];
+        }
+}
+
+int ReflectedGaps::chooseParts() const {
+    if (kT == 0)
+        return 1;
+    double largest = 0;
+    for (size_t i = 0; i < gaps.size(); i++) {
+        bool shares = false;
+        responses.forPorts(i, [&] (const GapResponses::ChainPorts& chain, int) {
+            shares |= chain.count() > 1;
+        });
+        if (shares && gaps[i].present && gaps[i].law == GapLaw::Reflection)
+            largest = max(largest, gaps[i].stiffness*responses.getOwn(i));
+    }
+    return clamp((int) ceil(2*largest/(LARGEST_MOTION*LARGEST_MOTION)), 1, MOST_PARTS_OF_GAPS);
+}
+
+/** Draw the numbers of gaps that have none for so many parts. */
+void ReflectedGaps::drawNumbers(const Loop& loop) {
+    const size_t known = ofBridges.size()/(2*parts), count = gaps.size();
+    ofBridges.resize(2*count*parts);
+    ofReflections.resize(2*count*parts);
+    loop((count-known+CHUNK_OF_GAPS-1)/CHUNK_OF_GAPS, [&] (int chunk) {
+        const size_t i = known+chunk*CHUNK_OF_GAPS;
+        noise.draw(&gaps[i], min(count-i, (size_t) CHUNK_OF_GAPS), parts, &ofBridges[2*i*parts],
+                &ofReflections[2*i*parts]);
+    });
+}
+
+/** Give numbers of ports the covariance of the responses, and sum them for each gap. */
+void ReflectedGaps::correlate(const vector<double>& normals, vector<double>& sums) const {
+    sums.assign(gaps.size()*parts, 0.0);
+    for (int number : responses.getChains()) {
+        const GapResponses::ChainPorts& chain = responses.getPorts(number);
+        for (int row = 0; row < chain.count(); row++) {
+            double* const sum = &sums[(size_t) chain.ports[row].gap*parts];
+            const double* const root = chain.rootOf(row);
+            for (int column = 0; column <= row; column++) {
+                const GapResponses::Port& port = chain.ports[column];
+                const double* const own = &normals[(2*(size_t) port.gap+port.side)*parts];
+                for (int part = 0; part < parts; part++)
+                    sum[part] += root[column]*own[part];
+            }
+        }
+    }
+}
+
+/**
+ * Find bridges of Brownian motion, and exponential variates, that are correlated as the gaps move: those that move as
+ * one are reflected as one.
+ */
+void ReflectedGaps::findNoise() {
+    correlate(ofBridges, bridges);
+    correlate(ofReflections, reflections);
+    const double size = sqrt(2*kT/parts);
+    for (size_t i = 0; i < gaps.size(); i++) {
+        double *const bridge = &bridges[i*parts], *const reflection = &reflections[i*parts];
+        const double mean = accumulate(bridge, bridge+parts, 0.0)/parts;
+        const double ofChains = responses.getOfChains(i);
+        const double ofGap = ofChains > 0 ? size*sqrt(responses.getOwn(i)/ofChains) : 0;
+        const double perSize = ofChains > 0 ? M_SQRT1_2/sqrt(ofChains) : 0;
+        for (int part = 0; part < parts; part++) {
+            bridge[part] = (bridge[part]-mean)*ofGap;
+            reflection[part] = -log(max(LEAST_CHANCE, 0.5*erfc(reflection[part]*perSize)));
+        }
+    }
+}
+
+/** How far a gap moves without being noticed: thermally behind its surface, or in the step. */
+double ReflectedGaps::scaleOf(int i) const {
+    return min(sqrt(kT/gaps[i].stiffness), sqrt(kT*responses.getOwn(i)));
+}
+
+/** The force in a part of the step on a gap that a spring holds, which would end there. */
+double ReflectedGaps::findPushOfSpring(int i, int part, double end) const {
+    const Gap& gap = gaps[i];
+    if (part < parts-1)
+        return 0;
+    const double response = responses.getOfChains(i), softer = 1/(1+gap.stiffness*response);
+    if (gap.law == GapLaw::SpringBehind)
+        return max(0.0, -gap.stiffness*end*softer);
+    const double rest = ofBridges[2*(size_t) i*parts]*sqrt(kT/gap.stiffness);
+    const double held = (end+gap.stiffness*response*rest)*softer, responseHeld = response*softer;
+    const double back = gap.ceiling < HUGE_VAL ? reflect(gap.ceiling-gap.start, gap.ceiling-held, responseHeld,
+            responseHeld, kT*reflections[(size_t) i*parts]) : 0;
+    return (held-responseHeld*back-end)/response;
+}
+
+/** The force of a gap in a part of the step, with what others push. */
+double ReflectedGaps::findPush(int i, int part) const {
+    const GapInPart& gap = inPart[i];
+    const MotionOfPort &one = motions[gap.ports[0]], &other = motions[gap.ports[1]];
+    const double end = gap.end+one.all+other.all-gap.ofChains*gap.push;
+    if (!gap.isReflected)
+        return findPushOfSpring(i, part, end);
+    const double opening = one.opening+other.opening-gap.ofChains*gap.push;
+    return reflect(gap.start+SHARE_AT_START*opening, end, gap.response, gap.ofChains, gap.variate);
+}
+
+/** Let a force on a gap move all ports of its chains. */
+void ReflectedGaps::move(int i, double push, bool opens) {
+    responses.forPorts(i, [&] (const GapResponses::ChainPorts& chain, int port) {
+        const double* const row = chain.responsesOf(port);
+        MotionOfPort* const to = &motions[chain.first];
+        for (int k = 0; k < chain.count(); k++) {
+            const double way = push*row[k];
+            to[k].all += way;
+            to[k].opening += opens && row[k] > 0 ? way : 0;
+        }
+    });
+}
+
+/**
+ * Go through the gaps of a part in turn, forwards and backwards, until no force changes: those that are pushed, and now
+ * and then all.
+ */
+void ReflectedGaps::findPushesOfPart(int part) {
+    const int count = gaps.size();
+    motions.assign(responses.countPorts()+1, MotionOfPort());
+    for (int i = 0; i < count; i++) {
+        inPart[i].push = inPart[i].response > 0 ? pushes[(size_t) i*parts+part] : 0;
+        if (inPart[i].push != 0)
+            move(i, inPart[i].push, inPart[i].isReflected);
+    }
+    // The change of a gap, over what it may be.
+    auto update = [&] (int i) {
+        GapInPart& gap = inPart[i];
+        const double push = findPush(i, part), change = push-gap.push, way = fabs(change)*gap.ofChains/gap.tolerance;
+        // Written so that NaN is no change.
+        if (!(way > LEAST_SHARE))
+            return 0.0;
+        gap.push = push;
+        move(i, change, gap.isReflected);
+        return way;
+    };
+    bool converged = false;
+    for (int sweeps = 0; sweeps < MOST_SWEEPS; sweeps++) {
+        double largest = 0;
+        pushed.clear();
+        for (int i = 0; i < count; i++)
+            if (inPart[i].response > 0) {
+                largest = max(largest, update(i));
+                if (inPart[i].push != 0)
+                    pushed.push_back(i);
+            }
+        if (largest == 0 || (converged && largest <= 1))
+            break;
+        converged = false;
+        for (int i = 0; i < SWEEPS_OF_PUSHED && !converged && ++sweeps < MOST_SWEEPS; i++) {
+            const double before = largest;
+            largest = 0;
+            for (size_t k = 0; k < pushed.size(); k++)
+                largest = max(largest, update(pushed[sweeps%2 == 0 ? k : pushed.size()-1-k]));
+            // All that is left to change, if each sweep changes as much less than the one before.
+            const double rate = min(largest/before, LARGEST_RATE);
+            converged = largest*rate <= 1-rate;
+        }
+    }
+    for (int i = 0; i < count; i++)
+        pushes[(size_t) i*parts+part] = inPart[i].push;
+}
+
+/** Find the forces of all gaps from their starts, and their ends without forces. */
+void ReflectedGaps::findPushes() {
+    const int count = gaps.size(), none = responses.countPorts();
+    inPart.resize(count);
+    forces.assign(count, 0.0);
+    for (int i = 0; i < count; i++) {
+        GapInPart& gap = inPart[i];
+        predicted[i] = gaps[i].start;
+        gap.isReflected = gaps[i].law == GapLaw::Reflection;
+        gap.ofChains = responses.getOfChains(i);
+        gap.response = gaps[i].present ? responses.getOwn(i) : 0;
+        gap.tolerance = OF_SWEEPS*scaleOf(i)+0.1*LEAST_CHANGE_OF_GAPS;
+        for (int side = 0; side < 2; side++)
+            gap.ports[side] = responses.getPort(i, side) >= 0 ? responses.getPort(i, side) : none;
+    }
+    for (int part = 0; part < parts; part++) {
+        for (int i = 0; i < count; i++) {
+            GapInPart& gap = inPart[i];
+            gap.start = predicted[i];
+            gap.end = gap.start+(free[i]-gaps[i].start)/parts+bridges[(size_t) i*parts+part];
+            gap.variate = kT/parts*reflections[(size_t) i*parts+part];
+        }
+        findPushesOfPart(part);
+        for (int i = 0; i < count; i++) {
+            const GapInPart& gap = inPart[i];
+            forces[i] += gap.push;
+            predicted[i] = gap.end+motions[gap.ports[0]].all+motions[gap.ports[1]].all;
+            if (gap.isReflected && part < parts-1)
+                predicted[i] = max(predicted[i], 0.0);
+        }
+    }
+}
+
+void ReflectedGaps::push(const vector<PackStep*>& packs, CoupledEquations& coupled,
+        const CoupledEquations::Demands& demands, const Loop& loop) {
+    const size_t count = gaps.size();
+    if (count == 0)
+        return;
+    free.resize(count);
+    predicted.resize(count);
+    const size_t first = firstEquations[0];
+    responses.addPorts(gaps);
+    if (!responses.isComplete() || bridges.size() != count*parts) {
+        responses.find(gaps, firstEquations, packs, coupled, precision, demands.single, loop);
+        const int needed = max(parts, chooseParts());
+        if (needed != parts) {
+            pushes.clear();
+            ofBridges.clear();
+            ofReflections.clear();
+        }
+        parts = needed;
+        pushes.resize(count*parts, 0.0);
+        drawNumbers(loop);
+        findNoise();
+    }
+    auto endMove = [&] (size_t i, const vector<double>& moves) {
+        double sum = 0;
+        for (int lever = 0; lever < gaps[i].numLevers; lever++)
+            sum += dot(gaps[i].levers[lever].gradient, &moves[3*(firstEquations[i]+lever-first)]);
+        return sum;
+    };
+    coupled.predictMoves(packs, first, loop);
+    corrections.resize(count, 0.0);
+    for (size_t i = 0; i < count; i++)
+        free[i] = gaps[i].end+endMove(i, coupled.getMoves())+corrections[i];
+    findPushes();
+    vector<double> loads(3*(firstEquations[count]-first));
+    for (size_t i = 0; i < count; i++)
+        for (int lever = 0; lever < gaps[i].numLevers; lever++)
+            for (int k = 0; k < 3; k++)
+                loads[3*(firstEquations[i]+lever-first)+k] = forces[i]*gaps[i].levers[lever].gradient[k];
+    coupled.push(packs, first, loads, demands, loop);
+    changes.resize(count, 0.0);
+    motions.assign(responses.countPorts()+1, MotionOfPort());
+    for (size_t i = 0; i < count; i++)
+        if (forces[i] != 0)
+            move(i, forces[i], false);
+    for (size_t i = 0; i < count; i++) {
+        const double pushed = endMove(i, coupled.getPushedMoves());
+        predicted[i] = free[i]-corrections[i]+pushed;
+        // Responses may be those of an iteration before, and others push through links.
+        const double correction = pushed-motions[inPart[i].ports[0]].all-motions[inPart[i].ports[1]].all;
+        const double change = correction-corrections[i];
+        const bool isBack = coupled.joinsPlaces() && change*changes[i] < 0;
+        corrections[i] += isBack ? DAMPING_OF_GAPS*change : change;
+        changes[i] = change;
+    }
+}
+
+/** Whether a gap that no iteration knows of yet may be pushed. */
+bool ReflectedGaps::wouldPush(const Gap& gap) const {
+    if (gap.law != GapLaw::Reflection)
+        return gap.law == GapLaw::Spring || gap.end < 0;
+    return gap.end < 0 || gap.start*gap.end < LARGE_REFLECTION*kT*gap.response;
+}
+
+bool ReflectedGaps::isUnfinished(int i) const {
+    return deviates(i, OF_ITERATIONS);
+}
+
+/** Whether a gap is farther from where the equations have led it than a share of its thermal scale. */
+bool ReflectedGaps::deviates(int i, double share) const {
+    if (!gaps[i].present)
+        return false;
+    if (i >= (int) predicted.size())
+        return wouldPush(gaps[i]);
+    return !(max(fabs(gaps[i].end-predicted[i]), fabs(changes[i])) <= share*scaleOf(i)+LEAST_CHANGE_OF_GAPS);
+}
+
+bool ReflectedGaps::anyUnfinished() {
+    bool any = false;
+    for (size_t i = 0; i < gaps.size(); i++) {
+        if (!isUnfinished(i))
+            continue;
+        any = true;
+        // Its chains may have turned so far that their responses have changed.
+        if (i < predicted.size() && deviates(i, OF_RESPONSES))
+            responses.forget(i);
+    }
+    return any;
+}
+
+/**
+ * Whether a gap that is held behind a ceiling is pulled back by much more than it would come out: where its contact has
+ * gone on to another gap, which is pushed out, both turn their chains against each other.
+ */
+bool ReflectedGaps::isTorn(int i) const {
+    const Gap& gap = gaps[i];
+    if (gap.law != GapLaw::Spring || !(gap.ceiling < HUGE_VAL) || !(getForce(i) < 0))
+        return false;
+    return -forces[i]*responses.getOwn(i) > LARGEST_PULL*(fabs(free[i]-gap.ceiling)+sqrt(kT*responses.getOwn(i)));
+}
+
+void ReflectedGaps::findFailures(vector<bool>& failed) const {
+    for (size_t i = 0; i < gaps.size(); i++)
+        for (int side = 0; side < 2 && (isUnfinished(i) || isTorn(i)); side++)
+            if (gaps[i].packOf(side) >= 0)
+                failed[gaps[i].chainOf(side)] = true;
+}

@@ -1,0 +1,116 @@
+#ifndef CYLCHAIN_REFLECTED_GAPS_H_
+#define CYLCHAIN_REFLECTED_GAPS_H_
+
+#include "networks/CoupledEquations.h"
+#include "networks/Gap.h"
+#include "networks/GapResponses.h"
+#include <cstddef>
+#include <vector>
+
+namespace cylchain {
+
+/**
+ * The forces of contacts and walls in an implicit step.
+ *
+ * Let the step without them be linear and reversible, with the equilibrium k_B T K^-1, and C its response to a force
+ * that acts during the step. Gaps n with gradients N then keep the equilibrium of hard surfaces at n = 0 exactly,
+ * whatever the step and the load, if their forces F are the local times at the end of the step of Brownian motion with
+ * the covariance 2 k_B T G, G = N^T C N, that goes from the gaps a at the start to the gaps b at the end without
+ * forces and is reflected at zero along G: the end is n = b+G F. All terms of the probability of a step with loads and
+ * with modes that relax in it are symmetric in start and end, and the law of reflected motion is exp(-F.n/k_B T) times
+ * what is symmetric in a and n. See Harrison and Reiman, Ann. Probab. 1981, 9, 302.
+ *
+ * For one gap, the motion between a and b has gone to the minimum
+ *
+ *     m = ((a+b)-((a-b)^2+4 k_B T G E)^(1/2))/2,      F = max(0, -m)/G
+ *
+ * with an exponential variate E of mean one. Gaps that share chains are found in parts of the step: in each, the ends
+ * move on by a share of b-a and by a bridge of Brownian motion with the covariance 2 k_B T G, and every gap takes the
+ * law of one, with what others push in this part whole at its end and, where it opens the gap, by a third at its start.
+ * Gaps that move together have variates E that are correlated as their motion is: those that move as one are reflected
+ * as one. With one gap on each chain, all this is exact. Going through the gaps in turn finds the forces of a part.
+ *
+ * Soft surfaces are hard ones at random depths: see placeHardSurface().
+ */
+class ReflectedGaps {
+public:
+    /** Begin a step without gaps. */
+    void begin(const StepSettings& settings, const ChainPlaces& places);
+    /** What gaps are drawn with. */
+    const GapNoise& getNoise() const {
+        return noise;
+    }
+    /** Add a gap; returns its number. */
+    int add(const Gap& gap);
+    Gap& get(int number) {
+        return gaps[number];
+    }
+    const Gap& get(int number) const {
+        return gaps[number];
+    }
+    int size() const {
+        return gaps.size();
+    }
+    /** Add an equation for each gap: it has no force yet, but places. */
+    void addEquations(std::vector<CouplingEquation>& equations);
+    /** Find the forces, and let the equations of an iteration take them, which have been solved without. */
+    void push(const std::vector<PackStep*>& packs, CoupledEquations& coupled, const CoupledEquations::Demands& demands,
+            const Loop& loop);
+    /** Whether a gap is not where the equations have led it, after its end has been found there. */
+    bool isUnfinished(int number) const;
+    bool anyUnfinished();
+    /** Mark the chains of gaps that are unfinished. */
+    void findFailures(std::vector<bool>& failed) const;
+    /** The force of a gap, the mean over the step: per length if its gradient is one. */
+    double getForce(int number) const {
+        return number < (int) forces.size() ? forces[number] : 0;
+    }
+private:
+    int chooseParts() const;
+    void drawNumbers(const Loop& loop);
+    void correlate(const std::vector<double>& normals, std::vector<double>& sums) const;
+    void findNoise();
+    void findPushes();
+    void findPushesOfPart(int part);
+    double findPush(int gap, int part) const;
+    double findPushOfSpring(int gap, int part, double end) const;
+    void move(int gap, double push, bool opens);
+    double scaleOf(int gap) const;
+    bool wouldPush(const Gap& gap) const;
+    bool isTorn(int gap) const;
+    bool deviates(int gap, double share) const;
+    std::vector<Gap> gaps;
+    GapNoise noise;
+    double kT = 0;
+    Precision precision = Precision::Double;
+    int parts = 1;
+    /**
+     * For each gap: the force and its share in each part; the end without forces, that which is predicted, and how much
+     * farther forces have moved it than responses say, and by how much that has changed in the last iteration.
+     */
+    std::vector<double> forces, pushes, free, predicted, corrections, changes;
+    /** The first equation of each gap, and one behind those of all. */
+    std::vector<std::size_t> firstEquations;
+    GapResponses responses;
+    /** For each gap and part: exponential variates, a bridge of Brownian motion, and what both are made of. */
+    std::vector<double> reflections, bridges, ofReflections, ofBridges;
+    /** A gap in a part of the step: where it begins and would end without forces, and the force that is found. */
+    struct GapInPart {
+        double start, end, response, ofChains, variate, tolerance, push;
+        /** Those that it does not have are behind all others, and do not move. */
+        int ports[2];
+        bool isReflected;
+    };
+    std::vector<GapInPart> inPart;
+    /** The gaps that are pushed in a part. */
+    std::vector<int> pushed;
+    /** How far forces move a port in a part, and those that open its gap alone. */
+    struct MotionOfPort {
+        double all = 0, opening = 0;
+    };
+    std::vector<MotionOfPort> motions;
+};
+
+} // namespace cylchain
+
+#endif /*CYLCHAIN_REFLECTED_GAPS_H_*/
