@@ -28,8 +28,6 @@ FLOORS = (
     ("runs",),
     ("rendering",),
     ("export",),
-    ("benchmark",),
-    ("reproduce",),
     ("scans",),
     ("cli",),
 )
