@@ -264,8 +264,9 @@ def test_memory_is_measured_in_a_fresh_process():
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="resident memory is read from /proc")
 def test_fresh_process_imports_this_very_package(tmp_path, monkeypatch):
-    (tmp_path / "openmm_cylchain").mkdir()
-    (tmp_path / "openmm_cylchain" / "__init__.py").write_text("raise ImportError('the wrong package')")
+    for name in ("openmm_cylchain", "benchmark"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "__init__.py").write_text("raise ImportError('the wrong package')")
     monkeypatch.chdir(tmp_path)
     assert memory.measure_growth("portable", 2, 4).resident > 0
 
