@@ -1,7 +1,7 @@
 """Filaments for OpenMM: Brownian dynamics of extensible cylinder chains.
 
-All that users call is here and in the modules ``analysis``, ``theory``, ``benchmark`` and ``reproduce``; all others are
-private and may change.
+All that users call is here and in the modules ``analysis``, ``theory`` and ``scans``; all others are private and may
+change.
 """
 
 from . import analysis, theory

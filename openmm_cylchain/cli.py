@@ -1,7 +1,7 @@
-"""The console script ``openmm-cylchain``: runs a configuration, explains its time step, measures, reproduces, informs.
+"""The console script ``openmm-cylchain``: runs a configuration, explains its time step, informs.
 
-Exit codes: 0 done, 1 the simulation blew up, a file could not be written or results are not reproduced, 2 wrong input,
-3 a time step is wrong, 130 and 143 interrupted by SIGINT and SIGTERM, 141 what read the output has ended.
+Exit codes: 0 done, 1 the simulation blew up or a file could not be written, 2 wrong input, 3 a time step is
+wrong, 130 and 143 interrupted by SIGINT and SIGTERM, 141 what read the output has ended.
 """
 
 import argparse
@@ -14,7 +14,6 @@ import warnings
 from dataclasses import replace
 from pathlib import Path
 
-from .engine_choice import ENGINES
 from .errors import BoxWarning, ContactWarning, InputError, InstabilityError, SegmentLengthWarning, TimeStepWarning
 from .export import command as export
 from .rendering import command as rendering
@@ -34,28 +33,40 @@ def main(arguments=None):
     arguments : list of str, optional
         Those of the command line if not given.
     """
-    options = _parser().parse_args(arguments)
+    return run_command(_parser(), arguments)
+
+
+def run_command(parser, arguments=None):
+    """Do what a parser sets as ``command``, tell its warnings and errors, and return the exit code.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+    arguments : list of str, optional
+        Those of the command line if not given.
+    """
+    options = parser.parse_args(arguments)
     with warnings.catch_warnings():
         told = (BoxWarning, ContactWarning, SegmentLengthWarning, TimeStepWarning)
         for category in told:
             warnings.simplefilter("always", category)
         show = warnings.showwarning
         warnings.showwarning = lambda message, category, *rest: (
-            _say("warning", message) if issubclass(category, told) else show(message, category, *rest)
+            say("warning", message) if issubclass(category, told) else show(message, category, *rest)
         )
         try:
             options.command(options)
             sys.stdout.flush()
         except InputError as error:
-            _say("error", error)
+            say("error", error)
             return _WRONG_INPUT
         except InstabilityError as error:
-            _say("error", error)
+            say("error", error)
             return _FAILED
         except OSError as error:
             if isinstance(error, BrokenPipeError) and _output_is_closed():
                 if _resumable(options):
-                    _say("error", "what read the output has ended, and so has the run: continue it with --resume.")
+                    say("error", "what read the output has ended, and so has the run: continue it with --resume.")
                 return _OUTPUT_CLOSED
             hint = (
                 " A run that has been interrupted by this can be continued with --resume."
@@ -63,12 +74,12 @@ def main(arguments=None):
                 else ""
             )
             if isinstance(error, FileNotFoundError) and _has_lost_its_directory(options):
-                _say("error", f"{options.output} has been removed while the run went on. Start it again ({error}).")
+                say("error", f"{options.output} has been removed while the run went on. Start it again ({error}).")
             else:
-                _say("error", f"{error}.{hint}")
+                say("error", f"{error}.{hint}")
             return _FAILED
         except KeyboardInterrupt:
-            _say("error", f"interrupted{'; a run can be continued with --resume' if _resumable(options) else ''}.")
+            say("error", f"interrupted{'; a run can be continued with --resume' if _resumable(options) else ''}.")
             return _KEYBOARD_INTERRUPT
         except SystemExit as exit_request:
             return exit_request.code
@@ -98,7 +109,8 @@ def _resumable(options):
     return options.command is _run and options.output is not None and Path(options.output).is_dir()
 
 
-def _say(kind, message):
+def say(kind, message):
+    """Write a message of a kind, such as "error" or "warning", to standard error."""
     print(f"{kind}: {message}", file=sys.stderr, flush=True)
 
 
@@ -136,8 +148,6 @@ def _parser():
     scans.add_command(commands)
     rendering.add_command(commands)
     export.add_command(commands)
-    _add_benchmarks(commands.add_parser("benchmark", help="measure speed and memory on this machine"))
-    _add_reproductions(commands.add_parser("reproduce", help="compute the results of a paper again"))
     information = commands.add_parser("info", help="print versions, engines and platforms, and why one is missing")
     information.set_defaults(command=_information)
     return parser
@@ -151,64 +161,6 @@ def _add_beginnings(commands):
     schema = commands.add_parser("schema", help="print the JSON schema of configurations, for editors")
     schema.add_argument("--scan", action="store_true", help="that of scans instead")
     schema.set_defaults(command=_schema)
-
-
-def _add_benchmarks(parser):
-    benchmarks = parser.add_subparsers(required=True, metavar="BENCHMARK")
-    engines = benchmarks.add_parser(
-        "engines", help="speed of the engines and of stock OpenMM: 200 chains of 64 segments, one to two minutes"
-    )
-    engines.set_defaults(command=_benchmark_engines)
-    scaling = benchmarks.add_parser(
-        "scaling", help="cost and memory per segment: 10^2 to 10^6 segments, several minutes and 3 GB of memory"
-    )
-    scaling.add_argument("--engine", choices=ENGINES, help="default: the fastest that is available")
-    scaling.set_defaults(command=_benchmark_scaling)
-    time_step = benchmarks.add_parser(
-        "time-step", help="errors and speed against the step, for every scheme and several systems, about ten minutes"
-    )
-    time_step.add_argument("--plot", metavar="FILE", help="draw the errors to FILE, a .png, .svg or .pdf")
-    time_step.set_defaults(command=_benchmark_time_step)
-    bead_spring = benchmarks.add_parser(
-        "bead-spring", help="segments of 10 to 1200 nm beside touching beads of stock OpenMM, several minutes"
-    )
-    bead_spring.set_defaults(command=_benchmark_bead_spring)
-    base_pairs = benchmarks.add_parser(
-        "base-pairs",
-        help="DNA base pair by base pair: the normal modes of Panja et al. beside scheme implicit, minutes",
-    )
-    base_pairs.set_defaults(command=_benchmark_base_pairs)
-    networks = benchmarks.add_parser(
-        "networks", help="links and contacts in implicit steps beside explicit ones: 200 filaments, ten minutes"
-    )
-    networks.set_defaults(command=_benchmark_networks)
-    kinetics = benchmarks.add_parser(
-        "kinetics", help="motors and crosslinkers: a contractile bundle at several steps, most of an hour"
-    )
-    kinetics.set_defaults(command=_benchmark_kinetics)
-    platforms = benchmarks.add_parser(
-        "platforms", help="filaments, alone and among particles, on each platform and in each precision, many minutes"
-    )
-    platforms.set_defaults(command=_benchmark_platforms)
-    for benchmark in (engines, scaling, time_step, bead_spring, base_pairs, networks, kinetics, platforms):
-        benchmark.add_argument("--quick", action="store_true", help="a rough measurement within a minute")
-        benchmark.add_argument("--json", metavar="FILE", help="write machine, settings and results to FILE as well")
-
-
-def _add_reproductions(parser):
-    parser.add_argument(
-        "paper",
-        metavar="PAPER",
-        help="pesek2016: Pesek et al., Soft Matter 2016, 12, 3360; "
-        "diffusion: Chandran and Mofrad, Phys. Rev. E 2009, 79, 011906; "
-        "panja2015: Panja, Barkema and van Leeuwen, Phys. Rev. E 2015, 92, 032603; "
-        "beams: accuracy of beam elements and straight segments against the number of unknowns",
-    )
-    parser.add_argument("--figure", type=int, metavar="N", help="only this figure of the paper")
-    parser.add_argument("--quick", action="store_true", help="reduced statistics, five minutes at most")
-    parser.add_argument("--force", action="store_true", help="measure anew what DIR holds already")
-    parser.add_argument("--output", metavar="DIR", required=True, help="directory for results, pictures and the page")
-    parser.set_defaults(command=_reproduce)
 
 
 def _run(options):
@@ -229,7 +181,7 @@ def _run(options):
     try:
         groups, linkers = run_with_summary(configuration, options.output, options.resume)
     except RunInterrupted as interruption:
-        _say("interrupted", interruption)
+        say("interrupted", interruption)
         raise SystemExit(128 + interruption.signal_number) from None
     directory = RunDirectory(options.output)
     print()
@@ -325,7 +277,7 @@ def _check_time_step(configuration, options):
         check = check_step(configuration, _SECONDS_OF_CHECK if options.seconds is None else options.seconds, progress)
     except RunInterrupted as interruption:
         progress.finish()
-        _say("interrupted", interruption)
+        say("interrupted", interruption)
         raise SystemExit(128 + interruption.signal_number) from None
     progress.finish()
     print(f"\n{check}", flush=True)
@@ -336,112 +288,13 @@ def _check_time_step(configuration, options):
     if check.verdict == "wrong":
         raise SystemExit(_WRONG_STEP)
     if check.verdict != "right":
-        _say("warning", "the step is not known to be right: give the check more time with --seconds.")
+        say("warning", "the step is not known to be right: give the check more time with --seconds.")
 
 
 def _information(options):
     from .runs.information import format_information
 
     print(format_information())
-
-
-def _reproduce(options):
-    from .output.progress import ProgressMessages
-    from .reproduce.reproduction import reproduce, unexplained
-
-    progress = ProgressMessages()
-    try:
-        content = reproduce(options.paper, options.output, options.figure, options.quick, options.force, say=progress)
-    finally:
-        progress.finish()
-    results = [result for case in content["cases"] for result in case["results"]]
-    for result in results:
-        if result["reason"]:
-            print(f"{result['name']} differs. {result['reason']}")
-    agreeing = sum(result["verdict"] == "agrees" for result in results)
-    print(f"{agreeing} of {len(results)} results agree. Written to {options.output}: results.json, {options.paper}.md")
-    if unexplained(content):
-        _say("error", f"without a stated cause differ: {', '.join(unexplained(content))}")
-        raise SystemExit(_FAILED)
-
-
-def _benchmark_engines(options):
-    from .benchmark.engines import FULL, QUICK, benchmark_engines
-
-    _benchmark(options, lambda say: benchmark_engines(QUICK if options.quick else FULL, say=say))
-
-
-def _benchmark_scaling(options):
-    from .benchmark.scaling import FULL, QUICK, benchmark_scaling
-
-    _benchmark(options, lambda say: benchmark_scaling(options.engine, QUICK if options.quick else FULL, say))
-
-
-def _benchmark_time_step(options):
-    from .benchmark.time_step import FULL, QUICK, benchmark_time_step
-    from .benchmark.time_step_figure import check_figure_path, write_figure
-
-    if options.plot is not None:
-        check_figure_path(options.plot)
-    results = []
-
-    def measure(say):
-        report, measured = benchmark_time_step(QUICK if options.quick else FULL, say)
-        results.extend(measured)
-        return report
-
-    _benchmark(options, measure)
-    if options.plot is not None:
-        write_figure(results, options.plot)
-        print(f"Drawn to {options.plot}")
-
-
-def _benchmark_bead_spring(options):
-    from .benchmark.bead_spring import FULL, QUICK, benchmark_bead_spring
-
-    _benchmark(options, lambda say: benchmark_bead_spring(QUICK if options.quick else FULL, say))
-
-
-def _benchmark_base_pairs(options):
-    from .benchmark.base_pairs import FULL, QUICK, benchmark_base_pairs
-
-    _benchmark(options, lambda say: benchmark_base_pairs(QUICK if options.quick else FULL, say))
-
-
-def _benchmark_networks(options):
-    from .benchmark.networks import FULL, QUICK, benchmark_networks
-
-    _benchmark(options, lambda say: benchmark_networks(QUICK if options.quick else FULL, say))
-
-
-def _benchmark_kinetics(options):
-    from .benchmark.kinetics import FULL, QUICK, benchmark_kinetics
-
-    _benchmark(options, lambda say: benchmark_kinetics(QUICK if options.quick else FULL, say=say))
-
-
-def _benchmark_platforms(options):
-    from .benchmark.platforms import FULL, QUICK, benchmark_platforms
-
-    _benchmark(options, lambda say: benchmark_platforms(QUICK if options.quick else FULL, say))
-
-
-def _benchmark(options, measure):
-    from .benchmark.report import format_report, write_json
-    from .output.files import check_output_path
-    from .output.progress import ProgressMessages
-
-    if options.json is not None:
-        check_output_path(options.json)
-    progress = ProgressMessages()
-    try:
-        report = measure(progress)
-    finally:
-        progress.finish()
-    print(format_report(report))
-    if options.json is not None:
-        write_json(report, options.json)
-        print(f"\nWritten to {options.json}")
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ from graphlib import TopologicalSorter
 
 import pytest
 
-from support.repository import PACKAGE, ROOT, TESTS
+from support.repository import PACKAGE, ROOT, STUDIES, TESTS
 
 # From the lowest to the highest. Modules on one line may import each other, but not in a circle.
 FLOORS = (
@@ -29,8 +29,6 @@ FLOORS = (
     ("runs",),
     ("rendering",),
     ("export",),
-    ("benchmark",),
-    ("reproduce",),
     ("scans",),
     ("cli",),
 )
@@ -93,13 +91,27 @@ def test_no_cpp_file_includes_upwards():
     assert {path.name for path in source.iterdir() if path.is_dir()} == {*floors, "python"}
 
 
-def test_no_module_imports_the_package_by_its_name():
+def packages_imported_by(path):
+    """Names of the packages that a file imports, its own aside."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+        if isinstance(node, ast.ImportFrom) and node.level == 0:
+            names.append(node.module)
+        yield from (name.split(".")[0] for name in names)
+
+
+def test_no_module_imports_studies_or_the_package_by_its_name():
+    unwanted = {"openmm_cylchain", *(path.stem for path in STUDIES.iterdir())}
+    assert {"benchmark", "reproduce"} <= unwanted
     for module, path in MODULES.items():
-        for node in ast.walk(ast.parse(path.read_text())):
-            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
-            if isinstance(node, ast.ImportFrom) and node.level == 0:
-                names.append(node.module)
-            assert not any(name.startswith("openmm_cylchain") for name in names), module
+        assert not unwanted & {*packages_imported_by(path)}, module
+
+
+def test_benchmarks_import_no_reproduction():
+    paths = [*(STUDIES / "benchmark").rglob("*.py")]
+    assert len(paths) > 10
+    for path in paths:
+        assert "reproduce" not in packages_imported_by(path), path
 
 
 def test_no_test_file_imports_another():

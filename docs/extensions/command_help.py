@@ -1,4 +1,4 @@
-"""The directive ``command-help``: what ``openmm-cylchain COMMAND --help`` prints, for every command that there is."""
+"""The directive ``command-help``: what ``--help`` prints, for every command and every study that there is."""
 
 import argparse
 import os
@@ -6,6 +6,7 @@ import os
 from docutils import nodes
 from sphinx.util.docutils import SphinxDirective
 
+from command_line import create_parser
 from openmm_cylchain import cli
 
 
@@ -15,7 +16,8 @@ class CommandHelp(SphinxDirective):
     def run(self):
         """Sections with the texts of the parsers."""
         os.environ["COLUMNS"] = "100"
-        return [section for name, parser in commands_of(cli._parser()) for section in self._section(name, parser)]
+        commands = [*commands_of(cli._parser()), *commands_of(create_parser())]
+        return [section for name, parser in commands for section in self._section(name, parser)]
 
     def _section(self, name, parser):
         section = nodes.section(ids=[nodes.make_id(name)], names=[name])

@@ -232,7 +232,7 @@ def implicit_time_step(
     its neighbours allow: after dt, waves of up to the length xi = (a dt l0/gamma_perp)^(1/4) have relaxed, which turns
     it by k_B T xi/a, and the filament turns as a whole by 24 k_B T dt l0/(gamma_perp L^3). Either must stay below
     0.15^2, or 0.1^2 for scheme "implicit-second-order", with which bends of long filaments are up to 10 % too large at
-    0.15 rad. Measured with ``openmm-cylchain benchmark time-step``, F-actin, microtubules, DNA and chains with free
+    0.15 rad. Measured with ``python studies benchmark time-step``, F-actin, microtubules, DNA and chains with free
     joints keep equilibrium within 5 % and dynamics within 10 % at that step and at several times as much. A step must
     also resolve the slowest relaxation of the filament, by 20 steps, or 2 of scheme "implicit-second-order", which is
     1 % too fast there: gamma_perp/(l0 a) (L/4.73)^4, or that of the mode in which a ring of radius R becomes oval,

@@ -1,6 +1,6 @@
 """The benchmark of DNA base pair by base pair: rows of one chain. How fast anything is is never asserted."""
 
-from openmm_cylchain.benchmark.base_pairs import BasePairEffort, benchmark_base_pairs
+from benchmark.base_pairs import BasePairEffort, benchmark_base_pairs
 
 
 def test_rows_of_one_chain():

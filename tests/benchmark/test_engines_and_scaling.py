@@ -8,9 +8,9 @@ import numpy as np
 import openmm
 import pytest
 
-from openmm_cylchain import cli
-from openmm_cylchain.benchmark import engines as engine_benchmark
-from openmm_cylchain.benchmark import measurement, memory, report, scaling, systems
+from benchmark import engines as engine_benchmark
+from benchmark import measurement, memory, report, scaling, systems
+from command_line import main
 from support.contexts import positions_of
 
 TINY_ENGINES = engine_benchmark.Effort(repetitions=2, seconds=1e-3)
@@ -264,8 +264,9 @@ def test_memory_is_measured_in_a_fresh_process():
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="resident memory is read from /proc")
 def test_fresh_process_imports_this_very_package(tmp_path, monkeypatch):
-    (tmp_path / "openmm_cylchain").mkdir()
-    (tmp_path / "openmm_cylchain" / "__init__.py").write_text("raise ImportError('the wrong package')")
+    for name in ("openmm_cylchain", "benchmark"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "__init__.py").write_text("raise ImportError('the wrong package')")
     monkeypatch.chdir(tmp_path)
     assert memory.measure_growth("portable", 2, 4).resident > 0
 
@@ -317,7 +318,7 @@ def instant(monkeypatch):
 @pytest.mark.parametrize("name", ["engines", "scaling"])
 def test_json(name, instant, tmp_path, capsys):
     path = tmp_path / "result.json"
-    assert cli.main(["benchmark", name, "--quick", "--json", str(path)]) == 0
+    assert main(["benchmark", name, "--quick", "--json", str(path)]) == 0
     content = json.loads(path.read_text())
     assert set(content) == {"machine", "settings", "rows", "missing"}
     assert content["rows"] == [
@@ -330,7 +331,7 @@ def test_json(name, instant, tmp_path, capsys):
 
 def test_file_that_cannot_be_written_is_refused_before_measuring(instant, tmp_path, capsys):
     for path in (tmp_path / "no" / "file.json", tmp_path):
-        assert cli.main(["benchmark", "engines", "--json", str(path)]) == 2
+        assert main(["benchmark", "engines", "--json", str(path)]) == 2
         captured = capsys.readouterr()
         assert captured.err.startswith("error: ") and captured.out == ""
 
@@ -340,13 +341,13 @@ def test_failure_to_write_does_not_speak_of_runs(instant, tmp_path, monkeypatch,
         raise OSError("No space left on device")
 
     monkeypatch.setattr(report, "write_json", fail)
-    assert cli.main(["benchmark", "engines", "--json", str(tmp_path / "file.json")]) == 1
+    assert main(["benchmark", "engines", "--json", str(tmp_path / "file.json")]) == 1
     error = capsys.readouterr().err
     assert "No space left" in error and "--resume" not in error
 
 
 def test_missing_engine_is_refused(without_compiled, capsys):
-    assert cli.main(["benchmark", "scaling", "--engine", "compiled"]) == 2
+    assert main(["benchmark", "scaling", "--engine", "compiled"]) == 2
     assert "compiled engine is missing" in capsys.readouterr().err
 
 
@@ -355,5 +356,5 @@ def test_interruption(monkeypatch, capsys):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(engine_benchmark, "benchmark_engines", interrupt)
-    assert cli.main(["benchmark", "engines"]) == 130
+    assert main(["benchmark", "engines"]) == 130
     assert "--resume" not in capsys.readouterr().err

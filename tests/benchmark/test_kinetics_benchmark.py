@@ -8,10 +8,10 @@ import pytest
 from openmm import unit
 from scipy.integrate import quad
 
-from openmm_cylchain import cli
-from openmm_cylchain.benchmark import kinetic_systems, kinetics, many_linkers, measurement
-from openmm_cylchain.benchmark.kinetic_systems import BundleSystem, create_bundle, relaxed_positions
-from openmm_cylchain.benchmark.kinetics import Course
+from benchmark import kinetic_systems, kinetics, many_linkers, measurement
+from benchmark.kinetic_systems import BundleSystem, create_bundle, relaxed_positions
+from benchmark.kinetics import Course
+from command_line import main
 
 SMALL = BundleSystem(filaments=8, motors=20, crosslinkers=15, length=2500.0)
 FEW = many_linkers.NetworkSystem(filaments=12, segments=8, linkers=900, edge=300.0, steps=40)
@@ -167,7 +167,7 @@ def test_benchmark_of_kinetics(monkeypatch, tmp_path, capsys):
     )
     monkeypatch.setattr(kinetics, "time_interleaved", quickly)
     path = tmp_path / "result.json"
-    assert cli.main(["benchmark", "kinetics", "--quick", "--json", str(path)]) == 0
+    assert main(["benchmark", "kinetics", "--quick", "--json", str(path)]) == 0
     content = json.loads(path.read_text())
     rows = {row["name"]: row for row in content["rows"]}
     assert len(rows) == len(content["rows"])

@@ -7,12 +7,13 @@ from itertools import product
 import numpy as np
 import pytest
 
-from openmm_cylchain import Filaments, cli
+from benchmark import measurement, network_systems, networks
+from benchmark.measurement import Estimate
+from benchmark.network_systems import NETWORKS, create_network, nearest_places, relaxed_positions
+from benchmark.networks import NetworkErrors
+from command_line import main
+from openmm_cylchain import Filaments
 from openmm_cylchain.analysis.crossings import segment_distances
-from openmm_cylchain.benchmark import measurement, network_systems, networks
-from openmm_cylchain.benchmark.measurement import Estimate
-from openmm_cylchain.benchmark.network_systems import NETWORKS, create_network, nearest_places, relaxed_positions
-from openmm_cylchain.benchmark.networks import NetworkErrors
 
 BY_NAME = {network.name: network for network in NETWORKS}
 EDGE = 400.0
@@ -185,7 +186,7 @@ def test_benchmark_of_networks(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr(networks, "QUICK", networks.NetworkEffort(systems, 5, 200.0, 100, 10, 2, 1e-3, ("contacts",)))
     monkeypatch.setattr(networks, "time_interleaved", quickly)
     path = tmp_path / "result.json"
-    assert cli.main(["benchmark", "networks", "--quick", "--json", str(path)]) == 0
+    assert main(["benchmark", "networks", "--quick", "--json", str(path)]) == 0
     content = json.loads(path.read_text())
     assert content["missing"] == {}
     rows = {row["name"]: row for row in content["rows"]}

@@ -7,9 +7,10 @@ import openmm
 import pytest
 from openmm import unit
 
-from openmm_cylchain import InputError, cli, stokes_friction
-from openmm_cylchain.benchmark import platforms
-from openmm_cylchain.benchmark.platforms import ChainsSize, Effort, MixedSize
+from benchmark import platforms
+from benchmark.platforms import ChainsSize, Effort, MixedSize
+from command_line import main
+from openmm_cylchain import InputError, stokes_friction
 from support.contexts import forces_of, new_context, positions_of
 from support.platforms import GPU_CASES
 
@@ -100,7 +101,7 @@ def test_platforms_that_are_not_there_are_missing_with_the_reason(monkeypatch):
 def _run(monkeypatch, tmp_path):
     monkeypatch.setattr(platforms, "QUICK", Effort(SMALL, 60, 2, 1e-3))
     path = tmp_path / "result.json"
-    assert cli.main(["benchmark", "platforms", "--quick", "--json", str(path)]) == 0
+    assert main(["benchmark", "platforms", "--quick", "--json", str(path)]) == 0
     content = json.loads(path.read_text())
     return content, {row["name"]: row["value"] for row in content["rows"]}
 

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from openmm_cylchain import cli
-from openmm_cylchain.benchmark import bead_spring, measurement, time_step, time_step_figure
-from openmm_cylchain.benchmark.measurement import Estimate
-from openmm_cylchain.benchmark.time_step import StepErrors, SystemErrors, ladder
-from openmm_cylchain.benchmark.time_step_systems import F_ACTIN_SYSTEM, WORKLOAD
+from benchmark import bead_spring, measurement, time_step, time_step_figure
+from benchmark.measurement import Estimate
+from benchmark.time_step import StepErrors, SystemErrors, ladder
+from benchmark.time_step_systems import F_ACTIN_SYSTEM, WORKLOAD
+from command_line import main
 from openmm_cylchain.dynamics.schemes import CYLINDER_SCHEMES
 
 TINY = time_step.Effort((replace(F_ACTIN_SYSTEM, segments=4),), frames=24, share=0.05, every=3, repetitions=2)
@@ -94,7 +94,7 @@ def test_benchmark_of_the_time_step(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr(time_step, "WORKLOAD", replace(WORKLOAD, segments=4, chains=20))
     monkeypatch.setattr(time_step, "time_interleaved", quickly)
     paths = tmp_path / "result.json", tmp_path / "figure.png"
-    assert cli.main(["benchmark", "time-step", "--quick", "--json", str(paths[0]), "--plot", str(paths[1])]) == 0
+    assert main(["benchmark", "time-step", "--quick", "--json", str(paths[0]), "--plot", str(paths[1])]) == 0
     content = json.loads(paths[0].read_text())
     names = {row["name"] for row in content["rows"]}
     assert {"recommended_step_f_actin", "speed_stock_openmm_bead_spring"} <= names
@@ -111,9 +111,9 @@ def quickly(cases, repetitions, seconds, say=None, minimum_steps=1):
 
 def test_plot_that_cannot_be_written_is_refused_before_measuring(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr(time_step, "benchmark_time_step", lambda *arguments: pytest.fail("has measured"))
-    assert cli.main(["benchmark", "time-step", "--plot", str(tmp_path / "no" / "figure.png")]) == 2
+    assert main(["benchmark", "time-step", "--plot", str(tmp_path / "no" / "figure.png")]) == 2
     assert capsys.readouterr().err.startswith("error: ")
-    assert cli.main(["benchmark", "time-step", "--plot", str(tmp_path / "figure.txt")]) == 2
+    assert main(["benchmark", "time-step", "--plot", str(tmp_path / "figure.txt")]) == 2
     assert "figure.txt" in capsys.readouterr().err
 
 

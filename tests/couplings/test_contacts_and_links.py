@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from openmm_cylchain.benchmark.network_systems import NETWORKS, SEGMENTS, create_network, enlarged, relaxed_positions
+from benchmark.network_systems import NETWORKS, SEGMENTS, create_network, enlarged, relaxed_positions
 
 FILAMENTS, STEPS = 40, 150
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from benchmark.network_systems import nearest_places
 from openmm_cylchain import F_ACTIN, Crosslinks, Filaments, capsule_contact_force
-from openmm_cylchain.benchmark.network_systems import nearest_places
 from support.contexts import new_context, positions_of
 from support.solvent import TEMPERATURE, VISCOSITY
 

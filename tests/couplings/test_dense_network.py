@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from openmm_cylchain.benchmark.memory import resident_and_peak
+from benchmark.memory import resident_and_peak
 from support.dense_network import crosslinked_network, dense_network
 
 

@@ -9,6 +9,7 @@ import matplotlib
 import numpy as np
 import pytest
 
+import command_line
 from openmm_cylchain import cli
 from openmm_cylchain.runs.beginnings import write_start
 from openmm_cylchain.runs.configuration import read_configuration
@@ -168,16 +169,17 @@ COMMANDS = [(page, words) for page in PAGES for block in blocks_of(page, "sh", "
 INLINE = [
     (page, shlex.split(command))
     for page in PAGES
-    for command in re.findall(r"`(openmm-cylchain [^`\n]*)`", page.read_text())
+    for command in re.findall(r"`((?:openmm-cylchain|python studies) [^`\n]*)`", page.read_text())
 ]
 
 
 def test_commands_exist_with_these_options(capsys):
     checked = 0
     for page, words in COMMANDS:
-        program = words[0].removeprefix(".venv/bin/")
-        if program == "openmm-cylchain":
-            parse(page, words[1:], capsys)
+        words = [words[0].removeprefix(".venv/bin/"), *words[1:]]
+        program = words[0]
+        if program == "openmm-cylchain" or words[:2] == ["python", "studies"]:
+            parse(page, words, capsys)
             checked += 1
         elif program == "python" and words[1].endswith(".py"):
             assert (ROOT / words[1]).exists(), (name_of(page), words)
@@ -198,9 +200,14 @@ def test_commands_exist_with_these_options(capsys):
     assert checked >= 6
 
 
+def parser_and_arguments(words):
+    return (command_line.create_parser(), words[2:]) if words[0] == "python" else (cli._parser(), words[1:])
+
+
 def parse(page, words, capsys):
+    parser, arguments = parser_and_arguments(words)
     try:
-        cli._parser().parse_args(words)
+        parser.parse_args(arguments)
     except SystemExit as refusal:
         assert refusal.code == 0, (name_of(page), words, capsys.readouterr().err)
 
@@ -209,8 +216,8 @@ def test_commands_in_text_exist():
     """In running text, a command may leave its arguments out; its words and options are there."""
     assert len(INLINE) > 20
     for page, words in INLINE:
-        parser = cli._parser()
-        for word in words[1:]:
+        parser, arguments = parser_and_arguments(words)
+        for word in arguments:
             word = word.strip("[],.")
             choices = next((one.choices for one in parser._actions if hasattr(one.choices, "keys")), {})
             if word in choices:

@@ -7,8 +7,8 @@ import pytest
 from openmm import unit
 from scipy.spatial import cKDTree
 
+from benchmark.kinetic_systems import BundleSystem, create_bundle, relaxed_positions
 from openmm_cylchain import MICROTUBULE, Crosslinker, Cylinder, Filaments, Hand, filament_wall_force
-from openmm_cylchain.benchmark.kinetic_systems import BundleSystem, create_bundle, relaxed_positions
 from support.contexts import new_context, positions_of
 
 MILLISECOND = 1e3

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from openmm_cylchain import cli
-from openmm_cylchain.reproduce import beam_accuracy, chromosome, rods_on_string
-from openmm_cylchain.reproduce.records import Records
+from command_line import main
+from reproduce import beam_accuracy, chromosome, rods_on_string
+from reproduce.records import Records
 from support.verdicts import verdicts
 
 CASES = {case.key: case for case in beam_accuracy.CASES}
@@ -22,7 +22,7 @@ def soft(monkeypatch):
 def test_the_page(tmp_path, monkeypatch):
     monkeypatch.setattr(chromosome, "_BEAM_COPIES", {True: 400})
     monkeypatch.setattr(beam_accuracy, "_DRAWN", (3,))
-    assert cli.main(["reproduce", "beams", "--quick", "--output", str(tmp_path)]) == 0
+    assert main(["reproduce", "beams", "--quick", "--output", str(tmp_path)]) == 0
     page = (tmp_path / "beams.md").read_text()
     assert "30 of 30 results agree" in page and "(columns.png)" in page
     assert "| beam elements | 1 | 4 | +0.75" in page

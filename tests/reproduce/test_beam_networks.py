@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from openmm_cylchain.reproduce import beam_networks
-from openmm_cylchain.reproduce.beam_networks import LENGTH, SPAN, STIFFNESS, STRAIN, Network
-from openmm_cylchain.reproduce.rods_on_string import ACTIN
+from reproduce import beam_networks
+from reproduce.beam_networks import LENGTH, SPAN, STIFFNESS, STRAIN, Network
+from reproduce.rods_on_string import ACTIN
 
 
 def two_filaments():

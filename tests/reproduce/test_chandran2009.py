@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from openmm_cylchain import cli, theory
-from openmm_cylchain.reproduce import cantilevers, chromosome, rod_diffusion, rods_on_string, thin_film
-from openmm_cylchain.reproduce.records import Records
-from openmm_cylchain.reproduce.rods_on_string import ACTIN, CHROMOSOME, MICROMETER, ROD, SECOND
-from openmm_cylchain.reproduce.transverse_modes import transverse_modes
+from command_line import main
+from openmm_cylchain import theory
+from reproduce import cantilevers, chromosome, rod_diffusion, rods_on_string, thin_film
+from reproduce.records import Records
+from reproduce.rods_on_string import ACTIN, CHROMOSOME, MICROMETER, ROD, SECOND
+from reproduce.transverse_modes import transverse_modes
 from support.verdicts import verdicts
 
 # Closed forms
@@ -114,7 +115,7 @@ def test_rods_and_a_planted_fault(tmp_path, monkeypatch):
 @pytest.mark.slow
 def test_cantilevers_and_a_planted_fault(tmp_path, monkeypatch):
     arguments = ["reproduce", "diffusion", "--quick", "--figure", "8", "--output", str(tmp_path / "page")]
-    assert cli.main(arguments) == 0
+    assert main(arguments) == 0
     page = (tmp_path / "page" / "diffusion.md").read_text()
     assert "Chandran" in page and "92 of 92 results agree" in page and "(figure-08b.png)" in page
     assert "| deflection end load 10 2 beam elements |" in page and "ruler deflection loads of the text 2 beam" in page

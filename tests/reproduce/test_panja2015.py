@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from openmm_cylchain.bead_spring.modes import bead_spring_mode_forces
-from openmm_cylchain.reproduce import (
+from reproduce import (
     base_pairs,
     coarse_graining,
     explicit_steps,
@@ -16,8 +16,8 @@ from openmm_cylchain.reproduce import (
     simulated_time,
     tumbling,
 )
-from openmm_cylchain.reproduce.records import Records
-from openmm_cylchain.reproduce.result import Estimate
+from reproduce.records import Records
+from reproduce.result import Estimate
 from support.verdicts import verdicts
 
 # Closed forms

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from openmm_cylchain import theory
-from openmm_cylchain.reproduce import (
+from reproduce import (
     end_to_end,
     force_extension,
     free_segments,
@@ -16,9 +16,9 @@ from openmm_cylchain.reproduce import (
     speed,
     tables,
 )
-from openmm_cylchain.reproduce.records import Records
-from openmm_cylchain.reproduce.reproduction import reproduce, unexplained
-from openmm_cylchain.reproduce.result import Printed
+from reproduce.records import Records
+from reproduce.reproduction import reproduce, unexplained
+from reproduce.result import Printed
 from support.verdicts import verdicts
 
 

@@ -6,13 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from openmm_cylchain import InputError, cli
-from openmm_cylchain.reproduce import pesek2016, simulation
-from openmm_cylchain.reproduce.case import Case, Outcome
-from openmm_cylchain.reproduce.page import format_number, format_page
-from openmm_cylchain.reproduce.records import Records
-from openmm_cylchain.reproduce.reproduction import unexplained
-from openmm_cylchain.reproduce.result import (
+from command_line import main
+from openmm_cylchain import InputError
+from reproduce import pesek2016, simulation
+from reproduce.case import Case, Outcome
+from reproduce.page import format_number, format_page
+from reproduce.records import Records
+from reproduce.reproduction import unexplained
+from reproduce.result import (
     ROUNDING,
     AtLeast,
     AtMost,
@@ -197,7 +198,7 @@ def two_cases(monkeypatch):
 
 def test_reproduction(two_cases, tmp_path, capsys):
     folder = tmp_path / "new"
-    assert cli.main(["reproduce", "pesek2016", "--quick", "--output", str(folder)]) == 0
+    assert main(["reproduce", "pesek2016", "--quick", "--output", str(folder)]) == 0
     content = json.loads((folder / "results.json").read_text())
     assert [case["key"] for case in content["cases"]] == ["one", "two"]
     assert content["cases"][0]["results"][0]["verdict"] == "agrees"
@@ -209,9 +210,9 @@ def test_reproduction(two_cases, tmp_path, capsys):
     assert "1 of 2 results agree" in output.out and "measuring double" in output.err
 
     # What is there is kept; one figure with full statistics replaces that of the quick run, and no other.
-    assert cli.main(["reproduce", "pesek2016", "--quick", "--output", str(folder)]) == 0
+    assert main(["reproduce", "pesek2016", "--quick", "--output", str(folder)]) == 0
     assert two_cases == [1]
-    assert cli.main(["reproduce", "pesek2016", "--figure", "1", "--output", str(folder)]) == 1
+    assert main(["reproduce", "pesek2016", "--figure", "1", "--output", str(folder)]) == 1
     assert two_cases == [1, 2]
     content = json.loads((folder / "results.json").read_text())
     assert [case["quick"] for case in content["cases"]] == [False, True]
@@ -228,16 +229,16 @@ def test_reproduction(two_cases, tmp_path, capsys):
     ],
 )
 def test_what_is_not_reproduced(arguments, message, tmp_path, capsys):
-    assert cli.main(["reproduce", *arguments, "--output", str(tmp_path / "new")]) == 2
+    assert main(["reproduce", *arguments, "--output", str(tmp_path / "new")]) == 2
     assert message in capsys.readouterr().err
     assert not (tmp_path / "new").exists()
 
 
 def test_output_that_is_no_directory_of_this_paper(two_cases, tmp_path, capsys):
     (tmp_path / "file").write_text("")
-    assert cli.main(["reproduce", "pesek2016", "--output", str(tmp_path / "file")]) == 2
+    assert main(["reproduce", "pesek2016", "--output", str(tmp_path / "file")]) == 2
     (tmp_path / "results.json").write_text('{"title": "another"}')
-    assert cli.main(["reproduce", "pesek2016", "--output", str(tmp_path)]) == 2
+    assert main(["reproduce", "pesek2016", "--output", str(tmp_path)]) == 2
     assert two_cases == []
 
 

@@ -11,7 +11,7 @@ PAGES += sorted(ROOT.glob("docs/**/*.md"))
 
 _FENCE = re.compile(r"^( *)```([^\n]*)\n(.*?)^\1```$", flags=re.DOTALL | re.MULTILINE)
 # README's commands beside the two that are run word for word.
-_INDENTED_COMMAND = re.compile(r"^    (openmm-cylchain .*)$", flags=re.MULTILINE)
+_INDENTED_COMMAND = re.compile(r"^    ((?:openmm-cylchain|python studies) .*)$", flags=re.MULTILINE)
 
 
 @dataclass(frozen=True)

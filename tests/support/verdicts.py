@@ -1,6 +1,6 @@
 """What a reproduction says of each of its results."""
 
-from openmm_cylchain.reproduce.records import Records
+from reproduce.records import Records
 
 
 def verdicts(case, folder):
