@@ -67,7 +67,7 @@ class KineticsEffort:
 
 _SYSTEMS = (BundleSystem(), BundleSystem(name="bundle_without_contacts", contacts=False))
 FULL = KineticsEffort(_SYSTEMS, (1000.0, 2000.0, 2500.0), 200, 1e6, 20, 4, 50, 7, 2.0)
-QUICK = KineticsEffort(_SYSTEMS, (2000.0,), 50, 2e5, 4, 2, 10, 3, 1.0, NetworkSystem(steps=100))
+QUICK = KineticsEffort(_SYSTEMS, (2000.0,), 50, 1e5, 4, 2, 10, 3, 1.0, NetworkSystem(steps=100))
 
 
 @dataclass(frozen=True)
