@@ -18,9 +18,6 @@ from .couplings.pulling import ConstantVelocityPulling, change_constant_force, c
 from .couplings.shapes import Box, Cylinder, Ellipsoid, Plane, Slab, Sphere
 from .couplings.wall_points import random_points_on
 from .couplings.walls import filament_wall_force, wall_force
-from .dynamics.recommended_step import fene_steps, recommended_time_step
-from .dynamics.stability import stability_bounds, time_step_bounds
-from .dynamics.time_step import TimeStep, effective_rate
 from .engine_choice import prepare_openmm
 from .engines.gpu_platforms import enable_platform
 from .errors import (
@@ -54,6 +51,9 @@ from .systems.periodic import make_trajectory_whole, make_whole, remove_jumps
 from .systems.run_reporter import RunReporter
 from .systems.step_check import check_time_step
 from .systems.step_check_results import ObservableCheck, StepCheck
+from .time_steps.recommended_step import fene_steps, recommended_time_step
+from .time_steps.stability import stability_bounds, time_step_bounds
+from .time_steps.time_step import TimeStep, effective_rate
 from .version import __version__
 
 __all__ = [

@@ -213,9 +213,9 @@ _BOUND_LABELS = {
 
 
 def _time_step(options):
-    from .dynamics.recommended_step import recommended_time_step
-    from .dynamics.stability import stability_bounds, time_step_bounds
     from .runs.configuration import read_configuration
+    from .time_steps.recommended_step import recommended_time_step
+    from .time_steps.stability import stability_bounds, time_step_bounds
     from .units.text import format_time
 
     if not options.check and (options.seconds is not None or options.json is not None):

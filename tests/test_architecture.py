@@ -21,7 +21,7 @@ FLOORS = (
     ("output",),
     ("couplings",),
     ("kinetics",),
-    ("dynamics",),
+    ("time_steps",),
     ("engines",),
     ("analysis",),
     ("systems",),

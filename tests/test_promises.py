@@ -21,8 +21,8 @@ from openmm_cylchain import (
     recommended_time_step,
 )
 from openmm_cylchain.couplings import walls as confinement
-from openmm_cylchain.dynamics.recommended_step import fene_steps
-from openmm_cylchain.dynamics.time_step import effective_rate
+from openmm_cylchain.time_steps.recommended_step import fene_steps
+from openmm_cylchain.time_steps.time_step import effective_rate
 from support.chain_energies import energies_of, exact_energies
 from support.closed_shapes import ClosedShape
 from support.contexts import new_context, positions_of

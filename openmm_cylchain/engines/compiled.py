@@ -10,19 +10,19 @@ from pathlib import Path
 import numpy as np
 import openmm
 
-from ..dynamics.other_particles import describe_other_particles
-from ..dynamics.precision import PRECISIONS as ALL_PRECISIONS
-from ..dynamics.precision import check_precision
-from ..dynamics.schemes import IMPLICIT_SCHEMES, check_scheme
-from ..dynamics.schemes import SCHEMES as ALL_SCHEMES
-from ..dynamics.step_watch import DividedSteps, ExplicitWork
-from ..dynamics.time_step import as_step
 from ..engine_choice import why_openmm_differs
 from ..errors import InputError, InstabilityError, instability_in_force
 from ..kinetics.binding_force import find_binding_force, make_binding_force
 from ..mechanics.flow import Flow, as_flow
 from ..mechanics.potentials import BENDING_MODELS as ALL_BENDING_MODELS
 from ..mechanics.potentials import STRETCHING_POTENTIALS
+from ..time_steps.other_particles import describe_other_particles
+from ..time_steps.precision import PRECISIONS as ALL_PRECISIONS
+from ..time_steps.precision import check_precision
+from ..time_steps.schemes import IMPLICIT_SCHEMES, check_scheme
+from ..time_steps.schemes import SCHEMES as ALL_SCHEMES
+from ..time_steps.step_watch import DividedSteps, ExplicitWork
+from ..time_steps.time_step import as_step
 from ..units.quantities import TEMPERATURE, non_negative, whole_number
 from .description import (
     advice_after_blow_up,

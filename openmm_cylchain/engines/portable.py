@@ -3,9 +3,9 @@
 import numpy as np
 
 from ..couplings.periodicity import is_periodic
-from ..dynamics.other_particles import describe_other_particles
 from ..errors import InputError
 from ..mechanics.geometry import joined
+from ..time_steps.other_particles import describe_other_particles
 from .description import (
     advice_after_blow_up,
     describe_chains,

@@ -15,12 +15,12 @@ import numpy as np
 import openmm
 
 from ..couplings.periodicity import is_periodic
-from ..dynamics.schemes import EXPLICIT_SCHEMES
 from ..errors import InputError, InstabilityError, note_raised_in_force
 from ..mechanics.broken_segment import find_broken_segment
 from ..mechanics.flow import Flow, flow_velocities
 from ..mechanics.geometry import to_nearest_images
 from ..mechanics.redistribution import STEPS
+from ..time_steps.schemes import EXPLICIT_SCHEMES
 
 REDISTRIBUTION_NAME = "CylinderChainRedistribution"
 

@@ -6,11 +6,11 @@ import numpy as np
 import openmm
 from openmm import unit
 
-from ..dynamics.schemes import EXPLICIT_SCHEMES, check_scheme
-from ..dynamics.step_watch import ExplicitWork, WorkRecorder
-from ..dynamics.time_step import as_step
 from ..errors import InputError, instability_in_force
 from ..mechanics.flow import Flow, as_flow
+from ..time_steps.schemes import EXPLICIT_SCHEMES, check_scheme
+from ..time_steps.step_watch import ExplicitWork, WorkRecorder
+from ..time_steps.time_step import as_step
 from ..units.quantities import BOLTZMANN, TEMPERATURE, non_negative, whole_number
 from .portable_displacements import (
     CONFIGURATION,

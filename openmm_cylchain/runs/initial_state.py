@@ -16,12 +16,12 @@ from ..couplings.crosslinks import Crosslinks
 from ..couplings.joints import Joints
 from ..couplings.pulling import constant_force, constant_tension
 from ..couplings.walls import filament_wall_force, wall_force
-from ..dynamics.recommended_step import recommended_time_step
 from ..errors import InputError
 from ..filaments import shapes
 from ..filaments.segment_place import SegmentPlace
 from ..systems.filaments import Filaments
 from ..theory import chain_mean_square_end_to_end
+from ..time_steps.recommended_step import recommended_time_step
 from .keys import ConfigurationError
 
 _ATTEMPTS, _NODES_OF_ATTEMPTS = 2000, 10**5

@@ -13,7 +13,6 @@ from ..couplings.crosslink_records import CrosslinkFile
 from ..couplings.crosslinks import Crosslinks
 from ..couplings.force_tables import ForceTables
 from ..couplings.mean_forces import contact_forces, wall_forces
-from ..dynamics.precision import PRECISIONS
 from ..engines.description import describe_lengths, filament_label
 from ..engines.gpu_platforms import GPU_PLATFORMS, enable_platform
 from ..errors import InputError, InstabilityError
@@ -29,6 +28,7 @@ from ..output.run_tables import (
 )
 from ..systems.described_runs import energy_cells, total_energies, write_topology
 from ..systems.step_check import check_time_step
+from ..time_steps.precision import PRECISIONS
 from ..units.quantities import thermal_energy
 from ..units.text import format_time
 from .description import describe

@@ -8,13 +8,6 @@ from openmm import app, unit
 
 from ..couplings.periodicity import is_periodic
 from ..couplings.stiff_joints import warn_of_stiff_joints
-from ..dynamics.bead_spring_step import refuse_modes
-from ..dynamics.coupled_forces import CoupledForces
-from ..dynamics.precision import check_precision, refuse_mixed_precision_of_beams
-from ..dynamics.schemes import MODES, check_scheme
-from ..dynamics.step_of_system import recommended_step_of
-from ..dynamics.step_warnings import warn_of_long_step
-from ..dynamics.time_step import TimeStep, as_step
 from ..engine_choice import default_scheme
 from ..engines.description import filament_label
 from ..engines.protocol import IntegratorSettings
@@ -22,6 +15,13 @@ from ..errors import InputError
 from ..filaments.attachments import add_virtual_site, attachment_positions, neighbors
 from ..filaments.beam_refusals import refuse_beams
 from ..mechanics.flow import Flow, as_flow
+from ..time_steps.bead_spring_step import refuse_modes
+from ..time_steps.coupled_forces import CoupledForces
+from ..time_steps.precision import check_precision, refuse_mixed_precision_of_beams
+from ..time_steps.schemes import MODES, check_scheme
+from ..time_steps.step_of_system import recommended_step_of
+from ..time_steps.step_warnings import warn_of_long_step
+from ..time_steps.time_step import TimeStep, as_step
 from ..units.quantities import TEMPERATURE, non_negative
 from ..units.types import BoxVectors, Numbers, Scalar, Vectors
 from .filaments_in_contexts import FilamentsInContexts

@@ -38,13 +38,13 @@ from typing import Any
 import numpy as np
 import openmm
 
-from ..dynamics.recommended_step import recommended_time_step
-from ..dynamics.schemes import check_scheme
-from ..dynamics.time_step import TimeStep, as_step
 from ..engine_choice import default_scheme
 from ..errors import InputError, InstabilityError
 from ..kinetics.binding_force import find_binding_force
 from ..mechanics.flow import Flow
+from ..time_steps.recommended_step import recommended_time_step
+from ..time_steps.schemes import check_scheme
+from ..time_steps.time_step import TimeStep, as_step
 from ..units.quantities import DIMENSIONLESS, positive, thermal_energy, whole_number
 from ..units.text import format_time
 from ..units.types import Numbers, Scalar, Vectors

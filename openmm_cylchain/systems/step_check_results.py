@@ -4,7 +4,7 @@ import math
 from dataclasses import asdict, dataclass
 from typing import Any, cast
 
-from ..dynamics.step_watch import LARGEST_DIVIDED_SHARE
+from ..time_steps.step_watch import LARGEST_DIVIDED_SHARE
 from ..units.text import format_time
 from .step_check_rule import DIVERGED, LARGEST_ERROR, diverged, sigmas, surely_large
 from .step_check_text import format_check, percent, two_digits

@@ -19,13 +19,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from openmm_cylchain import Filaments
-from openmm_cylchain.dynamics.recommended_step import recommended_time_step
-from openmm_cylchain.dynamics.schemes import CYLINDER_SCHEMES, EXPLICIT_SCHEMES
-from openmm_cylchain.dynamics.stability import stability_bounds
-from openmm_cylchain.dynamics.step_watch import LARGEST_DIVIDED_SHARE
 from openmm_cylchain.engine_choice import choose_engine
 from openmm_cylchain.errors import InstabilityError
 from openmm_cylchain.theory import bending_energy_mean, stretching_energy_mean
+from openmm_cylchain.time_steps.recommended_step import recommended_time_step
+from openmm_cylchain.time_steps.schemes import CYLINDER_SCHEMES, EXPLICIT_SCHEMES
+from openmm_cylchain.time_steps.stability import stability_bounds
+from openmm_cylchain.time_steps.step_watch import LARGEST_DIVIDED_SHARE
 from openmm_cylchain.units.text import format_time
 
 from .measurement import Case, Estimate, describe_machine, median, ratio, scaled, time_interleaved

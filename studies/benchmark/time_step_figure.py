@@ -6,9 +6,9 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from openmm_cylchain.dynamics.schemes import CYLINDER_SCHEMES
 from openmm_cylchain.errors import InputError
 from openmm_cylchain.output.files import check_output_path
+from openmm_cylchain.time_steps.schemes import CYLINDER_SCHEMES
 
 from .time_step import CRITERIA
 

@@ -8,8 +8,8 @@ import math
 
 import numpy as np
 
-from openmm_cylchain.dynamics.recommended_step import recommended_time_step
 from openmm_cylchain.theory import chain_mean_square_end_to_end, chain_persistence_length, wlc_mean_square_end_to_end
+from openmm_cylchain.time_steps.recommended_step import recommended_time_step
 
 from . import simulation, style
 from .case import Case, Outcome

@@ -9,7 +9,6 @@ import math
 import numpy as np
 
 from openmm_cylchain.couplings.pulling import constant_tension
-from openmm_cylchain.dynamics.recommended_step import recommended_time_step
 from openmm_cylchain.theory import (
     chain_extension,
     crossover_force,
@@ -19,6 +18,7 @@ from openmm_cylchain.theory import (
     marko_siggia_extension,
     marko_siggia_spring_constant,
 )
+from openmm_cylchain.time_steps.recommended_step import recommended_time_step
 
 from . import simulation, style
 from .case import Case, Outcome

@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmark.measurement import Case as Timed
 from benchmark.measurement import describe_machine, median, ratio, scaled, time_interleaved
-from openmm_cylchain.dynamics.recommended_step import recommended_time_step
+from openmm_cylchain.time_steps.recommended_step import recommended_time_step
 
 from . import base_pairs, style
 from .base_pairs import BASE_PAIRS, LARGEST_STEPS, PRINTED_UNIT, TEMPERATURE

@@ -15,7 +15,7 @@ from benchmark.measurement import describe_machine, median, ratio, scaled, time_
 from benchmark.systems import REFERENCE
 from benchmark.time_step import equilibrium_errors, system_stepper
 from benchmark.time_step_systems import BenchmarkSystem, actin
-from openmm_cylchain.dynamics.recommended_step import recommended_time_step
+from openmm_cylchain.time_steps.recommended_step import recommended_time_step
 
 from . import style
 from .case import Case, Outcome

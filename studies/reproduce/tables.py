@@ -6,8 +6,8 @@ Ours is what the software says of a filament; the theory is each formula of the 
 import math
 
 from benchmark.measurement import Estimate
-from openmm_cylchain.dynamics.stability import bead_spring_bounds, time_step_bounds
 from openmm_cylchain.mechanics.friction import momentum_relaxation_times
+from openmm_cylchain.time_steps.stability import bead_spring_bounds, time_step_bounds
 
 from .case import Case, Outcome
 from .result import ROUNDING, Result, printed

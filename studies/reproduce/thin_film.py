@@ -7,7 +7,6 @@ import numpy as np
 from benchmark.measurement import scaled
 from openmm_cylchain.analysis.statistics import fit_relaxation_time
 from openmm_cylchain.beams.curve import element_slopes
-from openmm_cylchain.dynamics.recommended_step import recommended_time_step
 from openmm_cylchain.theory import (
     bending_mode_variance,
     chain_mean_square_end_to_end,
@@ -16,6 +15,7 @@ from openmm_cylchain.theory import (
     wlc_mean_square_end_to_end,
     wlc_tangent_correlation,
 )
+from openmm_cylchain.time_steps.recommended_step import recommended_time_step
 
 from . import rods_on_string, simulation, style
 from .case import Case, Outcome

@@ -16,8 +16,8 @@ from openmm_cylchain import (
     theory,
     time_step_bounds,
 )
-from openmm_cylchain.dynamics.bead_spring_step import bead_spring_stability_bound
-from openmm_cylchain.dynamics.schemes import EXPLICIT_SCHEMES
+from openmm_cylchain.time_steps.bead_spring_step import bead_spring_stability_bound
+from openmm_cylchain.time_steps.schemes import EXPLICIT_SCHEMES
 from openmm_cylchain.units.quantities import thermal_energy
 from support.contexts import energy_of, forces_of, new_context, positions_of
 from support.platforms import ENGINES

@@ -11,7 +11,7 @@ from benchmark.measurement import Estimate
 from benchmark.time_step import StepErrors, SystemErrors, ladder
 from benchmark.time_step_systems import F_ACTIN_SYSTEM, WORKLOAD
 from command_line import main
-from openmm_cylchain.dynamics.schemes import CYLINDER_SCHEMES
+from openmm_cylchain.time_steps.schemes import CYLINDER_SCHEMES
 
 TINY = time_step.Effort((replace(F_ACTIN_SYSTEM, segments=4),), frames=24, share=0.05, every=3, repetitions=2)
 

@@ -14,8 +14,8 @@ from openmm_cylchain import F_ACTIN, ContactWarning, Filaments, InputError, caps
 from openmm_cylchain.analysis import CrossingCounter
 from openmm_cylchain.couplings.capsule_contacts import as_capsule_contact_force, default_capsule_stiffness
 from openmm_cylchain.couplings.contacts import contact_force
-from openmm_cylchain.dynamics.explicit_forces import ExplicitForces
 from openmm_cylchain.engines.compiled import plugin
+from openmm_cylchain.time_steps.explicit_forces import ExplicitForces
 from support.contexts import energy_of, forces_of, new_context, positions_of
 from support.platforms import ON_COMPILED_PLATFORMS
 from support.solvent import KT, TEMPERATURE, VISCOSITY

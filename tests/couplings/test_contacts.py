@@ -16,8 +16,8 @@ from openmm_cylchain.couplings.contacts import (
     excluded_pairs,
     share_exclusions,
 )
-from openmm_cylchain.dynamics.recommended_step import contact_time_step
-from openmm_cylchain.dynamics.stability import contact_stiffness_bound, diffusion_bound
+from openmm_cylchain.time_steps.recommended_step import contact_time_step
+from openmm_cylchain.time_steps.stability import contact_stiffness_bound, diffusion_bound
 from support.contexts import forces_of, new_context
 from support.platforms import ENGINE_PLATFORMS, PLATFORMS
 from support.solvent import KT, TEMPERATURE, VISCOSITY

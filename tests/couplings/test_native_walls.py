@@ -22,8 +22,8 @@ from openmm_cylchain import (
     wall_force,
 )
 from openmm_cylchain.couplings.walls import as_filament_wall_force
-from openmm_cylchain.dynamics.explicit_forces import ExplicitForces
 from openmm_cylchain.engines.compiled import plugin
+from openmm_cylchain.time_steps.explicit_forces import ExplicitForces
 from support.contexts import energy_of, forces_of, new_context, positions_of
 from support.platforms import ON_COMPILED_PLATFORMS
 from support.solvent import KT, TEMPERATURE, VISCOSITY

@@ -15,7 +15,7 @@ from openmm_cylchain import (
     constant_force,
     constant_tension,
 )
-from openmm_cylchain.dynamics.schemes import IMPLICIT_SCHEMES
+from openmm_cylchain.time_steps.schemes import IMPLICIT_SCHEMES
 from support.contexts import new_context, positions_of
 from support.dense_mechanics import straight_matrices
 from support.linked_pairs import PICONEWTON_PER_NANOMETER

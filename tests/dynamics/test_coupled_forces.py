@@ -15,8 +15,8 @@ from openmm_cylchain import (
     filament_wall_force,
 )
 from openmm_cylchain.couplings.shapes import Plane
-from openmm_cylchain.dynamics.coupled_forces import CoupledForces
-from openmm_cylchain.dynamics.explicit_forces import ExplicitForces
+from openmm_cylchain.time_steps.coupled_forces import CoupledForces
+from openmm_cylchain.time_steps.explicit_forces import ExplicitForces
 from support.contexts import new_context
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import eigh
 
 from openmm_cylchain import MICROTUBULE, Filaments
-from openmm_cylchain.dynamics.schemes import IMPLICIT_SCHEMES, amplification_of_second_order
+from openmm_cylchain.time_steps.schemes import IMPLICIT_SCHEMES, amplification_of_second_order
 from support.contexts import new_context, positions_of
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 

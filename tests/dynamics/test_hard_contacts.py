@@ -12,7 +12,7 @@ from openmm_cylchain import (
     Filaments,
     capsule_contact_force,
 )
-from openmm_cylchain.dynamics.hard_contacts import LARGEST_SOFTNESS, longest_resolving_step
+from openmm_cylchain.time_steps.hard_contacts import LARGEST_SOFTNESS, longest_resolving_step
 from support.solvent import TEMPERATURE, VISCOSITY
 
 ACTIN = F_ACTIN.with_segment_length(100)

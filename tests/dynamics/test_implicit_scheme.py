@@ -8,8 +8,8 @@ import pytest
 from openmm import unit
 
 from openmm_cylchain import F_ACTIN, MICROTUBULE, Filaments, InputError, InstabilityError
-from openmm_cylchain.dynamics.recommended_step import recommended_time_step
-from openmm_cylchain.dynamics.schemes import IMPLICIT_SCHEMES
+from openmm_cylchain.time_steps.recommended_step import recommended_time_step
+from openmm_cylchain.time_steps.schemes import IMPLICIT_SCHEMES
 from support.bending_models import BENDING_MODELS
 from support.contexts import energy_of, new_context, positions_of
 from support.equilibrium_cases import CASES, Case, exact_means, measured_means

@@ -10,10 +10,10 @@ import pytest
 from openmm import unit
 
 from openmm_cylchain import F_ACTIN, Filaments, Flow, InputError
-from openmm_cylchain.dynamics.precision import check_precision
 from openmm_cylchain.engines.compiled import PRECISIONS, CylinderChainIntegrator
 from openmm_cylchain.runs import configuration
 from openmm_cylchain.runs.run import create_simulation
+from openmm_cylchain.time_steps.precision import check_precision
 from support.chain_energies import energies_of, exact_energies
 from support.contexts import new_context, positions_of
 from support.solvent import KT, TEMPERATURE, VISCOSITY

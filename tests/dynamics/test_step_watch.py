@@ -18,8 +18,8 @@ from openmm_cylchain import (
 )
 from openmm_cylchain.couplings.shapes import Slab
 from openmm_cylchain.couplings.walls import wall_force
-from openmm_cylchain.dynamics.step_watch import ERROR_WORK, WARNING_WORK, DividedSteps, ExplicitWork, WorkRecorder
 from openmm_cylchain.engines.compiled import CylinderChainIntegrator
+from openmm_cylchain.time_steps.step_watch import ERROR_WORK, WARNING_WORK, DividedSteps, ExplicitWork, WorkRecorder
 from support.contexts import new_context, positions_of
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 

@@ -21,9 +21,9 @@ from openmm_cylchain import (
     TimeStepWarning,
     recommended_time_step,
 )
-from openmm_cylchain.dynamics import schemes, stability, step_warnings, time_step
 from openmm_cylchain.mechanics.flow import Flow
 from openmm_cylchain.mechanics.redistribution import STEPS, ChainSet, resistance_bands
+from openmm_cylchain.time_steps import schemes, stability, step_warnings, time_step
 from support.contexts import forces_of, new_context, positions_of
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 

@@ -13,10 +13,10 @@ import pytest
 from openmm import unit
 
 from openmm_cylchain import DSDNA, F_ACTIN, Filaments, InputError, InstabilityError
-from openmm_cylchain.dynamics.schemes import SCHEMES
 from openmm_cylchain.engines import compiled as native
 from openmm_cylchain.engines.compiled import CylinderChainForce, CylinderChainIntegrator
 from openmm_cylchain.mechanics.potentials import BENDING_POTENTIALS
+from openmm_cylchain.time_steps.schemes import SCHEMES
 from support.contexts import energy_of, new_context, positions_of
 from support.platforms import ON_COMPILED_PLATFORMS
 

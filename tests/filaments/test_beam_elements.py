@@ -11,8 +11,8 @@ from openmm_cylchain import F_ACTIN, Filaments, FilamentType, InputError, make_w
 from openmm_cylchain.analysis import contour_lengths, end_to_end_vectors, joint_cosines, segment_lengths, tangents
 from openmm_cylchain.beams.curve import arc_lengths, curve_points, element_energies, node_tangents
 from openmm_cylchain.beams.equilibrium import calibrated_rigidity, mean_cosine
-from openmm_cylchain.dynamics.recommended_step import recommended_time_step
 from openmm_cylchain.output.reporters import FilamentReporter
+from openmm_cylchain.time_steps.recommended_step import recommended_time_step
 from support.contexts import energy_of, new_context, new_simulation, positions_of
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 

@@ -9,7 +9,7 @@ from openmm import unit
 
 from openmm_cylchain import Filaments, InputError, contact_force
 from openmm_cylchain.beams.curve import element_points, particle_weights
-from openmm_cylchain.dynamics.beam_response import BeamResponse
+from openmm_cylchain.time_steps.beam_response import BeamResponse
 from support.contexts import forces_of, new_context, positions_of
 from support.linked_beams import BEAM, LENGTH, place_of
 from support.solvent import KT, TEMPERATURE, VISCOSITY

@@ -15,10 +15,10 @@ from openmm_cylchain import (
     InputError,
     theory,
 )
-from openmm_cylchain.dynamics.recommended_step import recommended_time_step
 from openmm_cylchain.engine_choice import default_scheme
 from openmm_cylchain.runs.configuration import changed_keys, parse_configuration, read_configuration
 from openmm_cylchain.runs.run import create_simulation
+from openmm_cylchain.time_steps.recommended_step import recommended_time_step
 from support.repository import EXAMPLES
 
 SOLVENT = '[solvent]\ntemperature = "310 K"\nviscosity = "1.71 mPa*s"\n'

@@ -6,8 +6,8 @@ import numpy as np
 from openmm import unit
 
 from openmm_cylchain import F_ACTIN, Filaments, FilamentType
-from openmm_cylchain.dynamics.stability import stability_bounds
 from openmm_cylchain.filaments.equilibrium import JointAngleDistribution, SegmentLengthDistribution
+from openmm_cylchain.time_steps.stability import stability_bounds
 from support.bending_models import BENDING_MODELS
 from support.contexts import new_context, positions_of
 from support.solvent import KT, TEMPERATURE, VISCOSITY

@@ -7,7 +7,7 @@ import openmm
 from openmm import app, unit
 
 from openmm_cylchain import DSDNA_BASE_PAIRS, F_ACTIN, Filaments, Flow, stokes_friction
-from openmm_cylchain.dynamics.stability import stability_bounds
+from openmm_cylchain.time_steps.stability import stability_bounds
 from support.solvent import KT, TEMPERATURE, VISCOSITY
 
 ACTIN = replace(F_ACTIN, name="ACT60", segment_length=60.0)

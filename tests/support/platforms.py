@@ -3,8 +3,8 @@
 import openmm
 import pytest
 
-from openmm_cylchain.dynamics.schemes import EXPLICIT_SCHEMES
 from openmm_cylchain.engines.gpu_platforms import GPU_PLATFORMS, why_not_on
+from openmm_cylchain.time_steps.schemes import EXPLICIT_SCHEMES
 
 from .compiled_platform import CompiledPlatform
 

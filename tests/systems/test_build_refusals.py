@@ -9,7 +9,7 @@ import pytest
 from openmm import app, unit
 
 from openmm_cylchain import DSDNA, F_ACTIN, Filaments, InputError, TimeStepWarning
-from openmm_cylchain.dynamics.stability import stability_bounds
+from openmm_cylchain.time_steps.stability import stability_bounds
 from support.contexts import new_context
 from support.solvent import VISCOSITY
 

@@ -3,8 +3,8 @@
 import math
 from dataclasses import dataclass
 
-from ...dynamics.schemes import SCHEMES
 from ...engine_choice import ENGINES, default_scheme
+from ...time_steps.schemes import SCHEMES
 from ...units import quantities as units
 from ...units.text import format_time
 from ..keys import REQUIRED, Choice, Flag, Key, Quantity, Text, Whole, WordOrQuantity
