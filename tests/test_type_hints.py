@@ -14,7 +14,7 @@ TYPED = (
     "theory",
     "output",
     "couplings",
-    "dynamics",
+    "time_steps",
     "analysis",
     "systems",
 )
