@@ -4,6 +4,14 @@
  * the chains that the program is compiled for.
  */
 
+#if !defined(BENDING_KratkyPorod) && !defined(BENDING_Quadratic) && !defined(BENDING_InscribedCircle) && \
+    !defined(BENDING_BondDifference)
+#error "The kernels do not know this bending model: its formulas are missing in potentials.cc"
+#endif
+#if !defined(STRETCHING_Harmonic) && !defined(STRETCHING_FENE)
+#error "The kernels do not know this stretching model: its formulas are missing in potentials.cc"
+#endif
+
 /** f of a bend b = f (t2-t1), and df/dc, for the cosine c. */
 typedef struct {double f, slope;} BendFactor;
 
