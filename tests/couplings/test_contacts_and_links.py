@@ -33,6 +33,7 @@ def test_few_steps_are_divided_and_none_tears_filaments_away(system, relaxed, fa
         network.integrator.step(1)
     moves = np.linalg.norm(np.diff(centers, axis=0), axis=2)
     assert np.isfinite(network.positions()).all()
-    assert network.integrator.getNumDividedSteps() < 0.02 * FILAMENTS * STEPS
+    # One is divided for all filaments that are connected, which are most of them.
+    assert network.integrator.getNumDividedSteps() < 0.05 * FILAMENTS * STEPS
     assert moves.max() < 10 * np.median(moves)
     assert network.energies()["contact"] > 1
