@@ -31,7 +31,7 @@ def test_motors_shorten_a_bundle_and_crosslinkers_alone_do_not():
     """As fast in steps of 2.5 ms as in steps of 0.8 ms, which resolve contacts, within what seeds differ by."""
     positions = relaxed_positions(BUNDLE, 100)
     with_motors = _shortening(BUNDLE, positions, 2.5, range(1, 9))
-    in_short_steps = _shortening(BUNDLE, positions, 0.8, range(31, 32))
+    in_short_steps = _shortening(BUNDLE, positions, 0.8, range(31, 34))
     without = _shortening(replace(BUNDLE, speed=0.0), positions, 2.5, range(1, 4))
     error = np.sqrt(with_motors.var(ddof=1) * (1 / len(with_motors) + 1 / len(in_short_steps)))
     assert with_motors.mean() > 0.08
