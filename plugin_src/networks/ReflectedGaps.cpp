@@ -31,7 +31,7 @@ const double DAMPING_OF_GAPS = 0.5;
 const double LARGEST_PULL = 10;
 /** Sweeps are taken to change by this factor at most from one to the next. */
 const double LARGEST_RATE = 0.995;
-/** The same in nm, where nothing moves thermally. */
+/** What sweeps and iterations may leave to change of a gap where nothing moves thermally, in nm. */
 const double LEAST_CHANGE_OF_GAPS = 1e-7;
 /** A gap that has just been found is pushed if its exponential variate is less than this. */
 const double LARGE_REFLECTION = 4;

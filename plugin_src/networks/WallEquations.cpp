@@ -72,23 +72,13 @@ void WallEquations::begin(const CoupledStart& start, const Loop& newLoop) {
 
 void WallEquations::beginStage(int, int, const double*) {
     reached.assign(places.size(), 0);
-    rooms.assign(places.size(), Room());
+    rooms.assign(places.size(), RoomBeforeWall());
     for (Part& part : parts)
         part.states.clear();
 }
 
-WallEquations::Position WallEquations::positionOf(int particle, const double* positions) const {
-    const WallParticle& own = system->particles[particle];
-    Position result;
-    if (own.onCurve.isOnCurve())
-        locate(own.onCurve, positions, NULL, result.at);
-    else
-        copy_n(positions+3*own.particle, 3, result.at);
-    return result;
-}
-
 double WallEquations::findDepthAt(const State& state, const double* positions) const {
-    const Position position = positionOf(state.particle, positions);
+    const WallPosition position = positionOf(state.particle, positions);
     const double* y = position.at;
     const double* g = state.gradient;
     return state.offset+g[0]*y[0]+g[1]*y[1]+g[2]*y[2];
@@ -105,7 +95,7 @@ void WallEquations::linearise(int iteration, const double* moved, vector<Couplin
             const WallParticle& particle = system->particles[state.particle];
             const bool searches = iteration <= ITERATIONS_THAT_LOOK_AT_FACES || state.deviates;
             if (searches) {
-                const Position position = positionOf(state.particle, moved);
+                const WallPosition position = positionOf(state.particle, moved);
                 const double* y = position.at;
                 double* const g = state.gradient;
                 const double depth = findDepth(system->wall, state.face, y, particle.radius, g);
@@ -193,7 +183,7 @@ void WallEquations::finishPart(int number, const double* moves, const double* mo
         if (!takesPart(i))
             continue;
         const WallParticle& own = system->particles[i];
-        const Position position = positionOf(i, moved);
+        const WallPosition position = positionOf(i, moved);
         if (rooms[i].holds(position.at))
             continue;
         double deepest = -HUGE_VAL;

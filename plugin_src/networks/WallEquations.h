@@ -1,9 +1,9 @@
 #ifndef CYLCHAIN_WALL_EQUATIONS_H_
 #define CYLCHAIN_WALL_EQUATIONS_H_
 
-#include "couplings/Walls.h"
 #include "networks/ImplicitCouplings.h"
 #include "networks/RestGap.h"
+#include "networks/WallPositions.h"
 #include <vector>
 
 namespace cylchain {
@@ -65,10 +65,9 @@ private:
         /** The packs that need another iteration, some of them more than once. */
         std::vector<int> unfinished;
     };
-    struct Position {
-        double at[3];
-    };
-    Position positionOf(int particle, const double* positions) const;
+    WallPosition positionOf(int particle, const double* positions) const {
+        return cylchain::positionOf(system->particles[particle], positions);
+    }
     double findDepthAt(const State& state, const double* positions) const;
     bool takesPart(int particle) const {
         return places[particle].pack >= 0 && (*active)[places[particle].pack];
@@ -90,17 +89,7 @@ private:
     std::vector<double> responses;
     std::vector<char> together;
     std::vector<unsigned char> reached;
-    /** Where a particle was, and the square of how far it may go from there before it is beyond another face. */
-    struct Room {
-        double from[3], square = -1;
-        bool holds(const double* to) const {
-            double way = 0;
-            for (int k = 0; k < 3; k++)
-                way += (to[k]-from[k])*(to[k]-from[k]);
-            return way < square;
-        }
-    };
-    std::vector<Room> rooms;
+    std::vector<RoomBeforeWall> rooms;
     std::vector<Part> parts;
 };
 

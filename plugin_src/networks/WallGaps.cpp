@@ -57,24 +57,14 @@ void WallGaps::begin(const CoupledStart& start, const Loop& newLoop) {
 
 void WallGaps::beginStage(int, int, const double*) {
     reached.assign(places.size(), 0);
-    rooms.assign(places.size(), Room());
+    rooms.assign(places.size(), RoomBeforeWall());
     states.clear();
-}
-
-WallGaps::Position WallGaps::positionOf(int particle, const double* positions) const {
-    const WallParticle& own = system->particles[particle];
-    Position result;
-    if (own.onCurve.isOnCurve())
-        locate(own.onCurve, positions, NULL, result.at);
-    else
-        copy_n(positions+3*own.particle, 3, result.at);
-    return result;
 }
 
 /** Find where a gap is now, and its gradient half-way there. */
 void WallGaps::follow(const State& state, const double* moved, Gap& gap) const {
     const double radius = system->particles[state.particle].radius;
-    const Position from = positionOf(state.particle, begun), to = positionOf(state.particle, moved);
+    const WallPosition from = positionOf(state.particle, begun), to = positionOf(state.particle, moved);
     double middle[3], gradient[3];
     for (int k = 0; k < 3; k++)
         middle[k] = 0.5*(from.at[k]+to.at[k]);
@@ -95,7 +85,7 @@ void WallGaps::findNew(int number, const double* moved) {
         if (places[i].pack < 0)
             continue;
         const double radius = system->particles[i].radius;
-        const Position from = positionOf(i, begun), to = positionOf(i, moved);
+        const WallPosition from = positionOf(i, begun), to = positionOf(i, moved);
         if (rooms[i].holds(to.at))
             continue;
         const double least = LARGEST_GAP_EXPONENT*kT*responses[i];

@@ -1,8 +1,8 @@
 #ifndef CYLCHAIN_WALL_GAPS_H_
 #define CYLCHAIN_WALL_GAPS_H_
 
-#include "couplings/Walls.h"
 #include "networks/ImplicitCouplings.h"
+#include "networks/WallPositions.h"
 #include <vector>
 
 namespace cylchain {
@@ -40,15 +40,14 @@ private:
         /** The gap from the hard surface, less that from the face. */
         double depth;
     };
-    struct Position {
-        double at[3];
-    };
     /** What a chunk of particles adds. */
     struct Part {
         std::vector<State> states;
         std::vector<Gap> gaps;
     };
-    Position positionOf(int particle, const double* positions) const;
+    WallPosition positionOf(int particle, const double* positions) const {
+        return cylchain::positionOf(system->particles[particle], positions);
+    }
     void follow(const State& state, const double* moved, Gap& gap) const;
     void findNew(int part, const double* moved);
     const WallSystem* system = nullptr;
@@ -64,16 +63,7 @@ private:
     std::vector<PlaceOnChain> places;
     std::vector<double> responses;
     std::vector<unsigned char> reached;
-    struct Room {
-        double from[3], square = -1;
-        bool holds(const double* to) const {
-            double way = 0;
-            for (int k = 0; k < 3; k++)
-                way += (to[k]-from[k])*(to[k]-from[k]);
-            return way < square;
-        }
-    };
-    std::vector<Room> rooms;
+    std::vector<RoomBeforeWall> rooms;
     std::vector<Part> parts;
     std::vector<State> states;
 };

@@ -1,0 +1,36 @@
+#ifndef CYLCHAIN_WALL_POSITIONS_H_
+#define CYLCHAIN_WALL_POSITIONS_H_
+
+#include "couplings/Walls.h"
+#include <algorithm>
+
+namespace cylchain {
+
+/** Where a particle of a wall is. */
+struct WallPosition {
+    double at[3];
+};
+
+inline WallPosition positionOf(const WallParticle& particle, const double* positions) {
+    WallPosition result;
+    if (particle.onCurve.isOnCurve())
+        locate(particle.onCurve, positions, nullptr, result.at);
+    else
+        std::copy_n(positions+3*particle.particle, 3, result.at);
+    return result;
+}
+
+/** Where a particle was, and the square of how far it may go from there before it is beyond another face. */
+struct RoomBeforeWall {
+    double from[3], square = -1;
+    bool holds(const double* to) const {
+        double way = 0;
+        for (int k = 0; k < 3; k++)
+            way += (to[k]-from[k])*(to[k]-from[k]);
+        return way < square;
+    }
+};
+
+} // namespace cylchain
+
+#endif /*CYLCHAIN_WALL_POSITIONS_H_*/
