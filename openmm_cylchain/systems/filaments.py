@@ -310,6 +310,7 @@ class Filaments(FilamentsInContexts):
             wormlike chain at a force that is a tenth off (see ``theory.wlc_share_of_force``).
         ContactWarning
             If scheme "implicit" takes contacts for hard ones: energies and forces of contacts and walls are too small.
+            If its step is nearly as long: contacts along filaments have up to a sixth too much energy.
         JointWarning
             If a joint of filaments that are not linked where it is has more than 20 EI/h of an element.
         BoxWarning
