@@ -12,7 +12,7 @@ from itertools import product
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
+import scipy
 
 from ..errors import InputError
 from ..filaments.beam_refusals import refuse_beams
@@ -260,7 +260,7 @@ def _box(box_vectors):
 def pairs_of_points(points: FloatArray, radius: float, box: FloatArray | None) -> Pairs:
     """All pairs within a radius, with every image of a periodic box: each once, the lower number first."""
     if box is None:
-        pairs = cKDTree(points).query_pairs(radius, output_type="ndarray")
+        pairs = scipy.spatial.cKDTree(points).query_pairs(radius, output_type="ndarray")
         return Pairs(pairs[:, 0], pairs[:, 1], np.zeros((len(pairs), 3)))
     inverse = np.linalg.inv(box)
     reach = radius * np.linalg.norm(inverse, axis=0)
@@ -280,7 +280,7 @@ def pairs_of_points(points: FloatArray, radius: float, box: FloatArray | None) -
             copies.append(near)
             shifts.append(np.broadcast_to(cell, (len(near), 3)))
     copy, shift = np.concatenate(copies), np.concatenate(shifts)
-    found = cKDTree((places[copy] + shift) @ box).query_pairs(radius, output_type="ndarray")
+    found = scipy.spatial.cKDTree((places[copy] + shift) @ box).query_pairs(radius, output_type="ndarray")
     # Originals come first among the points of the tree, and query_pairs puts the lower number first, but a pair of an
     # original with an image of a lower one comes again as an image of the original with the lower one.
     found = found[(found[:, 0] < len(points)) & (copy[found[:, 0]] < copy[found[:, 1]])]

@@ -3,7 +3,7 @@
 import math
 
 import numpy as np
-from scipy import sparse
+import scipy
 
 from ..errors import InputError
 from ..mechanics.geometry import segment_vectors
@@ -126,9 +126,9 @@ def find_bundles(run: Run, frame: int, gap: Scalar, angle: Scalar, overlap: Scal
         np.concatenate([[first, near.owners[second]], [second, near.owners[first]]], axis=1).astype(int), axis=1
     )
     count = len(run.filaments)
-    shared = sparse.coo_array((lengths[beside[0]], (near.owners[beside[0]], beside[1])), (count, count)).tocsr()
+    shared = scipy.sparse.coo_array((lengths[beside[0]], (near.owners[beside[0]], beside[1])), (count, count)).tocsr()
     joined = shared.minimum(shared.T) >= overlap if overlap > 0.0 else shared > 0.0
-    number, label = sparse.csgraph.connected_components(joined, directed=False)
+    number, label = scipy.sparse.csgraph.connected_components(joined, directed=False)
     bundles = [np.flatnonzero(label == each) for each in range(number)]
     return sorted((own for own in bundles if len(own) > 1), key=lambda own: -len(own))
 

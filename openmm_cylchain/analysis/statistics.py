@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 
 from ..errors import EquilibrationWarning, InputError
 from ..units.quantities import DIMENSIONLESS, TIME, in_units_of, positive, whole_number
@@ -363,7 +364,6 @@ def _jackknifed_fit(time, copies, amplitude, blocks):
 
 
 def _fit(time, correlation, amplitude):
-    from scipy.optimize import least_squares
 
     values = correlation / correlation[0]
     if not values.max() > values[-1]:
@@ -377,7 +377,7 @@ def _fit(time, correlation, amplitude):
         prefactor = parameters[1] if amplitude is None else amplitude
         return prefactor * np.exp(-parameters[0] * time / span) - values
 
-    fit = least_squares(residual, start if amplitude is not None else [*start, 1.0])
+    fit = scipy.optimize.least_squares(residual, start if amplitude is not None else [*start, 1.0])
     rate = fit.x[0] / span
     if not (fit.success and rate > 0):
         raise InputError("The correlation does not decay exponentially over the times given.")

@@ -8,7 +8,7 @@ diagonalise all of the energy but the contour length: dR_p/dtau = -zeta_p R_p + 
 """
 
 import numpy as np
-from scipy.fft import dct, idct
+import scipy
 
 from ..errors import InputError
 from ..units.quantities import LENGTH, TIME, in_units_of, positive, shown, thermal_energy, whole_number
@@ -21,12 +21,12 @@ def bead_spring_mode_amplitudes(positions: Vectors) -> FloatArray:
 
     R_0 is sqrt(N+1) times the centre of the beads. ``bead_spring_positions`` is the inverse.
     """
-    return np.asarray(dct(_vectors(positions, "positions"), type=2, norm="ortho", axis=-2))
+    return np.asarray(scipy.fft.dct(_vectors(positions, "positions"), type=2, norm="ortho", axis=-2))
 
 
 def bead_spring_positions(amplitudes: Vectors) -> FloatArray:
     """Positions (..., beads, 3) in nm of the beads of chains whose modes have the amplitudes (..., beads, 3)."""
-    return np.asarray(idct(_vectors(amplitudes, "amplitudes"), type=2, norm="ortho", axis=-2))
+    return np.asarray(scipy.fft.idct(_vectors(amplitudes, "amplitudes"), type=2, norm="ortho", axis=-2))
 
 
 def _vectors(values, name):

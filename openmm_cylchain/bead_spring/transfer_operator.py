@@ -23,8 +23,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from scipy.linalg import eigh
-from scipy.special import ive
+import scipy
 
 from ..units.types import FloatArray
 
@@ -193,7 +192,7 @@ class TransferOperator:
         root = np.sqrt(middle.weight)
         last = len(root) - 1
         zeroth, first = (
-            eigh(root[:, None] * kernel * root, eigvals_only=True, subset_by_index=[last, last])[0]
+            scipy.linalg.eigh(root[:, None] * kernel * root, eigvals_only=True, subset_by_index=[last, last])[0]
             for kernel in self._kernels_between(middle, middle)
         )
         return float(1.0 / np.log(zeroth / first))
@@ -278,11 +277,12 @@ _ASYMPTOTIC = 1e6
 
 def _zeroth_in_plane(x):
     # scipy gives up at very large x.
-    return np.where(x < _ASYMPTOTIC, ive(0, x), (1.0 + 0.125 / np.maximum(x, 1.0)) / np.sqrt(2.0 * np.pi * x + 1e-300))
+    asymptote = (1.0 + 0.125 / np.maximum(x, 1.0)) / np.sqrt(2.0 * np.pi * x + 1e-300)
+    return np.where(x < _ASYMPTOTIC, scipy.special.ive(0, x), asymptote)
 
 
 def _first_in_plane(x, zeroth):
-    return np.where(x < _ASYMPTOTIC, ive(1, x), zeroth * (1.0 - 0.5 / np.maximum(x, 1.0)))
+    return np.where(x < _ASYMPTOTIC, scipy.special.ive(1, x), zeroth * (1.0 - 0.5 / np.maximum(x, 1.0)))
 
 
 _RADIAL = {3: (_zeroth_in_space, _first_in_space), 2: (_zeroth_in_plane, _first_in_plane)}

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 
 from ..mechanics.geometry import unrolled
 from ..units.types import FloatArray
@@ -65,17 +66,16 @@ def natural_tangents(nodes: FloatArray, closed: bool = False) -> FloatArray:
     Of a ring, along the periodic one.
     """
     # Most filaments have no beams, and this is slow to load.
-    from scipy.interpolate import CubicSpline
 
     if closed:
         around = unrolled(nodes)
         along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(around, axis=0), axis=1))])
-        slopes = CubicSpline(along, around, bc_type="periodic")(along[:-1], 1)
+        slopes = scipy.interpolate.CubicSpline(along, around, bc_type="periodic")(along[:-1], 1)
     elif len(nodes) == 2:
         slopes = np.repeat(np.diff(nodes, axis=0), 2, axis=0)
     else:
         along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(nodes, axis=0), axis=1))])
-        slopes = CubicSpline(along, nodes, bc_type="natural")(along, 1)
+        slopes = scipy.interpolate.CubicSpline(along, nodes, bc_type="natural")(along, 1)
     return slopes / np.linalg.norm(slopes, axis=1, keepdims=True)
 
 

@@ -17,7 +17,7 @@ from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import brentq
+import scipy
 
 from ..errors import InputError
 from ..units.types import FloatArray
@@ -255,4 +255,4 @@ def calibrated_rigidity(bend: float) -> float:
     bend : float
         h/l_p, at most ``LONGEST_ELEMENT``.
     """
-    return 1.0 / brentq(lambda factor: np.log(mean_cosine(bend * factor)) + bend, 0.9, 1.3, xtol=1e-10)
+    return 1.0 / scipy.optimize.brentq(lambda factor: np.log(mean_cosine(bend * factor)) + bend, 0.9, 1.3, xtol=1e-10)

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import openmm
-from scipy.spatial import cKDTree
+import scipy
 
 from ..engine_choice import load_plugin
 from ..errors import JointWarning
@@ -53,7 +53,7 @@ def warn_of_stiff_joints(system: openmm.System, filaments: FilamentCollection) -
         # Of the angle: its energy is that of the difference of unit vectors, see Joints.add().
         ratios = np.where(joined, table.stiffness * (1.0 - 0.25 * table.rest_length**2) / rigidities, 0.0)
         stiff = np.flatnonzero(ratios > LARGEST_STIFFNESS)
-        away, _ = cKDTree(linked).query(own[stiff], p=np.inf)
+        away, _ = scipy.spatial.cKDTree(linked).query(own[stiff], p=np.inf)
         for row in stiff[away > _SAME_PLACE]:
             first, second = own[row, ::2].astype(int)
             stiffest = max(stiffest, (ratios[row], int(table.numbers[row]), first, second))

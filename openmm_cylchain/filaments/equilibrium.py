@@ -19,7 +19,7 @@ from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
-from scipy.integrate import simpson
+import scipy
 
 from ..units.quantities import TEMPERATURE, positive, thermal_energy
 from ..units.types import FloatArray, FloatOrArray, Scalar
@@ -63,7 +63,9 @@ class _Marginal:
     def mean(self, function: Callable[[FloatArray], npt.ArrayLike]) -> float:
         """Average of ``function`` (of the coordinate) by Simpson's rule."""
         values = np.where(self._weight > 0, function(self._coordinate), 0.0)
-        return simpson(values * self._weight, x=self._coordinate) / simpson(self._weight, x=self._coordinate)
+        integrands = values * self._weight, self._weight
+        weighted, total = (scipy.integrate.simpson(integrand, x=self._coordinate) for integrand in integrands)
+        return weighted / total
 
     def sample(self, generator: np.random.Generator, size: int) -> FloatArray:
         """Independent draws by inversion of the cumulative distribution."""

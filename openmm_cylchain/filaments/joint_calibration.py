@@ -3,7 +3,7 @@
 from functools import lru_cache
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 from ..mechanics.potentials import BENDING_POTENTIALS
 
@@ -54,4 +54,4 @@ def calibrated_stiffness(bending_model: str, decorrelation: float) -> float:
         return np.log(tangent_decorrelation(bending_model, np.exp(logarithm)) / decorrelation)
 
     lowest, highest = np.log(1e-3) - decorrelation, np.log(3.0 / decorrelation + 3.0)
-    return float(np.exp(brentq(excess, lowest, highest, xtol=1e-14, rtol=1e-14)))
+    return float(np.exp(scipy.optimize.brentq(excess, lowest, highest, xtol=1e-14, rtol=1e-14)))

@@ -8,7 +8,7 @@ system are handled at once: nodes are numbered chain after chain, and segment s 
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.linalg import LinAlgError, solveh_banded
+import scipy
 
 from ..errors import InstabilityError
 from ..units.types import BoolArray, FloatArray, IntArray
@@ -197,10 +197,10 @@ def redistribute(chains: ChainSet, nodes: FloatArray, forces: FloatArray, flow: 
     places = np.empty_like(right)
     places[chains.place] = right
     try:
-        velocities = solveh_banded(
+        velocities = scipy.linalg.solveh_banded(
             resistance_bands(chains, nodes), places.reshape(-1), overwrite_ab=True, lower=True, check_finite=False
         )
-    except LinAlgError:
+    except scipy.linalg.LinAlgError:
         raise InstabilityError("The resistance of a chain is singular.") from None
     return velocities.reshape(-1, 3)[chains.place]
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import openmm
+import scipy
 from openmm import app, unit
-from scipy.spatial import cKDTree
 
 from ..beams.curve import curve_points, element_points, element_slopes
 from ..couplings.capsule_contacts import capsule_contact_force, contact_spacing
@@ -436,7 +436,7 @@ def _random_pairs(own, filaments, box, generator):
     if box is not None and own.within >= 0.5 * min(box):
         raise InputError(f"{own.label} within must be less than half of the shortest edge of the box, {min(box):g} nm.")
     wrapped = points if box is None else np.mod(points, box) % box
-    found = cKDTree(wrapped, boxsize=box).query_pairs(own.within, output_type="ndarray")
+    found = scipy.spatial.cKDTree(wrapped, boxsize=box).query_pairs(own.within, output_type="ndarray")
     found = found[owners[found[:, 0]] != owners[found[:, 1]]]
     found = found[np.lexsort((found[:, 1], found[:, 0]))]
     if own.count is not None and len(found) > own.count:

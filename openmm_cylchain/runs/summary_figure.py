@@ -3,10 +3,10 @@
 import io
 
 import numpy as np
+import scipy
 from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from scipy.integrate import trapezoid
 
 from .. import theory
 from ..analysis.statistics import mean_with_error
@@ -384,7 +384,7 @@ def _draw_exact_joint_angles(axis, group, temperature, widest, colour):
         with np.errstate(divide="ignore"):
             density *= np.exp(-group.type.bending_energy(np.cos(angle)) / thermal_energy(temperature))
     degrees = np.degrees(angle)
-    density /= trapezoid(density, degrees)
+    density /= scipy.integrate.trapezoid(density, degrees)
     shown = degrees <= max(widest, degrees[np.flatnonzero(density > 1e-3 * density.max())[-1]])
     axis.plot(
         degrees[shown],
@@ -435,7 +435,7 @@ def _draw_segment_lengths(axis, groups, temperature, trajectory):
         length = np.linspace(max(0.0, group.type.segment_length - width), group.type.segment_length + width, 2001)
         energy = group.type.stretching_energy(length) / kT
         density = length ** (1 if group.planar else 2) * np.exp(-(energy - energy.min()))
-        density /= trapezoid(density, length)
+        density /= scipy.integrate.trapezoid(density, length)
         axis.plot(length, density, color=colour, linewidth=1.8, linestyle=_line(group), label=_exact_label(group))
     axis.set_xlabel("segment length (nm)")
     axis.set_ylabel("probability density (1/nm)")

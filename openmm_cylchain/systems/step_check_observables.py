@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import openmm
-from scipy.fft import dct
+import scipy
 
 from ..beams.curve import BeamElement, element_energies
 from ..couplings.capsule_contacts import as_capsule_contact_force
@@ -159,7 +159,7 @@ class Probe:
                 vectors = np.diff(positions[kind.nodes], axis=1)
                 tangents = vectors / np.linalg.norm(vectors, axis=2)[..., None]
                 # Twice the sum over cosines of the middles of segments.
-                amplitudes = 0.5 * dct(tangents, type=2, axis=1)[:, 1:] * self._scale(kind)
+                amplitudes = 0.5 * scipy.fft.dct(tangents, type=2, axis=1)[:, 1:] * self._scale(kind)
                 found.append(np.mean(np.sum(amplitudes**2, axis=2), axis=0))
         return found
 

@@ -2,7 +2,7 @@
 
 import math
 
-from scipy.special import ndtr, stdtrit
+import scipy
 
 LARGEST_ERROR = 0.05
 """Relative error up to which a step is right."""
@@ -16,7 +16,7 @@ SIGMAS = 4.0
 
 def sigmas(degrees: float) -> float:
     """Standard errors, estimated with so many degrees of freedom, in an error bar that is as safe: of Student's t."""
-    return float(stdtrit(degrees, ndtr(SIGMAS))) if degrees > 0.0 else math.inf
+    return float(scipy.special.stdtrit(degrees, scipy.special.ndtr(SIGMAS))) if degrees > 0.0 else math.inf
 
 
 def surely_large(error: float, error_bar: float) -> bool:

@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import scipy
 
 from ..filaments.equilibrium import PlanarJointAngleDistribution, SegmentLengthDistribution
 from ..filaments.filament_type import FilamentType
@@ -69,11 +70,10 @@ def _moments_by_quadrature(potential, stiffness):
 
 
 def _inscribed_circle_moments(stiffness):
-    from scipy.special import expn
-
     x = 2.0 * stiffness
     if x < 20.0:
-        first, zeroth = expn(1, x) / expn(2, x), math.exp(-x) / (x * expn(2, x))
+        second = scipy.special.expn(2, x)
+        first, zeroth = scipy.special.expn(1, x) / second, math.exp(-x) / (x * second)
         return x * (first - 1.0), x**2 * (zeroth - first**2)
     # The ratios of E_n cancel and underflow for large x; v = V_b/k_B T has the density exp(-v)/(1 + v/x)^2.
     energy, weight = np.polynomial.laguerre.laggauss(60)

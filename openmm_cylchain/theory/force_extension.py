@@ -4,8 +4,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from scipy.linalg import eigh
-from scipy.optimize import brentq
+import scipy
 
 from ..errors import InputError
 from ..filaments.equilibrium import JointAngleDistribution
@@ -167,7 +166,7 @@ def long_chain_extension(filament_type: FilamentType, force: Numbers, temperatur
     def extension(each):
         pull, slope = _pulled_lengths(filament_type, each, kT, node)
         root = np.sqrt(weight * pull)
-        state = eigh(root[:, None] * bending * root, subset_by_index=[len(node) - 1] * 2)[1][:, 0]
+        state = scipy.linalg.eigh(root[:, None] * bending * root, subset_by_index=[len(node) - 1] * 2)[1][:, 0]
         used = pull > 0.0
         return float(state[used] ** 2 @ (slope[used] / pull[used]))
 
@@ -210,7 +209,7 @@ def wlc_relative_extension(
         cosine = np.diag(beside, 1) + np.diag(beside, -1)
         square = cosine @ cosine
         energy = np.diag(order * (order + 1) / (2.0 * length)) - each / kT * (cosine + 0.5 * each * softness * square)
-        state = eigh(energy, subset_by_index=[0, 0])[1][:, 0]
+        state = scipy.linalg.eigh(energy, subset_by_index=[0, 0])[1][:, 0]
         return float(state @ cosine @ state + each * softness * (state @ square @ state))
 
     return np.vectorize(extension, otypes=[float])(forces)[()]
@@ -250,7 +249,7 @@ def wlc_share_of_force(filament_type: FilamentType, force: Numbers, temperature:
         if force == 0.0 or rigidity == 0.0:
             return 1.0
         target = 1.0 - 0.5 * kT / math.sqrt(force * rigidity) + force / modulus
-        return math.exp(brentq(lambda x: extension(force * math.exp(x)) - target, -30.0, 30.0))
+        return math.exp(scipy.optimize.brentq(lambda x: extension(force * math.exp(x)) - target, -30.0, 30.0))
 
     return np.vectorize(share, otypes=[float])(each_not_negative(force, FORCE, "force"))[()]
 
@@ -325,7 +324,7 @@ def calibrated_to_force(filament_type: FilamentType, force: Scalar, temperature:
             f"{name}: its segments of {contour:g} nm are too long, or too soft, for the extension of a wormlike chain "
             f"at {force / _PICONEWTON:.3g} pN."
         )
-    return shortened(brentq(excess, 0.5, 1.1, xtol=1e-9))
+    return shortened(scipy.optimize.brentq(excess, 0.5, 1.1, xtol=1e-9))
 
 
 def _contour(filament_type):

@@ -1,7 +1,7 @@
 """How far an explicit force moves a filament of beam elements in one step, taken as straight: see ``mobility``."""
 
 import numpy as np
-from scipy.linalg import cholesky, solve_triangular
+import scipy
 
 from ..beams.curve import BeamElement, place_weights
 from ..filaments.filament import Filament
@@ -72,8 +72,8 @@ class BeamResponse(PlaceResponse):
             for element in range(elements):
                 of_element = (2 * element + np.arange(4)) % unknowns
                 matrix[np.ix_(of_element, of_element)] += own
-            lower = cholesky(matrix[np.ix_(free, free)], lower=True)
-            yield solve_triangular(lower, shapes[:, free].T, lower=True).T
+            lower = scipy.linalg.cholesky(matrix[np.ix_(free, free)], lower=True)
+            yield scipy.linalg.solve_triangular(lower, shapes[:, free].T, lower=True).T
 
     def _fixed(self, first, elements):
         count = elements if self._closed else elements + 1

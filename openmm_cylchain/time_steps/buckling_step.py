@@ -21,7 +21,7 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.linalg import solveh_banded
+import scipy
 
 from ..filaments.collection import FilamentCollection
 from ..filaments.filament import Filament, Tether
@@ -142,4 +142,4 @@ def displacements(stiffness: FloatArray, held: FloatArray, forces: FloatArray) -
     bands[1] = held
     bands[1, :-1] += stiffness
     bands[1, 1:] += stiffness
-    return solveh_banded(bands, forces)
+    return scipy.linalg.solveh_banded(bands, forces)

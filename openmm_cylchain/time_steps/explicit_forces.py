@@ -17,8 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import openmm
-from scipy.optimize import brentq
-from scipy.sparse import csr_array
+import scipy
 
 from ..couplings.capsule_contacts import as_capsule_contact_force
 from ..couplings.contacts import CONTACT_STIFFNESS, is_contact_force
@@ -224,7 +223,8 @@ class ExplicitForces:
             below, above = above, 8.0 * above
             if above > 1e12 * shortest:
                 return math.inf
-        return math.exp(brentq(lambda x: excess(math.exp(x)), math.log(below), math.log(above), xtol=1e-3))
+        bracket = math.log(below), math.log(above)
+        return math.exp(scipy.optimize.brentq(lambda x: excess(math.exp(x)), *bracket, xtol=1e-3))
 
     def eigenvalue(self, springs: Sequence[Springs], step: float) -> tuple[float, str]:
         """lambda of some springs in a step in ps, and the name of the spring that has most part in it.
@@ -319,7 +319,7 @@ class ExplicitForces:
                 rows.append(site)
                 columns.append(places.setdefault(place, len(places)))
                 weights.append(weight)
-        self._components = csr_array((weights, (rows, columns)), shape=(len(particles), len(places)))
+        self._components = scipy.sparse.csr_array((weights, (rows, columns)), shape=(len(particles), len(places)))
         self._sort_places(list(places))
         return unknown
 

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 import openmm
-from scipy.optimize import brentq
+import scipy
 
 from ..couplings.capsule_contacts import as_capsule_contact_force
 from ..errors import ContactWarning
@@ -62,7 +62,7 @@ def longest_resolving_step(
     first, last = math.log(_SHORTEST), math.log(_LONGEST)
     if excess(last) <= 0.0:
         return math.inf
-    return math.exp(brentq(excess, first, last, xtol=1e-6)) if excess(first) < 0.0 else 0.0
+    return math.exp(scipy.optimize.brentq(excess, first, last, xtol=1e-6)) if excess(first) < 0.0 else 0.0
 
 
 def warn_of_hard_contacts(

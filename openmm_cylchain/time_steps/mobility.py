@@ -24,7 +24,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from scipy.linalg import eigh, eigvalsh
+import scipy
 
 from ..filaments.filament import Filament
 from ..mechanics.friction import SegmentFriction
@@ -63,7 +63,7 @@ class PlaceResponse(ABC):
         for factor in self._factors(piece, segments, fractions, step):
             scaled = root * factor
             gram = scaled @ scaled.T if scaled.shape[0] <= scaled.shape[1] else scaled.T @ scaled
-            largest = max(largest, float(eigvalsh(gram, subset_by_index=[len(gram) - 1] * 2)[0]))
+            largest = max(largest, float(scipy.linalg.eigvalsh(gram, subset_by_index=[len(gram) - 1] * 2)[0]))
         return largest
 
     def at(self, piece: int, segments: IntArray, fractions: FloatArray, step: float) -> FloatArray:
@@ -157,7 +157,7 @@ class FilamentResponse(PlaceResponse):
         modes = np.zeros((len(fixed), len(free)))
         if not len(free):
             return modes, np.zeros(0), fastest
-        rates, modes[free] = eigh(stiffness[np.ix_(free, free)], resistance[np.ix_(free, free)])
+        rates, modes[free] = scipy.linalg.eigh(stiffness[np.ix_(free, free)], resistance[np.ix_(free, free)])
         rates = np.maximum(rates, 0.0)
         if self._closed:
             # A ring can turn; an endless straight filament, whose modes these are, cannot.

@@ -11,7 +11,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 from ..errors import SegmentLengthWarning
 from ..filaments.collection import FilamentCollection
@@ -140,4 +140,4 @@ def _force_at(distance, length, compliance, bending, temperature):
     def excess(force):
         return length * marko_siggia_extension(force, bending, temperature) + force * compliance - distance
 
-    return brentq(excess, 0.0, distance / compliance) if distance > 0.0 else 0.0
+    return scipy.optimize.brentq(excess, 0.0, distance / compliance) if distance > 0.0 else 0.0

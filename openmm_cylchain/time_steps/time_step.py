@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 from ..mechanics.flow import Flow
 from ..units.quantities import (
@@ -189,4 +189,4 @@ def resolved_relaxation_time(
     if not beyond:
         return step * math.exp(-grid[-1])
     first = beyond[0]
-    return step * math.exp(-brentq(excess, grid[first - 1], grid[first]))
+    return step * math.exp(-scipy.optimize.brentq(excess, grid[first - 1], grid[first]))
