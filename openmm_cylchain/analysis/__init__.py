@@ -2,33 +2,33 @@
 
 from ..couplings.contact_frames import ContactFrame
 from ..couplings.crosslink_records import CrosslinkFrame
+from ..filaments.topology_nodes import filament_nodes, ring_filaments
 from . import statistics
+from .bending import (
+    TangentCorrelation,
+    bending_drift,
+    bending_mode_amplitudes,
+    joint_cosines,
+    persistence_length,
+    tangent_correlation,
+)
 from .crossings import CrossingCounter, Crossings, find_crossings
+from .diffusion import MeanSquareDisplacement, mean_square_displacement
+from .filament_shapes import (
+    centers_of_mass,
+    contour_lengths,
+    end_to_end_vectors,
+    filament_curves,
+    node_positions,
+    radii_of_gyration,
+    segment_lengths,
+    tangents,
+)
 from .moduli import RelaxationModulus, relaxation_modulus
 from .networks import contact_map, contraction, filament_distances, find_bundles, mesh_size
 from .order import director, order_parameter, order_tensor
 from .runs import Run, RunFilament, RunParticles, load
 from .stress import Stress, stress
-from .trajectories import (
-    MeanSquareDisplacement,
-    TangentCorrelation,
-    bending_drift,
-    bending_mode_amplitudes,
-    centers_of_mass,
-    contour_lengths,
-    end_to_end_vectors,
-    filament_curves,
-    filament_nodes,
-    joint_cosines,
-    mean_square_displacement,
-    node_positions,
-    persistence_length,
-    radii_of_gyration,
-    ring_filaments,
-    segment_lengths,
-    tangent_correlation,
-    tangents,
-)
 
 __all__ = [
     "ContactFrame",

@@ -364,7 +364,6 @@ def _jackknifed_fit(time, copies, amplitude, blocks):
 
 
 def _fit(time, correlation, amplitude):
-
     values = correlation / correlation[0]
     if not values.max() > values[-1]:
         raise InputError("The correlation does not decay over the times given.")

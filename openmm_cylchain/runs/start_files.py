@@ -6,7 +6,8 @@ from pathlib import Path
 import mdtraj
 import numpy as np
 
-from ..analysis.trajectories import control_point_positions, filament_nodes, ring_filaments
+from ..analysis.filament_shapes import control_point_positions
+from ..filaments.topology_nodes import filament_nodes, ring_filaments
 from .silence import silenced_c_library
 
 COPIES = "start_files"

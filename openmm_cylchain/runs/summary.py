@@ -10,16 +10,9 @@ import numpy as np
 import openmm
 
 from .. import theory
+from ..analysis.bending import bending_drift, joint_cosines, persistence_length
+from ..analysis.filament_shapes import control_point_positions, end_to_end_vectors, node_positions, segment_lengths
 from ..analysis.statistics import FEWEST_FRAMES_OF_DRIFT, SIGNIFICANT_DRIFT, mean_with_error, statistical_inefficiency
-from ..analysis.trajectories import (
-    bending_drift,
-    control_point_positions,
-    end_to_end_vectors,
-    joint_cosines,
-    node_positions,
-    persistence_length,
-    segment_lengths,
-)
 from ..bead_spring.bead_spring_type import BeadSpringType
 from ..beams.curve import element_energies
 from ..errors import EquilibrationWarning, InputError

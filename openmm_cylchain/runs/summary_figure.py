@@ -9,8 +9,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from .. import theory
+from ..analysis.bending import joint_cosines, tangent_correlation
+from ..analysis.filament_shapes import filament_curves, segment_lengths
 from ..analysis.statistics import mean_with_error
-from ..analysis.trajectories import filament_curves, joint_cosines, segment_lengths, tangent_correlation
 from ..mechanics.geometry import unrolled
 from ..output.colors import FILAMENT_COLORS, LINKER_COLORS
 from ..output.files import write_atomically

@@ -10,16 +10,20 @@ least of the diagonal elements of its vectors. So there is one image at most tha
 half that width, and that is the one to take.
 """
 
-import mdtraj
+from typing import TYPE_CHECKING
+
 import numpy as np
 from openmm import unit
 
-from ..analysis.trajectories import filament_nodes
 from ..engines.description import filament_label
 from ..errors import InputError
+from ..filaments.topology_nodes import filament_nodes
 from ..units.quantities import LENGTH, in_units_of
 from ..units.types import BoxVectors, Vectors
 from .filaments import Filaments
+
+if TYPE_CHECKING:
+    import mdtraj
 
 
 def make_whole(positions: Vectors, filaments: Filaments, box_vectors: BoxVectors) -> unit.Quantity:
@@ -78,7 +82,7 @@ def make_whole(positions: Vectors, filaments: Filaments, box_vectors: BoxVectors
     return frames.reshape(given.shape) * unit.nanometer
 
 
-def make_trajectory_whole(trajectory: mdtraj.Trajectory) -> mdtraj.Trajectory:
+def make_trajectory_whole(trajectory: "mdtraj.Trajectory") -> "mdtraj.Trajectory":
     """A copy of an mdtraj trajectory in which filaments are whole in every frame; see ``make_whole``.
 
     Filaments are found by the names of their nodes, see ``analysis``. An attachment point goes to the segment of its
@@ -108,7 +112,7 @@ def make_trajectory_whole(trajectory: mdtraj.Trajectory) -> mdtraj.Trajectory:
     return _with_positions(trajectory, positions)
 
 
-def remove_jumps(trajectory: mdtraj.Trajectory) -> mdtraj.Trajectory:
+def remove_jumps(trajectory: "mdtraj.Trajectory") -> "mdtraj.Trajectory":
     """A copy of an mdtraj trajectory in which filaments are whole and go on from frame to frame without jumps.
 
     A filament's middle is taken to the image that is nearest to where it was in the frame before, so that it may leave

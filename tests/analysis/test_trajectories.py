@@ -9,9 +9,8 @@ import pytest
 from mdtraj.core import element
 from openmm import unit
 
-from openmm_cylchain import theory
+from openmm_cylchain import analysis, theory
 from openmm_cylchain.analysis import statistics
-from openmm_cylchain.analysis import trajectories as analysis
 from openmm_cylchain.errors import EquilibrationWarning, InputError
 from openmm_cylchain.filaments.equilibrium import draw_chain
 from openmm_cylchain.filaments.filament_type import FilamentType

@@ -6,8 +6,7 @@ import openmm
 import pytest
 from openmm import app, unit
 
-from openmm_cylchain import DSDNA, F_ACTIN, Filaments, InputError
-from openmm_cylchain.analysis import trajectories as analysis
+from openmm_cylchain import DSDNA, F_ACTIN, Filaments, InputError, analysis
 from support.contexts import new_context, new_simulation, positions_of
 from support.solvent import TEMPERATURE, VISCOSITY
 

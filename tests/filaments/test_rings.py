@@ -8,8 +8,7 @@ from openmm import app, unit
 from scipy.integrate import simpson
 from scipy.spatial.transform import Rotation
 
-from openmm_cylchain import F_ACTIN, Filaments, InputError
-from openmm_cylchain.analysis import trajectories as analysis
+from openmm_cylchain import F_ACTIN, Filaments, InputError, analysis
 from openmm_cylchain.filaments.equilibrium import SegmentLengthDistribution
 from openmm_cylchain.mechanics import redistribution
 from openmm_cylchain.output.reporters import FilamentReporter

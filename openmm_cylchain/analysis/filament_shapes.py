@@ -1,0 +1,165 @@
+"""Observables of filaments from an ``mdtraj.Trajectory``: their curves and shapes.
+
+A filament is a chain of the topology; its nodes are the atoms of that chain with the name "NOD", in order. It is a ring
+if a bond joins the last one to the first.
+Of a filament of beam elements, whose control points have the name "CTL", functions take the curve: arc lengths of its
+elements, tangents at its nodes, and points along all of it.
+Anything else in the trajectory is left alone. Positions have to be those of whole filaments, not wrapped
+into a periodic box (``periodic`` makes them whole). Results are plain numbers in OpenMM's units (nm, ps).
+
+Every function takes ``filaments``: one index or a list of indices into ``filament_nodes``, all filaments if
+not given. Data per filament come as an array with the axes (frames, filaments); data per segment, joint or
+node come as a list with one array per filament, since filaments may differ in length. Every function raises
+InputError for a trajectory without filaments and for indices out of range.
+"""
+
+from collections.abc import Sequence
+
+import mdtraj
+import numpy as np
+
+from ..beams.curve import arc_lengths, curve_points
+from ..errors import InputError
+from ..filaments.filament import CONTROL_POINT_NAME
+from ..filaments.topology_nodes import filament_nodes, ring_filaments
+from ..units.quantities import whole_number
+from ..units.types import FloatArray, Indices
+
+_POINTS_OF_ELEMENT = 8
+
+
+def node_positions(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> list[FloatArray]:
+    """Positions of the nodes: a list of (frames, nodes, 3) arrays in nm."""
+    nodes = filament_nodes(trajectory)
+    return [trajectory.xyz[:, nodes[index]].astype(float) for index in selected_indices(filaments, len(nodes))]
+
+
+def control_point_positions(
+    trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None
+) -> list[FloatArray | None]:
+    """Positions of the control points: a list of (frames, nodes, 3) arrays in nm, None without beam elements."""
+    nodes, positions = filament_nodes(trajectory), []
+    for index in selected_indices(filaments, len(nodes)):
+        chain = trajectory.topology.atom(int(nodes[index][0])).residue.chain
+        own = [atom.index for atom in chain.atoms if atom.name == CONTROL_POINT_NAME]
+        if len(own) not in (0, len(nodes[index])):
+            raise InputError(
+                f"Filament {index} has {len(nodes[index])} nodes, but {len(own)} control points "
+                f"({CONTROL_POINT_NAME}): take all of its atoms."
+            )
+        positions.append(trajectory.xyz[:, own].astype(float) if own else None)
+    return positions
+
+
+def filament_curves(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> list[FloatArray]:
+    """Points by which filaments are drawn: nodes, or of beam elements eight along the curve of each and the last node.
+
+    Those of a ring end before its first point, to which the last one is joined.
+
+    Returns
+    -------
+    list of (frames, points, 3) arrays in nm
+    """
+    rings = ring_filaments(trajectory)
+    closed = rings[list(selected_indices(filaments, len(rings)))]
+    chains = zip(node_positions(trajectory, filaments), control_point_positions(trajectory, filaments), closed)
+    return [
+        nodes if own is None else curve_points(nodes, own, _POINTS_OF_ELEMENT, bool(ring))
+        for nodes, own, ring in chains
+    ]
+
+
+def selected_indices(filaments: int | Indices | None, count: int) -> Sequence[int]:
+    """Indices of the filaments that are meant among so many; InputError for others."""
+    if filaments is None:
+        return range(count)
+    if isinstance(filaments, (int, np.integer)):
+        filaments = [filaments]
+    selected = [whole_number(index, 0, "an index in filaments") for index in filaments]
+    if not selected:
+        raise InputError("filaments selects no filament.")
+    if max(selected) >= count:
+        raise InputError(f"filaments contains {max(selected)}, but the trajectory has {count} filaments.")
+    return selected
+
+
+def refuse_rings(trajectory: mdtraj.Trajectory, filaments: int | Indices | None, what: str) -> None:
+    """Raise InputError if one of the filaments is a ring, which lacks something."""
+    rings = ring_filaments(trajectory)
+    for index in selected_indices(filaments, len(rings)):
+        if rings[index]:
+            raise InputError(f"Filament {index} is a ring, which has no {what}: select the others.")
+
+
+def _segment_vectors(trajectory, filaments):
+    rings = ring_filaments(trajectory)
+    selected = selected_indices(filaments, len(rings))
+    return [
+        np.diff(positions, axis=1, append=positions[:, :1]) if rings[index] else np.diff(positions, axis=1)
+        for index, positions in zip(selected, node_positions(trajectory, filaments))
+    ]
+
+
+def end_to_end_vectors(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> FloatArray:
+    """Vectors from the first to the last node: (frames, filaments, 3) array in nm. Raises InputError for rings."""
+    refuse_rings(trajectory, filaments, "end-to-end vector")
+    return np.stack([p[:, -1] - p[:, 0] for p in node_positions(trajectory, filaments)], axis=1)
+
+
+def radii_of_gyration(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> FloatArray:
+    """Radii of gyration of the nodes, all of one weight: (frames, filaments) array in nm.
+
+    Of beam elements, those of the curve.
+    """
+    positions = filament_curves(trajectory, filaments)
+    return np.stack([np.sqrt(np.var(p, axis=1).sum(axis=-1)) for p in positions], axis=1)
+
+
+def centers_of_mass(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> FloatArray:
+    """Mean of the segments' midpoints, all of one weight: (frames, filaments, 3) array in nm."""
+    rings = ring_filaments(trajectory)
+    selected = selected_indices(filaments, len(rings))
+    lines = filament_curves(trajectory, filaments)
+    return np.stack([center_of_segments(p, rings[index]) for index, p in zip(selected, lines)], axis=1)
+
+
+def center_of_segments(positions: FloatArray, ring: bool) -> FloatArray:
+    """Mean (frames, 3) of the midpoints of segments between positions (frames, points, 3)."""
+    # Every node of a ring belongs to two segments.
+    return positions.mean(axis=1) if ring else 0.5 * (positions[:, 1:] + positions[:, :-1]).mean(axis=1)
+
+
+def segment_lengths(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> list[FloatArray]:
+    """Lengths of the segments, of beam elements along their arcs: a list of (frames, segments) arrays in nm."""
+    chains = zip(_segment_vectors(trajectory, filaments), *_curves(trajectory, filaments))
+    return [
+        np.linalg.norm(vectors, axis=-1) if own is None else arc_lengths(nodes, own, vectors.shape[1] == nodes.shape[1])
+        for vectors, nodes, own in chains
+    ]
+
+
+def _curves(trajectory, filaments):
+    return node_positions(trajectory, filaments), control_point_positions(trajectory, filaments)
+
+
+def contour_lengths(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> FloatArray:
+    """Sums of the segments' lengths: (frames, filaments) array in nm."""
+    return np.stack([lengths.sum(axis=1) for lengths in segment_lengths(trajectory, filaments)], axis=1)
+
+
+def tangents(trajectory: mdtraj.Trajectory, filaments: int | Indices | None = None) -> list[FloatArray]:
+    """Unit vectors along the segments: a list of (frames, segments, 3) arrays.
+
+    Of beam elements, unit vectors along the curve at the nodes: (frames, segments + 1, 3). Raises InputError for a
+    segment of zero length.
+    """
+    chains = zip(_segment_vectors(trajectory, filaments), *_curves(trajectory, filaments))
+    return [normalized(vectors if own is None else own - nodes) for vectors, nodes, own in chains]
+
+
+def normalized(vectors: FloatArray) -> FloatArray:
+    """Vectors (..., 3) divided by their lengths; InputError if one has none."""
+    norms = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    if np.any(norms == 0):
+        raise InputError("Two nodes that should span a segment or a filament lie at one point.")
+    return vectors / norms
