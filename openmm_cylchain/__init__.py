@@ -4,7 +4,10 @@ All that users call is here and in the modules ``analysis``, ``theory`` and ``sc
 change.
 """
 
-from . import analysis, theory
+import importlib
+from types import ModuleType
+from typing import TYPE_CHECKING
+
 from .bead_spring.bead_spring_type import DSDNA_BASE_PAIRS, BeadSpringType
 from .couplings.capsule_contacts import capsule_contact_force
 from .couplings.contact_frames import find_contacts
@@ -136,6 +139,7 @@ __all__ = [
     "random_points_on",
     "recommended_time_step",
     "remove_jumps",
+    "scans",
     "share_exclusions",
     "stability_bounds",
     "stokes_friction",
@@ -146,6 +150,21 @@ __all__ = [
     "write_lammps_data",
     "write_psf",
 ]
+
+if TYPE_CHECKING:
+    from . import analysis, scans, theory
+else:
+
+    def __getattr__(name: str) -> ModuleType:
+        # Loaded when they are asked for: what they import takes longer than all else, and few simulations need it.
+        if name in ("analysis", "scans", "theory"):
+            return importlib.import_module(f".{name}", __name__)
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
+
 
 # So that OpenMM can read Systems of it from XML files.
 prepare_openmm()

@@ -25,11 +25,11 @@ FLOORS = (
     ("engines",),
     ("analysis",),
     ("systems",),
-    ("",),
     ("runs",),
     ("rendering",),
     ("export",),
     ("scans",),
+    ("",),
     ("cli",),
 )
 FLOOR = {name: floor for floor, names in enumerate(FLOORS) for name in names}

@@ -13,11 +13,8 @@ import numpy.typing as npt
 import scipy
 
 from ..mechanics.geometry import unrolled
+from ..mechanics.quadrature import gauss_points
 from ..units.types import FloatArray
-
-_GAUSS_PLACES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)
-_GAUSS_PLACES, _GAUSS_WEIGHTS = 0.5 * (1.0 + _GAUSS_PLACES), 0.5 * _GAUSS_WEIGHTS
-
 
 _STRAIN = 1e-6
 """Of differences."""
@@ -65,8 +62,6 @@ def natural_tangents(nodes: FloatArray, closed: bool = False) -> FloatArray:
 
     Of a ring, along the periodic one.
     """
-    # Most filaments have no beams, and this is slow to load.
-
     if closed:
         around = unrolled(nodes)
         along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(around, axis=0), axis=1))])
@@ -135,8 +130,9 @@ def arc_lengths(nodes: FloatArray, control_points: FloatArray, closed: bool = Fa
     """Lengths of the elements along the curve: (..., elements) in nm, by eight Gauss points."""
     if closed:
         return arc_lengths(unrolled(nodes), unrolled(control_points))
-    slopes = _on_elements(nodes, control_points, _GAUSS_PLACES, derivative=True)
-    return np.linalg.norm(slopes, axis=-1) @ _GAUSS_WEIGHTS
+    places, weights = gauss_points(8)
+    slopes = _on_elements(nodes, control_points, places, derivative=True)
+    return np.linalg.norm(slopes, axis=-1) @ weights
 
 
 def _bend(first, second):

@@ -1,17 +1,19 @@
 """Reporters of the forces of walls and contacts, for ``simulation.reporters`` of OpenMM's app layer."""
 
 from abc import abstractmethod
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import openmm
-from openmm import app
 
 from ..errors import InputError
 from ..filaments.collection import FilamentCollection
 from ..output.files import TextFile
 from ..output.reporters import FilamentsReporter, TableReporter
 from .mean_forces import ContactForces, ForceReaders, WallForces
+
+if TYPE_CHECKING:
+    from openmm import app
 
 
 def rows_of_walls(walls: list[WallForces]) -> tuple[list[tuple[int, int]], list[tuple[float, ...]]]:
@@ -39,7 +41,7 @@ class _MeanForceReporter(TableReporter):
     _include = ()
     _readers: ForceReaders | None = None
 
-    def describeNextReport(self, simulation: app.Simulation) -> dict[str, Any]:  # noqa: N802 - OpenMM's name
+    def describeNextReport(self, simulation: "app.Simulation") -> dict[str, Any]:  # noqa: N802 - OpenMM's name
         """When the next report is due; means begin when this is called for the first time."""
         if self._readers is None:
             self._readers = ForceReaders(simulation.context)
@@ -92,7 +94,7 @@ class WallForceReporter(_MeanForceReporter):
         if not self.places:
             raise InputError("There are no walls to report: add a filament_wall_force or wall_force to the System.")
 
-    def _table(self, simulation: app.Simulation, state: openmm.State) -> tuple[list[str], list[tuple[float, ...]]]:
+    def _table(self, simulation: "app.Simulation", state: openmm.State) -> tuple[list[str], list[tuple[float, ...]]]:
         assert self._readers is not None
         places, rows = rows_of_walls(self._readers.wall_forces())
         return [f"{wall},{face}" for wall, face in places], rows
@@ -132,7 +134,7 @@ class ContactForceReporter(_MeanForceReporter, FilamentsReporter):
         if not readers.contact_forces():
             raise InputError("There are no contacts to report: add a capsule_contact_force to the System.")
 
-    def _table(self, simulation: app.Simulation, state: openmm.State) -> tuple[range, list[tuple[float, ...]]]:
+    def _table(self, simulation: "app.Simulation", state: openmm.State) -> tuple[range, list[tuple[float, ...]]]:
         assert self._readers is not None
         rows = rows_of_contacts(self._readers.contact_forces(), self._filaments)
         return range(len(rows)), rows

@@ -1,10 +1,9 @@
 """Pulling: constant forces, constant tension, and tethers that move at constant velocity."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import openmm
-from openmm import app
 
 from ..errors import InputError
 from ..filaments.collection import FilamentCollection
@@ -12,6 +11,9 @@ from ..output.files import TextFile
 from ..output.reporters import FilamentsReporter
 from ..units.quantities import FORCE, LENGTH, TIME, VELOCITY, in_units_of, shown, unit_vector, whole_number
 from ..units.types import FloatArray, Indices, Numbers, Scalar, Vector, Vectors
+
+if TYPE_CHECKING:
+    from openmm import app
 
 CONSTANT_FORCE_NAME = "ConstantForce"
 
@@ -222,7 +224,7 @@ class ConstantVelocityPulling(FilamentsReporter):
         ends = (nodes[0], nodes[-1]) if 2 * tether.node >= len(nodes) - 1 else (nodes[-1], nodes[0])
         return nodes[tether.node], *ends
 
-    def describeNextReport(self, simulation: app.Simulation) -> dict[str, Any]:  # noqa: N802 - OpenMM's name
+    def describeNextReport(self, simulation: "app.Simulation") -> dict[str, Any]:  # noqa: N802 - OpenMM's name
         """When the next report is due; puts the points where they belong if a run begins or goes on."""
         since = simulation.currentStep % self._interval * simulation.integrator.getStepSize()
         self._move(simulation.context, self._points_at((simulation.context.getTime() - since)._value))

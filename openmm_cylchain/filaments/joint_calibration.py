@@ -6,8 +6,9 @@ import numpy as np
 import scipy
 
 from ..mechanics.potentials import BENDING_POTENTIALS
+from ..mechanics.quadrature import gauss_points
 
-_NODE, _WEIGHT = np.polynomial.legendre.leggauss(400)
+_POINTS = 400
 _LARGEST_DECORRELATION = 300.0
 
 
@@ -22,9 +23,10 @@ def tangent_decorrelation(bending_model: str, reduced_stiffness: float) -> float
     """
     # V_b is at least K theta^2 2/pi^2, so that beyond the widest angle exp(-V_b/k_B T) vanishes.
     widest = min(np.pi, 20.0 / np.sqrt(reduced_stiffness))
-    angle = 0.5 * widest * (_NODE + 1.0)
+    places, weights = gauss_points(_POINTS)
+    angle = widest * places
     cosine = np.cos(angle)
-    measure = _WEIGHT * np.sin(angle)
+    measure = weights * np.sin(angle)
     energy = BENDING_POTENTIALS[bending_model].energy(reduced_stiffness, cosine)
     norm = measure @ np.exp(-energy)
     bend = measure @ (2.0 * np.sin(0.5 * angle) ** 2 * np.exp(-energy)) / norm

@@ -11,12 +11,11 @@ do: of lines with the same step, the last holds.
 
 from abc import ABC, abstractmethod
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 import openmm
-from openmm import app
 
 from ..beams.curve import arc_lengths
 from ..errors import InputError
@@ -29,6 +28,9 @@ from ..units.quantities import whole_number
 from ..units.types import FloatArray, IntArray
 from .files import TextFile
 from .linker_records import LINKER_COLUMNS, LinkedFilaments, LinkerFile, measure_linkers
+
+if TYPE_CHECKING:
+    from openmm import app
 
 
 class LinkedFilamentCollection(FilamentCollection, LinkedFilaments, Protocol):
@@ -66,12 +68,12 @@ class TableReporter(ABC):
         if stream is not None and not (append and self._owned and stream.tell() > 0):
             print(header, file=stream)
 
-    def describeNextReport(self, simulation: app.Simulation) -> dict[str, Any]:  # noqa: N802 - OpenMM's name
+    def describeNextReport(self, simulation: "app.Simulation") -> dict[str, Any]:  # noqa: N802 - OpenMM's name
         """When the next report is due, and that it needs positions; as OpenMM asks for it."""
         steps = self._interval - simulation.currentStep % self._interval
         return {"steps": steps, "periodic": False, "include": list(self._include)}
 
-    def report(self, simulation: app.Simulation, state: openmm.State) -> None:
+    def report(self, simulation: "app.Simulation", state: openmm.State) -> None:
         """Write a report; OpenMM calls it."""
         time = state.getTime()._value
         numbers, values = self._table(simulation, state)
@@ -263,7 +265,7 @@ class TensionReporter(FilamentsReporter):
         self._chains: ChainSet | None = None
         super().__init__(file, reportInterval, filaments, append)
 
-    def describeNextReport(self, simulation: app.Simulation) -> dict[str, Any]:  # noqa: N802 - OpenMM's name
+    def describeNextReport(self, simulation: "app.Simulation") -> dict[str, Any]:  # noqa: N802 - OpenMM's name
         if self._mean:
             self._filaments.record_tensions(simulation.context)
         return super().describeNextReport(simulation)

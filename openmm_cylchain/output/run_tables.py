@@ -3,12 +3,14 @@
 import os
 from collections.abc import Sequence
 from pathlib import Path
-
-from openmm import app
+from typing import TYPE_CHECKING
 
 from ..errors import InputError
 from ..units.types import FloatArray
 from .dcd_frames import DCDFrames
+
+if TYPE_CHECKING:
+    from openmm import app
 
 _DCD_HEADER_SIZE = 92
 
@@ -74,12 +76,14 @@ class TrajectoryFile:
     def __init__(
         self,
         path: Path,
-        topology: app.Topology,
+        topology: "app.Topology",
         time_step: float,
         steps_per_frame: int,
         size: int | None = None,
         header: bytes = b"",
     ) -> None:
+        from openmm import app
+
         if size is None:
             self._file = open(path, "w+b")
         else:

@@ -5,16 +5,20 @@ that is in the Topology, filaments and other molecules alike.
 """
 
 import re
+from typing import TYPE_CHECKING
 
 import numpy as np
 import openmm
-from openmm import app, unit
+from openmm import unit
 
 from ..errors import InputError
 from ..units.quantities import LENGTH, MASS, in_units_of
 from ..units.types import BoxVectors, Vectors
 from ..version import __version__
 from .files import TextFile
+
+if TYPE_CHECKING:
+    from openmm import app
 
 _PSF_NAME_LENGTH = 7  # The fields have eight columns, of which VMD reads seven.
 _PSF_TYPE_LENGTH = 6
@@ -30,7 +34,7 @@ _PSF_EMPTY_SECTIONS = (
 _ANGSTROM = 10.0  # in a nanometre
 
 
-def write_psf(topology: app.Topology, file: TextFile, system: openmm.System | None = None) -> None:
+def write_psf(topology: "app.Topology", file: TextFile, system: openmm.System | None = None) -> None:
     """Write a PSF file: atoms, masses, charges and bonds, in CHARMM's extended X-PLOR format.
 
     Chains become segments of the file. Names are cut to the seven characters that VMD reads. Where ids of chains are
@@ -79,7 +83,7 @@ def _psf_atoms(topology, system):
 
 
 def write_lammps_data(
-    topology: app.Topology,
+    topology: "app.Topology",
     positions: Vectors,
     file: TextFile,
     system: openmm.System | None = None,
@@ -140,6 +144,8 @@ def write_lammps_data(
 
 
 def _check_topology(topology, system):
+    from openmm import app
+
     if not isinstance(topology, app.Topology):
         raise InputError(f"topology must be an openmm.app.Topology, but is {topology!r}.")
     if system is not None and system.getNumParticles() != topology.getNumAtoms():

@@ -3,11 +3,10 @@
 import dataclasses
 import io
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import openmm
-from openmm import app
 
 from ..couplings.capsule_contacts import as_capsule_contact_force
 from ..couplings.shapes import Shape
@@ -25,6 +24,9 @@ from ..output.run_files import RunFiles
 from ..output.structure_files import write_lammps_data, write_psf
 from ..units.types import FloatArray
 
+if TYPE_CHECKING:
+    from openmm import app
+
 
 def describe_system(
     filaments: Any,
@@ -35,7 +37,7 @@ def describe_system(
     steps_per_frame: int,
     box: FloatArray | None,
     shapes: Sequence[Shape] = (),
-    topology: app.Topology | None = None,
+    topology: "app.Topology | None" = None,
     diameters: Mapping[int, float] | None = None,
 ) -> RunDescription:
     """What a run of a System simulates: filaments, linkers, walls and contacts.
@@ -164,7 +166,7 @@ def _contacts(force):
     )
 
 
-def write_topology(files: RunFiles, topology: app.Topology, system: openmm.System, positions: Any) -> None:
+def write_topology(files: RunFiles, topology: "app.Topology", system: openmm.System, positions: Any) -> None:
     """Write what programs need to know of a trajectory: files for mdtraj, VMD and OVITO.
 
     Parameters
@@ -174,6 +176,8 @@ def write_topology(files: RunFiles, topology: app.Topology, system: openmm.Syste
     system : openmm.System
     positions : (particles, 3) lengths
     """
+    from openmm import app
+
     mmcif, psf, data = io.StringIO(), io.StringIO(), io.StringIO()
     app.PDBxFile.writeFile(topology, positions, mmcif, keepIds=True)
     write_psf(topology, psf, system)

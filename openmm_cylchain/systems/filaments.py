@@ -1,10 +1,11 @@
 """Filaments, which users add, put into a System, integrate and ask; the work is done by the modules that it calls."""
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import openmm
-from openmm import app, unit
+from openmm import unit
 
 from ..couplings.periodicity import is_periodic
 from ..couplings.stiff_joints import warn_of_stiff_joints
@@ -35,6 +36,9 @@ from .insertion import (
 )
 from .periodic_forces import warn_of_forces_without_images
 
+if TYPE_CHECKING:
+    from openmm import app
+
 
 class Filaments(FilamentsInContexts):
     """Filaments in a solvent, to be added to an OpenMM System.
@@ -64,7 +68,7 @@ class Filaments(FilamentsInContexts):
 
     def build(
         self, box_vectors: BoxVectors | None = None, stretching_force_group: int = 0, bending_force_group: int = 0
-    ) -> tuple[app.Topology, openmm.System, unit.Quantity]:
+    ) -> tuple["app.Topology", openmm.System, unit.Quantity]:
         """Put the filaments into a new Topology, System and positions.
 
         Parameters
@@ -88,6 +92,8 @@ class Filaments(FilamentsInContexts):
             For box vectors that are not three, not finite or not in the reduced form that OpenMM needs; or the cube of
             2 nm that every System has.
         """
+        from openmm import app
+
         topology, system = app.Topology(), openmm.System()
         if box_vectors is not None:
             vectors = set_box_vectors(system, box_vectors)
@@ -99,7 +105,7 @@ class Filaments(FilamentsInContexts):
 
     def add_to(
         self,
-        topology: app.Topology,
+        topology: "app.Topology",
         system: openmm.System,
         positions: Vectors,
         stretching_force_group: int = 0,

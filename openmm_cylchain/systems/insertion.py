@@ -1,11 +1,10 @@
 """Insertion of filaments into a Topology and a System that may hold other things already."""
 
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import openmm
-from openmm import app
 
 from ..couplings.periodicity import has_box, is_periodic
 from ..errors import InputError
@@ -13,8 +12,11 @@ from ..filaments.filament import CONTROL_POINT_NAME, NODE_NAME, Filament
 from ..units.quantities import LENGTH, in_units_of, shown, vector, whole_number
 from ..units.types import BoxVectors, FloatArray, IntArray, Vectors
 
+if TYPE_CHECKING:
+    from openmm import app
 
-def check_target(topology: app.Topology, system: openmm.System, positions: Vectors) -> FloatArray:
+
+def check_target(topology: "app.Topology", system: openmm.System, positions: Vectors) -> FloatArray:
     """Positions (particles, 3) in nm of what is there; raise InputError if they, Topology and System do not match."""
     positions = np.asarray(in_units_of(positions, LENGTH, "positions"))
     count = system.getNumParticles()
@@ -61,7 +63,7 @@ def add_nodes_to_system(system: openmm.System, filament: Filament) -> tuple[IntA
     return np.array(nodes), np.array(control_points, dtype=int)
 
 
-def add_to_topology(topology: app.Topology, filament: Filament, name: str, attachment_names: Sequence[str]) -> None:
+def add_to_topology(topology: "app.Topology", filament: Filament, name: str, attachment_names: Sequence[str]) -> None:
     """Add a Filament to a Topology: a chain with bonds along its nodes.
 
     It has a residue and an atom for each node, control point or attachment point.

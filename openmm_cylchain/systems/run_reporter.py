@@ -3,11 +3,10 @@
 import contextlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import openmm
-from openmm import app
 
 from ..couplings.crosslink_records import CrosslinkFile
 from ..couplings.crosslinks import Crosslinks
@@ -31,6 +30,9 @@ from ..units.quantities import LENGTH, positive, thermal_energy, whole_number
 from ..units.types import Scalar
 from .described_runs import describe_system, energy_cells, total_energies, write_topology
 from .filaments import Filaments
+
+if TYPE_CHECKING:
+    from openmm import app
 
 
 class RunReporter:
@@ -116,7 +118,7 @@ class RunReporter:
             raise InputError(f"{directory} holds no run of a RunReporter: it cannot be gone on with.")
         self._closed = False
 
-    def describeNextReport(self, simulation: app.Simulation) -> dict[str, Any]:  # noqa: N802 - OpenMM's name
+    def describeNextReport(self, simulation: "app.Simulation") -> dict[str, Any]:  # noqa: N802 - OpenMM's name
         """When the next report is due, and that it needs positions; as OpenMM asks for it."""
         if self._closed:
             raise InputError(f"The RunReporter of {self._files.path} is closed: make another one with append=True.")
@@ -196,7 +198,7 @@ class RunReporter:
                 raise InputError(f"particle_diameters has {name!r}, but residues are named {there}.")
         return {index: self._diameters[name] for index, name in names.items() if name in self._diameters}
 
-    def report(self, simulation: app.Simulation, state: openmm.State) -> None:
+    def report(self, simulation: "app.Simulation", state: openmm.State) -> None:
         """Write a frame; OpenMM calls it."""
         step, time = simulation.currentStep, state.getTime()._value
         positions = state.getPositions(asNumpy=True)._value

@@ -6,13 +6,13 @@ import scipy
 from ..beams.curve import BeamElement, place_weights
 from ..filaments.filament import Filament
 from ..mechanics.friction import SegmentFriction
+from ..mechanics.quadrature import gauss_points
 from .mobility import PlaceResponse
 
 _LONGEST_PIECE = 128
 # Rates of relaxation of a free element, as in plugin_src/beams/BeamStep-inl.h: of strains in K/(zeta h^2), of the sum
 # and of the difference of its bends in EI/(zeta h^4).
 _STRAIN_RATE, _SUM_RATE, _DIFFERENCE_RATE = 378.0, 720.0, 8400.0
-_GAUSS_PLACES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 
 class BeamResponse(PlaceResponse):
@@ -62,8 +62,9 @@ class BeamResponse(PlaceResponse):
         shapes = np.zeros((len(local), unknowns))
         columns = (2 * local[:, None] + np.arange(4)) % unknowns
         np.put_along_axis(shapes, columns, place_weights(fractions), axis=1)
-        weights = place_weights(0.5 * (1.0 + _GAUSS_PLACES))
-        consistent = 0.5 * weights.T @ (_GAUSS_WEIGHTS[:, None] * weights)
+        places, shares = gauss_points(4)
+        weights = place_weights(places)
+        consistent = weights.T @ (shares[:, None] * weights)
         for friction, coordinates, stiffness, rates in self._directions:
             # What an implicit step resists: friction, and coordinates whose theta is above 1/2.
             excess = np.maximum(0.0, 0.5 - 1.0 / (step * rates))
