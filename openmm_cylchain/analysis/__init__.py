@@ -27,7 +27,9 @@ from .filament_shapes import (
 from .moduli import RelaxationModulus, relaxation_modulus
 from .networks import contact_map, contraction, filament_distances, find_bundles, mesh_size
 from .order import director, order_parameter, order_tensor
-from .runs import Run, RunFilament, RunParticles, load
+from .run_filaments import RunFilament, RunParticles
+from .run_loading import load
+from .runs import Run
 from .stress import Stress, stress
 
 __all__ = [

@@ -1,18 +1,14 @@
-"""A run that is in a directory as one object: times, filaments, linkers, energies; for mdtraj and MDAnalysis."""
+"""A run as one object: times, filaments, linkers, energies; for mdtraj and MDAnalysis."""
 
-import csv
-import math
 import warnings
-from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import mdtraj
 import numpy as np
 import numpy.typing as npt
 
-from ..beams.curve import BeamElement, arc_lengths, curve_points
+from ..beams.curve import arc_lengths, curve_points
 from ..couplings.beam_curves import BeamCurves
 from ..couplings.contact_frames import ContactFrame, DescribedContactFinder, joined_contacts
 from ..couplings.crosslink_records import CROSSLINK_RECORD, CrosslinkFrame, crosslinks_at
@@ -21,14 +17,13 @@ from ..errors import InputError, PrecisionWarning
 from ..mechanics.geometry import joint_cosines, segment_vectors
 from ..output.dcd_frames import DCDFrames
 from ..output.linker_records import LINKER_RECORD
+from ..output.read_tables import read_reports
 from ..output.record_file import read_records
-from ..output.run_description import DescribedFilament, DescribedLinkers, RunDescription, read_run_description
+from ..output.run_description import DescribedLinkers, RunDescription
 from ..output.run_files import RunFiles
 from ..units.quantities import VOLUME, positive, thermal_energy, whole_number
 from ..units.types import FloatArray, Indices, IntArray, Scalar
-
-PIECES_OF_ELEMENT = 8
-"""Straight pieces by which a beam element is drawn, alike in its parameter."""
+from .run_filaments import PIECES_OF_ELEMENT, RunParticles, described_filament
 
 _COARSE = 0.2
 _SHAPES = {
@@ -39,76 +34,6 @@ _SHAPES = {
     "box": lambda point, vector, length: Box(point, vector),
     "ellipsoid": lambda point, vector, length: Ellipsoid(point, vector),
 }
-
-
-@dataclass(frozen=True)
-class RunFilament:
-    """A filament of a run.
-
-    Attributes
-    ----------
-    type : FilamentType or BeadSpringType
-    nodes : (n,) int array
-        Particles, in order along the filament.
-    diameter : float
-        In nm.
-    ring : bool
-        Whether the last node is joined to the first.
-    clamped : tuple of int
-        Nodes that do not move, counted along the filament.
-    control_points : (n,) int array
-        Particles of the control points of nodes of beam elements; empty of straight segments.
-    clamped_tangents : tuple of int
-        Nodes whose control points do not move.
-    planar : bool
-        Whether it stays in its plane z = const.
-    """
-
-    type: Any
-    nodes: IntArray
-    diameter: float
-    ring: bool
-    clamped: tuple[int, ...] = ()
-    control_points: IntArray = field(default_factory=lambda: np.zeros(0, dtype=int))
-    clamped_tangents: tuple[int, ...] = ()
-    planar: bool = False
-
-    @property
-    def segments(self) -> int:
-        """Number of segments."""
-        return len(self.nodes) - (0 if self.ring else 1)
-
-    @property
-    def has_beam_elements(self) -> bool:
-        """Whether its segments are elements that bend inside."""
-        return len(self.control_points) > 0
-
-    def beam_element(self, temperature: float) -> BeamElement:
-        """What its beam elements are made of at a temperature."""
-        return self.type.beam_element(temperature, self.planar)
-
-    @property
-    def pieces(self) -> int:
-        """Straight pieces by which each of its segments is drawn: 1, or ``PIECES_OF_ELEMENT`` of a beam element."""
-        return PIECES_OF_ELEMENT if self.has_beam_elements else 1
-
-
-@dataclass(frozen=True)
-class RunParticles:
-    """Particles of a run beside its filaments.
-
-    Attributes
-    ----------
-    name : str
-        Of their residues.
-    indices : (n,) int array
-    diameter : float
-        In nm, 0 if it is not known.
-    """
-
-    name: str
-    indices: IntArray
-    diameter: float
 
 
 class Run:
@@ -155,7 +80,7 @@ class Run:
         self.times: FloatArray = energies["time (ps)"][:frames]
         self.energies: dict[str, FloatArray] = {name: values[:frames] for name, values in energies.items()}
         self.box: FloatArray | None = None if description.box is None else np.array(description.box)
-        self.filaments = tuple(_filament(own) for own in description.filaments)
+        self.filaments = tuple(described_filament(own) for own in description.filaments)
         self.particles = tuple(
             RunParticles(own.name, np.array(own.particles, dtype=int), own.diameter) for own in description.others
         )
@@ -163,7 +88,7 @@ class Run:
         self.walls: tuple[Shape, ...] = tuple(
             _SHAPES[own.shape](own.point, own.vector, own.length) for own in description.walls
         )
-        self.complete = description.steps is None or frames == _frames_of(description)
+        self.complete = description.frames in (None, frames)
 
     def __len__(self) -> int:
         """Number of frames."""
@@ -200,9 +125,8 @@ class Run:
         """Numbers and tensions of linkers: (frames, types) arrays by the headers of ``linkers.csv``."""
         if not self.linker_types:
             return {}
-        table = _read_table(self._files.linkers)
-        count = len(self.linker_types)
-        return {name: values[: count * len(self)].reshape(-1, count) for name, values in table.items()}
+        table = read_reports(self._files.linkers, len(self.linker_types))
+        return {name: values[: len(self)] for name, values in table.items()}
 
     @cached_property
     def pulling(self) -> dict[str, FloatArray]:
@@ -223,11 +147,8 @@ class Run:
         return self._by_frame(self._files.contact_forces)
 
     def _by_frame(self, path):
-        if not path.exists():
-            return {}
-        table = _read_table(path)
-        count = int(np.sum(table["step"] == table["step"][0]))
-        return {name: values[: count * len(self)].reshape(-1, count) for name, values in table.items()}
+        table = read_reports(path) if path.exists() else {}
+        return {name: values[: len(self)] for name, values in table.items()}
 
     @cached_property
     def _crosslink_records(self):
@@ -498,122 +419,3 @@ def volume_of(run: Run, volume: Scalar | None) -> float:
     if run.box is None:
         raise InputError("There is no periodic box: give the volume that is meant.")
     return float(np.linalg.det(run.box))
-
-
-def _frames_of(description):
-    return math.inf if description.steps is None else description.steps // description.steps_per_frame + 1
-
-
-def _filament(own: DescribedFilament) -> RunFilament:
-    nodes, control_points = (np.array(particles, dtype=int) for particles in (own.nodes, own.control_points))
-    return RunFilament(
-        own.type, nodes, own.diameter, own.ring, own.clamped, control_points, own.clamped_tangents, own.planar
-    )
-
-
-def load(path: str | Path, incomplete: bool = False) -> Run:
-    """Load the directory that ``openmm-cylchain run`` or a ``RunReporter`` has written.
-
-    Parameters
-    ----------
-    path : str or Path
-    incomplete : bool
-        Take a run that goes on still, was interrupted or has blown up, as far as its frames are whole.
-
-    Returns
-    -------
-    Run
-
-    Raises
-    ------
-    InputError
-        If the directory holds no run, or one that is not at its end (unless ``incomplete``), or a damaged one.
-
-    Warns
-    -----
-    PrecisionWarning
-        If positions are so far from the origin that their single precision is coarser than thermal fluctuations.
-
-    Examples
-    --------
-    >>> run = load("output_f_actin")  # doctest: +SKIP
-    >>> run.mdtraj(slice(100, None))  # doctest: +SKIP
-    """
-    files = RunFiles(path)
-    if not files.path.is_dir():
-        raise InputError(f"{path} is not a directory: give that of `openmm-cylchain run --output` or of a RunReporter.")
-    if not files.description.exists():
-        reason = "its files are those of an older version" if files.trajectory.exists() else "nothing has run into it"
-        raise InputError(f"{path} is not the directory of a run: it has no {files.description.name}, {reason}.")
-    if not incomplete and files.is_being_written:
-        raise InputError(
-            f"The run in {path} is still going on: wait until it ends, or take what there is with incomplete=True "
-            "(--incomplete)."
-        )
-    description = read_run_description(files.description)
-    needed = [files.topology, files.trajectory, files.energies]
-    needed += [files.linkers, files.linker_places] if description.linkers else []
-    for file in needed:
-        if not file.exists():
-            raise InputError(f"{path} lacks {file.name}: the run has not begun, or its files were moved.")
-    frames, energies = _whole_frames(files, description)
-    expected = _frames_of(description)
-    if frames == 0:
-        raise InputError(f"The run in {path} has not a frame that is whole.")
-    if frames < expected < math.inf and not incomplete:
-        raise InputError(
-            f"The run in {path} is incomplete: it has {frames} of {expected} frames. Continue it with "
-            f"`openmm-cylchain run {files.configuration} --output {path} --resume`, or take what there is with "
-            "incomplete=True (--incomplete)."
-        )
-    run = Run(files, description, int(min(frames, expected)), energies)
-    run.warn_of_rounding()
-    return run
-
-
-def _whole_frames(files, description):
-    # A kill may come between the writing of one file and of the next.
-    energies = _read_table(files.energies)
-    dcd = DCDFrames(files.trajectory)
-    if dcd.particles != description.particles:
-        raise InputError(
-            f"{files.trajectory} has {dcd.particles} particles, but {files.description.name} {description.particles}: "
-            "they are not of one run."
-        )
-    frames = min(len(energies["step"]), len(dcd))
-    expected = np.arange(frames) * description.steps_per_frame
-    if description.steps is None and frames:
-        # A RunReporter may come into a Simulation that has gone on for a while.
-        expected += int(energies["step"][0])
-    if not np.array_equal(energies["step"][:frames], expected):
-        raise InputError(f"{files.energies} does not have a line for each frame of the run.")
-    if description.linkers:
-        table = _read_table(files.linkers)
-        kinds = len(description.linkers)
-        frames = min(frames, len(table["step"]) // kinds)
-        recorded = read_records(files.linker_places)["step"]
-        held = (table["one hand bound"] + table["both hands bound"])[kinds * (frames - 1) : kinds * frames].sum()
-        unfinished = held > 0 and (len(recorded) == 0 or recorded[-1] < expected[frames - 1])
-        if frames < _frames_of(description) and unfinished:
-            frames -= 1
-    for path in (files.pulling, files.wall_forces, files.contact_forces):
-        if not path.exists():
-            continue
-        steps = _read_table(path)["step"]
-        first = np.sum(steps == steps[0]) if len(steps) else 1
-        frames = min(frames, len(steps) // int(first))
-    return frames, energies
-
-
-def _read_table(path):
-    # Of lines that are whole: a kill may leave a part of the last.
-    with open(path, newline="") as file:
-        lines = [line for line in file if line.endswith("\n")]
-    if not lines:
-        raise InputError(f"{path} is empty.")
-    names = next(csv.reader(lines[:1]))
-    try:
-        values = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]])
-        return dict(zip(names, values.reshape(len(lines) - 1, len(names)).T))
-    except ValueError:
-        raise InputError(f"{path} is damaged: its lines do not fit {lines[0].strip()!r}.") from None

@@ -18,7 +18,7 @@ def add_command(commands):
 def _export(options):
     if options.format not in FORMATS:
         raise InputError(f"--format must be one of {', '.join(FORMATS)}, but is {options.format!r}.")
-    from ..analysis.runs import load
+    from ..analysis.run_loading import load
     from .ovito import write_ovito
     from .simularium import write_simularium
     from .vmd import write_vmd

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..analysis.runs import Run, RunParticles
+from ..analysis.run_filaments import RunParticles
+from ..analysis.runs import Run
 from ..errors import InputError
 from ..output.files import check_output_path
 from ..rendering.outlines import wall_lines

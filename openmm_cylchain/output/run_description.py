@@ -140,6 +140,11 @@ class RunDescription:
     contacts: tuple[DescribedContacts, ...] = ()
     others: tuple[DescribedParticles, ...] = ()
 
+    @property
+    def frames(self) -> int | None:
+        """Of the whole run, with that at its start; None if nobody has said how long it will be."""
+        return None if self.steps is None else self.steps // self.steps_per_frame + 1
+
     def write(self, path: Path) -> None:
         """Write the description as JSON."""
         types = list(dict.fromkeys(filament.type for filament in self.filaments))

@@ -44,7 +44,7 @@ def _render(options):
     if not options.film and (options.turn or any(own is not None for own in of_films)):
         raise InputError("--frames, --fps, --colors and --turn belong to --film: give that, too.")
 
-    from ..analysis.runs import load
+    from ..analysis.run_loading import load
     from ..output.progress import ProgressMessages
     from .pictures import View, write_film, write_picture
     from .scene import Look

@@ -3,12 +3,12 @@
 import time
 
 from ..errors import InstabilityError
+from ..output.run_tables import ENERGY_COLUMNS, LINKER_TABLE_COLUMNS
 from ..units.text import format_time
 from .configuration import linker_labels, named_bound
 from .initial_state import recommended_step
 from .relaxation import relaxed_positions
 from .run import create_simulation
-from .run_directory import ENERGY_COLUMNS, LINKER_TABLE_COLUMNS
 from .summary import group_labels
 
 _MEASURED_SECONDS = 2.0

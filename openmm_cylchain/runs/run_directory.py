@@ -8,17 +8,9 @@ import hashlib
 import json
 from dataclasses import dataclass
 
-import numpy as np
-
 from ..errors import InputError
 from ..output.files import write_atomically
 from ..output.run_files import RunFiles, try_lock
-from ..output.run_tables import (
-    CONTACT_FORCE_COLUMNS,
-    ENERGY_COLUMNS,
-    LINKER_TABLE_COLUMNS,
-    WALL_FORCE_COLUMNS,
-)
 from ..version import __version__
 from .configuration import changed_keys, read_configuration
 from .start_files import COPIES
@@ -217,32 +209,3 @@ class RunDirectory(RunFiles):
 def digest_of_checkpoint(header, state):
     """SHA-256 of all that a checkpoint says: of its header, a dict, and of OpenMM's checkpoint, in bytes."""
     return hashlib.sha256(json.dumps(header, sort_keys=True).encode() + b"\n" + state).hexdigest()
-
-
-def read_energies(path):
-    """Read an energy table: a dict of arrays by the names of ENERGY_COLUMNS."""
-    values = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
-    return dict(zip(ENERGY_COLUMNS, values.T))
-
-
-def read_linkers(path):
-    """Read a table of linkers: a dict of arrays (reports, [[linkers]] tables) by the names of LINKER_TABLE_COLUMNS."""
-    values = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
-    types = int(values[:, LINKER_TABLE_COLUMNS.index("linkers")].max()) + 1
-    return dict(zip(LINKER_TABLE_COLUMNS, np.moveaxis(values.reshape(-1, types, values.shape[1]), 2, 0)))
-
-
-def read_wall_forces(path):
-    """Read a table of forces of walls: a dict of arrays (reports, faces of all walls) by WALL_FORCE_COLUMNS."""
-    return _by_report(path, WALL_FORCE_COLUMNS)
-
-
-def read_contact_forces(path):
-    """Read a table of forces of contacts: a dict of arrays (reports, filaments) by CONTACT_FORCE_COLUMNS."""
-    return _by_report(path, CONTACT_FORCE_COLUMNS)
-
-
-def _by_report(path, columns):
-    values = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
-    things = int(np.sum(values[:, 0] == values[0, 0]))
-    return dict(zip(columns, np.moveaxis(values.reshape(-1, things, values.shape[1]), 2, 0)))

@@ -18,12 +18,12 @@ from ..beams.curve import element_energies
 from ..errors import EquilibrationWarning, InputError
 from ..filaments.equilibrium import SegmentLengthDistribution
 from ..output.files import write_atomically
+from ..output.read_tables import read_reports
 from ..theory import beam_elements
 from ..units.quantities import AVOGADRO, thermal_energy
 from ..units.text import format_time, format_with_error
 from ..version import __version__
 from .configuration import linker_labels
-from .run_directory import read_linkers
 from .silence import silenced_c_library
 
 _STRETCHING, _STRETCHING_OF_ELEMENTS = "stretching energy per segment", "stretching energy per element"
@@ -175,7 +175,7 @@ def summarise_linkers(configuration, directory):
     """
     if not configuration.linkers:
         return []
-    table = read_linkers(directory.linkers)
+    table = read_reports(directory.linkers)
     names = linker_labels(configuration)
     return [_summarise_linkers(name, {key: table[key][:, n] for key in table}) for n, name in enumerate(names)]
 

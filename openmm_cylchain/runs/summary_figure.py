@@ -15,11 +15,11 @@ from ..analysis.statistics import mean_with_error
 from ..mechanics.geometry import unrolled
 from ..output.colors import FILAMENT_COLORS, LINKER_COLORS
 from ..output.files import write_atomically
+from ..output.read_tables import read_reports, read_table
 from ..output.record_file import read_records
 from ..units.quantities import thermal_energy
 from ..units.text import time_unit
 from .configuration import linker_labels
-from .run_directory import read_contact_forces, read_energies, read_linkers, read_wall_forces
 from .summary import (
     PICONEWTON,
     extensions,
@@ -69,7 +69,7 @@ def _draw(configuration, directory, trajectory):
     ]
     temperature = configuration.solvent.temperature
     _draw_conformations(axes[0, 0], groups, trajectory)
-    _draw_energies(axes[0, 1], groups, temperature, read_energies(directory.energies))
+    _draw_energies(axes[0, 1], groups, temperature, read_table(directory.energies))
     _draw_tangent_correlation(axes[1, 0], groups, temperature, trajectory)
     if any(has_exact_extension(group) for group, *_ in groups):
         _draw_extensions(axes[1, 1], groups, temperature, trajectory)
@@ -78,7 +78,7 @@ def _draw(configuration, directory, trajectory):
     else:
         _draw_segment_lengths(axes[1, 1], groups, temperature, trajectory)
     if configuration.linkers:
-        labels, table = linker_labels(configuration), read_linkers(directory.linkers)
+        labels, table = linker_labels(configuration), read_reports(directory.linkers)
         _draw_linkers(axes[0, 0], labels, directory.linker_places)
         _draw_numbers_bound(axes[2, 0], labels, table)
         _draw_tensions(axes[2, 1], labels, table)
@@ -239,14 +239,14 @@ def _draw_forces(axes, configuration, directory, times):
     # Means between reports: at the first one, there are none.
     name, length = _time_unit(times[-1])
     if configuration.walls:
-        table = read_wall_forces(directory.wall_forces)
+        table = read_reports(directory.wall_forces)
         time, loads = table["time (ps)"][1:, 0] / length, table["load (kJ/mol/nm)"][1:] / PICONEWTON
         faces = zip(table["wall"][0].astype(int), table["face"][0].astype(int))
         for number, (wall, face) in enumerate(faces):
             label = _face_label(configuration.walls[wall], wall, face)
             axes[0].plot(time, loads[:, number], color=_COLOURS[number % len(_COLOURS)], linewidth=1.2, label=label)
     if configuration.contacts:
-        table = read_contact_forces(directory.contact_forces)
+        table = read_reports(directory.contact_forces)
         time, loads = table["time (ps)"][1:, 0] / length, table["load (kJ/mol/nm)"][1:] / PICONEWTON
         axes[1].plot(time, loads.mean(axis=1), color=_COLOURS[0], linewidth=1.5, label="mean over filaments")
         axes[1].plot(time, loads.max(axis=1), ":", color=_COLOURS[0], linewidth=1.0, label="largest")

@@ -8,7 +8,7 @@ import pytest
 from openmm import unit
 
 from openmm_cylchain import F_ACTIN, EquilibrationWarning, InputError, analysis
-from openmm_cylchain.analysis.runs import RunFilament
+from openmm_cylchain.analysis.run_filaments import RunFilament
 from openmm_cylchain.analysis.statistics import mean_in_equilibrium
 from support.random_series import correlated_series
 

@@ -7,7 +7,7 @@ import pytest
 
 from openmm_cylchain import DSDNA_BASE_PAIRS, F_ACTIN, MICROTUBULE, InputError, analysis
 from openmm_cylchain.analysis import CrosslinkFrame
-from openmm_cylchain.analysis.runs import RunFilament
+from openmm_cylchain.analysis.run_filaments import RunFilament
 from openmm_cylchain.beams.curve import BeamElement, beam_virial
 from openmm_cylchain.beams.equilibrium import draw_beam
 from openmm_cylchain.couplings.contact_frames import joined_contacts

@@ -23,9 +23,10 @@ from openmm_cylchain import (
 from openmm_cylchain.beams.curve import curve_points, element_energies, element_points
 from openmm_cylchain.cli import main
 from openmm_cylchain.couplings.capsule_contacts import contact_spacing
+from openmm_cylchain.output.read_tables import read_table
 from openmm_cylchain.runs.configuration import parse_configuration, read_configuration
 from openmm_cylchain.runs.initial_state import build_system
-from openmm_cylchain.runs.run_directory import RunDirectory, read_energies
+from openmm_cylchain.runs.run_directory import RunDirectory
 from openmm_cylchain.runs.summary import group_labels, load_trajectory, summarise
 from support.configurations import BEAMS
 from support.contexts import positions_of
@@ -201,7 +202,7 @@ def test_runs_of_rings(tmp_path):
             "bending energy per element",
             "cosine between ends of an element",
         ]
-    energies, bending = read_energies(out / "energies.csv"), 0.0
+    energies, bending = read_table(out / "energies.csv"), 0.0
     for own, nodes, controls in chains_of(filaments, run.positions(-1)):
         parts = own.energies(nodes, controls, 310.0) if own.type.has_beam_elements else own.energies(nodes)
         bending += parts[1]
@@ -266,7 +267,7 @@ def test_timestep_explains_that_of_beam_elements(tmp_path, capsys):
 
 
 def test_energies_are_those_of_the_curve(unbroken):
-    energies, run = read_energies(unbroken / "energies.csv"), analysis.load(unbroken)
+    energies, run = read_table(unbroken / "energies.csv"), analysis.load(unbroken)
     configuration = read_configuration(unbroken / "configuration.toml")
     filaments = build_system(configuration, None, 5).filaments
     kT = 8.31446261815324e-3 * 310

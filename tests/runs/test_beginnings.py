@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from openmm_cylchain.cli import main
+from openmm_cylchain.output.read_tables import read_table
 from openmm_cylchain.runs.beginnings import START_NAMES, start_text
 from openmm_cylchain.runs.configuration import parse_configuration, read_configuration
 from openmm_cylchain.runs.initial_state import build_system
 from openmm_cylchain.runs.run import run
-from openmm_cylchain.runs.run_directory import read_energies
 from support.checkpoints import resealed
 from support.commands import finish, start, wait_for_size
 from support.configurations import EVERYTHING
@@ -38,7 +38,7 @@ def test_new_configurations_run(tmp_path, kind, monkeypatch, capsys):
     (tmp_path / "short.toml").write_text(short)
     assert main(["run", "short.toml", "--output", "out"]) == 0
     assert "warning" not in capsys.readouterr().err
-    assert all(np.all(np.isfinite(column)) for column in read_energies(tmp_path / "out" / "energies.csv").values())
+    assert all(np.all(np.isfinite(column)) for column in read_table(tmp_path / "out" / "energies.csv").values())
 
 
 def test_new_does_not_overwrite(tmp_path, capsys):

@@ -12,9 +12,9 @@ from openmm import unit
 from openmm_cylchain import ALPHA_ACTININ, F_ACTIN, KINESIN_1, MICROTUBULE, MYOSIN_II, InputError
 from openmm_cylchain.cli import main
 from openmm_cylchain.output.linker_records import LINKER_RECORD
+from openmm_cylchain.output.read_tables import read_reports
 from openmm_cylchain.runs.configuration import changed_keys, parse_configuration, read_configuration
 from openmm_cylchain.runs.run import create_filaments
-from openmm_cylchain.runs.run_directory import read_linkers
 from support import small_runs
 from support.checkpoints import resealed
 from support.commands import finish, start, wait_for_size
@@ -236,7 +236,7 @@ def test_changes_of_linkers_and_box_are_named():
 
 def test_tables_and_places_are_those_of_the_linkers(unbroken):
     """Numbers and tensions of the table, from the records of the other file; places lie on the filaments of frames."""
-    table = read_linkers(unbroken / "linkers.csv")
+    table = read_reports(unbroken / "linkers.csv")
     assert table["step"].shape == (FRAMES, 2)
     np.testing.assert_array_equal(table["step"][:, 0], np.arange(0, 801, 20))
     np.testing.assert_allclose(table["time (ps)"][:, 1], 5e6 * table["step"][:, 1])
@@ -308,7 +308,7 @@ def test_summary_has_linkers(unbroken, capsys):
     summary = json.loads((unbroken / "summary.json").read_text())
     (group,) = summary["groups"]
     assert not group["in_equilibrium"] and any("Linkers bind to these filaments" in note for note in group["notes"])
-    table = read_linkers(unbroken / "linkers.csv")
+    table = read_reports(unbroken / "linkers.csv")
     for number, (name, own) in enumerate(zip(("alpha-actinin", "motor"), summary["linkers"])):
         assert own["name"] == name
         late = table["both hands bound"][FRAMES // 2 :, number]
@@ -356,7 +356,7 @@ def test_example_of_a_network_runs_without_a_warning(tmp_path, capsys):
     (tmp_path / "short.toml").write_text(short)
     assert main(["run", str(tmp_path / "short.toml"), "--output", str(tmp_path / "out")]) == 0
     assert "warning" not in capsys.readouterr().err
-    assert read_linkers(tmp_path / "out" / "linkers.csv")["step"].shape == (3, 2)
+    assert read_reports(tmp_path / "out" / "linkers.csv")["step"].shape == (3, 2)
 
 
 def test_recommended_step_knows_linkers(tmp_path, capsys):

@@ -17,9 +17,10 @@ from openmm import app
 from openmm_cylchain import F_ACTIN, InputError
 from openmm_cylchain.cli import main
 from openmm_cylchain.engines.gpu_platforms import why_not_on
+from openmm_cylchain.output.read_tables import read_table
 from openmm_cylchain.runs.configuration import parse_configuration, read_configuration
 from openmm_cylchain.runs.run import create_filaments, run
-from openmm_cylchain.runs.run_directory import RunDirectory, read_energies
+from openmm_cylchain.runs.run_directory import RunDirectory
 from openmm_cylchain.runs.summary import format_summary, load_trajectory, summarise
 from support.checkpoints import resealed
 from support.commands import COMMAND, finish, start, wait_for_size
@@ -119,7 +120,7 @@ def test_energies_are_those_of_the_trajectory(unbroken):
         rows = list(csv.DictReader(file))
     assert [int(row["step"]) for row in rows] == list(range(0, 1201, 20))
     assert [float(row["time (ps)"]) for row in rows] == [1e4 * step for step in range(0, 1201, 20)]
-    energies = read_energies(unbroken / "energies.csv")
+    energies = read_table(unbroken / "energies.csv")
     configuration = read_configuration(unbroken / "configuration.toml")
     trajectory = load_trajectory(configuration, RunDirectory(unbroken))
     np.testing.assert_allclose(trajectory.time, energies["time (ps)"])
@@ -509,7 +510,7 @@ def test_blow_up_is_reported_and_leaves_no_broken_frame(tmp_path, capsys):
     trajectory = mdtraj.load_dcd(str(output / "trajectory.dcd"), top=str(output / "topology.cif"))
     assert 1 <= trajectory.n_frames < 200
     assert np.all(np.isfinite(trajectory.xyz))
-    energies = read_energies(output / "energies.csv")
+    energies = read_table(output / "energies.csv")
     assert len(energies["step"]) == trajectory.n_frames
     assert all(np.all(np.isfinite(column)) for column in energies.values())
 
@@ -529,7 +530,7 @@ def test_infinite_energy_is_not_written(tmp_path, capsys):
     output = tmp_path / "out"
     assert main(["run", config, "--output", str(output)]) == 1
     assert re.search(r"error: Filament \d \(ACT\) has blown up at segment \d in step \d+", capsys.readouterr().err)
-    energies = read_energies(output / "energies.csv")
+    energies = read_table(output / "energies.csv")
     assert all(np.all(np.isfinite(column)) for column in energies.values())
 
 
@@ -551,7 +552,7 @@ def test_configuration_without_an_energy_is_traced_to_its_segment(tmp_path, monk
     assert main(["run", configured(tmp_path, text), "--output", str(tmp_path / "out")]) == 1
     error = capsys.readouterr().err
     assert "Filament 3 (ACT) has blown up at segment 3 by step" in error and "its position or energy is not" in error
-    assert np.all(np.isfinite(read_energies(tmp_path / "out" / "energies.csv")["stretching energy (kJ/mol)"]))
+    assert np.all(np.isfinite(read_table(tmp_path / "out" / "energies.csv")["stretching energy (kJ/mol)"]))
 
 
 @pytest.mark.parametrize(
@@ -640,7 +641,7 @@ def test_what_a_trajectory_is_too_coarse_for_is_not_compared(tmp_path, distance,
     if said:
         assert ("nothing is compared" if compared == 0 else "it is not compared") in said[0]
         assert not any("Not in equilibrium" in note for note in group.notes) or compared > 0
-    energies = read_energies(tmp_path / "out" / "energies.csv")
+    energies = read_table(tmp_path / "out" / "energies.csv")
     assert np.all(energies["stretching energy per segment (kT)"] < 4.0)
 
 
@@ -662,7 +663,7 @@ def test_freely_jointed_and_single_segments_have_a_summary(tmp_path):
         report_interval='"0.2 us"',
     )
     assert main(["run", config, "--output", str(tmp_path / "single")]) == 0
-    column = read_energies(tmp_path / "single" / "energies.csv")["bending energy per joint (kT)"]
+    column = read_table(tmp_path / "single" / "energies.csv")["bending energy per joint (kT)"]
     assert all(math.isnan(value) for value in column)
 
 

@@ -1,0 +1,91 @@
+"""The filaments of a run, and its other particles."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..beams.curve import BeamElement
+from ..output.run_description import DescribedFilament
+from ..units.types import IntArray
+
+PIECES_OF_ELEMENT = 8
+"""Straight pieces by which a beam element is drawn, alike in its parameter."""
+
+
+@dataclass(frozen=True)
+class RunFilament:
+    """A filament of a run.
+
+    Attributes
+    ----------
+    type : FilamentType or BeadSpringType
+    nodes : (n,) int array
+        Particles, in order along the filament.
+    diameter : float
+        In nm.
+    ring : bool
+        Whether the last node is joined to the first.
+    clamped : tuple of int
+        Nodes that do not move, counted along the filament.
+    control_points : (n,) int array
+        Particles of the control points of nodes of beam elements; empty of straight segments.
+    clamped_tangents : tuple of int
+        Nodes whose control points do not move.
+    planar : bool
+        Whether it stays in its plane z = const.
+    """
+
+    type: Any
+    nodes: IntArray
+    diameter: float
+    ring: bool
+    clamped: tuple[int, ...] = ()
+    control_points: IntArray = field(default_factory=lambda: np.zeros(0, dtype=int))
+    clamped_tangents: tuple[int, ...] = ()
+    planar: bool = False
+
+    @property
+    def segments(self) -> int:
+        """Number of segments."""
+        return len(self.nodes) - (0 if self.ring else 1)
+
+    @property
+    def has_beam_elements(self) -> bool:
+        """Whether its segments are elements that bend inside."""
+        return len(self.control_points) > 0
+
+    def beam_element(self, temperature: float) -> BeamElement:
+        """What its beam elements are made of at a temperature."""
+        return self.type.beam_element(temperature, self.planar)
+
+    @property
+    def pieces(self) -> int:
+        """Straight pieces by which each of its segments is drawn: 1, or ``PIECES_OF_ELEMENT`` of a beam element."""
+        return PIECES_OF_ELEMENT if self.has_beam_elements else 1
+
+
+@dataclass(frozen=True)
+class RunParticles:
+    """Particles of a run beside its filaments.
+
+    Attributes
+    ----------
+    name : str
+        Of their residues.
+    indices : (n,) int array
+    diameter : float
+        In nm, 0 if it is not known.
+    """
+
+    name: str
+    indices: IntArray
+    diameter: float
+
+
+def described_filament(own: DescribedFilament) -> RunFilament:
+    """A filament of a run, as its description has it."""
+    nodes, control_points = (np.array(particles, dtype=int) for particles in (own.nodes, own.control_points))
+    return RunFilament(
+        own.type, nodes, own.diameter, own.ring, own.clamped, control_points, own.clamped_tangents, own.planar
+    )
