@@ -168,7 +168,7 @@ def _run(options):
     from .runs.run import RunInterrupted
     from .runs.run_directory import RunDirectory
     from .runs.summarised_run import run_with_summary
-    from .runs.summary import format_summary
+    from .runs.summary_text import format_summary
 
     configuration = read_configuration(options.configuration)
     if options.dry_run:

@@ -10,7 +10,7 @@ from ..analysis.order import director
 from ..analysis.runs import Run
 from ..errors import InputError
 from ..mechanics.geometry import segment_vectors
-from ..units.quantities import AVOGADRO
+from ..units.quantities import PICONEWTON
 from ..units.types import FloatArray, IntArray
 from .colors import filament_colors, linker_color, particle_colors
 from .outlines import box_edges, wall_lines
@@ -21,7 +21,6 @@ COLORINGS = ("type", "tension", "orientation", "bending")
 _LINE_COLOR, _LINE_WIDTH = np.array([0.62, 0.64, 0.68]), 0.0011
 _VISIBLE = 0.009  # Of the extent of the scene: what a tube is wide at least.
 _VISIBLE_BALL = 0.012
-_PICONEWTON = 1e-15 * AVOGADRO * 1e-9
 
 
 @dataclass(frozen=True)
@@ -223,7 +222,7 @@ def _values(run: Run, look: Look, axis: FloatArray | None, frame: int) -> list[F
         units = [own / np.linalg.norm(own, axis=1, keepdims=True) for own in _segments(run, frame)]
         return [np.degrees(np.arccos(np.clip(np.abs(own @ axis), 0.0, 1.0))) for own in units]
     if look.color == "tension":
-        values = [tensions / _PICONEWTON for tensions in run.segment_tensions(frame, look.average)]
+        values = [tensions / PICONEWTON for tensions in run.segment_tensions(frame, look.average)]
     else:
         values = [np.degrees(bends) for bends in run.bends(frame)]
     return [np.repeat(own, filament.pieces) for own, filament in zip(values, run.filaments)]

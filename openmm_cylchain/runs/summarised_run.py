@@ -1,9 +1,11 @@
 """A run with its summary and figure: what the command ``run`` does, and each run of a scan."""
 
+from .linker_summary import summarise_linkers
 from .run import run
 from .run_directory import RunDirectory
-from .summary import load_trajectory, summarise, summarise_linkers, write_summary
+from .summary import load_trajectory, summarise
 from .summary_figure import write_figure
+from .summary_text import write_summary
 
 
 def run_with_summary(configuration, output, resume=False):

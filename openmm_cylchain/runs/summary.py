@@ -1,13 +1,11 @@
-"""The summary of a run: observables of its trajectory against theory, as JSON, a table and a figure."""
+"""The summary of a run: observables of its trajectory against theory."""
 
-import json
 import math
 import warnings
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import mdtraj
 import numpy as np
-import openmm
 
 from .. import theory
 from ..analysis.bending import bending_drift, joint_cosines, persistence_length
@@ -17,13 +15,8 @@ from ..bead_spring.bead_spring_type import BeadSpringType
 from ..beams.curve import element_energies
 from ..errors import EquilibrationWarning, InputError
 from ..filaments.equilibrium import SegmentLengthDistribution
-from ..output.files import write_atomically
-from ..output.read_tables import read_reports
 from ..theory import beam_elements
-from ..units.quantities import AVOGADRO, thermal_energy
-from ..units.text import format_time, format_with_error
-from ..version import __version__
-from .configuration import linker_labels
+from ..units.quantities import thermal_energy
 from .silence import silenced_c_library
 
 _STRETCHING, _STRETCHING_OF_ELEMENTS = "stretching energy per segment", "stretching energy per element"
@@ -32,8 +25,19 @@ _EXTENSION = "extension along the tension, second half of the run"
 _ROUNDING_OF_STRETCHING, _ROUNDING_OF_ALL = 0.01, 1.0
 """Beyond which share of its thermal energy, that of stretching, or nothing at all, is compared with theory."""
 _ENOUGH_FILAMENTS = 8
-_AGREEMENT_SIGMA = 3.0
-_AGREEMENT_FRACTION = 0.05
+AGREEMENT_SIGMA = 3.0
+AGREEMENT_FRACTION = 0.05
+_DISTURBANCES = {
+    "linkers": "linkers bind to these filaments",
+    "links": "links join them",
+    "joints": "joints hold their directions",
+    "contacts": "contacts keep them apart",
+    "walls": "walls confine them",
+    "forces": "constant forces pull at them",
+    "tethers": "tethers hold them in several places",
+    "flow": "the solvent flows",
+    "propulsion": "they propel themselves",
+}
 
 
 @dataclass(frozen=True)
@@ -77,28 +81,6 @@ class GroupSummary:
     in_equilibrium: bool
     observables: tuple
     notes: tuple
-
-
-@dataclass(frozen=True)
-class LinkerSummary:
-    """Linkers of one [[linkers]] table: means over the last half of a run, and the largest tension of all of it.
-
-    Numbers of linkers with standard errors from their fluctuations in time; tensions in pN, None where none pulled.
-    """
-
-    name: str
-    unbound: float
-    unbound_error: float
-    one_hand_bound: float
-    one_hand_bound_error: float
-    both_hands_bound: float
-    both_hands_bound_error: float
-    mean_tension: float
-    largest_tension: float
-
-
-PICONEWTON = 1e-15 * AVOGADRO * 1e-9
-"""In kJ/(mol nm)."""
 
 
 def load_trajectory(configuration, directory):
@@ -158,46 +140,6 @@ def summarise(configuration, trajectory):
         _summarise_group(configuration, group, list(members), label, trajectory)
         for group, members, label in zip(configuration.filaments, group_members(configuration), labels)
     ]
-
-
-def summarise_linkers(configuration, directory):
-    """What the linkers of a run did.
-
-    Parameters
-    ----------
-    configuration : Configuration
-    directory : RunDirectory
-
-    Returns
-    -------
-    list of LinkerSummary
-        One for each [[linkers]] table.
-    """
-    if not configuration.linkers:
-        return []
-    table = read_reports(directory.linkers)
-    names = linker_labels(configuration)
-    return [_summarise_linkers(name, {key: table[key][:, n] for key in table}) for n, name in enumerate(names)]
-
-
-def _summarise_linkers(name, table):
-    # Two values at least, which a standard error needs.
-    late = slice(min(len(table["step"]) // 2, len(table["step"]) - 2), None)
-    states = {}
-    for state in ("unbound", "one hand bound", "both hands bound"):
-        mean, error = mean_with_error(table[state][late, None])
-        states[state.replace(" ", "_")] = mean
-        states[f"{state.replace(' ', '_')}_error"] = error
-    pulling = table["both hands bound"][late]
-    tensions = np.nan_to_num(table["mean tension (kJ/mol/nm)"][late])
-    largest = table["maximum tension (kJ/mol/nm)"]
-    largest = largest[~np.isnan(largest)]
-    return LinkerSummary(
-        name=name,
-        **states,
-        mean_tension=float(np.average(tensions, weights=pulling)) / PICONEWTON if pulling.any() else None,
-        largest_tension=float(largest.max()) / PICONEWTON if len(largest) else None,
-    )
 
 
 def _summarise_group(configuration, group, members, label, trajectory):
@@ -386,10 +328,10 @@ def _compared(name, unit, value, error, exact, comparable):
         verdict = "not comparable"
     elif name == _WORMLIKE:
         verdict = "reference"
-    elif deviation is not None and abs(deviation) <= _AGREEMENT_SIGMA:
+    elif deviation is not None and abs(deviation) <= AGREEMENT_SIGMA:
         verdict = "agrees"
-    elif relative is not None and abs(relative) <= _AGREEMENT_FRACTION:
-        verdict = f"within {100 * _AGREEMENT_FRACTION:.0f} %"
+    elif relative is not None and abs(relative) <= AGREEMENT_FRACTION:
+        verdict = f"within {100 * AGREEMENT_FRACTION:.0f} %"
     else:
         verdict = "differs"
     return Observable(name, unit, value, error, exact, deviation, relative, verdict)
@@ -453,113 +395,3 @@ def _rounding_share(configuration, group, trajectory):
         # The strain at a node is that of Q - P, a third of an element long, with a share of an element of its energy.
         variance *= 3.0
     return variance * group.type.segment_stiffness / thermal_energy(configuration.solvent.temperature)
-
-
-def write_summary(configuration, directory, groups, linkers=()):
-    """Write the summary as JSON into the directory of the run."""
-    settings = configuration.simulation
-    content = {
-        "title": configuration.title,
-        "openmm_cylchain": __version__,
-        "openmm": openmm.Platform.getOpenMMVersion(),
-        "platform": settings.platform,
-        "scheme": settings.scheme,
-        "temperature (K)": configuration.solvent.temperature,
-        "time step (ps)": settings.time_step,
-        "simulated time (ps)": settings.steps * settings.time_step,
-        "groups": [asdict(group) for group in groups],
-        **({"linkers": [asdict(own) for own in linkers]} if linkers else {}),
-    }
-    write_atomically(directory.summary, (json.dumps(content, indent=2, allow_nan=False) + "\n").encode())
-
-
-_DISTURBANCES = {
-    "linkers": "linkers bind to these filaments",
-    "links": "links join them",
-    "joints": "joints hold their directions",
-    "contacts": "contacts keep them apart",
-    "walls": "walls confine them",
-    "forces": "constant forces pull at them",
-    "tethers": "tethers hold them in several places",
-    "flow": "the solvent flows",
-    "propulsion": "they propel themselves",
-}
-
-_EXPLANATIONS = {
-    "agrees": f"agrees: within {_AGREEMENT_SIGMA:g} standard errors.",
-    f"within {100 * _AGREEMENT_FRACTION:.0f} %": (
-        "within 5 %: a deviation beyond chance, but of the size that a recommended time step may leave; a smaller "
-        "step reduces it."
-    ),
-    "reference": "reference: the continuous chain, to which the discrete one tends for short segments.",
-    "differs": "differs: more than 3 standard errors and 5 %. Try a smaller time step.",
-}
-
-
-def _rounded(value, digits):
-    # To significant digits; large numbers without an exponent, as long as they can be read.
-    text = f"{value:.{digits}g}"
-    return f"{float(text):.0f}" if "e+" in text and abs(value) < 1e9 else text
-
-
-def format_summary(configuration, groups, linkers=()):
-    """The summary as text for a terminal."""
-    settings = configuration.simulation
-    lines = [
-        f"{configuration.title or 'Run'}: {format_time(settings.steps * settings.time_step)} in steps of "
-        f"{format_time(settings.time_step)}, scheme {settings.scheme}"
-    ]
-    for group in groups:
-        lines += ["", group.label, *_table(group.observables), *(f"  {note}" for note in group.notes)]
-    if linkers:
-        lines += [
-            "",
-            *_linker_table(linkers),
-            "  Means over the last half of the run; the largest tension of all of it.",
-        ]
-    verdicts = {observable.verdict for group in groups for observable in group.observables}
-    lines += ["", *(text for verdict, text in _EXPLANATIONS.items() if verdict in verdicts)]
-    return "\n".join(lines).rstrip()
-
-
-def _linker_table(linkers):
-    rows = [("linkers", "unbound", "one hand", "both hands", "mean tension (pN)", "largest (pN)")]
-    for own in linkers:
-        states = [
-            format_with_error(getattr(own, state), getattr(own, f"{state}_error"))
-            for state in ("unbound", "one_hand_bound", "both_hands_bound")
-        ]
-        tensions = ["-" if force is None else f"{force:.3g}" for force in (own.mean_tension, own.largest_tension)]
-        rows.append((own.name, *states, *tensions))
-    return _aligned(rows, (0,))
-
-
-def _table(observables):
-    rows = [("", "average", "standard error", "theory", "deviation", "", "")]
-    for observable in observables:
-        deviation = "-" if observable.deviation is None else f"{observable.deviation:+.1f} sigma"
-        relative = observable.relative_deviation
-        if observable.verdict == "not comparable":
-            deviation, relative = "-", None
-        rows.append(
-            (
-                observable.name + (f" ({observable.unit})" if observable.unit else ""),
-                _rounded(observable.value, 6),
-                _rounded(observable.standard_error, 2),
-                _rounded(observable.theory, 6),
-                deviation,
-                "" if relative is None else f"{100 * relative:+.2g} %",
-                observable.verdict,
-            )
-        )
-    return _aligned(rows, (0, len(rows[0]) - 1))
-
-
-def _aligned(rows, left):
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    return [
-        "  ".join(
-            ["", *(cell.ljust(widths[i]) if i in left else cell.rjust(widths[i]) for i, cell in enumerate(row))]
-        ).rstrip()
-        for row in rows
-    ]

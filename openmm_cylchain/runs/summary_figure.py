@@ -17,11 +17,10 @@ from ..output.colors import FILAMENT_COLORS, LINKER_COLORS
 from ..output.files import write_atomically
 from ..output.read_tables import read_reports, read_table
 from ..output.record_file import read_records
-from ..units.quantities import thermal_energy
+from ..units.quantities import PICONEWTON, thermal_energy
 from ..units.text import time_unit
 from .configuration import linker_labels
 from .summary import (
-    PICONEWTON,
     extensions,
     group_labels,
     group_members,

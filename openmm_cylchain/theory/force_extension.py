@@ -9,11 +9,9 @@ import scipy
 from ..errors import InputError
 from ..filaments.equilibrium import JointAngleDistribution
 from ..filaments.filament_type import FilamentType
-from ..units.quantities import DIMENSIONLESS, FORCE, LENGTH, STIFFNESS, in_units_of, positive, whole_number
+from ..units.quantities import DIMENSIONLESS, FORCE, LENGTH, PICONEWTON, STIFFNESS, in_units_of, positive, whole_number
 from ..units.types import FloatOrArray, Numbers, Scalar
 from .arguments import each_not_negative, require_straight_segments, thermal_energy_above_zero
-
-_PICONEWTON = 0.602214076
 
 
 def marko_siggia_force(relative_extension: Numbers, persistence_length: Scalar, temperature: Scalar) -> FloatOrArray:
@@ -322,7 +320,7 @@ def calibrated_to_force(filament_type: FilamentType, force: Scalar, temperature:
     if excess(0.5) > 0.0:
         raise InputError(
             f"{name}: its segments of {contour:g} nm are too long, or too soft, for the extension of a wormlike chain "
-            f"at {force / _PICONEWTON:.3g} pN."
+            f"at {force / PICONEWTON:.3g} pN."
         )
     return shortened(scipy.optimize.brentq(excess, 0.5, 1.1, xtol=1e-9))
 

@@ -25,6 +25,7 @@ import scipy
 
 from ..filaments.collection import FilamentCollection
 from ..filaments.filament import Filament, Tether
+from ..units.quantities import PICONEWTON
 from ..units.types import FloatArray
 from .time_step import TimeStep
 
@@ -33,7 +34,6 @@ _SHARE_OF_RATE_OF_OTHERS = 0.09
 # Of its length, between the ends of a filament: one that is more bent has no direction along which it is compressed.
 _STRAIGHT = 0.5
 _ROUNDING = 1e-9
-_PICONEWTON = 0.602214076
 
 
 def steps_of_buckling(
@@ -78,7 +78,7 @@ def _time_step(name, scheme, rate, compression, number):
     share = _SHARE_OF_RATE.get(scheme, _SHARE_OF_RATE_OF_OTHERS)
     what = f"buckling of {name}, filament {number}"
     reason = (
-        f"{what}: compressed with {compression / _PICONEWTON:.3g} pN, it grows with up to {rate * 1e12:.3g}/s, "
+        f"{what}: compressed with {compression / PICONEWTON:.3g} pN, it grows with up to {rate * 1e12:.3g}/s, "
         f"of which a step may take {share:g}"
     )
     return TimeStep(share / rate, reason, {what: 1.0 / rate}, {what: share / rate})

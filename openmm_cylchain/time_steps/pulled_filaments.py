@@ -18,11 +18,11 @@ from ..filaments.collection import FilamentCollection
 from ..filaments.filament import Tether
 from ..filaments.filament_type import FilamentType
 from ..theory.force_extension import marko_siggia_extension, wlc_share_of_force
+from ..units.quantities import PICONEWTON
 from ..units.types import FloatArray
 from .buckling_step import displacements
 
 _LARGEST_ERROR = 0.1
-_PICONEWTON = 0.602214076
 _HELD = 1e6
 
 
@@ -61,7 +61,7 @@ def _warn(kind, name, number, share, force):
         "that is right at one force."
     )
     warnings.warn(
-        f"Filament {number} ({name}) is pulled with {force / _PICONEWTON:.3g} pN, under which a wormlike chain bends "
+        f"Filament {number} ({name}) is pulled with {force / PICONEWTON:.3g} pN, under which a wormlike chain bends "
         f"over (k_BT l_p/F)^(1/2) = {bend:.3g} nm. In segments of {kind.segment_length:.4g} nm, a long filament has "
         f"the extension of the wormlike chain at {share:.2f} of the force. {remedy}",
         SegmentLengthWarning,

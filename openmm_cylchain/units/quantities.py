@@ -11,6 +11,8 @@ from ..errors import InputError
 from .types import FloatArray, FloatOrArray, Numbers, Scalar, Vector
 
 AVOGADRO = 6.02214076e23
+PICONEWTON = 1e-15 * AVOGADRO * 1e-9
+"""In kJ/(mol nm)."""
 BOLTZMANN = unit.MOLAR_GAS_CONSTANT_R.value_in_unit(unit.kilojoule_per_mole / unit.kelvin)
 
 LENGTH = unit.nanometer

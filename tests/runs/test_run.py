@@ -21,7 +21,8 @@ from openmm_cylchain.output.read_tables import read_table
 from openmm_cylchain.runs.configuration import parse_configuration, read_configuration
 from openmm_cylchain.runs.run import create_filaments, run
 from openmm_cylchain.runs.run_directory import RunDirectory
-from openmm_cylchain.runs.summary import format_summary, load_trajectory, summarise
+from openmm_cylchain.runs.summary import load_trajectory, summarise
+from openmm_cylchain.runs.summary_text import format_summary
 from support.checkpoints import resealed
 from support.commands import COMMAND, finish, start, wait_for_size
 from support.contexts import positions_of

@@ -1,0 +1,68 @@
+"""What the linkers of a run did, for its summary."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..analysis.statistics import mean_with_error
+from ..output.read_tables import read_reports
+from ..units.quantities import PICONEWTON
+from .configuration import linker_labels
+
+
+@dataclass(frozen=True)
+class LinkerSummary:
+    """Linkers of one [[linkers]] table: means over the last half of a run, and the largest tension of all of it.
+
+    Numbers of linkers with standard errors from their fluctuations in time; tensions in pN, None where none pulled.
+    """
+
+    name: str
+    unbound: float
+    unbound_error: float
+    one_hand_bound: float
+    one_hand_bound_error: float
+    both_hands_bound: float
+    both_hands_bound_error: float
+    mean_tension: float
+    largest_tension: float
+
+
+def summarise_linkers(configuration, directory):
+    """What the linkers of a run did.
+
+    Parameters
+    ----------
+    configuration : Configuration
+    directory : RunDirectory
+
+    Returns
+    -------
+    list of LinkerSummary
+        One for each [[linkers]] table.
+    """
+    if not configuration.linkers:
+        return []
+    table = read_reports(directory.linkers)
+    names = linker_labels(configuration)
+    return [_summarise_linkers(name, {key: table[key][:, n] for key in table}) for n, name in enumerate(names)]
+
+
+def _summarise_linkers(name, table):
+    # Two values at least, which a standard error needs.
+    late = slice(min(len(table["step"]) // 2, len(table["step"]) - 2), None)
+    states = {}
+    for state in ("unbound", "one hand bound", "both hands bound"):
+        mean, error = mean_with_error(table[state][late, None])
+        states[state.replace(" ", "_")] = mean
+        states[f"{state.replace(' ', '_')}_error"] = error
+    pulling = table["both hands bound"][late]
+    tensions = np.nan_to_num(table["mean tension (kJ/mol/nm)"][late])
+    largest = table["maximum tension (kJ/mol/nm)"]
+    largest = largest[~np.isnan(largest)]
+    return LinkerSummary(
+        name=name,
+        **states,
+        mean_tension=float(np.average(tensions, weights=pulling)) / PICONEWTON if pulling.any() else None,
+        largest_tension=float(largest.max()) / PICONEWTON if len(largest) else None,
+    )
