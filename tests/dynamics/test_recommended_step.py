@@ -26,10 +26,10 @@ from openmm_cylchain import (
 from openmm_cylchain.couplings import contacts, pulling
 from openmm_cylchain.couplings import walls as confinement
 from openmm_cylchain.couplings.crosslinks import Crosslinks
-from openmm_cylchain.time_steps.explicit_forces import ACCURATE
 from openmm_cylchain.time_steps.mobility import FilamentResponse
 from openmm_cylchain.time_steps.recommended_step import fene_steps
 from openmm_cylchain.time_steps.schemes import IMPLICIT_SCHEMES, SCHEMES, amplification_of_second_order
+from openmm_cylchain.time_steps.springs import ACCURATE
 from openmm_cylchain.time_steps.time_step import as_step
 from support.contexts import new_context, positions_of
 from support.dense_mechanics import straight_matrices, straight_resistance
