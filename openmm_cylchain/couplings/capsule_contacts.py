@@ -14,7 +14,7 @@ from ..filaments.collection import FilamentCollection
 from ..units.quantities import LENGTH, STIFFNESS, positive, thermal_energy, whole_number
 from ..units.types import Indices, Numbers, Scalar
 from .contacts import SAFE_BARRIER, filament_diameters, outside_particles, particle_diameters
-from .periodicity import is_periodic
+from .periodicity import default_box, is_periodic
 from .planar_crossings import find_planar_crossing
 
 CAPSULE_BARRIER = 40.0
@@ -138,7 +138,7 @@ def capsule_contact_force(
     if periodic:
         _check_box(system, filaments, max([*diameters, *sphere_diameters]))
     _warn_of_barrier(filaments, diameters, stiffness)
-    _warn_of_planar_crossing(filaments, _box_vectors(system) if periodic else None)
+    _warn_of_planar_crossing(filaments, default_box(system) if periodic else None)
     force = plugin.CylinderChainContactForce(stiffness)
     force.setUsesPeriodicBoundaryConditions(periodic)
     for number, (filament, value) in enumerate(zip(filaments, diameters)):
@@ -183,12 +183,8 @@ def _capsule_lengths(filaments, number):
     return lengths * (filament.segments / (beads if filament.closed else beads - 1))
 
 
-def _box_vectors(system):
-    return np.array([edge._value for edge in system.getDefaultPeriodicBoxVectors()])
-
-
 def _check_box(system, filaments, diameter):
-    a, b, c = _box_vectors(system)
+    a, b, c = default_box(system)
     volume = abs(np.dot(a, np.cross(b, c)))
     narrowest = min(volume / np.linalg.norm(np.cross(*pair)) for pair in ((b, c), (c, a), (a, b)))
     longest = max(float(_capsule_lengths(filaments, number).max()) for number in range(len(filaments)))

@@ -27,7 +27,7 @@ from ..units.quantities import (
     whole_number,
 )
 from ..units.types import FloatArray, Indices, IntArray, Numbers, Scalar
-from .periodicity import is_periodic
+from .periodicity import default_box, is_periodic
 
 CONTACT_NAME = "Contact"
 CONTACT_STIFFNESS = "contact_stiffness"
@@ -360,7 +360,7 @@ def _set_cutoff(force, system, diameter, periodic):
     force.setNonbondedMethod(openmm.CustomNonbondedForce.CutoffNonPeriodic)
     if periodic:
         force.setNonbondedMethod(openmm.CustomNonbondedForce.CutoffPeriodic)
-        narrowest = min(edge._value[axis] for axis, edge in enumerate(system.getDefaultPeriodicBoxVectors()))
+        narrowest = np.diagonal(default_box(system)).min()
         if narrowest < 2.0 * diameter:
             raise InputError(f"The periodic box is {narrowest:g} nm wide: contacts of {diameter:g} nm need twice that.")
         cutoff = min(cutoff, 0.5 * narrowest)

@@ -5,7 +5,7 @@ import openmm
 
 from ..errors import InputError, note_raised_in_force
 from ..mechanics.potentials import STRETCHING_POTENTIALS
-from ..units.types import FloatArray
+from ..units.types import FloatArray, FloatOrArray
 from .beam_curves import BeamCurves
 from .crosslink_tables import RECENT_TABLES, TABLES, CrosslinkTable
 from .link_store import unknown_crosslinks
@@ -98,6 +98,16 @@ def lengths_and_vectors(
 def slopes_of(model: str, table: CrosslinkTable, lengths: FloatArray) -> FloatArray:
     """Derivatives dV/dd (n,) in kJ/(mol nm); zero for crosslinks that are off."""
     return _where_active(table, lengths, STRETCHING_POTENTIALS[model].derivative)
+
+
+def thermal_stiffness_of(
+    model: str, stiffness: FloatOrArray, maximum_extension: FloatOrArray, kT: float
+) -> FloatOrArray:
+    """Stiffness of crosslinks in kJ/(mol nm^2), as ``Crosslinks.thermal_stiffness`` says."""
+    if model != "fene":
+        return stiffness
+    square = np.minimum(4.0 * kT / (3.0 * kT + stiffness * maximum_extension**2), 0.9)
+    return stiffness * (1.0 + square) / (1.0 - square) ** 2
 
 
 def _energy(model, table, lengths):

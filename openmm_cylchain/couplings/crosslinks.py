@@ -18,19 +18,18 @@ from typing import Any
 
 import numpy as np
 import openmm
-from openmm import unit
 
 from ..errors import InputError
 from ..filaments.segment_place import SegmentPlace
 from ..mechanics.potentials import STRETCHING_POTENTIALS
 from ..units.quantities import LENGTH, STIFFNESS, non_negative, positive, thermal_energy, whole_number
 from ..units.types import FloatArray, FloatOrArray, Indices, IntArray, Scalar, Vector
-from .crosslink_computation import lengths_and_vectors, slopes_of
+from .crosslink_computation import lengths_and_vectors, slopes_of, thermal_stiffness_of
 from .crosslink_tables import CrosslinkTable
 from .link_places import as_places
 from .link_store import LinkStore
 from .native_links import NativeLinks, is_link_force, is_of_compiled_engine
-from .periodicity import is_periodic
+from .periodicity import check_rest_lengths, default_box, is_periodic
 from .portable_links import PortableLinks
 
 CROSSLINKS_NAME = "Crosslinks"
@@ -171,8 +170,7 @@ class Crosslinks:
         self._initial.places.check(self._initial.numbers, system.getNumParticles())
         periodic = is_periodic(system) if periodic is None else bool(periodic)
         if periodic:
-            box = np.array([vector.value_in_unit(unit.nanometer) for vector in system.getDefaultPeriodicBoxVectors()])
-            _check_rest_lengths(self._initial.numbers, self._initial.rest_length, box)
+            check_rest_lengths(self._initial.numbers, self._initial.rest_length, default_box(system))
         kind: Any = NativeLinks if is_of_compiled_engine(system) else PortableLinks
         store, force = kind.make_for(system, self._model, self._initial, periodic, self._defaults)
         force.setName(CROSSLINKS_NAME)
@@ -427,11 +425,7 @@ class Crosslinks:
         stiffness, extension = self._defaults[0], self._defaults[2]
         if table is not None:
             stiffness, extension = table.stiffness, table.maximum_extension
-        if self._model != "fene":
-            return stiffness
-        kT = thermal_energy(temperature)
-        square = np.minimum(4.0 * kT / (3.0 * kT + stiffness * extension**2), 0.9)
-        return stiffness * (1.0 + square) / (1.0 - square) ** 2
+        return thermal_stiffness_of(self._model, stiffness, extension, thermal_energy(temperature))
 
     def _measured(self, context):
         self._store_in(context)
@@ -478,19 +472,7 @@ def _check_in_context(store, context, numbers, rest_lengths):
     if np.any(rest_lengths > 0.0):
         box, _ = store.boxes(context, context.getState())
         if box is not None:
-            _check_rest_lengths(numbers, rest_lengths, box)
-
-
-def _check_rest_lengths(numbers, rest_lengths, box):
-    # The nearest image of a point is in the brick around the other one that has the widths of the box along the axes.
-    farthest = 0.5 * float(np.linalg.norm(np.diagonal(box)))
-    too_long = np.flatnonzero(rest_lengths > farthest)
-    if len(too_long):
-        raise InputError(
-            f"Crosslink {numbers[too_long[0]]} has a rest length of {rest_lengths[too_long[0]]:.6g} nm, but in the "
-            f"periodic box, nearest images are never more than {farthest:.6g} nm apart. Give it a shorter one, or take "
-            "a larger box."
-        )
+            check_rest_lengths(numbers, rest_lengths, box)
 
 
 def _as_numbers(numbers):
