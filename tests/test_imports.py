@@ -11,7 +11,6 @@ LATE = ("analysis", "scans", "theory")
 SLOW = (
     "matplotlib",
     "mdtraj",
-    "numpy.polynomial",
     "openmm.app",
     "openmm_cylchain.analysis",
     "openmm_cylchain.rendering",
