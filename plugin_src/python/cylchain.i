@@ -295,10 +295,6 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
     val[2] = unit.Quantity(val[2], _LENGTH)
     val[3] = unit.Quantity(val[3], _STIFFNESS)
 %}
-%pythonappend OpenMM::CylinderChainForce::getBeamTetherParameters(int, int&, int&, Vec3&, double&) const %{
-    val[2] = unit.Quantity(val[2], _LENGTH)
-    val[3] = unit.Quantity(val[3], _STIFFNESS)
-%}
 %pythonappend OpenMM::CylinderChainForce::getBeamChainParameters(int, double&, double&, double&, double&, double&,
         double&) const %{
     friction = _FRICTION/_LENGTH
@@ -430,10 +426,7 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %concreteClass(CylinderChainWallForce, Force)
 %concreteClass(CylinderChainIntegrator, Integrator)
 
-%ignore OpenMM::CylinderChainForce::SegmentInfo;
-%ignore OpenMM::CylinderChainForce::ChainInfo;
-%ignore OpenMM::CylinderChainForce::TetherInfo;
-%ignore OpenMM::CylinderChainForce::BeamInfo;
+%ignore OpenMM::CylinderChainForce::describeChains;
 %ignore OpenMM::CylinderChainContactForce::ChainInfo;
 %ignore OpenMM::CylinderChainContactForce::SphereInfo;
 %ignore OpenMM::CylinderChainContactForce::ExclusionInfo;

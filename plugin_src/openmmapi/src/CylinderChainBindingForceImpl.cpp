@@ -80,7 +80,7 @@ void CylinderChainBindingForceImpl::initialize(ContextImpl& context) {
     parameter = "CylinderChainLinkers"+to_string(number);
     nearestParticles = chains->usesPeriodicBoundaryConditions();
     const CylinderChainDescription description(ofContext, *chains);
-    const cylchain::Contours contours(description.getChains(), description.getBeams());
+    const cylchain::Contours contours(description.getList());
     lengths.clear();
     for (int chain = 0; chain < contours.getNumChains(); chain++)
         lengths.push_back(contours.getLength(chain));
@@ -125,8 +125,8 @@ void CylinderChainBindingForceImpl::initialize(ContextImpl& context) {
     if (seed == 0)
         seed = (uint32_t) osrngseed();
     linkerKernel = context.getPlatform().createKernel(UpdateCylinderChainLinkersKernel::Name(), context);
-    linkerKernel.getAs<UpdateCylinderChainLinkersKernel>().initialize(system, description.getChains(),
-            description.getBeams(), owner.usesPeriodicBoundaryConditions(), nearestParticles);
+    linkerKernel.getAs<UpdateCylinderChainLinkersKernel>().initialize(system, description.getList(),
+            owner.usesPeriodicBoundaryConditions(), nearestParticles);
     linkKernel = context.getPlatform().createKernel(CalcCylinderChainLinkForceKernel::Name(), context);
     linkKernel.getAs<CalcCylinderChainLinkForceKernel>().initialize(ofContext, owner.usesPeriodicBoundaryConditions(),
             nearestParticles);

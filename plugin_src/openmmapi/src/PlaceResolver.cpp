@@ -15,21 +15,22 @@ static const double SAME_WEIGHT = 1e-12;
 PlaceResolver::PlaceResolver(const System& system) : system(system) {
     for (int i = 0; i < system.getNumForces(); i++) {
         const CylinderChainForce* force = dynamic_cast<const CylinderChainForce*>(&system.getForce(i));
-        if (force == NULL || force->getNumBeamChains() == 0)
+        if (force == NULL)
+            continue;
+        const ChainList chains = force->describeChains();
+        if (chains.getBeams().empty())
             continue;
         controls.resize(system.getNumParticles(), -1);
         next.resize(system.getNumParticles(), -1);
         isControl.resize(system.getNumParticles(), false);
         elementLengths.resize(system.getNumParticles(), 0);
-        for (int chain = 0; chain < force->getNumBeamChains(); chain++) {
-            const vector<int>& particles = force->getBeamChainParticles(chain);
-            double length, modulus, rigidity, shortening, parallel, perpendicular;
-            force->getBeamChainParameters(chain, length, modulus, rigidity, shortening, parallel, perpendicular);
+        for (const BeamChain& beam : chains.getBeams()) {
+            const vector<int>& particles = beam.particles;
             for (size_t node = 0; node+1 < particles.size(); node += 2) {
                 controls[particles[node]] = particles[node+1];
-                elementLengths[particles[node]] = length;
+                elementLengths[particles[node]] = beam.elementLength;
                 isControl[particles[node+1]] = true;
-                if (node+2 < particles.size() || force->isBeamChainClosed(chain))
+                if (node+2 < particles.size() || beam.closed)
                     next[particles[node]] = particles[(node+2)%particles.size()];
             }
         }

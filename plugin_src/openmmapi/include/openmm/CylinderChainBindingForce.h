@@ -27,8 +27,7 @@ namespace OpenMM {
  *
  * With the first law of unbinding and without speed, equilibrium is that of the energies, whatever the step is.
  * Lengths along a filament are those of its segments at rest, from its first node, the minus end, to its last, the plus
- * end.  Chains of beam elements, to whose curves hands bind, have their numbers behind all other chains: beam chain i
- * is chain n+i, where n is getNumChains() of the CylinderChainForce.
+ * end.  Hands bind to the curves of beam elements.
  *
  * Which linkers there are and where they are bound belongs to each Context; this object holds what every new Context
  * begins with.  A parameter of the Context counts the steps that they have taken.  CylinderChainIntegrator writes them

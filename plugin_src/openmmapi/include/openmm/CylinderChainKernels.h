@@ -206,12 +206,11 @@ public:
      *
      * @param system            the kinds of hands and linkers
      * @param chains            the chains of the System
-     * @param beams             its chains of beam elements, which have their numbers behind those
      * @param periodic          whether distances are those of nearest periodic images
      * @param nearestParticles  whether the particles of a place are taken as their nearest images
      */
-    virtual void initialize(const cylchain::LinkerSystem& system, const std::vector<cylchain::Chain>& chains,
-            const std::vector<cylchain::BeamChain>& beams, bool periodic, bool nearestParticles) = 0;
+    virtual void initialize(const cylchain::LinkerSystem& system, const cylchain::ChainList& chains, bool periodic,
+            bool nearestParticles) = 0;
     /**
      * Take a step of the linkers, in which particles do not move.
      *

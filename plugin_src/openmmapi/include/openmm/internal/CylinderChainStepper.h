@@ -88,7 +88,6 @@ private:
     void recordForces(cylchain::StepSettings& settings, bool records);
     void takeNoteOfForces(const cylchain::StepSettings& settings, bool followsOn);
     void refuseBeams(cylchain::Scheme scheme, double kT) const;
-    void refuseTornBeams() const;
     bool areForcesFinite();
     void reportInstability(int chain, const cylchain::StepSettings& settings);
     void reportCoupling(const cylchain::BrokenCoupling& coupling, const cylchain::CoupledForces& coupled,
