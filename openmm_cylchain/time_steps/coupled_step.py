@@ -79,7 +79,7 @@ def steps_of_couplings(
     -------
     list of TimeStep
     """
-    forces = coupled_forces or CoupledForces(system, filaments)
+    forces = coupled_forces or CoupledForces(system)
     coupled = [(index, force) for index, force in enumerate(system.getForces()) if forces.includes(index)]
     kT = thermal_energy(temperature)
     if not coupled or kT == 0.0:

@@ -137,7 +137,7 @@ class ExplicitForces:
         self.springs: list[Springs] = []
         self.constant_forces: dict[int, FloatArray] = {}
         unknown: list[str] = []
-        coupled = coupled_forces or CoupledForces(system, filaments)
+        coupled = coupled_forces or CoupledForces(system)
         for index, force in enumerate(system.getForces()):
             found = self._read(force, f"{force.getName()} (force {index})", index, coupled)
             if found is None:

@@ -15,6 +15,7 @@ namespace std {
 }
 
 %{
+#include "openmm/CylinderChainCoupling.h"
 #include "openmm/CylinderChainException.h"
 #include "openmm/CylinderChainBindingForce.h"
 #include "openmm/CylinderChainContactForce.h"
@@ -419,6 +420,17 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 }
 %enddef
 
+%extend OpenMM::CylinderChainCoupling {
+    static OpenMM::CylinderChainCoupling& cast(OpenMM::Force& object) {
+        OpenMM::CylinderChainCoupling* result = dynamic_cast<OpenMM::CylinderChainCoupling*>(&object);
+        if (result == NULL)
+            throw OpenMM::OpenMMException("The object is not a CylinderChainCoupling");
+        return *result;
+    }
+    static bool isinstance(OpenMM::Force& object) {
+        return dynamic_cast<OpenMM::CylinderChainCoupling*>(&object) != NULL;
+    }
+}
 %concreteClass(CylinderChainForce, Force)
 %concreteClass(CylinderChainBindingForce, Force)
 %concreteClass(CylinderChainContactForce, Force)
@@ -426,6 +438,8 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %concreteClass(CylinderChainWallForce, Force)
 %concreteClass(CylinderChainIntegrator, Integrator)
 
+%ignore findPlaces;
+%ignore OpenMM::CylinderChainForce::getChains;
 %ignore OpenMM::CylinderChainForce::describeChains;
 %ignore OpenMM::CylinderChainContactForce::ChainInfo;
 %ignore OpenMM::CylinderChainContactForce::SphereInfo;
@@ -441,6 +455,7 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %import "mechanics/StretchingModels.h"
 %import "dynamics/Schemes.h"
 %import "dynamics/Precisions.h"
+%include "openmm/CylinderChainCoupling.h"
 %include "openmm/CylinderChainForce.h"
 %include "openmm/CylinderChainBindingForce.h"
 %include "openmm/CylinderChainContactForce.h"

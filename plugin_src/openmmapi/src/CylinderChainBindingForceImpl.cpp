@@ -8,6 +8,7 @@
 #include "openmm/System.h"
 #include "openmm/internal/ContextImpl.h"
 #include "openmm/internal/CylinderChainDescription.h"
+#include "openmm/internal/LinkDescription.h"
 #include "openmm/internal/LinkerDescription.h"
 #include "openmm/internal/OSRngSeed.h"
 #include "openmm/reference/SimTKOpenMMRealType.h"
@@ -55,7 +56,7 @@ static void require(bool condition, const string& message) {
 }
 
 CylinderChainBindingForceImpl::CylinderChainBindingForceImpl(const CylinderChainBindingForce& owner) :
-        StepForceImpl(owner), owner(owner), context(NULL), seed(0), number(0), upToDate(false),
+        CouplingForceImpl(owner), owner(owner), context(NULL), seed(0), number(0), upToDate(false),
         nearestParticles(false), wasExcluded(false), hasStepped(false), timeBefore(0), stepSize(0), countBefore(0) {
 }
 
@@ -250,4 +251,13 @@ double CylinderChainBindingForceImpl::calcForcesAndEnergy(ContextImpl& context, 
     int outOfRange = -1;
     return linkKernel.getAs<CalcCylinderChainLinkForceKernel>().execute(context, getLinks(), includeForces,
             includeEnergy, outOfRange);
+}
+
+cylchain::ImplicitCouplings* CylinderChainBindingForceImpl::getEquations(ContextImpl& context) {
+    return linkKernel.getAs<CalcCylinderChainLinkForceKernel>().getEquations(context, getLinks());
+}
+
+string CylinderChainBindingForceImpl::describeFailure(const cylchain::BrokenCoupling& coupling, const string& other) {
+    return describeBrokenLink(coupling, other, links, *context, owner.usesPeriodicBoundaryConditions(),
+            nearestParticles);
 }

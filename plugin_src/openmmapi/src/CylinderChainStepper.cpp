@@ -1,6 +1,5 @@
 #include "openmm/internal/CylinderChainStepper.h"
 #include "beams/BeamEngine.h"
-#include "couplings/Links.h"
 #include "mechanics/BrokenSegment.h"
 #include "mechanics/PeriodicBox.h"
 #include "openmm/CylinderChainException.h"
@@ -47,14 +46,13 @@ static bool isPeriodic(const System& system) {
 
 CylinderChainStepper::CylinderChainStepper(ContextImpl& context, const CylinderChainIntegrator& integrator,
         CylinderChainForceImpl& force) : context(context), integrator(integrator), chains(force.getDescription()),
-        others(context.getSystem(), integrator, chains), couplings(context, chains, others),
+        others(context.getSystem(), integrator, chains), couplings(context, others),
         kernel(createKernel(context, force, others)),
         explicitWork(getKernel().getLoop()), periodic(isPeriodic(context.getSystem())), recorded(false) {
     getKernel().refuseScheme(static_cast<Scheme>(integrator.getScheme()));
     if (isImplicit(static_cast<Scheme>(integrator.getScheme())))
-        couplings.refuseNarrowBox(chains);
-    if (!chains.getBeams().empty())
-        couplings.refuseBeams();
+        couplings.refuseBox(chains);
+    couplings.refuseChains(chains);
     explicitWork.initialize(findMobileParticles(chains.getList(), others));
 }
 
@@ -244,12 +242,11 @@ void CylinderChainStepper::step(uint64_t seed, int level, uint64_t step, bool fo
     takeNoteOfForces(settings, followsOn);
     getKernel().displaceOthers(context, settings, integrator.getFriction());
     const CoupledForces& coupled = couplings.describe(getCoupledGroups(), integrator.getFriction());
-    if (settings.scheme == Scheme::ImplicitSecondOrder && !(coupled.contacts.empty() && coupled.walls.empty()))
-        throw OpenMMException("CylinderChainIntegrator: Contacts and walls are for scheme Implicit: in the two stages "
-                "of ImplicitSecondOrder they would not keep their equilibrium");
+    if (settings.scheme == Scheme::ImplicitSecondOrder)
+        couplings.refuseTwoStages(getCoupledGroups());
     const Instability found = coupled.empty() ? getKernel().displaceChains(context, settings) :
             getKernel().displaceCoupledChains(context, settings, coupled);
-    if (found.chain != -1 && found.coupling.kind != BrokenCoupling::None && areForcesFinite())
+    if (found.chain != -1 && found.coupling.force != -1 && areForcesFinite())
         reportCoupling(found.coupling, coupled, settings);
     if (found.chain >= chains.getList().size())
         reportParticle(coupled.particles[found.chain-chains.getList().size()].particle, settings);
@@ -383,23 +380,6 @@ bool CylinderChainStepper::areForcesFinite() {
     return all_of(forces.begin(), forces.end(), [] (const Vec3& force) {return isfinite(norm(force));});
 }
 
-string CylinderChainStepper::describeLink(const BrokenCoupling& coupling, const CoupledForces& coupled) const {
-    const CoupledForces::Links& links = coupled.links[coupling.force];
-    double box[9];
-    getBox(box);
-    const LinkBoxes boxes = {links.periodic ? box : NULL, links.nearestParticles ? box : NULL};
-    const auto link = find_if(links.links->begin(), links.links->end(), [&] (const Link& one) {
-        return one.number == coupling.link;
-    });
-    vector<Vec3> positions = getPositions();
-    const LinkPull pull = computePull(*link, &positions[0][0], boxes);
-    stringstream text;
-    text.precision(3);
-    text << pull.length << " nm long and has a force of " <<
-            norm(Vec3(pull.force[0], pull.force[1], pull.force[2])) << " kJ/mol/nm";
-    return text.str();
-}
-
 void CylinderChainStepper::reportCoupling(const BrokenCoupling& coupling, const CoupledForces& coupled,
         const StepSettings& settings) {
     const ChainList& list = chains.getList();
@@ -438,27 +418,10 @@ void CylinderChainStepper::reportCoupling(const BrokenCoupling& coupling, const 
         place.otherSegment = second.segment;
     }
     message << " in step " << place.step << ": ";
-    switch (coupling.kind) {
-        case BrokenCoupling::Contact:
-            if (coupling.reason == BrokenCoupling::Crosses)
-                message << "it would pass through " << describe(second) << ", however short the parts of the step";
-            else if (coupling.reason == BrokenCoupling::LeavesBox)
-                message << "it moves too far for the periodic box, which must be wider than twice what a segment with "
-                        "its diameter passes over in a step";
-            else
-                message << "its contact with " << describe(second) << " cannot be solved";
-            break;
-        case BrokenCoupling::Link:
-            place.link = coupling.link;
-            message << "link " << place.link << " to " << describe(second) <<
-                    (coupling.reason == BrokenCoupling::LeavesRange ? " would leave the range of its potential" :
-                    " cannot be solved") <<
-                    ". It is " << describeLink(coupling, coupled);
-            break;
-        default:
-            message << "a wall cannot hold it";
-    }
-    message << " (" << couplings.getForce(coupling).getName() << "). Positions are those before this step. "
+    CouplingForceImpl& force = couplings.getForce(coupling);
+    message << force.describeFailure(coupling, describe(second));
+    place.link = coupling.link;
+    message << " (" << force.getOwner().getName() << "). Positions are those before this step. "
             "Use a smaller time step, or look for overlapping particles or excessive forces.";
     throw CylinderChainException(place.chain >= 0 ? CylinderChainException::UnstableChain :
             CylinderChainException::UnstableParticle, place, message.str());

@@ -71,7 +71,7 @@ void CylinderChainForceProxy::serialize(const void* object, SerializationNode& n
     node.setStringProperty("name", force.getName());
     node.setBoolProperty("usesPeriodic", force.usesPeriodicBoundaryConditions());
     SerializationNode& chains = node.createChildNode("Chains");
-    const ChainList list = force.describeChains();
+    const ChainList& list = force.getChains();
     for (int i = 0; i < list.size(); i++) {
         SerializationNode& chain = chains.createChildNode(
                 list.getKind(i) == ChainKind::BeamElements ? "BeamChain" : "Chain");

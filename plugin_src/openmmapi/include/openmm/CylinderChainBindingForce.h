@@ -3,7 +3,7 @@
 
 #include "kinetics/Linkers.h"
 #include "openmm/Context.h"
-#include "openmm/Force.h"
+#include "openmm/CylinderChainCoupling.h"
 #include "openmm/Vec3.h"
 #include <vector>
 
@@ -34,7 +34,7 @@ namespace OpenMM {
  * into its checkpoints, and into States that hold the parameters of the Integrator.  With other Integrators, save what
  * getLinkersInContext() returns beside the State, and give it to setLinkersInContext().
  */
-class CylinderChainBindingForce : public Force {
+class CylinderChainBindingForce : public CylinderChainCoupling {
 public:
     /**
      * Create a CylinderChainBindingForce.
@@ -308,6 +308,7 @@ public:
      * Get the description of a type of linkers.  This is for internal use.
      */
     const cylchain::LinkerType& getLinkerType(int type) const;
+    std::vector<cylchain::Place> findPlaces(const PlaceResolver& resolver) const;
 protected:
     ForceImpl* createImpl() const;
 private:

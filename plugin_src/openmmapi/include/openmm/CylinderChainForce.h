@@ -349,6 +349,12 @@ public:
      */
     bool usesPeriodicBoundaryConditions() const;
     /**
+     * Get the chains without their tethers.
+     */
+    const cylchain::ChainList& getChains() const {
+        return chains;
+    }
+    /**
      * Describe the chains with their tethers; which particles are fixed is known by a System.
      */
     cylchain::ChainList describeChains() const;

@@ -92,7 +92,6 @@ private:
     void reportInstability(int chain, const cylchain::StepSettings& settings);
     void reportCoupling(const cylchain::BrokenCoupling& coupling, const cylchain::CoupledForces& coupled,
             const cylchain::StepSettings& settings);
-    std::string describeLink(const cylchain::BrokenCoupling& coupling, const cylchain::CoupledForces& coupled) const;
     void reportParticle(int particle, const cylchain::StepSettings& settings) const;
     std::vector<Vec3> getPositions() const;
     void getBox(double* box) const;
