@@ -159,7 +159,7 @@ public:
      * Get the equations of contacts in an implicit step, or NULL if this platform has none.
      *
      * @param context   the context in which to execute this kernel
-     * @param onCurves  the capsules between places on the curve of a beam element, which exist for as long as the kernel
+     * @param onCurves  the capsules between places on the curve of a beam element; they exist for as long as the kernel
      * @param sites     the virtual sites there
      * @param impulses  receives the forces of the step
      */
