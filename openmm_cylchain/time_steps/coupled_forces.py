@@ -112,7 +112,7 @@ class CoupledForces:
         return self._flags(particle for own in self._filaments.node_indices for particle in own)
 
     def _has_beams(self, filament):
-        return self._filaments[filament].type.has_beam_elements
+        return len(self._filaments.control_point_indices[filament]) > 0
 
     def _flags(self, particles):
         result = np.zeros(self._system.getNumParticles(), dtype=bool)
