@@ -26,10 +26,10 @@ from ..mechanics.redistribution import ChainSet
 from ..mechanics.tension import components_along, filament_tensions
 from ..units.quantities import FORCE, LENGTH, STIFFNESS, in_units_of, positive, vector, whole_number
 from ..units.types import Indices, Scalar, Vector, Vectors
-from .added_filaments import AddedFilaments
+from .tied_filaments import TiedFilaments
 
 
-class FilamentsInContexts(AddedFilaments):
+class FilamentsInContexts(TiedFilaments):
     """Filaments whose tensions, linkers and tethers each Context has: what ``Filaments`` asks and moves there."""
 
     def linkers_in(self, context: openmm.Context) -> LinkerTable:

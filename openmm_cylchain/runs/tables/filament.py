@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...filaments.chain_type import ChainType
-from ...filaments.placement import clamped_nodes
-from ...filaments.shapes import MINIMUM_RING, beam_control_points, clamped_beam
+from ...filaments.shapes import MINIMUM_RING
 from ...units import quantities as units
 from ..keys import Choice, Either, Flag, Inline, Key, Listing, Quantity, Text, Whole, direction, point
 from ..start_files import read_start
@@ -148,8 +147,8 @@ class FilamentGroup:
 
     @property
     def joints(self):
-        """Joints of each filament; beam elements bend themselves, and there are as many bends."""
-        return self.segments - (not (self.closed or self.has_beam_elements))
+        """Bends of each filament: joints, or beam elements, which bend themselves."""
+        return self.type.segment_kind.bends(self.segments, self.closed)
 
     @property
     def has_beam_elements(self):
@@ -187,10 +186,8 @@ def read_filaments(entries, table, solvent, box, folder):
     for group in groups:
         with entries.naming():
             label = entries.label.rstrip(":")
-            if kind.has_beam_elements:
-                clamped, tangents = clamped_beam(entries["clamped"], entries["clamped_tangents"], group.nodes, label)
-            else:
-                clamped, tangents = clamped_nodes(entries["clamped"], group.nodes, label), ()
+            given = entries["clamped"], entries["clamped_tangents"]
+            clamped, tangents = kind.segment_kind.clamps(*given, group.nodes, label)
             kind.segment_friction(solvent.viscosity, solvent.temperature, group.segments)
         finished.append(dataclasses.replace(group, clamped=clamped, clamped_tangents=tangents, **own, **common))
     return finished
@@ -198,7 +195,7 @@ def read_filaments(entries, table, solvent, box, folder):
 
 def _check_element(entries, kind):
     # What beam elements alone have.
-    if not kind.has_beam_elements:
+    if kind.segment_kind.straight:
         entries.refuse(("tangents", "clamped_tangents"), 'belongs to element = "beam".')
 
 
@@ -214,7 +211,7 @@ def _from_nodes(entries, kind):
     _check_lengths(entries, "nodes", kind, nodes, closed, None)
     with entries.naming():
         tangents = None if entries["tangents"] is None else np.array(entries["tangents"])
-        controls = beam_control_points(kind, nodes, tangents, label, closed)
+        controls = kind.segment_kind.control_points(kind, nodes, label, tangents, closed=closed)
     if entries["planar"] and controls is not None and np.any(controls[:, 2] != nodes[0, 2]):
         raise entries.at("tangents").error("must lie in the xy plane, because this filament is planar.")
     yield FilamentGroup(
@@ -335,12 +332,10 @@ def _from_file(entries, kind, box, folder):
 
 def _control_points(entries, kind, nodes, whole, controls, box, closed):
     # Those of a file next to whole nodes; of a smooth curve where it has none.
-    if not kind.has_beam_elements:
-        if controls is not None:
-            raise entries.at("file").error('has beam elements: write element = "beam".')
-        return None
     if controls is None:
-        return beam_control_points(kind, whole, None, entries.label.rstrip(":"), closed)
+        return kind.segment_kind.control_points(kind, whole, entries.label.rstrip(":"), closed=closed)
+    if kind.segment_kind.straight:
+        raise entries.at("file").error('has beam elements: write element = "beam".')
     vectors = controls - nodes
     return whole + (vectors if box is None else vectors - np.round(vectors / box) * box)
 

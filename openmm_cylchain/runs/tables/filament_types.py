@@ -3,7 +3,8 @@
 import dataclasses
 
 from ...bead_spring.bead_spring_type import DSDNA_BASE_PAIRS, BeadSpringType
-from ...filaments.filament_type import DSDNA, F_ACTIN, MICROTUBULE, FilamentType
+from ...filaments.filament_type import FilamentType
+from ...filaments.presets import DSDNA, F_ACTIN, MICROTUBULE
 from ...mechanics.friction import EndCorrections
 from ...mechanics.potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
 from ...theory import calibrated_to_force

@@ -55,7 +55,7 @@ def read_joint(entries, groups):
             continue
         check_place(tangent, groups)
         group = group_of(tangent["filament"], groups)
-        if not group.type.has_beam_elements:
+        if group.type.segment_kind.straight:
             raise tangent.at("filament").error(
                 f"{tangent['filament']} ({group.type.name}) has straight segments: joints are between filaments of "
                 'element = "beam".'
