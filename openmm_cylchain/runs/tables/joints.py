@@ -22,7 +22,7 @@ JOINT = TableKind(
     "joint",
     (
         Key("between", Pair(_TANGENT, _TANGENTS), REQUIRED, "Two tangents, or a tangent and a direction."),
-        Key("stiffness", Quantity(units.ENERGY), REQUIRED, "Of the joint, per square radian."),
+        Key("stiffness", Quantity(units.ENERGY), REQUIRED, "Stiffness of the joint, per square radian."),
         Key(
             "angle",
             Quantity(units.ANGLE, "zero"),
