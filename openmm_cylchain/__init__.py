@@ -39,8 +39,10 @@ from .errors import (
 )
 from .filaments.attachments import Attachment
 from .filaments.filament import Filament, Tether
-from .filaments.filament_type import DSDNA, F_ACTIN, MICROTUBULE, FilamentType
+from .filaments.filament_type import FilamentType
+from .filaments.presets import DSDNA, F_ACTIN, MICROTUBULE
 from .filaments.segment_place import SegmentPlace
+from .filaments.shapes import FilamentOptions
 from .kinetics.crosslinker import Crosslinker
 from .kinetics.hand import Hand
 from .kinetics.linker_table import LinkerTable
@@ -84,6 +86,7 @@ __all__ = [
     "FILAMIN",
     "F_ACTIN",
     "Filament",
+    "FilamentOptions",
     "FilamentReporter",
     "FilamentType",
     "Hand",

@@ -213,6 +213,7 @@ _BOUND_LABELS = {
 
 
 def _time_step(options):
+    from .filaments.straight_segments import STRAIGHT_SEGMENTS
     from .runs.configuration import read_configuration
     from .time_steps.recommended_step import recommended_time_step
     from .time_steps.stability import stability_bounds, time_step_bounds
@@ -225,13 +226,13 @@ def _time_step(options):
     for group in configuration.filaments:
         arguments = (group.type, solvent.viscosity, solvent.temperature)
         recommended = recommended_time_step(*arguments, settings.scheme, group.segments)
-        segments = "beam elements" if group.has_beam_elements else "segments"
-        print(f"{group.type.name}, {group.segments} {segments} of {group.type.segment_length:g} nm")
+        kind = group.type.segment_kind
+        print(f"{group.type.name}, {group.segments} {kind.name}s of {group.type.segment_length:g} nm")
         # Table 1 is of cylinders that are straight, and explicit schemes are for straight segments and beads.
-        cylinders = group.type.node_friction == 0.0 and not group.has_beam_elements
+        cylinders = kind is STRAIGHT_SEGMENTS
         for name, bound in (time_step_bounds(*arguments, segments=group.segments) if cylinders else {}).items():
             print(f"  {_BOUND_LABELS[name]:<36} {format_time(bound, 4):>12}")
-        if not group.has_beam_elements:
+        if kind.straight:
             stability = min(stability_bounds(*arguments, group.segments).values())
             print(f"  {'stability of explicit schemes':<36} {format_time(stability, 4):>12}")
         for name, allowed in recommended.allowed.items():

@@ -4,9 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..beams.curve import beam_virial
-from ..filaments.placement import joint_stiffnesses
-from ..mechanics.geometry import segment_vectors
+from ..filaments.chain_type import Chain
 from ..units.quantities import thermal_energy
 from ..units.types import FloatArray, Scalar
 from .runs import Run, volume_of
@@ -75,12 +73,8 @@ def stress(run: Run, frame: int, volume: Scalar | None = None) -> Stress:
     chains, free = np.zeros((3, 3)), np.zeros(3)
     positions = run.positions(frame)
     for own in run.filaments:
-        if own.has_beam_elements:
-            chains += beam_virial(
-                positions[own.nodes], positions[own.control_points], own.beam_element(run.temperature), own.ring
-            )
-        else:
-            chains += _virial_of_chain(own, positions[own.nodes])
+        chain = Chain(own.type, own.clamped, own.ring, own.planar, run.temperature)
+        chains += own.type.segment_kind.virial(chain, positions[own.nodes], positions[own.control_points])
         moving = len(own.nodes) + len(own.control_points) - len(own.clamped) - len(own.clamped_tangents)
         free += moving * np.array([1.0, 1.0, 0.0 if own.planar else 1.0])
     linkers = run.linkers[frame]
@@ -106,13 +100,3 @@ def _virial_of_springs(places, tensions):
     vectors = np.asarray(places[:, 1] - places[:, 0], dtype=float)
     lengths = np.linalg.norm(vectors, axis=1)
     return _virial(vectors, np.divide(tensions, lengths, out=np.zeros(len(lengths)), where=lengths > 0.0))
-
-
-def _virial_of_chain(own, nodes):
-    vectors = segment_vectors(nodes, own.ring)
-    lengths = np.linalg.norm(vectors, axis=1)
-    pulls = (own.type.stretching_derivatives(lengths, own.ring) / lengths)[:, None] * vectors
-    stiffnesses = joint_stiffnesses(own.type, len(nodes), own.clamped, own.ring)
-    if len(stiffnesses):
-        pulls -= own.type.bending_end_forces(vectors, stiffnesses, own.ring)
-    return np.einsum("ni,nj->ij", vectors, pulls)

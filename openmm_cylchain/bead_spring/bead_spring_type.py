@@ -9,6 +9,7 @@ from openmm import unit
 
 from ..errors import InputError
 from ..filaments.chain_type import ChainType, check_bending_is_given_once, check_type_name
+from ..filaments.straight_segments import StraightSegments
 from ..mechanics.friction import SegmentFriction
 from ..mechanics.potentials import BOND_DIFFERENCE
 from ..units.quantities import (
@@ -26,6 +27,13 @@ from ..units.quantities import (
 from ..units.types import FloatArray, Scalar
 from .draws import draw_bonds
 from .transfer_operator import straight_lengths
+
+
+class BeadBonds(StraightSegments):
+    """Segments between beads, whose lengths and angles do not fluctuate independently."""
+
+
+BEAD_BONDS = BeadBonds()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -227,6 +235,11 @@ class BeadSpringType(ChainType):
     def reduced_temperature(self, temperature: Scalar) -> float:
         """T* = k_B T/(lambda d^2) at a temperature."""
         return thermal_energy(temperature) / (self.stiffness * self.natural_length**2)
+
+    @property
+    def segment_kind(self) -> BeadBonds:
+        """``BEAD_BONDS``."""
+        return BEAD_BONDS
 
     @property
     def bending_model(self) -> str:

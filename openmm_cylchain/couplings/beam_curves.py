@@ -42,9 +42,10 @@ class BeamCurves:
             if plugin is None or not plugin.CylinderChainForce.isinstance(force):
                 continue
             own = plugin.CylinderChainForce.cast(force)
-            for chain in range(own.getNumBeamChains()):
-                particles = np.array(own.getBeamChainParticles(chain))
-                chains.append((particles[::2], particles[1::2], own.isBeamChainClosed(chain)))
+            for chain in range(own.getNumChains()):
+                if own.getChainKind(chain) == own.BeamElements:
+                    particles = np.array(own.getChainParticles(chain))
+                    chains.append((particles[::2], particles[1::2], own.isChainClosed(chain)))
         return cls(chains, system.getNumParticles()) if chains else None
 
     def on_curve(self, first: IntArray, second: IntArray) -> BoolArray:

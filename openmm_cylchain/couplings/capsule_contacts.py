@@ -146,8 +146,8 @@ def capsule_contact_force(
         if neighbors is None:
             shortest = _capsule_lengths(filaments, number).min()
             neighbors = max(1, math.ceil(_EXCLUDED_DIAMETERS * value / shortest - 1e-9))
-        ends = filaments.bead_indices if filament.type.has_beam_elements else filaments.node_indices
-        force.addChain([int(end) for end in ends[number]], float(value), neighbors, filament.closed)
+        ends = [int(end) for end in _ends_of_capsules(filaments, number)]
+        force.addChain(ends, float(value), neighbors, filament.closed)
     for particle, value in zip(spheres, sphere_diameters):
         force.addSphere(int(particle), float(value))
     return force
@@ -166,7 +166,7 @@ def as_capsule_contact_force(force: openmm.Force) -> Any | None:
 
 def _require_beads(filaments, diameters):
     for number, (filament, beads) in enumerate(zip(filaments, filaments.bead_indices)):
-        if filament.type.has_beam_elements and not len(beads):
+        if not (filament.type.segment_kind.straight or len(beads)):
             spacing = contact_spacing(filament.type, diameters[number], filaments.temperature)
             raise InputError(
                 f"Filament {number} ({filament.type.name}) has beam elements, whose capsules lie between beads on its "
@@ -174,13 +174,15 @@ def _require_beads(filaments, diameters):
             )
 
 
+def _ends_of_capsules(filaments, number):
+    kind = filaments[number].type.segment_kind
+    return kind.particles_along(filaments.node_indices[number], filaments.bead_indices[number])
+
+
 def _capsule_lengths(filaments, number):
     filament = filaments[number]
     lengths = filament.type.segment_lengths(filament.segments, filament.closed)
-    if not filament.type.has_beam_elements:
-        return lengths
-    beads = len(filaments.bead_indices[number])
-    return lengths * (filament.segments / (beads if filament.closed else beads - 1))
+    return lengths * (filament.segments / (len(_ends_of_capsules(filaments, number)) - (not filament.closed)))
 
 
 def _check_box(system, filaments, diameter):

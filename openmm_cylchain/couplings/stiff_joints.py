@@ -80,11 +80,7 @@ class _PlacesOnFilaments:
         for number, filament in enumerate(filaments):
             nodes = filaments.node_indices[number]
             self._filament[nodes], self._node[nodes] = number, np.arange(len(nodes))
-            if filament.type.has_beam_elements:
-                element = filament.type.beam_element(filaments.temperature)
-                rigidities.append(element.rigidity / element.length)
-            else:
-                rigidities.append(np.inf)
+            rigidities.append(filament.type.segment_kind.bend_stiffness(filament.type, filaments.temperature))
         self.rigidities = np.array(rigidities)
 
     def of(self, table: Any) -> FloatArray:

@@ -114,7 +114,7 @@ def filament_wall_force(
     force = plugin.CylinderChainWallForce(name, openmm.Vec3(*point), openmm.Vec3(*direction), length, stiffness)
     force.setName(f"CylinderChainWallForce ({name})")
     for filament, nodes, beads, value in zip(filaments, filaments.node_indices, filaments.bead_indices, radii):
-        for place in beads if filament.type.has_beam_elements and len(beads) else nodes:
+        for place in filament.type.segment_kind.particles_along(nodes, beads):
             force.addParticle(int(place), float(value))
     for particle, value in zip(spheres, sphere_radii):
         force.addParticle(int(particle), float(value))

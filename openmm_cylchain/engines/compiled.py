@@ -4,7 +4,6 @@ platforms. Those for GPUs are in gpu_platforms.py.
 Importing this module loads the plugin into OpenMM. An ImportError says why that cannot be done.
 """
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -105,11 +104,9 @@ class CompiledEngine(Engine):
                 _add_beam_chain(force, filament, nodes, controls, placed.viscosity, placed.temperature)
             else:
                 _add_chain(force, filament, nodes, placed.viscosity, placed.temperature)
-        chains = _numbers_in_lists(placed.filaments)
+            force.setChainName(number, filament_label(number, filament))
         for tether in placed.tethers:
-            beam = placed.filaments[tether.filament].type.has_beam_elements
-            add = force.addBeamTether if beam else force.addTether
-            add(chains[tether.filament], tether.node, openmm.Vec3(*tether.point), tether.stiffness)
+            force.addTether(tether.filament, tether.node, openmm.Vec3(*tether.point), tether.stiffness)
         system.addForce(force)
         if placed.linkers:
             box = None
@@ -123,20 +120,16 @@ class CompiledEngine(Engine):
         refuse_constraints(system, placed)
         fixed_nodes(system, placed)
         others, frictions = describe_other_particles(system, placed.nodes, settings.particle_friction)
-        labels: list[dict[int, str]] = [{}, {}]
-        for number, filament in enumerate(placed.filaments):
-            labels[filament.type.has_beam_elements][number] = filament_label(number, filament)
         integrator = NativeIntegrator(
             settings.temperature,
             settings.step_size,
             settings.scheme,
             settings.random_seed,
-            labels[False],
+            len(placed.filaments),
             settings.flow,
             advice_after_blow_up(system),
             settings.checks,
             settings.precision,
-            labels[True],
         )
         for particle, friction in zip(others, frictions):
             integrator.setParticleFriction(int(particle), float(friction))
@@ -158,9 +151,9 @@ class CompiledEngine(Engine):
         for force in context.getSystem().getForces():
             if CylinderChainForce.isinstance(force):
                 force = CylinderChainForce.cast(force)
-                _set_tethers(force, tethers, placed)
+                _set_tethers(force, tethers)
                 force.updateParametersInContext(context)
-                _set_tethers(force, {number: placed.tethers[number] for number in tethers}, placed)
+                _set_tethers(force, {number: placed.tethers[number] for number in tethers})
 
     def record_tensions(self, context):
         """See ``NativeIntegrator.setRecordsTensions``."""
@@ -187,25 +180,9 @@ class CompiledEngine(Engine):
 ENGINE = CompiledEngine()
 
 
-def _numbers_in_lists(filaments):
-    # Of chains in the force, which has those of straight segments and those of beam elements in lists of their own; or
-    # of tethers, given the filament of each.
-    numbers, counts = [], [0, 0]
-    for filament in filaments:
-        beam = filament.type.has_beam_elements
-        numbers.append(counts[beam])
-        counts[beam] += 1
-    return numbers
-
-
-def _set_tethers(force, tethers, placed):
-    chains = _numbers_in_lists(placed.filaments)
-    numbers = _numbers_in_lists([placed.filaments[one.filament] for one in placed.tethers])
+def _set_tethers(force, tethers):
     for number, tether in tethers.items():
-        beam = placed.filaments[tether.filament].type.has_beam_elements
-        set_parameters = force.setBeamTetherParameters if beam else force.setTetherParameters
-        point = openmm.Vec3(*tether.point)
-        set_parameters(numbers[number], chains[tether.filament], tether.node, point, tether.stiffness)
+        force.setTetherParameters(number, tether.filament, tether.node, openmm.Vec3(*tether.point), tether.stiffness)
 
 
 def _flow_of_integrator(integrator):
@@ -277,11 +254,8 @@ def _add_beam_chain(force, filament, nodes, control_points, viscosity, temperatu
     force.setBeamChainPropulsion(chain, filament.propulsion)
 
 
-_OF_BEAM_CHAIN = re.compile(r"(?:CylinderChainIntegrator: )?(The elements of )?[Bb]eam chain (\d+)")
-
-
 class NativeIntegrator(CylinderChainIntegrator):
-    """A CylinderChainIntegrator that knows filaments by their labels and raises the errors of this package.
+    """A CylinderChainIntegrator that raises the errors of this package.
 
     Parameters
     ----------
@@ -291,10 +265,8 @@ class NativeIntegrator(CylinderChainIntegrator):
     scheme : {"implicit", "implicit-second-order", "midpoint", "euler"}
     random_seed : int
         0 draws a fresh seed for each Context.
-    labels : dict of int and str
-        The number of the filament that each chain is, and what to call it in messages.
-    beam_labels : dict of int and str
-        The same for each chain of beam elements.
+    filaments : int
+        How many there are.
     flow : Flow, optional
         Of the solvent; at rest if not given.
     advice : str
@@ -320,22 +292,16 @@ class NativeIntegrator(CylinderChainIntegrator):
         step_size,
         scheme="implicit",
         random_seed=0,
-        labels=None,
+        filaments=0,
         flow=None,
         advice="",
         checks=True,
         precision="automatic",
-        beam_labels=None,
     ):
         temperature = non_negative(temperature, TEMPERATURE, "temperature")
         super().__init__(temperature, _EACH_ITS_OWN, as_step(step_size))
         self.checks = checks
-        # The engine numbers chains of beam elements behind all others.
-        labels, beam_labels = labels or {}, beam_labels or {}
-        self._first_beam = len(labels)
-        self._numbers = [*labels, *beam_labels]
-        self._labels = [*labels.values(), *beam_labels.values()]
-        self._divided_steps = DividedSteps(len(self._labels))
+        self._divided_steps = DividedSteps(filaments)
         self._work = ExplicitWork()
         check_scheme(scheme)
         check_precision(precision)
@@ -392,52 +358,23 @@ class NativeIntegrator(CylinderChainIntegrator):
         except plugin.CylinderChainException as error:
             raise self._error_of(error) from None
         except openmm.OpenMMException as error:
-            instability = instability_in_force(error, self._advice) or self._error_of_beam(error)
+            instability = instability_in_force(error, self._advice)
             if instability is None:
                 raise
             raise instability from None
 
-    def _error_of_beam(self, error):
-        found = _OF_BEAM_CHAIN.match(str(error))
-        if found is None:
-            return None
-        label = self._labels[self._first_beam + int(found[2])]
-        rest = str(error)[found.end() :]
-        if found[1]:
-            return InputError(f"{found[1]}{label[0].lower()}{label[1:]}{rest}.")
-        if " has blown up in step " in rest:
-            return InstabilityError(f"{label}{rest}.{self._advice}")
-        return InputError(f"{label}{rest} (openmm_cylchain.make_whole).")
-
     def _error_of(self, error):
-        message = str(error).replace("outside chains", "outside filaments")
-        numbers: dict[str, int | None] = {"filament": error.chain, "other_filament": error.other_chain}
-        if error.chain is not None and error.chain < len(self._labels):
-            message = self._labels[error.chain] + message.removeprefix(self._name_of_chain(error.chain))
-            numbers["filament"] = self._numbers[error.chain]
-        if error.other_chain is not None and error.other_chain < len(self._labels):
-            label, name = self._labels[error.other_chain], self._name_of_chain(error.other_chain)
-            message = message.replace(f" of {name[0].lower()}{name[1:]}", f" of {label[0].lower()}{label[1:]}")
-            numbers["other_filament"] = self._numbers[error.other_chain]
         if error.kind == "torn-chain":
-            return InputError(f"{message} (openmm_cylchain.make_whole).")
-        if error.kind == "length-out-of-range":
-            return InputError(f"{message}.")
-        if error.kind == "unknown-links":
-            return InputError(f"{message}.")
-        if error.kind == "link-out-of-range":
-            return InstabilityError(message + self._advice, link=error.link)
-        if error.kind in ("unstable-chain", "unstable-particle"):
-            place = numbers | {
-                name: getattr(error, name) for name in ("segment", "other_segment", "particle", "link", "step")
-            }
-            return InstabilityError(message + self._advice, **place)
+            return InputError(f"{error} (openmm_cylchain.make_whole).")
+        if error.kind in ("length-out-of-range", "unknown-links", "element-too-long"):
+            return InputError(f"{error}.")
+        if error.kind in ("link-out-of-range", "unstable-chain", "unstable-particle"):
+            names = ("segment", "other_segment", "particle", "link", "step")
+            place = {name: getattr(error, name) for name in names}
+            return InstabilityError(
+                f"{error}{self._advice}", filament=error.chain, other_filament=error.other_chain, **place
+            )
         return error
-
-    def _name_of_chain(self, chain):
-        # As the engine calls it.
-        beam = chain - self._first_beam
-        return f"Chain {chain}" if beam < 0 else f"Beam chain {beam}"
 
     def setRandomNumberSeed(self, seed):
         """Set the seed of the noise; 0 draws one for each Context that is created."""

@@ -85,7 +85,7 @@ def write_vmd(run: Run, path: str | Path) -> None:
         diameter = max(own.diameter for own in run.filaments if own.type.name == kind)
         radius = _ANGSTROM * 0.5 * max(diameter, 0.006 * extent * diameter / widest)
         members = [i for i, own in enumerate(run.filaments) if own.type.name == kind]
-        beams = [i for i in members if run.filaments[i].has_beam_elements]
+        beams = [i for i in members if run.filaments[i].pieces > 1]
         lines.append(_color(_FIRST_COLOR + number, color))
         if beams:
             curves[_FIRST_COLOR + number] = radius, beams

@@ -198,12 +198,8 @@ def distribute_beads(filament: Filament, number: int, spacing: float) -> list[At
     -------
     list of Attachment
     """
-    contour = filament.segments * filament.type.segment_length
-    if filament.type.has_beam_elements:
-        pieces = max(1, math.ceil(filament.type.segment_length / spacing * (1.0 - 1e-12)))
-        intervals = filament.segments * pieces
-    else:
-        intervals = max(1, math.ceil(contour / spacing * (1.0 - 1e-12)))
+    kind = filament.type.segment_kind
+    intervals = kind.intervals(filament.segments, filament.type.segment_length, spacing)
     # In a ring, the last place would be the first once more.
     count = intervals if filament.closed else intervals + 1
     places = filament.segments * np.arange(count) / intervals

@@ -17,8 +17,9 @@ def refuse_beams(filaments: Iterable[Any], what: str) -> None:
         That cannot have them, such as "contacts of capsules".
     """
     for number, filament in enumerate(filaments):
-        if filament.type.has_beam_elements:
+        kind = filament.type.segment_kind
+        if not kind.straight:
             raise InputError(
-                f"Filament {number} ({filament.type.name}) has beam elements, which {what} cannot have as yet: give "
-                "its type element='straight'."
+                f"Filament {number} ({filament.type.name}) has {kind.name}s, which {what} cannot have as yet: give its "
+                "type element='straight'."
             )

@@ -1,6 +1,10 @@
-"""ChainType: what all code that handles filaments needs to know of what they are made of."""
+"""ChainType: what all code that handles filaments needs to know of what they are made of.
+
+What depends on whether segments are straight, or bend inside, is in a SegmentKind.
+"""
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -8,10 +12,10 @@ import numpy.typing as npt
 
 from ..beams.curve import BeamElement
 from ..errors import InputError
-from ..mechanics.friction import SegmentFriction
+from ..mechanics.friction import EndCorrections, SegmentFriction
 from ..mechanics.geometry import segment_vectors
 from ..units.quantities import TEMPERATURE, positive, thermal_energy
-from ..units.types import FloatArray, Scalar
+from ..units.types import FloatArray, Indices, IntArray, Scalar, Vectors
 
 
 class ChainType(ABC):
@@ -32,6 +36,8 @@ class ChainType(ABC):
     bending_model, stretching_model : str
     maximum_extension : float or None
         By how much a length may differ from its rest length, if there is a bound.
+    temperature : float or None
+        At which it has the persistence length that it was given by, if it was.
     """
 
     if TYPE_CHECKING:
@@ -57,6 +63,14 @@ class ChainType(ABC):
         @property
         def maximum_extension(self) -> float | None: ...
 
+        @property
+        def temperature(self) -> float | None: ...
+
+    @property
+    @abstractmethod
+    def segment_kind(self) -> "SegmentKind":
+        """What its segments are."""
+
     @property
     @abstractmethod
     def segment_stiffness(self) -> float:
@@ -81,11 +95,18 @@ class ChainType(ABC):
     @property
     def has_beam_elements(self) -> bool:
         """Whether segments are beam elements, with a control point beside each node, and not straight."""
-        return False
+        return not self.segment_kind.straight
 
     def beam_element(self, temperature: Scalar, planar: bool = False) -> BeamElement:
-        """What the beam elements of a filament are made of; InputError if its segments are straight."""
-        raise InputError(f"Filament type {self.name!r}: its segments are straight, so it has no beam elements.")
+        """What the beam elements of a filament are made of; InputError if its segments are straight.
+
+        Parameters
+        ----------
+        temperature : temperature
+            At which bends inside of an element shorten its chord, by h k_B T/15 EI in space and half of it in a plane.
+        planar : bool
+        """
+        return self.segment_kind.element(self, temperature, planar)
 
     @property
     def node_friction(self) -> float:
@@ -191,6 +212,153 @@ class ChainType(ABC):
         """Persistence length EI/(k_B T) of the continuous filament in nm at a temperature."""
         kT = thermal_energy(positive(temperature, TEMPERATURE, "temperature"))
         return self.bending_rigidity / kT
+
+
+@dataclass(frozen=True)
+class Chain:
+    """What the energy of a filament is a function of, beside its positions: see ``Filament``. The temperature is in K,
+    that of the solvent."""
+
+    type: ChainType
+    clamped: tuple[int, ...]
+    closed: bool
+    planar: bool
+    temperature: float
+
+
+class SegmentKind(ABC):
+    """What segments are. It keeps nothing: there is one object of each class.
+
+    Node positions are (..., n, 3) arrays in nm, and so are control points, of which straight segments have none.
+
+    Attributes
+    ----------
+    name : str
+        Of a segment, in messages.
+    bend_name, bend_ends : str
+        What bends, and what its angle is between.
+    straight : bool
+        Whether a segment is the straight line between its nodes. If not, there is a control point beside each node.
+    end_mobility : float
+        Of a node, across the filament, over that of a whole segment.
+    """
+
+    name: str
+    bend_name: str
+    bend_ends: str
+    straight: bool
+    end_mobility: float
+
+    @abstractmethod
+    def bends(self, segments: int, closed: bool) -> int:
+        """How many bends of a filament have an energy."""
+
+    @abstractmethod
+    def check_type(self, filament_type: ChainType) -> None:
+        """Raise InputError if a FilamentType cannot have such segments."""
+
+    @abstractmethod
+    def element(self, filament_type: ChainType, temperature: Scalar, planar: bool) -> BeamElement:
+        """What segments that bend inside are made of; InputError if they do not."""
+
+    @abstractmethod
+    def bend_stiffness(self, filament_type: ChainType, temperature: float) -> float:
+        """The energy of a small bend is half of that, in kJ/mol, times the square of its angle."""
+
+    @abstractmethod
+    def frictions(
+        self, length: float, diameter: float, viscosity: Scalar, corrections: EndCorrections, logarithm_length: float
+    ) -> tuple[float, float, float]:
+        """Parallel, perpendicular and rotational friction of a segment that is a cylinder."""
+
+    @abstractmethod
+    def control_points(
+        self,
+        filament_type: ChainType,
+        nodes: FloatArray,
+        label: str,
+        tangents: Vectors | None = None,
+        control_points: Vectors | None = None,
+        closed: bool = False,
+    ) -> FloatArray | None:
+        """Control points of nodes (n, 3) with tangents, which are normalised, or given ones, checked; None if segments
+        are straight.
+
+        With neither, tangents are those of the natural cubic spline through the nodes, or of the periodic one of a
+        ring.
+        """
+
+    @abstractmethod
+    def ring(
+        self,
+        filament_type: ChainType,
+        segments: int,
+        temperature: float,
+        center: FloatArray,
+        normal: FloatArray,
+        planar: bool,
+    ) -> "Points":
+        """A ring without strains."""
+
+    @abstractmethod
+    def draw(
+        self,
+        filament_type: ChainType,
+        segments: int,
+        temperature: float,
+        generator: np.random.Generator,
+        start: FloatArray,
+        direction: FloatArray | None,
+        clamped: int | Indices,
+        planar: bool,
+        label: str,
+    ) -> "Points":
+        """A free open chain in equilibrium."""
+
+    @abstractmethod
+    def clamps(
+        self, clamped: int | Indices, tangents: int | Indices, nodes: int, label: str
+    ) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        """Clamped nodes, and those whose tangents are clamped, too; InputError if they cannot be."""
+
+    @abstractmethod
+    def intervals(self, segments: int, segment_length: float, spacing: float) -> int:
+        """How many equal intervals beads are apart by along a filament, none longer than the spacing."""
+
+    @abstractmethod
+    def particles_along(self, nodes: IntArray, beads: IntArray) -> IntArray:
+        """Those between which the surface of a filament is, of the particles of its nodes and its beads."""
+
+    @abstractmethod
+    def energies(
+        self, chain: Chain, nodes: FloatArray, control_points: FloatArray | None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Stretching energies (..., segments) and bending energies (..., bends) in kJ/mol."""
+
+    @abstractmethod
+    def virial(self, chain: Chain, nodes: FloatArray, control_points: FloatArray) -> FloatArray:
+        """The derivative of the energy by an affine strain: (3, 3) in kJ/mol."""
+
+    @abstractmethod
+    def tensions(self, chain: Chain, nodes: FloatArray, control_points: FloatArray) -> FloatArray:
+        """Tensions (..., segments) dV_el/dl in kJ/(mol nm)."""
+
+    @abstractmethod
+    def lengths(self, nodes: FloatArray, control_points: FloatArray, closed: bool) -> FloatArray:
+        """Lengths (..., segments) along the filament in nm."""
+
+    @abstractmethod
+    def angles(self, nodes: FloatArray, control_points: FloatArray, closed: bool) -> FloatArray:
+        """Angles (segments,) in radians by which the segments of a filament bend."""
+
+    @abstractmethod
+    def curve(self, nodes: FloatArray, control_points: FloatArray, per_segment: int, closed: bool) -> FloatArray:
+        """Points (..., points, 3) that the filament is straight between: nodes, or so many of each segment that bends
+        and the last node."""
+
+
+Points = tuple[FloatArray, FloatArray | None]
+"""Nodes and control points, (n, 3) in nm each; None if segments are straight."""
 
 
 def check_type_name(name: object) -> None:

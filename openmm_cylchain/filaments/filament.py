@@ -4,10 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..beams.curve import BeamElement, element_energies
-from ..errors import InputError
+from ..beams.curve import BeamElement
 from ..units.types import FloatArray
-from .chain_type import ChainType
+from .chain_type import Chain, ChainType
 from .placement import joint_stiffnesses
 
 NODE_NAME = "NOD"
@@ -56,6 +55,11 @@ class Filament:
         return len(self.positions) - (0 if self.closed else 1)
 
     @property
+    def bends(self) -> int:
+        """Number of bends that have an energy: joints, or beam elements, which bend themselves."""
+        return self.type.segment_kind.bends(self.segments, self.closed)
+
+    @property
     def joint_stiffnesses(self) -> FloatArray:
         """Stiffness in the bending potential of every joint, see ``placement.joint_stiffnesses``.
 
@@ -74,12 +78,15 @@ class Filament:
 
         Of beam elements, control points (n, 3) and the temperature of the solvent are needed, too.
         """
-        if self.type.has_beam_elements:
-            if control_points is None:
-                raise InputError(f"Energies of beam elements ({self.type.name}) need the control points of its nodes.")
-            stretching, bending = element_energies(nodes, control_points, self.beam_element(temperature), self.closed)
-            return float(np.sum(stretching)), float(np.sum(bending))
-        return self.type.chain_energies(nodes, self.joint_stiffnesses, self.closed)
+        stretching, bending = self.energies_along(nodes, control_points, temperature)
+        return float(np.sum(stretching)), float(np.sum(bending))
+
+    def energies_along(
+        self, nodes: FloatArray, control_points: FloatArray | None, temperature: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """Those of its segments (..., segments) and of its bends (..., bends), with node positions (..., n, 3)."""
+        chain = Chain(self.type, self.clamped, self.closed, self.planar, temperature)
+        return self.type.segment_kind.energies(chain, nodes, control_points)
 
 
 @dataclass(frozen=True)

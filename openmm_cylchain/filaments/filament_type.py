@@ -1,24 +1,13 @@
-"""FilamentType: what a filament is made of, and presets for actin, DNA and microtubules."""
+"""FilamentType: what a filament of cylinders is made of."""
 
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
 import numpy.typing as npt
-from openmm import unit
 
-from ..beams.curve import BeamElement, shortening_of
-from ..beams.equilibrium import LONGEST_ELEMENT, calibrated_rigidity
 from ..errors import InputError
-from ..mechanics.friction import (
-    EndCorrections,
-    SegmentFriction,
-    affine_extensional_friction,
-    extensional_friction,
-    rotational_friction,
-    translational_friction_parallel,
-    translational_friction_perpendicular,
-)
+from ..mechanics.friction import EndCorrections, SegmentFriction, affine_extensional_friction, extensional_friction
 from ..mechanics.geometry import joined
 from ..mechanics.potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS, BendingPotential, StretchingPotential
 from ..units.quantities import (
@@ -37,9 +26,13 @@ from ..units.quantities import (
     whole_number,
 )
 from ..units.types import FloatArray, FloatOrArray, Scalar
-from .chain_type import ChainType, check_bending_is_given_once, check_type_name
+from .beam_elements import BEAM_ELEMENTS
+from .chain_type import ChainType, SegmentKind, check_bending_is_given_once, check_type_name
 from .equilibrium import draw_chain
 from .joint_calibration import calibrated_stiffness
+from .straight_segments import STRAIGHT_SEGMENTS
+
+_ELEMENTS = {"straight": STRAIGHT_SEGMENTS, "beam": BEAM_ELEMENTS}
 
 _SMALLEST, _LARGEST = 1e-30, 1e30
 """Of what a filament type is given: fourth powers and products of two are finite."""
@@ -189,8 +182,10 @@ class FilamentType(ChainType):
         if self.mass_per_length is None:
             self._fail("mass_per_length must be given; 3500 Da/nm if it is left out.")
         self._resolve_bending()
-        self._resolve_stretching()
-        self._resolve_extension()
+        if (self.stretching_stiffness is None) == (self.stretching_modulus is None):
+            self._fail("give either stretching_stiffness (of one segment) or stretching_modulus (EA).")
+        if self.extension_relaxation_time is not None and self.extensional_friction is not None:
+            self._fail("give either extension_relaxation_time or extensional_friction, not both.")
         self._check_choices()
         self._check_end_corrections()
         self._check_segment_length()
@@ -226,17 +221,9 @@ class FilamentType(ChainType):
                 f"{attribute} must be between {_SMALLEST:g} and {_LARGEST:g} in OpenMM's units, but is {value:g}."
             )
 
-    def _resolve_stretching(self):
-        if (self.stretching_stiffness is None) == (self.stretching_modulus is None):
-            self._fail("give either stretching_stiffness (of one segment) or stretching_modulus (EA).")
-
-    def _resolve_extension(self):
-        if self.extension_relaxation_time is not None and self.extensional_friction is not None:
-            self._fail("give either extension_relaxation_time or extensional_friction, not both.")
-
     def _check_choices(self):
         for attribute, choices in (
-            ("element", ("straight", "beam")),
+            ("element", tuple(_ELEMENTS)),
             ("bending_model", tuple(BENDING_POTENTIALS)),
             ("stretching_model", tuple(STRETCHING_POTENTIALS)),
         ):
@@ -244,43 +231,17 @@ class FilamentType(ChainType):
                 self._fail(f"{attribute} must be one of {', '.join(choices)}, but is {getattr(self, attribute)!r}.")
         if self.friction_length not in ("segment", "filament"):
             self._check_friction_length()
-        if self.has_beam_elements:
-            self._check_beam()
+        self.segment_kind.check_type(self)
         if (self.stretching_model == "fene") != (self.maximum_extension is not None):
             self._fail("maximum_extension must be given for stretching_model 'fene', and only for it.")
         if self.maximum_extension is not None and self.maximum_extension > self.segment_length:
             self._fail("maximum_extension must not exceed segment_length.")
 
-    def _check_beam(self):
-        for attribute, allowed in (
-            ("bending_model", "inscribed-circle"),
-            ("stretching_model", "harmonic"),
-            ("extension_relaxation_time", None),
-            ("extensional_friction", None),
-        ):
-            if getattr(self, attribute) != allowed:
-                self._fail(
-                    f"{attribute} is one of straight segments: leave it out for element 'beam', whose energy and "
-                    "friction are those of its curve."
-                )
-        if self.bending_rigidity == 0.0:
-            self._fail("bending_rigidity must be above zero for element 'beam'.")
-        if self.temperature is not None:
-            bend = self._bend_of_element()
-            if bend > LONGEST_ELEMENT or bend > LONGEST_ELEMENT * calibrated_rigidity(bend):
-                self._fail(
-                    f"an element is {bend:.3g} persistence lengths long, and must not be longer than 0.92: take a "
-                    "shorter segment_length."
-                )
-
-    def _bend_of_element(self):
-        return self.segment_length * thermal_energy(self.temperature) / self.bending_rigidity
-
     def _refuse_beam(self, what):
-        if self.has_beam_elements:
+        if not self.segment_kind.straight:
             self._fail(
-                f"its beam elements have no {what}, which belongs to straight segments. Take element='straight' where "
-                "it is needed."
+                f"its {self.segment_kind.name}s have no {what}, which belongs to straight segments. Take "
+                "element='straight' where it is needed."
             )
 
     def _check_friction_length(self):
@@ -305,32 +266,9 @@ class FilamentType(ChainType):
                 self._fail(str(error))
 
     @property
-    def has_beam_elements(self) -> bool:
-        """Whether ``element`` is "beam"."""
-        return self.element == "beam"
-
-    def beam_element(self, temperature: Scalar, planar: bool = False) -> BeamElement:
-        """An element of a filament with ``element="beam"``: its length, rigidity EI and modulus EA.
-
-        Parameters
-        ----------
-        temperature : temperature
-            At which bends inside of an element shorten its chord, by h k_B T/15 EI in space and half of it in a plane.
-        planar : bool
-
-        Raises
-        ------
-        InputError
-            If segments are straight.
-        """
-        if not self.has_beam_elements:
-            return super().beam_element(temperature, planar)
-        rigidity = self.bending_rigidity
-        if self.temperature is not None:
-            rigidity *= calibrated_rigidity(self._bend_of_element())
-        length, modulus = self.segment_length, self.segment_stiffness * self.segment_length
-        shortening = shortening_of(length * thermal_energy(temperature) / rigidity, planar)
-        return BeamElement(length, rigidity, modulus, shortening)
+    def segment_kind(self) -> SegmentKind:
+        """The one that ``element`` names."""
+        return _ELEMENTS[self.element]
 
     @property
     def segment_stiffness(self) -> float:
@@ -454,7 +392,7 @@ class FilamentType(ChainType):
 
     def check_folds(self, vectors: FloatArray, label: str, closed: bool = False) -> None:
         """Raise InputError for segments (segments, 3) in nm that are antiparallel to their neighbours."""
-        if self.bending_rigidity == 0.0 or self.has_beam_elements:
+        if self.bending_rigidity == 0.0 or not self.segment_kind.straight:
             return
         cosines = _cosines(_tangents(vectors), closed)
         energies = self.bending_energy(cosines)
@@ -504,19 +442,10 @@ class FilamentType(ChainType):
         SegmentFriction
         """
         segments = whole_number(segments, 1, "segments")
-        length, diameter = self.segment_length, self.diameter
-        logarithm_length = self._logarithm_length(segments)
-        corrections = self.end_corrections
-        # The rotational one first: with the usual end corrections it asks for the longest segments.
-        if not self.has_beam_elements:
-            rotational = rotational_friction(length, diameter, viscosity, corrections.rotational, logarithm_length)
-        parallel = translational_friction_parallel(length, diameter, viscosity, corrections.parallel, logarithm_length)
-        perpendicular = translational_friction_perpendicular(
-            length, diameter, viscosity, corrections.perpendicular, logarithm_length
+        length, logarithm_length = self.segment_length, self._logarithm_length(segments)
+        parallel, perpendicular, rotational = self.segment_kind.frictions(
+            length, self.diameter, viscosity, self.end_corrections, logarithm_length
         )
-        if self.has_beam_elements:
-            # That of a friction per length.
-            rotational = perpendicular * length**2 / 12.0
         if self.extensional_friction is not None:
             extensional = self.extensional_friction
         elif self.extension_relaxation_time is not None:
@@ -567,67 +496,3 @@ def _cosines(tangents, closed):
     before = np.roll(tangents, 1, axis=-2) if closed else tangents[..., :-1, :]
     behind = tangents if closed else tangents[..., 1:, :]
     return np.einsum("...k,...k->...", before, behind)
-
-
-_PICONEWTON = unit.piconewton
-_PICONEWTON_PER_NANOMETER = unit.piconewton / unit.nanometer
-
-F_ACTIN = FilamentType(
-    name="ACT",
-    diameter=6 * unit.nanometer,
-    persistence_length=17.2 * unit.micrometer,
-    temperature=310 * unit.kelvin,
-    stretching_stiffness=48.7 * _PICONEWTON_PER_NANOMETER,
-    segment_length=360 * unit.nanometer,
-    extension_relaxation_time=0.1 * unit.microsecond,
-    mass_per_length=3500 * unit.dalton / unit.nanometer,
-)
-"""F-actin as in Table 2 of Pesek et al., Soft Matter 2016, 12, 3360.
-
-d = 6 nm, l_p = 17.2 um at 310 K, k = 48.7 pN/nm for a segment of 360 nm (unchanged by
-``with_segment_length``, as in their Table 3), tau_l = 0.1 us, inscribed-circle bending (27); mass
-1.26 MDa per 360 nm (their Section 5). Tangents decorrelate over l_p; the joints of the paper have the stiffness
-l_p k_B T/l0, 3 % more: ``dataclasses.replace(F_ACTIN, temperature=None)``. Their sources: Yogurtcu et al., Biophys. J.
-2012, 103, 719 (d);
-Nagashima and Asakura 1980, Gittes et al. 1993 (l_p); Kojima et al. 1994 (k).
-"""
-
-DSDNA = FilamentType(
-    name="DNA",
-    diameter=2 * unit.nanometer,
-    persistence_length=43.3 * unit.nanometer,
-    temperature=310 * unit.kelvin,
-    stretching_modulus=1100 * _PICONEWTON,
-    segment_length=8 * unit.nanometer,
-    friction_length=8 * unit.nanometer,
-    mass_per_length=1940 * unit.dalton / unit.nanometer,
-)
-"""Double-stranded DNA, after the footnote on DNA of Pesek et al., Soft Matter 2016, 12, 3360.
-
-d = 2 nm, l_p = 43.3 nm, l0 = 8 nm (their sources: Odijk, Macromolecules 1995, 28, 7016; Wang et al.,
-Biophys. J. 1997, 72, 1335). EA = 1100 pN: the middle of what Wang et al. and Smith, Cui and Bustamante,
-Science 1996, 271, 795 report, 1000 to 1200 pN depending on salt. Affine extensional friction. Mass:
-660 Da per base pair of 0.34 nm. The flexibility holds at 310 K here; the paper does not say.
-
-Tangents decorrelate over 43.3 nm with segments of any length. A segment lengthens by 2 k_B T/EA = 0.008 nm on average
-as it fluctuates, however short it is: by 1 % with segments of 0.8 nm. Under forces above 1 pN the chain is longer than
-a wormlike chain, however it is cut: ``theory.calibrated_to_force`` has by how much, and makes a type that is not. The
-friction of a length of DNA is that of the paper's segments of 8 nm, or of longer ones, so that shorter segments, down
-to 1 nm and less, make up the same filament. It leaves out the flow that one segment makes at another. Of a whole rod,
-up to a persistence length or so, ``friction_length="filament"`` is nearer to what is measured.
-"""
-
-MICROTUBULE = FilamentType(
-    name="MT",
-    diameter=25 * unit.nanometer,
-    bending_rigidity=2.2e7 * _PICONEWTON * unit.nanometer**2,
-    stretching_modulus=2.6e5 * _PICONEWTON,
-    segment_length=1 * unit.micrometer,
-    mass_per_length=1.6e5 * unit.dalton / unit.nanometer,
-)
-"""Microtubule: rigidity measured, stretching modulus estimated.
-
-EI = 2.2e-23 N m^2, that is l_p = 5.2 mm at 37 C: Gittes et al., J. Cell Biol. 1993, 120, 923. EA is an
-estimate, good to some 30 %: Young's modulus 1.2 GPa (same paper, from the same EI) times a wall of about
-220 nm^2. d = 25 nm. Affine extensional friction. Mass: 13 protofilaments of 100 kDa dimers every 8 nm.
-"""

@@ -1,6 +1,5 @@
 """The CylinderChainBindingForce of a System: linkers of the compiled engine."""
 
-import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -15,16 +14,12 @@ from ..filaments.filament import Filament
 from ..mechanics.geometry import to_nearest_images
 from ..units.quantities import thermal_energy
 from ..units.types import FloatArray, IntArray
-from .chain_numbers import ChainNumbers
 from .first_places import FirstPlaces, contour_of
 from .hand import Hand
 from .linker_table import LinkerTable
 from .linkers import LinkerPulls, Linkers
 
 BINDING_FORCE_NAME = "Linkers"
-
-_CHAIN = re.compile(r"\bchain (\d+)")
-"""What the plugin calls a filament."""
 
 
 def is_binding_force(force: openmm.Force) -> bool:
@@ -70,7 +65,6 @@ def make_binding_force(
     force = load_plugin().CylinderChainBindingForce(temperature)
     force.setName(BINDING_FORCE_NAME)
     force.setUsesPeriodicBoundaryConditions(box is not None)
-    numbers_of = ChainNumbers(filaments)
     hands: dict[Hand, int] = {}
     columns: list[Any] = [[], [], [], []]
     first_places = FirstPlaces(filaments, thermal_energy(temperature), box)
@@ -79,7 +73,7 @@ def make_binding_force(
         for hand in own.kind.hands:
             if hand not in hands:
                 bound_to = [i for i, filament in enumerate(filaments) if hand.binds(filament.type)]
-                hands[hand] = _add_hand(force, hand, numbers_of.chains(bound_to).tolist(), own.kind.name)
+                hands[hand] = _add_hand(force, hand, bound_to, own.kind.name)
             numbers.append(hands[hand])
         first = -1 if own.anchors is not None else numbers[0]
         number = force.addLinkerType(
@@ -98,7 +92,7 @@ def make_binding_force(
         elif own.bound:
             which, where = first_places.near(_anchor_points(own, positions), own.kind, own.bound, generator)
             chains[which, 1], places[which, 1] = where
-        for column, values in zip(columns, (np.full(own.count, number), anchors, numbers_of.chains(chains), places)):
+        for column, values in zip(columns, (np.full(own.count, number), anchors, chains, places)):
             column.append(values)
     rows: list[list[Any]] = [np.concatenate(column).ravel().tolist() for column in columns]
     count = len(rows[0])
@@ -148,7 +142,7 @@ def naming_unknown_linkers() -> Iterator[None]:
         raise InputError(str(error)) from None
 
 
-def table_of(force: Any, context: openmm.Context, filaments: Sequence[Filament]) -> LinkerTable:
+def table_of(force: Any, context: openmm.Context) -> LinkerTable:
     """The linkers of a Context; InputError if it is not known where they are."""
     with naming_unknown_linkers():
         columns = force.getLinkersInContext(context)
@@ -157,13 +151,13 @@ def table_of(force: Any, context: openmm.Context, filaments: Sequence[Filament])
         numbers.astype(int),
         types.astype(int),
         anchors.astype(int),
-        ChainNumbers(filaments).filaments(chains.reshape(-1, 2)),
+        chains.astype(int).reshape(-1, 2),
         places.astype(float).reshape(-1, 2),
         columns[5],
     )
 
 
-def set_table(force: Any, context: openmm.Context, table: LinkerTable, filaments: Sequence[Filament]) -> None:
+def set_table(force: Any, context: openmm.Context, table: LinkerTable) -> None:
     """Give a Context the linkers of a table.
 
     Raises
@@ -171,15 +165,13 @@ def set_table(force: Any, context: openmm.Context, table: LinkerTable, filaments
     InputError
         For linkers that do not fit their types, the anchors or the filaments.
     """
-    numbers = ChainNumbers(filaments)
     columns = [np.asarray(column).ravel().tolist() for column in (
-        table.numbers, table.types, table.anchors, numbers.chains(table.filaments), table.arc_lengths
+        table.numbers, table.types, table.anchors, table.filaments, table.arc_lengths
     )]  # fmt: skip
     try:
         force.setLinkersInContext(context, *columns, int(table.next_number))
     except openmm.OpenMMException as error:
-        message = str(error).removeprefix("CylinderChainBindingForce: ")
-        raise InputError(_CHAIN.sub(lambda found: f"filament {numbers.filaments(int(found[1]))}", message)) from None
+        raise InputError(str(error)) from None
 
 
 def pulls_of(

@@ -17,7 +17,7 @@ Visscher, Block, Nat. Cell Biol. 2000, 2, 718. Svoboda, Block, Cell 1994, 77, 77
 
 from openmm import unit
 
-from ..filaments.filament_type import F_ACTIN, MICROTUBULE
+from ..filaments.presets import F_ACTIN, MICROTUBULE
 from .crosslinker import Crosslinker
 from .hand import Hand
 

@@ -88,6 +88,16 @@ def translational_friction_perpendicular(
     return 4.0 * math.pi * positive(viscosity, VISCOSITY, "viscosity") * length / logarithm
 
 
+def translational_frictions(
+    length: Scalar, diameter: Scalar, viscosity: Scalar, corrections: EndCorrections, logarithm_length: Scalar
+) -> tuple[float, float]:
+    """``translational_friction_parallel`` and ``translational_friction_perpendicular``."""
+    parallel = translational_friction_parallel(length, diameter, viscosity, corrections.parallel, logarithm_length)
+    return parallel, translational_friction_perpendicular(
+        length, diameter, viscosity, corrections.perpendicular, logarithm_length
+    )
+
+
 def rotational_friction(
     length: Scalar,
     diameter: Scalar,

@@ -14,8 +14,8 @@ from ..units.types import FloatArray
 
 
 def segment_vectors(nodes: FloatArray, closed: bool = False) -> FloatArray:
-    """Vectors from the minus to the plus end of all segments of a chain with node positions (n, 3)."""
-    return np.diff(nodes, axis=0, append=nodes[:1]) if closed else np.diff(nodes, axis=0)
+    """Vectors from the minus to the plus end of all segments of a chain with node positions (..., n, 3)."""
+    return np.diff(nodes, axis=-2, append=nodes[..., :1, :]) if closed else np.diff(nodes, axis=-2)
 
 
 def to_nearest_images(vectors: FloatArray, box: FloatArray) -> FloatArray:

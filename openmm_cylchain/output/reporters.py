@@ -17,11 +17,9 @@ import numpy as np
 import numpy.typing as npt
 import openmm
 
-from ..beams.curve import arc_lengths
 from ..errors import InputError
 from ..filaments.beam_refusals import refuse_beams
 from ..filaments.collection import FilamentCollection
-from ..mechanics.geometry import segment_vectors
 from ..mechanics.redistribution import ChainSet
 from ..mechanics.tension import axial_tensions, filament_tensions
 from ..units.quantities import whole_number
@@ -177,25 +175,17 @@ class FilamentReporter(FilamentsReporter):
         positions = state.getPositions(asNumpy=True)._value
         controls, temperature = self._filaments.control_point_indices, self._filaments.temperature
         rows = [
-            _describe_beam(filament, positions[nodes], positions[own], temperature)
-            if filament.type.has_beam_elements
-            else _describe(filament, positions[nodes])
+            _describe(filament, positions[nodes], positions[own], temperature)
             for filament, nodes, own in zip(self._filaments, self._nodes, controls)
         ]
         return range(len(rows)), rows
 
 
-def _describe_beam(filament, nodes, control_points, temperature):
+def _describe(filament, nodes, control_points, temperature):
     energies = filament.energies(nodes, control_points, temperature)
     end_to_end_distance = 0.0 if filament.closed else np.linalg.norm(nodes[-1] - nodes[0])
-    return *energies, end_to_end_distance, arc_lengths(nodes, control_points, filament.closed).sum()
-
-
-def _describe(filament, nodes):
-    segments = segment_vectors(nodes, filament.closed)
-    contour_length = np.linalg.norm(segments, axis=1).sum()
-    end_to_end_distance = 0.0 if filament.closed else np.linalg.norm(nodes[-1] - nodes[0])
-    return *filament.energies(nodes), end_to_end_distance, contour_length
+    lengths = filament.type.segment_kind.lengths(nodes, control_points, filament.closed)
+    return *energies, end_to_end_distance, lengths.sum()
 
 
 class TensionReporter(FilamentsReporter):

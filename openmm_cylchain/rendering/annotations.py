@@ -11,7 +11,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ..filaments.filament_type import DSDNA, F_ACTIN, MICROTUBULE
+from ..filaments.presets import DSDNA, F_ACTIN, MICROTUBULE
 from ..units.text import time_unit
 from ..units.types import FloatArray
 from .camera import Camera

@@ -151,7 +151,7 @@ def place_filaments(configuration, engine, seed, linkers=True):
             _add(filaments, group, *_nodes(group, index, solvent.temperature, seed, number, places, box, centers))
     if configuration.contacts is not None:
         for number, filament in enumerate(filaments):
-            if filament.type.has_beam_elements:
+            if not filament.type.segment_kind.straight:
                 diameter = configuration.contacts.diameter
                 filaments.add_beads(number, contact_spacing(filament.type, diameter, solvent.temperature))
     for own in configuration.tethers:
@@ -178,16 +178,15 @@ def box_vectors(box):
 
 
 def _add(filaments, group, nodes, control_points):
-    own = {"control_points": control_points} if group.has_beam_elements else {}
     filaments.add_nodes(
         group.type,
         nodes,
-        group.clamped,
+        control_points=control_points,
         closed=group.closed,
+        clamped=group.clamped,
+        clamped_tangents=group.clamped_tangents,
         planar=group.planar,
         propulsion=group.propulsion,
-        clamped_tangents=group.clamped_tangents,
-        **own,
     )
 
 
@@ -244,10 +243,8 @@ def _attempts(group):
 def _shape(group, temperature, seed, number, places, attempt=0):
     # Nodes with the first one at the origin, and control points. Each filament has a seed of its own.
     kind, origin, label = group.type, (0.0, 0.0, 0.0), f"Filament {number}"
-    if group.closed and group.has_beam_elements:
-        return shapes.beam_ring(kind, group.segments, temperature, origin, group.normal, group.planar, label)
     if group.closed:
-        return shapes.ring(kind, group.segments, origin, group.normal, label), None
+        return shapes.ring(kind, group.segments, temperature, origin, group.normal, group.planar, label)
     direction = group.direction
     generator = np.random.default_rng([seed, number, *([2, attempt] if attempt else [])])
     if direction is not None and group.orientation == "nematic":
@@ -257,12 +254,9 @@ def _shape(group, temperature, seed, number, places, attempt=0):
             direction = (1.0, 0.0, 0.0) if places is None else places.normal(size=3)
             if group.planar:
                 direction = (*direction[:2], 0.0)
-        nodes = shapes.straight(kind, group.segments, origin, direction, label)
-        return nodes, shapes.beam_control_points(kind, nodes, None, label)
-    drawn = kind, group.segments, temperature, generator, origin, direction
-    if group.has_beam_elements:
-        return shapes.drawn_beam(*drawn, group.planar, label)
-    return shapes.drawn(*drawn, group.clamped, group.planar, label), None
+        return shapes.straight(kind, group.segments, origin, direction, label)
+    own = origin, direction, group.clamped, group.planar, label
+    return shapes.drawn(kind, group.segments, temperature, generator, *own)
 
 
 def _grid_centers(groups, temperature):

@@ -13,7 +13,7 @@ import openmm
 
 from ..engines.gpu_platforms import enable_platform, why_not_on
 from ..errors import InputError
-from ..filaments.filament_type import F_ACTIN
+from ..filaments.presets import F_ACTIN
 from ..systems.filaments import Filaments
 
 _STEPS, _STEP_SIZE, _SEED = 5, 2e6, 1

@@ -374,9 +374,10 @@ class _Recorder:
         if np.isfinite(stretching) and np.isfinite(bending) and np.all(np.isfinite(positions)):
             return
         filaments = self._filaments
-        for number, own in enumerate(filaments):
+        curved = [(number, own) for number, own in enumerate(filaments) if not own.type.segment_kind.straight]
+        for number, own in curved:
             particles = np.concatenate([filaments.node_indices[number], filaments.control_point_indices[number]])
-            if own.type.has_beam_elements and not np.all(np.isfinite(positions[particles])):
+            if not np.all(np.isfinite(positions[particles])):
                 node = int(np.argmin(np.isfinite(positions[particles]).all(axis=1))) % len(own.positions)
                 raise InstabilityError(
                     f"{filament_label(number, own)} has blown up at node {node} by step {self._step}: its position is "
@@ -385,7 +386,7 @@ class _Recorder:
                     segment=min(node, own.segments - 1),
                     step=self._step,
                 )
-        if any(own.type.has_beam_elements for own in filaments):
+        if curved:
             raise InstabilityError(
                 f"The energy is not finite in step {self._step}. Use a smaller time step.", step=self._step
             )

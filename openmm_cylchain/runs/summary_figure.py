@@ -12,6 +12,7 @@ from .. import theory
 from ..analysis.bending import joint_cosines, tangent_correlation
 from ..analysis.filament_shapes import filament_curves, segment_lengths
 from ..analysis.statistics import mean_with_error
+from ..filaments.straight_segments import STRAIGHT_SEGMENTS
 from ..mechanics.geometry import unrolled
 from ..output.colors import FILAMENT_COLORS, LINKER_COLORS
 from ..output.files import write_atomically
@@ -279,16 +280,14 @@ def _draw_energies(axis, groups, temperature, energies):
     segments = np.array([group.count * group.segments for group in kinds])
     joints = np.array([group.count * group.joints for group in kinds])
     stretching, bending = np.array([mean_energies(group, temperature) for group in kinds]).T / kT
-    beams = all(group.has_beam_elements for group in kinds)
-    curves = [("stretching", "segment", np.average(stretching, weights=segments), _STRETCHING_COLOUR)]
+    kind = _kind(groups)
+    curves = [("stretching", "segment", kind.name, np.average(stretching, weights=segments), _STRETCHING_COLOUR)]
     if np.any(joints * bending):
-        curves.append(("bending", "joint", np.average(bending, weights=joints), _BENDING_COLOUR))
+        curves.append(("bending", "joint", kind.bend_name, np.average(bending, weights=joints), _BENDING_COLOUR))
     free = "exact in equilibrium" if all(map(is_in_equilibrium, kinds)) else "free chains"
-    for label, per, exact, colour in curves:
-        values = energies[f"{label} energy per {per} (kT)"]
-        axis.plot(
-            time, values, color=colour, linewidth=1.0, alpha=0.8, label=f"{label}, per {'element' if beams else per}"
-        )
+    for label, column, per, exact, colour in curves:
+        values = energies[f"{label} energy per {column} (kT)"]
+        axis.plot(time, values, color=colour, linewidth=1.0, alpha=0.8, label=f"{label}, per {per}")
         axis.axhline(exact, color=colour, linewidth=1.8, linestyle="--", label=f"{free}: {exact:.4g}")
     axis.set_xlim(time[0], time[-1])
     bottom, top = axis.get_ylim()
@@ -359,7 +358,7 @@ def _draw_joint_angles(axis, groups, temperature, trajectory):
         cosines = np.clip(np.concatenate([c.ravel() for c in joint_cosines(trajectory, members)]), -1.0, 1.0)
         angles = np.degrees(np.arccos(cosines))
         _draw_histogram(axis, angles, label, colour)
-        if group.type.node_friction > 0.0 or group.has_beam_elements:
+        if group.type.segment_kind is not STRAIGHT_SEGMENTS:
             # Those of beads have no distribution that holds all along the chain, and of those of beam elements there is
             # no closed form.
             continue
@@ -371,9 +370,10 @@ def _draw_joint_angles(axis, groups, temperature, trajectory):
     for group, widest, colour in kinds.values():
         _draw_exact_joint_angles(axis, group, temperature, widest, colour)
     axis.set_xlim(left=0.0)
-    axis.set_xlabel(f"angle between {_bends(groups)} (degrees)")
+    ends = dict.fromkeys(group.type.segment_kind.bend_ends for group, *_ in groups)
+    axis.set_xlabel(f"angle between {' or '.join(ends)} (degrees)")
     axis.set_ylabel("probability density (1/degree)")
-    axis.set_title("Bends of elements" if all(group.has_beam_elements for group, *_ in groups) else "Joint angles")
+    axis.set_title(f"{_kind(groups).bend_name.capitalize()} angles")
     _legend(axis, loc="upper right")
 
 
@@ -396,11 +396,10 @@ def _draw_exact_joint_angles(axis, group, temperature, widest, colour):
     )
 
 
-def _bends(groups):
-    # What has the angles of joint_cosines between it.
-    kinds = {group.has_beam_elements for group, *_ in groups}
-    names = {False: "neighbouring segments", True: "ends of an element"}
-    return " or ".join(names[kind] for kind in sorted(kinds))
+def _kind(groups):
+    # That of all filaments; of several kinds, the one with the most general words.
+    kinds = {group.type.segment_kind for group, *_ in groups}
+    return kinds.pop() if len(kinds) == 1 else STRAIGHT_SEGMENTS
 
 
 def _draw_extensions(axis, groups, temperature, trajectory):

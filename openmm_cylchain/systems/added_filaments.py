@@ -1,54 +1,31 @@
-"""Filaments, and what is tied to them, as they are added: before they are in a System."""
+"""Filaments as they are added: before they are in a System."""
 
-from collections import defaultdict
 from collections.abc import Iterator
-from typing import Any
-from weakref import WeakKeyDictionary
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..engine_choice import choose_engine, load_engine
-from ..engines.protocol import PlacedFilaments
 from ..errors import InputError
 from ..filaments import shapes
-from ..filaments.attachments import Attachment, distribute_beads, locate
 from ..filaments.chain_type import ChainType
-from ..filaments.filament import Filament, Tether
-from ..filaments.placement import named_nodes
-from ..filaments.segment_place import SegmentPlace
-from ..kinetics.crosslinker import Crosslinker
-from ..kinetics.linkers import Linkers, as_linkers, warn_if_springs_do_not_fit
-from ..units.quantities import (
-    LENGTH,
-    STIFFNESS,
-    TEMPERATURE,
-    VISCOSITY,
-    non_negative,
-    positive,
-    shown,
-    vector,
-    whole_number,
-)
-from ..units.types import Indices, IntArray, Scalar, Vector, Vectors
+from ..filaments.filament import Filament
+from ..filaments.shapes import FilamentOptions
+from ..units.quantities import TEMPERATURE, VISCOSITY, non_negative, positive, shown, whole_number
+from ..units.types import IntArray, Scalar, Vector, Vectors
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 
 class AddedFilaments:
-    """Filaments in a solvent, with their tethers, attachment points, beads and linkers: what ``Filaments`` adds."""
+    """Filaments in a solvent: what ``Filaments`` adds."""
 
     def __init__(self, viscosity: Scalar, temperature: Scalar, engine: str | None = None) -> None:
         self._viscosity = positive(viscosity, VISCOSITY, "viscosity")
         self._temperature = non_negative(temperature, TEMPERATURE, "temperature")
         self._filaments: list[Filament] = []
-        self._tethers: list[Tether] = []
-        self._tethered_nodes: set[tuple[int, int]] = set()
-        self._linkers: list[Linkers] = []
         self._periodic = False
-        # By Context: what has moved there, by number.
-        self._moved_tethers: WeakKeyDictionary[Any, dict[int, Tether]] = WeakKeyDictionary()
-        self._attachments: list[Attachment] = []
-        self._attachments_of: defaultdict[int, list[int]] = defaultdict(list)
-        self._attachment_indices: Any = None
-        self._beads: dict[int, list[int]] = {}
         self._nodes: Any = None
         self._control_points: Any = None
         self._engine_name = choose_engine(engine)
@@ -91,39 +68,13 @@ class AddedFilaments:
         self._refuse_unless_built()
         return self._control_points
 
-    @property
-    def tethers(self) -> tuple[Tether, ...]:
-        """Tuple of the tethers, in the order of their numbers, as they were added; see ``tethers_in``."""
-        return tuple(self._tethers)
-
-    @property
-    def attachments(self) -> tuple[Attachment, ...]:
-        """Tuple of the attachment points, in the order of their numbers."""
-        return tuple(self._attachments)
-
-    @property
-    def attachment_indices(self) -> IntArray:
-        """Particle indices of the attachment points, in the order of their numbers, once they are in a System."""
-        self._refuse_unless_built()
-        return self._attachment_indices
-
-    @property
-    def bead_indices(self) -> list[IntArray]:
-        """Particle indices of the beads, a list of an array for each filament, once they are in a System."""
-        self._refuse_unless_built()
-        return [self._attachment_indices[self._beads.get(number, [])] for number in range(len(self))]
-
     def add_straight(
         self,
         filament_type: ChainType,
         segments: int,
         start: Vector,
         direction: Vector,
-        clamped: int | Indices = (),
-        *,
-        planar: bool = False,
-        propulsion: Scalar = 0.0,
-        clamped_tangents: int | Indices = (),
+        **options: "Unpack[FilamentOptions]",
     ) -> int:
         """Add a straight filament with segments of rest length.
 
@@ -141,18 +92,8 @@ class AddedFilaments:
             Position of the first node.
         direction : (3,) array
             Direction from the first node to the last; need not be normalised.
-        clamped : sequence of int
-            Nodes that do not move; negative numbers count from the end.
-        planar : bool
-            The filament moves in a plane of constant z, as under a cover slip: its nodes keep their z, and no force or
-            noise acts along z.
-        propulsion : force
-            F0 of self-propelled filaments: a force F0 t acts on every segment, half on either end, where t is its
-            tangent, away from the first node; on beam elements, along their curves. With a negative F0 the filament
-            moves with its first node in front. It is not conservative and has no energy.
-        clamped_tangents : sequence of int
-            Of beam elements: clamped nodes whose tangents do not turn either. The filament is clamped exactly there; a
-            clamped node alone is a hinge.
+        **options
+            See ``FilamentOptions``: ``clamped``, ``clamped_tangents``, ``planar`` and ``propulsion``.
 
         Returns
         -------
@@ -160,24 +101,18 @@ class AddedFilaments:
             The filament's number.
         """
         label = self._label(filament_type)
-        positions = shapes.straight(filament_type, segments, start, direction, label)
-        controls = shapes.beam_control_points(filament_type, positions, None, label)
-        return self._add(
-            filament_type, positions, clamped, label, False, planar, propulsion, controls, clamped_tangents
-        )
+        points = shapes.straight(filament_type, segments, start, direction, label)
+        return self._add(filament_type, points, label, False, options)
 
     def add_nodes(
         self,
         filament_type: ChainType,
         positions: Vectors,
-        clamped: int | Indices = (),
         *,
         closed: bool = False,
-        planar: bool = False,
-        propulsion: Scalar = 0.0,
         tangents: Vectors | None = None,
         control_points: Vectors | None = None,
-        clamped_tangents: int | Indices = (),
+        **options: "Unpack[FilamentOptions]",
     ) -> int:
         """Add a filament with given node positions.
 
@@ -188,9 +123,6 @@ class AddedFilaments:
         filament_type : FilamentType or BeadSpringType
         positions : (n, 3) length
             At least two nodes, four for a ring.
-        clamped : sequence of int
-            Nodes that do not move; negative numbers count from the end. ``[0, 1]`` is a clamp at
-            node 1: see ``add_straight``.
         closed : bool
             Make a ring: a last segment leads from the last node back to the first.
         tangents : (n, 3) array, optional
@@ -198,8 +130,8 @@ class AddedFilaments:
             cubic spline through the nodes, or of the periodic one of a ring, if not given.
         control_points : (n, 3) length, optional
             Of beam elements, in place of tangents: those of another chain, as it is, with its strains.
-        planar, propulsion, clamped_tangents
-            See ``add_straight``.
+        **options
+            See ``FilamentOptions``.
 
         Returns
         -------
@@ -207,14 +139,8 @@ class AddedFilaments:
             The filament's number.
         """
         label = self._label(filament_type)
-        positions = shapes.given(positions, label)
-        if control_points is None:
-            controls = shapes.beam_control_points(filament_type, positions, tangents, label, bool(closed))
-        else:
-            controls = shapes.given_control_points(filament_type, positions, tangents, control_points, label)
-        return self._add(
-            filament_type, positions, clamped, label, closed, planar, propulsion, controls, clamped_tangents
-        )
+        points = shapes.given(filament_type, positions, label, tangents, control_points, bool(closed))
+        return self._add(filament_type, points, label, closed, options)
 
     def add_ring(
         self,
@@ -222,11 +148,7 @@ class AddedFilaments:
         segments: int,
         center: Vector,
         normal: Vector = (0.0, 0.0, 1.0),
-        *,
-        clamped: int | Indices = (),
-        planar: bool = False,
-        propulsion: Scalar = 0.0,
-        clamped_tangents: int | Indices = (),
+        **options: "Unpack[FilamentOptions]",
     ) -> int:
         """Add a ring: a regular polygon with segments of rest length, or a circle of beam elements without strains.
 
@@ -238,8 +160,8 @@ class AddedFilaments:
         center : (3,) length
         normal : (3,) array
             Of the polygon's plane; nodes go counter-clockwise around it. It need not be normalised.
-        clamped, planar, propulsion, clamped_tangents
-            See ``add_straight``.
+        **options
+            See ``FilamentOptions``.
 
         Returns
         -------
@@ -247,14 +169,9 @@ class AddedFilaments:
             The filament's number.
         """
         label = self._label(filament_type)
-        controls = None
-        if filament_type.has_beam_elements:
-            positions, controls = shapes.beam_ring(
-                filament_type, segments, self._temperature, center, normal, planar, label
-            )
-        else:
-            positions = shapes.ring(filament_type, segments, center, normal, label)
-        return self._add(filament_type, positions, clamped, label, True, planar, propulsion, controls, clamped_tangents)
+        planar = options.get("planar", False)
+        points = shapes.ring(filament_type, segments, self._temperature, center, normal, planar, label)
+        return self._add(filament_type, points, label, True, options)
 
     def add_equilibrium(
         self,
@@ -263,11 +180,7 @@ class AddedFilaments:
         seed: int,
         start: Vector = (0.0, 0.0, 0.0),
         direction: Vector | None = None,
-        clamped: int | Indices = (),
-        *,
-        planar: bool = False,
-        propulsion: Scalar = 0.0,
-        clamped_tangents: int | Indices = (),
+        **options: "Unpack[FilamentOptions]",
     ) -> int:
         """Add a filament drawn from the exact equilibrium of the free discrete chain.
 
@@ -284,11 +197,8 @@ class AddedFilaments:
             Position of the first node.
         direction : (3,) array, optional
             Direction of the first segment; drawn from the sphere, or from the plane's directions, if not given.
-        clamped : sequence of int
-            Nodes that do not move; negative numbers count from the end. ``[0, 1]`` is a clamp at
-            node 1: see ``add_straight``.
-        planar, propulsion, clamped_tangents
-            See ``add_straight``.
+        **options
+            See ``FilamentOptions``.
 
         Returns
         -------
@@ -297,229 +207,11 @@ class AddedFilaments:
         """
         label = self._label(filament_type)
         generator = np.random.default_rng(whole_number(seed, 0, f"{label}: seed"))
-        controls = None
-        if filament_type.has_beam_elements:
-            positions, controls = shapes.drawn_beam(
-                filament_type, segments, self._temperature, generator, start, direction, planar, label
-            )
-        else:
-            positions = shapes.drawn(
-                filament_type, segments, self._temperature, generator, start, direction, clamped, planar, label
-            )
-        return self._add(
-            filament_type, positions, clamped, label, False, planar, propulsion, controls, clamped_tangents
+        clamped, planar = options.get("clamped", ()), options.get("planar", False)
+        points = shapes.drawn(
+            filament_type, segments, self._temperature, generator, start, direction, clamped, planar, label
         )
-
-    def add_tether(self, filament: int, node: int, point: Vector, stiffness: Scalar) -> int:
-        """Tether a node to a point by a harmonic spring, such as an optical trap: energy (k/2) |x - point|^2.
-
-        Scheme "implicit" takes tethers at the end of the step, like the filament's own forces, so they may be as stiff
-        as a segment. The explicit schemes, and other OpenMM forces in all schemes, need a step well below
-        2 gamma/k, where gamma is the friction of what the spring pulls, at least a quarter of a segment's parallel
-        friction per segment that meets in the node. A node of beam elements is held at its position, and can turn.
-
-        Parameters
-        ----------
-        filament : int
-            The filament's number.
-        node : int
-            The node's number in the filament; negative numbers count from the end. A node can have one tether.
-        point : (3,) length
-        stiffness : energy/length^2
-
-        Returns
-        -------
-        int
-            The tether's number, for ``move_tether``.
-
-        Raises
-        ------
-        InputError
-            For a filament or node that does not exist, a second tether, or a stiffness that is not positive.
-        """
-        label = f"Tether {len(self._tethers)}"
-        self._refuse_if_built(label)
-        filament = self._filament_number(filament, label)
-        (node,) = named_nodes([node], len(self[filament].positions), f"{label}:")
-        if (filament, node) in self._tethered_nodes:
-            raise InputError(f"{label}: node {node} of filament {filament} has a tether already.")
-        x, y, z = (float(x) for x in vector(point, LENGTH, f"{label}: point"))
-        stiffness = positive(stiffness, STIFFNESS, f"{label}: stiffness")
-        self._tethers.append(Tether(filament, node, (x, y, z), stiffness))
-        self._tethered_nodes.add((filament, node))
-        return len(self._tethers) - 1
-
-    def add_attachment(
-        self, filament: int, arc_length: Scalar | None = None, segment: int | None = None, fraction: float | None = None
-    ) -> int:
-        """Add an attachment point: a virtual site on a segment, on which any OpenMM force can act.
-
-        It is at ``(1 - fraction) x_minus + fraction x_plus`` of its segment's ends, or on the curve of a beam element
-        at the parameter ``fraction``, and follows them in the same step; a force on it acts at that place of the
-        cylinder (step 5 of Section 4 of the paper). It becomes a particle of its own behind the nodes of its filament,
-        in the Topology with the name "ATT"; ``attachment_indices`` says which.
-
-        Parameters
-        ----------
-        filament : int
-            The filament's number.
-        arc_length : length, optional
-            Distance from the first node along segments of rest length. Give this, or a segment.
-        segment : int, optional
-            The segment's number; negative numbers count from the end.
-        fraction : float, optional
-            Place on the segment, from 0 at its first node to 1 at its last; 0.5 if not given.
-
-        Returns
-        -------
-        int
-            The attachment point's number.
-
-        Raises
-        ------
-        InputError
-            For a filament, segment or place that does not exist.
-        """
-        label = f"Attachment point {len(self._attachments)}"
-        self._refuse_if_built(label)
-        filament = self._filament_number(filament, label)
-        return self._attach(locate(self[filament], filament, label, arc_length, segment, fraction))
-
-    def segment_place(
-        self, filament: int, arc_length: Scalar | None = None, segment: int | None = None, fraction: float | None = None
-    ) -> SegmentPlace:
-        """A place on a filament that crosslinks can hold, at any time, without an attachment point.
-
-        Parameters
-        ----------
-        filament : int
-            The filament's number.
-        arc_length, segment, fraction
-            As for ``add_attachment``.
-
-        Returns
-        -------
-        SegmentPlace
-
-        Raises
-        ------
-        InputError
-            For a filament, segment or place that does not exist, or before ``build`` or ``add_to``.
-        """
-        label = "Place on a segment"
-        filament = self._filament_number(filament, label)
-        place = locate(self[filament], filament, label, arc_length, segment, fraction)
-        nodes = self.node_indices[filament]
-        return SegmentPlace(int(nodes[place.segment]), int(nodes[(place.segment + 1) % len(nodes)]), place.fraction)
-
-    def add_beads(self, filament: int, spacing: Scalar) -> list[int]:
-        """Cover a filament evenly with beads, on which contact forces act (see ``openmm_cylchain.couplings.contacts``).
-
-        Beads are attachment points, from the first node to the last at equal distances along the contour, in the
-        Topology with the name "BED". ``bead_indices`` says which particles they are.
-
-        Parameters
-        ----------
-        filament : int
-            The filament's number.
-        spacing : length
-            The largest distance of two neighbours along segments of rest length. Half a contact diameter closes
-            all gaps.
-
-        Returns
-        -------
-        list of int
-            The beads' numbers among the attachment points.
-
-        Raises
-        ------
-        InputError
-            For a filament that does not exist or has beads already, or a spacing that is not positive.
-        """
-        label = f"Beads of filament {filament}"
-        self._refuse_if_built(label)
-        filament = self._filament_number(filament, label)
-        if filament in self._beads:
-            raise InputError(f"{label}: it has beads already.")
-        beads = distribute_beads(self[filament], filament, positive(spacing, LENGTH, f"{label}: spacing"))
-        self._beads[filament] = [self._attach(bead) for bead in beads]
-        return list(self._beads[filament])
-
-    def add_linkers(
-        self,
-        kind: Crosslinker,
-        count: int | None = None,
-        *,
-        concentration: Scalar | None = None,
-        volume: Scalar | None = None,
-        anchors: Indices | Vectors | None = None,
-        bound: int = 0,
-        seed: int = 0,
-    ) -> int:
-        """Add linkers that bind to filaments, walk along them and unbind: crosslinkers or motors.
-
-        While they are not bound, they are anywhere: a linker binds its first hand with the rate
-        ``binding_rate/(2 reach) v/V`` for each length of filament, where V is the volume in which unbound linkers are
-        and v = (4 pi/3) R^3 with the reach R (of hands that differ, the geometric mean of both v). How many there are
-        of them, and where they are bound, belongs to each Context: ``linkers_in``.
-
-        In every step, filaments stand still while linkers bind and unbind as long as the step takes; then filaments
-        move, with the springs of linkers in their equations if the scheme is implicit.
-
-        Parameters
-        ----------
-        kind : Crosslinker
-        count : int
-            How many there are. Or give one of the next two.
-        concentration : 1/length^3, or amount/length^3
-            Of those that are not bound, if that does not change.
-        anchors : (n,) int or (n, 3) length
-            Particles of the System, or points, to which n linkers are tied, in the place of their first hands.
-        volume : length^3, optional
-            V, of a count of linkers; that of the periodic box if not given.
-        bound : int
-            How many begin with their first hand bound, at random places. Of those with anchors, the first that have a
-            filament within reach begin with their only hand bound to it, as the energy of the spring has it.
-        seed : int
-            Of these places.
-
-        Returns
-        -------
-        int
-            The number of their type, for tables.
-
-        Raises
-        ------
-        InputError
-            For a value that is missing or wrong; with the portable engine, which has no linkers; or if the filaments
-            are in a System already.
-
-        Warns
-        -----
-        LinkerWarning
-            For a spring without rest length that is so stiff that hands do not bind anywhere near their reach, or one
-            that is much longer at rest than they reach.
-        """
-        if not self._engine.has_linkers:
-            raise InputError(
-                f"The {self._engine_name} engine has no linkers that bind and unbind; use the compiled one, or "
-                "Crosslinks, which are added and removed from Python."
-            )
-        if self._nodes is not None:
-            raise InputError("These filaments are already in a System: add linkers before.")
-        self._linkers.append(as_linkers(kind, count, concentration, volume, anchors, bound, seed))
-        warn_if_springs_do_not_fit(kind, self.temperature)
-        return len(self._linkers) - 1
-
-    @property
-    def linkers(self) -> tuple[Linkers, ...]:
-        """Tuple of the types of linkers, in the order of their numbers, as they were added."""
-        return tuple(self._linkers)
-
-    def _attach(self, attachment):
-        self._attachments.append(attachment)
-        self._attachments_of[attachment.filament].append(len(self._attachments) - 1)
-        return len(self._attachments) - 1
+        return self._add(filament_type, points, label, False, options)
 
     def _refuse_if_built(self, label):
         if self._nodes is not None:
@@ -529,12 +221,6 @@ class AddedFilaments:
         if self._nodes is None:
             raise InputError("The filaments are not in a System yet: call build or add_to first.")
 
-    def _filament_number(self, filament, label):
-        filament = whole_number(filament, 0, f"{label}: filament")
-        if filament >= len(self):
-            raise InputError(f"{label}: filament {filament} does not exist; there are {len(self)}.")
-        return filament
-
     def _label(self, filament_type):
         if not isinstance(filament_type, ChainType):
             raise InputError(
@@ -543,32 +229,11 @@ class AddedFilaments:
             )
         return f"Filament {len(self)} ({filament_type.name})"
 
-    def _add(
-        self,
-        filament_type,
-        positions,
-        clamped,
-        label,
-        closed,
-        planar,
-        propulsion,
-        control_points,
-        clamped_tangents,
-    ):
+    def _add(self, filament_type, points, label, closed, options):
         self._refuse_if_built(label)
-        if filament_type.has_beam_elements and not self._engine.has_beam_elements:
+        if not (filament_type.segment_kind.straight or self._engine.has_beam_elements):
             raise InputError(f"{label}: the {self._engine_name} engine has no beam elements: use the compiled one.")
-        filament = shapes.new_filament(
-            filament_type,
-            positions,
-            clamped,
-            label,
-            closed,
-            planar,
-            propulsion,
-            control_points,
-            clamped_tangents,
-        )
+        filament = shapes.new_filament(filament_type, points, label, closed, **options)
         # Friction is computed now, so that a filament that has none is refused here.
         try:
             filament_type.segment_friction(self._viscosity, self._temperature, filament.segments)
@@ -576,15 +241,3 @@ class AddedFilaments:
             raise InputError(f"{label}: {error}") from None
         self._filaments.append(filament)
         return len(self) - 1
-
-    def _placed(self):
-        return PlacedFilaments(
-            tuple(self._filaments),
-            tuple(self.node_indices),
-            tuple(self._tethers),
-            self._viscosity,
-            self._temperature,
-            tuple(self._linkers),
-            self._periodic,
-            tuple(self._control_points),
-        )

@@ -212,14 +212,13 @@ def energy_cells(
     kT : float
     """
     segments = sum(filament.segments for filament in filaments)
-    # Beam elements bend themselves.
-    joints = sum(own.segments - (not (own.closed or own.type.has_beam_elements)) for own in filaments)
+    bends = sum(filament.bends for filament in filaments)
     ends = np.array([(nodes[0], nodes[-1]) for nodes in filaments.node_indices])
     return (
         stretching,
         bending,
         stretching + bending,
         stretching / segments / kT if kT else np.nan,
-        bending / joints / kT if joints and kT else np.nan,
+        bending / bends / kT if bends and kT else np.nan,
         float(np.mean(np.linalg.norm(positions[ends[:, 1]] - positions[ends[:, 0]], axis=1))),
     )

@@ -341,7 +341,7 @@ class Filaments(FilamentsInContexts):
         warn_of_forces_without_images(system)
         if scheme != "implicit":
             refuse_beams(self, f"scheme {scheme!r}")
-        CoupledForces(system, self).refuse_in_two_stages(scheme)
+        CoupledForces(system).refuse_in_two_stages(scheme)
         bath = self._bath(temperature)
         if checks:
             warn_of_long_step(self, system, step_size, scheme, bath, particle_friction, flow)

@@ -26,10 +26,10 @@ from ..mechanics.redistribution import ChainSet
 from ..mechanics.tension import components_along, filament_tensions
 from ..units.quantities import FORCE, LENGTH, STIFFNESS, in_units_of, positive, vector, whole_number
 from ..units.types import Indices, Scalar, Vector, Vectors
-from .added_filaments import AddedFilaments
+from .tied_filaments import TiedFilaments
 
 
-class FilamentsInContexts(AddedFilaments):
+class FilamentsInContexts(TiedFilaments):
     """Filaments whose tensions, linkers and tethers each Context has: what ``Filaments`` asks and moves there."""
 
     def linkers_in(self, context: openmm.Context) -> LinkerTable:
@@ -40,7 +40,7 @@ class FilamentsInContexts(AddedFilaments):
         InputError
             If there are none, or the Context has got a State that does not say where linkers are.
         """
-        return table_of(self._binding_force(context), context, self._filaments)
+        return table_of(self._binding_force(context), context)
 
     def set_linkers(self, context: openmm.Context, table: LinkerTable) -> None:
         """Give a Context other linkers.
@@ -50,7 +50,7 @@ class FilamentsInContexts(AddedFilaments):
         InputError
             For linkers that do not fit their types, the anchors or the filaments.
         """
-        set_table(self._binding_force(context), context, table, self._filaments)
+        set_table(self._binding_force(context), context, table)
 
     def linker_pulls(self, context: openmm.Context) -> LinkerPulls:
         """What the springs of linkers do that join two places in a Context: a LinkerPulls."""

@@ -6,17 +6,9 @@ from typing import Any
 import numpy as np
 import openmm
 
-from ..bead_spring.bead_spring_type import BeadSpringType
 from ..filaments.collection import FilamentCollection
 from ..mechanics.flow import Flow
-from ..theory import (
-    bead_spring_bending_energies,
-    bead_spring_stretching_energies,
-    bending_energy_mean,
-    chain_mean_square_end_to_end,
-    stretching_energy_mean,
-)
-from ..theory.beam_elements import beam_averages, beam_mean_square_end_to_end, beam_stretching_energy_mean
+from ..theory import chain_mean_energies, chain_mean_square_end_to_end
 from ..units.quantities import thermal_energy
 from ..units.types import FloatArray
 from .step_check_observables import Kind, Probe, interacting
@@ -220,23 +212,12 @@ class ExactAverages:
         one = kind.filament
         if one.closed or one.clamped or one.propulsion:
             return None
-        if one.type.has_beam_elements:
-            return None if one.planar else self._average_of_beams(one, what)
-        arguments = self._temperature, one.planar
+        if one.planar and not one.type.segment_kind.straight:
+            return None
+        free = one.type, one.segments, self._temperature, one.planar
         if what == "distance":
-            return chain_mean_square_end_to_end(one.type, one.segments, *arguments)
+            return chain_mean_square_end_to_end(*free)
         if what not in ("stretching", "bending"):
             return None
-        if isinstance(one.type, BeadSpringType):
-            of_beads = bead_spring_stretching_energies if what == "stretching" else bead_spring_bending_energies
-            energies = of_beads(one.type, one.segments, *arguments) / self._kT
-            return energies.mean() if len(energies) else 0.0
-        mean = stretching_energy_mean if what == "stretching" else bending_energy_mean
-        return mean(one.type, *arguments) / self._kT
-
-    def _average_of_beams(self, one, what):
-        if what == "distance":
-            return beam_mean_square_end_to_end(one.type, one.segments, self._temperature)
-        if what == "stretching":
-            return beam_stretching_energy_mean(one.type, one.segments, self._temperature) / self._kT
-        return beam_averages(one.type, self._temperature).bending if what == "bending" else None
+        stretching, bending = chain_mean_energies(*free)
+        return (stretching if what == "stretching" else bending) / self._kT

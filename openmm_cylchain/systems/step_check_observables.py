@@ -9,7 +9,6 @@ import numpy as np
 import openmm
 import scipy
 
-from ..beams.curve import BeamElement, element_energies
 from ..couplings.capsule_contacts import as_capsule_contact_force
 from ..couplings.pulling import is_constant_force
 from ..couplings.walls import as_filament_wall_force
@@ -36,13 +35,9 @@ class Kind:
     filament: Filament
     nodes: IntArray
     control_points: IntArray
-    joint_stiffnesses: FloatArray
-    """Empty for beam elements."""
-    element: BeamElement | None
-    """None for straight segments."""
 
 
-def _kinds(filaments, temperature):
+def _kinds(filaments):
     groups: dict[Any, list[int]] = {}
     for number, one in enumerate(filaments):
         key = (one.type, one.segments, one.closed, one.planar, one.clamped, one.clamped_tangents, one.propulsion)
@@ -57,12 +52,7 @@ def _kinds(filaments, temperature):
             np.array([own[number] for number in numbers])
             for own in (filaments.node_indices, filaments.control_point_indices)
         )
-        element, stiffnesses = None, np.zeros(0)
-        if first.type.has_beam_elements:
-            element = first.type.beam_element(temperature, first.planar)
-        else:
-            stiffnesses = first.joint_stiffnesses
-        kinds.append(Kind(label, first, nodes, control_points, stiffnesses, element))
+        kinds.append(Kind(label, first, nodes, control_points))
     return kinds
 
 
@@ -70,9 +60,9 @@ class Probe:
     """What is looked at in a Context: names, units, and values of one frame."""
 
     def __init__(self, filaments: FilamentsInContexts, system: openmm.System, temperature: Scalar) -> None:
-        self._kT = thermal_energy(temperature)
+        self._temperature, self._kT = temperature, thermal_energy(temperature)
         self._filaments = filaments
-        self.kinds = _kinds(filaments, temperature)
+        self.kinds = _kinds(filaments)
         self._system = system
         chains = [*filaments.node_indices, *filaments.control_point_indices]
         outside = np.setdiff1d(np.arange(system.getNumParticles()), np.concatenate(chains))
@@ -179,7 +169,7 @@ class Probe:
         return math.sqrt(2.0 * kind.filament.type.segment_length / kind.filament.segments)
 
     def _measure_kind(self, kind, positions, before):
-        filament, one, nodes = kind.filament, kind.filament.type, positions[kind.nodes]
+        filament, nodes = kind.filament, positions[kind.nodes]
         closed = filament.closed
         vectors = np.diff(nodes, axis=1, append=nodes[:, :1]) if closed else np.diff(nodes, axis=1)
         lengths = np.linalg.norm(vectors, axis=2)
@@ -191,21 +181,11 @@ class Probe:
         waves = np.cos(np.outer(modes, np.pi * (np.arange(filament.segments) + 0.5) / filament.segments))
         amplitudes = self._scale(kind) * np.einsum("ms,fsk->mfk", waves, tangents)
         moved = [amplitudes, middle] if before is None else [amplitudes - before[0], middle - before[1]]
-        if kind.element is not None:
-            energies = element_energies(nodes, positions[kind.control_points], kind.element, closed)
-        else:
-            energies = one.stretching_energies(lengths, closed), self._bending_energies(kind, vectors)
-        values = [*(own.mean(axis=1) / self._kT for own in energies), np.sum(ends**2, axis=1)]
+        energies = filament.energies_along(nodes, positions[kind.control_points], self._temperature)
+        # Of a single straight segment, nothing bends.
+        values = [*(own.sum(axis=1) / max(1, own.shape[1]) / self._kT for own in energies), np.sum(ends**2, axis=1)]
         values += [*np.sum(moved[0] ** 2, axis=2), np.sum(moved[1] ** 2, axis=1)]
         return values, (amplitudes, middle)
-
-    @staticmethod
-    def _bending_energies(kind, vectors):
-        # Of the joints of each filament, in kJ/mol; one zero if there are none.
-        one = kind.filament.type
-        if not len(kind.joint_stiffnesses) or one.bending_rigidity == 0.0:
-            return np.zeros((len(vectors), 1))
-        return one.bending_energies(vectors, kind.joint_stiffnesses, kind.filament.closed)
 
     def _tether_energy(self, positions):
         energy = 0.0

@@ -30,6 +30,7 @@ from .beam_elements import (
 )
 from .discrete_chain import (
     chain_bending_mode_variance,
+    chain_mean_energies,
     chain_mean_square_end_to_end,
     chain_mean_square_radius_of_gyration,
     chain_persistence_length,
@@ -89,6 +90,7 @@ __all__ = [
     "calibrated_to_force",
     "chain_bending_mode_variance",
     "chain_extension",
+    "chain_mean_energies",
     "chain_mean_square_end_to_end",
     "chain_mean_square_radius_of_gyration",
     "chain_persistence_length",

@@ -6,6 +6,7 @@ from openmm import unit
 
 from ..errors import InputError
 from ..filaments.chain_type import ChainType
+from ..filaments.straight_segments import STRAIGHT_SEGMENTS
 from ..units.quantities import DIMENSIONLESS, TEMPERATURE, in_units_of, positive, shown, thermal_energy
 from ..units.types import FloatOrArray, Numbers, Scalar
 
@@ -15,15 +16,10 @@ def require_straight_segments(filament_type: ChainType) -> None:
 
     Lengths and joints of beads do not fluctuate independently, and beam elements bend inside.
     """
-    if filament_type.node_friction > 0.0:
+    if filament_type.segment_kind is not STRAIGHT_SEGMENTS:
         raise InputError(
-            f"Filament type {filament_type.name!r} is a chain of beads, for which this closed form does not hold: see "
-            "the functions theory.bead_spring_..."
-        )
-    if filament_type.has_beam_elements:
-        raise InputError(
-            f"Filament type {filament_type.name!r} has beam elements, for which this closed form does not hold: see "
-            "the functions theory.beam_..."
+            f"Filament type {filament_type.name!r} has no straight segments of cylinders, for which this closed form "
+            "holds: see the functions theory.bead_spring_... of beads, and theory.beam_... of beam elements."
         )
 
 

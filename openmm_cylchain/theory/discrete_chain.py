@@ -1,21 +1,37 @@
 """Statistics of the free discrete chain, exact for the model that is simulated, at any stiffness."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
-from ..bead_spring.bead_spring_type import BeadSpringType
+from ..bead_spring.bead_spring_type import BEAD_BONDS, BeadSpringType
 from ..bead_spring.equilibrium import (
+    bead_spring_bending_energies,
     bead_spring_mean_square_end_to_end,
     bead_spring_mean_square_radius_of_gyration,
     bead_spring_persistence_length,
+    bead_spring_stretching_energies,
 )
 from ..errors import InputError
+from ..filaments.beam_elements import BEAM_ELEMENTS
+from ..filaments.chain_type import ChainType, SegmentKind
 from ..filaments.equilibrium import JointAngleDistribution, PlanarJointAngleDistribution, SegmentLengthDistribution
 from ..filaments.filament_type import FilamentType
+from ..filaments.straight_segments import STRAIGHT_SEGMENTS
 from ..units.quantities import whole_number
 from ..units.types import FloatOrArray, Scalar
 from .arguments import each_whole_number, require_straight_segments
-from .beam_elements import beam_mean_square_end_to_end, beam_persistence_length, beam_tangent_correlation
+from .beam_elements import (
+    beam_bending_energy_mean,
+    beam_mean_square_end_to_end,
+    beam_persistence_length,
+    beam_stretching_energy_mean,
+    beam_tangent_correlation,
+)
+from .energies import bending_energy_mean, stretching_energy_mean
 
 
 def mean_joint_cosine(filament_type: FilamentType, temperature: Scalar, planar: bool = False) -> float:
@@ -42,8 +58,10 @@ def chain_tangent_correlation(
     planar : bool
         In a plane.
     """
-    if filament_type.has_beam_elements:
-        return beam_tangent_correlation(filament_type, lag, temperature, planar)
+    return _averages(filament_type).tangent_correlation(filament_type, lag, temperature, planar)
+
+
+def _tangent_correlation(filament_type, lag, temperature, planar):
     return mean_joint_cosine(filament_type, temperature, planar) ** each_whole_number(lag, 0, "lag")
 
 
@@ -60,10 +78,10 @@ def chain_persistence_length(
     for segments that are short against it. A freely jointed chain has 0. Of beads and of beam elements, see
     ``bead_spring_persistence_length`` and ``beam_persistence_length``.
     """
-    if isinstance(filament_type, BeadSpringType):
-        return bead_spring_persistence_length(filament_type, temperature, planar)
-    if filament_type.has_beam_elements:
-        return beam_persistence_length(filament_type, temperature, planar)
+    return _averages(filament_type).persistence_length(filament_type, temperature, planar)
+
+
+def _persistence_length(filament_type, temperature, planar):
     if filament_type.joint_stiffness == 0:
         return 0.0
     length = SegmentLengthDistribution(filament_type, temperature, planar).mean(lambda length: length)
@@ -101,10 +119,10 @@ def chain_mean_square_end_to_end(
     planar : bool
         In a plane.
     """
-    if isinstance(filament_type, BeadSpringType):
-        return bead_spring_mean_square_end_to_end(filament_type, segments, temperature, planar)
-    if filament_type.has_beam_elements:
-        return beam_mean_square_end_to_end(filament_type, segments, temperature, planar)
+    return _averages(filament_type).mean_square_end_to_end(filament_type, segments, temperature, planar)
+
+
+def _mean_square_end_to_end(filament_type, segments, temperature, planar):
     segments = whole_number(segments, 1, "segments")
     return float(_subchain_mean_square(filament_type, segments, temperature, planar)[-1])
 
@@ -116,11 +134,47 @@ def chain_mean_square_radius_of_gyration(
 
     Every node has the same weight: ``<R_g^2> = sum over pairs <R_ij^2> / (N+1)^2``. Of beads, by the transfer operator.
     """
-    if isinstance(filament_type, BeadSpringType):
-        return bead_spring_mean_square_radius_of_gyration(filament_type, segments, temperature, planar)
+    return _averages(filament_type).mean_square_radius_of_gyration(filament_type, segments, temperature, planar)
+
+
+def _mean_square_radius_of_gyration(filament_type, segments, temperature, planar):
     segments = whole_number(segments, 1, "segments")
     distances = _subchain_mean_square(filament_type, segments, temperature, planar)
     return float(np.arange(segments, 0, -1) @ distances) / (segments + 1) ** 2
+
+
+def chain_mean_energies(
+    filament_type: FilamentType | BeadSpringType, segments: int, temperature: Scalar, planar: bool = False
+) -> tuple[float, float]:
+    """Mean stretching energy of a segment, and bending energy of a joint or beam element, of the free discrete chain.
+
+    In kJ/mol; of beads, whose energies depend on their places along the chain, their means over it.
+
+    Parameters
+    ----------
+    filament_type : FilamentType or BeadSpringType
+    segments : int
+    temperature : temperature, above zero
+    planar : bool
+        In a plane.
+    """
+    return _averages(filament_type).mean_energies(filament_type, segments, temperature, planar)
+
+
+def _mean_energies(filament_type, segments, temperature, planar):
+    bending = bending_energy_mean(filament_type, temperature, planar)
+    return stretching_energy_mean(filament_type, temperature, planar), bending
+
+
+def _mean_energies_of_beads(bead_type, bonds, temperature, planar):
+    bending = bead_spring_bending_energies(bead_type, bonds, temperature, planar)
+    stretching = bead_spring_stretching_energies(bead_type, bonds, temperature, planar)
+    return stretching.mean(), bending.mean() if len(bending) else 0.0
+
+
+def _mean_energies_of_beams(filament_type, elements, temperature, planar):
+    bending = beam_bending_energy_mean(filament_type, temperature, planar)
+    return beam_stretching_energy_mean(filament_type, elements, temperature, planar), bending
 
 
 def chain_bending_mode_variance(
@@ -184,3 +238,34 @@ def _bending_modes(segments, mode):
     if np.any(np.asarray(modes) >= segments):
         raise InputError(f"mode must be below the number of segments, {segments}, but is {mode!r}.")
     return segments, modes
+
+
+@dataclass(frozen=True)
+class _Averages:
+    # Of free chains of one kind of segments; those of straight ones refuse what there is no closed form of.
+    persistence_length: Callable[..., Any]
+    mean_square_end_to_end: Callable[..., Any]
+    mean_energies: Callable[..., Any]
+    tangent_correlation: Callable[..., Any] = _tangent_correlation
+    mean_square_radius_of_gyration: Callable[..., Any] = _mean_square_radius_of_gyration
+
+
+_AVERAGES: dict[SegmentKind, _Averages] = {
+    STRAIGHT_SEGMENTS: _Averages(_persistence_length, _mean_square_end_to_end, _mean_energies),
+    BEAM_ELEMENTS: _Averages(
+        beam_persistence_length,
+        beam_mean_square_end_to_end,
+        _mean_energies_of_beams,
+        tangent_correlation=beam_tangent_correlation,
+    ),
+    BEAD_BONDS: _Averages(
+        bead_spring_persistence_length,
+        bead_spring_mean_square_end_to_end,
+        _mean_energies_of_beads,
+        mean_square_radius_of_gyration=bead_spring_mean_square_radius_of_gyration,
+    ),
+}
+
+
+def _averages(filament_type: ChainType) -> _Averages:
+    return _AVERAGES[filament_type.segment_kind]

@@ -88,13 +88,13 @@ def _growth_rate(filament, filaments, compression, at_end):
     kind = filament.type
     friction = kind.segment_friction(filaments.viscosity, filaments.temperature, filament.segments)
     per_length = friction.perpendicular / kind.segment_length
-    # A single straight segment does not bend, but turns.
-    inside = compression if filament.segments > 1 or kind.has_beam_elements else 0.0
+    # What does not bend, turns.
+    inside = compression if filament.bends else 0.0
     square = max(inside**2 / 4.0, at_end**2)
     if square == 0.0:
         return 0.0
     waves = square / (kind.bending_rigidity * per_length) if kind.bending_rigidity > 0.0 else math.inf
-    if kind.has_beam_elements:
+    if not kind.segment_kind.straight:
         return waves
     return min(waves, max(inside, at_end) * kind.segment_length / friction.rotational)
 

@@ -46,9 +46,6 @@ RELATIVE_MOTION = 0.6
 LARGEST_LINKED_MOTION = 0.6
 """The largest product of a step, the mobility of two places, and the stiffness of a link in series with a contact."""
 
-_END_OF_ELEMENT = 4.0
-"""How much more than all of an element that is alone its end moves, as that of a rod: elements are long."""
-
 _REASON = (
     "{what}: the two may diffuse against each other by {share:g} of {distance}, {value:.3g} nm, in an implicit step"
 )
@@ -79,7 +76,7 @@ def steps_of_couplings(
     -------
     list of TimeStep
     """
-    forces = coupled_forces or CoupledForces(system, filaments)
+    forces = coupled_forces or CoupledForces(system)
     coupled = [(index, force) for index, force in enumerate(system.getForces()) if forces.includes(index)]
     kT = thermal_energy(temperature)
     if not coupled or kT == 0.0:
@@ -166,9 +163,8 @@ def mobilities(filaments: FilamentCollection, system: openmm.System, particle_fr
     mobility = np.zeros(system.getNumParticles())
     for filament, nodes in zip(filaments, filaments.node_indices):
         friction = filament.type.segment_friction(filaments.viscosity, filaments.temperature, filament.segments)
-        mobility[nodes] = 1.0 / max(friction.perpendicular, filament.type.node_friction)
-        if filament.type.has_beam_elements:
-            mobility[nodes] *= _END_OF_ELEMENT
+        whole = 1.0 / max(friction.perpendicular, filament.type.node_friction)
+        mobility[nodes] = filament.type.segment_kind.end_mobility * whole
     for particle, attachment in zip(filaments.attachment_indices, filaments.attachments):
         mobility[particle] = mobility[filaments.node_indices[attachment.filament][0]]
     nodes = np.concatenate([*filaments.node_indices, *filaments.control_point_indices])

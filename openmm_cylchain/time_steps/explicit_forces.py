@@ -67,7 +67,7 @@ class ExplicitForces:
     ) -> None:
         self.springs: list[Springs] = []
         unknown: list[str] = []
-        coupled = coupled_forces or CoupledForces(system, filaments)
+        coupled = coupled_forces or CoupledForces(system)
         reader = SpringReader(system, filaments)
         for index, force in enumerate(system.getForces()):
             name = label = f"{force.getName()} (force {index})"

@@ -120,8 +120,6 @@ def _response_of_end(filaments, step, kind, segments, closed):
     friction = kind.segment_friction(filaments.viscosity, filaments.temperature, segments)
     length = kind.segment_length
     arm = 0.25 * length**2 / friction.rotational if friction.rotational > 0.0 else math.inf
-    if kind.has_beam_elements:
-        arm = 3.0 / friction.perpendicular
     of_segment = 1.0 / (1.0 / friction.perpendicular + arm) if friction.perpendicular > 0.0 else 0.0
     alone = step / (of_segment + kind.node_friction)
     per_length = friction.perpendicular / length

@@ -20,8 +20,8 @@ def refuse_mixed_precision_of_beams(filaments: Iterable[Any], precision: str) ->
 
     Their steps are in double precision. Beside others, they are as filaments in which "mixed" would not do.
     """
-    have = [one.type.has_beam_elements for one in filaments]
-    if precision == "mixed" and have and all(have):
+    straight = [one.type.segment_kind.straight for one in filaments]
+    if precision == "mixed" and straight and not any(straight):
         raise InputError(
             'precision "mixed" is for filaments of straight segments, but all of these have beam elements, whose steps '
             'are in double precision: choose "automatic" or "double".'

@@ -17,6 +17,7 @@ from ..errors import SegmentLengthWarning
 from ..filaments.collection import FilamentCollection
 from ..filaments.filament import Tether
 from ..filaments.filament_type import FilamentType
+from ..filaments.straight_segments import STRAIGHT_SEGMENTS
 from ..theory.force_extension import marko_siggia_extension, wlc_share_of_force
 from ..units.quantities import PICONEWTON
 from ..units.types import FloatArray
@@ -78,7 +79,7 @@ def _pulls(filaments, temperature, constant_forces):
     pulls = {}
     for number, filament in enumerate(filaments):
         kind = filament.type
-        if not isinstance(kind, FilamentType) or kind.has_beam_elements or kind.bending_rigidity == 0.0:
+        if kind.segment_kind is not STRAIGHT_SEGMENTS or kind.bending_rigidity == 0.0:
             continue
         nodes = filaments.node_indices[number].tolist() if constant_forces else []
         loads = {node: constant_forces[one] for node, one in enumerate(nodes) if one in constant_forces}

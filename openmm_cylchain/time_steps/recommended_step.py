@@ -107,7 +107,7 @@ def recommended_time_step(
         raise InputError(f"Scheme 'modes' moves chains of beads, but no cylinders, such as {filament_type.name!r}.")
     if friction is None:
         friction = filament_type.segment_friction(viscosity, temperature, segments)
-    if filament_type.has_beam_elements:
+    if not filament_type.segment_kind.straight:
         return beam_time_step(filament_type, temperature, scheme, segments, flow, friction, propulsion, closed)
     if scheme in IMPLICIT_SCHEMES:
         return implicit_time_step(filament_type, viscosity, temperature, segments, closed, flow, friction, scheme)

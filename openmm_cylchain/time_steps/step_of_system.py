@@ -44,7 +44,7 @@ def recommended_step_of(
         raise InputError("A contact_stiffness needs a contact_diameter.")
     constant_forces: dict[int, FloatArray] = {}
     if system is not None:
-        coupled = CoupledForces(system, filaments)
+        coupled = CoupledForces(system)
         coupled.refuse_in_two_stages(scheme)
         steps += _steps_of_diffusion(filaments, system, temperature, confidence, scheme, coupled)
         if scheme in IMPLICIT_SCHEMES:

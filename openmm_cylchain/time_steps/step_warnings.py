@@ -49,7 +49,7 @@ def warn_of_long_step(
             friction = f.type.segment_friction(*solvent, f.segments)
             warn_if_far_above(f.type, solvent[0], temperature, step, f.segments, scheme, f.closed, friction)
             warn_if_fene_is_wrong(f.type, temperature, step, friction, scheme)
-    coupled = CoupledForces(system, filaments)
+    coupled = CoupledForces(system)
     forces = ExplicitForces(system, filaments, scheme, particle_friction, coupled)
     forces.warn_if_too_stiff(step)
     warn_if_hands_are_not_resolved(system, step)

@@ -4,29 +4,32 @@
 using namespace cylchain;
 using namespace std;
 
-Contours::Contours(const vector<Chain>& ofChains, const vector<BeamChain>& beams) {
-    for (const Chain& own : ofChains) {
-        Contour contour = {static_cast<int>(segments.size()), static_cast<int>(own.segments.size()), 0, 0, own.closed};
-        bool same = true;
-        for (size_t s = 0; s < own.segments.size(); s++) {
-            const double length = own.segments[s].restLength;
-            segments.push_back({getNumChains(), own.nodes[s], own.nodes[(s+1)%own.nodes.size()], contour.length, length,
-                    {-1, -1}});
-            contour.length += length;
-            same = same && length == own.segments[0].restLength;
-        }
-        contour.ofSegments = same ? own.segments[0].restLength : 0;
-        chains.push_back(contour);
+Contours::Contours(const ChainList& list) {
+    for (int chain = 0; chain < list.size(); chain++)
+        list.visit(chain, [&] (const auto& own) {add(own);});
+}
+
+void Contours::add(const Chain& own) {
+    Contour contour = {static_cast<int>(segments.size()), static_cast<int>(own.segments.size()), 0, 0, own.closed};
+    bool same = true;
+    for (size_t s = 0; s < own.segments.size(); s++) {
+        const double length = own.segments[s].restLength;
+        segments.push_back({getNumChains(), own.nodes[s], own.nodes[(s+1)%own.nodes.size()], contour.length, length,
+                {-1, -1}});
+        contour.length += length;
+        same = same && length == own.segments[0].restLength;
     }
-    for (const BeamChain& own : beams) {
-        const int elements = own.numElements(), particles = own.particles.size();
-        const double length = own.elementLength;
-        for (int i = 0; i < elements; i++)
-            segments.push_back({getNumChains(), own.particles[2*i], own.particles[(2*i+2)%particles], i*length, length,
-                    {own.particles[2*i+1], own.particles[(2*i+3)%particles]}});
-        chains.push_back({static_cast<int>(segments.size())-elements, elements, elements*length, length,
-                own.closed});
-    }
+    contour.ofSegments = same ? own.segments[0].restLength : 0;
+    chains.push_back(contour);
+}
+
+void Contours::add(const BeamChain& own) {
+    const int elements = own.numElements(), particles = own.particles.size();
+    const double length = own.elementLength;
+    for (int i = 0; i < elements; i++)
+        segments.push_back({getNumChains(), own.particles[2*i], own.particles[(2*i+2)%particles], i*length, length,
+                {own.particles[2*i+1], own.particles[(2*i+3)%particles]}});
+    chains.push_back({static_cast<int>(segments.size())-elements, elements, elements*length, length, own.closed});
 }
 
 int Contours::findSegment(int chain, double position) const {

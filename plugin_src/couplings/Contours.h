@@ -2,8 +2,7 @@
 #define CYLCHAIN_CONTOURS_H_
 
 #include "couplings/Place.h"
-#include "mechanics/BeamChain.h"
-#include "mechanics/Chain.h"
+#include "mechanics/ChainList.h"
 #include <cstddef>
 #include <vector>
 
@@ -12,12 +11,12 @@ namespace cylchain {
 /**
  * Lengths along chains, from their minus ends, with segments at rest; and where such lengths are.
  *
- * Segments of all chains are numbered in the order of chains. Chains of beam elements have their numbers behind all
- * others; their segments are the elements, on the curves of which lengths are.
+ * Segments of all chains are numbered in the order of the list of chains. Those of beam elements are the elements, on
+ * the curves of which lengths are.
  */
 class Contours {
 public:
-    explicit Contours(const std::vector<Chain>& chains, const std::vector<BeamChain>& beams = {});
+    explicit Contours(const ChainList& chains);
     int getNumChains() const {
         return chains.size();
     }
@@ -74,6 +73,8 @@ public:
      */
     void findTangent(int chain, double position, const double* positions, const double* box, double* tangent) const;
 private:
+    void add(const Chain& chain);
+    void add(const BeamChain& beam);
     struct Contour {
         int firstSegment, numSegments;
         double length;

@@ -1,13 +1,10 @@
 #ifndef CYLCHAIN_BROKEN_COUPLING_H_
 #define CYLCHAIN_BROKEN_COUPLING_H_
 
-#include <cstdint>
-
 namespace cylchain {
 
 /** The coupling by which an implicit step of coupled chains has gone wrong. */
 struct BrokenCoupling {
-    enum Kind {None, Contact, Link, Wall};
     enum Reason {
         /** Newton's method has not found where its places are. */
         NotSolved,
@@ -23,12 +20,11 @@ struct BrokenCoupling {
         int chain = -1;
         int segment = -1;
     };
-    Kind kind = None;
     Reason reason = NotSolved;
-    /** Its force, among those of CoupledForces: links, contacts, walls, in this order. */
-    int force = 0;
+    /** Its force, among those of CoupledForces, or -1 if there is none. */
+    int force = -1;
     /** The number of a link. */
-    std::uint32_t link = 0;
+    long long link = -1;
     Place places[2];
 };
 

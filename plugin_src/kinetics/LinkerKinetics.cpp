@@ -26,8 +26,8 @@ uint64_t drawNumber() {
 
 } // namespace
 
-LinkerKinetics::LinkerKinetics(const LinkerSystem& ofSystem, const vector<Chain>& chains,
-        const vector<BeamChain>& beams) : system(ofSystem), contours(chains, beams), ownNumber(drawNumber()) {
+LinkerKinetics::LinkerKinetics(const LinkerSystem& ofSystem, const ChainList& chains) : system(ofSystem),
+        contours(chains), ownNumber(drawNumber()) {
     vector<double> different;
     double largestSpacing = 0;
     for (const Hand& hand : system.hands) {

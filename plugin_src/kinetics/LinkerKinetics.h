@@ -55,10 +55,8 @@ class LinkerKinetics {
 public:
     /**
      * @param chains  the chains of the System; they are not needed any more afterwards
-     * @param beams   those of beam elements, which have their numbers behind all others
      */
-    LinkerKinetics(const LinkerSystem& system, const std::vector<Chain>& chains,
-            const std::vector<BeamChain>& beams = {});
+    LinkerKinetics(const LinkerSystem& system, const ChainList& chains);
     /** Set the temperature. */
     void setTemperature(double kT) {
         system.kT = kT;

@@ -60,6 +60,9 @@ struct BeamChain {
     std::vector<Tether> tethers;
     /** Whether one more element, the last one, leads from the last node to the first: a ring. */
     bool closed = false;
+    const std::vector<int>& getParticles() const {
+        return particles;
+    }
     int numNodes() const {
         return particles.size()/2;
     }

@@ -55,6 +55,12 @@ struct Chain {
     bool closed = false;
     /** Whether nodes keep their z, which must be the same for all of them. */
     bool planar = false;
+    int numNodes() const {
+        return nodes.size();
+    }
+    const std::vector<int>& getParticles() const {
+        return nodes;
+    }
 };
 
 } // namespace cylchain

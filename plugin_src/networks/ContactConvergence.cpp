@@ -270,14 +270,12 @@ bool ContactEquations::findCulprit(const double* moved, const CouplingEquation* 
     if (isEndless)
         return false;
     if (movesTooFar) {
-        culprit.kind = BrokenCoupling::Contact;
         culprit.reason = BrokenCoupling::LeavesBox;
         culprit.places[0] = describePlace(places[findFastest(moved)].place);
         return true;
     }
     for (int i = 0; i < pairs.getNumPairs(); i++)
         if (search->crosses(pairs.getPair(i), begun, moved)) {
-            culprit.kind = BrokenCoupling::Contact;
             culprit.reason = BrokenCoupling::Crosses;
             culprit.places[0] = describePlace(places[pairs.getPair(i).a].place);
             culprit.places[1] = describePlace(places[pairs.getPair(i).b].place);
@@ -285,7 +283,6 @@ bool ContactEquations::findCulprit(const double* moved, const CouplingEquation* 
         }
     if (unsettled < 0)
         return false;
-    culprit.kind = BrokenCoupling::Contact;
     for (int side = 0; side < 2; side++)
         culprit.places[side] = describePlace(equations[unsettled].places[side]);
     return true;

@@ -44,13 +44,12 @@ const int CHUNK_OF_CONTACTS = 128;
 
 } // namespace
 
-void ContactEquations::setContacts(ContactSearch* newSearch, double newStiffness, const double* newBox,
-        const vector<CapsuleOnCurve>& newOnCurves) {
-    onCurves = &newOnCurves;
-    search = newSearch;
+void ContactEquations::setContacts(const ContactSystem& contacts) {
+    onCurves = contacts.onCurves;
+    search = contacts.search;
     pairs.setSearch(search);
-    stiffness = newStiffness;
-    box = newBox;
+    stiffness = contacts.stiffness;
+    box = contacts.box;
 }
 
 void ContactEquations::begin(const CoupledStart& start, const Loop& newLoop) {

@@ -14,6 +14,20 @@
 
 namespace cylchain {
 
+/** The capsules whose contacts steps have, which must exist while steps are taken. */
+struct ContactSystem {
+    ContactSearch* search = nullptr;
+    /** k_c. */
+    double stiffness = 0;
+    /** The periodic box, if distances are those of nearest images, or NULL. */
+    const double* box = nullptr;
+    /** Capsules that end at virtual sites on curves of beam elements, and these sites, which are particles. */
+    const std::vector<CapsuleOnCurve>* onCurves = nullptr;
+    const std::vector<CurveSite>* sites = nullptr;
+    /** Receives their forces. */
+    CouplingImpulses* impulses = nullptr;
+};
+
 /**
  * Contacts of capsules in an implicit step.
  *
@@ -29,16 +43,8 @@ namespace cylchain {
  */
 class ContactEquations : public ImplicitCouplings {
 public:
-    /**
-     * Set what touches, which must exist while steps are taken.
-     *
-     * @param stiffness  k_c
-     * @param box        the periodic box, if distances are those of nearest images, or NULL
-     * @param onCurves   capsules that end at virtual sites on curves of beam elements, whose positions are among those
-     *                   of all particles
-     */
-    void setContacts(ContactSearch* search, double stiffness, const double* box,
-            const std::vector<CapsuleOnCurve>& onCurves);
+    /** Set what touches. */
+    void setContacts(const ContactSystem& contacts);
     void begin(const CoupledStart& start, const Loop& loop) override;
     void beginStage(int stage, int numStages, const double* moved) override;
     void linearise(int iteration, const double* moved, std::vector<CouplingEquation>& equations) override;

@@ -66,13 +66,19 @@ ContactGaps::PairGap ContactGaps::findPairGap(const SegmentPair& pair, const Con
     return result;
 }
 
-void ContactGaps::setContacts(ContactSearch* newSearch, double newStiffness, const double* newBox,
-        const vector<CapsuleOnCurve>& newOnCurves, int newForce) {
-    onCurves = &newOnCurves;
-    search = newSearch;
-    stiffness = newStiffness;
-    box = newBox;
-    force = newForce;
+void ContactGaps::setContacts(const ContactSystem& contacts) {
+    hard.setContacts(contacts);
+    onCurves = contacts.onCurves;
+    sites = contacts.sites;
+    search = contacts.search;
+    stiffness = contacts.stiffness;
+    box = contacts.box;
+    impulses = contacts.impulses;
+}
+
+void ContactGaps::placeSites(double* positions) const {
+    for (const CurveSite& site : *sites)
+        locate(site.place, positions, NULL, positions+3*site.particle);
 }
 
 double ContactGaps::findLargestSoftness(const CoupledStart& start) {
@@ -470,7 +476,6 @@ bool ContactGaps::findCulprit(const double* moved, const CouplingEquation*, Brok
     // The chain itself is known.
     if (isEndless)
         return false;
-    culprit.kind = BrokenCoupling::Contact;
     auto name = [&] (int number) {
         culprit.places[0] = describePlace(places[pairs.get(number).a].place);
         culprit.places[1] = describePlace(places[pairs.get(number).b].place);

@@ -3,6 +3,7 @@
 
 #include "couplings/ContactSearch.h"
 #include "networks/CapsuleMotion.h"
+#include "networks/ContactEquations.h"
 #include "networks/CurveSites.h"
 #include "networks/ImplicitCouplings.h"
 #include "networks/PairList.h"
@@ -22,19 +23,22 @@ namespace cylchain {
  */
 class ContactGaps : public ImplicitCouplings {
 public:
-    /**
-     * Set what touches, which must exist while steps are taken.
-     *
-     * @param stiffness  k_c
-     * @param box        the periodic box, if distances are those of nearest images, or NULL
-     * @param onCurves   capsules that end at virtual sites on curves of beam elements, whose positions are among those
-     *                   of all particles
-     * @param force      a number of the force that they belong to, for their noise
-     */
-    void setContacts(ContactSearch* search, double stiffness, const double* box,
-            const std::vector<CapsuleOnCurve>& onCurves, int force);
-    /** About the largest softness k c of a contact, see ContactRest: c is how far a force moves it in the step. */
-    double findLargestSoftness(const CoupledStart& start);
+    /** Set what touches. */
+    void setContacts(const ContactSystem& contacts);
+    bool areGaps() const override {
+        return true;
+    }
+    void setNumber(int number) override {
+        force = number;
+    }
+    CouplingImpulses* getImpulses() const override {
+        return impulses;
+    }
+    double findLargestSoftness(const CoupledStart& start) override;
+    ImplicitCouplings& getHardOnes() override {
+        return hard;
+    }
+    void placeSites(double* positions) const override;
     void begin(const CoupledStart& start, const Loop& loop) override;
     bool findGaps(int iteration, bool settled, const double* moved, ReflectedGaps& gaps) override;
     Rests getRests() const override {
@@ -104,6 +108,8 @@ private:
     }
     int findFastest(const double* moved) const;
     PlaceOnChain placeOf(int capsule, double fraction) const;
+    /** Those of steps that do not resolve contacts. */
+    ContactEquations hard;
     ContactSearch* search = nullptr;
     const ReflectedGaps* all = nullptr;
     double stiffness = 0, kT = 0;
@@ -111,6 +117,8 @@ private:
     const Loop* loop = nullptr;
     const double *begun = nullptr, *box = nullptr;
     const std::vector<CapsuleOnCurve>* onCurves = nullptr;
+    const std::vector<CurveSite>* sites = nullptr;
+    CouplingImpulses* impulses = nullptr;
     PlaceResponses responses;
     double slack = 0, reach = 0;
     std::vector<CapsulePlace> places;

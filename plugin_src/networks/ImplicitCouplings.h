@@ -33,12 +33,43 @@ inline BrokenCoupling::Place describePlace(const PlaceOnChain& place) {
 enum class Rests {Possible, Worthwhile, Wrong};
 
 /**
- * Couplings of one kind: forces between places of chains, or on places of chains, that an implicit step has in its
+ * The couplings of a force: forces between places of chains, or on places of chains, that an implicit step has in its
  * equations. NetworkStep calls these functions in the order in which they stand here.
  */
 class ImplicitCouplings {
 public:
     virtual ~ImplicitCouplings() {
+    }
+    /** Whether they are gaps, as those of contacts and walls. */
+    virtual bool areGaps() const {
+        return false;
+    }
+    /** Take a number, for their noise: among the forces of a step that are gaps, or among those that are none. */
+    virtual void setNumber(int) {
+    }
+    /** What receives their forces, or NULL. */
+    virtual CouplingImpulses* getImpulses() const {
+        return nullptr;
+    }
+    /**
+     * Whether a coupling is so stiff in one direction that a step in single precision loses the digits of what lies
+     * across.
+     *
+     * @param besideGaps  whether the step has gaps
+     */
+    virtual bool needDoublePrecision(const ChainPlaces&, double, bool) const {
+        return false;
+    }
+    /** Of gaps, about the largest softness k c, see ContactRest: c is how far a force moves it in the step. */
+    virtual double findLargestSoftness(const CoupledStart&) {
+        return 0;
+    }
+    /** What takes their place in steps in which gaps are too soft to be resolved. */
+    virtual ImplicitCouplings& getHardOnes() {
+        return *this;
+    }
+    /** Let virtual sites that they have on curves of beam elements follow these. */
+    virtual void placeSites(double*) const {
     }
     /** Describe the start of a step, and draw its noise. */
     virtual void begin(const CoupledStart& start, const Loop& loop) = 0;

@@ -71,10 +71,9 @@ double largestCoordinate(const Link& link, const double* positions) {
 
 } // namespace
 
-void LinkEquations::setLinks(const vector<Link>* newLinks, const LinkBoxes& newBoxes, int newForce) {
+void LinkEquations::setLinks(const vector<Link>* newLinks, const LinkBoxes& newBoxes) {
     links = newLinks;
     boxes = newBoxes;
-    force = newForce;
 }
 
 void LinkEquations::vectorOf(const State& state, const double* positions, double* r) const {
@@ -503,7 +502,6 @@ bool LinkEquations::findCulprit(const double* moved, const CouplingEquation*, Br
     if (number == states.size())
         return false;
     const State& state = states[number];
-    culprit.kind = BrokenCoupling::Link;
     culprit.reason = unfinished[number] != 0 ? BrokenCoupling::NotSolved : BrokenCoupling::LeavesRange;
     culprit.link = state.link->number;
     for (int side = 0; side < 2; side++)

@@ -35,15 +35,13 @@ public:
     /**
      * Set the links that steps have, which must exist while steps are taken, and how distances are measured. Links that
      * are on no chain are left out.
-     *
-     * @param force  a number of the force that they belong to, for their noise
      */
-    void setLinks(const std::vector<Link>* links, const LinkBoxes& boxes, int force);
-    /**
-     * Whether a link is so stiff in one direction that a step in single precision loses the digits of what lies across.
-     * Beside gaps, no link may be as stiff: how it yields is what its stiffness leaves of them.
-     */
-    bool needDoublePrecision(const ChainPlaces& places, double stepSize, bool besideGaps) const;
+    void setLinks(const std::vector<Link>* links, const LinkBoxes& boxes);
+    void setNumber(int number) override {
+        force = number;
+    }
+    /** Beside gaps, no link may be as stiff: how it yields is what its stiffness leaves of them. */
+    bool needDoublePrecision(const ChainPlaces& places, double stepSize, bool besideGaps) const override;
     void begin(const CoupledStart& start, const Loop& loop) override;
     void beginStage(int stage, int numStages, const double* moved) override;
     void linearise(int iteration, const double* moved, std::vector<CouplingEquation>& equations) override;
@@ -124,6 +122,7 @@ private:
     /** The same of links that turn alone. */
     double turningStiffness = 0;
     bool anyTurns = false;
+    /** Of the force that they belong to. */
     int force = 0;
     /** Of all links on the segment that begins with a particle. */
     std::vector<double> stiffness;

@@ -42,49 +42,13 @@ NetworkStep::NetworkStep(const ChainEngine& engine, const vector<Chain>& chains,
 NetworkStep::~NetworkStep() {
 }
 
-void NetworkStep::setForces(const CoupledForces& forces, const double* box) {
-    setParticles(forces.particles);
-    sites = &forces.sites;
-    couplings.clear();
-    impulses.assign(forces.links.size(), nullptr);
-    links.resize(max(links.size(), forces.links.size()));
-    for (size_t i = 0; i < forces.links.size(); i++) {
-        const CoupledForces::Links& own = forces.links[i];
-        if (!links[i])
-            links[i].reset(new LinkEquations());
-        LinkBoxes boxes;
-        boxes.distances = own.periodic ? box : NULL;
-        boxes.segments = own.nearestParticles ? box : NULL;
-        links[i]->setLinks(own.links, boxes, i);
-        couplings.push_back(links[i].get());
-    }
-    contacts.resize(max(contacts.size(), forces.contacts.size()));
-    hardContacts.resize(contacts.size());
-    firstContacts = couplings.size();
-    for (size_t i = 0; i < forces.contacts.size(); i++) {
-        const CoupledForces::Contacts& own = forces.contacts[i];
-        if (!contacts[i]) {
-            contacts[i].reset(new ContactGaps());
-            hardContacts[i].reset(new ContactEquations());
-        }
-        hardContacts[i]->setContacts(own.search, own.stiffness, own.periodic ? box : NULL, *own.onCurves);
-        contacts[i]->setContacts(own.search, own.stiffness, own.periodic ? box : NULL, *own.onCurves, i);
-        couplings.push_back(contacts[i].get());
-        impulses.push_back(own.impulses);
-    }
-    firstWalls = couplings.size();
-    walls.resize(max(walls.size(), forces.walls.size()));
-    wallsOfHardContacts.resize(walls.size());
-    for (size_t i = 0; i < forces.walls.size(); i++) {
-        if (!walls[i]) {
-            walls[i].reset(new WallGaps());
-            wallsOfHardContacts[i].reset(new WallEquations());
-        }
-        wallsOfHardContacts[i]->setWalls(forces.walls[i].system);
-        walls[i]->setWalls(forces.walls[i].system, forces.contacts.size()+i);
-        couplings.push_back(walls[i].get());
-        impulses.push_back(forces.walls[i].impulses);
-    }
+void NetworkStep::setForces(const CoupledForces& given) {
+    setParticles(given.particles);
+    ofForces = couplings = given.couplings;
+    int numbers[] = {0, 0};
+    for (ImplicitCouplings* own : ofForces)
+        own->setNumber(numbers[own->areGaps()]++);
+    haveGaps = numbers[true] > 0;
 }
 
 void NetworkStep::setParticles(const vector<CoupledParticle>& newParticles) {
@@ -138,8 +102,8 @@ void NetworkStep::choosePacks(const StepSettings& settings) {
 Instability NetworkStep::step(const double* positions, const double* forces, const double* box,
             const StepSettings& given, double* displacements, const Loop& loop) {
     StepSettings settings = given;
-    for (const unique_ptr<LinkEquations>& own : links)
-        if (own->needDoublePrecision(places, settings.stepSize, couplings.size() > firstContacts))
+    for (const ImplicitCouplings* own : ofForces)
+        if (own->needDoublePrecision(places, settings.stepSize, haveGaps))
             settings.precision = Precision::Double;
     choosePacks(settings);
     iterations = substitutions = 0;
@@ -223,18 +187,13 @@ bool NetworkStep::attempt(const Attempt& attempt, double* displacements, vector<
     return find(failed.begin(), failed.end(), true) == failed.end();
 }
 
-/** Steps that do not resolve contacts have hard ones, and walls that go with them. */
+/** Steps that do not resolve gaps have hard ones. */
 void NetworkStep::chooseCouplings(const CoupledStart& start) {
-    areSoft = mayBeSoft && couplings.size() > firstContacts;
-    for (size_t i = firstContacts; i < firstWalls; i++)
-        areSoft = areSoft && contacts[i-firstContacts]->findLargestSoftness(start) <= LARGEST_SOFTNESS;
-    auto choose = [&] (size_t i, ImplicitCouplings& soft, ImplicitCouplings& hard) {
-        couplings[i] = areSoft ? &soft : &hard;
-    };
-    for (size_t i = firstContacts; i < firstWalls; i++)
-        choose(i, *contacts[i-firstContacts], *hardContacts[i-firstContacts]);
-    for (size_t i = firstWalls; i < couplings.size(); i++)
-        choose(i, *walls[i-firstWalls], *wallsOfHardContacts[i-firstWalls]);
+    areSoft = mayBeSoft && haveGaps;
+    for (ImplicitCouplings* own : ofForces)
+        areSoft = areSoft && own->findLargestSoftness(start) <= LARGEST_SOFTNESS;
+    for (size_t i = 0; i < ofForces.size(); i++)
+        couplings[i] = areSoft ? ofForces[i] : &ofForces[i]->getHardOnes();
 }
 
 bool NetworkStep::iterate(const Attempt& attempt, int stage) {
@@ -309,8 +268,8 @@ bool NetworkStep::iterate(const Attempt& attempt, int stage) {
 
 /** Let virtual sites on curves follow them. */
 void NetworkStep::placeSites(double* positions) const {
-    for (const CurveSite& site : *sites)
-        locate(site.place, positions, NULL, positions+3*site.particle);
+    for (const ImplicitCouplings* own : ofForces)
+        own->placeSites(positions);
 }
 
 /** Find the packs that need another iteration; false if there are none. */
@@ -341,13 +300,14 @@ bool NetworkStep::finishIteration(const vector<size_t>& first) {
 /** Take note of the forces on chains that have taken a step, or a part of it. */
 void NetworkStep::addImpulses(const vector<bool>& taken, double stepSize) {
     for (size_t i = 0; i < couplings.size(); i++) {
-        if (impulses[i] == nullptr)
+        CouplingImpulses* const receiver = ofForces[i]->getImpulses();
+        if (receiver == nullptr)
             continue;
         pushes.clear();
         couplings[i]->findPushes(moved.data(), pushes);
         for (const Push& push : pushes)
             if (any_of(push.chains, push.chains+2, [&] (int chain) {return chain >= 0 && taken[chain];}))
-                received.push_back({impulses[i], push, stepSize});
+                received.push_back({receiver, push, stepSize});
     }
 }
 
@@ -413,7 +373,7 @@ BrokenCoupling NetworkStep::findCulprit() const {
         if (!couplings[i]->findCulprit(moved.data(), equations.data()+firstEquations[i], culprit))
             continue;
         culprit.force = i;
-        if (result.kind == BrokenCoupling::None || (result.reason == BrokenCoupling::NotSolved &&
+        if (result.force < 0 || (result.reason == BrokenCoupling::NotSolved &&
                 culprit.reason != BrokenCoupling::NotSolved))
             result = culprit;
     }

@@ -3,13 +3,8 @@
 
 #include "dynamics/ChainEngine.h"
 #include "dynamics/PackStepSource.h"
-#include "networks/ContactEquations.h"
-#include "networks/ContactGaps.h"
 #include "networks/CoupledForces.h"
 #include "networks/ImplicitCouplings.h"
-#include "networks/LinkEquations.h"
-#include "networks/WallEquations.h"
-#include "networks/WallGaps.h"
 #include <cstddef>
 #include <memory>
 #include <vector>
@@ -36,12 +31,8 @@ public:
     NetworkStep(const ChainEngine& engine, const std::vector<Chain>& chains, const PackStepSource& beamEngine,
             const std::vector<BeamChain>& beams, int particles);
     ~NetworkStep();
-    /**
-     * Set the forces that steps have in their equations. What they point to must exist while steps are taken.
-     *
-     * @param box  the three vectors of the periodic box, for forces that are periodic, or NULL
-     */
-    void setForces(const CoupledForces& forces, const double* box);
+    /** Set the forces that steps have in their equations. What they point to must exist while steps are taken. */
+    void setForces(const CoupledForces& forces);
     /**
      * Compute the displacements of all nodes and of the coupled particles in a step, as ChainEngine::step() does. Of
      * the result, the chain by which the step has gone wrong may be one of beam elements, with a number behind those of
@@ -70,18 +61,10 @@ private:
     const ChainEngine& engine;
     const PackStepSource& beamEngine;
     ChainPlaces places;
-    std::vector<std::unique_ptr<LinkEquations> > links;
-    /** Contacts and walls, and those of steps that do not resolve contacts; and where they are among the couplings. */
-    std::vector<std::unique_ptr<ContactGaps> > contacts;
-    std::vector<std::unique_ptr<WallGaps> > walls;
-    std::vector<std::unique_ptr<ContactEquations> > hardContacts;
-    std::vector<std::unique_ptr<WallEquations> > wallsOfHardContacts;
-    std::size_t firstContacts = 0, firstWalls = 0;
-    /** Whether contacts and walls may be those that a step resolves, and whether they are in this attempt. */
-    bool mayBeSoft = true, areSoft = false;
-    std::vector<ImplicitCouplings*> couplings;
-    /** What receives their forces, or NULL. */
-    std::vector<CouplingImpulses*> impulses;
+    /** Those of all forces, and what an attempt has in their place. */
+    std::vector<ImplicitCouplings*> ofForces, couplings;
+    /** Whether any are gaps, whether a step may resolve these, and whether this attempt does. */
+    bool haveGaps = false, mayBeSoft = true, areSoft = false;
     std::vector<Push> pushes;
     /** A force of a step, or of a part of it, until the step has been taken. */
     struct Impulse {
@@ -90,7 +73,6 @@ private:
         double duration;
     };
     std::vector<Impulse> received;
-    const std::vector<CurveSite>* sites = nullptr;
     std::vector<CoupledParticle> particles;
     std::vector<int> packs;
     std::vector<std::vector<int> > chainsOfLanes;

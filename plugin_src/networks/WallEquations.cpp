@@ -243,7 +243,6 @@ bool WallEquations::findCulprit(const double*, const CouplingEquation*, BrokenCo
     for (const Part& part : parts)
         for (const State& state : part.states)
             if (state.unfinished) {
-                culprit.kind = BrokenCoupling::Wall;
                 culprit.places[0] = describePlace(places[state.particle]);
                 return true;
             }

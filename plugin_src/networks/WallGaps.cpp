@@ -31,9 +31,10 @@ void findTurning(const Wall& wall, const double* g, double distance, double* tur
 
 } // namespace
 
-void WallGaps::setWalls(const WallSystem* newSystem, int newForce) {
+void WallGaps::setWalls(const WallSystem* newSystem, CouplingImpulses* newImpulses) {
+    hard.setWalls(newSystem);
     system = newSystem;
-    force = newForce;
+    impulses = newImpulses;
     numFaces = countFaces(system->wall);
 }
 
@@ -144,7 +145,6 @@ bool WallGaps::findGaps(int, bool, const double* moved, ReflectedGaps& gaps) {
 bool WallGaps::findCulprit(const double*, const CouplingEquation*, BrokenCoupling& culprit) const {
     for (const State& state : states)
         if (all->isUnfinished(state.gap)) {
-            culprit.kind = BrokenCoupling::Wall;
             culprit.places[0] = describePlace(places[state.particle]);
             return true;
         }

@@ -2,6 +2,7 @@
 #define CYLCHAIN_WALL_GAPS_H_
 
 #include "networks/ImplicitCouplings.h"
+#include "networks/WallEquations.h"
 #include "networks/WallPositions.h"
 #include <vector>
 
@@ -13,12 +14,20 @@ namespace cylchain {
  */
 class WallGaps : public ImplicitCouplings {
 public:
-    /**
-     * Set the wall and its particles, which must exist while steps are taken.
-     *
-     * @param force  a number of the force that they belong to, for their noise
-     */
-    void setWalls(const WallSystem* system, int force);
+    /** Set the wall and its particles, and what receives its forces; they must exist while steps are taken. */
+    void setWalls(const WallSystem* system, CouplingImpulses* impulses);
+    bool areGaps() const override {
+        return true;
+    }
+    void setNumber(int number) override {
+        force = number;
+    }
+    CouplingImpulses* getImpulses() const override {
+        return impulses;
+    }
+    ImplicitCouplings& getHardOnes() override {
+        return hard;
+    }
     void begin(const CoupledStart& start, const Loop& loop) override;
     void beginStage(int stage, int numStages, const double* moved) override;
     bool findGaps(int iteration, bool settled, const double* moved, ReflectedGaps& gaps) override;
@@ -50,7 +59,10 @@ private:
     }
     void follow(const State& state, const double* moved, Gap& gap) const;
     void findNew(int part, const double* moved);
+    /** Those of steps that do not resolve contacts beside them. */
+    WallEquations hard;
     const WallSystem* system = nullptr;
+    CouplingImpulses* impulses = nullptr;
     const Loop* loop = nullptr;
     const double* begun = nullptr;
     ReflectedGaps* all = nullptr;

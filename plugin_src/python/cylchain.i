@@ -15,6 +15,7 @@ namespace std {
 }
 
 %{
+#include "openmm/CylinderChainCoupling.h"
 #include "openmm/CylinderChainException.h"
 #include "openmm/CylinderChainBindingForce.h"
 #include "openmm/CylinderChainContactForce.h"
@@ -295,10 +296,6 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
     val[2] = unit.Quantity(val[2], _LENGTH)
     val[3] = unit.Quantity(val[3], _STIFFNESS)
 %}
-%pythonappend OpenMM::CylinderChainForce::getBeamTetherParameters(int, int&, int&, Vec3&, double&) const %{
-    val[2] = unit.Quantity(val[2], _LENGTH)
-    val[3] = unit.Quantity(val[3], _STIFFNESS)
-%}
 %pythonappend OpenMM::CylinderChainForce::getBeamChainParameters(int, double&, double&, double&, double&, double&,
         double&) const %{
     friction = _FRICTION/_LENGTH
@@ -423,6 +420,17 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 }
 %enddef
 
+%extend OpenMM::CylinderChainCoupling {
+    static OpenMM::CylinderChainCoupling& cast(OpenMM::Force& object) {
+        OpenMM::CylinderChainCoupling* result = dynamic_cast<OpenMM::CylinderChainCoupling*>(&object);
+        if (result == NULL)
+            throw OpenMM::OpenMMException("The object is not a CylinderChainCoupling");
+        return *result;
+    }
+    static bool isinstance(OpenMM::Force& object) {
+        return dynamic_cast<OpenMM::CylinderChainCoupling*>(&object) != NULL;
+    }
+}
 %concreteClass(CylinderChainForce, Force)
 %concreteClass(CylinderChainBindingForce, Force)
 %concreteClass(CylinderChainContactForce, Force)
@@ -430,10 +438,9 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %concreteClass(CylinderChainWallForce, Force)
 %concreteClass(CylinderChainIntegrator, Integrator)
 
-%ignore OpenMM::CylinderChainForce::SegmentInfo;
-%ignore OpenMM::CylinderChainForce::ChainInfo;
-%ignore OpenMM::CylinderChainForce::TetherInfo;
-%ignore OpenMM::CylinderChainForce::BeamInfo;
+%ignore findPlaces;
+%ignore OpenMM::CylinderChainForce::getChains;
+%ignore OpenMM::CylinderChainForce::describeChains;
 %ignore OpenMM::CylinderChainContactForce::ChainInfo;
 %ignore OpenMM::CylinderChainContactForce::SphereInfo;
 %ignore OpenMM::CylinderChainContactForce::ExclusionInfo;
@@ -448,6 +455,7 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %import "mechanics/StretchingModels.h"
 %import "dynamics/Schemes.h"
 %import "dynamics/Precisions.h"
+%include "openmm/CylinderChainCoupling.h"
 %include "openmm/CylinderChainForce.h"
 %include "openmm/CylinderChainBindingForce.h"
 %include "openmm/CylinderChainContactForce.h"

@@ -11,4 +11,7 @@ class Force {
 class Integrator {
 };
 
+class System {
+};
+
 } // namespace OpenMM

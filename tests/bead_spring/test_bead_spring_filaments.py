@@ -208,7 +208,7 @@ def test_what_is_for_cylinders_is_refused():
         lambda: theory.stretching_energy_variance(KIND, ROOM),
         lambda: theory.chain_extension(KIND, 5, 1.0, ROOM),
     ):
-        with pytest.raises(InputError, match="chain of beads, for which this closed form does not hold"):
+        with pytest.raises(InputError, match="has no straight segments of cylinders"):
             function()
 
 

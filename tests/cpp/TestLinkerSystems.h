@@ -13,8 +13,7 @@ const double KT = 4.0;
 
 /** Rods of some segments, and arcs of beam elements, that stand still. */
 struct Rods {
-    vector<Chain> chains;
-    vector<BeamChain> beams;
+    ChainList chains;
     Array x;
     void add(const double* start, const double* direction, int segments, double length) {
         Chain chain;
@@ -29,7 +28,7 @@ struct Rods {
         Segment segment = {length, 1, 0, 1, 1, 1, 1};
         chain.segments.assign(segments, segment);
         chain.joints.assign(segments-1, 1);
-        chains.push_back(chain);
+        chains.add(chain);
     }
     /** Part of a circle with a center, which begins along one of two vectors and goes towards the other one. */
     void addArc(const double* center, const double* from, const double* towards, double radius, int elements,
@@ -45,7 +44,7 @@ struct Rods {
                     x.push_back(center[k]+(radius*c-along*s)*from[k]+(radius*s+along*c)*towards[k]);
         }
         beam.fixed.assign(beam.particles.size(), true);
-        beams.push_back(beam);
+        chains.add(beam);
     }
 };
 
@@ -110,7 +109,7 @@ struct Expected {
 inline Expected expectedOn(const Rods& rods, const LinkerSystem& system, double volume) {
     const Hand &a = system.hands[0], &b = system.hands[1];
     const LinkerType& type = system.types[0];
-    const Contours contours(rods.chains, rods.beams);
+    const Contours contours(rods.chains);
     const double inVolume = 4*M_PI/3*pow(a.reach*b.reach, 1.5)/volume;
     const double ofA = a.bindingRate/a.unbindingRate, ofB = b.bindingRate/b.unbindingRate;
     double one = 0, both = 0, square = 0;
@@ -155,7 +154,7 @@ inline void checkEquilibrium(const Rods& rods, double stiffness, double restLeng
     KineticStep step = stepOf(rods.x, stepSize);
     step.volume = 1.2e9;
     const Expected expected = expectedOn(rods, system, step.volume);
-    LinkerKinetics kinetics(system, rods.chains, rods.beams);
+    LinkerKinetics kinetics(system, rods.chains);
     LinkerState state = freeLinkers(2000);
     // Longer than a hand stays bound.
     const int interval = max(1, (int) (3/stepSize)), blocks = 20, samples = 5;

@@ -134,7 +134,7 @@ static void testWalkingTogether() {
 static Rods ringOf(int segments, double length) {
     Rods ring;
     ring.add(ORIGIN, ALONG_X, segments-1, length);
-    Chain& chain = ring.chains[0];
+    Chain& chain = ring.chains.getChain(0);
     chain.closed = true;
     chain.segments.push_back(chain.segments[0]);
     for (int i = 0; i < segments; i++) {

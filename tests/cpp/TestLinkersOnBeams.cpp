@@ -29,7 +29,7 @@ static void testWalkingAlongAnArc() {
     for (int direction : {1, -1}) {
         Hand hand = handOf(0, 100, 0, {0});
         hand.speed = 3*direction;
-        LinkerKinetics kinetics(anchoredSystem(hand, 0, ORIGIN), rods.chains, rods.beams);
+        LinkerKinetics kinetics(anchoredSystem(hand, 0, ORIGIN), rods.chains);
         LinkerState state = boundLinkers(1, 400);
         for (int i = 1; i <= 100; i++) {
             kinetics.advance(state, stepOf(rods.x, 1), SERIAL);
@@ -56,7 +56,7 @@ static void testSpeedUnderLoadOnAnArc() {
             hand.stallForce = 4;
             hand.walksBackward = true;
             const double far = 1e6, point[] = {force > 0 ? far : -far, 0, 0};
-            LinkerKinetics kinetics(anchoredSystem(hand, fabs(force)/far, point), rods.chains, rods.beams);
+            LinkerKinetics kinetics(anchoredSystem(hand, fabs(force)/far, point), rods.chains);
             LinkerState state = boundLinkers(1, position);
             kinetics.advance(state, stepOf(rods.x, 0.01), SERIAL);
             const double along = -sin(position/200)*force, moved = state.linkers[0].hands[1].position-position;
@@ -87,7 +87,7 @@ static void testCurvesAround() {
         }
         rods.beams.push_back(beam);
     }
-    const Contours contours(rods.chains, rods.beams);
+    const Contours contours(rods.chains);
     check(contours.getNumSegments() == 180 && contours.getLength(7) == 120, "lengths of curves");
     for (const double* ofCells : {(const double*) NULL, box})
         for (double reach : {7.0, 35.0, 70.0}) {

@@ -83,7 +83,7 @@ def test_a_stiff_link_is_as_stable_as_it_is_said_to_be(name):
     links = Crosslinks(STIFF, 0.0)
     links.add(None, 7, place)
     links.add_to(system)
-    assert CoupledForces(system, filaments).place_outside(system.getNumForces() - 1) == outside
+    assert CoupledForces(system).place_outside(system.getNumForces() - 1) == outside
     springs = ExplicitForces(system, filaments, "implicit").springs
     assert len(springs) == (0 if outside is None else 1)
     if outside is not None:
@@ -145,7 +145,7 @@ def test_spheres_at_virtual_sites_make_contacts_explicit():
     for particles, outside in (([10], None), ([12], "virtual site 12")):
         force = capsule_contact_force(filaments, system, 30.0, particles=particles, particle_diameter=30.0)
         index = system.addForce(force)
-        assert CoupledForces(system, filaments).place_outside(index) == outside
+        assert CoupledForces(system).place_outside(index) == outside
         step = filaments.recommended_time_step(system=system)
         if outside is None:
             assert step.step == free.step

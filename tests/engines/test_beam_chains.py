@@ -135,8 +135,9 @@ def test_steps_are_the_same_on_platforms_and_from_checkpoints_and_xml():
 def test_parameters_are_read_back_and_changed_in_a_context():
     system, _, positions = beam_system(1, 2, 1.0, 20.0, 1e3, planar=True)
     force = CylinderChainForce.cast(system.getForce(0))
-    assert force.getNumBeamChains() == 1 and force.isBeamChainPlanar(0)
-    assert list(force.getBeamChainParticles(0)) == list(range(6))
+    assert force.getNumChains() == 1 and force.isChainPlanar(0)
+    assert force.getChainKind(0) == CylinderChainForce.BeamElements
+    assert list(force.getChainParticles(0)) == list(range(6))
     length, modulus, rigidity, shortening, along, across = force.getBeamChainParameters(0)
     assert (length, modulus) == (1.0 * unit.nanometer, 1e3 * unit.kilojoule_per_mole / unit.nanometer)
     assert rigidity == 20.0 * unit.kilojoule_per_mole * unit.nanometer
@@ -163,7 +164,7 @@ def test_beams_that_were_wrapped_into_a_box_are_refused_unless_they_are_periodic
         force = CylinderChainForce.cast(system.getForce(0))
         force.setUsesPeriodicBoundaryConditions(periodic)
         if not periodic:
-            refused_step(system, wrapped, "Beam chain 0 is torn between its particles 2 and 3")
+            refused_step(system, wrapped, "Chain 0 is torn at element 1")
             continue
         for start in (positions, wrapped):
             context = beam_context(system, start, 0.01)
@@ -202,5 +203,5 @@ def test_what_beams_cannot_have_is_refused():
     refused_step(system, positions, "contacts of this plugin between their nodes, but between virtual sites on their")
     system.removeForce(number)
     system.setParticleMass(3, 0.0)
-    with pytest.raises(Exception, match="Beam chain 0"):
+    with pytest.raises(Exception, match="control point of node 1 of chain 0 is fixed"):
         beam_context(system, positions, 0.01)

@@ -148,7 +148,7 @@ def test_it_does_not_matter_which_node_is_the_first(case):
         turned = tuple((particle + turn) % (2 * elements) for particle in fixed)
         own = np.roll(start, turn, axis=0)
         system, force, positions = rings(1, elements, element, (1.0, 2.0), case == "planar", turned, own, propulsion)
-        force.addBeamTether(0, turn // 2, openmm.Vec3(*(start[0] + 0.5 * (case != "planar"))), 50.0)
+        force.addTether(0, turn // 2, openmm.Vec3(*(start[0] + 0.5 * (case != "planar"))), 50.0)
         context = beam_context(system, positions, 0.05, temperature=0.0, platform="Reference")
         context.getIntegrator().step(4)
         ends.append(np.roll(positions_of(context), -turn, axis=0))
@@ -320,7 +320,7 @@ def test_steps_are_the_same_on_platforms_and_from_checkpoints_and_xml():
         positions = np.concatenate([positions, interleaved(nodes, nodes + [1.0 / 3.0, 0.0, 0.0])])
     copied = openmm.XmlSerializer.deserialize(openmm.XmlSerializer.serialize(system))
     own = CylinderChainForce.cast(copied.getForce(0))
-    assert [own.isBeamChainClosed(chain) for chain in range(14)] == [True] * 9 + [False] * 5
+    assert [own.isChainClosed(chain) for chain in range(14)] == [True] * 9 + [False] * 5
     ends = []
     for platform, each in (("Reference", system), ("CPU", system), ("CPU", copied)):
         context = beam_context(each, positions, 1e-3, platform=platform)

@@ -41,7 +41,7 @@ def _trajectory(engine, platform, scheme, steps=100):
     positions = np.array([[0.0, 500.0, 0.0], [50.0, 500.0, 0.0], [100.0, 500.0, 0.0]])
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine=engine)
     for seed, (kind, segments, clamped) in enumerate(KINDS):
-        filaments.add_nodes(kind, bent_chain(kind, segments, seed), clamped)
+        filaments.add_nodes(kind, bent_chain(kind, segments, seed), clamped=clamped)
     positions = filaments.add_to(topology, system, positions * unit.nanometer)
     external = openmm.CustomExternalForce("-(fx*x+fy*y+fz*z)")
     for name in ("fx", "fy", "fz"):

@@ -261,7 +261,7 @@ def test_what_a_type_of_beam_elements_cannot_have():
     for name in ("joint_stiffness", "clamped_bending_stiffness"):
         with pytest.raises(InputError, match="beam elements have no joint stiffness"):
             getattr(KIND, name)
-    with pytest.raises(InputError, match="has beam elements, for which this closed form does not hold"):
+    with pytest.raises(InputError, match="has no straight segments of cylinders"):
         theory.chain_mean_square_radius_of_gyration(KIND, 4, TEMPERATURE)
     with pytest.raises(InputError, match="segments are straight"):
         F_ACTIN.beam_element(TEMPERATURE)

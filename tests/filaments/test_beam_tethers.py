@@ -62,15 +62,15 @@ def test_copies_and_xml_keep_tethers():
     force = CylinderChainForce.cast(system.getForce(0))
     for duplicate in (copy.deepcopy(force), openmm.XmlSerializer.deserialize(openmm.XmlSerializer.serialize(force))):
         duplicate = CylinderChainForce.cast(duplicate)
-        assert (duplicate.getNumTethers(), duplicate.getNumBeamTethers()) == (1, 2)
-        chain, node, point, stiffness = duplicate.getBeamTetherParameters(1)
-        assert (chain, node, tuple(point._value), stiffness._value) == (0, 2, (4, 5, 6), 0.7)
-    with pytest.raises(openmm.OpenMMException, match="no node 4 in chain 0"):
-        force.addBeamTether(0, 4, openmm.Vec3(0, 0, 0), 1.0)
+        assert duplicate.getNumTethers() == force.getNumTethers() == 3
+        found = [duplicate.getTetherParameters(i) for i in range(3)]
+        assert (1, 2, (4, 5, 6), 0.7) in [(chain, node, tuple(at._value), k._value) for chain, node, at, k in found]
+    with pytest.raises(openmm.OpenMMException, match="no node 4 in chain 1"):
+        force.addTether(1, 4, openmm.Vec3(0, 0, 0), 1.0)
     with pytest.raises(openmm.OpenMMException, match="cannot have two tethers"):
-        force.addBeamTether(0, 0, openmm.Vec3(0, 0, 0), 1.0)
+        force.addTether(1, 0, openmm.Vec3(0, 0, 0), 1.0)
     with pytest.raises(openmm.OpenMMException, match="cannot be negative"):
-        force.addBeamTether(0, 1, openmm.Vec3(0, 0, 0), -1.0)
+        force.addTether(1, 1, openmm.Vec3(0, 0, 0), -1.0)
 
 
 def test_what_is_refused():

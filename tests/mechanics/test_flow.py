@@ -169,7 +169,7 @@ def _chains_and_particles(engine, planar=False):
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine=engine)
     shape = [1.0, 1.0, 0.0] if planar else 1.0
     for seed, (segments, clamped) in enumerate([(12, ()), (1, ()), (5, (2,)), (6, (0, 1)), (3, (-1,))]):
-        filaments.add_nodes(F_ACTIN, bent_chain(F_ACTIN, segments, seed) * shape, clamped, planar=planar)
+        filaments.add_nodes(F_ACTIN, bent_chain(F_ACTIN, segments, seed) * shape, clamped=clamped, planar=planar)
     positions = filaments.add_to(topology, system, beads * unit.nanometer)
     pull = openmm.CustomExternalForce("-(fx*x+fy*y+fz*z)")
     for name in ("fx", "fy", "fz"):

@@ -145,7 +145,13 @@ def test_a_clamped_filament_flutters_beyond_the_critical_force():
         controls[:, 1] += 2e-6 * nodes[:, 0] / length * KIND.segment_length / 3.0
         propulsion = -force * stiffness / length**3 * KIND.segment_length
         filaments.add_nodes(
-            KIND, nodes, [0], control_points=controls, propulsion=propulsion, clamped_tangents=[0], planar=True
+            KIND,
+            nodes,
+            control_points=controls,
+            clamped=[0],
+            clamped_tangents=[0],
+            planar=True,
+            propulsion=propulsion,
         )
         _, system, positions = filaments.build()
         step = 2e-5 * time

@@ -102,7 +102,7 @@ def test_joints_carry_what_the_segments_beyond_push(engine):
         if clamped:
             # At rest: segment i is stretched by all beyond it and half of its own.
             nodes[1:, 1] += np.cumsum(propulsion * (np.arange(5, 0, -1) - 0.5) / F_ACTIN.segment_stiffness)
-        filaments.add_nodes(F_ACTIN, nodes, clamped, propulsion=propulsion)
+        filaments.add_nodes(F_ACTIN, nodes, clamped=clamped, propulsion=propulsion)
     _, system, positions = filaments.build()
     context = new_context(system, positions, filaments.create_integrator(system, 1.0))
     free, pulled, pushed = (tensions._value for tensions in filaments.joint_tensions(context))

@@ -74,7 +74,7 @@ def test_what_is_built_is_that_of_python():
         hand.add_nodes(kind, own.positions, control_points=own.control_points)
     tangents = [[1, 0.5, 0], [1, 0, 0], [1, -0.5, 0]]
     nodes = [[0, 4000, 1000], [950, 4200, 1000], [1900, 4000, 1000]]
-    hand.add_nodes(clamped.type, nodes, [0, -1], tangents=tangents, clamped_tangents=0)
+    hand.add_nodes(clamped.type, nodes, clamped=[0, -1], tangents=tangents, clamped_tangents=0)
     hand.add_nodes(F_ACTIN, [[0, 6000, 0], [360, 6000, 0], [720, 6000, 0]], planar=True)
     for own in flat:
         assert np.all(own.positions[:, 2] == 200.0) and np.all(own.control_points[:, 2] == 200.0) and own.planar

@@ -12,7 +12,8 @@ from scipy.optimize import brentq
 from openmm_cylchain import theory
 from openmm_cylchain.errors import InputError
 from openmm_cylchain.filaments.equilibrium import draw_chain
-from openmm_cylchain.filaments.filament_type import DSDNA, F_ACTIN, FilamentType
+from openmm_cylchain.filaments.filament_type import FilamentType
+from openmm_cylchain.filaments.presets import DSDNA, F_ACTIN
 from openmm_cylchain.theory import energies
 from openmm_cylchain.units.quantities import thermal_energy
 from support.bending_models import BENDING_MODELS

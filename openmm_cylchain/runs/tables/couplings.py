@@ -26,7 +26,10 @@ CONTACTS = TableKind(
     (
         Key("diameter", Quantity(units.LENGTH), REQUIRED, "Distance of two axes at which filaments touch."),
         Key(
-            "stiffness", Quantity(units.STIFFNESS), None, "Of a contact; without it, two filaments cross for 40 k_B T."
+            "stiffness",
+            Quantity(units.STIFFNESS),
+            None,
+            "Stiffness of a contact; without it, two filaments cross for 40 k_B T.",
         ),
         Key("excluded_neighbors", Whole(0, 10**6, "2"), None, "Segments of one filament that do not touch each other."),
         Key(
@@ -44,7 +47,7 @@ WALL = TableKind(
     "wall",
     (
         *SHAPE_KEYS,
-        Key("stiffness", Quantity(units.STIFFNESS), REQUIRED, "Of the spring that pushes back."),
+        Key("stiffness", Quantity(units.STIFFNESS), REQUIRED, "Stiffness of the spring that pushes back."),
         Key(
             "distance",
             Quantity(units.LENGTH, "zero"),
@@ -78,14 +81,14 @@ TETHER = TableKind(
         *_WHICH,
         Key("node", Whole(-(10**9), 10**9, "0"), REQUIRED, "Its number in the filament; -1 is the last one."),
         Key("point", point(), None, "Where the node is held; where it begins if not given."),
-        Key("stiffness", Quantity(units.STIFFNESS), REQUIRED, "Of the spring."),
+        Key("stiffness", Quantity(units.STIFFNESS), REQUIRED, "Stiffness of the spring."),
         Key(
             "velocity",
             Triple(Quantity(units.VELOCITY, "any"), '["1 um/s", "0 um/s", "0 um/s"]'),
             None,
-            "At which the point moves; `pulling.csv` has its force at every report.",
+            "Velocity at which the point moves; `pulling.csv` has its force at every report.",
         ),
-        Key("start_time", Quantity(units.TIME, "zero"), 0.0, "Until which it stays where it begins."),
+        Key("start_time", Quantity(units.TIME, "zero"), 0.0, "Time until which the point stays where it begins."),
     ),
     "A spring from a node of a filament to a point, such as an optical trap, see `Filaments.add_tether`. The point may "
     "move at a constant velocity.",
@@ -97,11 +100,14 @@ PULL = TableKind(
     (
         *_WHICH,
         Key(
-            "tension", Quantity(units.FORCE, "any"), None, "On both ends, in opposite directions; negative to compress."
+            "tension",
+            Quantity(units.FORCE, "any"),
+            None,
+            "Force on both ends, in opposite directions; negative to compress.",
         ),
-        Key("direction", direction(), (1.0, 0.0, 0.0), "Of the tension, on the last node."),
-        Key("node", Whole(-(10**9), 10**9, "-1"), None, "On which the force acts."),
-        Key("force", Triple(Quantity(units.FORCE, "any"), '["1 pN", "0 pN", "0 pN"]'), None, "On that node."),
+        Key("direction", direction(), (1.0, 0.0, 0.0), "Direction of the tension on the last node."),
+        Key("node", Whole(-(10**9), 10**9, "-1"), None, "Node on which the force acts."),
+        Key("force", Triple(Quantity(units.FORCE, "any"), '["1 pN", "0 pN", "0 pN"]'), None, "Force on that node."),
     ),
     "Constant forces: a tension, or a force on one node of each filament.",
     repeated=True,
@@ -122,17 +128,28 @@ LINK = TableKind(
     "link",
     (
         Key("between", Pair(_PLACE, _PLACES), None, "Two places that are joined."),
-        Key("within", Quantity(units.LENGTH), None, "In place of that: random pairs of places on filaments this near."),
+        Key(
+            "within",
+            Quantity(units.LENGTH),
+            None,
+            "In place of between: random pairs of places on filaments this near.",
+        ),
         Key("count", Whole(0, 10**7, "100"), None, "How many random ones at most; all if not given."),
         Key(
-            "spacing", Quantity(units.LENGTH), None, "Of places along filaments that random ones join; half a segment."
+            "spacing",
+            Quantity(units.LENGTH),
+            None,
+            "Distance of the places along filaments that random ones join; half a segment if not given.",
         ),
-        Key("stiffness", Quantity(units.STIFFNESS), REQUIRED, "Of the spring."),
+        Key("stiffness", Quantity(units.STIFFNESS), REQUIRED, "Stiffness of the spring."),
         Key(
-            "rest_length", Quantity(units.LENGTH, "zero"), None, "Of the spring; without it, at rest as the run begins."
+            "rest_length",
+            Quantity(units.LENGTH, "zero"),
+            None,
+            "Rest length of the spring; without it, the spring is at rest as the run begins.",
         ),
-        Key("model", Choice(("harmonic", "fene")), "harmonic", "Of the spring."),
-        Key("maximum_extension", Quantity(units.LENGTH), None, "Of a FENE spring."),
+        Key("model", Choice(("harmonic", "fene")), "harmonic", "Energy of the spring."),
+        Key("maximum_extension", Quantity(units.LENGTH), None, "Largest extension of a FENE spring."),
     ),
     "Springs that stay: one between two places, or random ones between filaments, see `Crosslinks`.",
     repeated=True,

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...filaments.chain_type import ChainType
-from ...filaments.placement import clamped_nodes
-from ...filaments.shapes import MINIMUM_RING, beam_control_points, clamped_beam
+from ...filaments.shapes import MINIMUM_RING
 from ...units import quantities as units
 from ..keys import Choice, Either, Flag, Inline, Key, Listing, Quantity, Text, Whole, direction, point
 from ..start_files import read_start
@@ -42,15 +41,20 @@ FILAMENT = TableKind(
             "segments",
             Either(((list, Listing(_SEGMENTS, "whole numbers", "[8, 10, 12]")), (object, _SEGMENTS))),
             None,
-            "Of a filament; a list has the lengths that filaments have in turn.",
+            "How many segments a filament has; a list gives the numbers that filaments have in turn.",
         ),
         Key("count", Whole(1, MOST_NODES, "10"), None, "How many there are; 1 if not given."),
-        Key("concentration", Quantity(units.NUMBER_DENSITY), None, "In place of that: in the box, or in inside."),
+        Key(
+            "concentration",
+            Quantity(units.NUMBER_DENSITY),
+            None,
+            "In place of count: how many there are in the volume of the box, or of inside.",
+        ),
         Key(
             "start", Choice(STARTS), None, 'Their shape at first: "equilibrium" if not given, drawn from the exact one.'
         ),
-        Key("position", point(), None, "Of the first node, or of the centre of a ring."),
-        Key("direction", direction(), None, "Of the first segment; random if not given."),
+        Key("position", point(), None, "Where the first node is, or the centre of a ring."),
+        Key("direction", direction(), None, "Direction of the first segment; random if not given."),
         Key(
             "orientation",
             Choice(_ORIENTATIONS),
@@ -70,7 +74,7 @@ FILAMENT = TableKind(
             "clamped_tangents",
             Listing(Whole(-MOST_NODES, MOST_NODES, "0"), "node numbers", "[0]", 0),
             (),
-            'Of element = "beam": clamped nodes at which it does not turn; one that is clamped alone is a hinge.',
+            'Clamped nodes at which a filament of element = "beam" does not turn; one clamped alone is a hinge.',
         ),
         Key(
             "nodes",
@@ -82,21 +86,21 @@ FILAMENT = TableKind(
             "tangents",
             Listing(direction(), "directions", "[[1, 0, 0], [1, 0, 0]]", 2),
             None,
-            'Of element = "beam", with nodes: directions of its curve there; those of a smooth curve if not given.',
+            'With nodes and element = "beam": directions of the curve there; those of a smooth curve if not given.',
         ),
         Key("closed", Flag(), False, "A ring, which begins as a regular polygon, or as a circle of beam elements."),
-        Key("normal", direction(), (0.0, 0.0, 1.0), "Of the plane of a ring."),
+        Key("normal", direction(), (0.0, 0.0, 1.0), "Normal of the plane of a ring."),
         Key("planar", Flag(), False, "The filament moves in a plane of constant z."),
         Key("height", Quantity(units.LENGTH, "any"), 0.0, "z of that plane, where no position is given."),
         Key(
             "propulsion",
             Quantity(units.FORCE, "any"),
             0.0,
-            "Of self-propelled filaments, on each segment along its tangent, or on each element along its curve.",
+            "Force that propels it: on each segment along its tangent, or on each beam element along its curve.",
         ),
         Key("file", Text('"start.npz"'), None, "Start from a file: see below."),
-        Key("topology", Text('"topology.cif"'), None, "Of a file that is a trajectory."),
-        Key("frame", Whole(-(10**12), 10**12, "-1"), None, "Of a trajectory; the last one if not given."),
+        Key("topology", Text('"topology.cif"'), None, "Topology of a file that is a trajectory."),
+        Key("frame", Whole(-(10**12), 10**12, "-1"), None, "Which frame of a trajectory; the last one if not given."),
         Key(
             "filaments",
             Listing(Whole(0, None, "0"), "numbers of filaments", "[0, 1]"),
@@ -148,8 +152,8 @@ class FilamentGroup:
 
     @property
     def joints(self):
-        """Joints of each filament; beam elements bend themselves, and there are as many bends."""
-        return self.segments - (not (self.closed or self.has_beam_elements))
+        """Bends of each filament: joints, or beam elements, which bend themselves."""
+        return self.type.segment_kind.bends(self.segments, self.closed)
 
     @property
     def has_beam_elements(self):
@@ -187,10 +191,8 @@ def read_filaments(entries, table, solvent, box, folder):
     for group in groups:
         with entries.naming():
             label = entries.label.rstrip(":")
-            if kind.has_beam_elements:
-                clamped, tangents = clamped_beam(entries["clamped"], entries["clamped_tangents"], group.nodes, label)
-            else:
-                clamped, tangents = clamped_nodes(entries["clamped"], group.nodes, label), ()
+            given = entries["clamped"], entries["clamped_tangents"]
+            clamped, tangents = kind.segment_kind.clamps(*given, group.nodes, label)
             kind.segment_friction(solvent.viscosity, solvent.temperature, group.segments)
         finished.append(dataclasses.replace(group, clamped=clamped, clamped_tangents=tangents, **own, **common))
     return finished
@@ -198,7 +200,7 @@ def read_filaments(entries, table, solvent, box, folder):
 
 def _check_element(entries, kind):
     # What beam elements alone have.
-    if not kind.has_beam_elements:
+    if kind.segment_kind.straight:
         entries.refuse(("tangents", "clamped_tangents"), 'belongs to element = "beam".')
 
 
@@ -214,7 +216,7 @@ def _from_nodes(entries, kind):
     _check_lengths(entries, "nodes", kind, nodes, closed, None)
     with entries.naming():
         tangents = None if entries["tangents"] is None else np.array(entries["tangents"])
-        controls = beam_control_points(kind, nodes, tangents, label, closed)
+        controls = kind.segment_kind.control_points(kind, nodes, label, tangents, closed=closed)
     if entries["planar"] and controls is not None and np.any(controls[:, 2] != nodes[0, 2]):
         raise entries.at("tangents").error("must lie in the xy plane, because this filament is planar.")
     yield FilamentGroup(
@@ -335,12 +337,10 @@ def _from_file(entries, kind, box, folder):
 
 def _control_points(entries, kind, nodes, whole, controls, box, closed):
     # Those of a file next to whole nodes; of a smooth curve where it has none.
-    if not kind.has_beam_elements:
-        if controls is not None:
-            raise entries.at("file").error('has beam elements: write element = "beam".')
-        return None
     if controls is None:
-        return beam_control_points(kind, whole, None, entries.label.rstrip(":"), closed)
+        return kind.segment_kind.control_points(kind, whole, entries.label.rstrip(":"), closed=closed)
+    if kind.segment_kind.straight:
+        raise entries.at("file").error('has beam elements: write element = "beam".')
     vectors = controls - nodes
     return whole + (vectors if box is None else vectors - np.round(vectors / box) * box)
 

@@ -3,7 +3,8 @@
 import dataclasses
 
 from ...bead_spring.bead_spring_type import DSDNA_BASE_PAIRS, BeadSpringType
-from ...filaments.filament_type import DSDNA, F_ACTIN, MICROTUBULE, FilamentType
+from ...filaments.filament_type import FilamentType
+from ...filaments.presets import DSDNA, F_ACTIN, MICROTUBULE
 from ...mechanics.friction import EndCorrections
 from ...mechanics.potentials import BENDING_POTENTIALS, STRETCHING_POTENTIALS
 from ...theory import calibrated_to_force
@@ -17,31 +18,45 @@ PRESETS = {"F_ACTIN": F_ACTIN, "DSDNA": DSDNA, "MICROTUBULE": MICROTUBULE, "DSDN
 _CORRECTIONS = TableKind(
     "end_corrections",
     tuple(
-        Key(field.name, Number(f"{field.default}"), field.default, "Of a cylinder's friction, eq. (20).")
+        Key(
+            field.name,
+            Number(f"{field.default}"),
+            field.default,
+            "End correction of the friction of a cylinder, eq. (20) of the paper.",
+        )
         for field in dataclasses.fields(EndCorrections)
     ),
     "End corrections of friction.",
 )
 
 _QUANTITIES = {
-    "diameter": (units.LENGTH, "Of the filament."),
-    "segment_length": (units.LENGTH, "At rest."),
-    "bending_rigidity": (units.BENDING_RIGIDITY, "Of the filament; joints are those of the paper, a/l0."),
-    "persistence_length": (units.LENGTH, "Of the chain of segments, in place of a bending_rigidity."),
-    "temperature": (units.TEMPERATURE, "Of that persistence_length; the solvent's if not given."),
-    "stretching_stiffness": (units.STIFFNESS, "Of one segment."),
-    "stretching_modulus": (units.FORCE, "In place of that: stiffness times length of a segment."),
-    "maximum_extension": (units.LENGTH, 'Of a segment with stretching_model = "fene".'),
-    "extension_relaxation_time": (units.TIME, "Of the length of a segment."),
-    "extensional_friction": (units.ROTATIONAL_FRICTION, "In place of that."),
+    "diameter": (units.LENGTH, "Diameter of the filament."),
+    "segment_length": (units.LENGTH, "Length of a segment at rest."),
+    "bending_rigidity": (
+        units.BENDING_RIGIDITY,
+        "Bending rigidity of the filament, a; joints have a/l0, as in the paper.",
+    ),
+    "persistence_length": (units.LENGTH, "In place of bending_rigidity: persistence length of the chain of segments."),
+    "temperature": (
+        units.TEMPERATURE,
+        "Temperature at which the filament has its persistence_length; that of the solvent if not given.",
+    ),
+    "stretching_stiffness": (units.STIFFNESS, "Stiffness of one segment."),
+    "stretching_modulus": (units.FORCE, "In place of stretching_stiffness: stiffness times length of a segment."),
+    "maximum_extension": (units.LENGTH, 'Largest extension of a segment with stretching_model = "fene".'),
+    "extension_relaxation_time": (units.TIME, "Time in which the length of a segment relaxes."),
+    "extensional_friction": (
+        units.ROTATIONAL_FRICTION,
+        "In place of extension_relaxation_time: friction of a change of length.",
+    ),
     "mass_per_length": (units.MASS_PER_LENGTH, "For other programs: motion does not depend on it."),
 }
 _TEXTS = ("name", "element", "bending_model", "stretching_model")
 _CYLINDER_KEYS = (*_TEXTS, *_QUANTITIES, "friction_length", "end_corrections")
 _BEAD_QUANTITIES = {
-    "bead_spacing": (units.LENGTH, "Of a chain of beads: at rest."),
-    "bead_friction": (units.FRICTION, "Of a bead."),
-    "bead_mass": (units.MASS, "Of a bead: motion does not depend on it."),
+    "bead_spacing": (units.LENGTH, "Distance of beads at rest, which makes the type a chain of beads."),
+    "bead_friction": (units.FRICTION, "Friction of a bead."),
+    "bead_mass": (units.MASS, "Mass of a bead: motion does not depend on it."),
 }
 _BEAD_NUMBERS = ("nu", "reduced_temperature")
 _BEAD_KEYS = (*_BEAD_QUANTITIES, *_BEAD_NUMBERS, "coarse_graining")
@@ -50,7 +65,7 @@ _SHARED_KEYS = ("name", "diameter", "bending_rigidity", "persistence_length", "t
 
 TYPE_KEYS = (
     Key("type", Choice(tuple(PRESETS)), None, "A preset, of which any property can be changed by the keys below."),
-    Key("name", Text('"DNA"'), None, "Of a type of one's own: up to 5 letters or digits."),
+    Key("name", Text('"DNA"'), None, "Name of your own type: up to 5 letters or digits."),
     Key("element", Choice(("straight", "beam")), None, 'What segments are: "beam" elements bend inside.'),
     Key("bending_model", Choice(tuple(BENDING_POTENTIALS)), None, "See `FilamentType`."),
     Key("stretching_model", Choice(tuple(STRETCHING_POTENTIALS)), None, "See `FilamentType`."),
@@ -58,21 +73,34 @@ TYPE_KEYS = (
         Key(name, Quantity(unit, "zero" if name == "bending_rigidity" else "positive"), None, text)
         for name, (unit, text) in _QUANTITIES.items()
     ),
-    Key("friction_length", WordOrQuantity(("segment", "filament"), units.LENGTH), None, "Of eq. (20)."),
-    Key("end_corrections", Inline(_CORRECTIONS, "{ parallel = -0.114 }"), None, "Of eq. (20)."),
+    Key(
+        "friction_length",
+        WordOrQuantity(("segment", "filament"), units.LENGTH),
+        None,
+        "Length in the friction of a cylinder, eq. (20).",
+    ),
+    Key(
+        "end_corrections",
+        Inline(_CORRECTIONS, "{ parallel = -0.114 }"),
+        None,
+        "Corrections for the ends of a cylinder, eq. (20).",
+    ),
     *(Key(name, Quantity(unit), None, text) for name, (unit, text) in _BEAD_QUANTITIES.items()),
     Key(
-        "nu", Number("0.35"), None, "Of a chain of beads, with reduced_temperature: see `BeadSpringType.from_reduced`."
+        "nu",
+        Number("0.35"),
+        None,
+        "With reduced_temperature, describes a chain of beads: see `BeadSpringType.from_reduced`.",
     ),
     Key("reduced_temperature", Number("0.034"), None, "See nu."),
     Key(
         "calibrated_to_force",
         Quantity(units.FORCE),
         None,
-        "At which the chain of segments has the extension of the wormlike chain: `theory.calibrated_to_force`. "
+        "Force at which the chain of segments has the extension of the wormlike chain: `theory.calibrated_to_force`. "
         "segment_length is then the length of filament that a segment stands for.",
     ),
-    Key("coarse_graining", Whole(1, 10**6, "2"), 1, "Beads of the type that become one."),
+    Key("coarse_graining", Whole(1, 10**6, "2"), 1, "How many beads of the type become one."),
 )
 """Of a [[filament]] table: what kind of filament it is."""
 

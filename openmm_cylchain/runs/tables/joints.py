@@ -22,7 +22,7 @@ JOINT = TableKind(
     "joint",
     (
         Key("between", Pair(_TANGENT, _TANGENTS), REQUIRED, "Two tangents, or a tangent and a direction."),
-        Key("stiffness", Quantity(units.ENERGY), REQUIRED, "Of the joint, per square radian."),
+        Key("stiffness", Quantity(units.ENERGY), REQUIRED, "Stiffness of the joint, per square radian."),
         Key(
             "angle",
             Quantity(units.ANGLE, "zero"),
@@ -55,7 +55,7 @@ def read_joint(entries, groups):
             continue
         check_place(tangent, groups)
         group = group_of(tangent["filament"], groups)
-        if not group.type.has_beam_elements:
+        if group.type.segment_kind.straight:
             raise tangent.at("filament").error(
                 f"{tangent['filament']} ({group.type.name}) has straight segments: joints are between filaments of "
                 'element = "beam".'

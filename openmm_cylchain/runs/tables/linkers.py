@@ -18,15 +18,15 @@ from .filament_types import PRESETS as FILAMENT_PRESETS
 from .solvent import EDGES
 
 _QUANTITIES = {
-    "binding_rate": (units.RATE, "zero", "Of a hand that has filaments within reach."),
+    "binding_rate": (units.RATE, "zero", "Rate at which a hand binds that has filaments within reach."),
     "reach": (units.LENGTH, "positive", "How far a hand binds."),
-    "unbinding_rate": (units.RATE, "zero", "Without a load."),
-    "unbinding_force": (units.FORCE, "positive", "At which it is e times as fast."),
-    "catch_rate": (units.RATE, "zero", "Of a catch bond: of unbinding without a load, which loads slow down."),
-    "catch_force": (units.FORCE, "positive", "At which that is e times as slow."),
-    "speed": (units.VELOCITY, "any", "Of walking towards the last node; negative towards the first."),
-    "stall_force": (units.FORCE, "positive", "At which a hand stands still."),
-    "site_spacing": (units.LENGTH, "positive", "Of sites that a hand occupies alone."),
+    "unbinding_rate": (units.RATE, "zero", "Rate at which a hand unbinds without a load."),
+    "unbinding_force": (units.FORCE, "positive", "Force at which a hand unbinds e times as fast."),
+    "catch_rate": (units.RATE, "zero", "Rate of unbinding of a catch bond without a load; loads slow it down."),
+    "catch_force": (units.FORCE, "positive", "Force at which a catch bond unbinds e times as slowly."),
+    "speed": (units.VELOCITY, "any", "Speed of walking towards the last node; negative towards the first."),
+    "stall_force": (units.FORCE, "positive", "Force at which a hand stands still."),
+    "site_spacing": (units.LENGTH, "positive", "Distance of binding sites, each of which holds one hand."),
 }
 
 
@@ -99,7 +99,7 @@ _ANCHOR_REGION = TableKind(
     "anchors",
     (
         Key("count", Whole(1, 10**7, "1000"), REQUIRED, "How many."),
-        Key("wall", Whole(1, 1000, "1"), None, "On which [[wall]] they are, by its number from 1 on."),
+        Key("wall", Whole(1, 1000, "1"), None, "Number of the [[wall]] on which they are, from 1 on."),
         Key("lower", point(), None, "Corner of a box that they are in. For a wall, else that of the periodic box."),
         Key("upper", point(), None, "The opposite corner."),
     ),
@@ -109,15 +109,22 @@ LINKERS = TableKind(
     "linkers",
     (
         Key("type", Choice(tuple(PRESETS)), None, "A preset, of which any property can be changed by the keys below."),
-        Key("name", Text('"motor"'), None, "Of linkers of one's own."),
-        Key("hand", Inline(HAND, _HAND_EXAMPLE), None, "Of two equal hands."),
-        Key("hands", Pair(HAND, f"[{_HAND_EXAMPLE}, {{ ... }}]"), None, "Two that differ."),
-        Key("stiffness", Quantity(units.STIFFNESS), None, "Of the spring between the hands."),
-        Key("rest_length", Quantity(units.LENGTH, "zero"), None, "Of that spring."),
+        Key("name", Text('"motor"'), None, "Name of your own linkers."),
+        Key("hand", Inline(HAND, _HAND_EXAMPLE), None, "Properties of two equal hands."),
+        Key("hands", Pair(HAND, f"[{_HAND_EXAMPLE}, {{ ... }}]"), None, "In place of hand: two that differ."),
+        Key("stiffness", Quantity(units.STIFFNESS), None, "Stiffness of the spring between the hands."),
+        Key("rest_length", Quantity(units.LENGTH, "zero"), None, "Rest length of that spring."),
         Key("same_filament", Flag(), None, "Whether both hands may bind to one filament."),
         Key("count", Whole(0, 10**7, "1000"), None, "How many there are."),
-        Key("concentration", Quantity(units.NUMBER_DENSITY, "zero"), None, "In place of that: of unbound ones."),
-        Key("volume", Quantity(units.VOLUME), None, "Of unbound ones; that of the box if not given."),
+        Key(
+            "concentration",
+            Quantity(units.NUMBER_DENSITY, "zero"),
+            None,
+            "In place of count: concentration of unbound linkers.",
+        ),
+        Key(
+            "volume", Quantity(units.VOLUME), None, "Volume in which unbound linkers are; that of the box if not given."
+        ),
         Key("anchors", _Anchors(), None, "Points to which they are tied, one each, in place of their first hands."),
         Key("bound", Whole(0, 10**7, "100"), 0, "How many begin with one hand bound, at random or near anchors."),
     ),

@@ -16,17 +16,19 @@ PARTICLES = TableKind(
     "particles",
     (
         Key("name", Text('"BEAD"'), "PRT", "Up to 5 letters or digits, for structure files."),
-        Key("diameter", Quantity(units.LENGTH), REQUIRED, "Of a sphere: for its friction, contacts and walls."),
+        Key(
+            "diameter", Quantity(units.LENGTH), REQUIRED, "Diameter of a sphere, for its friction, contacts and walls."
+        ),
         Key("count", Whole(1, MOST_NODES, "100"), None, "How many begin at random places."),
         Key(
             "positions",
             Listing(point(), "points", '[["0 nm", "0 nm", "0 nm"]]'),
             None,
-            "In place of that: where they begin.",
+            "In place of count: where they begin.",
         ),
         Key("inside", Inline(REGION, REGION_EXAMPLE), None, "A region of random places; the box if not given."),
         Key("friction", Quantity(units.FRICTION), None, "That of Stokes if not given."),
-        Key("diffusion", Quantity(units.DIFFUSION), None, "In place of that: k_B T over the friction."),
+        Key("diffusion", Quantity(units.DIFFUSION), None, "In place of friction: k_B T over the friction."),
         Key("fixed", Flag(), False, "They do not move."),
     ),
     "Spheres that diffuse, beside filaments. Filaments push them where there are [contacts], walls keep them in; they "

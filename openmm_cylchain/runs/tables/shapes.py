@@ -19,15 +19,20 @@ _BOUNDED = ("sphere", "cylinder", "box", "ellipsoid")
 _ORIGIN = (0.0, 0.0, 0.0)
 
 _KEYS = (
-    Key("point", point(), _ORIGIN, "On a plane, half-way between those of a slit, or on the axis of a cylinder."),
-    Key("normal", direction(), (0.0, 0.0, 1.0), "Of a plane, to the side of the filaments, or of a slit."),
-    Key("thickness", Quantity(units.LENGTH), None, "Of a slit."),
-    Key("center", point(), _ORIGIN, "Of a sphere or an ellipsoid."),
-    Key("radius", Quantity(units.LENGTH), None, "Of a sphere or a cylinder."),
-    Key("axis", direction(), (1.0, 0.0, 0.0), "Of a cylinder."),
+    Key(
+        "point",
+        point(),
+        _ORIGIN,
+        "A point on a plane, half-way between the planes of a slit, or on the axis of a cylinder.",
+    ),
+    Key("normal", direction(), (0.0, 0.0, 1.0), "Normal of a plane, to the side of the filaments, or of a slit."),
+    Key("thickness", Quantity(units.LENGTH), None, "Distance of the planes of a slit."),
+    Key("center", point(), _ORIGIN, "Centre of a sphere or an ellipsoid."),
+    Key("radius", Quantity(units.LENGTH), None, "Radius of a sphere or a cylinder."),
+    Key("axis", direction(), (1.0, 0.0, 0.0), "Direction of the axis of a cylinder."),
     Key("lower", point(), None, "Corner of a box, along the axes of space."),
     Key("upper", point(), None, "The opposite corner."),
-    Key("semi_axes", point(), None, "Of an ellipsoid along x, y and z."),
+    Key("semi_axes", point(), None, "Semi-axes of an ellipsoid along x, y and z."),
 )
 SHAPE_KEYS = (Key("shape", Choice(tuple(_SHAPES)), REQUIRED, "What filaments are kept in."), *_KEYS)
 """Of walls."""
@@ -35,9 +40,9 @@ SHAPE_KEYS = (Key("shape", Choice(tuple(_SHAPES)), REQUIRED, "What filaments are
 REGION = TableKind(
     "inside",
     (
-        Key("shape", Choice(_BOUNDED), REQUIRED, "Of the region."),
+        Key("shape", Choice(_BOUNDED), REQUIRED, "Shape of the region."),
         *(key for key in _KEYS if key.name not in ("normal", "thickness")),
-        Key("length", Quantity(units.LENGTH), None, "Of a cylinder, half of it on either side of its point."),
+        Key("length", Quantity(units.LENGTH), None, "Length of a cylinder, half of it on either side of its point."),
     ),
     "A region in which filaments or particles begin.",
 )

@@ -19,14 +19,19 @@ SIMULATION = TableKind(
     (
         Key("scheme", Choice(tuple(SCHEMES)), None, "The engine's default if not given."),
         Key("time_step", WordOrQuantity(("recommended",), units.TIME), REQUIRED, "See `openmm-cylchain timestep`."),
-        Key("duration", Quantity(units.TIME), REQUIRED, "Of the run: a whole number of reports."),
+        Key("duration", Quantity(units.TIME), REQUIRED, "How long the run is: a whole number of reports."),
         Key("report_interval", Quantity(units.TIME), REQUIRED, "From frame to frame: a whole number of steps."),
         Key("checkpoint_interval", Quantity(units.TIME), None, "A whole number of reports; 10 of them if not given."),
         Key("seed", Whole(1, None, "1"), 1, "The same seed gives the same run."),
         Key("engine", Choice(tuple(ENGINES)), None, "The compiled one where it is installed, if not given."),
         Key("platform", Text('"CPU"'), "Reference", "One that OpenMM has."),
-        Key("precision", Choice(PRECISIONS), None, "Of filaments with the compiled engine, else of the platform."),
-        Key("threads", Whole(1, 4096, "2"), None, "Of the platform CPU; all cores if not given."),
+        Key(
+            "precision",
+            Choice(PRECISIONS),
+            None,
+            "Precision of filaments with the compiled engine, else of the platform.",
+        ),
+        Key("threads", Whole(1, 4096, "2"), None, "Threads of the platform CPU; all cores if not given."),
         Key(
             "checks",
             Flag(),

@@ -12,8 +12,8 @@ from ..table import TableKind
 SOLVENT = TableKind(
     "solvent",
     (
-        Key("temperature", Quantity(units.TEMPERATURE), REQUIRED, "Of the solvent and of the noise."),
-        Key("viscosity", Quantity(units.VISCOSITY), REQUIRED, "Of the solvent."),
+        Key("temperature", Quantity(units.TEMPERATURE), REQUIRED, "Temperature of the solvent and of the noise."),
+        Key("viscosity", Quantity(units.VISCOSITY), REQUIRED, "Viscosity of the solvent."),
     ),
     "The solvent.",
     required=True,
@@ -22,7 +22,7 @@ SOLVENT = TableKind(
 EDGES = Triple(Quantity(units.LENGTH, "any"), '["1 um", "1 um", "1 um"]', positive=True)
 BOX = TableKind(
     "box",
-    (Key("edges", EDGES, REQUIRED, "Of a rectangular box, along x, y and z."),),
+    (Key("edges", EDGES, REQUIRED, "Edges of a rectangular box, along x, y and z."),),
     "A periodic box. Contacts, links and linkers join nearest images; filaments without a place begin anywhere in it.",
 )
 
@@ -33,7 +33,7 @@ FLOW = TableKind(
             "velocity",
             Triple(Quantity(units.VELOCITY, "any"), '["1 um/s", "0 um/s", "0 um/s"]'),
             None,
-            "At the origin.",
+            "Velocity at the origin.",
         ),
         Key("shear", Quantity(units.RATE, "any"), None, "Rate of simple shear: flow along direction."),
         Key("extension", Quantity(units.RATE, "any"), None, "Rate of planar extension along direction."),
@@ -45,8 +45,8 @@ FLOW = TableKind(
             None,
             "Any linear flow: in row i and column j, the change of component i of the velocity along axis j.",
         ),
-        Key("direction", direction(), (1.0, 0.0, 0.0), "Of the flow of shear, or of extension."),
-        Key("gradient_direction", direction(), (0.0, 0.0, 1.0), "Along which the velocity of shear grows."),
+        Key("direction", direction(), (1.0, 0.0, 0.0), "Direction of the flow of shear, or of extension."),
+        Key("gradient_direction", direction(), (0.0, 0.0, 1.0), "Direction along which the velocity of shear grows."),
         Key("compression", direction(), (0.0, 1.0, 0.0), "Axis of compression of extension."),
         Key("origin", point(), (0.0, 0.0, 0.0), "Where the velocity is that given, or zero."),
     ),

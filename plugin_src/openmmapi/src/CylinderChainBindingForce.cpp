@@ -285,6 +285,11 @@ void CylinderChainBindingForce::getNumEventsInContext(Context& context, int type
     unbindings = type < (int) events.size() ? events[type].unbindings : 0;
 }
 
+vector<cylchain::Place> CylinderChainBindingForce::findPlaces(const PlaceResolver&) const {
+    // Hands are on chains.
+    return anchors;
+}
+
 ForceImpl* CylinderChainBindingForce::createImpl() const {
     return new CylinderChainBindingForceImpl(*this);
 }

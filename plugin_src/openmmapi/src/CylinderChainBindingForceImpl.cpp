@@ -8,6 +8,7 @@
 #include "openmm/System.h"
 #include "openmm/internal/ContextImpl.h"
 #include "openmm/internal/CylinderChainDescription.h"
+#include "openmm/internal/LinkDescription.h"
 #include "openmm/internal/LinkerDescription.h"
 #include "openmm/internal/OSRngSeed.h"
 #include "openmm/reference/SimTKOpenMMRealType.h"
@@ -55,7 +56,7 @@ static void require(bool condition, const string& message) {
 }
 
 CylinderChainBindingForceImpl::CylinderChainBindingForceImpl(const CylinderChainBindingForce& owner) :
-        StepForceImpl(owner), owner(owner), context(NULL), seed(0), number(0), upToDate(false),
+        CouplingForceImpl(owner), owner(owner), context(NULL), seed(0), number(0), upToDate(false),
         nearestParticles(false), wasExcluded(false), hasStepped(false), timeBefore(0), stepSize(0), countBefore(0) {
 }
 
@@ -80,7 +81,7 @@ void CylinderChainBindingForceImpl::initialize(ContextImpl& context) {
     parameter = "CylinderChainLinkers"+to_string(number);
     nearestParticles = chains->usesPeriodicBoundaryConditions();
     const CylinderChainDescription description(ofContext, *chains);
-    const cylchain::Contours contours(description.getChains(), description.getBeams());
+    const cylchain::Contours contours(description.getList());
     lengths.clear();
     for (int chain = 0; chain < contours.getNumChains(); chain++)
         lengths.push_back(contours.getLength(chain));
@@ -125,8 +126,8 @@ void CylinderChainBindingForceImpl::initialize(ContextImpl& context) {
     if (seed == 0)
         seed = (uint32_t) osrngseed();
     linkerKernel = context.getPlatform().createKernel(UpdateCylinderChainLinkersKernel::Name(), context);
-    linkerKernel.getAs<UpdateCylinderChainLinkersKernel>().initialize(system, description.getChains(),
-            description.getBeams(), owner.usesPeriodicBoundaryConditions(), nearestParticles);
+    linkerKernel.getAs<UpdateCylinderChainLinkersKernel>().initialize(system, description.getList(),
+            owner.usesPeriodicBoundaryConditions(), nearestParticles);
     linkKernel = context.getPlatform().createKernel(CalcCylinderChainLinkForceKernel::Name(), context);
     linkKernel.getAs<CalcCylinderChainLinkForceKernel>().initialize(ofContext, owner.usesPeriodicBoundaryConditions(),
             nearestParticles);
@@ -250,4 +251,13 @@ double CylinderChainBindingForceImpl::calcForcesAndEnergy(ContextImpl& context, 
     int outOfRange = -1;
     return linkKernel.getAs<CalcCylinderChainLinkForceKernel>().execute(context, getLinks(), includeForces,
             includeEnergy, outOfRange);
+}
+
+cylchain::ImplicitCouplings* CylinderChainBindingForceImpl::getEquations(ContextImpl& context) {
+    return linkKernel.getAs<CalcCylinderChainLinkForceKernel>().getEquations(context, getLinks());
+}
+
+string CylinderChainBindingForceImpl::describeFailure(const cylchain::BrokenCoupling& coupling, const string& other) {
+    return describeBrokenLink(coupling, other, links, *context, owner.usesPeriodicBoundaryConditions(),
+            nearestParticles);
 }

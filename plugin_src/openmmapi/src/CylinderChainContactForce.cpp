@@ -1,6 +1,7 @@
 #include "openmm/CylinderChainContactForce.h"
 #include "openmm/OpenMMException.h"
 #include "openmm/internal/AssertionUtilities.h"
+#include "openmm/internal/ContactDescription.h"
 #include "openmm/internal/CylinderChainContactForceImpl.h"
 #include <cmath>
 #include <set>
@@ -158,6 +159,22 @@ double CylinderChainContactForce::takeMeanForces(Context& context, int reader, s
 
 int CylinderChainContactForce::addForceReader(Context& context) {
     return dynamic_cast<CylinderChainContactForceImpl&>(getImplInContext(context)).addReader();
+}
+
+vector<cylchain::Place> CylinderChainContactForce::findPlaces(const PlaceResolver& resolver) const {
+    const vector<cylchain::Capsule> capsules =
+            describeCapsules(*this, resolver.getSystem().getNumParticles()).capsules;
+    vector<cylchain::Place> places(capsules.size());
+    for (size_t i = 0; i < capsules.size(); i++) {
+        places[i].first = capsules[i].first;
+        places[i].second = capsules[i].second;
+    }
+    vector<cylchain::CapsuleOnCurve> onCurves;
+    vector<cylchain::CurveSite> sites;
+    findCurves(capsules, resolver, onCurves, sites);
+    for (const cylchain::CapsuleOnCurve& own : onCurves)
+        places[own.capsule] = own.first;
+    return places;
 }
 
 ForceImpl* CylinderChainContactForce::createImpl() const {

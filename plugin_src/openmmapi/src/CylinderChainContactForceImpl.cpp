@@ -3,115 +3,35 @@
 #include "openmm/OpenMMException.h"
 #include "openmm/System.h"
 #include "openmm/internal/ContextImpl.h"
-#include "openmm/internal/PlaceResolver.h"
+#include "openmm/internal/ContactDescription.h"
+#include <algorithm>
 #include <cmath>
-#include <set>
+#include <sstream>
 
 using namespace OpenMM;
 using namespace cylchain;
 using namespace std;
 
-/** Parameters of curves that differ by less are the same. */
-static const double SAME_PLACE = 1e-9;
+/**
+ * In an implicit step, a periodic box must be wider than twice the sum of the longest segment and so many of the
+ * largest diameters: contacts are looked for beyond the surfaces of segments, and on their way.
+ */
+static const double DIAMETERS_OF_BOX = 2;
 
 CylinderChainContactForceImpl::CylinderChainContactForceImpl(const CylinderChainContactForce& owner) :
         PushForceImpl(owner), owner(owner), stiffness(owner.getStiffness()),
         periodic(owner.usesPeriodicBoundaryConditions()) {
 }
 
-int CylinderChainContactForceImpl::getNumSegments(int chain) const {
-    return owner.getChainParticles(chain).size()-(owner.isChainClosed(chain) ? 0 : 1);
-}
-
 void CylinderChainContactForceImpl::initialize(ContextImpl& context) {
-    const int numParticles = context.getSystem().getNumParticles();
-    auto checkParticle = [&] (int particle) {
-        if (particle >= numParticles)
-            throw OpenMMException("CylinderChainContactForce: Illegal particle index: "+to_string(particle));
-    };
-    CapsuleSystem capsules;
-    vector<int> firstOfChain;
-    for (int chain = 0; chain < owner.getNumChains(); chain++) {
-        const vector<int>& particles = owner.getChainParticles(chain);
-        for (int particle : particles)
-            checkParticle(particle);
-        const int segments = getNumSegments(chain);
-        firstOfChain.push_back(capsules.capsules.size());
-        for (int segment = 0; segment < segments; segment++)
-            capsules.capsules.push_back({particles[segment], particles[(segment+1)%particles.size()],
-                    0.5*owner.getChainDiameter(chain), chain, segment});
-        capsules.chains.push_back({segments, owner.isChainClosed(chain), owner.getChainExcludedNeighbors(chain)});
-    }
-    firstOfChain.push_back(capsules.capsules.size());
-    for (int sphere = 0; sphere < owner.getNumSpheres(); sphere++) {
-        checkParticle(owner.getSphereParticle(sphere));
-        capsules.capsules.push_back({owner.getSphereParticle(sphere), -1, 0.5*owner.getSphereDiameter(sphere), -1,
-                sphere});
-    }
-    for (int exclusion = 0; exclusion < owner.getNumExclusions(); exclusion++) {
-        int chain1, segment1, chain2, segment2;
-        owner.getExclusion(exclusion, chain1, segment1, chain2, segment2);
-        // Spheres come after the segments of all chains.
-
-        const int first = firstOfChain[chain1 == -1 ? owner.getNumChains() : chain1]+segment1;
-        const int second = firstOfChain[chain2 == -1 ? owner.getNumChains() : chain2]+segment2;
-        capsules.exclusions.push_back({first, second});
-    }
+    const System& system = context.getSystem();
+    const CapsuleSystem capsules = describeCapsules(owner, system.getNumParticles());
     search.reset(new ContactSearch(capsules));
-    findCurves(context.getSystem());
+    findCurves(capsules.capsules, PlaceResolver(system), onCurves, sites);
     kernel = context.getPlatform().createKernel(CalcCylinderChainContactForceKernel::Name(), context);
-    kernel.getAs<CalcCylinderChainContactForceKernel>().initialize(context.getSystem(), *search, stiffness, periodic);
-    beginSums(numParticles);
+    kernel.getAs<CalcCylinderChainContactForceKernel>().initialize(system, *search, stiffness, periodic);
+    beginSums(system.getNumParticles());
     notesPushes = kernel.getAs<CalcCylinderChainContactForceKernel>().notePushes(present);
-}
-
-/**
- * Find capsules that are straight pieces of beam elements: between virtual sites at neighbouring ones of places at
- * equal distances along the curve of an element, its nodes among them.
- */
-void CylinderChainContactForceImpl::findCurves(const System& system) {
-    const PlaceResolver places(system);
-    const vector<Capsule>& capsules = search->getSystem().capsules;
-    set<int> known;
-    for (size_t i = 0; i < capsules.size(); i++) {
-        const Capsule& capsule = capsules[i];
-        if (capsule.second < 0 || !system.isVirtualSite(capsule.first) ||
-                !system.isVirtualSite(capsule.second))
-            continue;
-        Place ends[2];
-        ends[0].first = capsule.first;
-        ends[1].first = capsule.second;
-        for (Place& end : ends)
-            end = places.resolve(end);
-        if (!ends[0].isOnCurve() || !ends[1].isOnCurve())
-            continue;
-        for (int side = 0; side < 2; side++) {
-            const int particle = side == 0 ? capsule.first : capsule.second;
-            if (known.insert(particle).second)
-                sites.push_back({particle, ends[side]});
-        }
-        // A site at a node is on both of its elements.
-
-        for (int side = 0; side < 2; side++) {
-            Place &one = ends[side], &other = ends[1-side];
-            if (one.first == other.first)
-                continue;
-            if (one.second == other.first && fabs(one.fraction-1) < SAME_PLACE) {
-                one = other;
-                one.fraction = 0;
-            }
-            else if (one.first == other.second && fabs(one.fraction) < SAME_PLACE) {
-                one = other;
-                one.fraction = 1;
-            }
-        }
-        const double length = fabs(ends[1].fraction-ends[0].fraction), pieces = round(1/max(length, SAME_PLACE));
-        const double first = ends[0].fraction*pieces;
-        if (ends[0].first != ends[1].first || fabs(length*pieces-1) > SAME_PLACE ||
-                fabs(first-round(first)) > SAME_PLACE)
-            continue;
-        onCurves.push_back({(int) i, ends[0], (int) pieces, ends[1].fraction > ends[0].fraction});
-    }
 }
 
 double CylinderChainContactForceImpl::calcForcesAndEnergy(ContextImpl& context, bool includeForces,
@@ -128,7 +48,7 @@ vector<string> CylinderChainContactForceImpl::getKernelNames() {
 void CylinderChainContactForceImpl::updateParametersInContext(ContextImpl& context) {
     int capsules = owner.getNumSpheres();
     for (int chain = 0; chain < owner.getNumChains(); chain++)
-        capsules += getNumSegments(chain);
+        capsules += countSegments(owner, chain);
     if (capsules != (int) search->getSystem().capsules.size())
         throw OpenMMException("CylinderChainContactForce: Chains and spheres cannot be added to a Context");
     if (owner.getNumExclusions() != (int) search->getSystem().exclusions.size())
@@ -136,7 +56,7 @@ void CylinderChainContactForceImpl::updateParametersInContext(ContextImpl& conte
     stiffness = owner.getStiffness();
     int capsule = 0;
     for (int chain = 0; chain < owner.getNumChains(); chain++)
-        for (int segment = 0; segment < getNumSegments(chain); segment++)
+        for (int segment = 0; segment < countSegments(owner, chain); segment++)
             search->setRadius(capsule++, 0.5*owner.getChainDiameter(chain));
     for (int sphere = 0; sphere < owner.getNumSpheres(); sphere++)
         search->setRadius(capsule++, 0.5*owner.getSphereDiameter(sphere));
@@ -188,4 +108,62 @@ void CylinderChainContactForceImpl::findPushes(ContextImpl& context, vector<Push
         pushes.push_back(pushOfContact(search->getSystem(), pair.a, pair.b, contact.s, contact.t,
                 -contact.weight*stiffness*contact.gap, contact.normal));
     });
+}
+
+ImplicitCouplings* CylinderChainContactForceImpl::getEquations(ContextImpl& context) {
+    return kernel.getAs<CalcCylinderChainContactForceKernel>().getEquations(context, onCurves, sites, getImpulses());
+}
+
+void CylinderChainContactForceImpl::refuseChains(const CylinderChainDescription& chains) const {
+    vector<int> ofBeams;
+    for (const BeamChain& beam : chains.getBeams())
+        ofBeams.insert(ofBeams.end(), beam.particles.begin(), beam.particles.end());
+    sort(ofBeams.begin(), ofBeams.end());
+    for (const Capsule& capsule : search->getSystem().capsules)
+        for (int particle : {capsule.first, capsule.end()})
+            if (binary_search(ofBeams.begin(), ofBeams.end(), particle))
+                throw OpenMMException("CylinderChainIntegrator: Chains of beam elements cannot have contacts of this "
+                        "plugin between their nodes, but between virtual sites on their curves: take such sites, or "
+                        "segments");
+}
+
+void CylinderChainContactForceImpl::refuseBox(ContextImpl& context, const CylinderChainDescription& chains) const {
+    if (!periodic)
+        return;
+    double longest = 0, longestElement = 0, diameter = 0;
+    for (const Chain& chain : chains.getChains())
+        for (const Segment& segment : chain.segments)
+            longest = max(longest, segment.restLength);
+    for (const BeamChain& beam : chains.getBeams())
+        longestElement = max(longestElement, beam.elementLength);
+    for (const CapsuleOnCurve& capsule : onCurves)
+        longest = max(longest, longestElement/capsule.pieces);
+    for (const Capsule& capsule : search->getSystem().capsules)
+        diameter = max(diameter, 2*capsule.radius);
+    Vec3 a, b, c;
+    context.getPeriodicBoxVectors(a, b, c);
+    double narrowest = INFINITY;
+    for (const Vec3& face : {b.cross(c), c.cross(a), a.cross(b)})
+        narrowest = min(narrowest, a[0]*b[1]*c[2]/sqrt(face.dot(face)));
+    const double needed = 2*(longest+DIAMETERS_OF_BOX*diameter);
+    if (narrowest >= needed)
+        return;
+    stringstream message;
+    message << "The periodic box is too small for contacts in implicit steps: it is " << narrowest <<
+            " nm wide between two of its faces, but segments of " << longest << " nm with contacts of " << diameter <<
+            " nm need twice their length and " << DIAMETERS_OF_BOX << " diameters, " << needed <<
+            " nm. Take a larger box or shorter segments";
+    throw OpenMMException(message.str());
+}
+
+string CylinderChainContactForceImpl::describeFailure(const BrokenCoupling& coupling, const string& other) {
+    switch (coupling.reason) {
+        case BrokenCoupling::Crosses:
+            return "it would pass through "+other+", however short the parts of the step";
+        case BrokenCoupling::LeavesBox:
+            return "it moves too far for the periodic box, which must be wider than twice what a segment with its "
+                    "diameter passes over in a step";
+        default:
+            return "its contact with "+other+" cannot be solved";
+    }
 }

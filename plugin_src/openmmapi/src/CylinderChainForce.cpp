@@ -36,8 +36,15 @@ static void refuseParticles(const vector<int>& particles) {
     }
 }
 
-static string twoTethers(int chain, int node) {
-    return "CylinderChainForce: Node "+to_string(node)+" of chain "+to_string(chain)+" cannot have two tethers";
+static void checkPart(int part, int count, const char* what, int chain) {
+    if (part < 0 || part >= count)
+        throw OpenMMException("CylinderChainForce: Index out of range: there is no "+string(what)+" "+to_string(part)+
+                " in chain "+to_string(chain));
+}
+
+static OpenMMException twoTethers(int chain, int node) {
+    return OpenMMException("CylinderChainForce: Node "+to_string(node)+" of chain "+to_string(chain)+
+            " cannot have two tethers");
 }
 
 CylinderChainForce::CylinderChainForce() : usePeriodic(false) {
@@ -49,6 +56,66 @@ vector<string> CylinderChainForce::getBendingModelNames() {
 
 vector<string> CylinderChainForce::getStretchingModelNames() {
     return cylchain::namesOf<cylchain::StretchingModel>();
+}
+
+void CylinderChainForce::checkIndex(int chain) const {
+    if (chain < 0 || chain >= chains.size())
+        throw OpenMMException("CylinderChainForce: Index out of range: there is no chain "+to_string(chain));
+}
+
+void CylinderChainForce::checkKind(int chain, cylchain::ChainKind kind) const {
+    checkIndex(chain);
+    if (chains.getKind(chain) != kind)
+        throw OpenMMException("CylinderChainForce: Chain "+to_string(chain)+
+                (kind == cylchain::ChainKind::BeamElements ? " has straight segments, not beam elements" :
+                " has beam elements, not straight segments"));
+}
+
+const cylchain::Chain& CylinderChainForce::getChain(int chain) const {
+    checkKind(chain, cylchain::ChainKind::StraightSegments);
+    return chains.getChain(chain);
+}
+
+cylchain::Chain& CylinderChainForce::getChain(int chain) {
+    checkKind(chain, cylchain::ChainKind::StraightSegments);
+    return chains.getChain(chain);
+}
+
+const cylchain::BeamChain& CylinderChainForce::getBeam(int chain) const {
+    checkKind(chain, cylchain::ChainKind::BeamElements);
+    return chains.getBeam(chain);
+}
+
+static void setParameters(cylchain::Segment& segment, cylchain::StretchingModel model, double restLength,
+        double stretchingStiffness, double maximumExtension, double parallelFriction, double perpendicularFriction,
+        double rotationalFriction, double extensionalFriction) {
+    checkPositive(restLength, "The rest length");
+    checkPositive(stretchingStiffness, "The stretching stiffness");
+    if (cylchain::hasRange(model))
+        checkPositive(maximumExtension, "The maximum extension");
+    // Nodes may have the friction that a segment lacks: CylinderChainDescription looks at both.
+    checkNotNegative(parallelFriction, "The parallel friction");
+    checkNotNegative(perpendicularFriction, "The perpendicular friction");
+    checkNotNegative(rotationalFriction, "The rotational friction");
+    checkNotNegative(extensionalFriction, "The extensional friction");
+    segment = {restLength, stretchingStiffness, maximumExtension, parallelFriction, perpendicularFriction,
+            rotationalFriction, extensionalFriction, segment.propulsion};
+}
+
+static void setParameters(cylchain::BeamChain& beam, double elementLength, double stretchingModulus,
+        double bendingRigidity, double shortening, double parallelFriction, double perpendicularFriction) {
+    checkPositive(elementLength, "The length of an element");
+    checkPositive(stretchingModulus, "The stretching modulus of a chain of beam elements");
+    checkPositive(bendingRigidity, "The bending rigidity of a chain of beam elements");
+    checkNotNegative(shortening, "The shortening of an element");
+    checkPositive(parallelFriction, "The friction along beam elements");
+    checkPositive(perpendicularFriction, "The friction across beam elements");
+    beam.elementLength = elementLength;
+    beam.stretchingModulus = stretchingModulus;
+    beam.bendingRigidity = bendingRigidity;
+    beam.shortening = shortening;
+    beam.parallelFriction = parallelFriction;
+    beam.perpendicularFriction = perpendicularFriction;
 }
 
 int CylinderChainForce::addChain(const vector<int>& particles, BendingModel bendingModel,
@@ -65,27 +132,18 @@ int CylinderChainForce::addChain(const vector<int>& particles, BendingModel bend
     if (!cylchain::isEntry<cylchain::StretchingModel>(stretchingModel))
         throw OpenMMException("CylinderChainForce: Illegal stretching model: "+to_string((int) stretchingModel));
     checkStiffness(jointStiffness);
-    ChainInfo chain;
-    chain.particles = particles;
-    chain.bendingModel = bendingModel;
-    chain.stretchingModel = stretchingModel;
+    cylchain::Chain chain;
+    chain.nodes = particles;
+    // The entries of both enumerations are those of one list.
+    chain.bending = static_cast<cylchain::BendingModel>(bendingModel);
+    chain.stretching = static_cast<cylchain::StretchingModel>(stretchingModel);
     chain.closed = closed;
-    chain.planar = false;
-    chain.nodeFriction = 0;
-    chain.segments.resize(closed ? particles.size() : particles.size()-1);
+    cylchain::Segment segment;
+    setParameters(segment, chain.stretching, restLength, stretchingStiffness, maximumExtension, parallelFriction,
+            perpendicularFriction, rotationalFriction, extensionalFriction);
+    chain.segments.assign(closed ? particles.size() : particles.size()-1, segment);
     chain.joints.assign(closed ? particles.size() : particles.size()-2, jointStiffness);
-    chains.push_back(chain);
-    const int index = chains.size()-1;
-    try {
-        for (int segment = 0; segment < getNumSegments(index); segment++)
-            setSegmentParameters(index, segment, restLength, stretchingStiffness, maximumExtension, parallelFriction,
-                    perpendicularFriction, rotationalFriction, extensionalFriction);
-    }
-    catch (...) {
-        chains.pop_back();
-        throw;
-    }
-    return index;
+    return chains.add(chain);
 }
 
 int CylinderChainForce::addBeamChain(const vector<int>& particles, double elementLength, double stretchingModulus,
@@ -97,50 +155,64 @@ int CylinderChainForce::addBeamChain(const vector<int>& particles, double elemen
         throw OpenMMException("CylinderChainForce: A chain of beam elements must have two particles for each of at "
                 "least two nodes");
     refuseParticles(particles);
-    beams.push_back({particles, 0, 0, 0, 0, 0, 0, planar, closed, 0});
-    const int index = beams.size()-1;
-    try {
-        setBeamChainParameters(index, elementLength, stretchingModulus, bendingRigidity, shortening, parallelFriction,
-                perpendicularFriction);
-    }
-    catch (...) {
-        beams.pop_back();
-        throw;
-    }
-    return index;
+    cylchain::BeamChain beam;
+    beam.particles = particles;
+    beam.planar = planar;
+    beam.closed = closed;
+    setParameters(beam, elementLength, stretchingModulus, bendingRigidity, shortening, parallelFriction,
+            perpendicularFriction);
+    return chains.add(beam);
 }
 
-const vector<int>& CylinderChainForce::getBeamChainParticles(int chain) const {
-    ASSERT_VALID_INDEX(chain, beams);
-    return beams[chain].particles;
+int CylinderChainForce::getChainKind(int chain) const {
+    checkIndex(chain);
+    return static_cast<int>(chains.getKind(chain));
 }
 
-bool CylinderChainForce::isBeamChainClosed(int chain) const {
-    ASSERT_VALID_INDEX(chain, beams);
-    return beams[chain].closed;
+const string& CylinderChainForce::getChainName(int chain) const {
+    checkIndex(chain);
+    return chains.getName(chain);
 }
 
-bool CylinderChainForce::isBeamChainPlanar(int chain) const {
-    ASSERT_VALID_INDEX(chain, beams);
-    return beams[chain].planar;
+void CylinderChainForce::setChainName(int chain, const string& name) {
+    checkIndex(chain);
+    chains.setName(chain, name);
+}
+
+const vector<int>& CylinderChainForce::getChainParticles(int chain) const {
+    checkIndex(chain);
+    return chains.getParticles(chain);
+}
+
+bool CylinderChainForce::isChainClosed(int chain) const {
+    checkIndex(chain);
+    return chains.isClosed(chain);
+}
+
+bool CylinderChainForce::isChainPlanar(int chain) const {
+    checkIndex(chain);
+    return chains.isPlanar(chain);
+}
+
+void CylinderChainForce::setChainPlanar(int chain, bool planar) {
+    checkIndex(chain);
+    chains.visit(chain, [&] (auto& own) {own.planar = planar;});
 }
 
 void CylinderChainForce::getBeamChainPropulsion(int chain, double& propulsion) const {
-    ASSERT_VALID_INDEX(chain, beams);
-    propulsion = beams[chain].propulsion;
+    propulsion = getBeam(chain).propulsion;
 }
 
 void CylinderChainForce::setBeamChainPropulsion(int chain, double propulsion) {
-    ASSERT_VALID_INDEX(chain, beams);
+    checkKind(chain, cylchain::ChainKind::BeamElements);
     if (!isfinite(propulsion))
         throw OpenMMException("CylinderChainForce: The propulsion of a chain of beam elements must be finite");
-    beams[chain].propulsion = propulsion;
+    chains.getBeam(chain).propulsion = propulsion;
 }
 
 void CylinderChainForce::getBeamChainParameters(int chain, double& elementLength, double& stretchingModulus,
         double& bendingRigidity, double& shortening, double& parallelFriction, double& perpendicularFriction) const {
-    ASSERT_VALID_INDEX(chain, beams);
-    const BeamInfo& beam = beams[chain];
+    const cylchain::BeamChain& beam = getBeam(chain);
     elementLength = beam.elementLength;
     stretchingModulus = beam.stretchingModulus;
     bendingRigidity = beam.bendingRigidity;
@@ -151,51 +223,14 @@ void CylinderChainForce::getBeamChainParameters(int chain, double& elementLength
 
 void CylinderChainForce::setBeamChainParameters(int chain, double elementLength, double stretchingModulus,
         double bendingRigidity, double shortening, double parallelFriction, double perpendicularFriction) {
-    ASSERT_VALID_INDEX(chain, beams);
-    checkPositive(elementLength, "The length of an element");
-    checkPositive(stretchingModulus, "The stretching modulus of a chain of beam elements");
-    checkPositive(bendingRigidity, "The bending rigidity of a chain of beam elements");
-    checkNotNegative(shortening, "The shortening of an element");
-    checkPositive(parallelFriction, "The friction along beam elements");
-    checkPositive(perpendicularFriction, "The friction across beam elements");
-    BeamInfo& beam = beams[chain];
-    beam.elementLength = elementLength;
-    beam.stretchingModulus = stretchingModulus;
-    beam.bendingRigidity = bendingRigidity;
-    beam.shortening = shortening;
-    beam.parallelFriction = parallelFriction;
-    beam.perpendicularFriction = perpendicularFriction;
-}
-
-const CylinderChainForce::ChainInfo& CylinderChainForce::getChain(int chain) const {
-    ASSERT_VALID_INDEX(chain, chains);
-    return chains[chain];
-}
-
-CylinderChainForce::ChainInfo& CylinderChainForce::getChain(int chain) {
-    ASSERT_VALID_INDEX(chain, chains);
-    return chains[chain];
-}
-
-const vector<int>& CylinderChainForce::getChainParticles(int chain) const {
-    return getChain(chain).particles;
+    checkKind(chain, cylchain::ChainKind::BeamElements);
+    setParameters(chains.getBeam(chain), elementLength, stretchingModulus, bendingRigidity, shortening,
+            parallelFriction, perpendicularFriction);
 }
 
 void CylinderChainForce::getChainModels(int chain, int& bendingModel, int& stretchingModel) const {
-    bendingModel = getChain(chain).bendingModel;
-    stretchingModel = getChain(chain).stretchingModel;
-}
-
-bool CylinderChainForce::isChainClosed(int chain) const {
-    return getChain(chain).closed;
-}
-
-bool CylinderChainForce::isChainPlanar(int chain) const {
-    return getChain(chain).planar;
-}
-
-void CylinderChainForce::setChainPlanar(int chain, bool planar) {
-    getChain(chain).planar = planar;
+    bendingModel = static_cast<int>(getChain(chain).bending);
+    stretchingModel = static_cast<int>(getChain(chain).stretching);
 }
 
 double CylinderChainForce::getChainNodeFriction(int chain) const {
@@ -218,139 +253,99 @@ int CylinderChainForce::getNumJoints(int chain) const {
 void CylinderChainForce::getSegmentParameters(int chain, int segment, double& restLength, double& stretchingStiffness,
         double& maximumExtension, double& parallelFriction, double& perpendicularFriction, double& rotationalFriction,
         double& extensionalFriction) const {
-    const vector<SegmentInfo>& segments = getChain(chain).segments;
-    ASSERT_VALID_INDEX(segment, segments);
-    const SegmentInfo& info = segments[segment];
-    restLength = info.restLength;
-    stretchingStiffness = info.stretchingStiffness;
-    maximumExtension = info.maximumExtension;
-    parallelFriction = info.parallelFriction;
-    perpendicularFriction = info.perpendicularFriction;
-    rotationalFriction = info.rotationalFriction;
-    extensionalFriction = info.extensionalFriction;
+    checkPart(segment, getNumSegments(chain), "segment", chain);
+    const cylchain::Segment& own = getChain(chain).segments[segment];
+    restLength = own.restLength;
+    stretchingStiffness = own.stiffness;
+    maximumExtension = own.maximumExtension;
+    parallelFriction = own.parallel;
+    perpendicularFriction = own.perpendicular;
+    rotationalFriction = own.rotational;
+    extensionalFriction = own.extensional;
 }
 
 void CylinderChainForce::setSegmentParameters(int chain, int segment, double restLength, double stretchingStiffness,
         double maximumExtension, double parallelFriction, double perpendicularFriction, double rotationalFriction,
         double extensionalFriction) {
-    vector<SegmentInfo>& segments = getChain(chain).segments;
-    ASSERT_VALID_INDEX(segment, segments);
-    checkPositive(restLength, "The rest length");
-    checkPositive(stretchingStiffness, "The stretching stiffness");
-    if (cylchain::hasRange(static_cast<cylchain::StretchingModel>(getChain(chain).stretchingModel)))
-        checkPositive(maximumExtension, "The maximum extension");
-    // Nodes may have the friction that a segment lacks: CylinderChainForceImpl looks at both.
-    checkNotNegative(parallelFriction, "The parallel friction");
-    checkNotNegative(perpendicularFriction, "The perpendicular friction");
-    checkNotNegative(rotationalFriction, "The rotational friction");
-    checkNotNegative(extensionalFriction, "The extensional friction");
-    segments[segment] = {restLength, stretchingStiffness, maximumExtension, parallelFriction, perpendicularFriction,
-            rotationalFriction, extensionalFriction, segments[segment].propulsion};
+    checkPart(segment, getNumSegments(chain), "segment", chain);
+    cylchain::Chain& own = getChain(chain);
+    setParameters(own.segments[segment], own.stretching, restLength, stretchingStiffness, maximumExtension,
+            parallelFriction, perpendicularFriction, rotationalFriction, extensionalFriction);
 }
 
 void CylinderChainForce::getSegmentPropulsion(int chain, int segment, double& propulsion) const {
-    const vector<SegmentInfo>& segments = getChain(chain).segments;
-    ASSERT_VALID_INDEX(segment, segments);
-    propulsion = segments[segment].propulsion;
+    checkPart(segment, getNumSegments(chain), "segment", chain);
+    propulsion = getChain(chain).segments[segment].propulsion;
 }
 
 void CylinderChainForce::setSegmentPropulsion(int chain, int segment, double propulsion) {
-    vector<SegmentInfo>& segments = getChain(chain).segments;
-    ASSERT_VALID_INDEX(segment, segments);
+    checkPart(segment, getNumSegments(chain), "segment", chain);
     if (!isfinite(propulsion))
         throw OpenMMException("CylinderChainForce: The propulsion of a segment must be finite");
-    segments[segment].propulsion = propulsion;
+    getChain(chain).segments[segment].propulsion = propulsion;
 }
 
 void CylinderChainForce::getJointParameters(int chain, int joint, double& stiffness) const {
-    const vector<double>& joints = getChain(chain).joints;
-    ASSERT_VALID_INDEX(joint, joints);
-    stiffness = joints[joint];
+    checkPart(joint, getNumJoints(chain), "joint", chain);
+    stiffness = getChain(chain).joints[joint];
 }
 
 void CylinderChainForce::setJointParameters(int chain, int joint, double stiffness) {
-    vector<double>& joints = getChain(chain).joints;
-    ASSERT_VALID_INDEX(joint, joints);
+    checkPart(joint, getNumJoints(chain), "joint", chain);
     checkStiffness(stiffness);
-    joints[joint] = stiffness;
+    getChain(chain).joints[joint] = stiffness;
 }
 
-void CylinderChainForce::checkTether(const TetherInfo& tether, int numNodes) const {
-    if (tether.node < 0 || tether.node >= numNodes)
-        throw OpenMMException("CylinderChainForce: Index out of range: there is no node "+to_string(tether.node)+
-                " in chain "+to_string(tether.chain));
-    for (int i = 0; i < 3; i++)
-        if (!isfinite(tether.point[i]))
+static cylchain::Tether makeTether(int node, const Vec3& point, double stiffness) {
+    return {node, {point[0], point[1], point[2]}, stiffness};
+}
+
+void CylinderChainForce::checkTether(const TetherInfo& info) const {
+    checkIndex(info.chain);
+    checkPart(info.tether.node, chains.getNumNodes(info.chain), "node", info.chain);
+    for (double coordinate : info.tether.point)
+        if (!isfinite(coordinate))
             throw OpenMMException("CylinderChainForce: The point of a tether must be finite");
-    if (!(tether.stiffness >= 0 && isfinite(tether.stiffness)))
+    if (!(info.tether.stiffness >= 0 && isfinite(info.tether.stiffness)))
         throw OpenMMException("CylinderChainForce: The stiffness of a tether cannot be negative and must be finite");
 }
 
-int CylinderChainForce::numNodesOfBeam(int chain) const {
-    return getBeamChainParticles(chain).size()/2;
-}
-
-/** Add a tether that has been checked to a list. */
-template <class Info> static int addTetherTo(vector<Info>& tethers, set<pair<int, int> >& nodes, const Info& tether) {
-    if (!nodes.insert({tether.chain, tether.node}).second)
-        throw OpenMMException(twoTethers(tether.chain, tether.node));
-    tethers.push_back(tether);
+int CylinderChainForce::addTether(int chain, int node, const Vec3& point, double stiffness) {
+    const TetherInfo added = {chain, makeTether(node, point, stiffness)};
+    checkTether(added);
+    if (!tetheredNodes.insert({chain, node}).second)
+        throw twoTethers(chain, node);
+    tethers.push_back(added);
     return tethers.size()-1;
 }
 
-/** Replace a tether of a list by one that has been checked. */
-template <class Info> static void replaceTether(Info& old, set<pair<int, int> >& nodes, const Info& tether) {
-    if (old.chain != tether.chain || old.node != tether.node) {
-        if (!nodes.insert({tether.chain, tether.node}).second)
-            throw OpenMMException(twoTethers(tether.chain, tether.node));
-        nodes.erase({old.chain, old.node});
-    }
-    old = tether;
-}
-
-/** Give the parameters of a tether of a list. */
-template <class Info> static void giveTether(const vector<Info>& tethers, int index, int& chain, int& node, Vec3& point,
-        double& stiffness) {
-    ASSERT_VALID_INDEX(index, tethers);
-    chain = tethers[index].chain;
-    node = tethers[index].node;
-    point = tethers[index].point;
-    stiffness = tethers[index].stiffness;
-}
-
-int CylinderChainForce::addTether(int chain, int node, const Vec3& point, double stiffness) {
-    const TetherInfo tether = {chain, node, point, stiffness};
-    checkTether(tether, getChain(chain).particles.size());
-    return addTetherTo(tethers, tetheredNodes, tether);
-}
-
 void CylinderChainForce::getTetherParameters(int index, int& chain, int& node, Vec3& point, double& stiffness) const {
-    giveTether(tethers, index, chain, node, point, stiffness);
+    ASSERT_VALID_INDEX(index, tethers);
+    const cylchain::Tether& tether = tethers[index].tether;
+    chain = tethers[index].chain;
+    node = tether.node;
+    point = Vec3(tether.point[0], tether.point[1], tether.point[2]);
+    stiffness = tether.stiffness;
 }
 
 void CylinderChainForce::setTetherParameters(int index, int chain, int node, const Vec3& point, double stiffness) {
     ASSERT_VALID_INDEX(index, tethers);
-    const TetherInfo tether = {chain, node, point, stiffness};
-    checkTether(tether, getChain(chain).particles.size());
-    replaceTether(tethers[index], tetheredNodes, tether);
+    const TetherInfo changed = {chain, makeTether(node, point, stiffness)};
+    checkTether(changed);
+    TetherInfo& old = tethers[index];
+    if (old.chain != chain || old.tether.node != node) {
+        if (!tetheredNodes.insert({chain, node}).second)
+            throw twoTethers(chain, node);
+        tetheredNodes.erase({old.chain, old.tether.node});
+    }
+    old = changed;
 }
 
-int CylinderChainForce::addBeamTether(int chain, int node, const Vec3& point, double stiffness) {
-    const TetherInfo tether = {chain, node, point, stiffness};
-    checkTether(tether, numNodesOfBeam(chain));
-    return addTetherTo(beamTethers, tetheredNodesOfBeams, tether);
-}
-
-void CylinderChainForce::getBeamTetherParameters(int index, int& chain, int& node, Vec3& point,
-        double& stiffness) const {
-    giveTether(beamTethers, index, chain, node, point, stiffness);
-}
-
-void CylinderChainForce::setBeamTetherParameters(int index, int chain, int node, const Vec3& point, double stiffness) {
-    ASSERT_VALID_INDEX(index, beamTethers);
-    const TetherInfo tether = {chain, node, point, stiffness};
-    checkTether(tether, numNodesOfBeam(chain));
-    replaceTether(beamTethers[index], tetheredNodesOfBeams, tether);
+cylchain::ChainList CylinderChainForce::describeChains() const {
+    cylchain::ChainList described = chains;
+    for (const TetherInfo& info : tethers)
+        described.visit(info.chain, [&] (auto& chain) {chain.tethers.push_back(info.tether);});
+    return described;
 }
 
 void CylinderChainForce::updateParametersInContext(Context& context) {

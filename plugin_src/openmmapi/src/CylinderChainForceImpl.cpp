@@ -14,10 +14,8 @@ CylinderChainForceImpl::CylinderChainForceImpl(const CylinderChainForce& owner) 
 void CylinderChainForceImpl::initialize(ContextImpl& context) {
     const System& system = context.getSystem();
     vector<int> chainOfParticle(system.getNumParticles(), -1);
-    const int numChains = owner.getNumChains();
-    for (int chain = 0; chain < numChains+owner.getNumBeamChains(); chain++)
-        for (int particle : chain < numChains ? owner.getChainParticles(chain) :
-                owner.getBeamChainParticles(chain-numChains)) {
+    for (int chain = 0; chain < owner.getNumChains(); chain++)
+        for (int particle : owner.getChainParticles(chain)) {
             if (particle >= system.getNumParticles())
                 throw OpenMMException("CylinderChainForce: Illegal particle index: "+to_string(particle));
             if (chainOfParticle[particle] != -1)
@@ -50,13 +48,6 @@ vector<pair<int, int> > CylinderChainForceImpl::getBondedParticles() const {
         for (size_t i = 1; i < particles.size(); i++)
             bonds.push_back(make_pair(particles[i-1], particles[i]));
         if (owner.isChainClosed(chain))
-            bonds.push_back(make_pair(particles.back(), particles.front()));
-    }
-    for (int chain = 0; chain < owner.getNumBeamChains(); chain++) {
-        const vector<int>& particles = owner.getBeamChainParticles(chain);
-        for (size_t i = 1; i < particles.size(); i++)
-            bonds.push_back(make_pair(particles[i-1], particles[i]));
-        if (owner.isBeamChainClosed(chain))
             bonds.push_back(make_pair(particles.back(), particles.front()));
     }
     return bonds;

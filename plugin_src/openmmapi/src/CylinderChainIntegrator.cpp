@@ -90,11 +90,9 @@ void CylinderChainIntegrator::checkSystem(const System& system, const CylinderCh
     }
     const CylinderChainForce& force = chains.getOwner();
     vector<bool> isNode(system.getNumParticles(), false);
-    const int numChains = force.getNumChains();
-    for (int chain = 0; chain < numChains+force.getNumBeamChains(); chain++) {
+    for (int chain = 0; chain < force.getNumChains(); chain++) {
         bool mobile = false;
-        for (int particle : chain < numChains ? force.getChainParticles(chain) :
-                force.getBeamChainParticles(chain-numChains)) {
+        for (int particle : force.getChainParticles(chain)) {
             if (system.isVirtualSite(particle))
                 throw OpenMMException("Particle "+to_string(particle)+" is a node of chain "+to_string(chain)+
                         " and cannot be a virtual site");

@@ -249,6 +249,14 @@ bool CylinderChainLinkForce::usesPeriodicBoundaryConditions() const {
     return usePeriodic && !joinsTangents;
 }
 
+vector<cylchain::Place> CylinderChainLinkForce::findPlaces(const PlaceResolver& resolver) const {
+    vector<cylchain::Place> places;
+    for (const cylchain::LinkEntry& entry : table.getEntries())
+        for (const cylchain::Place* place : {&entry.link.first, &entry.link.second})
+            places.push_back(joinsTangents ? resolver.resolveTangent(*place) : resolver.resolve(*place));
+    return places;
+}
+
 ForceImpl* CylinderChainLinkForce::createImpl() const {
     return new CylinderChainLinkForceImpl(*this);
 }

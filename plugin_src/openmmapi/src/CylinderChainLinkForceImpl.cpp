@@ -12,7 +12,7 @@
 using namespace OpenMM;
 using namespace std;
 
-CylinderChainLinkForceImpl::CylinderChainLinkForceImpl(const CylinderChainLinkForce& owner) : StepForceImpl(owner),
+CylinderChainLinkForceImpl::CylinderChainLinkForceImpl(const CylinderChainLinkForce& owner) : CouplingForceImpl(owner),
         owner(owner), context(NULL), upToDate(false), version(0), nearestParticles(false) {
 }
 
@@ -149,6 +149,22 @@ double CylinderChainLinkForceImpl::calcForcesAndEnergy(ContextImpl& context, boo
     if (outOfRange != -1)
         reportLink(outOfRange);
     return energy;
+}
+
+vector<cylchain::Place> CylinderChainLinkForceImpl::findPlaces(const PlaceResolver&) {
+    vector<cylchain::Place> found;
+    for (const cylchain::Link& link : getLinks())
+        found.insert(found.end(), {link.first, link.second});
+    return found;
+}
+
+cylchain::ImplicitCouplings* CylinderChainLinkForceImpl::getEquations(ContextImpl& context) {
+    return kernel.getAs<CalcCylinderChainLinkForceKernel>().getEquations(context, getLinks());
+}
+
+string CylinderChainLinkForceImpl::describeFailure(const cylchain::BrokenCoupling& coupling, const string& other) {
+    return describeBrokenLink(coupling, other, links, *context, owner.usesPeriodicBoundaryConditions(),
+            nearestParticles);
 }
 
 void CylinderChainLinkForceImpl::reportLink(int index) {

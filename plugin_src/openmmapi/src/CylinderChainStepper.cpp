@@ -1,6 +1,5 @@
 #include "openmm/internal/CylinderChainStepper.h"
 #include "beams/BeamEngine.h"
-#include "couplings/Links.h"
 #include "mechanics/BrokenSegment.h"
 #include "mechanics/PeriodicBox.h"
 #include "openmm/CylinderChainException.h"
@@ -25,16 +24,14 @@ static Kernel createKernel(ContextImpl& context, CylinderChainForceImpl& force, 
     return kernel;
 }
 
-static vector<int> findMobileParticles(const CylinderChainDescription& chains, const OtherParticles& others) {
+static vector<int> findMobileParticles(const ChainList& chains, const OtherParticles& others) {
     vector<int> mobile = others.getMobile();
-    for (const Chain& chain : chains.getChains())
-        for (size_t node = 0; node < chain.nodes.size(); node++)
-            if (!chain.fixed[node])
-                mobile.push_back(chain.nodes[node]);
-    for (const BeamChain& beam : chains.getBeams())
-        for (size_t i = 0; i < beam.particles.size(); i++)
-            if (!beam.fixed[i])
-                mobile.push_back(beam.particles[i]);
+    for (int number = 0; number < chains.size(); number++)
+        chains.visit(number, [&] (const auto& chain) {
+            for (size_t i = 0; i < chain.fixed.size(); i++)
+                if (!chain.fixed[i])
+                    mobile.push_back(chain.getParticles()[i]);
+        });
     sort(mobile.begin(), mobile.end());
     return mobile;
 }
@@ -49,15 +46,14 @@ static bool isPeriodic(const System& system) {
 
 CylinderChainStepper::CylinderChainStepper(ContextImpl& context, const CylinderChainIntegrator& integrator,
         CylinderChainForceImpl& force) : context(context), integrator(integrator), chains(force.getDescription()),
-        others(context.getSystem(), integrator, chains), couplings(context, chains, others),
+        others(context.getSystem(), integrator, chains), couplings(context, others),
         kernel(createKernel(context, force, others)),
         explicitWork(getKernel().getLoop()), periodic(isPeriodic(context.getSystem())), recorded(false) {
     getKernel().refuseScheme(static_cast<Scheme>(integrator.getScheme()));
     if (isImplicit(static_cast<Scheme>(integrator.getScheme())))
-        couplings.refuseNarrowBox(chains);
-    if (!chains.getBeams().empty())
-        couplings.refuseBeams();
-    explicitWork.initialize(findMobileParticles(chains, others));
+        couplings.refuseBox(chains);
+    couplings.refuseChains(chains);
+    explicitWork.initialize(findMobileParticles(chains.getList(), others));
 }
 
 IntegrateCylinderChainStepKernel& CylinderChainStepper::getKernel() {
@@ -129,66 +125,60 @@ void CylinderChainStepper::refuseBeams(Scheme scheme, double kT) const {
     for (size_t i = 0; i < chains.getBeams().size(); i++) {
         const double lengths = kT*chains.getBeams()[i].elementLength/chains.getBeams()[i].bendingRigidity;
         if (lengths > BeamEngine::LONGEST_ELEMENT) {
+            const int chain = chains.getList().getNumber(ChainKind::BeamElements, i);
             stringstream message;
-            message << "CylinderChainIntegrator: The elements of beam chain " << i << " are " << lengths <<
+            message << "The elements of " << chains.getList().getNameInSentence(chain) << " are " << lengths <<
                     " persistence lengths long, and must not be longer than " << BeamEngine::LONGEST_ELEMENT <<
                     ": divide it into more elements";
-            throw OpenMMException(message.str());
+            throw CylinderChainException(CylinderChainException::ElementTooLong, {chain}, message.str());
         }
     }
 }
 
-void CylinderChainStepper::refuseTornBeams() const {
-    const vector<Vec3> positions = getPositions();
-    double box[9];
-    getBox(box);
-    const double half = 0.5*min({box[0], box[4], box[8]});
-    for (size_t chain = 0; chain < chains.getBeams().size(); chain++) {
-        const BeamChain& beam = chains.getBeams()[chain];
-        const size_t count = beam.particles.size();
-        for (size_t i = 1; i < count+(beam.closed ? 1 : 0); i++) {
-            const Vec3 between = positions[beam.particles[i%count]]-positions[beam.particles[i-1]];
-            if (norm(between) <= max(half, 2*beam.elementLength))
-                continue;
-            double nearest[] = {between[0], between[1], between[2]};
-            takeToNearestImage(nearest, box);
-            if (norm(Vec3(nearest[0], nearest[1], nearest[2])) < 0.999*norm(between))
-                throw OpenMMException("Beam chain "+to_string(chain)+" is torn between its particles "+
-                        to_string(i-1)+" and "+to_string(i%count)+": positions were wrapped into the periodic box "
-                        "particle by particle. Make chains whole before setting them");
-        }
-    }
+/** How long the part of a chain that has its particle i is. */
+static double getLengthAtRest(const Chain& chain, size_t i) {
+    return chain.segments[i].restLength;
+}
+
+static double getLengthAtRest(const BeamChain& beam, size_t) {
+    return beam.elementLength;
+}
+
+static string describePart(ChainKind kind, int part) {
+    return (kind == ChainKind::BeamElements ? "element " : "segment ")+to_string(part);
 }
 
 void CylinderChainStepper::refuseTornChains() const {
     if (!periodic || chains.usesPeriodicBoundaryConditions())
         return;
-    refuseTornBeams();
     const vector<Vec3> positions = getPositions();
     double box[9];
     getBox(box);
     const double half = 0.5*min({box[0], box[4], box[8]});
-    for (size_t chain = 0; chain < chains.getChains().size(); chain++) {
-        const vector<int>& nodes = chains.getChains()[chain].nodes;
-        const vector<Segment>& segments = chains.getChains()[chain].segments;
-        for (size_t s = 0; s < segments.size(); s++) {
-            const Vec3 between = positions[nodes[(s+1)%nodes.size()]]-positions[nodes[s]];
-            const double length = norm(between);
-            if (length <= max(half, 2*segments[s].restLength))
-                continue;
-            double nearest[] = {between[0], between[1], between[2]};
-            takeToNearestImage(nearest, box);
-            const double shorter = norm(Vec3(nearest[0], nearest[1], nearest[2]));
-            if (shorter < 0.999*length) {
+    for (int number = 0; number < chains.getList().size(); number++)
+        chains.getList().visit(number, [&] (const auto& chain) {
+            const vector<int>& particles = chain.getParticles();
+            const size_t count = particles.size(), parts = chain.closed ? count : count-1;
+            for (size_t i = 0; i < parts; i++) {
+                const Vec3 between = positions[particles[(i+1)%count]]-positions[particles[i]];
+                const double length = norm(between);
+                if (length <= max(half, 2*getLengthAtRest(chain, i)))
+                    continue;
+                double nearest[] = {between[0], between[1], between[2]};
+                takeToNearestImage(nearest, box);
+                const double shorter = norm(Vec3(nearest[0], nearest[1], nearest[2]));
+                if (shorter >= 0.999*length)
+                    continue;
+                const ChainKind kind = chains.getList().getKind(number);
+                const int part = kind == ChainKind::BeamElements ? i/2 : i;
                 stringstream message;
-                message << "Chain " << chain << " is torn at segment " << s << ": its ends are " << length <<
-                        " nm apart, and " << shorter <<
+                message << chains.getList().getName(number) << " is torn at " << describePart(kind, part) <<
+                        ": particles of it are " << length << " nm apart, and " << shorter <<
                         " nm as nearest images. Positions were wrapped into the periodic box particle by particle: "
                         "make chains whole before setting them";
-                throw CylinderChainException(CylinderChainException::TornChain, {(int) chain, (int) s}, message.str());
+                throw CylinderChainException(CylinderChainException::TornChain, {number, part}, message.str());
             }
-        }
-    }
+        });
 }
 
 /** Whether a segment can have a length. NaN counts as such, because it has reasons of its own. */
@@ -221,11 +211,11 @@ void CylinderChainStepper::refuseInfiniteEnergies() const {
                 takeToNearestImage(&between[0], box);
             if (isInRange(own.segments[s], norm(between)))
                 continue;
+            const int number = chains.getList().getNumber(ChainKind::StraightSegments, chain);
             stringstream message;
-            message << "Chain " << chain << " is out of range at segment " << s << ": it is " << norm(between) <<
-                    " nm long, and " << describeRange(own.segments[s]) << ". Set other positions";
-            throw CylinderChainException(CylinderChainException::LengthOutOfRange, {(int) chain, (int) s},
-                    message.str());
+            message << chains.getList().getName(number) << " is out of range at segment " << s << ": it is " <<
+                    norm(between) << " nm long, and " << describeRange(own.segments[s]) << ". Set other positions";
+            throw CylinderChainException(CylinderChainException::LengthOutOfRange, {number, (int) s}, message.str());
         }
     }
 }
@@ -252,22 +242,16 @@ void CylinderChainStepper::step(uint64_t seed, int level, uint64_t step, bool fo
     takeNoteOfForces(settings, followsOn);
     getKernel().displaceOthers(context, settings, integrator.getFriction());
     const CoupledForces& coupled = couplings.describe(getCoupledGroups(), integrator.getFriction());
-    if (settings.scheme == Scheme::ImplicitSecondOrder && !(coupled.contacts.empty() && coupled.walls.empty()))
-        throw OpenMMException("CylinderChainIntegrator: Contacts and walls are for scheme Implicit: in the two stages "
-                "of ImplicitSecondOrder they would not keep their equilibrium");
+    if (settings.scheme == Scheme::ImplicitSecondOrder)
+        couplings.refuseTwoStages(getCoupledGroups());
     const Instability found = coupled.empty() ? getKernel().displaceChains(context, settings) :
             getKernel().displaceCoupledChains(context, settings, coupled);
-    if (found.chain != -1 && found.coupling.kind != BrokenCoupling::None && areForcesFinite())
+    if (found.chain != -1 && found.coupling.force != -1 && areForcesFinite())
         reportCoupling(found.coupling, coupled, settings);
-    const int numChains = chains.getChains().size(), numFilaments = numChains+chains.getBeams().size();
-    if (found.chain >= numChains && found.chain < numFilaments)
-        throw OpenMMException("Beam chain "+to_string(found.chain-numChains)+" has blown up in step "+
-                to_string(settings.step+1)+": its equations cannot be solved. Positions are those before this step. "
-                "Use a smaller time step, or look for excessive forces");
-    if (found.chain >= numFilaments)
-        reportParticle(coupled.particles[found.chain-numFilaments].particle, settings);
+    if (found.chain >= chains.getList().size())
+        reportParticle(coupled.particles[found.chain-chains.getList().size()].particle, settings);
     if (found.chain != -1)
-        reportInstability(found.chain, settings);
+        reportInstability(chains.getList().getNumberOfStep(found.chain), settings);
     divided += found.divided;
     const int particle = getKernel().findUnstableParticle();
     if (particle != -1)
@@ -322,9 +306,10 @@ void CylinderChainStepper::getMeanTensions(int chain, vector<double>& tensions, 
         throw CylinderChainException(CylinderChainException::NothingRecorded, {chain},
                 "No tensions were recorded in the last step: call setRecordsTensions(true) before it, "
                 "with an implicit scheme");
-    if (chain < 0 || chain >= (int) segmentForces.size())
-        throw OpenMMException("CylinderChainIntegrator: Illegal chain index: "+to_string(chain));
-    const vector<SegmentForces>& forces = segmentForces[chain];
+    if (chain < 0 || chain >= chains.getList().size() ||
+            chains.getList().getKind(chain) != ChainKind::StraightSegments)
+        throw OpenMMException("CylinderChainIntegrator: There is no chain of straight segments "+to_string(chain));
+    const vector<SegmentForces>& forces = segmentForces[chains.getList().getIndex(chain)];
     tensions.clear();
     jointForces.clear();
     directions.clear();
@@ -337,7 +322,7 @@ void CylinderChainStepper::getMeanTensions(int chain, vector<double>& tensions, 
     // Forces from outside act on both segments of a joint in equal parts, which leaves half the difference of their
     // own.
 
-    for (size_t joint = 0; joint < chains.getChains()[chain].joints.size(); joint++) {
+    for (size_t joint = 0; joint < chains.getList().getChain(chain).joints.size(); joint++) {
         const double* before = forces[joint].plus;
         const double* behind = forces[(joint+1)%forces.size()].minus;
         jointForces.push_back(Vec3(behind[0]-before[0], behind[1]-before[1], behind[2]-before[2])*0.5);
@@ -353,16 +338,21 @@ int CylinderChainStepper::getNumMixedPrecisionChains() const {
 }
 
 void CylinderChainStepper::reportInstability(int chain, const StepSettings& settings) {
-    const Chain& culprit = chains.getChains()[chain];
+    const long long step = settings.step+1;
+    if (chains.getList().getKind(chain) == ChainKind::BeamElements)
+        throw CylinderChainException(CylinderChainException::UnstableChain, {chain, -1, -1, step},
+                chains.getList().getName(chain)+" has blown up in step "+to_string(step)+": its equations cannot be "
+                "solved. Positions are those before this step. Use a smaller time step, or look for excessive forces.");
+    const Chain& culprit = chains.getList().getChain(chain);
     vector<Vec3> positions = getPositions(), forces = getKernel().getForces(context);
     vector<Vec3> displacements = getKernel().getDisplacements();
     double box[9];
     getBox(box);
     const BrokenSegment broken = findBrokenSegment(culprit, &positions[0][0], &forces[0][0], &displacements[0][0],
             chains.usesPeriodicBoundaryConditions() ? box : NULL, isImplicit(settings.scheme));
-    const long long step = settings.step+1;
     stringstream message;
-    message << "Chain " << chain << " has blown up at segment " << broken.segment << " in step " << step << ": ";
+    message << chains.getList().getName(chain) << " has blown up at segment " << broken.segment << " in step " <<
+            step << ": ";
     switch (broken.reason) {
         case BrokenSegment::NotFinite:
             message << "the force on it, or its position, is not finite";
@@ -390,85 +380,48 @@ bool CylinderChainStepper::areForcesFinite() {
     return all_of(forces.begin(), forces.end(), [] (const Vec3& force) {return isfinite(norm(force));});
 }
 
-string CylinderChainStepper::describeLink(const BrokenCoupling& coupling, const CoupledForces& coupled) const {
-    const CoupledForces::Links& links = coupled.links[coupling.force];
-    double box[9];
-    getBox(box);
-    const LinkBoxes boxes = {links.periodic ? box : NULL, links.nearestParticles ? box : NULL};
-    const auto link = find_if(links.links->begin(), links.links->end(), [&] (const Link& one) {
-        return one.number == coupling.link;
-    });
-    vector<Vec3> positions = getPositions();
-    const LinkPull pull = computePull(*link, &positions[0][0], boxes);
-    stringstream text;
-    text.precision(3);
-    text << pull.length << " nm long and has a force of " <<
-            norm(Vec3(pull.force[0], pull.force[1], pull.force[2])) << " kJ/mol/nm";
-    return text.str();
-}
-
 void CylinderChainStepper::reportCoupling(const BrokenCoupling& coupling, const CoupledForces& coupled,
         const StepSettings& settings) {
-    const int numChains = chains.getChains().size(), numFilaments = numChains+chains.getBeams().size();
-    auto isSegment = [&] (const BrokenCoupling::Place& place) {return place.chain >= 0 && place.chain < numFilaments;};
-    auto isElement = [&] (const BrokenCoupling::Place& place) {return isSegment(place) && place.chain >= numChains;};
+    const ChainList& list = chains.getList();
+    auto isPart = [&] (const BrokenCoupling::Place& place) {return place.chain >= 0 && place.chain < list.size();};
     auto particleOf = [&] (const BrokenCoupling::Place& place) {
-        return place.chain < numFilaments ? -1 : coupled.particles[place.chain-numFilaments].particle;
+        return place.chain < list.size() ? -1 : coupled.particles[place.chain-list.size()].particle;
     };
     auto describe = [&] (const BrokenCoupling::Place& place) {
-        if (isElement(place))
-            return "element "+to_string(place.segment)+" of beam chain "+to_string(place.chain-numChains);
-        if (isSegment(place))
-            return "segment "+to_string(place.segment)+" of chain "+to_string(place.chain);
-        const int particle = particleOf(place);
-        return particle < 0 ? string("what does not move") : "particle "+to_string(particle);
+        if (!isPart(place)) {
+            const int particle = particleOf(place);
+            return particle < 0 ? string("what does not move") : "particle "+to_string(particle);
+        }
+        const int chain = list.getNumberOfStep(place.chain);
+        return describePart(list.getKind(chain), place.segment)+" of "+list.getNameInSentence(chain);
     };
 
     // The first one is a segment, or at least a particle.
 
     BrokenCoupling::Place first = coupling.places[0], second = coupling.places[1];
-    if (!isSegment(first) && (isSegment(second) || first.chain < 0))
+    if (!isPart(first) && (isPart(second) || first.chain < 0))
         swap(first, second);
     CylinderChainException::Place place;
     place.step = settings.step+1;
     place.particle = max(particleOf(first), particleOf(second));
     stringstream message;
-    if (isSegment(first)) {
-        place.chain = first.chain;
+    if (isPart(first)) {
+        place.chain = list.getNumberOfStep(first.chain);
         place.segment = first.segment;
-        if (isElement(first))
-            message << "Beam chain " << first.chain-numChains << " has blown up at element " << first.segment;
-        else
-            message << "Chain " << first.chain << " has blown up at segment " << first.segment;
+        message << list.getName(place.chain) << " has blown up at " <<
+                describePart(list.getKind(place.chain), place.segment);
     }
     else
-        message << "Particle " << place.particle << ", outside chains, has blown up";
-    if (isSegment(second)) {
-        place.otherChain = second.chain;
+        message << "Particle " << place.particle << ", outside filaments, has blown up";
+    if (isPart(second)) {
+        place.otherChain = list.getNumberOfStep(second.chain);
         place.otherSegment = second.segment;
     }
     message << " in step " << place.step << ": ";
-    switch (coupling.kind) {
-        case BrokenCoupling::Contact:
-            if (coupling.reason == BrokenCoupling::Crosses)
-                message << "it would pass through " << describe(second) << ", however short the parts of the step";
-            else if (coupling.reason == BrokenCoupling::LeavesBox)
-                message << "it moves too far for the periodic box, which must be wider than twice what a segment with "
-                        "its diameter passes over in a step";
-            else
-                message << "its contact with " << describe(second) << " cannot be solved";
-            break;
-        case BrokenCoupling::Link:
-            place.link = coupling.link;
-            message << "link " << place.link << " to " << describe(second) <<
-                    (coupling.reason == BrokenCoupling::LeavesRange ? " would leave the range of its potential" :
-                    " cannot be solved") <<
-                    ". It is " << describeLink(coupling, coupled);
-            break;
-        default:
-            message << "a wall cannot hold it";
-    }
-    message << " (" << couplings.getForce(coupling).getName() << "). Positions are those before this step. "
+    CouplingForceImpl& force = couplings.getForce(coupling);
+    message << force.describeFailure(coupling, describe(second));
+    place.link = coupling.link;
+    message << " (" << force.getOwner().getName() << "). Positions are those before this step. "
             "Use a smaller time step, or look for overlapping particles or excessive forces.";
     throw CylinderChainException(place.chain >= 0 ? CylinderChainException::UnstableChain :
             CylinderChainException::UnstableParticle, place, message.str());
@@ -477,7 +430,7 @@ void CylinderChainStepper::reportCoupling(const BrokenCoupling& coupling, const 
 void CylinderChainStepper::reportParticle(int particle, const StepSettings& settings) const {
     const long long step = settings.step+1;
     throw CylinderChainException(CylinderChainException::UnstableParticle, {-1, -1, particle, step},
-            "Particle "+to_string(particle)+", outside chains, has blown up in step "+to_string(step)+
+            "Particle "+to_string(particle)+", outside filaments, has blown up in step "+to_string(step)+
             ": the force on it is not finite. Positions are those before this step. "
             "Use a smaller time step, or look for overlapping particles.");
 }

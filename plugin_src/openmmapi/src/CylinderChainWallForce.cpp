@@ -105,6 +105,18 @@ int CylinderChainWallForce::addForceReader(Context& context) {
     return dynamic_cast<CylinderChainWallForceImpl&>(getImplInContext(context)).addReader();
 }
 
+std::vector<cylchain::Place> CylinderChainWallForce::findPlaces(const PlaceResolver& resolver) const {
+    std::vector<cylchain::Place> places;
+    for (const ParticleInfo& info : particles) {
+        // A particle between two others is not on a chain for a wall, but one on a curve is.
+        cylchain::Place alone;
+        alone.first = info.particle;
+        const cylchain::Place place = resolver.resolve(alone);
+        places.push_back(place.isOnCurve() ? place : alone);
+    }
+    return places;
+}
+
 ForceImpl* CylinderChainWallForce::createImpl() const {
     return new CylinderChainWallForceImpl(*this);
 }

@@ -22,12 +22,10 @@ WallSystem CylinderChainWallForceImpl::describe() const {
     copy(&point[0], &point[0]+3, result.wall.point);
     copy(&vector[0], &vector[0]+3, result.wall.vector);
     result.stiffness = owner.getStiffness();
+    const std::vector<Place> found = owner.findPlaces(*places);
     for (int i = 0; i < owner.getNumParticles(); i++) {
-        Place place;
-        place.first = owner.getParticle(i);
-        const Place resolved = places->resolve(place);
         result.particles.push_back({owner.getParticle(i), owner.getParticleRadius(i),
-                resolved.isOnCurve() ? resolved : Place()});
+                found[i].isOnCurve() ? found[i] : Place()});
         if (!(owner.getParticleRadius(i) < getRoom(result.wall)))
             throw OpenMMException("CylinderChainWallForce: Particle "+to_string(owner.getParticle(i))+
                     " with its radius does not fit into the "+shape);
@@ -76,4 +74,12 @@ void CylinderChainWallForceImpl::updateParametersInContext(ContextImpl& context)
     walls = present;
     kernel.getAs<CalcCylinderChainWallForceKernel>().copyParametersToContext(context, walls);
     context.systemChanged();
+}
+
+ImplicitCouplings* CylinderChainWallForceImpl::getEquations(ContextImpl&) {
+    return kernel.getAs<CalcCylinderChainWallForceKernel>().getEquations(getImpulses());
+}
+
+string CylinderChainWallForceImpl::describeFailure(const BrokenCoupling&, const string&) {
+    return "a wall cannot hold it";
 }

@@ -79,27 +79,27 @@ void checkLinkers(const vector<Linker>& linkers, const LinkerSystem& system, con
             const HandPlace& place = linker.hands[side];
             if (!place.isBound()) {
                 if (place.chain < -1)
-                    refuseLinkers(name+" is bound to an illegal chain: "+to_string(place.chain));
+                    refuseLinkers(name+" is bound to an illegal filament: "+to_string(place.chain));
                 continue;
             }
             if (type.hands[side] < 0)
                 refuseLinkers(name+" has an anchor in the place of its first hand, but is bound with it");
             const Hand& hand = system.hands[type.hands[side]];
             if (!binary_search(hand.chains.begin(), hand.chains.end(), place.chain))
-                refuseLinkers(name+" is bound to chain "+to_string(place.chain)+", to which its hand does not bind");
+                refuseLinkers(name+" is bound to filament "+to_string(place.chain)+", to which its hand does not bind");
             if (!(place.position >= 0))
-                refuseLinkers(name+" is bound at an illegal position along chain "+to_string(place.chain));
+                refuseLinkers(name+" is bound at an illegal position along filament "+to_string(place.chain));
             if (lengths.empty())
                 continue;
             const double length = lengths[place.chain];
             if (!(place.position <= length*(1+1e-9)))
-                refuseLinkers(name+" is bound "+to_string(place.position)+" nm along chain "+to_string(place.chain)+
+                refuseLinkers(name+" is bound "+to_string(place.position)+" nm along filament "+to_string(place.chain)+
                         ", which is only "+to_string(length)+" nm long");
             if (hand.siteSpacing > 0) {
                 const long long site = (long long) floor(place.position/hand.siteSpacing);
                 if (site >= floor(length/hand.siteSpacing+1e-9) ||
                         !sites.insert(make_tuple(place.chain, hand.siteSpacing, site)).second)
-                    refuseLinkers(name+" is bound to site "+to_string(site)+" of chain "+to_string(place.chain)+
+                    refuseLinkers(name+" is bound to site "+to_string(site)+" of filament "+to_string(place.chain)+
                             ", which does not exist or is taken");
             }
         }

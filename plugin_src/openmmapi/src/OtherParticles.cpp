@@ -7,11 +7,8 @@ OtherParticles::OtherParticles(const System& system, const CylinderChainIntegrat
         const CylinderChainDescription& chains) {
     const int numParticles = system.getNumParticles();
     vector<bool> isNode(numParticles, false);
-    for (const cylchain::Chain& chain : chains.getChains())
-        for (int node : chain.nodes)
-            isNode[node] = true;
-    for (const cylchain::BeamChain& beam : chains.getBeams())
-        for (int particle : beam.particles)
+    for (int chain = 0; chain < chains.getList().size(); chain++)
+        for (int particle : chains.getList().getParticles(chain))
             isNode[particle] = true;
     masses.resize(numParticles);
     for (int i = 0; i < numParticles; i++) {

@@ -1,6 +1,7 @@
 #include "openmm/internal/PlaceResolver.h"
 #include "mechanics/BezierWeights.h"
 #include "openmm/CylinderChainForce.h"
+#include "openmm/OpenMMException.h"
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -12,28 +13,60 @@ using namespace std;
 /** Weights of virtual sites that differ by less are the same. */
 static const double SAME_WEIGHT = 1e-12;
 
-PlaceResolver::PlaceResolver(const System& system) : system(system) {
+PlaceResolver::PlaceResolver(const System& system) : system(system), next(system.getNumParticles(), -1),
+        controls(system.getNumParticles(), -1), elementLengths(system.getNumParticles(), 0),
+        isOfChain(system.getNumParticles(), false), isControl(system.getNumParticles(), false) {
     for (int i = 0; i < system.getNumForces(); i++) {
         const CylinderChainForce* force = dynamic_cast<const CylinderChainForce*>(&system.getForce(i));
-        if (force == NULL || force->getNumBeamChains() == 0)
-            continue;
-        controls.resize(system.getNumParticles(), -1);
-        next.resize(system.getNumParticles(), -1);
-        isControl.resize(system.getNumParticles(), false);
-        elementLengths.resize(system.getNumParticles(), 0);
-        for (int chain = 0; chain < force->getNumBeamChains(); chain++) {
-            const vector<int>& particles = force->getBeamChainParticles(chain);
-            double length, modulus, rigidity, shortening, parallel, perpendicular;
-            force->getBeamChainParameters(chain, length, modulus, rigidity, shortening, parallel, perpendicular);
-            for (size_t node = 0; node+1 < particles.size(); node += 2) {
-                controls[particles[node]] = particles[node+1];
-                elementLengths[particles[node]] = length;
-                isControl[particles[node+1]] = true;
-                if (node+2 < particles.size() || force->isBeamChainClosed(chain))
-                    next[particles[node]] = particles[(node+2)%particles.size()];
-            }
-        }
+        for (int chain = 0; force != NULL && chain < force->getNumChains(); chain++)
+            force->getChains().visit(chain, [&] (const auto& own) {add(own);});
     }
+}
+
+void PlaceResolver::add(const Chain& chain) {
+    const size_t nodes = chain.nodes.size();
+    for (size_t node = 0; node < nodes; node++) {
+        isOfChain[chain.nodes[node]] = true;
+        if (node+1 < nodes || chain.closed)
+            next[chain.nodes[node]] = chain.nodes[(node+1)%nodes];
+    }
+}
+
+void PlaceResolver::add(const BeamChain& chain) {
+    const vector<int>& particles = chain.particles;
+    for (size_t node = 0; node+1 < particles.size(); node += 2) {
+        isOfChain[particles[node]] = isOfChain[particles[node+1]] = isControl[particles[node+1]] = true;
+        controls[particles[node]] = particles[node+1];
+        elementLengths[particles[node]] = chain.elementLength;
+        if (node+2 < particles.size() || chain.closed)
+            next[particles[node]] = particles[(node+2)%particles.size()];
+    }
+}
+
+bool PlaceResolver::isMovedBySteps(const Place& place) const {
+    if (place.isPoint())
+        return true;
+    auto isFixed = [&] (int particle) {
+        return system.getParticleMass(particle) == 0.0 && !isOfChain[particle] && !system.isVirtualSite(particle);
+    };
+    if (!place.isOnSegment())
+        return !system.isVirtualSite(place.first) && !isControl[place.first];
+    // The line between two nodes of a beam element is not on it.
+    const bool isOfBeam = isControl[place.first] || controls[place.first] >= 0;
+    const bool isOnChain = place.isOnCurve() == isOfBeam &&
+            (next[place.first] == place.second || next[place.second] == place.first);
+    return isOnChain || (isFixed(place.first) && isFixed(place.second));
+}
+
+string PlaceResolver::whyExplicit(const vector<Place>& places) const {
+    const auto found = find_if(places.begin(), places.end(), [&] (const Place& place) {
+        return !isMovedBySteps(place);
+    });
+    if (found == places.end())
+        return "";
+    if (found->isOnSegment())
+        return "the place between particles "+to_string(found->first)+" and "+to_string(found->second);
+    return (isControl[found->first] ? "control point " : "virtual site ")+to_string(found->first);
 }
 
 static Place placeBetween(int first, int second, double fraction) {
@@ -44,11 +77,18 @@ static Place placeBetween(int first, int second, double fraction) {
     return place;
 }
 
+void PlaceResolver::checkParticles(const Place& place) const {
+    for (int particle : {place.first, place.second})
+        if (particle >= system.getNumParticles())
+            throw OpenMMException("Illegal particle index: "+to_string(particle));
+}
+
 Place PlaceResolver::resolve(const Place& place) const {
+    checkParticles(place);
     if (place.isPoint())
         return place;
     if (place.isOnSegment()) {
-        if (next.empty())
+        if (controls[place.first] < 0 || controls[place.second] < 0)
             return place;
         Place result = place;
         if (next[place.second] == place.first) {
@@ -90,7 +130,7 @@ Place PlaceResolver::resolveTangent(const Place& place) const {
 /** Find where a site of two nodes and their control points is, if their weights are those of their curve. */
 bool PlaceResolver::findOnCurve(const VirtualSite& any, Place& place) const {
     const LocalCoordinatesSite* site = dynamic_cast<const LocalCoordinatesSite*>(&any);
-    if (next.empty() || site == NULL || site->getNumParticles() != 4 || site->getLocalPosition() != Vec3())
+    if (site == NULL || site->getNumParticles() != 4 || site->getLocalPosition() != Vec3())
         return false;
     const int first = site->getParticle(0), second = site->getParticle(2);
     if (next[first] != second || !isControlOf(site->getParticle(1), first) ||

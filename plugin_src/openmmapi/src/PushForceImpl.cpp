@@ -8,6 +8,11 @@ using namespace OpenMM;
 using namespace cylchain;
 using namespace std;
 
+void PushForceImpl::refuseTwoStages() const {
+    throw OpenMMException("CylinderChainIntegrator: Contacts and walls are for scheme Implicit: in the two stages of "
+            "ImplicitSecondOrder they would not keep their equilibrium");
+}
+
 double PushForceImpl::takeMeanForces(ContextImpl& context, int reader, vector<double>& forces, vector<int>& numbers,
         vector<double>& sums, vector<double>& loads) {
     if (reader < 0 || reader >= (int) impulses.getReaders().size())

@@ -3,7 +3,7 @@
 
 #include "kinetics/Linkers.h"
 #include "openmm/Context.h"
-#include "openmm/Force.h"
+#include "openmm/CylinderChainCoupling.h"
 #include "openmm/Vec3.h"
 #include <vector>
 
@@ -27,15 +27,14 @@ namespace OpenMM {
  *
  * With the first law of unbinding and without speed, equilibrium is that of the energies, whatever the step is.
  * Lengths along a filament are those of its segments at rest, from its first node, the minus end, to its last, the plus
- * end.  Chains of beam elements, to whose curves hands bind, have their numbers behind all other chains: beam chain i
- * is chain n+i, where n is getNumChains() of the CylinderChainForce.
+ * end.  Hands bind to the curves of beam elements.
  *
  * Which linkers there are and where they are bound belongs to each Context; this object holds what every new Context
  * begins with.  A parameter of the Context counts the steps that they have taken.  CylinderChainIntegrator writes them
  * into its checkpoints, and into States that hold the parameters of the Integrator.  With other Integrators, save what
  * getLinkersInContext() returns beside the State, and give it to setLinkersInContext().
  */
-class CylinderChainBindingForce : public Force {
+class CylinderChainBindingForce : public CylinderChainCoupling {
 public:
     /**
      * Create a CylinderChainBindingForce.
@@ -309,6 +308,7 @@ public:
      * Get the description of a type of linkers.  This is for internal use.
      */
     const cylchain::LinkerType& getLinkerType(int type) const;
+    std::vector<cylchain::Place> findPlaces(const PlaceResolver& resolver) const;
 protected:
     ForceImpl* createImpl() const;
 private:

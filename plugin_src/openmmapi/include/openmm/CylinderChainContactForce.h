@@ -2,7 +2,7 @@
 #define OPENMM_CYLINDERCHAINCONTACTFORCE_H_
 
 #include "openmm/Context.h"
-#include "openmm/Force.h"
+#include "openmm/CylinderChainCoupling.h"
 #include <vector>
 
 namespace OpenMM {
@@ -22,7 +22,7 @@ namespace OpenMM {
  * The force is taken at the present positions, with every Integrator.  After a Context has been created, the stiffness
  * and diameters may be changed: call updateParametersInContext() to copy them over.
  */
-class CylinderChainContactForce : public Force {
+class CylinderChainContactForce : public CylinderChainCoupling {
 public:
     /**
      * Create a CylinderChainContactForce.
@@ -205,6 +205,7 @@ public:
      * Get whether this Force makes use of periodic boundary conditions.
      */
     bool usesPeriodicBoundaryConditions() const;
+    std::vector<cylchain::Place> findPlaces(const PlaceResolver& resolver) const;
 protected:
     ForceImpl* createImpl() const;
 private:

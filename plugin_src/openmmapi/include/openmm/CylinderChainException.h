@@ -9,6 +9,7 @@
  * What may be wrong with chains.
  *
  * - TornChain: positions were wrapped into a periodic box particle by particle.
+ * - ElementTooLong: beam elements are too long for their persistence length.
  * - LengthOutOfRange: a segment has a length at which its energy is infinite.
  * - UnstableChain: a chain has blown up.
  * - UnstableParticle: a particle outside chains has blown up.
@@ -18,6 +19,7 @@
  */
 #define CYLCHAIN_EXCEPTION_KINDS(ENTRY) \
     ENTRY(TornChain, "torn-chain") \
+    ENTRY(ElementTooLong, "element-too-long") \
     ENTRY(LengthOutOfRange, "length-out-of-range") \
     ENTRY(UnstableChain, "unstable-chain") \
     ENTRY(UnstableParticle, "unstable-particle") \

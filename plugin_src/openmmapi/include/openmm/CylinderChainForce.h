@@ -2,6 +2,7 @@
 #define OPENMM_CYLINDERCHAINFORCE_H_
 
 #include "mechanics/BendingModels.h"
+#include "mechanics/ChainList.h"
 #include "mechanics/StretchingModels.h"
 #include "openmm/Context.h"
 #include "openmm/Force.h"
@@ -22,6 +23,10 @@ namespace OpenMM {
  * other meet in a joint with a bending energy.  To use this class, create a CylinderChainForce object, then call
  * addChain() once for each chain.  All segments and joints of a chain begin with the same parameters; call
  * setSegmentParameters() and setJointParameters() for chains that are not uniform.
+ *
+ * A chain may also be made of beam elements, which bend inside: see addBeamChain().  All chains are in one list, and
+ * numbered in the order in which they are added, whatever their kind.  Functions that name segments, joints or models
+ * are for chains of straight segments, and those that name beam chains for those of beam elements.
  *
  * A chain may be closed: a ring, whose last segment joins its last node and its first.  Segments may propel themselves:
  * see setSegmentPropulsion().  A chain may be confined to a plane: see setChainPlanar().  Nodes may be tethered to
@@ -48,6 +53,11 @@ public:
      */
     enum StretchingModel : int {CYLCHAIN_STRETCHING_MODELS(CYLCHAIN_ENUMERATOR)};
     /**
+     * What a chain is made of.
+     */
+    enum ChainKind : int {StraightSegments = (int) cylchain::ChainKind::StraightSegments,
+            BeamElements = (int) cylchain::ChainKind::BeamElements};
+    /**
      * Get the names of all bending models, in the order of BendingModel.
      */
     static std::vector<std::string> getBendingModelNames();
@@ -60,11 +70,24 @@ public:
      */
     CylinderChainForce();
     /**
-     * Get the number of chains.
+     * Get the number of chains, of all kinds.
      */
     int getNumChains() const {
         return chains.size();
     }
+    /**
+     * Get what a chain is made of, a ChainKind.
+     */
+    int getChainKind(int chain) const;
+    /**
+     * Get the name by which errors call a chain.
+     */
+    const std::string& getChainName(int chain) const;
+    /**
+     * Set the name by which errors call a chain, at the beginning of a sentence.  It is "Chain" and its number unless
+     * this is called.
+     */
+    void setChainName(int chain, const std::string& name);
     /**
      * Add a chain.  Segments may have no friction at all if its nodes are given some, by setChainNodeFriction().
      *
@@ -93,7 +116,7 @@ public:
             double parallelFriction, double perpendicularFriction, double rotationalFriction,
             double extensionalFriction, bool closed = false);
     /**
-     * Get the particles that are the nodes of a chain.
+     * Get the particles of a chain: its nodes, or the position and the control point of each node.
      *
      * @param chain  the index of the chain
      * @return the indices of the particles, in the order of the chain
@@ -235,21 +258,11 @@ public:
      * @param planar                whether particles keep their z
      * @param closed                whether one more element leads from the last node to the first; there must be at
      *                              least three nodes then
-     * @return the index of the chain among those of beam elements
+     * @return the index of the chain that was added
      */
     int addBeamChain(const std::vector<int>& particles, double elementLength, double stretchingModulus,
             double bendingRigidity, double shortening, double parallelFriction, double perpendicularFriction,
             bool planar = false, bool closed = false);
-    /**
-     * Get the number of chains of beam elements.
-     */
-    int getNumBeamChains() const {
-        return beams.size();
-    }
-    /**
-     * Get the particles of a chain of beam elements.
-     */
-    const std::vector<int>& getBeamChainParticles(int chain) const;
     /**
      * Get the parameters of a chain of beam elements, see addBeamChain().
      */
@@ -260,14 +273,6 @@ public:
      */
     void setBeamChainParameters(int chain, double elementLength, double stretchingModulus, double bendingRigidity,
             double shortening, double parallelFriction, double perpendicularFriction);
-    /**
-     * Get whether the particles of a chain of beam elements keep their z.
-     */
-    bool isBeamChainPlanar(int chain) const;
-    /**
-     * Get whether a chain of beam elements is closed: a ring, whose last element leads from its last node to the first.
-     */
-    bool isBeamChainClosed(int chain) const;
     /**
      * Get the propulsion of a chain of beam elements.
      *
@@ -292,7 +297,7 @@ public:
      * CylinderChainIntegrator's scheme Implicit treats tethers like the other forces of chains, so they may be as stiff
      * as segments.
      *
-     * @param chain      the index of the chain
+     * @param chain      the index of the chain, of any kind
      * @param node       the index of the node in the chain
      * @param point      the point, measured in nm
      * @param stiffness  the stiffness k of the spring, measured in kJ/mol/nm^2
@@ -320,42 +325,6 @@ public:
      */
     void setTetherParameters(int index, int chain, int node, const Vec3& point, double stiffness);
     /**
-     * Get the number of tethers of chains of beam elements.
-     */
-    int getNumBeamTethers() const {
-        return beamTethers.size();
-    }
-    /**
-     * Tether a node of a chain of beam elements to a point: see addTether().
-     *
-     * @param chain      the index of the chain among those of beam elements
-     * @param node       the index of the node in the chain
-     * @param point      the point, measured in nm
-     * @param stiffness  the stiffness k of the spring, measured in kJ/mol/nm^2
-     * @return the index of the tether among those of chains of beam elements
-     */
-    int addBeamTether(int chain, int node, const Vec3& point, double stiffness);
-    /**
-     * Get the parameters of a tether of a chain of beam elements.
-     *
-     * @param index           the index of the tether among those of chains of beam elements
-     * @param[out] chain      the index of the chain among those of beam elements
-     * @param[out] node       the index of the node in the chain
-     * @param[out] point      the point, measured in nm
-     * @param[out] stiffness  the stiffness k of the spring, measured in kJ/mol/nm^2
-     */
-    void getBeamTetherParameters(int index, int& chain, int& node, Vec3& point, double& stiffness) const;
-    /**
-     * Set the parameters of a tether of a chain of beam elements.
-     *
-     * @param index      the index of the tether among those of chains of beam elements
-     * @param chain      the index of the chain among those of beam elements
-     * @param node       the index of the node in the chain
-     * @param point      the point, measured in nm
-     * @param stiffness  the stiffness k of the spring, measured in kJ/mol/nm^2
-     */
-    void setBeamTetherParameters(int index, int chain, int node, const Vec3& point, double stiffness);
-    /**
      * Copy the parameters of segments, joints and tethers to a Context, so that changes made by setSegmentParameters(),
      * setSegmentPropulsion(), setJointParameters(), setTetherParameters() and setChainPlanar() take effect in it, and
      * so does what is set of chains of beam elements.
@@ -379,68 +348,33 @@ public:
      * Get whether this Force makes use of periodic boundary conditions.
      */
     bool usesPeriodicBoundaryConditions() const;
+    /**
+     * Get the chains without their tethers.
+     */
+    const cylchain::ChainList& getChains() const {
+        return chains;
+    }
+    /**
+     * Describe the chains with their tethers; which particles are fixed is known by a System.
+     */
+    cylchain::ChainList describeChains() const;
 protected:
     ForceImpl* createImpl() const;
 private:
-    class ChainInfo;
-    class SegmentInfo;
-    class TetherInfo;
-    class BeamInfo;
-    const ChainInfo& getChain(int chain) const;
-    ChainInfo& getChain(int chain);
-    void checkTether(const TetherInfo& tether, int numNodes) const;
-    int numNodesOfBeam(int chain) const;
-    std::vector<ChainInfo> chains;
-    std::vector<TetherInfo> tethers, beamTethers;
-    std::vector<BeamInfo> beams;
-    std::set<std::pair<int, int> > tetheredNodes, tetheredNodesOfBeams;
+    struct TetherInfo {
+        int chain;
+        cylchain::Tether tether;
+    };
+    const cylchain::Chain& getChain(int chain) const;
+    cylchain::Chain& getChain(int chain);
+    const cylchain::BeamChain& getBeam(int chain) const;
+    void checkIndex(int chain) const;
+    void checkKind(int chain, cylchain::ChainKind kind) const;
+    void checkTether(const TetherInfo& info) const;
+    cylchain::ChainList chains;
+    std::vector<TetherInfo> tethers;
+    std::set<std::pair<int, int> > tetheredNodes;
     bool usePeriodic;
-};
-
-/**
- * The parameters of a segment.
- */
-class CylinderChainForce::SegmentInfo {
-public:
-    double restLength, stretchingStiffness, maximumExtension;
-    double parallelFriction, perpendicularFriction, rotationalFriction, extensionalFriction;
-    double propulsion;
-};
-
-/**
- * The parameters of a tether.
- */
-class CylinderChainForce::TetherInfo {
-public:
-    int chain, node;
-    Vec3 point;
-    double stiffness;
-};
-
-/**
- * The parameters of a chain.
- */
-class CylinderChainForce::ChainInfo {
-public:
-    std::vector<int> particles;
-    BendingModel bendingModel;
-    StretchingModel stretchingModel;
-    std::vector<SegmentInfo> segments;
-    std::vector<double> joints;
-    bool closed, planar;
-    double nodeFriction;
-};
-
-/**
- * This is an internal class used to record information about a chain of beam elements.
- * @private
- */
-class CylinderChainForce::BeamInfo {
-public:
-    std::vector<int> particles;
-    double elementLength, stretchingModulus, bendingRigidity, shortening, parallelFriction, perpendicularFriction;
-    bool planar, closed;
-    double propulsion;
 };
 
 } // namespace OpenMM

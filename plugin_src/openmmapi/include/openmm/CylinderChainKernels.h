@@ -8,6 +8,7 @@
 #include "dynamics/ChainEngine.h"
 #include "kinetics/Linkers.h"
 #include "networks/CoupledForces.h"
+#include "networks/CurveSites.h"
 #include "openmm/KernelImpl.h"
 #include "openmm/Platform.h"
 #include "openmm/System.h"
@@ -98,6 +99,15 @@ public:
      */
     virtual double execute(ContextImpl& context, const std::vector<cylchain::Link>& links, bool includeForces,
             bool includeEnergy, int& outOfRange) = 0;
+    /**
+     * Get the equations of links in an implicit step, or NULL if this platform has none.
+     *
+     * @param context  the context in which to execute this kernel
+     * @param links    the links of the context, which exist until the step has been taken
+     */
+    virtual cylchain::ImplicitCouplings* getEquations(ContextImpl&, const std::vector<cylchain::Link>&) {
+        return NULL;
+    }
 };
 
 /**
@@ -145,6 +155,18 @@ public:
      * @param stiffness  the stiffness of contacts
      */
     virtual void copyParametersToContext(ContextImpl& context, double stiffness) = 0;
+    /**
+     * Get the equations of contacts in an implicit step, or NULL if this platform has none.
+     *
+     * @param context   the context in which to execute this kernel
+     * @param onCurves  the capsules between places on the curve of a beam element; they exist for as long as the kernel
+     * @param sites     the virtual sites there
+     * @param impulses  receives the forces of the step
+     */
+    virtual cylchain::ImplicitCouplings* getEquations(ContextImpl&, const std::vector<cylchain::CapsuleOnCurve>&,
+            const std::vector<cylchain::CurveSite>&, cylchain::CouplingImpulses&) {
+        return NULL;
+    }
 };
 
 /**
@@ -189,6 +211,14 @@ public:
      * @param walls    the wall and its particles
      */
     virtual void copyParametersToContext(ContextImpl& context, const cylchain::WallSystem& walls) = 0;
+    /**
+     * Get the equations of walls in an implicit step, or NULL if this platform has none.
+     *
+     * @param impulses  receives the forces of the step
+     */
+    virtual cylchain::ImplicitCouplings* getEquations(cylchain::CouplingImpulses&) {
+        return NULL;
+    }
 };
 
 /**
@@ -206,12 +236,11 @@ public:
      *
      * @param system            the kinds of hands and linkers
      * @param chains            the chains of the System
-     * @param beams             its chains of beam elements, which have their numbers behind those
      * @param periodic          whether distances are those of nearest periodic images
      * @param nearestParticles  whether the particles of a place are taken as their nearest images
      */
-    virtual void initialize(const cylchain::LinkerSystem& system, const std::vector<cylchain::Chain>& chains,
-            const std::vector<cylchain::BeamChain>& beams, bool periodic, bool nearestParticles) = 0;
+    virtual void initialize(const cylchain::LinkerSystem& system, const cylchain::ChainList& chains, bool periodic,
+            bool nearestParticles) = 0;
     /**
      * Take a step of the linkers, in which particles do not move.
      *

@@ -4,7 +4,7 @@
 #include "couplings/LinkTable.h"
 #include "mechanics/StretchingModels.h"
 #include "openmm/Context.h"
-#include "openmm/Force.h"
+#include "openmm/CylinderChainCoupling.h"
 #include "openmm/Vec3.h"
 #include <string>
 #include <vector>
@@ -42,7 +42,7 @@ class CylinderChainLinkForceImpl;
  *
  * Links do not make molecules: a barostat scales the centers of what they join separately.
  */
-class CylinderChainLinkForce : public Force {
+class CylinderChainLinkForce : public CylinderChainCoupling {
 public:
     /**
      * The energy of a link whose places have the distance d, for the rest length d0 and the stiffness k:
@@ -341,6 +341,7 @@ public:
     void setTable(const cylchain::LinkTable& table) {
         this->table = table;
     }
+    std::vector<cylchain::Place> findPlaces(const PlaceResolver& resolver) const;
 protected:
     ForceImpl* createImpl() const;
 private:

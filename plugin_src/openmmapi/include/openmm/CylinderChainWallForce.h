@@ -2,7 +2,7 @@
 #define OPENMM_CYLINDERCHAINWALLFORCE_H_
 
 #include "openmm/Context.h"
-#include "openmm/Force.h"
+#include "openmm/CylinderChainCoupling.h"
 #include <string>
 #include <vector>
 
@@ -31,7 +31,7 @@ namespace OpenMM {
  * Positions are taken as they are, even in a periodic box.  After a Context has been created, the region, the stiffness
  * and the radii may be changed: call updateParametersInContext() to copy them over.
  */
-class CylinderChainWallForce : public Force {
+class CylinderChainWallForce : public CylinderChainCoupling {
 public:
     /**
      * Create a CylinderChainWallForce.
@@ -145,6 +145,7 @@ public:
     bool usesPeriodicBoundaryConditions() const {
         return false;
     }
+    std::vector<cylchain::Place> findPlaces(const PlaceResolver& resolver) const;
 protected:
     ForceImpl* createImpl() const;
 private:

@@ -15,8 +15,8 @@ namespace OpenMM {
 class CommonUpdateCylinderChainLinkersKernel : public UpdateCylinderChainLinkersKernel {
 public:
     CommonUpdateCylinderChainLinkersKernel(std::string name, const Platform& platform, ComputeContext& cc);
-    void initialize(const cylchain::LinkerSystem& system, const std::vector<cylchain::Chain>& chains,
-            const std::vector<cylchain::BeamChain>& beams, bool periodic, bool nearestParticles);
+    void initialize(const cylchain::LinkerSystem& system, const cylchain::ChainList& chains, bool periodic,
+            bool nearestParticles);
     long long execute(ContextImpl& context, cylchain::LinkerState& state, double kT, double stepSize,
             std::uint32_t seed, int force, std::vector<cylchain::Link>& links);
     void describe(const cylchain::LinkerState& state, std::vector<cylchain::Link>& links);

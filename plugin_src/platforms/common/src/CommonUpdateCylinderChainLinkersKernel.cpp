@@ -15,15 +15,15 @@ CommonUpdateCylinderChainLinkersKernel::CommonUpdateCylinderChainLinkersKernel(s
         nearestParticles(false) {
 }
 
-void CommonUpdateCylinderChainLinkersKernel::initialize(const LinkerSystem& system, const vector<Chain>& chains,
-        const vector<BeamChain>& beams, bool periodic, bool nearestParticles) {
-    kinetics.reset(new LinkerKinetics(system, chains, beams));
+void CommonUpdateCylinderChainLinkersKernel::initialize(const LinkerSystem& system, const ChainList& chains,
+        bool periodic, bool nearestParticles) {
+    kinetics.reset(new LinkerKinetics(system, chains));
     this->periodic = periodic;
     this->nearestParticles = nearestParticles;
-    for (const Chain& chain : chains)
-        particles.insert(particles.end(), chain.nodes.begin(), chain.nodes.end());
-    for (const BeamChain& beam : beams)
-        particles.insert(particles.end(), beam.particles.begin(), beam.particles.end());
+    for (int chain = 0; chain < chains.size(); chain++) {
+        const vector<int>& own = chains.getParticles(chain);
+        particles.insert(particles.end(), own.begin(), own.end());
+    }
     for (const Place& anchor : system.anchors)
         if (!anchor.isPoint())
             particles.push_back(anchor.first);

@@ -2,7 +2,7 @@
 #define OPENMM_REFERENCECALCCYLINDERCHAINCONTACTFORCEKERNEL_H_
 
 #include "ReferenceParallelLoop.h"
-#include "couplings/ContactSearch.h"
+#include "networks/ContactGaps.h"
 #include "openmm/CylinderChainKernels.h"
 #include <vector>
 
@@ -22,6 +22,9 @@ public:
     double execute(ContextImpl& context, bool includeForces, bool includeEnergy);
     bool notePushes(std::vector<cylchain::Push>& pushes);
     void copyParametersToContext(ContextImpl& context, double stiffness);
+    cylchain::ImplicitCouplings* getEquations(ContextImpl& context,
+            const std::vector<cylchain::CapsuleOnCurve>& onCurves, const std::vector<cylchain::CurveSite>& sites,
+            cylchain::CouplingImpulses& impulses);
 private:
     struct Touching;
     bool isListValid(const std::vector<Vec3>& positions, const Vec3* box) const;
@@ -33,6 +36,7 @@ private:
     std::vector<int> particles;
     std::vector<cylchain::ContactPair> pairs;
     std::vector<cylchain::Push>* noted;
+    cylchain::ContactGaps equations;
     // Where particles were, and the box, when pairs were searched for.
 
     std::vector<Vec3> listPositions;

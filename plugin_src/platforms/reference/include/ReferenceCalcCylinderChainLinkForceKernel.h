@@ -2,7 +2,7 @@
 #define OPENMM_REFERENCECALCCYLINDERCHAINLINKFORCEKERNEL_H_
 
 #include "ReferenceParallelLoop.h"
-#include "couplings/Links.h"
+#include "networks/LinkEquations.h"
 #include "openmm/CylinderChainKernels.h"
 #include <vector>
 
@@ -18,10 +18,13 @@ public:
     void initialize(const System& system, bool periodic, bool nearestParticles);
     double execute(ContextImpl& context, const std::vector<cylchain::Link>& links, bool includeForces,
             bool includeEnergy, int& outOfRange);
+    cylchain::ImplicitCouplings* getEquations(ContextImpl& context, const std::vector<cylchain::Link>& links);
 private:
+    cylchain::LinkBoxes getBoxes(ContextImpl& context) const;
     ReferenceParallelLoop loop;
     bool periodic, nearestParticles;
     std::vector<cylchain::LinkPull> pulls;
+    cylchain::LinkEquations equations;
 };
 
 } // namespace OpenMM

@@ -1,7 +1,7 @@
 #ifndef OPENMM_REFERENCECALCCYLINDERCHAINWALLFORCEKERNEL_H_
 #define OPENMM_REFERENCECALCCYLINDERCHAINWALLFORCEKERNEL_H_
 
-#include "couplings/CouplingImpulses.h"
+#include "networks/WallGaps.h"
 #include "openmm/CylinderChainKernels.h"
 #include <vector>
 
@@ -18,9 +18,11 @@ public:
     double execute(ContextImpl& context, bool includeForces, bool includeEnergy);
     bool notePushes(std::vector<cylchain::Push>& pushes);
     void copyParametersToContext(ContextImpl& context, const cylchain::WallSystem& walls);
+    cylchain::ImplicitCouplings* getEquations(cylchain::CouplingImpulses& impulses);
 private:
     cylchain::WallSystem walls;
     std::vector<cylchain::Push>* noted;
+    cylchain::WallGaps equations;
 };
 
 } // namespace OpenMM

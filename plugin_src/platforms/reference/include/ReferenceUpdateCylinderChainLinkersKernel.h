@@ -14,8 +14,8 @@ namespace OpenMM {
 class ReferenceUpdateCylinderChainLinkersKernel : public UpdateCylinderChainLinkersKernel {
 public:
     ReferenceUpdateCylinderChainLinkersKernel(std::string name, const Platform& platform, ContextImpl& context);
-    void initialize(const cylchain::LinkerSystem& system, const std::vector<cylchain::Chain>& chains,
-            const std::vector<cylchain::BeamChain>& beams, bool periodic, bool nearestParticles);
+    void initialize(const cylchain::LinkerSystem& system, const cylchain::ChainList& chains, bool periodic,
+            bool nearestParticles);
     long long execute(ContextImpl& context, cylchain::LinkerState& state, double kT, double stepSize,
             std::uint32_t seed, int force, std::vector<cylchain::Link>& links);
     void describe(const cylchain::LinkerState& state, std::vector<cylchain::Link>& links);

@@ -130,3 +130,10 @@ void ReferenceCalcCylinderChainContactForceKernel::copyParametersToContext(Conte
     this->stiffness = stiffness;
     hasList = false;
 }
+
+ImplicitCouplings* ReferenceCalcCylinderChainContactForceKernel::getEquations(ContextImpl& context,
+        const vector<CapsuleOnCurve>& onCurves, const vector<CurveSite>& sites, CouplingImpulses& impulses) {
+    const double* box = periodic ? &extractData(context).periodicBoxVectors[0][0] : NULL;
+    equations.setContacts({search, stiffness, box, &onCurves, &sites, &impulses});
+    return &equations;
+}

@@ -21,14 +21,25 @@ void ReferenceCalcCylinderChainLinkForceKernel::initialize(const System&, bool p
     this->nearestParticles = nearestParticles;
 }
 
+LinkBoxes ReferenceCalcCylinderChainLinkForceKernel::getBoxes(ContextImpl& context) const {
+    const double* box = &extractData(context).periodicBoxVectors[0][0];
+    LinkBoxes boxes;
+    boxes.distances = periodic ? box : NULL;
+    boxes.segments = nearestParticles ? box : NULL;
+    return boxes;
+}
+
+ImplicitCouplings* ReferenceCalcCylinderChainLinkForceKernel::getEquations(ContextImpl& context,
+        const vector<Link>& links) {
+    equations.setLinks(&links, getBoxes(context));
+    return &equations;
+}
+
 double ReferenceCalcCylinderChainLinkForceKernel::execute(ContextImpl& context, const vector<Link>& links,
         bool includeForces, bool, int& outOfRange) {
     ReferencePlatform::PlatformData& data = extractData(context);
     const double* positions = &(*data.positions)[0][0];
-    const double* box = &data.periodicBoxVectors[0][0];
-    LinkBoxes boxes;
-    boxes.distances = periodic ? box : NULL;
-    boxes.segments = nearestParticles ? box : NULL;
+    const LinkBoxes boxes = getBoxes(context);
     const int count = links.size();
     pulls.resize(count);
     loop.run((count+LINKS_OF_BLOCK-1)/LINKS_OF_BLOCK, [&] (int block) {

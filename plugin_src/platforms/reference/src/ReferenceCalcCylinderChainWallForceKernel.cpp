@@ -36,3 +36,8 @@ bool ReferenceCalcCylinderChainWallForceKernel::notePushes(vector<Push>& pushes)
 void ReferenceCalcCylinderChainWallForceKernel::copyParametersToContext(ContextImpl&, const WallSystem& walls) {
     this->walls = walls;
 }
+
+ImplicitCouplings* ReferenceCalcCylinderChainWallForceKernel::getEquations(CouplingImpulses& impulses) {
+    equations.setWalls(&walls, &impulses);
+    return &equations;
+}

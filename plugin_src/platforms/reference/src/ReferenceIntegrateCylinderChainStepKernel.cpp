@@ -91,7 +91,7 @@ Instability ReferenceIntegrateCylinderChainStepKernel::displaceCoupledChains(Con
                 context.getSystem().getNumParticles()));
         versionOfNetwork = chainKernel->getEngineVersion();
     }
-    network->setForces(coupled, &data.periodicBoxVectors[0][0]);
+    network->setForces(coupled);
     Instability result;
     loop.runMany([&] (const Loop& loops) {
         result = network->step(&(*data.positions)[0][0], &(*data.forces)[0][0], chainKernel->getBox(context), settings,

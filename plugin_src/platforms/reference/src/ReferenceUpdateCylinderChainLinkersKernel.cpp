@@ -10,9 +10,9 @@ ReferenceUpdateCylinderChainLinkersKernel::ReferenceUpdateCylinderChainLinkersKe
         loop(context), periodic(false), nearestParticles(false) {
 }
 
-void ReferenceUpdateCylinderChainLinkersKernel::initialize(const LinkerSystem& system, const vector<Chain>& chains,
-        const vector<BeamChain>& beams, bool periodic, bool nearestParticles) {
-    kinetics.reset(new LinkerKinetics(system, chains, beams));
+void ReferenceUpdateCylinderChainLinkersKernel::initialize(const LinkerSystem& system, const ChainList& chains,
+        bool periodic, bool nearestParticles) {
+    kinetics.reset(new LinkerKinetics(system, chains));
     this->periodic = periodic;
     this->nearestParticles = nearestParticles;
 }

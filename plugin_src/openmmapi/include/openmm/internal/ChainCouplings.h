@@ -3,39 +3,36 @@
 
 #include "networks/CoupledForces.h"
 #include "openmm/internal/ContextImpl.h"
-#include "openmm/internal/CylinderChainBindingForceImpl.h"
-#include "openmm/internal/CylinderChainContactForceImpl.h"
+#include "openmm/internal/CouplingForceImpl.h"
 #include "openmm/internal/CylinderChainDescription.h"
-#include "openmm/internal/CylinderChainLinkForceImpl.h"
-#include "openmm/internal/CylinderChainWallForceImpl.h"
 #include "openmm/internal/OtherParticles.h"
+#include "openmm/internal/PlaceResolver.h"
+#include "openmm/internal/PushForceImpl.h"
 #include <memory>
 #include <vector>
 
 namespace OpenMM {
 
 /**
- * The links, linkers, contacts and walls of a Context that implicit steps have in their equations.
- *
- * A Force is among them if all of its places are on segments of chains, at particles, or do not move.  If not, it stays
- * an ordinary Force.
+ * The couplings of a Context, and which of them implicit steps have in their equations: see CylinderChainCoupling.
  */
 class ChainCouplings {
 public:
-    ChainCouplings(ContextImpl& context, const CylinderChainDescription& chains, const OtherParticles& others);
+    ChainCouplings(ContextImpl& context, const OtherParticles& others);
     /**
-     * In an implicit step, a periodic box must be wider than twice the sum of the longest segment and so many of the
-     * largest diameters: contacts are looked for beyond the surfaces of segments, and on their way.
+     * Throw an exception if there are chains that cannot have one of the couplings.
      */
-    static constexpr double DIAMETERS_OF_BOX = 2;
+    void refuseChains(const CylinderChainDescription& chains) const;
     /**
-     * Throw an exception if the periodic box of the Context is too narrow for contacts in implicit steps.
+     * Throw an exception if implicit steps with these couplings cannot have the periodic box of the Context.
      */
-    void refuseNarrowBox(const CylinderChainDescription& chains) const;
+    void refuseBox(const CylinderChainDescription& chains) const;
     /**
-     * Throw an exception if there are couplings that chains of beam elements, which the Context has, cannot have.
+     * Throw an exception if implicit steps with these couplings cannot have the scheme of second order.
+     *
+     * @param groups  the force groups of the integrator
      */
-    void refuseBeams() const;
+    void refuseTwoStages(int groups) const;
     /**
      * While an object of this class exists, the Forces that implicit steps take contribute nothing.
      */
@@ -56,7 +53,7 @@ public:
      */
     const cylchain::CoupledForces& describe(int groups, double friction);
     /**
-     * Take note of the forces of contacts and walls in a step that has moved particles.
+     * Take note of a step that has moved particles.
      *
      * @param groups       those of describe()
      * @param integration  the force groups of the integrator
@@ -72,42 +69,31 @@ public:
     /**
      * Get the Force that a coupling of the last forces described belongs to.
      */
-    const Force& getForce(const cylchain::BrokenCoupling& coupling) const;
+    CouplingForceImpl& getForce(const cylchain::BrokenCoupling& coupling) const {
+        return *owners[coupling.force];
+    }
 private:
-    // A force, and whether implicit steps can take it.
+    struct Coupling {
+        CouplingForceImpl* force;
+        // Whether implicit steps can take it, and the particles outside chains that it acts on, both of a version.
 
-    template <class Impl> struct Coupling {
-        Impl* force;
         bool taken;
+        std::vector<int> particles;
+        long long version;
         bool isTaken(int groups) const {
             return taken && force->isIn(groups);
         }
     };
-    struct Links : Coupling<CylinderChainLinkForceImpl> {
-        long long version;
-    };
-    typedef Coupling<CylinderChainBindingForceImpl> Linkers;
-    typedef Coupling<CylinderChainContactForceImpl> Contacts;
-    typedef Coupling<CylinderChainWallForceImpl> Walls;
-    bool canTake(const cylchain::Place& place) const;
     void update();
-    void addParticle(const cylchain::Place& place, std::vector<int>& particles) const;
     ContextImpl& context;
-    const System& system;
     const OtherParticles& others;
-    // The nodes before and behind a particle in its chain, or -1, and which particles are nodes or control points.
-
-    std::vector<int> before, behind;
-    std::vector<bool> isNode, isOfBeam, isControlPoint;
-    std::vector<Links> links;
-    std::vector<Linkers> linkers;
-    std::vector<Contacts> contacts;
-    std::vector<Walls> walls;
+    const PlaceResolver resolver;
+    std::vector<Coupling> couplings;
     std::vector<PushForceImpl*> pushForces;
     cylchain::CoupledForces forces;
-    // The Forces of the forces above: links, contacts, walls.
+    // The Forces of the forces above.
 
-    std::vector<const Force*> owners;
+    std::vector<CouplingForceImpl*> owners;
 };
 
 } // namespace OpenMM

@@ -5,7 +5,7 @@
 #include "kinetics/Linkers.h"
 #include "openmm/CylinderChainBindingForce.h"
 #include "openmm/Kernel.h"
-#include "openmm/internal/StepForceImpl.h"
+#include "openmm/internal/CouplingForceImpl.h"
 #include <cstdint>
 #include <map>
 #include <string>
@@ -23,7 +23,7 @@ class CylinderChainIntegrator;
  * there is nothing to go on with.  A State that holds no parameters leaves the digest alone, but sets time and step
  * count.
  */
-class CylinderChainBindingForceImpl : public StepForceImpl {
+class CylinderChainBindingForceImpl : public CouplingForceImpl {
 public:
     explicit CylinderChainBindingForceImpl(const CylinderChainBindingForce& owner);
     void initialize(ContextImpl& context);
@@ -52,12 +52,14 @@ public:
      * Give the Context other linkers, whether its present ones are known or not.
      */
     void setState(const cylchain::LinkerState& replaced);
-    /**
-     * Get the places of anchors.
-     */
-    const std::vector<cylchain::Place>& getAnchors() const {
-        return system.anchors;
+    int getOrder() const {
+        return 1;
     }
+    bool hasForces() {
+        return !getLinks().empty();
+    }
+    cylchain::ImplicitCouplings* getEquations(ContextImpl& context);
+    std::string describeFailure(const cylchain::BrokenCoupling& coupling, const std::string& other);
     /**
      * Get the seed of this Context.
      */
@@ -69,12 +71,6 @@ public:
      */
     void setSeed(std::uint32_t replaced) {
         seed = replaced;
-    }
-    /**
-     * Get whether the two particles of a place are taken as their nearest images.
-     */
-    bool takesNearestParticles() const {
-        return nearestParticles;
     }
 private:
     void follow() const;

@@ -13,8 +13,6 @@
 
 namespace OpenMM {
 
-class System;
-
 /**
  * This is the internal implementation of CylinderChainContactForce.
  */
@@ -36,40 +34,21 @@ public:
      */
     void getContacts(ContextImpl& context, std::vector<int>& ends, std::vector<double>& fractions,
             std::vector<double>& gaps, std::vector<double>& forces, std::vector<Vec3>& directions) const;
-    /**
-     * Get what finds contacts in the Context: the segments of all chains, in their order, then the spheres.
-     */
-    cylchain::ContactSearch& getSearch() {
-        return *search;
+    int getOrder() const {
+        return 2;
     }
-    /**
-     * Get the capsules that lie between two places on the curve of a beam element, and the virtual sites there.
-     */
-    const std::vector<cylchain::CapsuleOnCurve>& getOnCurves() const {
-        return onCurves;
+    bool hasForces() {
+        return !search->getSystem().capsules.empty() && stiffness != 0;
     }
-    const std::vector<cylchain::CurveSite>& getSites() const {
-        return sites;
-    }
-    /**
-     * Get the stiffness in the Context.
-     */
-    double getStiffness() const {
-        return stiffness;
-    }
-    /**
-     * Get whether distances are those of nearest periodic images.
-     */
-    bool usesPeriodicBoundaryConditions() const {
-        return periodic;
-    }
+    cylchain::ImplicitCouplings* getEquations(ContextImpl& context);
+    void refuseChains(const CylinderChainDescription& chains) const;
+    void refuseBox(ContextImpl& context, const CylinderChainDescription& chains) const;
+    std::string describeFailure(const cylchain::BrokenCoupling& coupling, const std::string& other);
 protected:
     void findPushes(ContextImpl& context, std::vector<cylchain::Push>& pushes) const;
 private:
     template <class Function> void forContacts(ContextImpl& context, Function function) const;
-    int getNumSegments(int chain) const;
     const CylinderChainContactForce& owner;
-    void findCurves(const System& system);
     std::unique_ptr<cylchain::ContactSearch> search;
     std::vector<cylchain::CapsuleOnCurve> onCurves;
     std::vector<cylchain::CurveSite> sites;

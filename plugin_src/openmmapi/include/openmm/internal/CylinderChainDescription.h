@@ -1,8 +1,7 @@
 #ifndef OPENMM_CYLINDERCHAINDESCRIPTION_H_
 #define OPENMM_CYLINDERCHAINDESCRIPTION_H_
 
-#include "mechanics/BeamChain.h"
-#include "mechanics/Chain.h"
+#include "mechanics/ChainList.h"
 #include "openmm/CylinderChainForce.h"
 #include "openmm/System.h"
 #include <string>
@@ -21,14 +20,23 @@ public:
      * Copy the parameters of segments, joints and tethers, for CylinderChainForce::updateParametersInContext().
      */
     void update(const CylinderChainForce& force);
-    const std::vector<cylchain::Chain>& getChains() const {
+    /**
+     * Get all chains, in the order of the Force.
+     */
+    const cylchain::ChainList& getList() const {
         return chains;
+    }
+    /**
+     * Get the chains of straight segments.
+     */
+    const std::vector<cylchain::Chain>& getChains() const {
+        return chains.getChains();
     }
     /**
      * Get the chains of beam elements.
      */
     const std::vector<cylchain::BeamChain>& getBeams() const {
-        return beams;
+        return chains.getBeams();
     }
     /**
      * Throw an exception if a chain has no modes, see Scheme::Modes.
@@ -48,8 +56,7 @@ public:
     }
 private:
     void lookForModes();
-    std::vector<cylchain::Chain> chains;
-    std::vector<cylchain::BeamChain> beams;
+    cylchain::ChainList chains;
     // The first chain that has no modes, and why, or nothing.
 
     std::string withoutModes;

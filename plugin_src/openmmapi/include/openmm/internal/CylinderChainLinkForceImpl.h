@@ -4,8 +4,7 @@
 #include "couplings/LinkTable.h"
 #include "openmm/CylinderChainLinkForce.h"
 #include "openmm/Kernel.h"
-#include "openmm/internal/PlaceResolver.h"
-#include "openmm/internal/StepForceImpl.h"
+#include "openmm/internal/CouplingForceImpl.h"
 #include <map>
 #include <memory>
 #include <string>
@@ -19,7 +18,7 @@ namespace OpenMM {
  * Which they are is said by a parameter of the Context, the digest of their table.  Where that has changed, because the
  * Context has got a State or a checkpoint, the links follow as soon as they are looked at.
  */
-class CylinderChainLinkForceImpl : public StepForceImpl {
+class CylinderChainLinkForceImpl : public CouplingForceImpl {
 public:
     explicit CylinderChainLinkForceImpl(const CylinderChainLinkForce& owner);
     void initialize(ContextImpl& context);
@@ -36,9 +35,18 @@ public:
      */
     const std::vector<cylchain::Link>& getLinks();
     /**
-     * Get a number that increases whenever links change.
+     * Get the places of these links.
      */
+    std::vector<cylchain::Place> findPlaces(const PlaceResolver& resolver);
     long long getVersion();
+    int getOrder() const {
+        return 0;
+    }
+    bool hasForces() {
+        return !getLinks().empty();
+    }
+    cylchain::ImplicitCouplings* getEquations(ContextImpl& context);
+    std::string describeFailure(const cylchain::BrokenCoupling& coupling, const std::string& other);
     /**
      * Get all links of the Context as they were described.  An exception is thrown if they are not known.
      */
@@ -56,12 +64,6 @@ public:
      */
     const std::string& getDigestParameter() const {
         return parameter;
-    }
-    /**
-     * Get whether the two particles of a place are taken as their nearest images.
-     */
-    bool takesNearestParticles() const {
-        return nearestParticles;
     }
 private:
     void check(const cylchain::LinkChange& change) const;

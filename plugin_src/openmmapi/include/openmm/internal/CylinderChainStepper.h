@@ -88,12 +88,10 @@ private:
     void recordForces(cylchain::StepSettings& settings, bool records);
     void takeNoteOfForces(const cylchain::StepSettings& settings, bool followsOn);
     void refuseBeams(cylchain::Scheme scheme, double kT) const;
-    void refuseTornBeams() const;
     bool areForcesFinite();
     void reportInstability(int chain, const cylchain::StepSettings& settings);
     void reportCoupling(const cylchain::BrokenCoupling& coupling, const cylchain::CoupledForces& coupled,
             const cylchain::StepSettings& settings);
-    std::string describeLink(const cylchain::BrokenCoupling& coupling, const cylchain::CoupledForces& coupled) const;
     void reportParticle(int particle, const cylchain::StepSettings& settings) const;
     std::vector<Vec3> getPositions() const;
     void getBox(double* box) const;

@@ -29,12 +29,14 @@ public:
     }
     std::vector<std::string> getKernelNames();
     void updateParametersInContext(ContextImpl& context);
-    /**
-     * Get the wall and its particles in the Context.
-     */
-    const cylchain::WallSystem& getWalls() const {
-        return walls;
+    int getOrder() const {
+        return 3;
     }
+    bool hasForces() {
+        return !walls.particles.empty() && walls.stiffness != 0;
+    }
+    cylchain::ImplicitCouplings* getEquations(ContextImpl& context);
+    std::string describeFailure(const cylchain::BrokenCoupling& coupling, const std::string& other);
 protected:
     void findPushes(ContextImpl& context, std::vector<cylchain::Push>& pushes) const;
 private:

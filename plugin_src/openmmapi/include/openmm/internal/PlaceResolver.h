@@ -2,8 +2,10 @@
 #define OPENMM_PLACERESOLVER_H_
 
 #include "couplings/Place.h"
+#include "mechanics/ChainList.h"
 #include "openmm/System.h"
 #include "openmm/VirtualSite.h"
+#include <string>
 #include <vector>
 
 namespace OpenMM {
@@ -16,7 +18,8 @@ class PlaceResolver {
 public:
     explicit PlaceResolver(const System& system);
     /**
-     * Find the place between the parents of a virtual site, or on a curve; any other place is returned unchanged.
+     * Find the place between the parents of a virtual site, or on a curve; any other place is returned unchanged.  An
+     * exception is thrown for particles that do not exist.
      */
     cylchain::Place resolve(const cylchain::Place& place) const;
     /**
@@ -31,20 +34,35 @@ public:
      * Get whether a particle is the control point of a node of beam elements.
      */
     bool isControlPoint(int particle) const {
-        return !isControl.empty() && isControl[particle];
+        return isControl[particle];
     }
+    /**
+     * Get whether a particle that a place is at is moved by steps of its own, as those outside chains are.
+     */
+    bool movesAlone(const cylchain::Place& place) const {
+        return !place.isPoint() && !place.isOnSegment() && !isOfChain[place.first] &&
+                system.getParticleMass(place.first) != 0.0;
+    }
+    /**
+     * Find the first of some places that implicit steps do not move, in words; nothing is returned if there is none.
+     */
+    std::string whyExplicit(const std::vector<cylchain::Place>& places) const;
 private:
+    void add(const cylchain::Chain& chain);
+    void add(const cylchain::BeamChain& chain);
+    void checkParticles(const cylchain::Place& place) const;
+    bool isMovedBySteps(const cylchain::Place& place) const;
     bool findOnCurve(const VirtualSite& site, cylchain::Place& place) const;
     bool isControlOf(int particle, int node) const {
         return controls[node] >= 0 && controls[node] == particle;
     }
     const System& system;
-    // The control point of each node of beam elements, the next node, or -1, and the length of its elements. Empty
-    // without any.
+    // For each particle: the node behind it in its chain, or -1, and whether it is one of a chain. For nodes of beam
+    // elements their control points, or -1, and the lengths of elements.
 
-    std::vector<int> controls, next;
+    std::vector<int> next, controls;
     std::vector<double> elementLengths;
-    std::vector<bool> isControl;
+    std::vector<bool> isOfChain, isControl;
 };
 
 } // namespace OpenMM

@@ -2,9 +2,7 @@
 #define OPENMM_PUSHFORCEIMPL_H_
 
 #include "couplings/CouplingImpulses.h"
-#include "openmm/Vec3.h"
-#include "openmm/internal/ContextImpl.h"
-#include "openmm/internal/StepForceImpl.h"
+#include "openmm/internal/CouplingForceImpl.h"
 #include <iosfwd>
 #include <vector>
 
@@ -14,7 +12,7 @@ namespace OpenMM {
  * This is the implementation of a Force of contacts or walls, whose mean over steps of CylinderChainIntegrator is
  * known.
  */
-class PushForceImpl : public StepForceImpl {
+class PushForceImpl : public CouplingForceImpl {
 public:
     /**
      * Get what receives the forces of implicit steps.
@@ -22,19 +20,10 @@ public:
     cylchain::CouplingImpulses& getImpulses() {
         return impulses;
     }
-    /**
-     * Begin a step, the forces of which are not known.
-     */
+    void refuseTwoStages() const;
     void beginStep() {
         impulses.beginStep();
     }
-    /**
-     * Take note that particles have moved by a step.
-     *
-     * @param taken     whether the Force was in its equations
-     * @param acts      whether it acts in steps at all
-     * @param stepSize  how long it was
-     */
     void finishStep(bool taken, bool acts, double stepSize) {
         if (!taken && acts && !notesPushes)
             return;
@@ -60,7 +49,7 @@ public:
      */
     void readForces(std::istream& stream);
 protected:
-    explicit PushForceImpl(const Force& owner) : StepForceImpl(owner) {
+    explicit PushForceImpl(const Force& owner) : CouplingForceImpl(owner) {
     }
     void beginSums(int numParticles) {
         impulses = cylchain::CouplingImpulses(numParticles);

@@ -1,0 +1,68 @@
+"""Filament types of actin, DNA and microtubules."""
+
+from openmm import unit
+
+from .filament_type import FilamentType
+
+_PICONEWTON = unit.piconewton
+_PICONEWTON_PER_NANOMETER = unit.piconewton / unit.nanometer
+
+F_ACTIN = FilamentType(
+    name="ACT",
+    diameter=6 * unit.nanometer,
+    persistence_length=17.2 * unit.micrometer,
+    temperature=310 * unit.kelvin,
+    stretching_stiffness=48.7 * _PICONEWTON_PER_NANOMETER,
+    segment_length=360 * unit.nanometer,
+    extension_relaxation_time=0.1 * unit.microsecond,
+    mass_per_length=3500 * unit.dalton / unit.nanometer,
+)
+"""F-actin as in Table 2 of Pesek et al., Soft Matter 2016, 12, 3360.
+
+d = 6 nm, l_p = 17.2 um at 310 K, k = 48.7 pN/nm for a segment of 360 nm (unchanged by
+``with_segment_length``, as in their Table 3), tau_l = 0.1 us, inscribed-circle bending (27); mass
+1.26 MDa per 360 nm (their Section 5). Tangents decorrelate over l_p; the joints of the paper have the stiffness
+l_p k_B T/l0, 3 % more: ``dataclasses.replace(F_ACTIN, temperature=None)``. Their sources: Yogurtcu et al., Biophys. J.
+2012, 103, 719 (d);
+Nagashima and Asakura 1980, Gittes et al. 1993 (l_p); Kojima et al. 1994 (k).
+"""
+
+DSDNA = FilamentType(
+    name="DNA",
+    diameter=2 * unit.nanometer,
+    persistence_length=43.3 * unit.nanometer,
+    temperature=310 * unit.kelvin,
+    stretching_modulus=1100 * _PICONEWTON,
+    segment_length=8 * unit.nanometer,
+    friction_length=8 * unit.nanometer,
+    mass_per_length=1940 * unit.dalton / unit.nanometer,
+)
+"""Double-stranded DNA, after the footnote on DNA of Pesek et al., Soft Matter 2016, 12, 3360.
+
+d = 2 nm, l_p = 43.3 nm, l0 = 8 nm (their sources: Odijk, Macromolecules 1995, 28, 7016; Wang et al.,
+Biophys. J. 1997, 72, 1335). EA = 1100 pN: the middle of what Wang et al. and Smith, Cui and Bustamante,
+Science 1996, 271, 795 report, 1000 to 1200 pN depending on salt. Affine extensional friction. Mass:
+660 Da per base pair of 0.34 nm. The flexibility holds at 310 K here; the paper does not say.
+
+Tangents decorrelate over 43.3 nm with segments of any length. A segment lengthens by 2 k_B T/EA = 0.008 nm on average
+as it fluctuates, however short it is: by 1 % with segments of 0.8 nm. Under forces above 1 pN the chain is longer than
+a wormlike chain, however it is cut: ``theory.calibrated_to_force`` has by how much, and makes a type that is not. The
+friction of a length of DNA is that of the paper's segments of 8 nm, or of longer ones, so that shorter segments, down
+to 1 nm and less, make up the same filament. It leaves out the flow that one segment makes at another. Of a whole rod,
+up to a persistence length or so, ``friction_length="filament"`` is nearer to what is measured.
+"""
+
+MICROTUBULE = FilamentType(
+    name="MT",
+    diameter=25 * unit.nanometer,
+    bending_rigidity=2.2e7 * _PICONEWTON * unit.nanometer**2,
+    stretching_modulus=2.6e5 * _PICONEWTON,
+    segment_length=1 * unit.micrometer,
+    mass_per_length=1.6e5 * unit.dalton / unit.nanometer,
+)
+"""Microtubule: rigidity measured, stretching modulus estimated.
+
+EI = 2.2e-23 N m^2, that is l_p = 5.2 mm at 37 C: Gittes et al., J. Cell Biol. 1993, 120, 923. EA is an
+estimate, good to some 30 %: Young's modulus 1.2 GPa (same paper, from the same EI) times a wall of about
+220 nm^2. d = 25 nm. Affine extensional friction. Mass: 13 protofilaments of 100 kDa dimers every 8 nm.
+"""
