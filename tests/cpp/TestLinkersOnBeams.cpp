@@ -85,7 +85,7 @@ static void testCurvesAround() {
             for (int k = 0; k < 3; k++)
                 node[k] += 20*apart[k];
         }
-        rods.beams.push_back(beam);
+        rods.chains.add(beam);
     }
     const Contours contours(rods.chains);
     check(contours.getNumSegments() == 180 && contours.getLength(7) == 120, "lengths of curves");

@@ -1,4 +1,7 @@
 #include "openmm/internal/ChainCouplings.h"
+#include "openmm/OpenMMException.h"
+#include "openmm/internal/CheckpointValues.h"
+#include "openmm/serialization/SerializationNode.h"
 #include <algorithm>
 
 using namespace OpenMM;
@@ -11,9 +14,6 @@ ChainCouplings::ChainCouplings(ContextImpl& context, const OtherParticles& other
         CouplingForceImpl* force = dynamic_cast<CouplingForceImpl*>(impl);
         if (force != NULL)
             couplings.push_back({force, false, {}, -1});
-        PushForceImpl* pushes = dynamic_cast<PushForceImpl*>(impl);
-        if (pushes != NULL)
-            pushForces.push_back(pushes);
     }
     stable_sort(couplings.begin(), couplings.end(), [] (const Coupling& a, const Coupling& b) {
         return a.force->getOrder() < b.force->getOrder();
@@ -86,4 +86,68 @@ const CoupledForces& ChainCouplings::describe(int groups, double friction) {
 void ChainCouplings::finishStep(int groups, int integration, double stepSize) {
     for (const Coupling& own : couplings)
         own.force->finishStep(own.isTaken(groups), own.force->isIn(integration), stepSize);
+}
+
+/** The forces that have a state of each name. */
+map<string, vector<CouplingForceImpl*> > ChainCouplings::findStates() const {
+    map<string, vector<CouplingForceImpl*> > forces;
+    for (const Coupling& own : couplings)
+        if (!own.force->getStateName().empty())
+            forces[own.force->getStateName()].push_back(own.force);
+    return forces;
+}
+
+static void restore(const string& name, const vector<StateColumns>& states, const vector<CouplingForceImpl*>& forces) {
+    const bool areSame = states.size() == forces.size();
+    if (!areSame && (forces.empty() || !forces[0]->isStateOfCheckpoints()))
+        throw OpenMMException("CylinderChainIntegrator: The State or checkpoint has the "+name+" of "+
+                to_string(states.size())+" Forces, but the System has "+to_string(forces.size()));
+    for (size_t i = 0; i < forces.size(); i++)
+        if (areSame)
+            forces[i]->restoreState(states[i]);
+        else
+            forces[i]->beginState();
+}
+
+void ChainCouplings::writeStates(ostream& stream) const {
+    vector<pair<string, StateColumns> > states;
+    for (const auto& entry : findStates())
+        for (CouplingForceImpl* force : entry.second)
+            states.push_back({entry.first, force->storeState(true)});
+    writeValue(stream, (int) states.size());
+    for (const auto& state : states) {
+        writeText(stream, state.first);
+        state.second.write(stream);
+    }
+}
+
+void ChainCouplings::readStates(istream& stream) const {
+    map<string, vector<StateColumns> > states;
+    for (int i = readValue<int>(stream, "the states of Forces"); i > 0; i--) {
+        const string name = readText(stream, "the states of Forces");
+        states[name].push_back(StateColumns::read(stream));
+    }
+    map<string, vector<CouplingForceImpl*> > forces = findStates();
+    for (const auto& entry : states)
+        forces[entry.first];
+    for (const auto& entry : forces)
+        restore(entry.first, states[entry.first], entry.second);
+}
+
+void ChainCouplings::writeStates(SerializationNode& node) const {
+    for (const auto& entry : findStates())
+        for (CouplingForceImpl* force : entry.second)
+            if (!force->isStateOfCheckpoints())
+                force->storeState(false).write(node.createChildNode(entry.first));
+}
+
+void ChainCouplings::readStates(const SerializationNode& node) const {
+    for (const auto& entry : findStates()) {
+        vector<StateColumns> states;
+        for (const SerializationNode& child : node.getChildren())
+            if (child.getName() == entry.first)
+                states.push_back(StateColumns::read(child));
+        if (!states.empty())
+            restore(entry.first, states, entry.second);
+    }
 }

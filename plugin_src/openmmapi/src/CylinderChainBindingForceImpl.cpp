@@ -257,6 +257,19 @@ cylchain::ImplicitCouplings* CylinderChainBindingForceImpl::getEquations(Context
     return linkKernel.getAs<CalcCylinderChainLinkForceKernel>().getEquations(context, getLinks());
 }
 
+StateColumns CylinderChainBindingForceImpl::storeState(bool inCheckpoint) {
+    StateColumns columns = storeLinkers(getState());
+    if (inCheckpoint)
+        columns.put("seed", seed);
+    return columns;
+}
+
+void CylinderChainBindingForceImpl::restoreState(const StateColumns& columns) {
+    setState(restoreLinkers(columns));
+    if (columns.has("seed"))
+        seed = columns.getOne<uint32_t>("seed");
+}
+
 string CylinderChainBindingForceImpl::describeFailure(const cylchain::BrokenCoupling& coupling, const string& other) {
     return describeBrokenLink(coupling, other, links, *context, owner.usesPeriodicBoundaryConditions(),
             nearestParticles);

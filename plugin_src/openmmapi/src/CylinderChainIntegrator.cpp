@@ -8,8 +8,6 @@
 #include "openmm/internal/ContextImpl.h"
 #include "openmm/internal/CylinderChainForceImpl.h"
 #include "openmm/internal/CylinderChainStepper.h"
-#include "openmm/internal/LinkStorage.h"
-#include "openmm/internal/LinkerStorage.h"
 #include "openmm/internal/OSRngSeed.h"
 #include "openmm/serialization/SerializationNode.h"
 #include <cmath>
@@ -19,6 +17,9 @@
 
 using namespace OpenMM;
 using namespace std;
+
+/** Of checkpoints, and of what States hold; none but these are read. */
+static const int CHECKPOINT_VERSION = 9, STATE_VERSION = 8;
 
 /**
  * How many steps are taken between looks at anything but chains.
@@ -288,7 +289,7 @@ uint64_t CylinderChainIntegrator::findNextStep() const {
 }
 
 void CylinderChainIntegrator::createCheckpoint(ostream& stream) const {
-    const int version = 8;
+    const int version = CHECKPOINT_VERSION;
     stream.write((const char*) &version, sizeof(version));
     stream.write((const char*) &noiseLevel, sizeof(noiseLevel));
     stream.write((const char*) &noiseSeed, sizeof(noiseSeed));
@@ -296,12 +297,7 @@ void CylinderChainIntegrator::createCheckpoint(ostream& stream) const {
     stream.write((const char*) &steps, sizeof(steps));
     const Vec3 flow[] = {flowVelocity, flowGradient[0], flowGradient[1], flowGradient[2], flowOrigin};
     stream.write((const char*) flow, sizeof(flow));
-    writeLinks(stream, *context);
-    writeLinkers(stream, *context);
-    const vector<PushForceImpl*> pushing = stepper->getCouplings().getPushForces();
-    writeValue(stream, (int) pushing.size());
-    for (const PushForceImpl* force : pushing)
-        force->writeForces(stream);
+    stepper->getCouplings().writeStates(stream);
 }
 
 void CylinderChainIntegrator::loadCheckpoint(istream& stream) {
@@ -313,22 +309,10 @@ void CylinderChainIntegrator::loadCheckpoint(istream& stream) {
     stream.read((char*) &steps, sizeof(steps));
     Vec3 flow[5];
     stream.read((char*) flow, sizeof(flow));
-    if (!stream || version < 3 || version > 8 || level < 0 || level > getLargestPathLevel())
+    if (!stream || version != CHECKPOINT_VERSION || level < 0 || level > getLargestPathLevel())
         throw OpenMMException("loadCheckpoint: Checkpoint was not created with this version of "
                 "CylinderChainIntegrator");
-    if (version > 3)
-        readLinks(stream, *context);
-    if (version > 4)
-        readLinkers(stream, *context, version > 5, version > 6);
-    // Contacts and walls that have been added since then begin their sums.
-    const vector<PushForceImpl*> pushing = stepper->getCouplings().getPushForces();
-    const char* const within = "the forces of contacts and walls";
-    const bool areSame = version > 7 && readValue<int>(stream, within) == (int) pushing.size();
-    for (PushForceImpl* force : pushing)
-        if (areSame)
-            force->readForces(stream);
-        else
-            force->getImpulses().clear();
+    stepper->getCouplings().readStates(stream);
     setFlow(flow[0], flow[1], flow[2], flow[3], flow[4]);
     noiseLevel = level;
     noiseSeed = seed;
@@ -337,33 +321,28 @@ void CylinderChainIntegrator::loadCheckpoint(istream& stream) {
 }
 
 void CylinderChainIntegrator::serializeParameters(SerializationNode& node) const {
-    node.setIntProperty("version", 7);
+    node.setIntProperty("version", STATE_VERSION);
     node.setIntProperty("pathLevel", noiseLevel);
     node.setLongProperty("stepsTaken", findNextStep());
     const Vec3 flow[] = {flowVelocity, flowGradient[0], flowGradient[1], flowGradient[2], flowOrigin};
     for (const Vec3& vector : flow)
         node.createChildNode("Flow").setDoubleProperty("x", vector[0]).setDoubleProperty("y", vector[1])
                 .setDoubleProperty("z", vector[2]);
-    if (context != NULL) {
-        writeLinks(node, *context);
-        writeLinkers(node, *context);
-    }
+    if (context != NULL)
+        stepper->getCouplings().writeStates(node);
 }
 
 void CylinderChainIntegrator::deserializeParameters(const SerializationNode& node) {
-    const int version = node.getIntProperty("version");
-    if (version < 1 || version > 7)
+    if (node.getIntProperty("version") != STATE_VERSION)
         throw OpenMMException("Unsupported version number");
 
     // The same time on the path, or the next step after it.
 
-    const int level = node.getIntProperty("pathLevel", 0);
+    const int level = node.getIntProperty("pathLevel");
     if (level < 0 || level > getLargestPathLevel())
         throw OpenMMException("Illegal path level: "+to_string(level));
-    if (context != NULL) {
-        readLinks(node, *context);
-        readLinkers(node, *context);
-    }
+    if (context != NULL)
+        stepper->getCouplings().readStates(node);
     stepsTaken = node.getLongProperty("stepsTaken");
     countAfterSteps = -1;
     if (noiseLevel >= level)

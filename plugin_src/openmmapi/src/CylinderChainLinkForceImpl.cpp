@@ -162,6 +162,14 @@ cylchain::ImplicitCouplings* CylinderChainLinkForceImpl::getEquations(ContextImp
     return kernel.getAs<CalcCylinderChainLinkForceKernel>().getEquations(context, getLinks());
 }
 
+StateColumns CylinderChainLinkForceImpl::storeState(bool) {
+    return storeTable(getTable());
+}
+
+void CylinderChainLinkForceImpl::restoreState(const StateColumns& columns) {
+    setTable(restoreTable(columns));
+}
+
 string CylinderChainLinkForceImpl::describeFailure(const cylchain::BrokenCoupling& coupling, const string& other) {
     return describeBrokenLink(coupling, other, links, *context, owner.usesPeriodicBoundaryConditions(),
             nearestParticles);

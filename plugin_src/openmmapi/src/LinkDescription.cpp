@@ -124,6 +124,33 @@ void checkLink(const Link& link, const PlaceResolver& places) {
                 ": one is a virtual site at the other");
 }
 
+StateColumns storeTable(const LinkTable& table) {
+    vector<int> numbers, active;
+    LinkColumns links;
+    for (const LinkEntry& entry : table.getEntries()) {
+        numbers.push_back(entry.link.number);
+        active.push_back(entry.active);
+        links.add(entry.link);
+    }
+    StateColumns columns;
+    columns.put("nextNumber", table.getNextNumber());
+    columns.put("numbers", numbers);
+    columns.put("active", active);
+    columns.put("ends", links.ends);
+    columns.put("fractions", links.fractions);
+    columns.put("points", links.points);
+    columns.put("models", links.models);
+    columns.put("parameters", links.parameters);
+    return columns;
+}
+
+LinkTable restoreTable(const StateColumns& columns) {
+    const LinkColumns links(columns.get<int>("ends"), columns.get<double>("fractions"), columns.get<double>("points"),
+            columns.get<int>("models"), columns.get<double>("parameters"));
+    return makeTable(columns.get<int>("numbers"), links, columns.get<int>("active"),
+            columns.getOne<int>("nextNumber"));
+}
+
 string describeBrokenLink(const BrokenCoupling& coupling, const string& other, const vector<Link>& links,
         ContextImpl& context, bool periodic, bool nearestParticles) {
     vector<Vec3> positions, box(3);

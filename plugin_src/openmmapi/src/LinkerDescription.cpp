@@ -59,6 +59,47 @@ vector<Linker> LinkerColumns::getLinkers() const {
     return linkers;
 }
 
+StateColumns storeLinkers(const LinkerState& state) {
+    const LinkerColumns linkers(state);
+    vector<double> clocks;
+    for (size_t i = 0; i < state.linkers.size(); i++)
+        clocks.push_back(state.getClock(i));
+    vector<uint64_t> events;
+    for (const LinkerEvents& own : state.events)
+        events.insert(events.end(), {own.bindings, own.unbindings});
+    StateColumns columns;
+    columns.put("nextNumber", linkers.nextNumber);
+    columns.put("steps", state.steps);
+    columns.put("events", events);
+    columns.put("numbers", linkers.numbers);
+    columns.put("types", linkers.types);
+    columns.put("anchors", linkers.anchors);
+    columns.put("chains", linkers.chains);
+    columns.put("places", linkers.places);
+    columns.put("clocks", clocks);
+    return columns;
+}
+
+LinkerState restoreLinkers(const StateColumns& columns) {
+    LinkerColumns linkers;
+    linkers.nextNumber = columns.getOne<int>("nextNumber");
+    linkers.numbers = columns.get<int>("numbers");
+    linkers.types = columns.get<int>("types");
+    linkers.anchors = columns.get<int>("anchors");
+    linkers.chains = columns.get<int>("chains");
+    linkers.places = columns.get<double>("places");
+    LinkerState state;
+    state.linkers = linkers.getLinkers();
+    state.nextNumber = linkers.nextNumber;
+    state.steps = columns.getOne<uint64_t>("steps");
+    state.clocks = columns.get<double>("clocks");
+    const vector<uint64_t> events = columns.get<uint64_t>("events");
+    checkLinkerColumn("events", events.size(), events.size()/2*2);
+    for (size_t i = 0; i < events.size(); i += 2)
+        state.events.push_back({events[i], events[i+1]});
+    return state;
+}
+
 void checkLinkers(const vector<Linker>& linkers, const LinkerSystem& system, const vector<double>& lengths) {
     // Sites by chain, spacing and number.
     set<tuple<int, double, long long> > sites;

@@ -1,8 +1,6 @@
 #include "openmm/internal/PushForceImpl.h"
 #include "openmm/OpenMMException.h"
-#include "openmm/internal/CheckpointValues.h"
-#include <istream>
-#include <ostream>
+#include <algorithm>
 
 using namespace OpenMM;
 using namespace cylchain;
@@ -38,47 +36,51 @@ double PushForceImpl::takeMeanForces(ContextImpl& context, int reader, vector<do
     return duration;
 }
 
-static void writeSums(ostream& stream, const CouplingImpulses::Sums& sums) {
-    writeValue(stream, sums.time);
-    writeValue(stream, (int) sums.particles.size());
-    for (double value : sums.particles)
-        writeValue(stream, value);
-    writeValue(stream, (int) sums.loads.size());
-    for (const auto& entry : sums.loads) {
-        writeValue(stream, entry.first.first);
-        writeValue(stream, entry.first.second);
-        writeValue(stream, entry.second);
-    }
+StateColumns PushForceImpl::storeState(bool) {
+    const vector<CouplingImpulses::Sums>& readers = impulses.getReaders();
+    vector<double> times, particles, loads;
+    vector<int> counts, between;
+    auto add = [&] (const CouplingImpulses::Sums& sums) {
+        times.push_back(sums.time);
+        particles.insert(particles.end(), sums.particles.begin(), sums.particles.end());
+        counts.push_back(sums.loads.size());
+        for (const auto& entry : sums.loads) {
+            between.insert(between.end(), {entry.first.first, entry.first.second});
+            loads.insert(loads.end(), entry.second.force, entry.second.force+3);
+            loads.push_back(entry.second.size);
+        }
+    };
+    add(impulses.getLatest());
+    for (const CouplingImpulses::Sums& own : readers)
+        add(own);
+    StateColumns columns;
+    columns.put("times", times);
+    columns.put("particles", particles);
+    columns.put("counts", counts);
+    columns.put("between", between);
+    columns.put("loads", loads);
+    return columns;
 }
 
-static CouplingImpulses::Sums readSums(istream& stream, size_t size) {
-    const char* const within = "the forces of contacts and walls";
-    CouplingImpulses::Sums sums;
-    sums.time = readValue<double>(stream, within);
-    if (readValue<int>(stream, within) != (int) size)
-        throw OpenMMException("loadCheckpoint: The checkpoint has forces of another number of particles");
-    sums.particles.resize(size);
-    for (double& value : sums.particles)
-        value = readValue<double>(stream, within);
-    for (int i = readValue<int>(stream, within); i > 0; i--) {
-        const int first = readValue<int>(stream, within), second = readValue<int>(stream, within);
-        sums.loads[{first, second}] = readValue<CouplingImpulses::Load>(stream, within);
-    }
-    return sums;
-}
-
-void PushForceImpl::writeForces(ostream& stream) const {
-    writeSums(stream, impulses.getLatest());
-    writeValue(stream, (int) impulses.getReaders().size());
-    for (const CouplingImpulses::Sums& own : impulses.getReaders())
-        writeSums(stream, own);
-}
-
-void PushForceImpl::readForces(istream& stream) {
+void PushForceImpl::restoreState(const StateColumns& columns) {
+    const vector<double> times = columns.get<double>("times"), particles = columns.get<double>("particles"),
+            loads = columns.get<double>("loads");
+    const vector<int> counts = columns.get<int>("counts"), between = columns.get<int>("between");
     const size_t size = impulses.getLatest().particles.size();
-    const CouplingImpulses::Sums latest = readSums(stream, size);
-    vector<CouplingImpulses::Sums> readers;
-    for (int i = readValue<int>(stream, "the forces of contacts and walls"); i > 0; i--)
-        readers.push_back(readSums(stream, size));
-    impulses.restore(latest, readers);
+    if (times.empty() || counts.size() != times.size() || particles.size() != size*times.size())
+        throw OpenMMException("loadCheckpoint: The checkpoint has forces of another number of particles");
+    vector<CouplingImpulses::Sums> sums(times.size());
+    size_t next = 0;
+    for (size_t i = 0; i < sums.size(); i++) {
+        sums[i].time = times[i];
+        sums[i].particles.assign(particles.begin()+i*size, particles.begin()+(i+1)*size);
+        for (int k = 0; k < counts[i]; k++, next++) {
+            if (2*next+2 > between.size() || 4*next+4 > loads.size())
+                throw OpenMMException("loadCheckpoint: The checkpoint lacks forces of contacts or walls");
+            CouplingImpulses::Load& load = sums[i].loads[{between[2*next], between[2*next+1]}];
+            copy(loads.begin()+4*next, loads.begin()+4*next+3, load.force);
+            load.size = loads[4*next+3];
+        }
+    }
+    impulses.restore(sums[0], {sums.begin()+1, sums.end()});
 }

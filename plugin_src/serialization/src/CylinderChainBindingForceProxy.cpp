@@ -2,7 +2,6 @@
 #include "openmm/CylinderChainBindingForce.h"
 #include "openmm/OpenMMException.h"
 #include "openmm/internal/LinkerDescription.h"
-#include "openmm/internal/LinkerStorage.h"
 #include "openmm/serialization/SerializationNode.h"
 #include <memory>
 
@@ -13,7 +12,7 @@ CylinderChainBindingForceProxy::CylinderChainBindingForceProxy() : Serialization
 }
 
 void CylinderChainBindingForceProxy::serialize(const void* object, SerializationNode& node) const {
-    node.setIntProperty("version", 1);
+    node.setIntProperty("version", 2);
     const CylinderChainBindingForce& force = *reinterpret_cast<const CylinderChainBindingForce*>(object);
     node.setIntProperty("forceGroup", force.getForceGroup());
     node.setStringProperty("name", force.getName());
@@ -50,11 +49,11 @@ void CylinderChainBindingForceProxy::serialize(const void* object, Serialization
         anchors.createChildNode("Anchor").setIntProperty("particle", particle).setDoubleProperty("x", point[0])
                 .setDoubleProperty("y", point[1]).setDoubleProperty("z", point[2]);
     }
-    writeLinkerState(node.createChildNode("Linkers"), force.getState());
+    storeLinkers(force.getState()).write(node.createChildNode("Linkers"));
 }
 
 void* CylinderChainBindingForceProxy::deserialize(const SerializationNode& node) const {
-    if (node.getIntProperty("version") != 1)
+    if (node.getIntProperty("version") != 2)
         throw OpenMMException("Unsupported version number");
     unique_ptr<CylinderChainBindingForce> force(new CylinderChainBindingForce(node.getDoubleProperty("temperature")));
     force->setForceGroup(node.getIntProperty("forceGroup"));
@@ -89,7 +88,7 @@ void* CylinderChainBindingForceProxy::deserialize(const SerializationNode& node)
             force->addPointAnchor(Vec3(anchor.getDoubleProperty("x"), anchor.getDoubleProperty("y"),
                     anchor.getDoubleProperty("z")));
     }
-    const LinkerColumns linkers(readLinkerState(node.getChildNode("Linkers")));
+    const LinkerColumns linkers(restoreLinkers(StateColumns::read(node.getChildNode("Linkers"))));
     force->setLinkers(linkers.numbers, linkers.types, linkers.anchors, linkers.chains, linkers.places,
             linkers.nextNumber);
     return force.release();

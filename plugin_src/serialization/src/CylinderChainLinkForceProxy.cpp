@@ -1,7 +1,7 @@
 #include "openmm/serialization/CylinderChainLinkForceProxy.h"
 #include "openmm/CylinderChainLinkForce.h"
 #include "openmm/OpenMMException.h"
-#include "openmm/internal/LinkStorage.h"
+#include "openmm/internal/LinkDescription.h"
 #include "openmm/serialization/SerializationNode.h"
 #include <memory>
 
@@ -13,35 +13,32 @@ CylinderChainLinkForceProxy::CylinderChainLinkForceProxy() : SerializationProxy(
 
 void CylinderChainLinkForceProxy::serialize(const void* object, SerializationNode& node) const {
     const CylinderChainLinkForce& force = *reinterpret_cast<const CylinderChainLinkForce*>(object);
-    // Version 2 is that of links between tangents.
-
-    node.setIntProperty("version", force.getJoinsTangents() ? 2 : 1);
+    node.setIntProperty("version", 3);
+    node.setBoolProperty("joinsTangents", force.getJoinsTangents());
     node.setIntProperty("forceGroup", force.getForceGroup());
     node.setStringProperty("name", force.getName());
     node.setBoolProperty("usesPeriodic", force.usesPeriodicBoundaryConditions());
     int model;
     double restLength, stiffness, maximumExtension;
     force.getDefaultLinkParameters(model, restLength, stiffness, maximumExtension);
-    node.createChildNode("Defaults").setStringProperty("stretchingModel",
-            CylinderChainLinkForce::getStretchingModelNames()[model]).setDoubleProperty("restLength", restLength)
-            .setDoubleProperty("stiffness", stiffness).setDoubleProperty("maximumExtension", maximumExtension);
-    writeTable(node.createChildNode("Links"), force.getTable());
+    node.createChildNode("Defaults").setIntProperty("stretchingModel", model)
+            .setDoubleProperty("restLength", restLength).setDoubleProperty("stiffness", stiffness).setDoubleProperty("maximumExtension", maximumExtension);
+    storeTable(force.getTable()).write(node.createChildNode("Links"));
 }
 
 void* CylinderChainLinkForceProxy::deserialize(const SerializationNode& node) const {
-    const int version = node.getIntProperty("version");
-    if (version != 1 && version != 2)
+    if (node.getIntProperty("version") != 3)
         throw OpenMMException("Unsupported version number");
     unique_ptr<CylinderChainLinkForce> force(new CylinderChainLinkForce());
-    force->setJoinsTangents(version == 2);
+    force->setJoinsTangents(node.getBoolProperty("joinsTangents"));
     force->setForceGroup(node.getIntProperty("forceGroup"));
     force->setName(node.getStringProperty("name"));
     force->setUsesPeriodicBoundaryConditions(node.getBoolProperty("usesPeriodic"));
     const SerializationNode& defaults = node.getChildNode("Defaults");
-    const int model = findStretchingModel(defaults.getStringProperty("stretchingModel"));
-    force->setDefaultLinkParameters((CylinderChainLinkForce::StretchingModel) model,
+    force->setDefaultLinkParameters(
+            (CylinderChainLinkForce::StretchingModel) defaults.getIntProperty("stretchingModel"),
             defaults.getDoubleProperty("restLength"), defaults.getDoubleProperty("stiffness"),
             defaults.getDoubleProperty("maximumExtension"));
-    force->setTable(readTable(node.getChildNode("Links")));
+    force->setTable(restoreTable(StateColumns::read(node.getChildNode("Links"))));
     return force.release();
 }

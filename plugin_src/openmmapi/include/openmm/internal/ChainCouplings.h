@@ -7,11 +7,15 @@
 #include "openmm/internal/CylinderChainDescription.h"
 #include "openmm/internal/OtherParticles.h"
 #include "openmm/internal/PlaceResolver.h"
-#include "openmm/internal/PushForceImpl.h"
+#include <iosfwd>
+#include <map>
 #include <memory>
+#include <string>
 #include <vector>
 
 namespace OpenMM {
+
+class SerializationNode;
 
 /**
  * The couplings of a Context, and which of them implicit steps have in their equations: see CylinderChainCoupling.
@@ -61,11 +65,15 @@ public:
      */
     void finishStep(int groups, int integration, double stepSize);
     /**
-     * Get the contacts and walls, the forces of which are summed up.
+     * Write what couplings have in the Context beside positions to a checkpoint, or to a State.
      */
-    const std::vector<PushForceImpl*>& getPushForces() const {
-        return pushForces;
-    }
+    void writeStates(std::ostream& stream) const;
+    void writeStates(SerializationNode& node) const;
+    /**
+     * Read what writeStates() has written.  A State that has nothing of the kind leaves couplings as they are.
+     */
+    void readStates(std::istream& stream) const;
+    void readStates(const SerializationNode& node) const;
     /**
      * Get the Force that a coupling of the last forces described belongs to.
      */
@@ -85,11 +93,11 @@ private:
         }
     };
     void update();
+    std::map<std::string, std::vector<CouplingForceImpl*> > findStates() const;
     ContextImpl& context;
     const OtherParticles& others;
     const PlaceResolver resolver;
     std::vector<Coupling> couplings;
-    std::vector<PushForceImpl*> pushForces;
     cylchain::CoupledForces forces;
     // The Forces of the forces above.
 

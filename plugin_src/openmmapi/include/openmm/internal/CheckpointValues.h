@@ -28,6 +28,24 @@ template <class T> T readValue(std::istream& stream, const char* within) {
     return value;
 }
 
+/**
+ * Write a text to a checkpoint.
+ */
+inline void writeText(std::ostream& stream, const std::string& text) {
+    writeValue(stream, (int) text.size());
+    stream.write(text.data(), text.size());
+}
+
+/**
+ * Read a text from a checkpoint.
+ */
+inline std::string readText(std::istream& stream, const char* within) {
+    std::string text;
+    for (int i = readValue<int>(stream, within); i > 0; i--)
+        text.push_back(readValue<char>(stream, within));
+    return text;
+}
+
 } // namespace OpenMM
 
 #endif /*OPENMM_CHECKPOINTVALUES_H_*/

@@ -8,6 +8,7 @@
 #include "openmm/internal/ContextImpl.h"
 #include "openmm/internal/CylinderChainDescription.h"
 #include "openmm/internal/PlaceResolver.h"
+#include "openmm/internal/StateColumns.h"
 #include "openmm/internal/StepForceImpl.h"
 #include <string>
 #include <vector>
@@ -79,6 +80,36 @@ public:
      * @param other  the other place of the coupling, in words
      */
     virtual std::string describeFailure(const cylchain::BrokenCoupling& coupling, const std::string& other) = 0;
+    /**
+     * Get what it calls the state that it has in a Context beside positions; nothing if it has none.
+     */
+    virtual std::string getStateName() const {
+        return "";
+    }
+    /**
+     * Get whether States do not hold it, but checkpoints alone, and a Context may begin a new one.
+     */
+    virtual bool isStateOfCheckpoints() const {
+        return false;
+    }
+    /**
+     * Store the state; an exception is thrown if it is not known.
+     *
+     * @param inCheckpoint  whether random numbers are to go on as well
+     */
+    virtual StateColumns storeState(bool) {
+        return StateColumns();
+    }
+    /**
+     * Go on from a state that was stored.
+     */
+    virtual void restoreState(const StateColumns&) {
+    }
+    /**
+     * Begin a new state.
+     */
+    virtual void beginState() {
+    }
 protected:
     explicit CouplingForceImpl(const Force& owner) : StepForceImpl(owner) {
     }

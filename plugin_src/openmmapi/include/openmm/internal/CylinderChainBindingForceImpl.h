@@ -59,19 +59,12 @@ public:
         return !getLinks().empty();
     }
     cylchain::ImplicitCouplings* getEquations(ContextImpl& context);
+    std::string getStateName() const {
+        return "linkers";
+    }
+    StateColumns storeState(bool inCheckpoint);
+    void restoreState(const StateColumns& columns);
     std::string describeFailure(const cylchain::BrokenCoupling& coupling, const std::string& other);
-    /**
-     * Get the seed of this Context.
-     */
-    std::uint32_t getSeed() const {
-        return seed;
-    }
-    /**
-     * Set the seed of this Context.
-     */
-    void setSeed(std::uint32_t replaced) {
-        seed = replaced;
-    }
 private:
     void follow() const;
     void accept();

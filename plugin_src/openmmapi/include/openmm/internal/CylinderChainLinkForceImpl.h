@@ -46,6 +46,11 @@ public:
         return !getLinks().empty();
     }
     cylchain::ImplicitCouplings* getEquations(ContextImpl& context);
+    std::string getStateName() const {
+        return "links";
+    }
+    StateColumns storeState(bool inCheckpoint);
+    void restoreState(const StateColumns& columns);
     std::string describeFailure(const cylchain::BrokenCoupling& coupling, const std::string& other);
     /**
      * Get all links of the Context as they were described.  An exception is thrown if they are not known.

@@ -5,6 +5,7 @@
 #include "dynamics/BrokenCoupling.h"
 #include "openmm/internal/ContextImpl.h"
 #include "openmm/internal/PlaceResolver.h"
+#include "openmm/internal/StateColumns.h"
 #include <cstddef>
 #include <string>
 #include <vector>
@@ -50,6 +51,16 @@ void checkLink(const cylchain::Link& link, const PlaceResolver& places);
  */
 cylchain::LinkTable makeTable(const std::vector<int>& numbers, const LinkColumns& columns,
         const std::vector<int>& active, int nextNumber);
+
+/**
+ * Store a table.
+ */
+StateColumns storeTable(const cylchain::LinkTable& table);
+
+/**
+ * Put a table together that was stored; an exception is thrown if something is wrong with it.
+ */
+cylchain::LinkTable restoreTable(const StateColumns& columns);
 
 /**
  * Describe the places that a link joins: "between particles 3 and 5".

@@ -2,6 +2,7 @@
 #define OPENMM_LINKERDESCRIPTION_H_
 
 #include "kinetics/Linkers.h"
+#include "openmm/internal/StateColumns.h"
 #include <cstddef>
 #include <vector>
 
@@ -21,6 +22,16 @@ struct LinkerColumns {
      */
     std::vector<cylchain::Linker> getLinkers() const;
 };
+
+/**
+ * Store linkers.
+ */
+StateColumns storeLinkers(const cylchain::LinkerState& state);
+
+/**
+ * Put linkers together that were stored; an exception is thrown if something is wrong with them.
+ */
+cylchain::LinkerState restoreLinkers(const StateColumns& columns);
 
 /**
  * Throw an exception unless linkers fit their types, the anchors and the chains.

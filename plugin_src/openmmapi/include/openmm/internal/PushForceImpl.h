@@ -3,7 +3,7 @@
 
 #include "couplings/CouplingImpulses.h"
 #include "openmm/internal/CouplingForceImpl.h"
-#include <iosfwd>
+#include <string>
 #include <vector>
 
 namespace OpenMM {
@@ -14,12 +14,6 @@ namespace OpenMM {
  */
 class PushForceImpl : public CouplingForceImpl {
 public:
-    /**
-     * Get what receives the forces of implicit steps.
-     */
-    cylchain::CouplingImpulses& getImpulses() {
-        return impulses;
-    }
     void refuseTwoStages() const;
     void beginStep() {
         impulses.beginStep();
@@ -40,15 +34,24 @@ public:
     }
     double takeMeanForces(ContextImpl& context, int reader, std::vector<double>& forces, std::vector<int>& numbers,
             std::vector<double>& sums, std::vector<double>& loads);
-    /**
-     * Write the sums of forces to a checkpoint.
-     */
-    void writeForces(std::ostream& stream) const;
-    /**
-     * Go on from the sums of a checkpoint.
-     */
-    void readForces(std::istream& stream);
+    std::string getStateName() const {
+        return "forces";
+    }
+    bool isStateOfCheckpoints() const {
+        return true;
+    }
+    StateColumns storeState(bool inCheckpoint);
+    void restoreState(const StateColumns& columns);
+    void beginState() {
+        impulses.clear();
+    }
 protected:
+    /**
+     * Get what receives the forces of implicit steps.
+     */
+    cylchain::CouplingImpulses& getImpulses() {
+        return impulses;
+    }
     explicit PushForceImpl(const Force& owner) : CouplingForceImpl(owner) {
     }
     void beginSums(int numParticles) {
