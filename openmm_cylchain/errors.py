@@ -49,21 +49,19 @@ class InstabilityError(RuntimeError):
         return dict(vars(self))
 
 
-# Text and place of the last error of a PythonForce. OpenMM hands on the text alone, as that of an OpenMMException.
-_raised_in_force: tuple[str, dict[str, int | None]] | None = None
+# Where the last error of a PythonForce was. OpenMM hands on the text alone, as that of an OpenMMException.
+_raised_in_force: dict[str, int | None] | None = None
 
 
-def note_raised_in_force(error: Exception) -> None:
-    """Keep what the computation of a PythonForce is about to raise, for ``instability_in_force``."""
+def note_raised_in_force(error: Exception | None) -> None:
+    """Keep what a PythonForce is about to raise, for ``instability_in_force``; None before a step."""
     global _raised_in_force
-    _raised_in_force = str(error), error.place if isinstance(error, InstabilityError) else {}
+    _raised_in_force = None if error is None else error.place if isinstance(error, InstabilityError) else {}
 
 
 def instability_in_force(exception: Exception, advice: str = "") -> InstabilityError | None:
-    """The InstabilityError behind an exception of OpenMM, with advice, or None if no PythonForce has raised it."""
-    if _raised_in_force is None or _raised_in_force[0] not in str(exception):
-        return None
-    return InstabilityError(f"{exception}{advice}", **_raised_in_force[1])
+    """The InstabilityError behind an exception of a step, with advice, or None if no PythonForce has raised it."""
+    return None if _raised_in_force is None else InstabilityError(f"{exception}{advice}", **_raised_in_force)
 
 
 class TimeStepError(InstabilityError):

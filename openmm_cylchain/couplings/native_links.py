@@ -201,8 +201,7 @@ class _as_input_error:  # noqa: N801 - it reads as a statement
         if getattr(error, "kind", None) == "unknown-links":
             raise unknown_crosslinks(_CHANGES) from None
         if isinstance(error, openmm.OpenMMException):
-            text = str(error).removeprefix("CylinderChainLinkForce: ").replace("Link ", "Crosslink ")
-            raise InputError(f"{text}.") from None
+            raise InputError(f"{error}.") from None
 
 
 def _columns_of(places):

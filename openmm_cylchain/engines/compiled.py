@@ -10,7 +10,7 @@ import numpy as np
 import openmm
 
 from ..engine_choice import why_openmm_differs
-from ..errors import InputError, InstabilityError, instability_in_force
+from ..errors import InputError, InstabilityError, instability_in_force, note_raised_in_force
 from ..kinetics.binding_force import find_binding_force, make_binding_force
 from ..mechanics.flow import Flow, as_flow
 from ..mechanics.potentials import BENDING_MODELS as ALL_BENDING_MODELS
@@ -353,6 +353,7 @@ class NativeIntegrator(CylinderChainIntegrator):
         super().setStepSize(as_step(size))
 
     def _advance(self, steps):
+        note_raised_in_force(None)
         try:
             super().step(steps)
         except plugin.CylinderChainException as error:

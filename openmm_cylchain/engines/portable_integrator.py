@@ -6,7 +6,7 @@ import numpy as np
 import openmm
 from openmm import unit
 
-from ..errors import InputError, instability_in_force
+from ..errors import InputError, instability_in_force, note_raised_in_force
 from ..mechanics.flow import Flow, as_flow
 from ..time_steps.schemes import EXPLICIT_SCHEMES, check_scheme
 from ..time_steps.step_watch import ExplicitWork, WorkRecorder
@@ -221,6 +221,7 @@ class PortableIntegrator(openmm.CustomIntegrator):
             )
 
     def _advance(self, steps, recorder):
+        note_raised_in_force(None)
         with _STEPPING, recording(recorder):
             try:
                 super().step(steps)

@@ -3,7 +3,6 @@
 import copy
 import os
 import pickle
-import re
 import subprocess
 import sys
 
