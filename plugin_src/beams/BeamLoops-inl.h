@@ -9,7 +9,7 @@
 #include "dynamics/PackStep.h"
 #include "lanes/Noise.h"
 #include "mechanics/BackgroundFlow.h"
-#include "mechanics/ElementPlace.h"
+#include "mechanics/ElementHold.h"
 #include "mechanics/Inline.h"
 #include "mechanics/PeriodicBox.h"
 #include <algorithm>

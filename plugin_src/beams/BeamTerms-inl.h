@@ -19,7 +19,7 @@ public:
         weights.clear();
         for (int i = 0; i < count; i++) {
             const double length = pack.properties[BeamPack::Length*W+terms[i].lane];
-            const BezierWeights own = ElementPlace::weightsOf(terms[i].fraction, length);
+            const BezierWeights own = weightsOf(terms[i].hold, terms[i].fraction, length);
             weights.push_back({{own.position1, own.control1, own.position2, own.control2}});
         }
     }

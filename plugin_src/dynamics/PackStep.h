@@ -3,6 +3,7 @@
 
 #include "dynamics/ChainEngine.h"
 #include "dynamics/TermBlocks.h"
+#include "mechanics/ElementHold.h"
 #include <cmath>
 
 namespace cylchain {
@@ -14,8 +15,9 @@ namespace cylchain {
 struct CouplingTerm {
     /** The segment is the one between this node and the next. */
     int node, lane;
-    /** Of the segment; of a beam element, see ElementPlace.h. */
+    /** Of the segment, and what is held of a beam element there. */
     double fraction;
+    ElementHold hold;
     double force[3], stiffness[6];
 };
 

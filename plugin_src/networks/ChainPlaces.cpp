@@ -43,7 +43,7 @@ void ChainPlaces::findLeastFriction() {
         const int segments = isStraight(chain) ? chains[chain].segments.size() : 1;
         for (place.node = 0; place.node < segments; place.node++)
             leastFriction = min(leastFriction, getFriction(place));
-        place.fraction = ElementPlace::ofTangent(0, true);
+        place.hold.tangent = 1;
         if (isBeam(chain))
             leastFriction = min(leastFriction, getFriction(place));
     }
@@ -116,7 +116,10 @@ bool ChainPlaces::find(const Place& place, PlaceOnChain& result) const {
         fraction = 1;
     }
     result.node = node;
-    result.fraction = place.isTangent() ? ElementPlace::ofTangent(fraction, place.tangent > 0) : fraction;
+    result.fraction = fraction;
+    result.hold = ElementHold();
+    if (place.isTangent())
+        result.hold.tangent = place.tangent > 0 ? 1 : -1;
     return true;
 }
 
@@ -127,7 +130,7 @@ double ChainPlaces::getFriction(const PlaceOnChain& place) const {
         return particleOf(place.chain).friction;
     const BeamChain& beam = getBeam(place.chain);
     const double friction = beam.elementLength*min(beam.parallelFriction, beam.perpendicularFriction);
-    if (ElementPlace::isTangent(place.fraction))
+    if (place.hold.tangent != 0)
         return friction*beam.elementLength*beam.elementLength/MOBILITY_OF_BEAM_TANGENT;
     return friction/MOBILITY_OF_BEAM_END;
 }
@@ -147,7 +150,7 @@ LateralFriction ChainPlaces::findLateralFriction(const PlaceOnChain& place) cons
         // An element is moved as four Legendre polynomials of the place, of which the second turns it.
         const BeamChain& beam = getBeam(place.chain);
         const double whole = beam.elementLength*beam.perpendicularFriction;
-        return {0, whole, whole/12, 1, true};
+        return {0, whole, whole/12, 1};
     }
     const Chain& chain = chains[place.chain];
     const Segment& segment = chain.segments[place.node];

@@ -4,7 +4,7 @@
 #include "couplings/Place.h"
 #include "mechanics/BeamChain.h"
 #include "mechanics/Chain.h"
-#include "mechanics/ElementPlace.h"
+#include "mechanics/ElementHold.h"
 #include "networks/ParticleStep.h"
 #include <vector>
 
@@ -18,19 +18,19 @@ struct PlaceOnChain {
     int node = 0, lane = 0;
     /** The chain; of beam elements, its number behind those of segments; for a particle, behind those of all chains. */
     int chain = -1;
-    /** Of the segment; on an element, what of it is held: see ElementPlace.h. */
+    /** Of the segment or element, and what is held of an element there. */
     double fraction = 0;
+    ElementHold hold;
 };
 
 /** The friction that a segment or an element has against motion of a place across it, as if it were alone. */
 struct LateralFriction {
     /** That of a node or a particle; that of all of the segment against motion, and against turning; its length. */
     double ofNode = 0, perpendicular = 0, rotational = 0, length = 0;
-    bool isOfElement = false;
     double at(double fraction) const {
         if (!(perpendicular > 0 && rotational > 0))
             return ofNode;
-        const double arm = ((isOfElement ? ElementPlace::parameterOf(fraction) : fraction)-0.5)*length;
+        const double arm = (fraction-0.5)*length;
         return ofNode+1/(1/perpendicular+arm*arm/rotational);
     }
 };

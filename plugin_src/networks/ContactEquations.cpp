@@ -1,5 +1,4 @@
 #include "networks/ContactEquations.h"
-#include "mechanics/ElementPlace.h"
 #include "mechanics/Prefetch.h"
 #include "mechanics/SymmetricMatrices.h"
 #include "networks/RestGap.h"
@@ -88,7 +87,7 @@ void ContactEquations::begin(const CoupledStart& start, const Loop& newLoop) {
     for (const CapsuleOnCurve& own : *onCurves) {
         PlaceOnChain& found = places[own.capsule].place;
         if (start.places.find(own.first, found) && start.taken[found.chain]) {
-            found.fraction = ElementPlace::onPieces(found.fraction, own.pieces);
+            found.hold.pieces = own.pieces;
             places[own.capsule].direction = (own.forwards ? 1.0 : -1.0)/own.pieces;
         }
         else

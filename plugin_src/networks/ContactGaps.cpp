@@ -1,6 +1,5 @@
 #include "networks/ContactGaps.h"
 #include "couplings/Crossings.h"
-#include "mechanics/ElementPlace.h"
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -131,7 +130,7 @@ void ContactGaps::begin(const CoupledStart& start, const Loop& newLoop) {
         PlaceOnChain& found = places[own.capsule].place;
         double direction = 0;
         if (start.places.find(own.first, found) && start.taken[found.chain]) {
-            found.fraction = ElementPlace::onPieces(found.fraction, own.pieces);
+            found.hold.pieces = own.pieces;
             direction = (own.forwards ? 1.0 : -1.0)/own.pieces;
         }
         else

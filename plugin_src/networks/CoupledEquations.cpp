@@ -125,6 +125,7 @@ void CoupledEquations::gatherTerms(const vector<CouplingEquation>& equations, co
         term.node = place.node;
         term.lane = place.lane;
         term.fraction = place.fraction;
+        term.hold = place.hold;
         for (int k = 0; k < 3; k++)
             term.force[k] = side == 0 ? equations[i].force[k] : -equations[i].force[k];
         copy(equations[i].stiffness, equations[i].stiffness+6, term.stiffness);

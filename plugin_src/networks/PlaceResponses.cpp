@@ -1,5 +1,4 @@
 #include "networks/PlaceResponses.h"
-#include "mechanics/ElementPlace.h"
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -56,9 +55,7 @@ double PlaceResponses::find(const PlaceOnChain& place, const LateralFriction& fr
     // A ring turns, too, but about axes in its plane alone: 3/2 on the average over directions.
     double bending = beam.bending, whole = 1.5*beam.whole;
     if (!beam.closed) {
-        const double fraction = places->isBeam(place.chain) ? ElementPlace::parameterOf(place.fraction) :
-                place.fraction;
-        const double at = (place.node+fraction)*beam.length/beam.segments;
+        const double at = (place.node+place.fraction)*beam.length/beam.segments;
         const double x = min(at, beam.length-at)/beam.wave, off = at/beam.length-0.5;
         if (x < LENGTHS_OF_END)
             bending *= 1+exp(-2*x)*(1+2*cos(x)*(cos(x)-sin(x)));
