@@ -39,7 +39,7 @@ typedef ChainPack<Scalar> Pack;
 #include "mechanics/StretchingModels-inl.h"
 #include "dynamics/TensionBand-inl.h"
 #include "dynamics/ImplicitState-inl.h"
-#include "dynamics/elements/Elements-inl.h"
+#include "dynamics/coordinates/Coordinates-inl.h"
 #include "dynamics/ImplicitStages-inl.h"
 #include "dynamics/ImplicitNoise-inl.h"
 #include "dynamics/ImplicitPositions-inl.h"

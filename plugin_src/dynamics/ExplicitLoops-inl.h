@@ -22,17 +22,17 @@ template <int W> ChainEnergy addForcesTo(const Pack& pack, const double* positio
         current.tangent = current.difference*current.inverse;
         f[s+1] = Vector<Real> {};
         if (s > 0)
-            Elements<W>::template addForces<OnJoints>(pack, s, previous, current, f, included);
+            Coordinates<W>::template addForces<OnJoints>(pack, s, previous, current, f, included);
         // The last segment of an unrolled chain is there for its joint alone.
         if (s < pack.segments)
-            Elements<W>::template addForces<OnSegments>(pack, s, current, f, included);
+            Coordinates<W>::template addForces<OnSegments>(pack, s, current, f, included);
     }
     if (!pack.propulsions.empty()) {
         gatherSegments<W>(pack, positions, box, x);
         addPropulsion<W>(pack, x, f);
     }
     for (int node = 0; node < pack.ownNodes(); node++)
-        Elements<W>::template addForces<OnNodes>(pack, node, positions, box, f, included);
+        Coordinates<W>::template addForces<OnNodes>(pack, node, positions, box, f, included);
     for (int node = 0; node < pack.nodes; node++)
         for (int i = 0; i < W; i++) {
             const int particle = pack.particles[node*W+i];

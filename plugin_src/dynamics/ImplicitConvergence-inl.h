@@ -21,7 +21,7 @@ public:
         Real excess = Real{};
         const Real perEnergy = (pack.closed ? splat<Real>(1) : 1-loaded<Real>(pack.free, 0))*(1/(kT+TINY));
         const Scalar tighter = step.twoStages ? 1/(TOLERANCE_OF_STAGES*TOLERANCE_OF_STAGES) : 1;
-        const Scalar tolerance = Elements<W>::limitsOf(pack).tolerance;
+        const Scalar tolerance = Coordinates<W>::limitsOf(pack).tolerance;
         const Scalar ofSegments = tolerance*tolerance;
         for (int s = 0; s < pack.segments; s++) {
             const Vec difference = change[s+1]-change[s];
@@ -29,7 +29,7 @@ public:
             const Real moved = change[s].dot(change[s])*(ofSegments/(NODE_TOLERANCE*NODE_TOLERANCE));
             const Real ratio = larger<Real>(square, moved)*(inverse*inverse*(tighter/ofSegments));
             excess = ratio < excess ? excess : ratio;
-            Elements<W>::measure(step, s, square, perEnergy*tighter, excess);
+            Coordinates<W>::measure(step, s, square, perEnergy*tighter, excess);
         }
         return excess;
     }
@@ -47,7 +47,7 @@ public:
     /** Mark lanes that have changed too much in a step for it to be right. */
     void findExcessiveChanges(const Vec* y, bool* failed) const {
         for (int s = 0; s < pack.segments; s++)
-            Elements<W>::findExcessiveChange(step, y, s, failed);
+            Coordinates<W>::findExcessiveChange(step, y, s, failed);
     }
 private:
     const ImplicitState<W>& step;

@@ -13,7 +13,7 @@ public:
     typedef typename Band::Row Row;
     typedef typename Band::Memory Memory;
     typedef typename SegmentEquations<W>::Geometry Geometry;
-    typedef typename Elements<W>::Factors Factors;
+    typedef typename Coordinates<W>::Factors Factors;
     ImplicitEquations(const ImplicitState<W>& step, Memory& memory) : step(step), pack(step.pack),
             n(step.n), segments(step.segments), change(step.change), ofSegments(step), band(pack, memory) {
     }
@@ -51,16 +51,16 @@ public:
                 after->diagonal = Symmetric<Real> {};
                 after->right = step.loads[s+1];
             }
-            Elements<W>::template add<OnNodes>(step, s, y, *here);
+            Coordinates<W>::template add<OnNodes>(step, s, y, *here);
             if (numTerms > 0)
                 addTerms(s, term, *here, *after);
             if (pack.hasNodeFriction && s < pack.ownNodes())
                 ofSegments.addNodeFriction(y, s, *here);
             if (s > 0)
-                Elements<W>::template add<OnJoints>(step, s, factors, previous, current, *before, *here, *after);
+                Coordinates<W>::template add<OnJoints>(step, s, factors, previous, current, *before, *here, *after);
             if (s < n-2) {
                 ofSegments.describeNew(y, s+1, ahead);
-                Elements<W>::describeNew(step, s+1, current, ahead, factorsAhead);
+                Coordinates<W>::describeNew(step, s+1, current, ahead, factorsAhead);
             }
             if (s > 0)
                 band.template eliminate<2>(s-1, *before, *here, *after);
@@ -73,7 +73,7 @@ public:
         if constexpr (CLOSED)
             band.close(*before, *here);
         else {
-            Elements<W>::template add<OnNodes>(step, n-1, y, *here);
+            Coordinates<W>::template add<OnNodes>(step, n-1, y, *here);
             if (pack.hasNodeFriction)
                 ofSegments.addNodeFriction(y, n-1, *here);
             band.template eliminate<1>(n-2, *before, *here, *after);

@@ -1,7 +1,7 @@
 // Included into the namespace of an instruction set. It does not compile alone.
 
 /**
- * The random forces of an implicit step, which belong to friction, and the random coordinates of elements.
+ * The random forces of an implicit step, which belong to friction, and the random values of coordinates.
  */
 
 template <int W> class ImplicitNoise {
@@ -13,12 +13,12 @@ public:
     }
     void draw() {
         const NoiseKey key = noiseKey(step.settings);
-        const bool elementsOfNodes = Elements<W>::drawsWithNodes(pack);
+        const bool coordinatesOfNodes = Coordinates<W>::drawsWithNodes(pack);
         NoisePlaces<W> places = noisePlaces<W>(pack);
         PlaceNormals<Real> normals;
         for (int s = 0; s < step.n; s++, places.part += 1) {
             const bool ofNode = pack.hasNodeFriction && s < pack.ownNodes();
-            if (ofNode || elementsOfNodes)
+            if (ofNode || coordinatesOfNodes)
                 drawNormals<W, 4>(key, NoiseKind::Node, places, normals.ofNode);
             if (ofNode)
                 drawForceOnNode(normals.ofNode, s);
@@ -26,7 +26,7 @@ public:
                 drawNormals<W, 4>(key, NoiseKind::Segment, places, normals.ofSegment);
                 drawForces(normals.ofSegment, s);
             }
-            Elements<W>::draw(step, places, normals, s);
+            Coordinates<W>::draw(step, places, normals, s);
         }
     }
 private:

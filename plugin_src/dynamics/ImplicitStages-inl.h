@@ -15,7 +15,7 @@ public:
         for (int s = 0; s < step.n; s++) {
             if (s < step.n-1)
                 describeSegment(s);
-            Elements<W>::describe(step, s);
+            Coordinates<W>::describe(step, s);
         }
     }
     /** Describe a stage. The second one begins with the end of the first, y. */
@@ -24,7 +24,7 @@ public:
         for (int s = 0; s < step.n; s++) {
             if (next == Stage::Second && s < step.n-1)
                 describeEndOfFirst(y, s);
-            Elements<W>::prepare(step, y, s);
+            Coordinates<W>::prepare(step, y, s);
         }
         step.combineForces();
     }

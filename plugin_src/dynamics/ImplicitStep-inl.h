@@ -160,7 +160,7 @@ private:
     int solve(Vec* y, bool* failed) {
         Real active = splat<Real>(1);
         int iterations = 0;
-        const int most = Elements<W>::limitsOf(step.pack).iterations;
+        const int most = Coordinates<W>::limitsOf(step.pack).iterations;
         while (iterations < most) {
             eliminate(y, iterations);
             advance(y, iterations, active);

@@ -83,9 +83,9 @@ template <int W> void ImplicitTensions<W>::record(const Vec* y, Real active) con
         equations.describeNew(y, s, current);
         if (s > 0) {
             Row before = {}, here = {}, after = {};
-            typename Elements<W>::Factors factors;
-            Elements<W>::describeNew(step, s, previous, current, factors);
-            Elements<W>::template add<OnJoints>(step, s, factors, previous, current, before, here, after);
+            typename Coordinates<W>::Factors factors;
+            Coordinates<W>::describeNew(step, s, previous, current, factors);
+            Coordinates<W>::template add<OnJoints>(step, s, factors, previous, current, before, here, after);
             const Vec change1 = change[s]-change[s-1], change2 = change[s+1]-change[s];
             const Vec force1 = before.right+before.diagonal*change1-before.second*change2;
             const Vec force2 = after.diagonal*change2-before.second.transposedTimes(change1)-after.right;

@@ -132,7 +132,7 @@ private:
         const Real l0 = property<Real>(pack, s, Pack::RestLength);
         friction = 0.25*property<Real>(pack, s, Pack::Perpendicular)+
                 property<Real>(pack, s, Pack::Rotational)/(l0*l0)+0.5*loaded<Real>(pack.nodeFriction, 0)+TINY;
-        friction = friction+(h/step.shareOfForces())*Elements<W>::template stiffnessAgainstTurning<Real>(pack, s);
+        friction = friction+(h/step.shareOfForces())*Coordinates<W>::template stiffnessAgainstTurning<Real>(pack, s);
         tension = (h/step.shareOfForces())*segments[s].multiplier/segments[s].length;
     }
 };

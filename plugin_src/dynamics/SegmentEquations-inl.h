@@ -15,7 +15,7 @@ public:
     }
     /** From now on, an iteration is linearised. */
     void begin(int iteration) {
-        compressed = iteration < Elements<W>::limitsOf(pack).iterationsWithCompression;
+        compressed = iteration < Coordinates<W>::limitsOf(pack).iterationsWithCompression;
     }
     CYLCHAIN_INLINE void describeNew(const Vec* y, int s, Geometry& geometry) const {
         geometry.difference = segments[s].difference+(y[s+1]-y[s]);
@@ -37,7 +37,7 @@ public:
     template <class Band, class Row> CYLCHAIN_INLINE void addSegment(const Vec* y, int s, const Geometry& geometry,
                 Band& band, Row& here, Row& after) const {
         const FrictionOfEnd<Real> friction = addFriction(y, s, geometry, here, after);
-        Elements<W>::template add<OnSegments>(step, s, geometry, friction, compressed, band, here, after);
+        Coordinates<W>::template add<OnSegments>(step, s, geometry, friction, compressed, band, here, after);
         // Both ends have the same block.
         here.diagonal.add(after.diagonal);
     }

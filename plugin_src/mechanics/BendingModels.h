@@ -30,7 +30,7 @@ namespace cylchain {
 
 enum class BendingModel {CYLCHAIN_BENDING_MODELS(CYLCHAIN_ENUMERATOR)};
 
-/** The kinds of bends. Steps have a kind of elements for each: see dynamics/elements. */
+/** The kinds of bends. Steps have a kind of coordinates for each: see dynamics/coordinates. */
 enum class BendKind {Angular, Linear};
 
 /** The kind of the bends of a model. */

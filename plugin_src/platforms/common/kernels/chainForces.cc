@@ -1,6 +1,6 @@
 /**
  * The forces and energies of chains at the positions of their nodes: see dynamics/ExplicitLoops-inl.h and
- * dynamics/elements.
+ * dynamics/coordinates.
  */
 
 #ifndef CHAIN_BY_GROUP

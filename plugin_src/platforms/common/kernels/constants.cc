@@ -18,7 +18,7 @@ enum {NOISE_SEGMENT, NOISE_LENGTH, NOISE_BEND, NOISE_TETHER, NOISE_PARTICLE, NOI
 #define UNBOUNDED 1e30
 #define LARGEST_DIVISION 10
 
-/** When the iteration of a step ends: see ElementKind-inl.h and LinearBends-inl.h. */
+/** When the iteration of a step ends: see CoordinateKind-inl.h and LinearBends-inl.h. */
 #ifdef BENDING_BondDifference
 #define NEWTON_TOLERANCE 3e-2
 #define NEWTON_ITERATIONS 20

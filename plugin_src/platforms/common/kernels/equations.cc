@@ -1,6 +1,6 @@
 /**
  * The linear equations of an iteration of an implicit step: see dynamics/ImplicitEquations-inl.h and
- * dynamics/elements, whose names these are.
+ * dynamics/coordinates, whose names these are.
  */
 
 /** A new segment, and the one between the old nodes and the new. */

@@ -1,6 +1,6 @@
 /**
  * What an implicit step begins with: its segments, bends and tethers at the start, its noise, and what each of its
- * stages makes of these. See dynamics/ImplicitStages-inl.h, ImplicitNoise-inl.h and dynamics/elements.
+ * stages makes of these. See dynamics/ImplicitStages-inl.h, ImplicitNoise-inl.h and dynamics/coordinates.
  */
 
 /** The coordinate of a length, and theta of the segment. */

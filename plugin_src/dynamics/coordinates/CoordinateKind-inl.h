@@ -1,7 +1,7 @@
 // Included into the namespace of an instruction set. It does not compile alone.
 
 /**
- * What kinds of elements have in common, and what steps tell them: see Elements-inl.h.
+ * What kinds of coordinates have in common, and what steps tell them: see Coordinates-inl.h.
  */
 
 /** When the iteration of an implicit step ends. */
@@ -12,7 +12,7 @@ struct NewtonLimits {
     int iterations = 14, iterationsWithCompression = 0;
 };
 
-/** A segment, as elements see it. */
+/** A segment, as coordinates see it. */
 template <class Real> struct SegmentGeometry {
     Vector<Real> difference, tangent;
     Real length, inverse;
@@ -34,10 +34,10 @@ template <class Real> struct PlaceNormals {
     Real ofNode[8], ofSegment[8];
 };
 
-/** What a kind of elements has unless it has something else. */
-struct ElementDefaults {
+/** What a kind of coordinates has unless it has something else. */
+struct CoordinateDefaults {
     static constexpr bool DRAWS_WITH_NODES = false;
-    /** Whether the bends of a model are elements of this kind. */
+    /** Whether the bends of a model are coordinates of this kind. */
     static constexpr bool bends(BendingModel) {
         return false;
     }
@@ -57,22 +57,22 @@ struct ElementDefaults {
     }
 };
 
-/** Elements of a node, by its number. */
-struct OnNodes : ElementDefaults {
+/** Coordinates of a node, by its number. */
+struct OnNodes : CoordinateDefaults {
     static CYLCHAIN_INLINE bool isAt(const Pack&, int) {
         return true;
     }
 };
 
-/** Elements of a segment s, between the nodes s and s+1. */
-struct OnSegments : ElementDefaults {
+/** Coordinates of a segment s, between the nodes s and s+1. */
+struct OnSegments : CoordinateDefaults {
     static CYLCHAIN_INLINE bool isAt(const Pack& pack, int s) {
         return s < pack.segments;
     }
 };
 
-/** Elements of the joint between the segments s-1 and s. The last two segments of a ring that is unrolled have one. */
-struct OnJoints : ElementDefaults {
+/** Coordinates of the joint between the segments s-1 and s. The last two segments of a ring that is unrolled have one. */
+struct OnJoints : CoordinateDefaults {
     static CYLCHAIN_INLINE bool isAt(const Pack& pack, int s) {
         return s > 0 && s < pack.nodes-1;
     }
