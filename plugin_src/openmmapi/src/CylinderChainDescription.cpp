@@ -1,6 +1,7 @@
 #include "openmm/internal/CylinderChainDescription.h"
 #include "mechanics/BeadModes.h"
 #include "openmm/OpenMMException.h"
+#include <utility>
 
 using namespace std;
 
@@ -66,7 +67,7 @@ void CylinderChainDescription::update(const CylinderChainForce& force) {
         present.visit(i, [&] (auto& chain) {chain.fixed = fixed;});
     }
     checkFriction(present);
-    chains = present;
+    chains = move(present);
     lookForModes();
 }
 

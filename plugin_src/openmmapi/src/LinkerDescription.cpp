@@ -62,6 +62,7 @@ vector<Linker> LinkerColumns::getLinkers() const {
 StateColumns storeLinkers(const LinkerState& state) {
     const LinkerColumns linkers(state);
     vector<double> clocks;
+    clocks.reserve(state.linkers.size());
     for (size_t i = 0; i < state.linkers.size(); i++)
         clocks.push_back(state.getClock(i));
     vector<uint64_t> events;
