@@ -92,11 +92,6 @@ class ChainType(ABC):
     def clamped_bending_stiffness(self) -> float:
         """``bending_stiffness`` of a joint next to a segment that is held."""
 
-    @property
-    def has_beam_elements(self) -> bool:
-        """Whether segments are beam elements, with a control point beside each node, and not straight."""
-        return not self.segment_kind.straight
-
     def beam_element(self, temperature: Scalar, planar: bool = False) -> BeamElement:
         """What the beam elements of a filament are made of; InputError if its segments are straight.
 

@@ -156,11 +156,6 @@ class FilamentGroup:
         return self.type.segment_kind.bends(self.segments, self.closed)
 
     @property
-    def has_beam_elements(self):
-        """Whether segments are elements that bend inside."""
-        return self.type.has_beam_elements
-
-    @property
     def linked(self):
         """Whether linkers bind to them."""
         return "linkers" in self.disturbed
