@@ -41,7 +41,6 @@ def run_command(parser, arguments=None):
 
     Parameters
     ----------
-    parser : argparse.ArgumentParser
     arguments : list of str, optional
         Those of the command line if not given.
     """

@@ -21,9 +21,6 @@ def draw_bonds(
     ----------
     nu, reduced_temperature : float
         As for ``TransferOperator``.
-    bonds : int
-    generator : numpy.random.Generator
-    count : int
     planar : bool
         In the xy plane.
     direction : (3,) array, optional

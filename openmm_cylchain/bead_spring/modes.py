@@ -74,10 +74,7 @@ def bead_spring_mode_step(
 
     Parameters
     ----------
-    bead_type : BeadSpringType
-    bonds : int
     step : time
-    temperature : temperature
     """
     step = positive(step, TIME, "step")
     bending, along = bead_spring_mode_rates(bead_type, bonds)
@@ -101,7 +98,6 @@ def bead_spring_mode_forces(bead_type: BeadSpringType, positions: Vectors) -> tu
 
     Parameters
     ----------
-    bead_type : BeadSpringType
     positions : (..., beads, 3) length
         Of open chains.
     """

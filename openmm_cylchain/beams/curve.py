@@ -152,7 +152,6 @@ def element_energies(
     ----------
     nodes, control_points : (..., nodes, 3) arrays
         In nm.
-    element : BeamElement
     closed : bool
         A ring.
     """
@@ -187,7 +186,6 @@ def beam_virial(
     ----------
     nodes, control_points : (nodes, 3) arrays
         In nm.
-    element : BeamElement
     closed : bool
         A ring.
     """

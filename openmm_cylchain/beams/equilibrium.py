@@ -45,11 +45,8 @@ def draw_beam(
 
     Parameters
     ----------
-    element : BeamElement
-    elements : int
     kT : float
         In kJ/mol, above zero.
-    generator : numpy.random.Generator
     start : (3,) array, nm
         Position of the first node.
     direction : (3,) array, optional

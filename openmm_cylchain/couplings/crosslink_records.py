@@ -41,7 +41,6 @@ class CrosslinkFile:
 
     Parameters
     ----------
-    path : Path
     system : openmm.System
         With the Crosslinks.
     append : bool
@@ -135,7 +134,6 @@ def crosslinks_at(
     Parameters
     ----------
     records : (n,) array of CROSSLINK_RECORD
-    step : int
     positions : (particles, 3) array
         In nm, with filaments that are whole.
     box : (3, 3) array or None

@@ -14,7 +14,6 @@ class ForceTables:
 
     Parameters
     ----------
-    files : RunFiles
     walls, contacts : bool
         Whether there are such.
     sizes : (int, int), optional

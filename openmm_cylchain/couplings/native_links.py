@@ -39,7 +39,6 @@ class NativeLinks(LinkStore):
 
     Parameters
     ----------
-    force : CylinderChainLinkForce
     model, defaults, initial
         As for LinkStore.
     order : int, optional

@@ -27,10 +27,6 @@ def find_planar_crossing(filaments: FilamentCollection, box: FloatArray | None) 
         At the positions where they were added.
     box : (3, 3) array or None
         Vectors of the periodic box in nm; nearest images are looked at.
-
-    Returns
-    -------
-    PlanarCrossing or None
     """
     starts, vectors, numbers = [], [], []
     for number, filament in enumerate(filaments):

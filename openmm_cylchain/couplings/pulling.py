@@ -136,7 +136,6 @@ def tension_forces(count: int, tension: Numbers, direction: Vector) -> FloatArra
 
     Parameters
     ----------
-    count : int
     tension : force, or (count,) array of them
     direction : (3,) array
     """

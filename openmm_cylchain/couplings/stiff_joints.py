@@ -28,7 +28,6 @@ def warn_of_stiff_joints(system: openmm.System, filaments: FilamentCollection) -
 
     Parameters
     ----------
-    system : openmm.System
     filaments : Filaments
         Those in the System.
     """

@@ -21,9 +21,7 @@ def add_stretching_forces(system, segments, force_group):
 
     Parameters
     ----------
-    system : openmm.System
     segments : iterable of (ChainType, particle, particle, stiffness, rest length)
-    force_group : int
     """
     forces = {}
     for filament_type, minus, plus, stiffness, rest_length in segments:
@@ -49,9 +47,7 @@ def add_bending_forces(system, joints, force_group):
 
     Parameters
     ----------
-    system : openmm.System
     joints : iterable of (ChainType, particle, particle, particle, stiffness)
-    force_group : int
     """
     forces = {}
     for filament_type, before, joint, after, stiffness in joints:

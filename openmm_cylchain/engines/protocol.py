@@ -66,14 +66,9 @@ class IntegratorSettings:
     ----------
     step_size : float
         In ps.
-    scheme : str
     temperature : float
         Of the bath, in K.
     particle_friction : energy*time/length^2, array of them, or None
-    random_seed : int
-    flow : Flow
-    checks : bool
-    precision : str
     """
 
     step_size: float

@@ -63,7 +63,6 @@ def locate(
 
     Parameters
     ----------
-    filament : Filament
     number : int
         Of the filament.
     label : str
@@ -145,7 +144,6 @@ def neighbors(attachments: Sequence[Attachment], particles: Indices, nodes: Indi
 
     Parameters
     ----------
-    attachments : sequence of Attachment
     particles : sequence of int
         Their particle indices.
     nodes : sequence of int
@@ -188,15 +186,10 @@ def distribute_beads(filament: Filament, number: int, spacing: float) -> list[At
 
     Parameters
     ----------
-    filament : Filament
     number : int
         Of the filament.
     spacing : float
         The largest distance of two neighbours, in nm.
-
-    Returns
-    -------
-    list of Attachment
     """
     kind = filament.type.segment_kind
     intervals = kind.intervals(filament.segments, filament.type.segment_length, spacing)

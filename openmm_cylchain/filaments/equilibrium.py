@@ -86,7 +86,6 @@ class SegmentLengthDistribution(_Marginal):
 
     Parameters
     ----------
-    filament_type : FilamentType
     temperature : temperature, above zero
     planar : bool
         In a plane: rho(l) ~ l exp(-V_el/k_B T).
@@ -114,7 +113,6 @@ class JointAngleDistribution(_Marginal):
 
     Parameters
     ----------
-    filament_type : FilamentType
     temperature : temperature, above zero
     joint_stiffness : float, optional
         In kJ/mol; the type's if not given.
@@ -135,7 +133,6 @@ class PlanarJointAngleDistribution(_Marginal):
 
     Parameters
     ----------
-    filament_type : FilamentType
     temperature : temperature, above zero
     joint_stiffness : float, optional
         In kJ/mol; the type's if not given.
@@ -193,10 +190,7 @@ def draw_chain(
 
     Parameters
     ----------
-    filament_type : FilamentType
-    segments : int
     temperature : temperature, above zero
-    generator : numpy.random.Generator
     start : (3,) array, nm
         Position of the first node.
     direction : (3,) array, optional

@@ -17,7 +17,6 @@ def tangent_decorrelation(bending_model: str, reduced_stiffness: float) -> float
 
     Parameters
     ----------
-    bending_model : str
     reduced_stiffness : float, above zero
         K/(k_B T), where K takes the place of a/l0 in the bending potential.
     """
@@ -45,7 +44,6 @@ def calibrated_stiffness(bending_model: str, decorrelation: float) -> float:
 
     Parameters
     ----------
-    bending_model : str
     decorrelation : float, above zero
         l0/l_p.
     """

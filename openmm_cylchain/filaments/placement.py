@@ -39,13 +39,6 @@ def joint_stiffnesses(filament_type: ChainType, nodes: int, clamped: Indices, cl
     clamped, and its neighbour is not, only the half on the neighbour's side can: the joint of a FilamentType has
     ``FilamentType.clamped_joint_stiffness``, about twice as much, and the filament is clamped at that node.
 
-    Parameters
-    ----------
-    filament_type : ChainType
-    nodes : int
-    clamped : sequence of int
-    closed : bool
-
     Returns
     -------
     (joints,) array

@@ -49,7 +49,6 @@ def make_binding_force(
     ----------
     linkers : sequence of Linkers
         The types of linkers, in the order of their numbers.
-    filaments : sequence of Filament
     temperature : float
         In K.
     positions : (particles, 3) array
@@ -209,9 +208,6 @@ def places_of(
 
     Parameters
     ----------
-    force : CylinderChainBindingForce
-    table : LinkerTable
-    filaments : sequence of Filament
     nodes : sequence of (n,) int arrays
         The particles of each filament.
     positions : (particles, 3) array

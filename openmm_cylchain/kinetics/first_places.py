@@ -35,7 +35,6 @@ class FirstPlaces:
 
     Parameters
     ----------
-    filaments : sequence of Filament
     kT : float
         In kJ/mol.
     box : (3, 3) array or None

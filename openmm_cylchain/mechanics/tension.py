@@ -39,7 +39,6 @@ def segment_end_forces(filament: Chain, nodes: FloatArray) -> tuple[FloatArray, 
 
     Parameters
     ----------
-    filament : Filament
     nodes : (n, 3) array in nm
 
     Returns
@@ -83,13 +82,11 @@ def filament_tensions(
 
     Parameters
     ----------
-    filaments : sequence of Filament
     node_indices : sequence of int arrays
         Particle indices of the nodes of each filament.
     chains : ChainSet
         The same filaments.
     positions, forces : (particles, 3) arrays in nm and kJ/(mol nm)
-    flow : Flow, optional
 
     Returns
     -------

@@ -14,10 +14,6 @@ _HEADER_SIZE = 276
 class DCDFrames:
     """The whole frames of a DCD file; one that a killed run has left unfinished does not count.
 
-    Parameters
-    ----------
-    path : Path
-
     Attributes
     ----------
     particles : int

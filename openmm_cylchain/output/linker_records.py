@@ -82,7 +82,6 @@ class LinkerFile(RecordFile):
 
     Parameters
     ----------
-    path : Path
     count : int, optional
         How many records to keep of a file that exists, all if -1; a new file if not given.
     """

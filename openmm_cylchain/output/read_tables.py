@@ -35,7 +35,6 @@ def read_reports(path: Path, lines: int | None = None) -> dict[str, FloatArray]:
 
     Parameters
     ----------
-    path : Path
     lines : int, optional
         Of a report; as many as the first one has if not given.
     """

@@ -5,12 +5,7 @@ from typing import IO
 
 
 class RunFiles:
-    """The files of a run in its directory.
-
-    Parameters
-    ----------
-    path : str or Path
-    """
+    """The files of a run in its directory."""
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
@@ -46,7 +41,6 @@ def try_lock(file: IO[bytes], shared: bool = False) -> bool:
 
     Parameters
     ----------
-    file : file
     shared : bool
         Only against those that lock it for themselves.
     """

@@ -62,11 +62,8 @@ class TrajectoryFile:
 
     Parameters
     ----------
-    path : Path
-    topology : openmm.app.Topology
     time_step : float
         In ps.
-    steps_per_frame : int
     size : int, optional
         Of the file, where to continue; a new file if not given.
     header : bytes
@@ -170,8 +167,6 @@ class ReportTable:
 
     Parameters
     ----------
-    path : Path
-    columns : sequence of str
     size : int, optional
         Of the file, where to continue; a new file if not given.
     """

@@ -38,7 +38,6 @@ def annotated(image: FloatArray, camera: Camera, scene: Scene, clock: str) -> Fl
         sRGB between 0 and 1.
     camera : Camera
         Of the image without its margins.
-    scene : Scene
     clock : str
         See ``clock_text``.
     """
@@ -83,7 +82,6 @@ def margins(scene: Scene, cameras: Callable[[Margins], Iterable[Camera]], size: 
 
     Parameters
     ----------
-    scene : Scene
     cameras : callable (Margins)
         The cameras of all pictures of a film, whose pixels begin behind the left margin.
     size : (width, height) in pixels

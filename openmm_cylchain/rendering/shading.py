@@ -18,8 +18,6 @@ def shaded_image(camera: Camera, tubes: Tubes, background: FloatArray) -> FloatA
 
     Parameters
     ----------
-    camera : Camera
-    tubes : Tubes
     background : (3,) array
         sRGB.
     """

@@ -100,10 +100,6 @@ class Configuration:
 def read_configuration(path):
     """Read and check a configuration file.
 
-    Parameters
-    ----------
-    path : str or Path
-
     Returns
     -------
     Configuration

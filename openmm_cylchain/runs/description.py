@@ -9,11 +9,8 @@ def describe(configuration, filaments, system, topology):
 
     Parameters
     ----------
-    configuration : Configuration
-    filaments : Filaments
     system : openmm.System
         With the filaments, and behind them the particles.
-    topology : openmm.app.Topology
 
     Returns
     -------

@@ -31,11 +31,6 @@ class LinkerSummary:
 def summarise_linkers(configuration, directory):
     """What the linkers of a run did.
 
-    Parameters
-    ----------
-    configuration : Configuration
-    directory : RunDirectory
-
     Returns
     -------
     list of LinkerSummary

@@ -61,7 +61,6 @@ def run(configuration, output, resume=False):
 
     Parameters
     ----------
-    configuration : Configuration
     output : str or Path
     resume : bool
         Continue the run in ``output``; it starts from the beginning if there is no checkpoint yet.
@@ -108,10 +107,6 @@ def run(configuration, output, resume=False):
 def create_filaments(configuration):
     """Filaments with their initial positions, and linkers, that a configuration asks for; see ``place_filaments``.
 
-    Parameters
-    ----------
-    configuration : Configuration
-
     Returns
     -------
     Filaments
@@ -122,10 +117,6 @@ def create_filaments(configuration):
 
 def create_simulation(configuration):
     """The Simulation of a configuration, without positions, and its BuiltSystem.
-
-    Parameters
-    ----------
-    configuration : Configuration
 
     Raises
     ------
@@ -158,7 +149,6 @@ def check_step(configuration, seconds=20.0, say=lambda message: None):
 
     Parameters
     ----------
-    configuration : Configuration
     seconds : float
         Time that it may take.
     say : callable (str), optional

@@ -69,7 +69,6 @@ class RunDirectory(RunFiles):
 
         Parameters
         ----------
-        configuration : Configuration
         resume : bool
             Whether to continue a run that is there.
 

@@ -48,8 +48,6 @@ class Observable:
 
     Attributes
     ----------
-    name, unit : str
-    value, standard_error : float
     theory : float
         Exact value for the free discrete chain in equilibrium, unless the name says otherwise.
     deviation : float or None
@@ -128,7 +126,6 @@ def summarise(configuration, trajectory):
 
     Parameters
     ----------
-    configuration : Configuration
     trajectory : mdtraj.Trajectory
         See ``load_trajectory``.
 

@@ -40,8 +40,6 @@ def write_figure(configuration, directory, trajectory):
 
     Parameters
     ----------
-    configuration : Configuration
-    directory : RunDirectory
     trajectory : mdtraj.Trajectory
         See ``summary.load_trajectory``.
     """

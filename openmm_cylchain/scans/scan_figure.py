@@ -21,8 +21,6 @@ def write_scan_figure(path, scan, results):
 
     Parameters
     ----------
-    path : Path
-    scan : Scan
     results : list of dict
         Rows of ``results.csv``.
     """

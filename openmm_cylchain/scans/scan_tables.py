@@ -17,7 +17,6 @@ def gather(scan, path, status_of):
 
     Parameters
     ----------
-    scan : Scan
     path : Path
         Its directory.
     status_of : callable (ScanRun)

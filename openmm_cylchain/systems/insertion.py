@@ -86,7 +86,6 @@ def add_noninteracting_entries(system: openmm.System, existing: int, coinciding:
 
     Parameters
     ----------
-    system : openmm.System
     existing : int
         How many particles have parameters.
     coinciding : iterable of (int, int)

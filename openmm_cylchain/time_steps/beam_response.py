@@ -23,10 +23,8 @@ class BeamResponse(PlaceResponse):
 
     Parameters
     ----------
-    filament : Filament
     friction : SegmentFriction
         Of an element.
-    element : BeamElement
     """
 
     def __init__(self, filament: Filament, friction: SegmentFriction, element: BeamElement) -> None:

@@ -48,13 +48,8 @@ def steps_of_buckling(
     ----------
     filaments : Filaments
         As they begin.
-    scheme : str
     constant_forces : mapping of int to (3,) arrays
         Forces that do not change, in kJ/(mol nm), by the particle that they act on.
-
-    Returns
-    -------
-    list of TimeStep
     """
     tethers: dict[int, list[Tether]] = {}
     for tether in filaments.tethers:

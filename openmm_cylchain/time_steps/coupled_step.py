@@ -64,17 +64,12 @@ def steps_of_couplings(
     ----------
     filaments : Filaments
         In the System.
-    system : openmm.System
     temperature : float
         Of the bath, in K.
     particle_friction : energy*time/length^2, or array of them, optional
         As for ``Filaments.create_integrator``.
     coupled_forces : CoupledForces, optional
         Of the System, if it is known.
-
-    Returns
-    -------
-    list of TimeStep
     """
     forces = coupled_forces or CoupledForces(system)
     coupled = [(index, force) for index, force in enumerate(system.getForces()) if forces.includes(index)]

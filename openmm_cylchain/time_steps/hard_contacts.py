@@ -44,7 +44,6 @@ def longest_resolving_step(
     ----------
     filaments : Filaments
         In the System.
-    system : openmm.System
     contacts : CylinderChainContactForce
         In the System.
     particle_friction : energy*time/length^2, or array of them

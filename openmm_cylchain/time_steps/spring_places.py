@@ -23,13 +23,11 @@ class SpringPlaces:
 
     Parameters
     ----------
-    system : openmm.System
     filaments : Filaments
         In the System.
     scheme : {"implicit", "implicit-second-order", "midpoint", "euler"}
     particle_friction : energy*time/length^2, or array of them, or None
         As for ``Filaments.create_integrator``.
-    springs : list of Springs
     between : dict of (int, int, float) to int
         The numbers of places between two particles, behind those of all particles: see ``SpringReader``.
 
@@ -97,7 +95,6 @@ class SpringPlaces:
         Parameters
         ----------
         stiffness : (sites,) array
-        step : float
         """
         demand = self._components.T @ stiffness
         largest, places = 0.0, np.zeros(0, dtype=int)

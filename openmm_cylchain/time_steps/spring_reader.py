@@ -27,7 +27,6 @@ class SpringReader:
 
     Parameters
     ----------
-    system : openmm.System
     filaments : Filaments
         In the System.
 
@@ -50,7 +49,6 @@ class SpringReader:
 
         Parameters
         ----------
-        force : openmm.Force
         label : str
             What it is called.
         """

@@ -166,10 +166,8 @@ def read_filaments(entries, table, solvent, box, folder):
 
     Parameters
     ----------
-    entries : Entries
     table : int
         Its number, from 1.
-    solvent : Solvent
     box : (3,) tuple or None
     folder : Path
         That files are named from.

@@ -73,7 +73,6 @@ def read_simulation(entries, recommended):
 
     Parameters
     ----------
-    entries : Entries
     recommended : callable (scheme, engine)
         Returns the recommended step in ps.
     """
