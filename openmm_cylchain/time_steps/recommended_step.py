@@ -323,7 +323,7 @@ def contact_diffusion_step(
     diameter: Scalar,
     confidence: float = 3.0,
 ) -> TimeStep:
-    """The part of ``contact_time_step`` that does not depend on the stiffness of contacts, for segments of a friction."""
+    """The part of ``contact_time_step`` that does not depend on the stiffness of contacts."""
     confidence = positive(confidence, DIMENSIONLESS, "confidence")
     bound = diffusion_bound(friction, diameter, filament_type.segment_length, temperature, confidence)
     bounds = {"contact diffusion": bound}
