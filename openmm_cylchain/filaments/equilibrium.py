@@ -111,11 +111,7 @@ class SegmentLengthDistribution(_Marginal):
 class JointAngleDistribution(_Marginal):
     """Equilibrium distribution of the cosine c = t1.t2 of a joint: rho(c) ~ exp(-V_b/k_B T) on [-1, 1].
 
-    Parameters
-    ----------
-    temperature : temperature, above zero
-    joint_stiffness : float, optional
-        In kJ/mol; the type's if not given.
+    The stiffness is in kJ/mol; it is the type's if not given.
     """
 
     def __init__(
@@ -131,11 +127,7 @@ class JointAngleDistribution(_Marginal):
 class PlanarJointAngleDistribution(_Marginal):
     """Equilibrium distribution of the angle of a joint in a plane: rho(theta) ~ exp(-V_b/k_B T) on [-pi, pi].
 
-    Parameters
-    ----------
-    temperature : temperature, above zero
-    joint_stiffness : float, optional
-        In kJ/mol; the type's if not given.
+    The stiffness is in kJ/mol; it is the type's if not given.
     """
 
     def __init__(
@@ -186,24 +178,7 @@ def draw_chain(
     planar: bool = False,
     stiffnesses: FloatArray | None = None,
 ) -> FloatArray:
-    """Node positions of a chain drawn from the equilibrium of the free discrete chain.
-
-    Parameters
-    ----------
-    temperature : temperature, above zero
-    start : (3,) array, nm
-        Position of the first node.
-    direction : (3,) array, optional
-        Unit vector of the first segment; drawn from the sphere, or the circle, if not given.
-    planar : bool
-        Draw from the equilibrium in the plane z = start[2].
-    stiffnesses : (segments - 1,) array, optional
-        Bending stiffnesses of the joints in kJ/mol; the type's if not given.
-
-    Returns
-    -------
-    (segments + 1, 3) array in nm
-    """
+    """See ``ChainType.draw_chain``."""
     lengths = _length_distribution(filament_type, temperature, planar).sample(generator, segments)
     if stiffnesses is None:
         stiffnesses = np.full(segments - 1, filament_type.joint_stiffness)

@@ -32,7 +32,7 @@ from ..time_steps.precision import PRECISIONS
 from ..units.quantities import thermal_energy
 from ..units.text import format_time
 from .description import describe
-from .initial_state import build_system, place_filaments
+from .initial_state import build_system
 from .moving_tethers import MovingTethers
 from .relaxation import relaxed_positions
 from .run_directory import Checkpoint, RunDirectory
@@ -102,17 +102,6 @@ def run(configuration, output, resume=False):
                 "directory.",
                 **error.place,
             ) from None
-
-
-def create_filaments(configuration):
-    """Filaments with their initial positions, and linkers, that a configuration asks for; see ``place_filaments``.
-
-    Returns
-    -------
-    Filaments
-    """
-    settings = configuration.simulation
-    return place_filaments(configuration, settings.engine, settings.seed)
 
 
 def create_simulation(configuration):
