@@ -84,11 +84,7 @@ def _grid(low, high):
 class SegmentLengthDistribution(_Marginal):
     """Equilibrium distribution of the length of a segment, eq. (19): rho(l) ~ l^2 exp(-V_el/k_B T).
 
-    Parameters
-    ----------
-    temperature : temperature, above zero
-    planar : bool
-        In a plane: rho(l) ~ l exp(-V_el/k_B T).
+    In a plane, it is rho(l) ~ l exp(-V_el/k_B T). The temperature is above zero.
     """
 
     def __init__(self, filament_type: IndependentJoints, temperature: Scalar, planar: bool = False) -> None:

@@ -39,10 +39,7 @@ class RunFiles:
 def try_lock(file: IO[bytes], shared: bool = False) -> bool:
     """Lock a file that is open until it is closed, and say whether that was possible.
 
-    Parameters
-    ----------
-    shared : bool
-        Only against those that lock it for themselves.
+    A shared lock is one against those alone that lock it for themselves.
     """
     try:
         import fcntl

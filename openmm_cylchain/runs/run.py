@@ -107,10 +107,7 @@ def run(configuration, output, resume=False):
 def create_simulation(configuration):
     """The Simulation of a configuration, without positions, and its BuiltSystem.
 
-    Raises
-    ------
-    InputError
-        If it cannot be built, or the platform cannot simulate it.
+    InputError if it cannot be built, or the platform cannot simulate it.
     """
     settings = configuration.simulation
     built = build_system(configuration, settings.engine, settings.seed)

@@ -122,18 +122,7 @@ def is_in_equilibrium(group):
 
 
 def summarise(configuration, trajectory):
-    """Observables of a run against theory.
-
-    Parameters
-    ----------
-    trajectory : mdtraj.Trajectory
-        See ``load_trajectory``.
-
-    Returns
-    -------
-    list of GroupSummary
-        One for each [[filament]] table.
-    """
+    """Observables of a run against theory: a GroupSummary for each [[filament]] table; see ``load_trajectory``."""
     labels = group_labels(configuration)
     return [
         _summarise_group(configuration, group, list(members), label, trajectory)

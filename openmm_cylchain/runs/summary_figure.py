@@ -36,13 +36,7 @@ _FONT_SIZE = 11
 
 
 def write_figure(configuration, directory, trajectory):
-    """Draw the figure of a run into its directory as PNG.
-
-    Parameters
-    ----------
-    trajectory : mdtraj.Trajectory
-        See ``summary.load_trajectory``.
-    """
+    """Draw the figure of a run into its directory as PNG; see ``summary.load_trajectory``."""
     # Titles and names are of users: "$" is no mathematics in them.
     with rc_context({"text.parse_math": False}):
         image = _draw(configuration, directory, trajectory)

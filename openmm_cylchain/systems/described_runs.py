@@ -159,12 +159,7 @@ def _contacts(force):
 
 
 def write_topology(files: RunFiles, topology: "app.Topology", system: openmm.System, positions: Any) -> None:
-    """Write what programs need to know of a trajectory: files for mdtraj, VMD and OVITO.
-
-    Parameters
-    ----------
-    positions : (particles, 3) lengths
-    """
+    """Write what programs need to know of a trajectory: files for mdtraj, VMD and OVITO."""
     from openmm import app
 
     mmcif, psf, data = io.StringIO(), io.StringIO(), io.StringIO()
@@ -191,12 +186,7 @@ def energy_cells(
 ) -> tuple[float, ...]:
     """What a line of ENERGY_COLUMNS says behind its step and time.
 
-    Parameters
-    ----------
-    positions : (particles, 3) array
-        In nm.
-    stretching, bending : float
-        Of ``total_energies``.
+    Positions are in nm, and energies those of ``total_energies``.
     """
     segments = sum(filament.segments for filament in filaments)
     bends = sum(filament.bends for filament in filaments)

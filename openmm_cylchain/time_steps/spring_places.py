@@ -90,12 +90,8 @@ class SpringPlaces:
         return self._components @ responses
 
     def largest_eigenvalue(self, stiffness: FloatArray, step: float) -> tuple[float, BoolArray]:
-        """lambda of springs to fixed points in a step in ps, and which sites have part in it.
-
-        Parameters
-        ----------
-        stiffness : (sites,) array
-        """
+        """lambda of springs to fixed points, with stiffnesses (sites,), in a step in ps, and which sites have part in
+        it."""
         demand = self._components.T @ stiffness
         largest, places = 0.0, np.zeros(0, dtype=int)
         if len(self._free):

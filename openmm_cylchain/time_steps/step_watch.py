@@ -243,18 +243,10 @@ class WorkRecorder:
         self._count, self._work, self._change, self._way = 0, 0.0, 0.0, 0.0
 
     def record(self, number: int, positions: FloatArray, forces: FloatArray, moves: FloatArray, kT: float) -> None:
-        """Take note of one step.
+        """Take note of one step with a number: positions and forces (particles, 3) at its start, and displacements in
+        it.
 
-        Parameters
-        ----------
-        number : int
-            Of the step.
-        positions, forces : (particles, 3) arrays
-            At its start.
-        moves : (particles, 3) array
-            Displacements in it.
-        kT : float
-            With zero, nothing is recorded.
+        With a kT of zero, nothing is recorded.
         """
         if kT <= 0.0:
             self.clear()

@@ -164,13 +164,7 @@ class FilamentGroup:
 def read_filaments(entries, table, solvent, box, folder):
     """The FilamentGroups of a [[filament]] table, one for each length.
 
-    Parameters
-    ----------
-    table : int
-        Its number, from 1.
-    box : (3,) tuple or None
-    folder : Path
-        That files are named from.
+    The number of the table is counted from 1; files are named from the folder.
     """
     kind = read_filament_type(entries, solvent)
     _check_element(entries, kind)
