@@ -157,7 +157,7 @@ def table_of(force: Any, context: openmm.Context) -> LinkerTable:
 
 
 def set_table(force: Any, context: openmm.Context, table: LinkerTable) -> None:
-    """Give a Context the linkers of a table; InputError if they do not fit their types, the anchors or the filaments."""
+    """Give a Context the linkers of a table; InputError if they do not fit types, anchors or filaments."""
     columns = [np.asarray(column).ravel().tolist() for column in (
         table.numbers, table.types, table.anchors, table.filaments, table.arc_lengths
     )]  # fmt: skip

@@ -44,7 +44,7 @@ class FirstPlaces:
         self._taken: dict[float, IntArray] = {}
 
     def anywhere(self, hand: Hand, count: int, generator: np.random.Generator, name: str) -> Places:
-        """With the same chance for each length of filament; InputError if there are fewer sites that no hand has taken."""
+        """With the same chance for each length of filament; InputError if there are fewer sites without a hand."""
         if count == 0:
             return np.zeros(0, dtype=int), np.zeros(0)
         lengths = np.where(self._binds(hand), self._lengths, 0.0)

@@ -58,16 +58,16 @@ class ProgressMessages:
 
 
 class RunProgress:
-    """Reports how far a run is, how fast it goes and how long it will take, on standard output if no stream is given.
+    """Reports how far a run is, how fast it goes and how long it will take, on standard output.
 
     ``steps`` are those of the whole run, of which this part starts from ``first_step``; ``time_step`` is in ps.
     """
 
-    def __init__(self, steps: int, first_step: int, time_step: float, stream: TextIO | None = None) -> None:
+    def __init__(self, steps: int, first_step: int, time_step: float) -> None:
         self._steps = steps
         self._first = first_step
         self._time_step = time_step
-        self._line = StatusLine(sys.stdout if stream is None else stream)
+        self._line = StatusLine(sys.stdout)
         self._start = time.monotonic()
         self._last_refresh = self._start
         self._next_fraction = first_step / steps + _LINE_FRACTION

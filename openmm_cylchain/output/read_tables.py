@@ -10,7 +10,7 @@ from ..units.types import FloatArray
 
 
 def read_table(path: Path) -> dict[str, FloatArray]:
-    """The columns of a table by their headers: a dict of (lines,) arrays; InputError if the file is empty or damaged."""
+    """The columns of a table by their headers: a dict of (lines,) arrays; InputError if it is empty or damaged."""
     # A kill may leave a part of the last line.
     with open(path, newline="") as file:
         lines = [line for line in file if line.endswith("\n")]

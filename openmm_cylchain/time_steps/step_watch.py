@@ -213,21 +213,12 @@ class WorkRecorder:
 
     Steps that do not follow on from each other, because positions were set or a checkpoint was loaded, are left out. Of
     displacements and changes of forces, their means over the window are taken off: a filament that is dragged along
-    steadily, while its tension turns, is no sign of a step that is too long.
-
-    Parameters
-    ----------
-    window : int
-        Steps of a window.
-
-    Attributes
-    ----------
-    window : int
-        May be changed at any time.
+    steadily, while its tension turns, is no sign of a step that is too long. ``window``, how many steps one has, may be
+    changed at any time.
     """
 
-    def __init__(self, window: int = WINDOW) -> None:
-        self.window = window
+    def __init__(self) -> None:
+        self.window = WINDOW
         self.clear()
 
     def clear(self) -> None:
