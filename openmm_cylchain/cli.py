@@ -26,25 +26,12 @@ _SECONDS_OF_CHECK = 20.0
 
 
 def main(arguments=None):
-    """Run the console script and return its exit code.
-
-    Parameters
-    ----------
-    arguments : list of str, optional
-        Those of the command line if not given.
-    """
+    """Run the console script, with arguments of the command line if none are given, and return its exit code."""
     return run_command(_parser(), arguments)
 
 
 def run_command(parser, arguments=None):
-    """Do what a parser sets as ``command``, tell its warnings and errors, and return the exit code.
-
-    Parameters
-    ----------
-    parser : argparse.ArgumentParser
-    arguments : list of str, optional
-        Those of the command line if not given.
-    """
+    """Do what a parser sets as ``command``, tell its warnings and errors, and return the exit code."""
     options = parser.parse_args(arguments)
     with warnings.catch_warnings():
         told = (BoxWarning, ContactWarning, SegmentLengthWarning, TimeStepWarning)

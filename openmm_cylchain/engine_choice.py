@@ -19,46 +19,20 @@ _DEFAULT_SCHEMES = {"compiled": "implicit", "portable": "midpoint"}
 
 
 def default_scheme(engine: str | None = None) -> str:
-    """The integration scheme that an engine uses if none is named.
-
-    Parameters
-    ----------
-    engine : {"compiled", "portable"}, optional
-        The fastest that is available if not given.
-
-    Raises
-    ------
-    InputError
-        If there is no such engine, or it is not available.
-    """
+    """The integration scheme that an engine, or the fastest one, uses if none is named; InputError if it is not
+    available."""
     return _DEFAULT_SCHEMES[choose_engine(engine)]
 
 
 def load_engine(name: str | None = None) -> Any:
-    """The Engine of a name (see ``engines.protocol``).
-
-    Parameters
-    ----------
-    name : {"compiled", "portable"}, optional
-        The fastest that is available if not given.
-
-    Raises
-    ------
-    InputError
-        If there is no such engine, or it is not available.
-    """
+    """The Engine of a name (see ``engines.protocol``), or the fastest one; InputError if it is not available."""
     return importlib.import_module(_MODULES[choose_engine(name)]).ENGINE
 
 
 def choose_engine(name: str | None = None) -> str:
-    """The name of an engine that is available: that which is asked for, or else the fastest.
+    """The name of an engine that is available: that which is asked for, or the fastest; else InputError.
 
     An EngineWarning says why the compiled engine is left out, where it is installed.
-
-    Raises
-    ------
-    InputError
-        If there is no such engine, or it is not available.
     """
     if name is not None and name not in ENGINES:
         raise InputError(f"engine must be one of {', '.join(ENGINES)}, but is {name!r}.")
@@ -75,13 +49,7 @@ def choose_engine(name: str | None = None) -> str:
 
 
 def available_engines() -> dict[str, str | None]:
-    """Which engines work here.
-
-    Returns
-    -------
-    dict
-        The name of every engine with None if it is available, or with the reason why it is not.
-    """
+    """The name of every engine with None if it works here, or with the reason why it does not."""
     return {"portable": None, "compiled": _why_compiled_is_missing()}
 
 

@@ -289,19 +289,8 @@ def pairs_of_points(points: FloatArray, radius: float, box: FloatArray | None) -
 
 
 def segment_distances(p: FloatArray, q: FloatArray, w: FloatArray) -> FloatArray:
-    """Smallest distances of pairs of segments.
-
-    Parameters
-    ----------
-    p, q : (pairs, 3) arrays
-        Vectors along the two segments.
-    w : (pairs, 3) array
-        Vector from the first end of the one to that of the other.
-
-    Returns
-    -------
-    (pairs,) array
-    """
+    """Smallest distances (pairs,) of segments along p and q (pairs, 3), with the vectors w from the first ends of p to
+    those of q."""
     pp, qq, pq = _dot(p, p), _dot(q, q), _dot(p, q)
     pw, qw = _dot(p, w), _dot(q, w)
     tiny = np.finfo(float).tiny

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ..beams.curve import BeamElement
+from ..filaments.chain_type import Chain
 from ..output.run_description import DescribedFilament
 from ..units.types import IntArray
 
@@ -51,18 +51,9 @@ class RunFilament:
         return len(self.nodes) - (0 if self.ring else 1)
 
     @property
-    def has_beam_elements(self) -> bool:
-        """Whether its segments are elements that bend inside."""
-        return len(self.control_points) > 0
-
-    def beam_element(self, temperature: float) -> BeamElement:
-        """What its beam elements are made of at a temperature."""
-        return self.type.beam_element(temperature, self.planar)
-
-    @property
     def pieces(self) -> int:
         """Straight pieces by which each of its segments is drawn: 1, or ``PIECES_OF_ELEMENT`` of a beam element."""
-        return PIECES_OF_ELEMENT if self.has_beam_elements else 1
+        return 1 if self.type.segment_kind.straight else PIECES_OF_ELEMENT
 
 
 @dataclass(frozen=True)
@@ -81,6 +72,11 @@ class RunParticles:
     name: str
     indices: IntArray
     diameter: float
+
+
+def chain_of(own: RunFilament, temperature: float) -> Chain:
+    """What the energy of a filament is a function of, beside positions, at a temperature in K."""
+    return Chain(own.type, own.clamped, own.ring, own.planar, temperature)
 
 
 def described_filament(own: DescribedFilament) -> RunFilament:

@@ -8,13 +8,11 @@ import mdtraj
 import numpy as np
 import numpy.typing as npt
 
-from ..beams.curve import arc_lengths, curve_points
 from ..couplings.beam_curves import BeamCurves
 from ..couplings.contact_frames import ContactFrame, DescribedContactFinder, joined_contacts
 from ..couplings.crosslink_records import CROSSLINK_RECORD, CrosslinkFrame, crosslinks_at
 from ..couplings.shapes import Box, Cylinder, Ellipsoid, Plane, Shape, Slab, Sphere
 from ..errors import InputError, PrecisionWarning
-from ..mechanics.geometry import joint_cosines, segment_vectors
 from ..output.dcd_frames import DCDFrames
 from ..output.linker_records import LINKER_RECORD
 from ..output.read_tables import read_reports
@@ -23,7 +21,7 @@ from ..output.run_description import DescribedLinkers, RunDescription
 from ..output.run_files import RunFiles
 from ..units.quantities import VOLUME, positive, thermal_energy, whole_number
 from ..units.types import FloatArray, Indices, IntArray, Scalar
-from .run_filaments import PIECES_OF_ELEMENT, RunParticles, described_filament
+from .run_filaments import PIECES_OF_ELEMENT, RunParticles, chain_of, described_filament
 
 _COARSE = 0.2
 _SHAPES = {
@@ -334,9 +332,7 @@ class Run:
         """
         positions = self.positions(frame)
         return [
-            curve_points(positions[own.nodes], positions[own.control_points], per_element, own.ring)
-            if own.has_beam_elements
-            else positions[own.nodes]
+            own.type.segment_kind.curve(positions[own.nodes], positions[own.control_points], per_element, own.ring)
             for own in self.filaments
         ]
 
@@ -346,16 +342,10 @@ class Run:
         Of a beam element, between the tangents at its ends; of a straight segment, the mean of those at its joints.
         """
         positions = self.positions(frame)
-        angles = []
-        for own in self.filaments:
-            nodes = positions[own.nodes]
-            vectors = (
-                positions[own.control_points] - nodes if own.has_beam_elements else segment_vectors(nodes, own.ring)
-            )
-            units = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
-            between = np.arccos(np.clip(joint_cosines(units, own.ring), -1.0, 1.0))
-            angles.append(_of_elements(between, own.ring) if own.has_beam_elements else _of_segments(between, own.ring))
-        return angles
+        return [
+            own.type.segment_kind.angles(positions[own.nodes], positions[own.control_points], own.ring)
+            for own in self.filaments
+        ]
 
     def segment_tensions(self, frame: int, average: int = 1) -> list[FloatArray]:
         """Tensions dV_el/dl of the segments of each filament in kJ/(mol nm), averaged over frames about one.
@@ -383,33 +373,9 @@ class Run:
         for each in frames:
             positions = self.positions(each)
             for own, total in zip(self.filaments, totals):
-                nodes = positions[own.nodes]
-                if own.has_beam_elements:
-                    total += self._beam_tensions(own, nodes, positions[own.control_points])
-                else:
-                    lengths = np.linalg.norm(segment_vectors(nodes, own.ring), axis=1)
-                    total += own.type.stretching_derivatives(lengths, own.ring)
+                parts = positions[own.nodes], positions[own.control_points]
+                total += own.type.segment_kind.tensions(chain_of(own, self.temperature), *parts)
         return [total / len(frames) for total in totals]
-
-    def _beam_tensions(self, own, nodes, control_points):
-        element = own.beam_element(self.temperature)
-        lengths = arc_lengths(nodes, control_points, own.ring)
-        return element.modulus * (lengths / element.length - 1.0 + element.shortening)
-
-
-def _of_elements(angles, ring):
-    # Those of a ring begin with the angle between the tangents at its last and its first node.
-    return np.roll(angles, -1) if ring else angles
-
-
-def _of_segments(angles, ring):
-    # The mean of the angles at the joints of a segment.
-    if ring:
-        return 0.5 * (angles + np.roll(angles, -1))
-    if not len(angles):
-        return np.zeros(1)
-    padded = np.concatenate([angles[:1], angles, angles[-1:]])
-    return 0.5 * (padded[1:] + padded[:-1])
 
 
 def volume_of(run: Run, volume: Scalar | None) -> float:

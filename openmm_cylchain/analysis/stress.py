@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..filaments.chain_type import Chain
 from ..units.quantities import thermal_energy
 from ..units.types import FloatArray, Scalar
+from .run_filaments import chain_of
 from .runs import Run, volume_of
 
 
@@ -73,8 +73,8 @@ def stress(run: Run, frame: int, volume: Scalar | None = None) -> Stress:
     chains, free = np.zeros((3, 3)), np.zeros(3)
     positions = run.positions(frame)
     for own in run.filaments:
-        chain = Chain(own.type, own.clamped, own.ring, own.planar, run.temperature)
-        chains += own.type.segment_kind.virial(chain, positions[own.nodes], positions[own.control_points])
+        parts = positions[own.nodes], positions[own.control_points]
+        chains += own.type.segment_kind.virial(chain_of(own, run.temperature), *parts)
         moving = len(own.nodes) + len(own.control_points) - len(own.clamped) - len(own.clamped_tangents)
         free += moving * np.array([1.0, 1.0, 0.0 if own.planar else 1.0])
     linkers = run.linkers[frame]

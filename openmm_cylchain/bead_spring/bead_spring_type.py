@@ -322,7 +322,6 @@ class BeadSpringType(ChainType):
         return 0.5 * self.segment_stiffnesses(segments, closed) * extension**2
 
     def stretching_derivatives(self, lengths: FloatArray, closed: bool = False) -> FloatArray:
-        """See ``ChainType.stretching_derivatives``."""
         segments = np.shape(lengths)[-1]
         return self.segment_stiffnesses(segments, closed) * (lengths - self.segment_lengths(segments, closed))
 
@@ -337,7 +336,6 @@ class BeadSpringType(ChainType):
         return 0.5 * kappa * np.sum(_bond_differences(vectors, closed) ** 2, axis=-1)
 
     def bending_end_forces(self, vectors: FloatArray, stiffnesses: FloatArray, closed: bool = False) -> FloatArray:
-        """See ``ChainType.bending_end_forces``."""
         pairs = np.asarray(stiffnesses)[:, None] * _bond_differences(vectors, closed)
         if closed:
             return np.roll(pairs, -1, axis=0) - pairs
@@ -354,7 +352,6 @@ class BeadSpringType(ChainType):
         planar: bool = False,
         joint_stiffnesses: FloatArray | None = None,
     ) -> FloatArray:
-        """See ``ChainType.draw_chain``."""
         reduced = self.reduced_temperature(positive(temperature, TEMPERATURE, "temperature"))
         (bonds,) = draw_bonds(self.nu, reduced, segments, generator, 1, planar, direction)
         steps = self.natural_length * np.cumsum(bonds, axis=0)

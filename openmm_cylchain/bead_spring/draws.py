@@ -15,19 +15,11 @@ def draw_bonds(
     planar: bool = False,
     direction: FloatArray | None = None,
 ) -> FloatArray:
-    """Bond vectors (count, bonds, 3) of independent chains, in units of d.
+    """Bond vectors (count, bonds, 3) of independent chains, in units of d; parameters are those of
+    ``TransferOperator``.
 
-    Parameters
-    ----------
-    nu, reduced_temperature : float
-        As for ``TransferOperator``.
-    bonds : int
-    generator : numpy.random.Generator
-    count : int
-    planar : bool
-        In the xy plane.
-    direction : (3,) array, optional
-        Unit vector of the first bond; drawn from the sphere, or the circle, if not given.
+    The unit vector ``direction`` of first bonds is drawn from the sphere, or with ``planar`` from the circle, if not
+    given.
     """
     operator = transfer_operator(nu, reduced_temperature, bonds, 2 if planar else 3)
     lengths, concentrations = operator.draw(generator, count)

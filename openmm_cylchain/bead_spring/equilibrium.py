@@ -109,7 +109,7 @@ def bead_spring_mean_square_radius_of_gyration(
 def bead_spring_mode_variances(
     bead_type: BeadSpringType, bonds: int, modes: int | Indices, temperature: Scalar, planar: bool = False
 ) -> FloatArray:
-    """Mean squares <|R_p|^2> in nm^2 of the amplitudes of modes p >= 1, eq. (26); see ``bead_spring_mode_amplitudes``.
+    """Mean squares <|R_p|^2> in nm^2 of the amplitudes of modes p >= 1, R_p = sum_n phi_np r_n, eq. (26).
 
     All components together: three times k_B T/(lambda zeta_p) is what they would be without a coupling of modes.
     """

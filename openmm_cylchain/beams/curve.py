@@ -146,16 +146,7 @@ def _bend(first, second):
 def element_energies(
     nodes: FloatArray, control_points: FloatArray, element: BeamElement, closed: bool = False
 ) -> tuple[FloatArray, FloatArray]:
-    """Stretching and bending energies of the elements, (..., elements) each, in kJ/mol.
-
-    Parameters
-    ----------
-    nodes, control_points : (..., nodes, 3) arrays
-        In nm.
-    element : BeamElement
-    closed : bool
-        A ring.
-    """
+    """Stretching and bending energies of the elements, (..., elements) each, in kJ/mol; of a ring if ``closed``."""
     if closed:
         return element_energies(unrolled(nodes), unrolled(control_points), element)
     h = element.length
@@ -182,14 +173,6 @@ def beam_virial(
 
     By central differences of strains of 1e-6, in which energies are nearly quadratic; component (i, j) is the sum over
     particles of r_i dE/dr_j.
-
-    Parameters
-    ----------
-    nodes, control_points : (nodes, 3) arrays
-        In nm.
-    element : BeamElement
-    closed : bool
-        A ring.
     """
     strains = _STRAIN * np.eye(9).reshape(9, 3, 3)
     particles = np.stack([nodes, control_points]) - nodes[0]

@@ -45,11 +45,8 @@ def draw_beam(
 
     Parameters
     ----------
-    element : BeamElement
-    elements : int
     kT : float
         In kJ/mol, above zero.
-    generator : numpy.random.Generator
     start : (3,) array, nm
         Position of the first node.
     direction : (3,) array, optional
@@ -250,9 +247,6 @@ def element_averages(bend: float, planar: bool = False) -> ElementAverages:
 def calibrated_rigidity(bend: float) -> float:
     """EI of elements over l_p k_B T, with which ``<t.t'> = exp(-h/l_p)`` between neighbouring nodes in space.
 
-    Parameters
-    ----------
-    bend : float
-        h/l_p, at most ``LONGEST_ELEMENT``.
+    ``bend`` is h/l_p, at most ``LONGEST_ELEMENT``.
     """
     return 1.0 / scipy.optimize.brentq(lambda factor: np.log(mean_cosine(bend * factor)) + bend, 0.9, 1.3, xtol=1e-10)

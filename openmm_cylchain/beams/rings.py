@@ -20,7 +20,6 @@ def circle(
 
     Parameters
     ----------
-    element : BeamElement
     elements : int
         At least three.
     center : (3,) array

@@ -85,13 +85,7 @@ class BeamCurves:
         positions: FloatArray,
         box: FloatArray | None = None,
     ) -> FloatArray:
-        """Unit vectors along curves at places, from the first node of each towards the second: (n, 3).
-
-        Parameters
-        ----------
-        first, second, fractions, positions, box
-            As for ``places``.
-        """
+        """Unit vectors (n, 3) along curves at ``places``, from the first node of each towards the second."""
         weights, vectors, _, turned = self._on_elements(slope_weights, first, second, fractions, positions, box)
         slopes = sum(weight[:, None] * vector for weight, vector in zip(weights.T[1:], vectors))
         return np.where(turned, -1.0, 1.0)[:, None] * slopes / np.linalg.norm(slopes, axis=1, keepdims=True)

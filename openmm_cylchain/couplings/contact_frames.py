@@ -101,7 +101,6 @@ class DescribedContactFinder:
 
     Parameters
     ----------
-    contacts : DescribedContacts
     filaments : dict
         By the particles at which the segments of their capsules end, the number of each filament, and of how many
         capsules a segment is made: one, or several of a beam element.

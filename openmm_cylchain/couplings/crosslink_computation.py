@@ -23,7 +23,6 @@ class CrosslinkComputation:
     model : {"harmonic", "fene"}
     initial : CrosslinkTable
         What a new Context begins with.
-    periodic : bool
     defaults : tuple
         Stiffness, rest length and maximum extension of crosslinks that are given none.
     """
@@ -77,7 +76,6 @@ def lengths_and_vectors(
     Parameters
     ----------
     model : {"harmonic", "fene"}
-    table : CrosslinkTable
     positions : (particles, 3) array
     box, segment_box : (3, 3) array, optional
     curves : BeamCurves, optional

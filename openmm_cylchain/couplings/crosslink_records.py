@@ -41,7 +41,6 @@ class CrosslinkFile:
 
     Parameters
     ----------
-    path : Path
     system : openmm.System
         With the Crosslinks.
     append : bool
@@ -132,15 +131,7 @@ def crosslinks_at(
 ) -> CrosslinkFrame:
     """The crosslinks of a step: those of the last records that are not later.
 
-    Parameters
-    ----------
-    records : (n,) array of CROSSLINK_RECORD
-    step : int
-    positions : (particles, 3) array
-        In nm, with filaments that are whole.
-    box : (3, 3) array or None
-    curves : BeamCurves, optional
-        Those of beam elements, on which places between their nodes are.
+    At positions in nm, with filaments that are whole, and with the curves of beam elements that places are on.
     """
     end = int(np.searchsorted(records["step"], step, "right"))
     begin = 0 if end == 0 else int(np.searchsorted(records["step"], records["step"][end - 1], "left"))

@@ -10,16 +10,7 @@ from .mean_forces import ContactForces, WallForces
 
 
 class ForceTables:
-    """Files of forces of walls and of contacts, as far as a System has such.
-
-    Parameters
-    ----------
-    files : RunFiles
-    walls, contacts : bool
-        Whether there are such.
-    sizes : (int, int), optional
-        Of the files, where to continue; new files if not given.
-    """
+    """Files of forces of walls and of contacts, as far as a System has such; new ones, or continued at their sizes."""
 
     def __init__(self, files: RunFiles, walls: bool, contacts: bool, sizes: Sequence[int] | None = None) -> None:
         of_walls, of_contacts = (None, None) if sizes is None else sizes

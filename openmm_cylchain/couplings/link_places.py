@@ -136,12 +136,7 @@ class LinkPlaces:
     def check(self, numbers: npt.ArrayLike, particles: int | None) -> None:
         """Refuse particles that a System does not have (None for any), and links of a place to itself.
 
-        Parameters
-        ----------
-        numbers : (n,) array of int
-            By which links are known in messages.
-        particles : int or None
-            How many there are.
+        Links are known by their numbers (n,) in messages.
         """
         numbers = np.asarray(numbers)
         same = np.flatnonzero(self._joins_itself())
@@ -186,13 +181,8 @@ class LinkPlaces:
 
 
 def as_places(pairs: Any) -> LinkPlaces:
-    """What a user gives as (n, 2) places: particles, SegmentPlaces, and one fixed point at most in each pair.
-
-    Raises
-    ------
-    InputError
-        If it is something else.
-    """
+    """What a user gives as (n, 2) places: particles, SegmentPlaces, and one fixed point at most in each pair; else
+    InputError."""
     particles = _as_particles(pairs)
     if particles is not None:
         return LinkPlaces(particles)

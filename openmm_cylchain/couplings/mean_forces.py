@@ -89,13 +89,7 @@ class ContactForces:
 
 
 class ForceReaders:
-    """Somebody who asks a Context for mean forces again and again, whoever else may ask, too.
-
-    Parameters
-    ----------
-    context : openmm.Context
-        Means begin with what it does from now on.
-    """
+    """Somebody who asks a Context for mean forces, from now on, again and again, whoever else may ask, too."""
 
     def __init__(self, context: openmm.Context) -> None:
         self._context = context

@@ -35,15 +35,9 @@ def table_of_force(force: Any) -> CrosslinkTable:
 
 
 class NativeLinks(LinkStore):
-    """The crosslinks of a CylinderChainLinkForce of a System.
+    """The crosslinks of a CylinderChainLinkForce of a System: see ``LinkStore``.
 
-    Parameters
-    ----------
-    force : CylinderChainLinkForce
-    model, defaults, initial
-        As for LinkStore.
-    order : int, optional
-        How many such forces the System has before this one. Without it, the force is known by its address.
+    ``order`` says how many such forces the System has before this one. Without it, the force is known by its address.
     """
 
     def __init__(

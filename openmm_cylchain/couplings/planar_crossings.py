@@ -21,16 +21,7 @@ class PlanarCrossing:
 def find_planar_crossing(filaments: FilamentCollection, box: FloatArray | None) -> PlanarCrossing | None:
     """The first two segments, if any, that cross each other in one plane where filaments are planar.
 
-    Parameters
-    ----------
-    filaments : Filaments
-        At the positions where they were added.
-    box : (3, 3) array or None
-        Vectors of the periodic box in nm; nearest images are looked at.
-
-    Returns
-    -------
-    PlanarCrossing or None
+    Filaments are where they were added; in a box, vectors (3, 3) in nm, nearest images are looked at.
     """
     starts, vectors, numbers = [], [], []
     for number, filament in enumerate(filaments):

@@ -132,14 +132,7 @@ def constant_tension(
 
 
 def tension_forces(count: int, tension: Numbers, direction: Vector) -> FloatArray:
-    """Forces (2 count, 3), in kJ/(mol nm), on the first and the last node of each of ``count`` filaments in turn.
-
-    Parameters
-    ----------
-    count : int
-    tension : force, or (count,) array of them
-    direction : (3,) array
-    """
+    """Forces (2 count, 3), in kJ/(mol nm), on the first and the last node of each of ``count`` filaments in turn."""
     tension = np.asarray(in_units_of(tension, FORCE, "tension"))
     if tension.shape not in ((), (count,)):
         raise InputError(f"tension must be a number or have the shape ({count},), but has {tension.shape}.")

@@ -61,14 +61,18 @@ class Face(Shape):
 
     @abstractmethod
     def depths(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Depths beyond the face in nm, negative inside, and their gradients, for positions (n, 3)."""
+        """Depths beyond the face in nm, negative inside, and their gradients, for positions (..., 3)."""
+
+    def square_depth(self, positions: npt.ArrayLike) -> FloatOrArray:
+        depths, _ = self.depths(np.asarray(positions))
+        return np.maximum(0.0, depths) ** 2
 
 
 def _radial(vectors, radius):
     # Depths and gradients of what is so far from a centre or an axis; in the middle, there is no gradient.
     distances = np.linalg.norm(vectors, axis=-1)
     scale = np.divide(1.0, distances, out=np.zeros_like(distances), where=distances > 0.0)
-    return distances - radius, vectors * scale[:, None]
+    return distances - radius, vectors * scale[..., None]
 
 
 def number(value: float) -> str:
@@ -120,12 +124,9 @@ class Plane(Face):
     def room(self) -> float:
         return math.inf
 
-    def square_depth(self, positions: npt.ArrayLike) -> FloatOrArray:
-        return np.maximum(0.0, -((np.asarray(positions) - self.point) @ self.normal)) ** 2
-
     def depths(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
         depths = -((positions - self.point) @ self.normal)
-        return depths, np.broadcast_to(-self.normal, (len(depths), 3))
+        return depths, np.broadcast_to(-self.normal, positions.shape)
 
 
 @dataclass(frozen=True)
@@ -209,10 +210,6 @@ class Sphere(Face):
     def room(self) -> float:
         return self.radius
 
-    def square_depth(self, positions: npt.ArrayLike) -> FloatOrArray:
-        distance = np.linalg.norm(np.asarray(positions) - self.center, axis=-1)
-        return np.maximum(0.0, distance - self.radius) ** 2
-
     def depths(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
         return _radial(positions - self.center, self.radius)
 
@@ -261,13 +258,9 @@ class Cylinder(Face):
     def room(self) -> float:
         return self.radius
 
-    def square_depth(self, positions: npt.ArrayLike) -> FloatOrArray:
-        across = (np.asarray(positions) - self.point) @ np.transpose(self._across())
-        return np.maximum(0.0, np.linalg.norm(across, axis=-1) - self.radius) ** 2
-
     def depths(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
         relative = positions - self.point
-        return _radial(relative - (relative @ self.axis)[:, None] * self.axis, self.radius)
+        return _radial(relative - (relative @ self.axis)[..., None] * self.axis, self.radius)
 
 
 @dataclass(frozen=True)
@@ -366,12 +359,6 @@ class Ellipsoid(Face):
     def room(self) -> float:
         return float(np.min(self.semi_axes))
 
-    def square_depth(self, positions: npt.ArrayLike) -> FloatOrArray:
-        relative = np.asarray(positions) - self.center
-        s = np.sqrt(np.sum((relative / self.semi_axes) ** 2, axis=-1))
-        steepness = np.sum(relative**2 / self.semi_axes**4, axis=-1)
-        return np.maximum(0.0, s - 1.0) ** 2 * s**2 / np.maximum(steepness, self._least_steepness)
-
     def depths(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
         relative, squares = positions - self.center, self.semi_axes**2
         s = np.sqrt(np.sum(relative**2 / squares, axis=-1))
@@ -380,7 +367,7 @@ class Ellipsoid(Face):
         # Of the square of s, and of the steepness; inside, the gradient is of no use.
         of_square, of_steepness = 2.0 * relative / squares, 2.0 * relative / squares**2
         rise = (1.0 - 0.5 / np.maximum(s, 0.5)) / np.sqrt(steepness)
-        return depths, rise[:, None] * of_square - (0.5 * depths / steepness)[:, None] * of_steepness
+        return depths, rise[..., None] * of_square - (0.5 * depths / steepness)[..., None] * of_steepness
 
 
 def _set(instance, name, value):

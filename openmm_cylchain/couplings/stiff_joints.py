@@ -25,12 +25,6 @@ def warn_of_stiff_joints(system: openmm.System, filaments: FilamentCollection) -
     At the recommended step, a joint of 100 EI/h has 2.6 % too much energy, and elements beside it 2.7 % too little in
     their bends, of 500 EI/h 5.6 %, half as much in a fourth of that step: measured, see docs/design/beam_elements.md.
     Where a crosslink without rest length holds the same two places together, they are right.
-
-    Parameters
-    ----------
-    system : openmm.System
-    filaments : Filaments
-        Those in the System.
     """
     plugin: Any = load_plugin()
     forces = [plugin.CylinderChainLinkForce.cast(force) for force in system.getForces() if is_link_force(force)]

@@ -99,11 +99,11 @@ class CompiledEngine(Engine):
         force = CylinderChainForce()
         force.setForceGroup(int(stretching_force_group))
         for number, (filament, nodes) in enumerate(zip(placed.filaments, placed.node_indices)):
-            if filament.type.has_beam_elements:
+            if filament.type.segment_kind.straight:
+                _add_chain(force, filament, nodes, placed.viscosity, placed.temperature)
+            else:
                 controls = placed.control_point_indices[number]
                 _add_beam_chain(force, filament, nodes, controls, placed.viscosity, placed.temperature)
-            else:
-                _add_chain(force, filament, nodes, placed.viscosity, placed.temperature)
             force.setChainName(number, filament_label(number, filament))
         for tether in placed.tethers:
             force.addTether(tether.filament, tether.node, openmm.Vec3(*tether.point), tether.stiffness)

@@ -48,10 +48,7 @@ def refuse_constraints(system, placed):
 def describe_chains(system, placed):
     """The filaments as a ChainSet. Nodes of mass zero in the System are fixed.
 
-    Raises
-    ------
-    InputError
-        If a node is a virtual site, or all nodes of a filament have mass zero.
+    InputError if a node is a virtual site, or all nodes of a filament have mass zero.
     """
     fixed = fixed_nodes(system, placed)
     filaments, solvent = placed.filaments, (placed.viscosity, placed.temperature)
@@ -75,10 +72,7 @@ def describe_chains(system, placed):
 def fixed_nodes(system, placed):
     """Whether nodes have mass zero in the System: a list of bools, filament by filament, control points behind nodes.
 
-    Raises
-    ------
-    InputError
-        If a node is a virtual site, or all nodes of a filament have mass zero.
+    InputError if a node is a virtual site, or all nodes of a filament have mass zero.
     """
     fixed = []
     for number, filament in enumerate(placed.filaments):

@@ -19,11 +19,7 @@ PROPULSION_NAME = "CylinderChainPropulsion"
 def add_stretching_forces(system, segments, force_group):
     """Add one CustomBondForce for each stretching model in use.
 
-    Parameters
-    ----------
-    system : openmm.System
-    segments : iterable of (ChainType, particle, particle, stiffness, rest length)
-    force_group : int
+    Segments are (ChainType, particle, particle, stiffness, rest length).
     """
     forces = {}
     for filament_type, minus, plus, stiffness, rest_length in segments:
@@ -47,11 +43,7 @@ def add_stretching_forces(system, segments, force_group):
 def add_bending_forces(system, joints, force_group):
     """Add one force for each bending model in use: a CustomAngleForce, or a CustomCompoundBondForce of beads.
 
-    Parameters
-    ----------
-    system : openmm.System
-    joints : iterable of (ChainType, particle, particle, particle, stiffness)
-    force_group : int
+    Joints are (ChainType, particle, particle, particle, stiffness).
     """
     forces = {}
     for filament_type, before, joint, after, stiffness in joints:
@@ -95,12 +87,7 @@ def add_propulsion(system, filaments, node_indices, force_group):
 class Propulsion:
     """The computation of a PythonForce: a force F0 t on every segment of self-propelled filaments.
 
-    Parameters
-    ----------
-    minus, plus : (segments,) int arrays
-        Particle indices of the ends of the segments.
-    propulsion : (segments,) array
-        F0 in kJ/(mol nm).
+    The particles of the ends of segments (segments,), and F0 (segments,) in kJ/(mol nm).
     """
 
     def __init__(self, minus, plus, propulsion):

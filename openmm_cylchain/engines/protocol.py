@@ -66,14 +66,9 @@ class IntegratorSettings:
     ----------
     step_size : float
         In ps.
-    scheme : str
     temperature : float
         Of the bath, in K.
     particle_friction : energy*time/length^2, array of them, or None
-    random_seed : int
-    flow : Flow
-    checks : bool
-    precision : str
     """
 
     step_size: float
@@ -99,13 +94,8 @@ class Engine(ABC):
     def add_forces(
         self, system: openmm.System, placed: PlacedFilaments, stretching_force_group: int, bending_force_group: int
     ) -> None:
-        """Add the forces of filaments to a System that holds their nodes.
-
-        Raises
-        ------
-        InputError
-            If the engine cannot have these force groups.
-        """
+        """Add the forces of filaments to a System that holds their nodes; InputError if they cannot have these force
+        groups."""
 
     @abstractmethod
     def create_integrator(
@@ -113,10 +103,7 @@ class Engine(ABC):
     ) -> openmm.Integrator:
         """Create the integrator of a System with filaments.
 
-        Raises
-        ------
-        InputError
-            If the engine does not have the scheme or the precision, or the System is none that it can move.
+        InputError if there is no such scheme or precision, or the System is none that the engine can move.
         """
 
     @abstractmethod
@@ -129,25 +116,13 @@ class Engine(ABC):
 
     @abstractmethod
     def record_tensions(self, context: openmm.Context) -> None:
-        """Let the integrator of a Context record mean tensions from its next step on.
-
-        Raises
-        ------
-        InputError
-            If it cannot.
-        """
+        """Let the integrator of a Context record mean tensions from its next step on; InputError if it cannot."""
 
     @abstractmethod
     def mean_tensions(self, context: openmm.Context, filaments: int) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """What the integrator of a Context has recorded of the last step, for so many filaments.
+        """What the integrator of a Context has recorded of the last step, for so many filaments; InputError if it is
+        nothing.
 
-        Returns
-        -------
-        list of (tensions, joint_forces, directions)
-            For each filament arrays (segments,) and (joints, 3) in kJ/(mol nm), and (segments, 3).
-
-        Raises
-        ------
-        InputError
-            If it has recorded nothing.
+        For each filament tensions (segments,) and joint forces (joints, 3) in kJ/(mol nm), and directions
+        (segments, 3).
         """

@@ -63,7 +63,6 @@ def locate(
 
     Parameters
     ----------
-    filament : Filament
     number : int
         Of the filament.
     label : str
@@ -143,13 +142,7 @@ def add_virtual_site(system: openmm.System, attachment: Attachment, nodes: IntAr
 def neighbors(attachments: Sequence[Attachment], particles: Indices, nodes: Indices) -> Iterator[tuple[int, int]]:
     """Pairs of particles of one filament that may coincide: attachment points, and the ends of their segments.
 
-    Parameters
-    ----------
-    attachments : sequence of Attachment
-    particles : sequence of int
-        Their particle indices.
-    nodes : sequence of int
-        Particle indices of the nodes.
+    By the particles of the attachments, and those of the nodes.
     """
     on_segment = defaultdict(list)
     for attachment, particle in zip(attachments, particles):
@@ -181,22 +174,11 @@ def attachment_positions(
 
 
 def distribute_beads(filament: Filament, number: int, spacing: float) -> list[Attachment]:
-    """Attachments at equal distances along segments of rest length, the first and the last node of a chain included.
+    """Attachments along segments of rest length, the first and the last node of a chain included, at equal distances of
+    ``spacing`` in nm at most.
 
     In a ``BeadSpringType``, whose end bonds are shorter, they are closer to each other there. On beam elements, there
     is one at each node, so that the pieces of curve between neighbours belong to one element each.
-
-    Parameters
-    ----------
-    filament : Filament
-    number : int
-        Of the filament.
-    spacing : float
-        The largest distance of two neighbours, in nm.
-
-    Returns
-    -------
-    list of Attachment
     """
     kind = filament.type.segment_kind
     intervals = kind.intervals(filament.segments, filament.type.segment_length, spacing)

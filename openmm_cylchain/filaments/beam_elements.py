@@ -90,7 +90,6 @@ class BeamElements(SegmentKind):
         control_points: Vectors | None = None,
         closed: bool = False,
     ) -> FloatArray:
-        """See ``SegmentKind``."""
         if control_points is not None:
             return _given(nodes, control_points, label)
         if tangents is None:

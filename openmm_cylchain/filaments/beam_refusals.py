@@ -9,12 +9,7 @@ from ..errors import InputError
 def refuse_beams(filaments: Iterable[Any], what: str) -> None:
     """Raise InputError, naming the first filament of beam elements, for something that knows straight segments alone.
 
-    Parameters
-    ----------
-    filaments : iterable of Filament
-        Or of anything else that has a ``type``, such as the filaments of a Run.
-    what : str
-        That cannot have them, such as "contacts of capsules".
+    Filaments are anything that has a ``type``; ``what`` cannot have them, such as "contacts of capsules".
     """
     for number, filament in enumerate(filaments):
         kind = filament.type.segment_kind

@@ -13,7 +13,6 @@ import numpy.typing as npt
 from ..beams.curve import BeamElement
 from ..errors import InputError
 from ..mechanics.friction import EndCorrections, SegmentFriction
-from ..mechanics.geometry import segment_vectors
 from ..units.quantities import TEMPERATURE, positive, thermal_energy
 from ..units.types import FloatArray, Indices, IntArray, Scalar, Vectors
 
@@ -92,11 +91,6 @@ class ChainType(ABC):
     def clamped_bending_stiffness(self) -> float:
         """``bending_stiffness`` of a joint next to a segment that is held."""
 
-    @property
-    def has_beam_elements(self) -> bool:
-        """Whether segments are beam elements, with a control point beside each node, and not straight."""
-        return not self.segment_kind.straight
-
     def beam_element(self, temperature: Scalar, planar: bool = False) -> BeamElement:
         """What the beam elements of a filament are made of; InputError if its segments are straight.
 
@@ -157,24 +151,6 @@ class ChainType(ABC):
     def bending_end_forces(self, vectors: FloatArray, stiffnesses: FloatArray, closed: bool = False) -> FloatArray:
         """Forces (segments, 3) of bending on the plus ends of segments, in kJ/(mol nm); the minus ends have the
         opposite ones."""
-
-    def chain_energies(
-        self, nodes: FloatArray, joint_stiffnesses: npt.ArrayLike | None = None, closed: bool = False
-    ) -> tuple[float, float]:
-        """Stretching and bending energy, in kJ/mol, of a chain with node positions (n, 3) in nm.
-
-        Parameters
-        ----------
-        nodes : (n, 3) array
-        joint_stiffnesses : (joints,) array, optional
-            As ``Filament.joint_stiffnesses``; those of a free chain if not given.
-        closed : bool
-            Whether the last node is joined to the first.
-        """
-        vectors = segment_vectors(nodes, closed)
-        bending = self.bending_energies(vectors, joint_stiffnesses, closed)
-        stretching = self.stretching_energies(np.linalg.norm(vectors, axis=1), closed)
-        return float(np.sum(stretching)), float(np.sum(bending))
 
     @abstractmethod
     def check_folds(self, vectors: FloatArray, label: str, closed: bool = False) -> None:

@@ -84,12 +84,7 @@ def _grid(low, high):
 class SegmentLengthDistribution(_Marginal):
     """Equilibrium distribution of the length of a segment, eq. (19): rho(l) ~ l^2 exp(-V_el/k_B T).
 
-    Parameters
-    ----------
-    filament_type : FilamentType
-    temperature : temperature, above zero
-    planar : bool
-        In a plane: rho(l) ~ l exp(-V_el/k_B T).
+    In a plane, it is rho(l) ~ l exp(-V_el/k_B T). The temperature is above zero.
     """
 
     def __init__(self, filament_type: IndependentJoints, temperature: Scalar, planar: bool = False) -> None:
@@ -112,12 +107,7 @@ class SegmentLengthDistribution(_Marginal):
 class JointAngleDistribution(_Marginal):
     """Equilibrium distribution of the cosine c = t1.t2 of a joint: rho(c) ~ exp(-V_b/k_B T) on [-1, 1].
 
-    Parameters
-    ----------
-    filament_type : FilamentType
-    temperature : temperature, above zero
-    joint_stiffness : float, optional
-        In kJ/mol; the type's if not given.
+    The stiffness is in kJ/mol; it is the type's if not given.
     """
 
     def __init__(
@@ -133,12 +123,7 @@ class JointAngleDistribution(_Marginal):
 class PlanarJointAngleDistribution(_Marginal):
     """Equilibrium distribution of the angle of a joint in a plane: rho(theta) ~ exp(-V_b/k_B T) on [-pi, pi].
 
-    Parameters
-    ----------
-    filament_type : FilamentType
-    temperature : temperature, above zero
-    joint_stiffness : float, optional
-        In kJ/mol; the type's if not given.
+    The stiffness is in kJ/mol; it is the type's if not given.
     """
 
     def __init__(
@@ -189,27 +174,7 @@ def draw_chain(
     planar: bool = False,
     stiffnesses: FloatArray | None = None,
 ) -> FloatArray:
-    """Node positions of a chain drawn from the equilibrium of the free discrete chain.
-
-    Parameters
-    ----------
-    filament_type : FilamentType
-    segments : int
-    temperature : temperature, above zero
-    generator : numpy.random.Generator
-    start : (3,) array, nm
-        Position of the first node.
-    direction : (3,) array, optional
-        Unit vector of the first segment; drawn from the sphere, or the circle, if not given.
-    planar : bool
-        Draw from the equilibrium in the plane z = start[2].
-    stiffnesses : (segments - 1,) array, optional
-        Bending stiffnesses of the joints in kJ/mol; the type's if not given.
-
-    Returns
-    -------
-    (segments + 1, 3) array in nm
-    """
+    """See ``ChainType.draw_chain``."""
     lengths = _length_distribution(filament_type, temperature, planar).sample(generator, segments)
     if stiffnesses is None:
         stiffnesses = np.full(segments - 1, filament_type.joint_stiffness)

@@ -357,17 +357,14 @@ class FilamentType(ChainType):
         return self.bending_potential.derivative(self.joint_stiffness if stiffness is None else stiffness, cosine)
 
     def stretching_energies(self, lengths: FloatArray, closed: bool = False) -> FloatArray:
-        """See ``ChainType.stretching_energies``."""
         return np.asarray(self.stretching_energy(lengths))
 
     def stretching_derivatives(self, lengths: FloatArray, closed: bool = False) -> FloatArray:
-        """See ``ChainType.stretching_derivatives``."""
         return np.asarray(self.stretching_derivative(lengths))
 
     def bending_energies(
         self, vectors: FloatArray, stiffnesses: npt.ArrayLike | None = None, closed: bool = False
     ) -> FloatArray:
-        """See ``ChainType.bending_energies``."""
         return np.asarray(self.bending_energy(_cosines(_tangents(vectors), closed), stiffnesses))
 
     def bending_end_forces(self, vectors: FloatArray, stiffnesses: FloatArray, closed: bool = False) -> FloatArray:
@@ -413,7 +410,6 @@ class FilamentType(ChainType):
         planar: bool = False,
         joint_stiffnesses: FloatArray | None = None,
     ) -> FloatArray:
-        """See ``ChainType.draw_chain``."""
         self._refuse_beam("draw without control points")
         return draw_chain(self, segments, temperature, generator, start, direction, planar, joint_stiffnesses)
 

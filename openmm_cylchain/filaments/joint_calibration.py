@@ -15,11 +15,7 @@ _LARGEST_DECORRELATION = 300.0
 def tangent_decorrelation(bending_model: str, reduced_stiffness: float) -> float:
     """``-ln <c>`` of a joint in space: the average of c = t1.t2 with the weight exp(-V_b/k_B T), by quadrature.
 
-    Parameters
-    ----------
-    bending_model : str
-    reduced_stiffness : float, above zero
-        K/(k_B T), where K takes the place of a/l0 in the bending potential.
+    The stiffness is K/(k_B T), where K takes the place of a/l0 in the bending potential; it is above zero.
     """
     # V_b is at least K theta^2 2/pi^2, so that beyond the widest angle exp(-V_b/k_B T) vanishes.
     widest = min(np.pi, 20.0 / np.sqrt(reduced_stiffness))
@@ -42,12 +38,6 @@ def calibrated_stiffness(bending_model: str, decorrelation: float) -> float:
 
     It tends to 1/decorrelation for stiff joints, and falls to zero for weak ones, without end: every bending model
     reaches every mean cosine between 0 and 1.
-
-    Parameters
-    ----------
-    bending_model : str
-    decorrelation : float, above zero
-        l0/l_p.
     """
     # exp(-300) is no correlation at all to any precision.
     decorrelation = min(decorrelation, _LARGEST_DECORRELATION)

@@ -33,23 +33,13 @@ def clamped_nodes(clamped: int | Indices, count: int, label: str) -> tuple[int, 
 
 
 def joint_stiffnesses(filament_type: ChainType, nodes: int, clamped: Indices, closed: bool = False) -> FloatArray:
-    """Stiffness in the bending potential of every joint of a filament; that next to a clamped segment differs.
+    """Stiffness (joints,) in the bending potential of every joint of a filament; that next to a clamped segment
+    differs.
 
     Half a segment of material on either side of a joint bends. Where a segment is held, because both of its nodes are
     clamped, and its neighbour is not, only the half on the neighbour's side can: the joint of a FilamentType has
-    ``FilamentType.clamped_joint_stiffness``, about twice as much, and the filament is clamped at that node.
-
-    Parameters
-    ----------
-    filament_type : ChainType
-    nodes : int
-    clamped : sequence of int
-    closed : bool
-
-    Returns
-    -------
-    (joints,) array
-        A ring has a joint at every node; an open filament at all nodes but its ends.
+    ``FilamentType.clamped_joint_stiffness``, about twice as much, and the filament is clamped at that node. A ring has
+    a joint at every node, an open filament at all nodes but its ends.
     """
     fixed = np.zeros(nodes, dtype=bool)
     fixed[list(clamped)] = True

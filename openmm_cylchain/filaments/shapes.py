@@ -143,10 +143,7 @@ def new_filament(
 ) -> Filament:
     """A Filament with nodes and control points, and FilamentOptions.
 
-    Raises
-    ------
-    InputError
-        If forces are not defined there, or the filament is not what it is said to be.
+    InputError if forces are not defined there, or the filament is not what it is said to be.
     """
     positions, control_points = points
     closed, planar = _flag(closed, f"{label}: closed"), _flag(planar, f"{label}: planar")

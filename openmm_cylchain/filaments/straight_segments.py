@@ -83,7 +83,6 @@ class StraightSegments(SegmentKind):
         planar: bool,
         label: str,
     ) -> Points:
-        """See ``ChainType.draw_chain``."""
         held = clamped_nodes(clamped, segments + 1, label)
         stiffnesses = joint_stiffnesses(filament_type, segments + 1, held)
         return filament_type.draw_chain(segments, temperature, generator, start, direction, planar, stiffnesses), None

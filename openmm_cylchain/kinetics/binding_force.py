@@ -49,7 +49,6 @@ def make_binding_force(
     ----------
     linkers : sequence of Linkers
         The types of linkers, in the order of their numbers.
-    filaments : sequence of Filament
     temperature : float
         In K.
     positions : (particles, 3) array
@@ -158,13 +157,7 @@ def table_of(force: Any, context: openmm.Context) -> LinkerTable:
 
 
 def set_table(force: Any, context: openmm.Context, table: LinkerTable) -> None:
-    """Give a Context the linkers of a table.
-
-    Raises
-    ------
-    InputError
-        For linkers that do not fit their types, the anchors or the filaments.
-    """
+    """Give a Context the linkers of a table; InputError if they do not fit types, anchors or filaments."""
     columns = [np.asarray(column).ravel().tolist() for column in (
         table.numbers, table.types, table.anchors, table.filaments, table.arc_lengths
     )]  # fmt: skip
@@ -207,19 +200,8 @@ def places_of(
 ) -> FloatArray:
     """Where the two ends of linkers hold something: (n, 2, 3) in nm, NaN where they do not.
 
-    Parameters
-    ----------
-    force : CylinderChainBindingForce
-    table : LinkerTable
-    filaments : sequence of Filament
-    nodes : sequence of (n,) int arrays
-        The particles of each filament.
-    positions : (particles, 3) array
-        In nm.
-    box : (3, 3) array or None
-        Periodic box vectors if distances are those of nearest images: then a second end is at that of its first one.
-    curves : BeamCurves or None
-        Those of beam elements, if there are any.
+    By the particles of the nodes of each filament, all positions in nm, and the curves of beam elements. In a box,
+    (3, 3), a second end is at the nearest image of its first one.
     """
     places = np.full((len(table), 2, 3), np.nan)
     chains, along = np.asarray(table.filaments), np.asarray(table.arc_lengths)

@@ -33,13 +33,7 @@ def contour_of(filament: Filament) -> FloatArray:
 class FirstPlaces:
     """Draws places where linkers begin bound; of sites, each once, for the linkers of all types.
 
-    Parameters
-    ----------
-    filaments : sequence of Filament
-    kT : float
-        In kJ/mol.
-    box : (3, 3) array or None
-        Periodic box vectors if distances are those of nearest images.
+    kT is in kJ/mol. In a box, (3, 3), distances are those of nearest images.
     """
 
     def __init__(self, filaments: Sequence[Filament], kT: float, box: FloatArray | None) -> None:
@@ -50,13 +44,7 @@ class FirstPlaces:
         self._taken: dict[float, IntArray] = {}
 
     def anywhere(self, hand: Hand, count: int, generator: np.random.Generator, name: str) -> Places:
-        """With the same chance for each length of filament.
-
-        Raises
-        ------
-        InputError
-            If there are fewer sites that no hand has taken.
-        """
+        """With the same chance for each length of filament; InputError if there are fewer sites without a hand."""
         if count == 0:
             return np.zeros(0, dtype=int), np.zeros(0)
         lengths = np.where(self._binds(hand), self._lengths, 0.0)
@@ -82,10 +70,7 @@ class FirstPlaces:
     ) -> tuple[IntArray, Places]:
         """Within reach of anchors, in the equilibrium of the spring: which of the anchors, the first that have a place.
 
-        Raises
-        ------
-        InputError
-            If fewer anchors have one.
+        InputError if fewer anchors have one.
         """
         hand = kind.hands[1]
         found: list[tuple[int, int, float]] = []

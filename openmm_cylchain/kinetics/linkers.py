@@ -37,7 +37,6 @@ class Linkers:
 
     Attributes
     ----------
-    kind : Crosslinker
     count : int
         How many there are to begin with.
     concentration : float or None

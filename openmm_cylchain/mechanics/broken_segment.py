@@ -14,7 +14,6 @@ class BrokenSegment:
 
     Attributes
     ----------
-    chain : int
     segment : int
         Its number in the chain.
     what : str
@@ -38,7 +37,6 @@ def find_broken_segment(
 
     Parameters
     ----------
-    chains : ChainSet
     rest_lengths : (segments,) array
     ranges : (segments,) array
         By how much a segment may be longer or shorter than that.

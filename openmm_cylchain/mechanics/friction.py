@@ -1,4 +1,4 @@
-"""Friction of one segment: coefficients, thermal torque and relaxation times.
+"""Friction of one segment: coefficients and relaxation times.
 
 Equation numbers refer to Pesek et al., Soft Matter 2016, 12, 3360. All results are plain numbers
 in OpenMM's units: friction in kJ ps/(mol nm^2), rotational friction in kJ ps/mol, time in ps.
@@ -158,17 +158,6 @@ def affine_extensional_friction(parallel: float, length: Scalar) -> float:
 def stokes_friction(diameter: Scalar, viscosity: Scalar) -> float:
     """Translational friction of a sphere, 3 pi eta d, for particles outside filaments."""
     return 3.0 * math.pi * positive(viscosity, VISCOSITY, "viscosity") * positive(diameter, LENGTH, "diameter")
-
-
-def thermal_torque(friction: SegmentFriction, temperature: Scalar) -> float:
-    """Thermal effective torque of a free segment along its axis, eq. (15), in kJ/mol.
-
-    ``T = 2 k_B T (2 - gamma_def/gamma_rot)``
-
-    This is the drift k_B T div(M) of one *free* segment. Scheme "euler" sends it through the chain's
-    constraints as the paper does, which is not the drift of a chain.
-    """
-    return 2.0 * thermal_energy(temperature) * (2.0 - friction.extensional / friction.rotational)
 
 
 def rotational_relaxation_time(friction: SegmentFriction, temperature: Scalar) -> float:

@@ -214,11 +214,7 @@ def _flow_at_nodes(chains, nodes, flow):
 def drag_forces(chains: ChainSet, nodes: FloatArray, velocities: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Forces zeta_s v on the ends of all segments whose nodes move with the given velocities (nodes, 3).
 
-    Those of the friction of nodes are not among them.
-
-    Returns
-    -------
-    (minus, plus) : two (segments, 3) arrays
+    They are (minus, plus), (segments, 3) each. Those of the friction of nodes are not among them.
     """
     length, tangent = segment_geometry(chains, nodes)
     first, second = velocities[chains.first_node], velocities[chains.second_node]
@@ -282,12 +278,8 @@ def random_forces(
 ) -> FloatArray:
     """Random forces (nodes, 3) on all nodes, of the covariance (2 k_B T/dt) Z.
 
-    Those of ``noise_forces``, and sqrt(2 k_B T xi/dt) c where nodes have a friction xi by themselves.
-
-    Parameters
-    ----------
-    nodal : (nodes, 3) array
-        The independent standard Gaussian vectors c; needed if, and only if, nodes have friction.
+    Those of ``noise_forces``, and sqrt(2 k_B T xi/dt) c where nodes have a friction xi by themselves. The independent
+    standard Gaussian vectors c, ``nodal`` (nodes, 3), are needed if, and only if, they have.
     """
     forces = segment_forces_to_nodes(chains, *noise_forces(chains, nodes, kT, step, translational, rotational))
     if chains.node_friction is not None:
@@ -301,14 +293,11 @@ def _apply_root(across, along, tangent, vector):
 
 
 def thermal_forces(chains: ChainSet, nodes: FloatArray, kT: float) -> tuple[FloatArray, FloatArray]:
-    """Forces on the ends of all segments from the thermal torque (15), step (2) of Section 4.
+    """Forces (minus, plus), (segments, 3), on the ends of all segments from the thermal torque (15), step (2) of
+    Section 4.
 
     T = 2 k_B T (2 - g_def/g_rot) t, f_pm = pm T/l; in d dimensions, k_B T (d + 1 - (d - 1) g_def/g_rot) t. None on
     segments without friction, whose nodes have all of it: the mobility of those depends on nothing.
-
-    Returns
-    -------
-    (minus, plus) : two (segments, 3) arrays
     """
     length, tangent = segment_geometry(chains, nodes)
     dimensions, turns = chains.segment_dimensions, chains.rotational > 0.0

@@ -35,16 +35,9 @@ class Chain(Protocol):
 
 
 def segment_end_forces(filament: Chain, nodes: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Forces of stretching (8), bending (28) and propulsion on the ends of all segments of one filament.
+    """Forces of stretching (8), bending (28) and propulsion on the minus and plus ends of all segments of one filament.
 
-    Parameters
-    ----------
-    filament : Filament
-    nodes : (n, 3) array in nm
-
-    Returns
-    -------
-    (minus, plus) : two (segments, 3) arrays in kJ/(mol nm)
+    (segments, 3) arrays in kJ/(mol nm), for nodes (n, 3) in nm.
     """
     vectors = segment_vectors(nodes, filament.closed)
     length = np.linalg.norm(vectors, axis=1)
@@ -58,13 +51,9 @@ def segment_end_forces(filament: Chain, nodes: FloatArray) -> tuple[FloatArray, 
 def split_external_forces(
     chains: ChainSet, forces: FloatArray, minus: FloatArray, plus: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Add what the nodal forces hold beyond ``minus`` and ``plus`` to the ends of the segments.
+    """Add what the nodal forces hold beyond (minus, plus), (segments, 3), to these forces on the ends of the segments.
 
     Half to each of the two segments at a joint, all of it to the one segment at an end.
-
-    Returns
-    -------
-    (minus, plus) : two (segments, 3) arrays
     """
     external = forces - segment_forces_to_nodes(chains, minus, plus)
     share = external / segments_at_nodes(chains)[:, None]
@@ -83,13 +72,11 @@ def filament_tensions(
 
     Parameters
     ----------
-    filaments : sequence of Filament
     node_indices : sequence of int arrays
         Particle indices of the nodes of each filament.
     chains : ChainSet
         The same filaments.
     positions, forces : (particles, 3) arrays in nm and kJ/(mol nm)
-    flow : Flow, optional
 
     Returns
     -------

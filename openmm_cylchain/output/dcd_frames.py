@@ -14,18 +14,7 @@ _HEADER_SIZE = 276
 class DCDFrames:
     """The whole frames of a DCD file; one that a killed run has left unfinished does not count.
 
-    Parameters
-    ----------
-    path : Path
-
-    Attributes
-    ----------
-    particles : int
-
-    Raises
-    ------
-    InputError
-        If the file is no DCD file of OpenMM.
+    InputError if the file is no DCD file of OpenMM. ``particles`` says how many a frame has.
     """
 
     def __init__(self, path: Path) -> None:

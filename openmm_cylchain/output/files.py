@@ -11,13 +11,7 @@ TextFile: TypeAlias = str | Path | TextIO
 
 
 def write_atomically(path: Path, data: bytes) -> None:
-    """Replace a file as a whole: after a kill it holds either the old or the new content.
-
-    Parameters
-    ----------
-    path : Path
-    data : bytes
-    """
+    """Replace a file as a whole: after a kill it holds either the old or the new content."""
     temporary = path.with_name(path.name + ".new")
     with open(temporary, "wb") as file:
         file.write(data)

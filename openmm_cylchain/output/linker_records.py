@@ -78,14 +78,7 @@ def measure_linkers(
 
 
 class LinkerFile(RecordFile):
-    """A RecordFile of LINKER_RECORD.
-
-    Parameters
-    ----------
-    path : Path
-    count : int, optional
-        How many records to keep of a file that exists, all if -1; a new file if not given.
-    """
+    """A RecordFile of LINKER_RECORD."""
 
     def __init__(self, path: Path, count: int | None = None) -> None:
         super().__init__(path, LINKER_RECORD, "places of linkers", count)

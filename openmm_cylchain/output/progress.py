@@ -11,17 +11,7 @@ _LINE_FRACTION = 0.1
 
 
 class StatusLine:
-    """Writes lines, each in place of the last one if the stream is a terminal.
-
-    Parameters
-    ----------
-    stream : file
-
-    Attributes
-    ----------
-    in_place : bool
-        Whether the stream is a terminal.
-    """
+    """Writes lines, each in place of the last one if the stream is a terminal: if it is ``in_place``."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
@@ -45,14 +35,9 @@ class StatusLine:
 
 
 class ProgressMessages:
-    """Says what a task is at, with the time since its beginning.
+    """Says what a task is at, with the time since its beginning, on standard error if no stream is given.
 
-    Parameters
-    ----------
-    stream : file
-        Standard error if not given.
-    seconds_between_lines : float
-        Messages that come sooner after a line than that are left out, but not on a terminal.
+    Messages that come sooner after a line than ``seconds_between_lines`` are left out, but not on a terminal.
     """
 
     def __init__(self, stream: TextIO | None = None, seconds_between_lines: float = 0.0) -> None:
@@ -73,25 +58,16 @@ class ProgressMessages:
 
 
 class RunProgress:
-    """Reports how far a run is, how fast it goes and how long it will take.
+    """Reports how far a run is, how fast it goes and how long it will take, on standard output.
 
-    Parameters
-    ----------
-    steps : int
-        Steps of the whole run.
-    first_step : int
-        The step from which this part of it starts.
-    time_step : float
-        In ps.
-    stream : file
-        Standard output if not given.
+    ``steps`` are those of the whole run, of which this part starts from ``first_step``; ``time_step`` is in ps.
     """
 
-    def __init__(self, steps: int, first_step: int, time_step: float, stream: TextIO | None = None) -> None:
+    def __init__(self, steps: int, first_step: int, time_step: float) -> None:
         self._steps = steps
         self._first = first_step
         self._time_step = time_step
-        self._line = StatusLine(sys.stdout if stream is None else stream)
+        self._line = StatusLine(sys.stdout)
         self._start = time.monotonic()
         self._last_refresh = self._start
         self._next_fraction = first_step / steps + _LINE_FRACTION

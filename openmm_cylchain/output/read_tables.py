@@ -10,13 +10,7 @@ from ..units.types import FloatArray
 
 
 def read_table(path: Path) -> dict[str, FloatArray]:
-    """The columns of a table by their headers: a dict of (lines,) arrays.
-
-    Raises
-    ------
-    InputError
-        If the file is empty or damaged.
-    """
+    """The columns of a table by their headers: a dict of (lines,) arrays; InputError if it is empty or damaged."""
     # A kill may leave a part of the last line.
     with open(path, newline="") as file:
         lines = [line for line in file if line.endswith("\n")]
@@ -33,11 +27,7 @@ def read_table(path: Path) -> dict[str, FloatArray]:
 def read_reports(path: Path, lines: int | None = None) -> dict[str, FloatArray]:
     """The columns of a table that has several lines for each report, whole ones: a dict of (reports, lines) arrays.
 
-    Parameters
-    ----------
-    path : Path
-    lines : int, optional
-        Of a report; as many as the first one has if not given.
+    Reports have as many lines as the first one if that is not given.
     """
     table = read_table(path)
     steps = table["step"]

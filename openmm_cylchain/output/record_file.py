@@ -18,7 +18,6 @@ class RecordFile:
 
     Parameters
     ----------
-    path : Path
     dtype : numpy.dtype
         Of a record.
     content : str

@@ -24,7 +24,6 @@ class DescribedFilament:
 
     Attributes
     ----------
-    type : FilamentType or BeadSpringType
     nodes : tuple of int
         Particles, in order along the filament.
     ring : bool
@@ -109,15 +108,12 @@ class RunDescription:
 
     Attributes
     ----------
-    title : str
     temperature : float
         In K.
     time_step : float
         In ps.
     steps : int or None
         Of the whole run; None if nobody has said how long it will be.
-    steps_per_frame : int
-    particles : int
     filaments : tuple of DescribedFilament
     box : three vectors of a periodic box in nm, or None
     linkers : tuple of DescribedLinkers

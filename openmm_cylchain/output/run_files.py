@@ -5,12 +5,7 @@ from typing import IO
 
 
 class RunFiles:
-    """The files of a run in its directory.
-
-    Parameters
-    ----------
-    path : str or Path
-    """
+    """The files of a run in its directory."""
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
@@ -44,11 +39,7 @@ class RunFiles:
 def try_lock(file: IO[bytes], shared: bool = False) -> bool:
     """Lock a file that is open until it is closed, and say whether that was possible.
 
-    Parameters
-    ----------
-    file : file
-    shared : bool
-        Only against those that lock it for themselves.
+    A shared lock is one against those alone that lock it for themselves.
     """
     try:
         import fcntl

@@ -39,13 +39,7 @@ def size_of_lines(path: Path, step: int) -> tuple[int, int]:
 
 
 def start_of_trajectory(path: Path, frames: int) -> tuple[int, bytes]:
-    """The size and the header of a trajectory with its first frames alone.
-
-    Raises
-    ------
-    InputError
-        If it has fewer.
-    """
+    """The size and the header of a trajectory with its first frames alone; InputError if it has fewer."""
     there = DCDFrames(path)
     if len(there) < frames:
         raise InputError(f"{path} has {len(there)} frames, but there are energies of {frames}: it is damaged.")
@@ -60,17 +54,8 @@ def start_of_trajectory(path: Path, frames: int) -> tuple[int, bytes]:
 class TrajectoryFile:
     """A DCD file that is written frame by frame and can be continued.
 
-    Parameters
-    ----------
-    path : Path
-    topology : openmm.app.Topology
-    time_step : float
-        In ps.
-    steps_per_frame : int
-    size : int, optional
-        Of the file, where to continue; a new file if not given.
-    header : bytes
-        Of the file at that size.
+    ``time_step`` is in ps. Where the file is continued, ``size`` is that of the file there, and ``header`` what it has
+    at that size.
     """
 
     def __init__(
@@ -166,15 +151,7 @@ CONTACT_FORCE_COLUMNS = ("step", "time (ps)", "filament", *_MEAN_FORCE_COLUMNS)
 
 
 class ReportTable:
-    """A table of comma-separated values that can be continued.
-
-    Parameters
-    ----------
-    path : Path
-    columns : sequence of str
-    size : int, optional
-        Of the file, where to continue; a new file if not given.
-    """
+    """A table of comma-separated values that is continued where the file has a given size; a new file if not given."""
 
     def __init__(self, path: Path, columns: Sequence[str], size: int | None = None) -> None:
         if size is None:

@@ -32,15 +32,7 @@ class Margins:
 def annotated(image: FloatArray, camera: Camera, scene: Scene, clock: str) -> FloatArray:
     """An image with its annotations, (height, width, 3) as whole numbers from 0 to 255.
 
-    Parameters
-    ----------
-    image : (height, width, 3) array
-        sRGB between 0 and 1.
-    camera : Camera
-        Of the image without its margins.
-    scene : Scene
-    clock : str
-        See ``clock_text``.
+    The image without its margins, which the camera sees, is sRGB between 0 and 1; ``clock`` is a ``clock_text``.
     """
     height, width = image.shape[:2]
     figure, canvas, text = _figure((width, height))
@@ -57,14 +49,9 @@ def annotated(image: FloatArray, camera: Camera, scene: Scene, clock: str) -> Fl
 
 
 def clock_text(time: float, times: FloatArray) -> str:
-    """The time of a picture, such as "2.00 s", in a unit and with decimals that suit all times of its film.
+    """The time of a picture, such as "2.00 s", in a unit and with decimals that suit all times of its film, in ps.
 
-    Parameters
-    ----------
-    time : float
-        In ps.
-    times : (n,) array
-        Those of all pictures of the film, in ps: the last one has three digits, or as many as part it from the others.
+    The last one has three digits, or as many as part it from the others.
     """
     last = float(np.max(times))
     if last <= 0.0:
@@ -79,14 +66,9 @@ def clock_text(time: float, times: FloatArray) -> str:
 
 
 def margins(scene: Scene, cameras: Callable[[Margins], Iterable[Camera]], size: tuple[int, int]) -> Margins:
-    """Those that a picture needs so that nothing is written over what it shows.
+    """Those that a picture needs so that nothing is written over what it shows; ``size`` is (width, height) in pixels.
 
-    Parameters
-    ----------
-    scene : Scene
-    cameras : callable (Margins)
-        The cameras of all pictures of a film, whose pixels begin behind the left margin.
-    size : (width, height) in pixels
+    With margins, ``cameras`` makes those of all pictures of a film, whose pixels begin behind the left margin.
     """
     width, height = size
     figure, canvas, text = _figure(size)

@@ -85,8 +85,6 @@ def write_picture(run: Run, frame: int, path: str | Path, look: Look | None = No
         A negative one counts from the end.
     path : str or Path
         Ends in ``.png``.
-    look : Look, optional
-    view : View, optional
 
     Raises
     ------
@@ -121,9 +119,6 @@ def write_film(
         Ends in ``.gif``, ``.mp4`` or ``.webm``.
     frames : list of int, optional
         All if not given.
-    frames_per_second : float
-    look : Look, optional
-    view : View, optional
     say : callable (str), optional
         Told how far it is.
     colors : int

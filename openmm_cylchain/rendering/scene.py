@@ -140,9 +140,7 @@ class Scene:
 def cut_at_faces(ends: FloatArray, box: FloatArray) -> tuple[FloatArray, IntArray]:
     """Lines (n, 2, 3) cut where they cross faces of a periodic box, and brought into it piece by piece.
 
-    Returns
-    -------
-    (m, 2, 3) array in nm, and (m,) int array of the lines that the pieces belong to.
+    These are the pieces (m, 2, 3) in nm, and the numbers (m,) of the lines that they belong to.
     """
     inverse = np.linalg.inv(box)
     pieces, which = ends @ inverse, np.arange(len(ends))

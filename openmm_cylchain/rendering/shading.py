@@ -14,15 +14,7 @@ _HAZE = 0.4
 
 
 def shaded_image(camera: Camera, tubes: Tubes, background: FloatArray) -> FloatArray:
-    """An image (height, width, 3) of sRGB values between 0 and 1.
-
-    Parameters
-    ----------
-    camera : Camera
-    tubes : Tubes
-    background : (3,) array
-        sRGB.
-    """
+    """An image (height, width, 3) of sRGB values between 0 and 1, before a background (3,) that is one, too."""
     fine = camera.enlarged(_SAMPLING)
     image = np.tile(np.asarray(background) ** _GAMMA, (fine.height * fine.width, 1))
     if len(tubes.ends):

@@ -98,20 +98,9 @@ class Configuration:
 
 
 def read_configuration(path):
-    """Read and check a configuration file.
+    """Read and check a configuration file: a Configuration.
 
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    Configuration
-
-    Raises
-    ------
-    InputError
-        For a file that cannot be read, is not TOML, or describes no run.
+    InputError for a file that cannot be read, is not TOML, or describes no run.
     """
     path = Path(path)
     try:

@@ -5,20 +5,7 @@ from .initial_state import box_vectors
 
 
 def describe(configuration, filaments, system, topology):
-    """What a run of a configuration simulates.
-
-    Parameters
-    ----------
-    configuration : Configuration
-    filaments : Filaments
-    system : openmm.System
-        With the filaments, and behind them the particles.
-    topology : openmm.app.Topology
-
-    Returns
-    -------
-    RunDescription
-    """
+    """The RunDescription of a run of a configuration, in whose System particles are behind the filaments."""
     settings = configuration.simulation
     diameters = [own.diameter for own in configuration.particles for _ in range(own.count)]
     return describe_system(

@@ -19,10 +19,7 @@ _BYTES_OF_NUMBER = 20
 def format_dry_run(configuration):
     """A description of the run of a configuration: text for a terminal. It takes some steps, and their time.
 
-    Raises
-    ------
-    InputError
-        If the configuration cannot be simulated.
+    InputError if the configuration cannot be simulated.
     """
     settings = configuration.simulation
     simulation, built = create_simulation(configuration)

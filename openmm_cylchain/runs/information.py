@@ -16,12 +16,7 @@ from .platform_trial import try_platform
 
 
 def versions():
-    """Versions of this package and of what it stands on.
-
-    Returns
-    -------
-    dict of str
-    """
+    """Versions of this package and of what it stands on, by name."""
     return {
         "openmm-cylchain": __version__,
         "openmm": openmm.Platform.getOpenMMVersion(),
@@ -32,13 +27,7 @@ def versions():
 
 
 def platforms():
-    """The OpenMM platforms that are installed.
-
-    Returns
-    -------
-    dict
-        The name of every platform with None if a Context can be created on it, or with the reason why not.
-    """
+    """The name of every OpenMM platform with None if a Context can be created on it, or with the reason why not."""
     installed = [openmm.Platform.getPlatform(index) for index in range(openmm.Platform.getNumPlatforms())]
     return {each.getName(): _why_platform_is_unusable(each) for each in installed}
 

@@ -52,7 +52,6 @@ def build_system(configuration, engine, seed, linkers=True):
 
     Parameters
     ----------
-    configuration : Configuration
     engine : {"compiled", "portable"} or None
     seed : int
         Of random places and shapes.
@@ -132,10 +131,7 @@ def place_filaments(configuration, engine, seed, linkers=True):
 
     Parameters
     ----------
-    configuration : Configuration
     engine : {"compiled", "portable"} or None
-    seed : int
-    linkers : bool
 
     Returns
     -------

@@ -29,18 +29,7 @@ class LinkerSummary:
 
 
 def summarise_linkers(configuration, directory):
-    """What the linkers of a run did.
-
-    Parameters
-    ----------
-    configuration : Configuration
-    directory : RunDirectory
-
-    Returns
-    -------
-    list of LinkerSummary
-        One for each [[linkers]] table.
-    """
+    """What the linkers of a run did: a LinkerSummary for each [[linkers]] table."""
     if not configuration.linkers:
         return []
     table = read_reports(directory.linkers)

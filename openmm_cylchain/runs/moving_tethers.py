@@ -16,11 +16,6 @@ class MovingTethers:
     A point is at ``point + velocity max(0, t - start_time)`` at the last step at which points were moved: often enough
     that none moves by more than a twentieth of its thermal width at once, if steps allow it.
 
-    Parameters
-    ----------
-    configuration : Configuration
-    filaments : Filaments
-
     Attributes
     ----------
     interval : int

@@ -24,7 +24,6 @@ def relaxed_positions(configuration, built, say=None):
 
     Parameters
     ----------
-    configuration : Configuration
     built : BuiltSystem
     say : callable (str), optional
         Told how far it is where it takes longer than two seconds; lines of standard error if not given.

@@ -32,7 +32,7 @@ from ..time_steps.precision import PRECISIONS
 from ..units.quantities import thermal_energy
 from ..units.text import format_time
 from .description import describe
-from .initial_state import build_system, place_filaments
+from .initial_state import build_system
 from .moving_tethers import MovingTethers
 from .relaxation import relaxed_positions
 from .run_directory import Checkpoint, RunDirectory
@@ -61,7 +61,6 @@ def run(configuration, output, resume=False):
 
     Parameters
     ----------
-    configuration : Configuration
     output : str or Path
     resume : bool
         Continue the run in ``output``; it starts from the beginning if there is no checkpoint yet.
@@ -105,32 +104,10 @@ def run(configuration, output, resume=False):
             ) from None
 
 
-def create_filaments(configuration):
-    """Filaments with their initial positions, and linkers, that a configuration asks for; see ``place_filaments``.
-
-    Parameters
-    ----------
-    configuration : Configuration
-
-    Returns
-    -------
-    Filaments
-    """
-    settings = configuration.simulation
-    return place_filaments(configuration, settings.engine, settings.seed)
-
-
 def create_simulation(configuration):
     """The Simulation of a configuration, without positions, and its BuiltSystem.
 
-    Parameters
-    ----------
-    configuration : Configuration
-
-    Raises
-    ------
-    InputError
-        If it cannot be built, or the platform cannot simulate it.
+    InputError if it cannot be built, or the platform cannot simulate it.
     """
     settings = configuration.simulation
     built = build_system(configuration, settings.engine, settings.seed)
@@ -158,7 +135,6 @@ def check_step(configuration, seconds=20.0, say=lambda message: None):
 
     Parameters
     ----------
-    configuration : Configuration
     seconds : float
         Time that it may take.
     say : callable (str), optional

@@ -35,13 +35,7 @@ class Checkpoint:
 
 
 class RunDirectory(RunFiles):
-    """A directory that one run at a time writes into; a context manager that holds its lock.
-
-    Parameters
-    ----------
-    path : str or Path
-        Made if it does not exist.
-    """
+    """A directory, made if need be, that one run at a time writes into; a context manager that holds its lock."""
 
     def __init__(self, path):
         super().__init__(path)
@@ -69,7 +63,6 @@ class RunDirectory(RunFiles):
 
         Parameters
         ----------
-        configuration : Configuration
         resume : bool
             Whether to continue a run that is there.
 

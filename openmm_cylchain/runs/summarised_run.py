@@ -11,9 +11,7 @@ from .summary_text import write_summary
 def run_with_summary(configuration, output, resume=False):
     """Run a configuration to its end, and write its summary and figure; see ``run`` for arguments and errors.
 
-    Returns
-    -------
-    groups, linkers : list of GroupSummary, list of LinkerSummary
+    Returns lists of GroupSummary and of LinkerSummary.
     """
     run(configuration, output, resume)
     directory = RunDirectory(output)

@@ -11,10 +11,12 @@ from .. import theory
 from ..analysis.bending import bending_drift, joint_cosines, persistence_length
 from ..analysis.filament_shapes import control_point_positions, end_to_end_vectors, node_positions, segment_lengths
 from ..analysis.statistics import FEWEST_FRAMES_OF_DRIFT, SIGNIFICANT_DRIFT, mean_with_error, statistical_inefficiency
-from ..bead_spring.bead_spring_type import BeadSpringType
+from ..bead_spring.bead_spring_type import BEAD_BONDS
 from ..beams.curve import element_energies
 from ..errors import EquilibrationWarning, InputError
+from ..filaments.beam_elements import BEAM_ELEMENTS
 from ..filaments.equilibrium import SegmentLengthDistribution
+from ..filaments.straight_segments import STRAIGHT_SEGMENTS
 from ..theory import beam_elements
 from ..units.quantities import thermal_energy
 from .silence import silenced_c_library
@@ -46,8 +48,6 @@ class Observable:
 
     Attributes
     ----------
-    name, unit : str
-    value, standard_error : float
     theory : float
         Exact value for the free discrete chain in equilibrium, unless the name says otherwise.
     deviation : float or None
@@ -103,7 +103,7 @@ def group_labels(configuration):
     """A short name for each [[filament]] table, distinct if there are several."""
     labels = [
         f"{group.count} × {group.type.name}, {group.segments} "
-        f"{'beam element' if group.has_beam_elements else 'segment'}{'s' * (group.segments > 1)}"
+        f"{group.type.segment_kind.name}{'s' * (group.segments > 1)}"
         for group in configuration.filaments
     ]
     if len(set(labels)) < len(labels):
@@ -122,19 +122,7 @@ def is_in_equilibrium(group):
 
 
 def summarise(configuration, trajectory):
-    """Observables of a run against theory.
-
-    Parameters
-    ----------
-    configuration : Configuration
-    trajectory : mdtraj.Trajectory
-        See ``load_trajectory``.
-
-    Returns
-    -------
-    list of GroupSummary
-        One for each [[filament]] table.
-    """
+    """Observables of a run against theory: a GroupSummary for each [[filament]] table; see ``load_trajectory``."""
     labels = group_labels(configuration)
     return [
         _summarise_group(configuration, group, list(members), label, trajectory)
@@ -174,8 +162,7 @@ def _summarise_group(configuration, group, members, label, trajectory):
 
 def has_exact_extension(group):
     """Whether the exact extension of a group under its tension is known."""
-    plain = not (group.closed or group.planar or group.clamped or group.has_beam_elements)
-    plain = plain and not isinstance(group.type, BeadSpringType)
+    plain = not (group.closed or group.planar or group.clamped) and group.type.segment_kind is STRAIGHT_SEGMENTS
     return plain and group.tension is not None and group.tension[0] >= 0.0
 
 
@@ -187,16 +174,17 @@ def extensions(group, trajectory, members):
 
 def _series(group, temperature, trajectory, members):
     # (name, unit, (frames, filaments) averages, exact value) of every observable that is a plain average.
-    kT = thermal_energy(temperature)
-    kind = group.type
-    if isinstance(kind, BeadSpringType):
+    kind = group.type.segment_kind
+    if kind is BEAD_BONDS and group.closed:
         # Nothing is known of rings of beads.
-        if not group.closed:
-            yield from _series_of_beads(group, temperature, trajectory, members)
         return
-    if group.has_beam_elements:
-        yield from _series_of_beams(group, temperature, trajectory, members)
-        return
+    yield from _SERIES[kind](group, temperature, trajectory, members)
+    if not group.closed:
+        yield from _end_to_end(group, temperature, trajectory, members)
+
+
+def _series_of_cylinders(group, temperature, trajectory, members):
+    kT, kind = thermal_energy(temperature), group.type
     lengths = np.stack(segment_lengths(trajectory, members), axis=1)
     distribution = SegmentLengthDistribution(kind, temperature, group.planar)
     yield (
@@ -217,8 +205,6 @@ def _series(group, temperature, trajectory, members):
             )
         exact = theory.mean_joint_cosine(kind, temperature, group.planar)
         yield "cosine of joint angle", "", cosines.mean(axis=2), exact
-    if not group.closed:
-        yield from _end_to_end(group, temperature, trajectory, members)
 
 
 def _series_of_beams(group, temperature, trajectory, members):
@@ -233,8 +219,6 @@ def _series_of_beams(group, temperature, trajectory, members):
     yield "bending energy per element", "kT", bending.mean(axis=2) / kT, exact.bending
     cosines = np.stack(joint_cosines(trajectory, members), axis=1)
     yield "cosine between ends of an element", "", cosines.mean(axis=2), exact.cosine
-    if not group.closed:
-        yield from _end_to_end(group, temperature, trajectory, members)
 
 
 def _series_of_beads(group, temperature, trajectory, members):
@@ -249,22 +233,13 @@ def _series_of_beads(group, temperature, trajectory, members):
     if group.joints:
         energies = kind.bending_energies(vectors).mean(axis=2) / kT
         yield "bending energy per joint", "kT", energies, theory.bead_spring_bending_energies(*free).mean() / kT
-    yield from _end_to_end(group, temperature, trajectory, members)
 
 
-def mean_energies(group, temperature):
-    """Exact mean energies in kJ/mol of a segment and of a joint of free chains; zero if there is no joint.
-
-    Of beam elements, those of an element.
-    """
-    kind, chain = group.type, (group.type, temperature, group.planar)
-    free = kind, group.segments, temperature, group.planar
-    if group.has_beam_elements:
-        return theory.beam_stretching_energy_mean(*free), theory.beam_bending_energy_mean(*chain)
-    if not isinstance(kind, BeadSpringType):
-        return theory.stretching_energy_mean(*chain), theory.bending_energy_mean(*chain)
-    stretching, bending = theory.bead_spring_stretching_energies(*free), theory.bead_spring_bending_energies(*free)
-    return stretching.mean(), bending.mean() if group.segments > 1 else 0.0
+_SERIES = {
+    STRAIGHT_SEGMENTS: _series_of_cylinders,
+    BEAM_ELEMENTS: _series_of_beams,
+    BEAD_BONDS: _series_of_beads,
+}
 
 
 def _end_to_end(group, temperature, trajectory, members):
@@ -288,36 +263,44 @@ def _mean_with_error(series):
 
 
 def _persistence_length(group, temperature, trajectory, members, comparable):
-    # In chains of beads, mean cosines depend on the place along the chain.
-    if group.has_beam_elements:
-        return _persistence_length_of_beams(group, temperature, trajectory, members, comparable)
-    if group.closed or group.segments < 2 or group.type.bending_rigidity == 0 or isinstance(group.type, BeadSpringType):
+    # Rings bend all around. In chains of beads, mean cosines depend on the place along the chain.
+    kind = group.type.segment_kind
+    if group.closed or kind not in _PERSISTENCE_LENGTHS:
         return []
+    measured = _PERSISTENCE_LENGTHS[kind](group, trajectory, members)
+    if measured is None:
+        return []
+    exact = theory.chain_persistence_length(group.type, temperature, group.planar)
+    return [_compared("persistence length", "nm", *measured, exact, comparable)]
+
+
+def _persistence_length_of_cylinders(group, trajectory, members):
+    if group.segments < 2 or group.type.bending_rigidity == 0:
+        return None
     try:
         with warnings.catch_warnings():
             # The notes say it.
             warnings.simplefilter("ignore", EquilibrationWarning)
-            value, error = persistence_length(trajectory, members, group.planar)
+            return persistence_length(trajectory, members, group.planar)
     except InputError:
         # The mean cosine of a very flexible or unrelaxed chain need not define one.
-        return []
-    exact = theory.chain_persistence_length(group.type, temperature, group.planar)
-    return [_compared("persistence length", "nm", value, error, exact, comparable)]
+        return None
 
 
-def _persistence_length_of_beams(group, temperature, trajectory, members, comparable):
-    # -h/ln<c> of the cosine c between tangents at the ends of an element, half of it in a plane, and its error. Rings
-    # bend all around.
-    if group.closed:
-        return []
+def _persistence_length_of_beams(group, trajectory, members):
+    # -h/ln<c> of the cosine c between tangents at the ends of an element, half of it in a plane, and its error.
     cosine, error = _mean_with_error(np.stack(joint_cosines(trajectory, members), axis=1).mean(axis=2))
-    exact = theory.beam_persistence_length(group.type, temperature, group.planar)
     if not 0.0 < cosine < 1.0:
-        return []
+        return None
     length = group.type.segment_length / (2.0 if group.planar else 1.0)
     value = -length / math.log(cosine)
-    error *= value**2 / (length * cosine)
-    return [_compared("persistence length", "nm", value, error, exact, comparable)]
+    return value, error * value**2 / (length * cosine)
+
+
+_PERSISTENCE_LENGTHS = {
+    STRAIGHT_SEGMENTS: _persistence_length_of_cylinders,
+    BEAM_ELEMENTS: _persistence_length_of_beams,
+}
 
 
 def _compared(name, unit, value, error, exact, comparable):
@@ -391,7 +374,7 @@ def _rounding_share(configuration, group, trajectory):
     # DCD holds single-precision angstroms and mdtraj single-precision nm; each rounds both ends of a segment.
     spacing = float(np.spacing(np.float32(10.0 * np.abs(trajectory.xyz).max()))) / 10.0
     variance = 4.0 * spacing**2 / 12.0
-    if group.has_beam_elements:
+    if not group.type.segment_kind.straight:
         # The strain at a node is that of Q - P, a third of an element long, with a share of an element of its energy.
         variance *= 3.0
     return variance * group.type.segment_stiffness / thermal_energy(configuration.solvent.temperature)

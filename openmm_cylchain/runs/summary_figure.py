@@ -27,7 +27,6 @@ from .summary import (
     group_members,
     has_exact_extension,
     is_in_equilibrium,
-    mean_energies,
 )
 
 _COLOURS = (*FILAMENT_COLORS, "#CC79A7", "#000000")
@@ -37,15 +36,7 @@ _FONT_SIZE = 11
 
 
 def write_figure(configuration, directory, trajectory):
-    """Draw the figure of a run into its directory as PNG.
-
-    Parameters
-    ----------
-    configuration : Configuration
-    directory : RunDirectory
-    trajectory : mdtraj.Trajectory
-        See ``summary.load_trajectory``.
-    """
+    """Draw the figure of a run into its directory as PNG; see ``summary.load_trajectory``."""
     # Titles and names are of users: "$" is no mathematics in them.
     with rc_context({"text.parse_math": False}):
         image = _draw(configuration, directory, trajectory)
@@ -279,7 +270,8 @@ def _draw_energies(axis, groups, temperature, energies):
     kinds = [group for group, *_ in groups]
     segments = np.array([group.count * group.segments for group in kinds])
     joints = np.array([group.count * group.joints for group in kinds])
-    stretching, bending = np.array([mean_energies(group, temperature) for group in kinds]).T / kT
+    means = [theory.chain_mean_energies(one.type, one.segments, temperature, one.planar) for one in kinds]
+    stretching, bending = np.array(means).T / kT
     kind = _kind(groups)
     curves = [("stretching", "segment", kind.name, np.average(stretching, weights=segments), _STRETCHING_COLOUR)]
     if np.any(joints * bending):

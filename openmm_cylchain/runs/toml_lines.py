@@ -26,12 +26,7 @@ _PLAIN = re.compile(r"[^,\]}#\n]+")
 def lines_of(text, entries):
     """Lines, counted from 1, by paths such as ("filament", 0, "segments"); empty if they cannot be told.
 
-    Parameters
-    ----------
-    text : str
-        Valid TOML with line ends that are a line feed.
-    entries : dict
-        What tomllib made of it.
+    ``text`` is valid TOML with line ends that are a line feed, and ``entries`` what tomllib made of it.
     """
     walk = _Walk(text)
     try:

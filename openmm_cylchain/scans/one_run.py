@@ -47,12 +47,7 @@ class Outcome:
 
 
 def perform(task):
-    """Do a run in a process of its own, or what is left of it, and return its Outcome.
-
-    Parameters
-    ----------
-    task : Task
-    """
+    """Do a run in a process of its own, or what is left of it, and return its Outcome."""
     begun = time.monotonic()
     attempt, code = 0, -1
     while code < 0 and attempt < task.attempts:

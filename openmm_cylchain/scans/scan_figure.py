@@ -17,15 +17,8 @@ _FONT_SIZE = 11
 
 
 def write_scan_figure(path, scan, results):
-    """Draw results as PNG: a panel for each quantity, a curve for each point of all keys but the first.
-
-    Parameters
-    ----------
-    path : Path
-    scan : Scan
-    results : list of dict
-        Rows of ``results.csv``.
-    """
+    """Draw results, rows of ``results.csv``, as PNG: a panel for each quantity, a curve for each point of all keys but
+    the first."""
     # Titles and names are of users: "$" is no mathematics in them.
     with rc_context({"text.parse_math": False}):
         image = _draw(scan, results)

@@ -51,8 +51,6 @@ class Scan:
 
     Attributes
     ----------
-    path : Path
-    title : str
     folder : Path
         From which runs name their files.
     axes : tuple of Axis
@@ -60,7 +58,6 @@ class Scan:
         All replicas of all points, point by point.
     gather : tuple of str
         Names of quantities; all if empty.
-    attempts : int
     """
 
     path: Path

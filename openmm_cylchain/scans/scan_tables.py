@@ -13,19 +13,9 @@ from .quantities import read_quantities
 
 
 def gather(scan, path, status_of):
-    """Rows of ``runs.csv`` and ``results.csv``.
+    """Rows of ``runs.csv`` and ``results.csv``, lists of dicts, of a scan in a directory.
 
-    Parameters
-    ----------
-    scan : Scan
-    path : Path
-        Its directory.
-    status_of : callable (ScanRun)
-        "done" for a run with a summary.
-
-    Returns
-    -------
-    runs, results : list of dict
+    ``status_of`` of a ScanRun is "done" for a run with a summary.
     """
     runs, points = [], {}
     for run in scan.runs:

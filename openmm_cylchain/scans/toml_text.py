@@ -9,10 +9,7 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+")
 def toml_text(entries):
     """The text of a configuration that tomllib has read: ``entries`` again when tomllib reads it.
 
-    Parameters
-    ----------
-    entries : dict
-        Of texts, numbers, true and false, lists, and tables of these.
+    They are texts, numbers, true and false, lists, and tables of these.
     """
     lines = [f"{_key(name)} = {_value(value)}" for name, value in entries.items() if not _is_table(value)]
     for name, value in entries.items():

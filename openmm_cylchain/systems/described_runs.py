@@ -44,14 +44,10 @@ def describe_system(
 
     Parameters
     ----------
-    filaments : Filaments
     system : openmm.System
         With the filaments; walls of ``filament_wall_force`` and contacts are found in it.
-    title : str
     time_step : float
         In ps.
-    steps : int or None
-    steps_per_frame : int
     box : (3, 3) array in nm, or None
     shapes : sequence of Shape
         Walls beside those in the System.
@@ -60,10 +56,6 @@ def describe_system(
     diameters : mapping, optional
         Of particles beside filaments, in nm, by their indices. Those of contacts and the sigma of a
         ``NonbondedForce`` if not given.
-
-    Returns
-    -------
-    RunDescription
     """
     walls = [wall for wall in map(_wall, system.getForces()) if wall is not None]
     contacts = [own for own in map(_contacts, system.getForces()) if own is not None]
@@ -167,15 +159,7 @@ def _contacts(force):
 
 
 def write_topology(files: RunFiles, topology: "app.Topology", system: openmm.System, positions: Any) -> None:
-    """Write what programs need to know of a trajectory: files for mdtraj, VMD and OVITO.
-
-    Parameters
-    ----------
-    files : RunFiles
-    topology : openmm.app.Topology
-    system : openmm.System
-    positions : (particles, 3) lengths
-    """
+    """Write what programs need to know of a trajectory: files for mdtraj, VMD and OVITO."""
     from openmm import app
 
     mmcif, psf, data = io.StringIO(), io.StringIO(), io.StringIO()
@@ -202,14 +186,7 @@ def energy_cells(
 ) -> tuple[float, ...]:
     """What a line of ENERGY_COLUMNS says behind its step and time.
 
-    Parameters
-    ----------
-    filaments : Filaments
-    positions : (particles, 3) array
-        In nm.
-    stretching, bending : float
-        Of ``total_energies``.
-    kT : float
+    Positions are in nm, and energies those of ``total_energies``.
     """
     segments = sum(filament.segments for filament in filaments)
     bends = sum(filament.bends for filament in filaments)

@@ -46,13 +46,8 @@ def check_force_groups(*groups: int) -> None:
 
 
 def add_nodes_to_system(system: openmm.System, filament: Filament) -> tuple[IntArray, IntArray]:
-    """Add the nodes of a Filament to a System, and behind them their control points if it has beam elements.
-
-    Returns
-    -------
-    nodes, control_points : int arrays
-        Their particle indices; no control points of straight segments.
-    """
+    """Add the nodes of a Filament to a System, and behind them the control points of beam elements: the indices of
+    both."""
     masses = filament.type.node_masses(len(filament.positions), filament.closed)
     if filament.control_points is not None:
         masses *= 0.5
@@ -84,13 +79,7 @@ def add_to_topology(topology: "app.Topology", filament: Filament, name: str, att
 def add_noninteracting_entries(system: openmm.System, existing: int, coinciding: Iterable[tuple[int, int]]) -> None:
     """Give forces that ask for parameters of every particle those of particles that do not interact.
 
-    Parameters
-    ----------
-    system : openmm.System
-    existing : int
-        How many particles have parameters.
-    coinciding : iterable of (int, int)
-        Pairs of new particles that may be in one place.
+    ``existing`` particles have parameters; of the new ones, pairs that are ``coinciding`` may be in one place.
     """
     missing, coinciding = system.getNumParticles() - existing, list(coinciding)
     for force in system.getForces():

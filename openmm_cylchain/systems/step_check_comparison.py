@@ -74,7 +74,6 @@ def compare_growth(probe: Probe, starts: list[Any], step: float, looks: int, sec
 
     Parameters
     ----------
-    probe : Probe
     starts : list
         Of runs from the same start: square amplitudes (times, modes) of each kind, with h and with that of the
         reference.
@@ -82,7 +81,6 @@ def compare_growth(probe: Probe, starts: list[Any], step: float, looks: int, sec
         h in ps.
     looks : int
         At the reference, within h.
-    seconds : float
     """
     checks = []
     for label, coarse, fine, beyond in _bends(probe, starts):

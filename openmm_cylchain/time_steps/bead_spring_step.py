@@ -83,9 +83,6 @@ def bead_spring_time_step(
 
     Parameters
     ----------
-    bead_type : BeadSpringType
-    scheme : str
-    bonds : int
     closed : bool
         A ring relaxes as an open chain that is 2.3 times shorter.
     flow : Flow, optional

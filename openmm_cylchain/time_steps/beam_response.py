@@ -19,14 +19,7 @@ class BeamResponse(PlaceResponse):
     """The response of one filament of beam elements, taken as straight, to explicit forces in a step.
 
     Clamped nodes and tangents stay. Filaments of more than 128 elements are cut into pieces, and rings, whose elements
-    are taken as straight but joined all the same, are then open.
-
-    Parameters
-    ----------
-    filament : Filament
-    friction : SegmentFriction
-        Of an element.
-    element : BeamElement
+    are taken as straight but joined all the same, are then open. The friction is that of an element.
     """
 
     def __init__(self, filament: Filament, friction: SegmentFriction, element: BeamElement) -> None:

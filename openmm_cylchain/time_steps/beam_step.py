@@ -45,11 +45,8 @@ def beam_time_step(
     ----------
     filament_type : FilamentType
         With beam elements.
-    temperature : temperature
     scheme : str
         "implicit".
-    elements : int
-    flow : Flow or None
     friction : SegmentFriction
         Of an element.
     propulsion : float

@@ -42,19 +42,8 @@ def steps_of_buckling(
     """The TimeSteps of filaments that known forces compress, one for each type: of the one that is pressed most.
 
     The step is 0.09 over the fastest rate with which it buckles, or 0.15 over it with scheme "implicit-second-order":
-    growth rates are then right within 5 %.
-
-    Parameters
-    ----------
-    filaments : Filaments
-        As they begin.
-    scheme : str
-    constant_forces : mapping of int to (3,) arrays
-        Forces that do not change, in kJ/(mol nm), by the particle that they act on.
-
-    Returns
-    -------
-    list of TimeStep
+    growth rates are then right within 5 %. Filaments are as they begin. Constant forces, (3,) in kJ/(mol nm), are by
+    the particle that they act on.
     """
     tethers: dict[int, list[Tether]] = {}
     for tether in filaments.tethers:

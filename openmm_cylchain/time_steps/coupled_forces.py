@@ -15,12 +15,8 @@ class CoupledForces:
 
     These are links, contacts, walls and linkers. They are in the equations if all of their places are: particles that
     move by themselves, nodes, places on segments, and what does not move. A place that moves in any other way, such as
-    a virtual site between particles that are not the ends of a segment, makes its force explicit: all of it.
-
-    Parameters
-    ----------
-    system : openmm.System
-        With all of its forces.
+    a virtual site between particles that are not the ends of a segment, makes its force explicit: all of it. What is
+    read is the System with all of its forces.
     """
 
     def __init__(self, system: openmm.System) -> None:

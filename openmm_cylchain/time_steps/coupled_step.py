@@ -58,23 +58,10 @@ def steps_of_couplings(
     particle_friction: Numbers | None = None,
     coupled_forces: CoupledForces | None = None,
 ) -> list[TimeStep]:
-    """The TimeSteps of the links and contacts of a System; none where they do not bind.
+    """The TimeSteps of the links and contacts of a System with filaments; none where they do not bind.
 
-    Parameters
-    ----------
-    filaments : Filaments
-        In the System.
-    system : openmm.System
-    temperature : float
-        Of the bath, in K.
-    particle_friction : energy*time/length^2, or array of them, optional
-        As for ``Filaments.create_integrator``.
-    coupled_forces : CoupledForces, optional
-        Of the System, if it is known.
-
-    Returns
-    -------
-    list of TimeStep
+    The temperature is that of the bath, in K; ``particle_friction`` is as for ``Filaments.create_integrator``. The
+    CoupledForces of the System are given if they are known.
     """
     forces = coupled_forces or CoupledForces(system)
     coupled = [(index, force) for index, force in enumerate(system.getForces()) if forces.includes(index)]

@@ -38,7 +38,6 @@ class ExplicitForces:
 
     Parameters
     ----------
-    system : openmm.System
     filaments : Filaments
         In the System.
     scheme : {"implicit", "implicit-second-order", "midpoint", "euler"}

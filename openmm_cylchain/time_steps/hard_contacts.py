@@ -38,17 +38,10 @@ _SHORTEST, _LONGEST = 1e-9, 1e18  # ps
 def longest_resolving_step(
     filaments: FilamentCollection, system: openmm.System, contacts: Any, particle_friction: Numbers | None
 ) -> float:
-    """The longest implicit step, in ps, in which a ``capsule_contact_force`` is not a hard one.
+    """The longest implicit step, in ps, in which a ``capsule_contact_force`` of a System with filaments is not a hard
+    one.
 
-    Parameters
-    ----------
-    filaments : Filaments
-        In the System.
-    system : openmm.System
-    contacts : CylinderChainContactForce
-        In the System.
-    particle_friction : energy*time/length^2, or array of them
-        As for ``Filaments.create_integrator``.
+    ``particle_friction`` is as for ``Filaments.create_integrator``.
     """
     stiffness = contacts.getStiffness()._value
     chains = _chains_in_contact(filaments, contacts)

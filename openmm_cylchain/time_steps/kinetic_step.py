@@ -50,8 +50,6 @@ def steps_of_kinetics(
     ----------
     filaments : Filaments
         In the System.
-    system : openmm.System
-    scheme : str
     temperature : float
         Of the bath, in K.
     particle_friction

@@ -50,7 +50,6 @@ class PlaceResponse(ABC):
 
         Parameters
         ----------
-        piece : int
         segments, fractions : (places,) arrays
             The places: at ``fraction`` from the first to the second end of a segment, or of the curve of an element.
         stiffness : (places,) array
@@ -80,12 +79,6 @@ class FilamentResponse(PlaceResponse):
 
     Clamped nodes stay. Tethers are left out, and filaments of more than 128 segments are cut into pieces: both make it
     more mobile than it is.
-
-    Parameters
-    ----------
-    filament : Filament
-    friction : SegmentFriction
-    scheme : str
     """
 
     def __init__(self, filament: Filament, friction: SegmentFriction, scheme: str) -> None:

@@ -32,14 +32,8 @@ def warn_of_pulled_filaments(
 ) -> None:
     """Issue a SegmentLengthWarning, for each type, of the filament whose force is most off, if by more than a tenth.
 
-    Parameters
-    ----------
-    filaments : Filaments
-        As they begin.
-    temperature : float
-        In K; at zero, nothing bends.
-    constant_forces : mapping of int to (3,) arrays
-        Forces that do not change, in kJ/(mol nm), by the particle that they act on.
+    Filaments are as they begin. At a temperature of zero, nothing bends. Constant forces, (3,) in kJ/(mol nm), are by
+    the particle that they act on.
     """
     if temperature == 0.0:
         return

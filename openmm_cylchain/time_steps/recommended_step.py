@@ -246,10 +246,6 @@ def implicit_time_step(
     0.8 %, the step may be 0.0008 N gamma_def/k_B T, which leaves 0.8 %. FENE lengths may bind it, see ``fene_steps``.
     At a temperature of zero, where nothing else moves (one segment, or free joints), the relaxation of a segment's
     length is resolved by 20 steps.
-
-    Returns
-    -------
-    TimeStep
     """
     kT = thermal_energy(temperature)
     if friction is None:
@@ -300,21 +296,13 @@ def contact_time_step(
 
     Parameters
     ----------
-    filament_type : FilamentType or BeadSpringType
     viscosity : pressure*time
-    temperature : temperature
     diameter : length
         Contact diameter.
     stiffness : energy/length^2
         Of a contact between two beads, as of ``contacts.contact_force``.
-    segments : int
-    beads_per_segment : float
     confidence : float
         c_sigma of eq. (53): how many standard deviations of a displacement must stay below half the diameter.
-
-    Returns
-    -------
-    TimeStep
     """
     friction = filament_type.segment_friction(viscosity, temperature, segments)
     length = filament_type.segment_length
@@ -335,12 +323,7 @@ def contact_diffusion_step(
     diameter: Scalar,
     confidence: float = 3.0,
 ) -> TimeStep:
-    """The part of ``contact_time_step`` that does not depend on the stiffness of contacts, for segments of a friction.
-
-    Returns
-    -------
-    TimeStep
-    """
+    """The part of ``contact_time_step`` that does not depend on the stiffness of contacts."""
     confidence = positive(confidence, DIMENSIONLESS, "confidence")
     bound = diffusion_bound(friction, diameter, filament_type.segment_length, temperature, confidence)
     bounds = {"contact diffusion": bound}

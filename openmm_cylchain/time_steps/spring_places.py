@@ -23,13 +23,11 @@ class SpringPlaces:
 
     Parameters
     ----------
-    system : openmm.System
     filaments : Filaments
         In the System.
     scheme : {"implicit", "implicit-second-order", "midpoint", "euler"}
     particle_friction : energy*time/length^2, or array of them, or None
         As for ``Filaments.create_integrator``.
-    springs : list of Springs
     between : dict of (int, int, float) to int
         The numbers of places between two particles, behind those of all particles: see ``SpringReader``.
 
@@ -92,13 +90,8 @@ class SpringPlaces:
         return self._components @ responses
 
     def largest_eigenvalue(self, stiffness: FloatArray, step: float) -> tuple[float, BoolArray]:
-        """lambda of springs to fixed points in a step in ps, and which sites have part in it.
-
-        Parameters
-        ----------
-        stiffness : (sites,) array
-        step : float
-        """
+        """lambda of springs to fixed points, with stiffnesses (sites,), in a step in ps, and which sites have part in
+        it."""
         demand = self._components.T @ stiffness
         largest, places = 0.0, np.zeros(0, dtype=int)
         if len(self._free):
@@ -141,7 +134,7 @@ class SpringPlaces:
         return {
             int(particle): (one.filament, one.segment, one.fraction)
             for particle, one in zip(self._filaments.attachment_indices, self._filaments.attachments)
-            if self._filaments[one.filament].type.has_beam_elements
+            if not self._filaments[one.filament].type.segment_kind.straight
         }
 
     def _places_of(self, particle):
@@ -186,7 +179,7 @@ class SpringPlaces:
             return None
         (number, minus), (other, plus) = (self._node[parent] for parent in parents)
         nodes = len(self._filaments.node_indices[number])
-        if self._filaments[number].type.has_beam_elements:
+        if not self._filaments[number].type.segment_kind.straight:
             # The line between two nodes is not on the curve.
             return None
         closes = self._filaments[number].closed and minus + 1 == nodes
@@ -213,15 +206,14 @@ class SpringPlaces:
 
     def _response(self, number):
         filament = self._filaments[number]
-        key: tuple[Any, ...] = (filament.type, filament.segments, filament.clamped, filament.closed)
-        if filament.type.has_beam_elements:
-            key = (*key, filament.clamped_tangents, filament.planar)
+        ends = filament.clamped, filament.clamped_tangents
+        key = (filament.type, filament.segments, *ends, filament.closed, filament.planar)
         if key not in self._responses:
             solvent = (self._filaments.viscosity, self._filaments.temperature)
             friction = filament.type.segment_friction(*solvent, filament.segments)
-            if filament.type.has_beam_elements:
+            if filament.type.segment_kind.straight:
+                self._responses[key] = FilamentResponse(filament, friction, self._scheme)
+            else:
                 element = filament.beam_element(self._filaments.temperature)
                 self._responses[key] = BeamResponse(filament, friction, element)
-            else:
-                self._responses[key] = FilamentResponse(filament, friction, self._scheme)
         return self._responses[key]

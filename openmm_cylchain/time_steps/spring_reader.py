@@ -27,7 +27,6 @@ class SpringReader:
 
     Parameters
     ----------
-    system : openmm.System
     filaments : Filaments
         In the System.
 
@@ -46,14 +45,7 @@ class SpringReader:
         self.between: dict[tuple[int, int, float], int] = {}
 
     def read(self, force: openmm.Force, label: str) -> list[Springs] | None:
-        """The springs of a force of the System, or None where the stiffness is not known.
-
-        Parameters
-        ----------
-        force : openmm.Force
-        label : str
-            What it is called.
-        """
+        """The springs of a force of the System, known by a label, or None where the stiffness is not known."""
         capsules = as_capsule_contact_force(force)
         if capsules is not None:
             return self._between_capsules(label, capsules)

@@ -99,34 +99,6 @@ def bending_bound(friction: SegmentFriction, bending_rigidity: Scalar, length: S
     return 2.0 * positive(length, LENGTH, "length") * friction.rotational / rigidity
 
 
-def chain_stretching_bound(friction: SegmentFriction, stiffness: Scalar, length: Scalar) -> float:
-    """Step, in ps, above which an explicit scheme blows up the stiffest longitudinal mode of a chain.
-
-    ``dt < 2/lambda``, lambda the largest eigenvalue of Z^-1 K of a long straight chain. A longitudinal
-    wave of wave number q has K = 4 k sin^2(q/2) and Z = gamma_par cos^2(q/2) + (4 gamma_def/l0^2)
-    sin^2(q/2), so the fastest mode is the one in which neighbouring nodes move against each other and
-
-        dt < 2 gamma_def / (k l0^2),
-
-    which is (57): being in a chain changes nothing.
-    """
-    return stretching_bound(friction, stiffness, length)
-
-
-def chain_bending_bound(friction: SegmentFriction, bending_rigidity: Scalar, length: Scalar) -> float:
-    """Step, in ps, above which an explicit scheme blows up the stiffest bending mode of a chain.
-
-    ``dt < 2/lambda``, lambda the largest eigenvalue of Z^-1 K of a long straight chain. A transverse
-    wave of wave number q has K = (16 a/l0^3) sin^4(q/2) and Z = gamma_perp cos^2(q/2) +
-    (4 gamma_rot/l0^2) sin^2(q/2), so neighbouring nodes against each other give
-
-        dt < gamma_rot l0 / (2 a),
-
-    a quarter of (58), which looks at a single joint.
-    """
-    return bending_bound(friction, bending_rigidity, length) / 4.0
-
-
 def bead_spring_bounds(
     diameter: Scalar,
     viscosity: Scalar,
@@ -219,9 +191,18 @@ def stability_bounds(
 
 
 def bounds_of_chain(filament_type: ChainType, friction: SegmentFriction, segments: int) -> dict[str, float]:
-    """The bounds of ``stability_bounds`` for segments of a friction."""
+    """The bounds of ``stability_bounds`` for segments of a friction.
+
+    ``dt < 2/lambda``, lambda the largest eigenvalue of Z^-1 K of a long straight chain. A longitudinal wave of wave
+    number q has K = 4 k sin^2(q/2) and Z = gamma_par cos^2(q/2) + (4 gamma_def/l0^2) sin^2(q/2), a transverse one
+    K = (16 a/l0^3) sin^4(q/2) and Z = gamma_perp cos^2(q/2) + (4 gamma_rot/l0^2) sin^2(q/2). The fastest are those in
+    which neighbouring nodes move against each other, so
+
+        dt < 2 gamma_def/(k l0^2), which is (57): being in a chain changes nothing
+        dt < gamma_rot l0/(2 a), a quarter of (58), which looks at a single joint
+    """
     length = filament_type.segment_length
-    bounds = {"stretching": chain_stretching_bound(friction, filament_type.segment_stiffness, length)}
+    bounds = {"stretching": stretching_bound(friction, filament_type.segment_stiffness, length)}
     if segments > 1:
-        bounds["bending"] = chain_bending_bound(friction, filament_type.joint_stiffness * length, length)
+        bounds["bending"] = bending_bound(friction, filament_type.joint_stiffness * length, length) / 4.0
     return bounds

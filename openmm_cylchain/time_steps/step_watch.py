@@ -213,21 +213,12 @@ class WorkRecorder:
 
     Steps that do not follow on from each other, because positions were set or a checkpoint was loaded, are left out. Of
     displacements and changes of forces, their means over the window are taken off: a filament that is dragged along
-    steadily, while its tension turns, is no sign of a step that is too long.
-
-    Parameters
-    ----------
-    window : int
-        Steps of a window.
-
-    Attributes
-    ----------
-    window : int
-        May be changed at any time.
+    steadily, while its tension turns, is no sign of a step that is too long. ``window``, how many steps one has, may be
+    changed at any time.
     """
 
-    def __init__(self, window: int = WINDOW) -> None:
-        self.window = window
+    def __init__(self) -> None:
+        self.window = WINDOW
         self.clear()
 
     def clear(self) -> None:
@@ -243,18 +234,10 @@ class WorkRecorder:
         self._count, self._work, self._change, self._way = 0, 0.0, 0.0, 0.0
 
     def record(self, number: int, positions: FloatArray, forces: FloatArray, moves: FloatArray, kT: float) -> None:
-        """Take note of one step.
+        """Take note of one step with a number: positions and forces (particles, 3) at its start, and displacements in
+        it.
 
-        Parameters
-        ----------
-        number : int
-            Of the step.
-        positions, forces : (particles, 3) arrays
-            At its start.
-        moves : (particles, 3) array
-            Displacements in it.
-        kT : float
-            With zero, nothing is recorded.
+        With a kT of zero, nothing is recorded.
         """
         if kT <= 0.0:
             self.clear()

@@ -166,15 +166,10 @@ def resolved_relaxation_time(
     Parameters
     ----------
     step : time
-    scheme : str
     error : float
         Of the rate, above 0 and below 1.
     fastest_rate : 1/time
         As for ``effective_rate``. With zero, there are no bends, and every relaxation is taken as slow.
-
-    Returns
-    -------
-    float
     """
     check_scheme(scheme)
     step = as_step(step, "step")

@@ -43,13 +43,9 @@ _short.maxstring = _short.maxother = 160
 def in_units_of(value: Numbers, target: unit.Unit, name: str) -> FloatOrArray:
     """Return ``value`` as a float or float array in the unit ``target``.
 
-    A plain number or array is taken to be in ``target`` already. A quantity is converted; one per
-    particle (pN/nm, Pa s) is turned into one per mole (kJ/mol/nm^2) where ``target`` is molar.
-
-    Raises
-    ------
-    InputError
-        If the value is not a number, not finite, or has the dimension of something else.
+    A plain number or array is taken to be in ``target`` already. A quantity is converted; one per particle
+    (pN/nm, Pa s) is turned into one per mole (kJ/mol/nm^2) where ``target`` is molar. InputError if the value is not a
+    number, not finite, or has the dimension of something else.
     """
     if not isinstance(value, unit.Quantity) and isinstance(value, (list, tuple)):
         if any(isinstance(item, unit.Quantity) for item in value):

@@ -81,7 +81,6 @@ def parse_quantity(text: str, target: unit.Unit, name: str) -> float:
 
     Parameters
     ----------
-    text : str
     target : openmm.unit.Unit
         LENGTH, TIME and so on of ``quantities``.
     name : str

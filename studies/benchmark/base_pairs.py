@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bead_spring_observables import observables
 from openmm_cylchain.bead_spring.bead_spring_type import DSDNA_BASE_PAIRS
 from openmm_cylchain.bead_spring.equilibrium import bead_spring_bond_correlations
-from openmm_cylchain.bead_spring.observables import observables
 from openmm_cylchain.engine_choice import choose_engine
 from openmm_cylchain.systems.filaments import Filaments
 from openmm_cylchain.units.text import format_time

@@ -8,10 +8,10 @@ As in ``simulation``, what is simulated is stated here apart from what the theor
 import numpy as np
 import openmm
 
+from bead_spring_observables import mean_squares_of_observables, observables
 from benchmark.base_pairs import MODES_STEPS
 from openmm_cylchain import DSDNA_BASE_PAIRS, Filaments
 from openmm_cylchain.bead_spring.draws import draw_bonds
-from openmm_cylchain.bead_spring.observables import mean_squares_of_observables, observables
 
 from . import simulation
 

@@ -1,8 +1,9 @@
 """Fig. 1: how much of the force that couples the modes is left when its linear part is taken out."""
 
 import numpy as np
+import scipy
 
-from openmm_cylchain.bead_spring.modes import bead_spring_mode_forces, mode_shapes
+from openmm_cylchain.bead_spring.modes import mode_shapes
 from openmm_cylchain.bead_spring.transfer_operator import transfer_operator
 
 from . import base_pairs, simulation, style
@@ -14,6 +15,34 @@ _MODES = (1, 2, 3, 4, 5, 6, 7, 8, 16, 31, 32, 48, 62, 63)
 _COPIES = {True: 2048, False: 16384}
 _GROUPS = 32
 _RULE = Rule(3.0, 0.005, 0.03)
+
+
+def mode_amplitudes(positions):
+    """Amplitudes R_p, eq. (26): (..., beads, 3) of p = 0 to N, from positions (..., beads, 3) of chains."""
+    return scipy.fft.dct(positions, type=2, norm="ortho", axis=-2)
+
+
+def mode_forces(bead_type, positions):
+    """What couples the modes of chains: (lambda DeltaH_p, lambda H_p), two arrays (..., beads, 3) in kJ/(mol nm).
+
+    H_p is the force of the contour length, (37), all that is not linear; DeltaH_p, (44), what is left of it once the
+    linear force that it has on average is in zeta_p:
+
+        DeltaH_p = sum_n chi_np u_n (1/|u_n| - (1 - 2 nu)),    chi_np = phi_np - phi_(n-1)p
+
+    with lengths in units of d. (chi_np = -2 sqrt(2/(N+1)) s_p sin(p n pi/(N+1)); the print of (39) lacks the minus.)
+    """
+    bonds = np.diff(positions, axis=-2)
+    tangents = bonds / np.linalg.norm(bonds, axis=-1)[..., None]
+    force = bead_type.stiffness * bead_type.natural_length
+    linear = bonds / bead_type.bead_spacing
+    return mode_amplitudes(force * _on_beads(tangents - linear)), mode_amplitudes(force * _on_beads(tangents))
+
+
+def _on_beads(pushes):
+    # Every bond pushes its beads apart: forces (..., beads, 3) of pushes (..., bonds, 3).
+    none = np.zeros_like(pushes[..., :1, :])
+    return np.concatenate([none, pushes], axis=-2) - np.concatenate([pushes, none], axis=-2)
 
 
 def coupling_forces(bonds, copies, groups, seed):
@@ -29,7 +58,7 @@ def coupling_forces(bonds, copies, groups, seed):
     scale = (kind.stiffness * kind.natural_length) ** 2
     rest, whole = (
         simulation.groups(np.sum(force[:, 1:] ** 2, axis=-1).T / scale, groups)
-        for force in bead_spring_mode_forces(kind, positions)
+        for force in mode_forces(kind, positions)
     )
     return {"whole": whole, "rest": rest}
 

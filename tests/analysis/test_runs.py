@@ -32,7 +32,7 @@ from openmm_cylchain.output.run_description import (
 )
 from openmm_cylchain.runs.configuration import parse_configuration
 from openmm_cylchain.runs.description import describe
-from openmm_cylchain.runs.run import create_filaments
+from support.configurations import placed_filaments
 from support.small_runs import NETWORK, TWO_TYPES, simulated
 
 FRAMES = 31
@@ -262,7 +262,7 @@ def test_far_from_the_origin_the_trajectory_is_coarse(tmp_path):
 
 def test_walls_are_described():
     configuration = parse_configuration(TWO_TYPES)
-    filaments = create_filaments(configuration)
+    filaments = placed_filaments(configuration)
     topology, system, _ = filaments.build()
     for shape in (Sphere([1, 2, 3], 5e4), Box([-1e4] * 3, [2e4] * 3), Cylinder([0, 0, 1], [0, 0, 2], 3e4)):
         system.addForce(filament_wall_force(filaments, system, shape, 1.0))

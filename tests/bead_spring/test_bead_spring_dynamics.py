@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from bead_spring_observables import mean_squares_of_observables, observables
 from openmm_cylchain import DSDNA_BASE_PAIRS, Filaments, theory
-from openmm_cylchain.bead_spring.observables import mean_squares_of_observables, observables
 from support.contexts import new_context, positions_of
 
 ROOM, VISCOSITY = 296.15, 602.0

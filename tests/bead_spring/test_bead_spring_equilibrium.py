@@ -6,6 +6,7 @@ from openmm import unit
 
 from openmm_cylchain import DSDNA_BASE_PAIRS, F_ACTIN, BeadSpringType, InputError, theory
 from openmm_cylchain.units.quantities import thermal_energy
+from support.chain_energies import chain_energies
 
 ROOM = 296.15
 
@@ -127,9 +128,9 @@ def test_a_cold_chain_is_straight():
     assert end_to_end == pytest.approx(straight.sum() ** 2, rel=1e-5)
     # Without forces.
     nodes = np.outer(np.concatenate([[0.0], np.cumsum(straight)]), [1.0, 0.0, 0.0])
-    shorter, longer = (sum(kind.chain_energies(scale * nodes)) for scale in (1.0 - 1e-4, 1.0 + 1e-4))
+    shorter, longer = (sum(chain_energies(kind, scale * nodes)) for scale in (1.0 - 1e-4, 1.0 + 1e-4))
     assert shorter == pytest.approx(longer, rel=1e-6)
-    assert min(shorter, longer) > sum(kind.chain_energies(nodes))
+    assert min(shorter, longer) > sum(chain_energies(kind, nodes))
 
 
 @pytest.mark.parametrize("planar", [False, True])
@@ -161,7 +162,7 @@ def test_energies_add_up():
     bonds = kind.straight_lengths(7)
     lowest = 0.5 * np.sum((bonds - 1.0) ** 2) - nu * np.sum(bonds[1:] * bonds[:-1])
     excess = theory.bead_spring_stretching_energies(*chain).sum() + theory.bead_spring_bending_energies(*chain).sum()
-    excess -= sum(kind.chain_energies(straight))
+    excess -= sum(chain_energies(kind, straight))
     assert excess / kind.stiffness == pytest.approx(mean - lowest, rel=1e-9)
 
 

@@ -2,17 +2,13 @@
 
 import numpy as np
 import pytest
+import scipy
 
-from openmm_cylchain import DSDNA_BASE_PAIRS, BeadSpringType, InputError, theory
+from openmm_cylchain import DSDNA_BASE_PAIRS, BeadSpringType, theory
 from openmm_cylchain.bead_spring.draws import draw_bonds
-from openmm_cylchain.bead_spring.modes import (
-    bead_spring_mode_amplitudes,
-    bead_spring_mode_forces,
-    bead_spring_mode_rates,
-    bead_spring_mode_step,
-    bead_spring_positions,
-    mode_shapes,
-)
+from openmm_cylchain.bead_spring.modes import bead_spring_mode_rates, mode_shapes
+from openmm_cylchain.units.quantities import thermal_energy
+from reproduce.mode_coupling import mode_amplitudes, mode_forces
 
 ROOM = 296.15
 KIND = DSDNA_BASE_PAIRS
@@ -27,32 +23,52 @@ def energy(kind, nodes):
     )
 
 
+def positions_of(amplitudes):
+    return scipy.fft.idct(amplitudes, type=2, norm="ortho", axis=-2)
+
+
+def mode_step(kind, bonds, step, temperature):
+    """What one step of scheme "modes" does to all modes: decay, response and noise, three arrays (bonds + 1,).
+
+        R_p(t + h) = exp(-zeta_p h) R_p(t) + E_p F_p(t) + w_p N(0, 1)
+
+    with the force F_p = lambda DeltaH_p, of ``mode_forces``, taken to decay with zeta^l_p in the step (48):
+
+        E_p = (exp(-zeta_p h) - exp(-zeta^l_p h))/(xi (zeta^l_p - zeta_p)), E_0 = h/xi    (49), in nm^2 mol/kJ
+        w_p^2 = k_B T (1 - exp(-2 zeta_p h))/(xi zeta_p), w_0^2 = 2 k_B T h/xi            (35), w_p in nm
+    """
+    bending, along = bead_spring_mode_rates(kind, bonds)
+    decay, friction = np.exp(-bending * step), kind.bead_friction
+    with np.errstate(invalid="ignore", divide="ignore"):
+        response = decay * -np.expm1(-(along - bending) * step) / (along - bending)
+        noise = -np.expm1(-2.0 * bending * step) / bending
+    response[0], noise[0] = step, 2.0 * step
+    return decay, response / friction, np.sqrt(thermal_energy(temperature) / friction * noise)
+
+
 def test_amplitudes_and_back():
     nodes = np.random.default_rng(1).normal(size=(3, 8, 3))
-    amplitudes = bead_spring_mode_amplitudes(nodes)
+    amplitudes = mode_amplitudes(nodes)
     shapes = mode_shapes(7, np.arange(8))
     assert shapes.T @ shapes == pytest.approx(np.eye(8), abs=1e-12)
     assert amplitudes == pytest.approx(np.einsum("np,cnk->cpk", shapes, nodes))
     assert amplitudes[:, 0] == pytest.approx(np.sqrt(8.0) * nodes.mean(axis=1))
-    assert bead_spring_positions(amplitudes) == pytest.approx(nodes)
-    for wrong in (np.zeros(3), np.zeros((1, 3)), np.zeros((4, 2))):
-        with pytest.raises(InputError, match="must have the shape"):
-            bead_spring_mode_amplitudes(wrong)
+    assert positions_of(amplitudes) == pytest.approx(nodes)
 
 
 @pytest.mark.parametrize("bonds", [1, 2, 7])
 def test_the_equation_of_motion_in_modes_is_exact(bonds):
     """(46): the gradient of the energy (1), by differences, is what rates and couplings of modes give."""
     nodes = np.random.default_rng(bonds).normal(size=(bonds + 1, 3))
-    amplitudes = bead_spring_mode_amplitudes(nodes)
+    amplitudes = mode_amplitudes(nodes)
     bending, along = (rate[:, None] * KIND.bead_friction for rate in bead_spring_mode_rates(KIND, bonds))
-    rest, whole = bead_spring_mode_forces(KIND, nodes)
+    rest, whole = mode_forces(KIND, nodes)
     forces = np.zeros_like(nodes)
     for index in np.ndindex(*nodes.shape):
         moved = np.zeros_like(nodes)
         moved[index] = 1e-6
         forces[index] = (energy(KIND, nodes - moved) - energy(KIND, nodes + moved)) / 2e-6
-    expected = bead_spring_mode_amplitudes(forces)
+    expected = mode_amplitudes(forces)
     scale = np.abs(expected).max()
     assert rest - bending * amplitudes == pytest.approx(expected, abs=1e-6 * scale)
     assert whole - along * amplitudes == pytest.approx(expected, abs=1e-6 * scale)
@@ -74,7 +90,7 @@ def test_what_couples_modes_is_small():
     """The ratios of Fig. 1, N = 63, from exact samples; their values from other samples are known to about 3 %."""
     drawn = draw_bonds(KIND.nu, KIND.reduced_temperature(ROOM), 63, np.random.default_rng(7), 1500)
     nodes = KIND.natural_length * np.concatenate([np.zeros((1500, 1, 3)), np.cumsum(drawn, axis=1)], axis=1)
-    rest, whole = (np.mean(np.sum(force**2, axis=2), axis=0) for force in bead_spring_mode_forces(KIND, nodes))
+    rest, whole = (np.mean(np.sum(force**2, axis=2), axis=0) for force in mode_forces(KIND, nodes))
     ratios = np.sqrt(whole / np.where(rest > 0.0, rest, 1.0))
     expected = {1: 64, 2: 20, 3: 19.5, 4: 10.3, 5: 10.3, 6: 6.7, 7: 6.8, 8: 4.8, 9: 4.9, 10: 3.6, 31: 1.53, 62: 1.54}
     for mode, ratio in expected.items():
@@ -82,7 +98,7 @@ def test_what_couples_modes_is_small():
 
 
 def test_a_short_step_is_eulers():
-    decay, response, noise = bead_spring_mode_step(KIND, 7, 1e-4 * KIND.time_unit, ROOM)
+    decay, response, noise = mode_step(KIND, 7, 1e-4 * KIND.time_unit, ROOM)
     step, friction = 1e-4 * KIND.time_unit, KIND.bead_friction
     bending, _ = bead_spring_mode_rates(KIND, 7)
     assert 1.0 - decay == pytest.approx(step * bending, rel=1e-3)
@@ -93,7 +109,7 @@ def test_a_short_step_is_eulers():
 
 def test_a_long_step_forgets():
     """Modes that relax within a step are Gaussian, of the variance k_B T/(xi zeta_p), and the coupling is gone."""
-    decay, response, noise = bead_spring_mode_step(KIND, 7, 1e6 * KIND.time_unit, ROOM)
+    decay, response, noise = mode_step(KIND, 7, 1e6 * KIND.time_unit, ROOM)
     bending, _ = bead_spring_mode_rates(KIND, 7)
     kT = KIND.reduced_temperature(ROOM) * KIND.stiffness * KIND.natural_length**2
     assert np.all(decay[1:] < 1e-100) and np.all(response[1:] < 1e-100)
@@ -111,12 +127,12 @@ def test_steps_in_modes_keep_the_exact_equilibrium():
     nodes = kind.natural_length * np.concatenate([np.zeros((chains, 1, 3)), np.cumsum(drawn, axis=1)], axis=1)
     # Away from equilibrium first: it must find back.
     nodes *= 1.3
-    decay, response, noise = (one[:, None] for one in bead_spring_mode_step(kind, bonds, 0.1 * kind.time_unit, ROOM))
+    decay, response, noise = (one[:, None] for one in mode_step(kind, bonds, 0.1 * kind.time_unit, ROOM))
     sums = []
     for step in range(3000):
-        force, _ = bead_spring_mode_forces(kind, nodes)
-        amplitudes = decay * bead_spring_mode_amplitudes(nodes) + response * force
-        nodes = bead_spring_positions(amplitudes + noise * generator.normal(size=amplitudes.shape))
+        force, _ = mode_forces(kind, nodes)
+        amplitudes = decay * mode_amplitudes(nodes) + response * force
+        nodes = positions_of(amplitudes + noise * generator.normal(size=amplitudes.shape))
         if step >= 1000 and step % 50 == 0:
             vectors = np.diff(nodes, axis=1)
             sums.append(np.stack([np.sum(vectors.sum(axis=1) ** 2, axis=1), *np.sum(vectors**2, axis=2).T]))

@@ -11,6 +11,7 @@ from openmm_cylchain import F_ACTIN, Filaments, FilamentType, InputError, make_w
 from openmm_cylchain.analysis import contour_lengths, end_to_end_vectors, joint_cosines, segment_lengths, tangents
 from openmm_cylchain.beams.curve import arc_lengths, curve_points, element_energies, node_tangents
 from openmm_cylchain.beams.equilibrium import calibrated_rigidity, mean_cosine
+from openmm_cylchain.filaments.beam_elements import BEAM_ELEMENTS
 from openmm_cylchain.output.reporters import FilamentReporter
 from openmm_cylchain.time_steps.recommended_step import recommended_time_step
 from support.contexts import energy_of, new_context, new_simulation, positions_of
@@ -265,7 +266,7 @@ def test_what_a_type_of_beam_elements_cannot_have():
         theory.chain_mean_square_radius_of_gyration(KIND, 4, TEMPERATURE)
     with pytest.raises(InputError, match="segments are straight"):
         F_ACTIN.beam_element(TEMPERATURE)
-    assert replace(F_ACTIN, element="beam", extension_relaxation_time=None).has_beam_elements
+    assert replace(F_ACTIN, element="beam", extension_relaxation_time=None).segment_kind is BEAM_ELEMENTS
 
 
 def test_what_filaments_of_beam_elements_cannot_have():

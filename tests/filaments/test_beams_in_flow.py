@@ -117,17 +117,17 @@ def test_a_bent_filament_in_a_shear_is_that_of_straight_segments():
         angles = 0.8 * np.linspace(0.0, 1.0, 48001)
         points = np.cumsum(np.stack([np.cos(angles), 0 * angles, np.sin(angles)], axis=1), axis=0) * length / 48000
         nodes = points[:: 48000 // number][: number + 1]
-        if kind.has_beam_elements:
+        if kind.segment_kind.straight:
+            filaments.add_nodes(kind, nodes)
+        else:
             bends = 0.8 * np.linspace(0.0, 1.0, number + 1)
             filaments.add_nodes(kind, nodes, tangents=np.stack([np.cos(bends), 0 * bends, np.sin(bends)], axis=1))
-        else:
-            filaments.add_nodes(kind, nodes)
         _, end = _carried(filaments, Flow.shear(rate), 4e5, 100)
         nodes = end[filaments.node_indices[0]]
-        if kind.has_beam_elements:
-            curves.append(curve_points(nodes, end[filaments.control_point_indices[0]], 12))
-        else:
+        if kind.segment_kind.straight:
             curves.append(nodes)
+        else:
+            curves.append(curve_points(nodes, end[filaments.control_point_indices[0]], 12))
     moved = np.abs(curves[1] - points[::1000]).max()
     assert moved > 0.2 * length
     assert np.abs(curves[0] - curves[1]).max() < 0.01 * moved

@@ -131,7 +131,7 @@ ALL = [
 
 def on_beams(filaments, table):
     """Which hands are bound to beams: (n, 2)."""
-    beams = np.array([filament.type.has_beam_elements for filament in filaments] + [False])
+    beams = np.array([not filament.type.segment_kind.straight for filament in filaments] + [False])
     return beams[table.filaments]
 
 

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from openmm_cylchain.bead_spring.modes import bead_spring_mode_forces
 from reproduce import (
     base_pairs,
     coarse_graining,
@@ -42,7 +41,7 @@ def test_coupling_of_one_bond():
     """A single bond has H_1 = sqrt(2) along it; DeltaH_1 is what the bond is shorter or longer than b, over b."""
     positions = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.5]])
     kind = base_pairs.BASE_PAIRS
-    rest, whole = bead_spring_mode_forces(kind, positions)
+    rest, whole = mode_coupling.mode_forces(kind, positions)
     force = kind.stiffness * kind.natural_length
     assert np.linalg.norm(whole[1]) == pytest.approx(np.sqrt(2.0) * force)
     assert np.linalg.norm(rest[1]) == pytest.approx(np.sqrt(2.0) * force * (0.5 / kind.bead_spacing - 1.0))

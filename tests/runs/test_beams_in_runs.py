@@ -69,7 +69,7 @@ def test_what_is_built_is_that_of_python():
         friction_length="filament",
         element="beam",
     )
-    assert free.type == other.type == kind and clamped.type.has_beam_elements
+    assert free.type == other.type == kind and not clamped.type.segment_kind.straight
     for own in (free, other):
         hand.add_nodes(kind, own.positions, control_points=own.control_points)
     tangents = [[1, 0.5, 0], [1, 0, 0], [1, -0.5, 0]]
@@ -204,7 +204,7 @@ def test_runs_of_rings(tmp_path):
         ]
     energies, bending = read_table(out / "energies.csv"), 0.0
     for own, nodes, controls in chains_of(filaments, run.positions(-1)):
-        parts = own.energies(nodes, controls, 310.0) if own.type.has_beam_elements else own.energies(nodes)
+        parts = own.energies(nodes) if own.type.segment_kind.straight else own.energies(nodes, controls, 310.0)
         bending += parts[1]
     assert energies["bending energy (kJ/mol)"][-1] == pytest.approx(bending, rel=1e-3)
     assert main(["render", str(out), "--output", str(tmp_path / "rings.png")]) == 0
@@ -238,7 +238,7 @@ def test_linkers_of_runs_are_on_the_curves(tmp_path):
         for filament, along, place in zip(
             records["filaments"].ravel(), records["arc_lengths"].ravel(), records["places"].reshape(-1, 3)
         ):
-            if filament < 0 or not run.filaments[filament].has_beam_elements:
+            if filament < 0 or not len(run.filaments[filament].control_points):
                 continue
             own = run.filaments[filament]
             element = min(int(along // own.type.segment_length), own.segments - 1)

@@ -14,10 +14,10 @@ from openmm_cylchain.cli import main
 from openmm_cylchain.output.linker_records import LINKER_RECORD
 from openmm_cylchain.output.read_tables import read_reports
 from openmm_cylchain.runs.configuration import changed_keys, parse_configuration, read_configuration
-from openmm_cylchain.runs.run import create_filaments
 from support import small_runs
 from support.checkpoints import resealed
 from support.commands import finish, start, wait_for_size
+from support.configurations import placed_filaments
 from support.repository import EXAMPLES
 
 MOTOR = 'hand = { binding_rate = "1e5 1/s", reach = "60 nm", unbinding_rate = "2000 1/s", speed = "-0.5 um/s", '
@@ -97,7 +97,7 @@ def test_concentrations(entry, expected):
     text = NETWORK.replace("count = 40\nbound = 40", f'concentration = "{entry}"')
     group = parse_configuration(text).linkers[1]
     assert group.count is None and group.concentration == pytest.approx(expected)
-    assert create_filaments(parse_configuration(text)).linkers[1].concentration == pytest.approx(expected)
+    assert placed_filaments(parse_configuration(text)).linkers[1].concentration == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(
@@ -106,7 +106,7 @@ def test_concentrations(entry, expected):
 )
 def test_anchors(anchors, expected):
     text = NETWORK.replace("count = 40\nbound = 40", f"anchors = {anchors}\nbound = 1")
-    linkers = create_filaments(parse_configuration(text)).linkers[1]
+    linkers = placed_filaments(parse_configuration(text)).linkers[1]
     np.testing.assert_array_equal(linkers.anchors, expected)
     assert (linkers.count, linkers.bound) == (2, 1)
 
@@ -217,7 +217,7 @@ def test_kinesin_binds_to_microtubules_alone():
 
 def test_filaments_begin_at_random_places_in_a_box():
     text = NETWORK.replace("count = 20", 'count = 400\nstart = "straight"')
-    filaments = create_filaments(parse_configuration(text))
+    filaments = placed_filaments(parse_configuration(text))
     middles = np.array([filament.positions.mean(axis=0) for filament in filaments])
     assert (middles >= 0.0).all() and (middles < (400, 400, 500)).all()
     # The standard error of a mean of 400 is 1/(20 sqrt 12) of an edge, and that of mean squares of a unit vector 0.015.

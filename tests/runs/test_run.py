@@ -19,12 +19,13 @@ from openmm_cylchain.cli import main
 from openmm_cylchain.engines.gpu_platforms import why_not_on
 from openmm_cylchain.output.read_tables import read_table
 from openmm_cylchain.runs.configuration import parse_configuration, read_configuration
-from openmm_cylchain.runs.run import create_filaments, run
+from openmm_cylchain.runs.run import run
 from openmm_cylchain.runs.run_directory import RunDirectory
 from openmm_cylchain.runs.summary import load_trajectory, summarise
 from openmm_cylchain.runs.summary_text import format_summary
 from support.checkpoints import resealed
 from support.commands import COMMAND, finish, start, wait_for_size
+from support.configurations import placed_filaments
 from support.contexts import positions_of
 
 SHORT = """
@@ -111,7 +112,7 @@ def test_mdtraj_reads_trajectory_and_topology(unbroken):
         bond[1].index == bond[0].index + 1 and bond[0].residue.chain == bond[1].residue.chain for bond in topology.bonds
     )
     assert {residue.name for residue in topology.residues} == {"ACT"}
-    initial = np.concatenate([f.positions for f in create_filaments(parse_configuration(SHORT))])
+    initial = np.concatenate([f.positions for f in placed_filaments(parse_configuration(SHORT))])
     np.testing.assert_allclose(trajectory.xyz[0], initial, rtol=1e-6, atol=1e-3)
     np.testing.assert_array_equal(trajectory.xyz[:, 21], np.broadcast_to(trajectory.xyz[0, 21], (FRAMES, 3)))
 
@@ -572,7 +573,7 @@ def test_wrong_input_leaves_no_directory(tmp_path, capsys, changes, fragment):
 
 def test_filaments_are_laid_out_side_by_side():
     configuration = parse_configuration(SHORT.replace("count = 3", "count = 15"))
-    filaments = create_filaments(configuration)
+    filaments = placed_filaments(configuration)
     centers = np.array([f.positions.mean(axis=0) for f in filaments])
     distances = np.linalg.norm(centers[:, None] - centers[None], axis=-1)
     extent = max(np.linalg.norm(f.positions - c, axis=1).max() for f, c in zip(filaments, centers))
@@ -584,7 +585,7 @@ def test_filaments_are_laid_out_side_by_side():
 
 def test_position_and_direction_are_those_of_the_first_node_and_segment():
     text = SHORT.replace("count = 3", 'count = 2\nposition = ["1 nm", "2 nm", "3 nm"]\ndirection = [0, 3, 0]')
-    first, second, _ = create_filaments(parse_configuration(text))
+    first, second, _ = placed_filaments(parse_configuration(text))
     for filament in (first, second):
         np.testing.assert_allclose(filament.positions[0], (1.0, 2.0, 3.0))
         tangent = filament.positions[1] - filament.positions[0]

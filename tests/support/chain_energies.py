@@ -3,6 +3,7 @@
 import numpy as np
 
 from openmm_cylchain.filaments.equilibrium import JointAngleDistribution, SegmentLengthDistribution
+from openmm_cylchain.mechanics.geometry import segment_vectors
 from support.solvent import KT, TEMPERATURE
 
 
@@ -26,3 +27,10 @@ def exact_energies(kind):
     if kind.bending_rigidity == 0:
         return stretching, 0.0
     return stretching, JointAngleDistribution(kind, TEMPERATURE).mean(kind.bending_energy) / KT
+
+
+def chain_energies(kind, nodes, stiffnesses=None, closed=False):
+    """Stretching and bending energy in kJ/mol of a chain of straight segments, whose joints may have other ones."""
+    vectors = segment_vectors(nodes, closed)
+    stretching = kind.stretching_energies(np.linalg.norm(vectors, axis=1), closed)
+    return float(stretching.sum()), float(kind.bending_energies(vectors, stiffnesses, closed).sum())

@@ -1,4 +1,6 @@
-"""A configuration with every kind of table."""
+"""A configuration with every kind of table, and the filaments of one."""
+
+from openmm_cylchain.runs.initial_state import place_filaments
 
 EVERYTHING = """
 title = "everything"
@@ -144,3 +146,9 @@ checkpoint_interval = "120 us"
 seed = 5
 """
 """Filaments of beam elements, beside one of straight segments: clamped, linked, joined, planar, of given nodes."""
+
+
+def placed_filaments(configuration):
+    """Filaments with their initial positions, and linkers, that a run of a configuration has."""
+    settings = configuration.simulation
+    return place_filaments(configuration, settings.engine, settings.seed)

@@ -101,7 +101,7 @@ def test_functions_of_chains_take_them_or_say_which_do():
         lambda: theory.chain_planar_bending_mode_variance(own, 6, 1, warm),
         lambda: theory.chain_extension(own, 6, 1.0, warm),
     ):
-        with pytest.raises(InputError, match=r"'BEAM' has beam elements.*theory\.beam_"):
+        with pytest.raises(InputError, match=r"'BEAM' has no straight segments.*theory\.beam_"):
             function()
 
 

@@ -156,11 +156,6 @@ class FilamentGroup:
         return self.type.segment_kind.bends(self.segments, self.closed)
 
     @property
-    def has_beam_elements(self):
-        """Whether segments are elements that bend inside."""
-        return self.type.has_beam_elements
-
-    @property
     def linked(self):
         """Whether linkers bind to them."""
         return "linkers" in self.disturbed
@@ -169,15 +164,7 @@ class FilamentGroup:
 def read_filaments(entries, table, solvent, box, folder):
     """The FilamentGroups of a [[filament]] table, one for each length.
 
-    Parameters
-    ----------
-    entries : Entries
-    table : int
-        Its number, from 1.
-    solvent : Solvent
-    box : (3,) tuple or None
-    folder : Path
-        That files are named from.
+    The number of the table is counted from 1; files are named from the folder.
     """
     kind = read_filament_type(entries, solvent)
     _check_element(entries, kind)

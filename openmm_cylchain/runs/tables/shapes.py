@@ -60,13 +60,7 @@ def read_shape(entries):
 
 
 class Region:
-    """A bounded region: positions are drawn in it, and asked whether they are in it.
-
-    Parameters
-    ----------
-    entries : Entries
-        Of REGION.
-    """
+    """A bounded region, of Entries of REGION: positions are drawn in it, and asked whether they are in it."""
 
     def __init__(self, entries):
         self._shape = read_shape(entries)

@@ -69,14 +69,7 @@ def read_seed(entries):
 
 
 def read_simulation(entries, recommended):
-    """The SimulationSettings of a [simulation] table.
-
-    Parameters
-    ----------
-    entries : Entries
-    recommended : callable (scheme, engine)
-        Returns the recommended step in ps.
-    """
+    """The SimulationSettings of a [simulation] table; ``recommended(scheme, engine)`` is the recommended step in ps."""
     engine = entries["engine"]
     scheme = entries["scheme"] or default_scheme(engine)
     if "threads" in entries and entries["platform"] != "CPU":
