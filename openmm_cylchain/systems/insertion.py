@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import openmm
 
+from ..couplings.chain_forces import is_chain_force
 from ..couplings.periodicity import has_box, is_periodic
 from ..errors import InputError
 from ..filaments.filament import CONTROL_POINT_NAME, NODE_NAME, Filament
@@ -33,7 +34,7 @@ def check_target(topology: "app.Topology", system: openmm.System, positions: Vec
             "topology.setPeriodicBoxVectors(None)."
         )
     for force in system.getForces():
-        if force.getName().startswith("CylinderChain"):
+        if is_chain_force(force):
             raise InputError("The System already holds filaments: add all of them through one Filaments object.")
     return positions
 

@@ -4,12 +4,12 @@ import warnings
 
 import openmm
 
-from ..couplings.capsule_contacts import as_capsule_contact_force
+from ..couplings.chain_forces import is_coupling
 from ..couplings.contacts import is_contact_force
 from ..couplings.crosslinks import Crosslinks
 from ..couplings.periodicity import is_periodic
+from ..couplings.walls import as_filament_wall_force
 from ..errors import BoxWarning
-from ..kinetics.binding_force import is_binding_force
 
 
 def warn_of_forces_without_images(system: openmm.System) -> None:
@@ -34,9 +34,6 @@ def warn_of_forces_without_images(system: openmm.System) -> None:
 
 
 def _takes_distances(force):
-    return (
-        is_contact_force(force)
-        or is_binding_force(force)
-        or as_capsule_contact_force(force) is not None
-        or Crosslinks.of_force(force) is not None
-    )
+    if is_coupling(force):
+        return as_filament_wall_force(force) is None
+    return is_contact_force(force) or Crosslinks.of_force(force) is not None

@@ -9,9 +9,8 @@ import numpy as np
 import openmm
 import scipy
 
-from ..couplings.capsule_contacts import as_capsule_contact_force
+from ..couplings.chain_forces import is_chain_force
 from ..couplings.pulling import is_constant_force
-from ..couplings.walls import as_filament_wall_force
 from ..filaments.collection import FilamentCollection
 from ..filaments.filament import Filament
 from ..kinetics.binding_force import find_binding_force
@@ -203,10 +202,4 @@ def interacting(filaments: FilamentCollection, system: openmm.System) -> bool:
 
 
 def _other_forces(system):
-    return [(index, force) for index, force in enumerate(system.getForces()) if not _is_chain_force(force)]
-
-
-def _is_chain_force(force):
-    if as_capsule_contact_force(force) is not None or as_filament_wall_force(force) is not None:
-        return False
-    return force.getName().startswith("CylinderChain")
+    return [(index, force) for index, force in enumerate(system.getForces()) if not is_chain_force(force)]

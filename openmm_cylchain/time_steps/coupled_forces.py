@@ -1,10 +1,9 @@
 """Which forces of a System implicit schemes have in their equations, and what keeps others out: the plugin says it."""
 
-from typing import Any
-
 import openmm
 
 from ..couplings.capsule_contacts import as_capsule_contact_force
+from ..couplings.chain_forces import is_coupling
 from ..couplings.walls import as_filament_wall_force
 from ..engine_choice import load_plugin
 from ..errors import InputError
@@ -25,8 +24,7 @@ class CoupledForces:
 
     def may_include(self, index: int) -> bool:
         """Whether a force, by its index, is one of links, contacts, walls or linkers: in the equations if it can be."""
-        plugin: Any = load_plugin()
-        return plugin is not None and plugin.CylinderChainCoupling.isinstance(self._system.getForce(index))
+        return is_coupling(self._system.getForce(index))
 
     def includes(self, index: int) -> bool:
         """Whether a force, by its index, is in the equations of implicit schemes."""

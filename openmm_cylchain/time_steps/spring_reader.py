@@ -6,6 +6,7 @@ import numpy as np
 import openmm
 
 from ..couplings.capsule_contacts import as_capsule_contact_force
+from ..couplings.chain_forces import is_chain_force
 from ..couplings.contacts import CONTACT_STIFFNESS, is_contact_force
 from ..couplings.crosslinks import Crosslinks
 from ..couplings.native_links import is_link_force
@@ -58,7 +59,7 @@ class SpringReader:
             return None if links is None else self._crosslinks(links, label)
         if is_binding_force(force):
             return self._linkers(label)
-        if force.getName().startswith("CylinderChain") or isinstance(force, _WITHOUT_STIFFNESS):
+        if is_chain_force(force) or isinstance(force, _WITHOUT_STIFFNESS):
             return []
         if isinstance(force, openmm.HarmonicBondForce):
             bonds = [force.getBondParameters(index) for index in range(force.getNumBonds())]

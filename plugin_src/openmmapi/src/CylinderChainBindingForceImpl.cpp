@@ -56,12 +56,11 @@ static void require(bool condition, const string& message) {
 }
 
 CylinderChainBindingForceImpl::CylinderChainBindingForceImpl(const CylinderChainBindingForce& owner) :
-        CouplingForceImpl(owner), owner(owner), context(NULL), seed(0), number(0), upToDate(false),
-        nearestParticles(false), wasExcluded(false), hasStepped(false), timeBefore(0), stepSize(0), countBefore(0) {
+        SpringForceImpl(owner), owner(owner), seed(0), number(0), upToDate(false), wasExcluded(false), hasStepped(false), timeBefore(0), stepSize(0), countBefore(0) {
 }
 
 void CylinderChainBindingForceImpl::initialize(ContextImpl& context) {
-    this->context = &context;
+    initializeLinks(context, owner.usesPeriodicBoundaryConditions());
     const System& ofContext = context.getSystem();
 
     // Each such Force of a System has a parameter of its own.
@@ -79,7 +78,6 @@ void CylinderChainBindingForceImpl::initialize(ContextImpl& context) {
     }
     require(chains != NULL, "The System has no CylinderChainForce with chains to bind to");
     parameter = "CylinderChainLinkers"+to_string(number);
-    nearestParticles = chains->usesPeriodicBoundaryConditions();
     const CylinderChainDescription description(ofContext, *chains);
     const cylchain::Contours contours(description.getList());
     lengths.clear();
@@ -128,9 +126,6 @@ void CylinderChainBindingForceImpl::initialize(ContextImpl& context) {
     linkerKernel = context.getPlatform().createKernel(UpdateCylinderChainLinkersKernel::Name(), context);
     linkerKernel.getAs<UpdateCylinderChainLinkersKernel>().initialize(system, description.getList(),
             owner.usesPeriodicBoundaryConditions(), nearestParticles);
-    linkKernel = context.getPlatform().createKernel(CalcCylinderChainLinkForceKernel::Name(), context);
-    linkKernel.getAs<CalcCylinderChainLinkForceKernel>().initialize(ofContext, owner.usesPeriodicBoundaryConditions(),
-            nearestParticles);
     upToDate = false;
 }
 
@@ -241,7 +236,7 @@ void CylinderChainBindingForceImpl::setState(const cylchain::LinkerState& replac
     accept();
 }
 
-double CylinderChainBindingForceImpl::calcForcesAndEnergy(ContextImpl& context, bool includeForces,
+double CylinderChainBindingForceImpl::calcForcesAndEnergy(ContextImpl&, bool includeForces,
         bool includeEnergy, int groups) {
     if (!isIn(groups))
         return 0.0;
@@ -249,12 +244,7 @@ double CylinderChainBindingForceImpl::calcForcesAndEnergy(ContextImpl& context, 
     if (isExcluded())
         return 0.0;
     int outOfRange = -1;
-    return linkKernel.getAs<CalcCylinderChainLinkForceKernel>().execute(context, getLinks(), includeForces,
-            includeEnergy, outOfRange);
-}
-
-cylchain::ImplicitCouplings* CylinderChainBindingForceImpl::getEquations(ContextImpl& context) {
-    return linkKernel.getAs<CalcCylinderChainLinkForceKernel>().getEquations(context, getLinks());
+    return computeLinks(includeForces, includeEnergy, outOfRange);
 }
 
 StateColumns CylinderChainBindingForceImpl::storeState(bool inCheckpoint) {
@@ -268,9 +258,4 @@ void CylinderChainBindingForceImpl::restoreState(const StateColumns& columns) {
     setState(restoreLinkers(columns));
     if (columns.has("seed"))
         seed = columns.getOne<uint32_t>("seed");
-}
-
-string CylinderChainBindingForceImpl::describeFailure(const cylchain::BrokenCoupling& coupling, const string& other) {
-    return describeBrokenLink(coupling, other, links, *context, owner.usesPeriodicBoundaryConditions(),
-            nearestParticles);
 }

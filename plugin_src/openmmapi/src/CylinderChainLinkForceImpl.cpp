@@ -1,7 +1,5 @@
 #include "openmm/internal/CylinderChainLinkForceImpl.h"
 #include "openmm/CylinderChainException.h"
-#include "openmm/CylinderChainForce.h"
-#include "openmm/CylinderChainKernels.h"
 #include "openmm/OpenMMException.h"
 #include "openmm/System.h"
 #include "openmm/internal/ContextImpl.h"
@@ -12,8 +10,8 @@
 using namespace OpenMM;
 using namespace std;
 
-CylinderChainLinkForceImpl::CylinderChainLinkForceImpl(const CylinderChainLinkForce& owner) : CouplingForceImpl(owner),
-        owner(owner), context(NULL), upToDate(false), version(0), nearestParticles(false) {
+CylinderChainLinkForceImpl::CylinderChainLinkForceImpl(const CylinderChainLinkForce& owner) : SpringForceImpl(owner),
+        owner(owner), upToDate(false), version(0) {
 }
 
 void CylinderChainLinkForceImpl::initialize(ContextImpl& context) {
@@ -30,24 +28,15 @@ void CylinderChainLinkForceImpl::initialize(ContextImpl& context) {
             parameter = "CylinderChainLinks"+to_string(before);
         if (dynamic_cast<const CylinderChainLinkForce*>(force) != NULL)
             before++;
-        const CylinderChainForce* chains = dynamic_cast<const CylinderChainForce*>(force);
-        if (chains != NULL && chains->usesPeriodicBoundaryConditions())
-            nearestParticles = true;
     }
     const cylchain::LinkChange change = history.getTable().changeTo(owner.getTable());
     check(change);
     history = cylchain::LinkHistory(owner.getTable());
-    kernel = context.getPlatform().createKernel(CalcCylinderChainLinkForceKernel::Name(), context);
-    kernel.getAs<CalcCylinderChainLinkForceKernel>().initialize(system, owner.usesPeriodicBoundaryConditions(),
-            nearestParticles);
+    initializeLinks(context, owner.usesPeriodicBoundaryConditions());
 }
 
 map<string, double> CylinderChainLinkForceImpl::getDefaultParameters() {
     return {{parameter, (double) history.getTable().getDigest()}};
-}
-
-vector<string> CylinderChainLinkForceImpl::getKernelNames() {
-    return {CalcCylinderChainLinkForceKernel::Name()};
 }
 
 void CylinderChainLinkForceImpl::check(const cylchain::LinkChange& change) const {
@@ -130,7 +119,7 @@ const vector<cylchain::Link>& CylinderChainLinkForceImpl::getLinks() {
     return links;
 }
 
-double CylinderChainLinkForceImpl::calcForcesAndEnergy(ContextImpl& context, bool includeForces, bool includeEnergy,
+double CylinderChainLinkForceImpl::calcForcesAndEnergy(ContextImpl&, bool includeForces, bool includeEnergy,
         int groups) {
     if (!isIn(groups))
         return 0.0;
@@ -144,8 +133,7 @@ double CylinderChainLinkForceImpl::calcForcesAndEnergy(ContextImpl& context, boo
     if (isExcluded() && !anyRange)
         return 0.0;
     int outOfRange = -1;
-    const double energy = kernel.getAs<CalcCylinderChainLinkForceKernel>().execute(context, present,
-            includeForces && !isExcluded(), includeEnergy && !isExcluded(), outOfRange);
+    const double energy = computeLinks(includeForces && !isExcluded(), includeEnergy && !isExcluded(), outOfRange);
     if (outOfRange != -1)
         reportLink(outOfRange);
     return energy;
@@ -158,10 +146,6 @@ vector<cylchain::Place> CylinderChainLinkForceImpl::findPlaces(const PlaceResolv
     return found;
 }
 
-cylchain::ImplicitCouplings* CylinderChainLinkForceImpl::getEquations(ContextImpl& context) {
-    return kernel.getAs<CalcCylinderChainLinkForceKernel>().getEquations(context, getLinks());
-}
-
 StateColumns CylinderChainLinkForceImpl::storeState(bool) {
     return storeTable(getTable());
 }
@@ -170,20 +154,9 @@ void CylinderChainLinkForceImpl::restoreState(const StateColumns& columns) {
     setTable(restoreTable(columns));
 }
 
-string CylinderChainLinkForceImpl::describeFailure(const cylchain::BrokenCoupling& coupling, const string& other) {
-    return describeBrokenLink(coupling, other, links, *context, owner.usesPeriodicBoundaryConditions(),
-            nearestParticles);
-}
-
 void CylinderChainLinkForceImpl::reportLink(int index) {
     const cylchain::Link& link = links[index];
-    vector<Vec3> positions, box(3);
-    context->getPositions(positions);
-    context->getPeriodicBoxVectors(box[0], box[1], box[2]);
-    cylchain::LinkBoxes boxes;
-    boxes.distances = owner.usesPeriodicBoundaryConditions() ? &box[0][0] : NULL;
-    boxes.segments = nearestParticles ? &box[0][0] : NULL;
-    const double length = cylchain::computePull(link, &positions[0][0], boxes).length;
+    const double length = findPull(link.number).length;
     stringstream message;
     message << "Link " << link.number << " " << describePlaces(history.getTable().find(link.number)->link) <<
             " has blown up: its length of " << length << " nm is outside " << link.restLength << " -/+ " <<

@@ -151,25 +151,6 @@ LinkTable restoreTable(const StateColumns& columns) {
             columns.getOne<int>("nextNumber"));
 }
 
-string describeBrokenLink(const BrokenCoupling& coupling, const string& other, const vector<Link>& links,
-        ContextImpl& context, bool periodic, bool nearestParticles) {
-    vector<Vec3> positions, box(3);
-    context.getPositions(positions);
-    context.getPeriodicBoxVectors(box[0], box[1], box[2]);
-    const LinkBoxes boxes = {periodic ? &box[0][0] : NULL, nearestParticles ? &box[0][0] : NULL};
-    const auto link = find_if(links.begin(), links.end(), [&] (const Link& one) {
-        return one.number == coupling.link;
-    });
-    const LinkPull pull = computePull(*link, &positions[0][0], boxes);
-    const Vec3 force(pull.force[0], pull.force[1], pull.force[2]);
-    stringstream text;
-    text.precision(3);
-    text << "link " << coupling.link << " to " << other << (coupling.reason == BrokenCoupling::LeavesRange ?
-            " would leave the range of its potential" : " cannot be solved") << ". It is " << pull.length <<
-            " nm long and has a force of " << sqrt(force.dot(force)) << " kJ/mol/nm";
-    return text.str();
-}
-
 LinkTable makeTable(const vector<int>& numbers, const LinkColumns& columns, const vector<int>& active,
         int nextNumber) {
     checkColumn("numbers", numbers.size(), columns.size());

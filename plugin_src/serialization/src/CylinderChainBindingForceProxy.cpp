@@ -1,21 +1,12 @@
-#include "openmm/serialization/CylinderChainBindingForceProxy.h"
 #include "openmm/CylinderChainBindingForce.h"
-#include "openmm/OpenMMException.h"
 #include "openmm/internal/LinkerDescription.h"
-#include "openmm/serialization/SerializationNode.h"
+#include "openmm/serialization/ObjectProxy.h"
 #include <memory>
 
 using namespace OpenMM;
 using namespace std;
 
-CylinderChainBindingForceProxy::CylinderChainBindingForceProxy() : SerializationProxy("CylinderChainBindingForce") {
-}
-
-void CylinderChainBindingForceProxy::serialize(const void* object, SerializationNode& node) const {
-    node.setIntProperty("version", 2);
-    const CylinderChainBindingForce& force = *reinterpret_cast<const CylinderChainBindingForce*>(object);
-    node.setIntProperty("forceGroup", force.getForceGroup());
-    node.setStringProperty("name", force.getName());
+static void write(const CylinderChainBindingForce& force, SerializationNode& node) {
     node.setDoubleProperty("temperature", force.getTemperature()).setIntProperty("randomSeed",
             force.getRandomNumberSeed()).setBoolProperty("usesPeriodic", force.usesPeriodicBoundaryConditions());
     SerializationNode& hands = node.createChildNode("Hands");
@@ -52,12 +43,8 @@ void CylinderChainBindingForceProxy::serialize(const void* object, Serialization
     storeLinkers(force.getState()).write(node.createChildNode("Linkers"));
 }
 
-void* CylinderChainBindingForceProxy::deserialize(const SerializationNode& node) const {
-    if (node.getIntProperty("version") != 2)
-        throw OpenMMException("Unsupported version number");
+static unique_ptr<CylinderChainBindingForce> readBindingForce(const SerializationNode& node) {
     unique_ptr<CylinderChainBindingForce> force(new CylinderChainBindingForce(node.getDoubleProperty("temperature")));
-    force->setForceGroup(node.getIntProperty("forceGroup"));
-    force->setName(node.getStringProperty("name"));
     force->setRandomNumberSeed(node.getIntProperty("randomSeed"));
     force->setUsesPeriodicBoundaryConditions(node.getBoolProperty("usesPeriodic"));
     for (auto& hand : node.getChildNode("Hands").getChildren()) {
@@ -91,5 +78,7 @@ void* CylinderChainBindingForceProxy::deserialize(const SerializationNode& node)
     const LinkerColumns linkers(restoreLinkers(StateColumns::read(node.getChildNode("Linkers"))));
     force->setLinkers(linkers.numbers, linkers.types, linkers.anchors, linkers.chains, linkers.places,
             linkers.nextNumber);
-    return force.release();
+    return force;
 }
+
+static const bool isBindingForceRegistered = registerProxy<CylinderChainBindingForce>("CylinderChainBindingForce", 2, write, readBindingForce);

@@ -1,20 +1,11 @@
-#include "openmm/serialization/CylinderChainContactForceProxy.h"
 #include "openmm/CylinderChainContactForce.h"
-#include "openmm/OpenMMException.h"
-#include "openmm/serialization/SerializationNode.h"
+#include "openmm/serialization/ObjectProxy.h"
 #include <memory>
 
 using namespace OpenMM;
 using namespace std;
 
-CylinderChainContactForceProxy::CylinderChainContactForceProxy() : SerializationProxy("CylinderChainContactForce") {
-}
-
-void CylinderChainContactForceProxy::serialize(const void* object, SerializationNode& node) const {
-    node.setIntProperty("version", 1);
-    const CylinderChainContactForce& force = *reinterpret_cast<const CylinderChainContactForce*>(object);
-    node.setIntProperty("forceGroup", force.getForceGroup());
-    node.setStringProperty("name", force.getName());
+static void write(const CylinderChainContactForce& force, SerializationNode& node) {
     node.setBoolProperty("usesPeriodic", force.usesPeriodicBoundaryConditions());
     node.setDoubleProperty("stiffness", force.getStiffness());
     SerializationNode& chains = node.createChildNode("Chains");
@@ -40,12 +31,8 @@ void CylinderChainContactForceProxy::serialize(const void* object, Serialization
     }
 }
 
-void* CylinderChainContactForceProxy::deserialize(const SerializationNode& node) const {
-    if (node.getIntProperty("version") != 1)
-        throw OpenMMException("Unsupported version number");
+static unique_ptr<CylinderChainContactForce> readContactForce(const SerializationNode& node) {
     unique_ptr<CylinderChainContactForce> force(new CylinderChainContactForce(node.getDoubleProperty("stiffness")));
-    force->setForceGroup(node.getIntProperty("forceGroup"));
-    force->setName(node.getStringProperty("name"));
     force->setUsesPeriodicBoundaryConditions(node.getBoolProperty("usesPeriodic"));
     for (auto& chain : node.getChildNode("Chains").getChildren()) {
         vector<int> particles;
@@ -59,5 +46,7 @@ void* CylinderChainContactForceProxy::deserialize(const SerializationNode& node)
     for (auto& exclusion : node.getChildNode("Exclusions").getChildren())
         force->addExclusion(exclusion.getIntProperty("chain1"), exclusion.getIntProperty("segment1"),
                 exclusion.getIntProperty("chain2"), exclusion.getIntProperty("segment2"));
-    return force.release();
+    return force;
 }
+
+static const bool isContactForceRegistered = registerProxy<CylinderChainContactForce>("CylinderChainContactForce", 1, write, readContactForce);

@@ -1,18 +1,11 @@
-#include "openmm/serialization/CylinderChainForceProxy.h"
 #include "openmm/CylinderChainForce.h"
 #include "openmm/OpenMMException.h"
-#include "openmm/serialization/SerializationNode.h"
+#include "openmm/serialization/ObjectProxy.h"
 #include <memory>
 
 using namespace OpenMM;
 using namespace cylchain;
 using namespace std;
-
-/** Of what is written; none but this is read. */
-static const int VERSION = 9;
-
-CylinderChainForceProxy::CylinderChainForceProxy() : SerializationProxy("CylinderChainForce") {
-}
 
 static void writeParticles(SerializationNode& chain, const vector<int>& indices) {
     SerializationNode& particles = chain.createChildNode("Particles");
@@ -64,11 +57,7 @@ static int addBeamChain(CylinderChainForce& force, const SerializationNode& node
     return chain;
 }
 
-void CylinderChainForceProxy::serialize(const void* object, SerializationNode& node) const {
-    const CylinderChainForce& force = *reinterpret_cast<const CylinderChainForce*>(object);
-    node.setIntProperty("version", VERSION);
-    node.setIntProperty("forceGroup", force.getForceGroup());
-    node.setStringProperty("name", force.getName());
+static void write(const CylinderChainForce& force, SerializationNode& node) {
     node.setBoolProperty("usesPeriodic", force.usesPeriodicBoundaryConditions());
     SerializationNode& chains = node.createChildNode("Chains");
     const ChainList& list = force.getChains();
@@ -132,12 +121,8 @@ static int addChain(CylinderChainForce& force, const SerializationNode& node) {
     return chain;
 }
 
-void* CylinderChainForceProxy::deserialize(const SerializationNode& node) const {
-    if (node.getIntProperty("version") != VERSION)
-        throw OpenMMException("Unsupported version number");
+static unique_ptr<CylinderChainForce> readForce(const SerializationNode& node) {
     unique_ptr<CylinderChainForce> force(new CylinderChainForce());
-    force->setForceGroup(node.getIntProperty("forceGroup"));
-    force->setName(node.getStringProperty("name"));
     force->setUsesPeriodicBoundaryConditions(node.getBoolProperty("usesPeriodic"));
     for (auto& chain : node.getChildNode("Chains").getChildren()) {
         const int number = chain.getName() == "BeamChain" ? addBeamChain(*force, chain) : addChain(*force, chain);
@@ -148,5 +133,7 @@ void* CylinderChainForceProxy::deserialize(const SerializationNode& node) const 
         force->addTether(tether.getIntProperty("chain"), tether.getIntProperty("node"),
                 Vec3(tether.getDoubleProperty("x"), tether.getDoubleProperty("y"), tether.getDoubleProperty("z")),
                 tether.getDoubleProperty("stiffness"));
-    return force.release();
+    return force;
 }
+
+static const bool isForceRegistered = registerProxy<CylinderChainForce>("CylinderChainForce", 9, write, readForce);

@@ -1,7 +1,5 @@
-#include "openmm/serialization/CylinderChainIntegratorProxy.h"
 #include "openmm/CylinderChainIntegrator.h"
-#include "openmm/OpenMMException.h"
-#include "openmm/serialization/SerializationNode.h"
+#include "openmm/serialization/ObjectProxy.h"
 #include <memory>
 #include <string>
 
@@ -18,12 +16,7 @@ static Vec3 readVector(const SerializationNode& node, const string& name) {
     return {child.getDoubleProperty("x"), child.getDoubleProperty("y"), child.getDoubleProperty("z")};
 }
 
-CylinderChainIntegratorProxy::CylinderChainIntegratorProxy() : SerializationProxy("CylinderChainIntegrator") {
-}
-
-void CylinderChainIntegratorProxy::serialize(const void* object, SerializationNode& node) const {
-    node.setIntProperty("version", 3);
-    const CylinderChainIntegrator& integrator = *reinterpret_cast<const CylinderChainIntegrator*>(object);
+static void write(const CylinderChainIntegrator& integrator, SerializationNode& node) {
     node.setDoubleProperty("stepSize", integrator.getStepSize());
     node.setDoubleProperty("constraintTolerance", integrator.getConstraintTolerance());
     node.setDoubleProperty("temperature", integrator.getTemperature());
@@ -32,7 +25,7 @@ void CylinderChainIntegratorProxy::serialize(const void* object, SerializationNo
     node.setIntProperty("precision", integrator.getPrecision());
     node.setIntProperty("pathLevel", integrator.getPathLevel());
     node.setIntProperty("workWindow", integrator.getWorkWindow());
-    node.setIntProperty("recordsTensions", integrator.getRecordsTensions());
+    node.setBoolProperty("recordsTensions", integrator.getRecordsTensions());
     node.setIntProperty("randomSeed", integrator.getRandomNumberSeed());
     node.setIntProperty("integrationForceGroups", integrator.getIntegrationForceGroups());
     Vec3 velocity, gradientX, gradientY, gradientZ, origin;
@@ -49,27 +42,23 @@ void CylinderChainIntegratorProxy::serialize(const void* object, SerializationNo
                 .setDoubleProperty("friction", entry.second);
 }
 
-void* CylinderChainIntegratorProxy::deserialize(const SerializationNode& node) const {
-    const int version = node.getIntProperty("version");
-    if (version < 1 || version > 3)
-        throw OpenMMException("Unsupported version number");
+static unique_ptr<CylinderChainIntegrator> readIntegrator(const SerializationNode& node) {
     unique_ptr<CylinderChainIntegrator> integrator(new CylinderChainIntegrator(node.getDoubleProperty("temperature"),
             node.getDoubleProperty("friction"), node.getDoubleProperty("stepSize")));
     integrator->setConstraintTolerance(node.getDoubleProperty("constraintTolerance"));
     integrator->setScheme((CylinderChainIntegrator::Scheme) node.getIntProperty("scheme"));
-    integrator->setPrecision((CylinderChainIntegrator::Precision) node.getIntProperty("precision",
-            CylinderChainIntegrator::Automatic));
+    integrator->setPrecision((CylinderChainIntegrator::Precision) node.getIntProperty("precision"));
     integrator->setRandomNumberSeed(node.getIntProperty("randomSeed"));
-    integrator->setPathLevel(node.getIntProperty("pathLevel", 0));
-    integrator->setWorkWindow(node.getIntProperty("workWindow", 0));
-    integrator->setRecordsTensions(node.getIntProperty("recordsTensions", 0) != 0);
+    integrator->setPathLevel(node.getIntProperty("pathLevel"));
+    integrator->setWorkWindow(node.getIntProperty("workWindow"));
+    integrator->setRecordsTensions(node.getBoolProperty("recordsTensions"));
     integrator->setIntegrationForceGroups(node.getIntProperty("integrationForceGroups"));
-    if (version > 1) {
-        const SerializationNode& flow = node.getChildNode("Flow");
-        integrator->setFlow(readVector(flow, "Velocity"), readVector(flow, "GradientX"), readVector(flow, "GradientY"),
-                readVector(flow, "GradientZ"), readVector(flow, "Origin"));
-    }
+    const SerializationNode& flow = node.getChildNode("Flow");
+    integrator->setFlow(readVector(flow, "Velocity"), readVector(flow, "GradientX"), readVector(flow, "GradientY"),
+            readVector(flow, "GradientZ"), readVector(flow, "Origin"));
     for (auto& particle : node.getChildNode("ParticleFrictions").getChildren())
         integrator->setParticleFriction(particle.getIntProperty("index"), particle.getDoubleProperty("friction"));
-    return integrator.release();
+    return integrator;
 }
+
+static const bool isIntegratorRegistered = registerProxy<CylinderChainIntegrator>("CylinderChainIntegrator", 4, write, readIntegrator);

@@ -1,22 +1,13 @@
-#include "openmm/serialization/CylinderChainLinkForceProxy.h"
 #include "openmm/CylinderChainLinkForce.h"
-#include "openmm/OpenMMException.h"
 #include "openmm/internal/LinkDescription.h"
-#include "openmm/serialization/SerializationNode.h"
+#include "openmm/serialization/ObjectProxy.h"
 #include <memory>
 
 using namespace OpenMM;
 using namespace std;
 
-CylinderChainLinkForceProxy::CylinderChainLinkForceProxy() : SerializationProxy("CylinderChainLinkForce") {
-}
-
-void CylinderChainLinkForceProxy::serialize(const void* object, SerializationNode& node) const {
-    const CylinderChainLinkForce& force = *reinterpret_cast<const CylinderChainLinkForce*>(object);
-    node.setIntProperty("version", 3);
+static void write(const CylinderChainLinkForce& force, SerializationNode& node) {
     node.setBoolProperty("joinsTangents", force.getJoinsTangents());
-    node.setIntProperty("forceGroup", force.getForceGroup());
-    node.setStringProperty("name", force.getName());
     node.setBoolProperty("usesPeriodic", force.usesPeriodicBoundaryConditions());
     int model;
     double restLength, stiffness, maximumExtension;
@@ -26,13 +17,9 @@ void CylinderChainLinkForceProxy::serialize(const void* object, SerializationNod
     storeTable(force.getTable()).write(node.createChildNode("Links"));
 }
 
-void* CylinderChainLinkForceProxy::deserialize(const SerializationNode& node) const {
-    if (node.getIntProperty("version") != 3)
-        throw OpenMMException("Unsupported version number");
+static unique_ptr<CylinderChainLinkForce> readLinkForce(const SerializationNode& node) {
     unique_ptr<CylinderChainLinkForce> force(new CylinderChainLinkForce());
     force->setJoinsTangents(node.getBoolProperty("joinsTangents"));
-    force->setForceGroup(node.getIntProperty("forceGroup"));
-    force->setName(node.getStringProperty("name"));
     force->setUsesPeriodicBoundaryConditions(node.getBoolProperty("usesPeriodic"));
     const SerializationNode& defaults = node.getChildNode("Defaults");
     force->setDefaultLinkParameters(
@@ -40,5 +27,7 @@ void* CylinderChainLinkForceProxy::deserialize(const SerializationNode& node) co
             defaults.getDoubleProperty("restLength"), defaults.getDoubleProperty("stiffness"),
             defaults.getDoubleProperty("maximumExtension"));
     force->setTable(restoreTable(StateColumns::read(node.getChildNode("Links"))));
-    return force.release();
+    return force;
 }
+
+static const bool isLinkForceRegistered = registerProxy<CylinderChainLinkForce>("CylinderChainLinkForce", 3, write, readLinkForce);

@@ -5,7 +5,7 @@
 #include "kinetics/Linkers.h"
 #include "openmm/CylinderChainBindingForce.h"
 #include "openmm/Kernel.h"
-#include "openmm/internal/CouplingForceImpl.h"
+#include "openmm/internal/SpringForceImpl.h"
 #include <cstdint>
 #include <map>
 #include <string>
@@ -23,7 +23,7 @@ class CylinderChainIntegrator;
  * there is nothing to go on with.  A State that holds no parameters leaves the digest alone, but sets time and step
  * count.
  */
-class CylinderChainBindingForceImpl : public CouplingForceImpl {
+class CylinderChainBindingForceImpl : public SpringForceImpl {
 public:
     explicit CylinderChainBindingForceImpl(const CylinderChainBindingForce& owner);
     void initialize(ContextImpl& context);
@@ -55,16 +55,11 @@ public:
     int getOrder() const {
         return 1;
     }
-    bool hasForces() {
-        return !getLinks().empty();
-    }
-    cylchain::ImplicitCouplings* getEquations(ContextImpl& context);
     std::string getStateName() const {
         return "linkers";
     }
     StateColumns storeState(bool inCheckpoint);
     void restoreState(const StateColumns& columns);
-    std::string describeFailure(const cylchain::BrokenCoupling& coupling, const std::string& other);
 private:
     void follow() const;
     void accept();
@@ -82,8 +77,7 @@ private:
     const CylinderChainIntegrator* findIntegrator() const;
     double getTemperature() const;
     const CylinderChainBindingForce& owner;
-    ContextImpl* context;
-    Kernel linkerKernel, linkKernel;
+    Kernel linkerKernel;
     std::string parameter;
     cylchain::LinkerState state;
     cylchain::LinkerSystem system;
@@ -91,7 +85,7 @@ private:
     std::vector<cylchain::Link> links;
     std::uint32_t seed;
     int number;
-    bool upToDate, nearestParticles, wasExcluded;
+    bool upToDate, wasExcluded;
     // Before the last step of the linkers, unless they were given since.
     bool hasStepped;
     double timeBefore, stepSize;

@@ -3,8 +3,7 @@
 
 #include "couplings/LinkTable.h"
 #include "openmm/CylinderChainLinkForce.h"
-#include "openmm/Kernel.h"
-#include "openmm/internal/CouplingForceImpl.h"
+#include "openmm/internal/SpringForceImpl.h"
 #include <map>
 #include <memory>
 #include <string>
@@ -18,7 +17,7 @@ namespace OpenMM {
  * Which they are is said by a parameter of the Context, the digest of their table.  Where that has changed, because the
  * Context has got a State or a checkpoint, the links follow as soon as they are looked at.
  */
-class CylinderChainLinkForceImpl : public CouplingForceImpl {
+class CylinderChainLinkForceImpl : public SpringForceImpl {
 public:
     explicit CylinderChainLinkForceImpl(const CylinderChainLinkForce& owner);
     void initialize(ContextImpl& context);
@@ -27,7 +26,6 @@ public:
     }
     double calcForcesAndEnergy(ContextImpl& context, bool includeForces, bool includeEnergy, int groups);
     std::map<std::string, double> getDefaultParameters();
-    std::vector<std::string> getKernelNames();
     /**
      * Get the links of the Context that are switched on, in the order of their numbers.  Places at virtual sites
      * between two particles are those between these particles, and those between the nodes of a beam element are on its
@@ -42,16 +40,11 @@ public:
     int getOrder() const {
         return 0;
     }
-    bool hasForces() {
-        return !getLinks().empty();
-    }
-    cylchain::ImplicitCouplings* getEquations(ContextImpl& context);
     std::string getStateName() const {
         return "links";
     }
     StateColumns storeState(bool inCheckpoint);
     void restoreState(const StateColumns& columns);
-    std::string describeFailure(const cylchain::BrokenCoupling& coupling, const std::string& other);
     /**
      * Get all links of the Context as they were described.  An exception is thrown if they are not known.
      */
@@ -77,9 +70,7 @@ private:
     void accept(const cylchain::LinkChange& change);
     void reportLink(int index);
     const CylinderChainLinkForce& owner;
-    ContextImpl* context;
     std::unique_ptr<PlaceResolver> places;
-    Kernel kernel;
     std::string parameter;
     cylchain::LinkHistory history;
     std::vector<cylchain::Link> links;
@@ -87,7 +78,6 @@ private:
 
     bool upToDate;
     long long version;
-    bool nearestParticles;
 };
 
 } // namespace OpenMM

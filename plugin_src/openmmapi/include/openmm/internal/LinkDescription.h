@@ -2,8 +2,6 @@
 #define OPENMM_LINKDESCRIPTION_H_
 
 #include "couplings/LinkTable.h"
-#include "dynamics/BrokenCoupling.h"
-#include "openmm/internal/ContextImpl.h"
 #include "openmm/internal/PlaceResolver.h"
 #include "openmm/internal/StateColumns.h"
 #include <cstddef>
@@ -66,16 +64,6 @@ cylchain::LinkTable restoreTable(const StateColumns& columns);
  * Describe the places that a link joins: "between particles 3 and 5".
  */
 std::string describePlaces(const cylchain::Link& link);
-
-/**
- * Describe how an implicit step has gone wrong by a link: see CouplingForceImpl::describeFailure().
- *
- * @param links             those of the step
- * @param periodic          whether the places of a link are taken as their nearest images
- * @param nearestParticles  whether the two particles of a place are
- */
-std::string describeBrokenLink(const cylchain::BrokenCoupling& coupling, const std::string& other,
-        const std::vector<cylchain::Link>& links, ContextImpl& context, bool periodic, bool nearestParticles);
 
 /**
  * The change that adds links to a table.
