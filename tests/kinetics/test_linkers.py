@@ -307,9 +307,9 @@ def test_runs_go_on_from_checkpoints_and_states_to_the_bit():
 def test_checkpoints_of_systems_without_linkers_are_refused():
     _, bare = network([])
     _, context = network()
-    with pytest.raises(openmm.OpenMMException, match="linkers of 0 CylinderChainBindingForces, but the System has 1"):
+    with pytest.raises(openmm.OpenMMException, match="linkers of 0 Forces, but the System has 1"):
         context.loadCheckpoint(bare.createCheckpoint())
-    with pytest.raises(openmm.OpenMMException, match="linkers of 1 CylinderChainBindingForces, but the System has 0"):
+    with pytest.raises(openmm.OpenMMException, match="linkers of 1 Forces, but the System has 0"):
         bare.loadCheckpoint(context.createCheckpoint())
 
 
