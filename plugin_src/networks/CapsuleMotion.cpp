@@ -98,3 +98,15 @@ void CapsuleMotion::follow(const function<bool(int)>& takesPart, const double* m
     }
     exceeds = all.first+all.second > reach;
 }
+
+int cylchain::findFastest(const vector<Capsule>& capsules, const double* begun, const double* moved) {
+    auto motionOf = [&] (const Capsule& capsule) {
+        double square = 0;
+        for (int k = 3*capsule.first; k < 3*capsule.first+3; k++)
+            square += (moved[k]-begun[k])*(moved[k]-begun[k]);
+        return square;
+    };
+    return max_element(capsules.begin(), capsules.end(), [&] (const Capsule& one, const Capsule& other) {
+        return motionOf(one) < motionOf(other);
+    })-capsules.begin();
+}

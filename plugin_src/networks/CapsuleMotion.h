@@ -76,6 +76,9 @@ private:
     bool exceeds = false;
 };
 
+/** The capsule whose first particle has moved most, from three doubles for each to others. */
+int findFastest(const std::vector<Capsule>& capsules, const double* begun, const double* moved);
+
 } // namespace cylchain
 
 #endif /*CYLCHAIN_CAPSULE_MOTION_H_*/

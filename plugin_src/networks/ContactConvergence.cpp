@@ -250,20 +250,6 @@ void ContactEquations::findFailures(const double* moved, vector<bool>& failed) {
                     failed[places[capsule].place.chain] = true;
 }
 
-/** The capsule whose first particle has moved most. */
-int ContactEquations::findFastest(const double* moved) const {
-    const vector<Capsule>& capsules = search->getSystem().capsules;
-    auto motionOf = [&] (const Capsule& capsule) {
-        double square = 0;
-        for (int k = 3*capsule.first; k < 3*capsule.first+3; k++)
-            square += (moved[k]-begun[k])*(moved[k]-begun[k]);
-        return square;
-    };
-    return max_element(capsules.begin(), capsules.end(), [&] (const Capsule& one, const Capsule& other) {
-        return motionOf(one) < motionOf(other);
-    })-capsules.begin();
-}
-
 bool ContactEquations::findCulprit(const double* moved, const CouplingEquation* equations,
         BrokenCoupling& culprit) const {
     // The chain itself is known.
@@ -271,7 +257,7 @@ bool ContactEquations::findCulprit(const double* moved, const CouplingEquation* 
         return false;
     if (movesTooFar) {
         culprit.reason = BrokenCoupling::LeavesBox;
-        culprit.places[0] = describePlace(places[findFastest(moved)].place);
+        culprit.places[0] = describePlace(places[findFastest(search->getSystem().capsules, begun, moved)].place);
         return true;
     }
     for (int i = 0; i < pairs.getNumPairs(); i++)

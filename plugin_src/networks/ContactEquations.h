@@ -111,7 +111,6 @@ private:
     void findNear(int firstNew, int run, Part& part);
     bool anyCross();
     void findCrossed(bool all, int run, Part& part) const;
-    int findFastest(const double* moved) const;
     PlaceOnChain placeOf(int capsule, double fraction) const;
     ContactSearch* search = nullptr;
     double stiffness = 0;

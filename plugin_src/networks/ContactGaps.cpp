@@ -457,20 +457,6 @@ void ContactGaps::findCrossed() {
         crossed.insert(crossed.end(), parts[chunk].pairs.begin(), parts[chunk].pairs.end());
 }
 
-/** The capsule whose first particle has moved most. */
-int ContactGaps::findFastest(const double* moved) const {
-    const vector<Capsule>& capsules = search->getSystem().capsules;
-    auto motionOf = [&] (const Capsule& capsule) {
-        double square = 0;
-        for (int k = 3*capsule.first; k < 3*capsule.first+3; k++)
-            square += (moved[k]-begun[k])*(moved[k]-begun[k]);
-        return square;
-    };
-    return max_element(capsules.begin(), capsules.end(), [&] (const Capsule& one, const Capsule& other) {
-        return motionOf(one) < motionOf(other);
-    })-capsules.begin();
-}
-
 bool ContactGaps::findCulprit(const double* moved, const CouplingEquation*, BrokenCoupling& culprit) const {
     // The chain itself is known.
     if (isEndless)
@@ -481,7 +467,7 @@ bool ContactGaps::findCulprit(const double* moved, const CouplingEquation*, Brok
     };
     if (movesTooFar) {
         culprit.reason = BrokenCoupling::LeavesBox;
-        culprit.places[0] = describePlace(places[findFastest(moved)].place);
+        culprit.places[0] = describePlace(places[findFastest(search->getSystem().capsules, begun, moved)].place);
         return true;
     }
     if (!crossed.empty()) {

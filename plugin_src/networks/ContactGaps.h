@@ -106,7 +106,6 @@ private:
     bool isHeld(const ContactPair& pair) const {
         return places[pair.a].place.pack < 0 && places[pair.b].place.pack < 0;
     }
-    int findFastest(const double* moved) const;
     PlaceOnChain placeOf(int capsule, double fraction) const;
     /** Those of steps that do not resolve contacts. */
     ContactEquations hard;

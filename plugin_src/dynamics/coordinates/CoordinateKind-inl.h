@@ -71,7 +71,7 @@ struct OnSegments : CoordinateDefaults {
     }
 };
 
-/** Coordinates of the joint between the segments s-1 and s. The last two segments of a ring that is unrolled have one. */
+/** Coordinates of the joint between segments s-1 and s. The last two segments of a ring that is unrolled have one. */
 struct OnJoints : CoordinateDefaults {
     static CYLCHAIN_INLINE bool isAt(const Pack& pack, int s) {
         return s > 0 && s < pack.nodes-1;

@@ -2,12 +2,12 @@
 
 /**
  * The coordinates of chains: q of one to three nodes that lie next to each other, each with the energy
- * k q^2/2. What takes a step asks all kinds of coordinates for the same. It knows none of them but lengths, whose tensions
+ * k q^2/2. What takes a step asks all kinds of these for the same. It knows none of them but lengths, whose tensions
  * are unknowns of its equations.
  *
- * A kind of coordinates is a struct in a file of its own, whose static functions have the names of those below; one that
+ * A kind of coordinates is a struct in its own file, whose static functions have the names of those below; one that
  * lacks a function does not compile. It is on nodes, on segments or on joints: see CoordinateKind-inl.h, which also has
- * what most kinds do not need. What an implicit step keeps of coordinates is in ImplicitState-inl.h. Forces between chains
+ * what most kinds do not need. What an implicit step keeps of them is in ImplicitState-inl.h. Forces between chains
  * are no coordinates but couplings: see ImplicitCouplings.h.
  */
 

@@ -56,7 +56,8 @@ static void require(bool condition, const string& message) {
 }
 
 CylinderChainBindingForceImpl::CylinderChainBindingForceImpl(const CylinderChainBindingForce& owner) :
-        SpringForceImpl(owner), owner(owner), seed(0), number(0), upToDate(false), wasExcluded(false), hasStepped(false), timeBefore(0), stepSize(0), countBefore(0) {
+        SpringForceImpl(owner), owner(owner), seed(0), number(0), upToDate(false), wasExcluded(false),
+        hasStepped(false), timeBefore(0), stepSize(0), countBefore(0) {
 }
 
 void CylinderChainBindingForceImpl::initialize(ContextImpl& context) {

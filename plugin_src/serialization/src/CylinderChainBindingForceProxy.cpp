@@ -81,4 +81,5 @@ static unique_ptr<CylinderChainBindingForce> readBindingForce(const Serializatio
     return force;
 }
 
-static const bool isBindingForceRegistered = registerProxy<CylinderChainBindingForce>("CylinderChainBindingForce", 2, write, readBindingForce);
+static const bool isBindingForceRegistered =
+        registerProxy<CylinderChainBindingForce>("CylinderChainBindingForce", 2, write, readBindingForce);

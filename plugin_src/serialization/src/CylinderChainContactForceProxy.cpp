@@ -49,4 +49,5 @@ static unique_ptr<CylinderChainContactForce> readContactForce(const Serializatio
     return force;
 }
 
-static const bool isContactForceRegistered = registerProxy<CylinderChainContactForce>("CylinderChainContactForce", 1, write, readContactForce);
+static const bool isContactForceRegistered =
+        registerProxy<CylinderChainContactForce>("CylinderChainContactForce", 1, write, readContactForce);

@@ -136,4 +136,5 @@ static unique_ptr<CylinderChainForce> readForce(const SerializationNode& node) {
     return force;
 }
 
-static const bool isForceRegistered = registerProxy<CylinderChainForce>("CylinderChainForce", 9, write, readForce);
+static const bool isForceRegistered =
+        registerProxy<CylinderChainForce>("CylinderChainForce", 9, write, readForce);

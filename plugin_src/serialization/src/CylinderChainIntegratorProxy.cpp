@@ -61,4 +61,5 @@ static unique_ptr<CylinderChainIntegrator> readIntegrator(const SerializationNod
     return integrator;
 }
 
-static const bool isIntegratorRegistered = registerProxy<CylinderChainIntegrator>("CylinderChainIntegrator", 4, write, readIntegrator);
+static const bool isIntegratorRegistered =
+        registerProxy<CylinderChainIntegrator>("CylinderChainIntegrator", 4, write, readIntegrator);

@@ -13,7 +13,8 @@ static void write(const CylinderChainLinkForce& force, SerializationNode& node) 
     double restLength, stiffness, maximumExtension;
     force.getDefaultLinkParameters(model, restLength, stiffness, maximumExtension);
     node.createChildNode("Defaults").setIntProperty("stretchingModel", model)
-            .setDoubleProperty("restLength", restLength).setDoubleProperty("stiffness", stiffness).setDoubleProperty("maximumExtension", maximumExtension);
+            .setDoubleProperty("restLength", restLength).setDoubleProperty("stiffness", stiffness)
+            .setDoubleProperty("maximumExtension", maximumExtension);
     storeTable(force.getTable()).write(node.createChildNode("Links"));
 }
 
@@ -30,4 +31,5 @@ static unique_ptr<CylinderChainLinkForce> readLinkForce(const SerializationNode&
     return force;
 }
 
-static const bool isLinkForceRegistered = registerProxy<CylinderChainLinkForce>("CylinderChainLinkForce", 3, write, readLinkForce);
+static const bool isLinkForceRegistered =
+        registerProxy<CylinderChainLinkForce>("CylinderChainLinkForce", 3, write, readLinkForce);

@@ -38,4 +38,5 @@ static unique_ptr<CylinderChainWallForce> readWallForce(const SerializationNode&
     return force;
 }
 
-static const bool isWallForceRegistered = registerProxy<CylinderChainWallForce>("CylinderChainWallForce", 1, write, readWallForce);
+static const bool isWallForceRegistered =
+        registerProxy<CylinderChainWallForce>("CylinderChainWallForce", 1, write, readWallForce);
