@@ -92,13 +92,14 @@ def course(filaments, simulation):
 
 interval = max(1, steps // FRAMES)
 filaments, simulation = disc("hold")
+here = filaments.in_context(simulation.context)
 with open(folder / "aster.cif", "w") as file:
     positions = simulation.context.getState(positions=True).getPositions()
     app.PDBxFile.writeFile(simulation.topology, positions, file, keepIds=True)
 simulation.reporters.append(app.DCDReporter(str(folder / "aster.dcd"), interval))
 held = course(filaments, simulation)
 divided = simulation.integrator.getNumDividedSteps() / (FILAMENTS * steps)
-table, pulls = filaments.linkers_in(simulation.context), filaments.linker_pulls(simulation.context)
+table, pulls = here.linkers(), here.linker_pulls()
 joining = table.held == 2
 at_ends = np.sum(table.arc_lengths[joining] >= SEGMENTS * SEGMENT_LENGTH - 1e-3) / max(1, 2 * joining.sum())
 released = course(*disc("release"))

@@ -116,7 +116,7 @@ def course(filaments, simulation):
     for _ in range(steps // interval):
         simulation.step(interval)
         lengths.append(length(filaments, current(simulation)))
-        table = filaments.linkers_in(simulation.context)
+        table = filaments.in_context(simulation.context).linkers()
         bound.append((table.counts(0)[2], table.counts(1)[2]))
     return np.array(lengths), np.array(bound)
 
@@ -124,6 +124,7 @@ def course(filaments, simulation):
 interval = max(1, steps // FRAMES)
 start = relaxed()
 filaments, simulation = bundle(0.5, start)
+here = filaments.in_context(simulation.context)
 first = current(simulation)
 with open(folder / "bundle.cif", "w") as file:
     app.PDBxFile.writeFile(simulation.topology, start, file, keepIds=True)
@@ -142,8 +143,8 @@ grid = figure.add_gridspec(3, 2, height_ratios=(1, 1, 2.6))
 panels = [figure.add_subplot(grid[0, :]), figure.add_subplot(grid[1, :])]
 plot, numbers = figure.add_subplot(grid[2, 0]), figure.add_subplot(grid[2, 1])
 colours = ("#c0392b", "#1f6f8b")
-last, table = current(simulation), filaments.linkers_in(simulation.context)
-pulls = filaments.linker_pulls(simulation.context)
+last, table = current(simulation), here.linkers()
+pulls = here.linker_pulls()
 kinds = table.types[np.searchsorted(table.numbers, pulls.numbers)]
 for axes, shape, title in zip(panels, (first, last), ("At first", f"After {time[-1]:.3g} s")):
     for number, own in enumerate(filaments.node_indices):

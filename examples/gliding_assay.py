@@ -59,6 +59,7 @@ topology, system, positions = filaments.build(box_vectors=box)
 integrator = filaments.create_integrator(system, STEP, random_seed=1, checks=False)
 simulation = app.Simulation(topology, system, integrator, openmm.Platform.getPlatformByName("CPU"))
 context = simulation.context
+here = filaments.in_context(context)
 context.setPositions(positions)
 with open(folder / "assay.cif", "w") as file:
     app.PDBxFile.writeFile(topology, positions, file, keepIds=True)
@@ -70,7 +71,7 @@ frames, holding = [], []
 for _ in range(steps // interval):
     simulation.step(interval)
     frames.append(context.getState(positions=True).getPositions(asNumpy=True).value_in_unit(unit.nanometer)[nodes])
-    holding.append(filaments.linkers_in(context).counts()[2])
+    holding.append(here.linkers().counts()[2])
 frames = np.array(frames)[..., :2]
 divided = integrator.getNumDividedSteps() / (FILAMENTS * steps)
 
@@ -97,7 +98,7 @@ def wrapped(path):
 
 
 plane.plot(*anchors[:, :2].T / 1000, ".", color="0.8", markersize=1.5, zorder=0)
-pulls = filaments.linker_pulls(context)
+pulls = here.linker_pulls()
 plane.plot(*np.mod(pulls.places[:, 0, :2], BOX).T / 1000, ".", color="#e67e22", markersize=4, zorder=3)
 for number in range(FILAMENTS):
     trace = frames[:, number].mean(axis=1)

@@ -80,6 +80,7 @@ def current(simulation):
 
 def course(filaments, simulation, upper):
     """Stress in Pa and the number of linkers that join filaments after each interval, and places before the shear."""
+    here = filaments.in_context(simulation.context)
     tethers, points = [one[0] for one in upper], np.array([one[3] for one in upper])
     particles = [filaments.node_indices[number][node] for _, number, node, _ in upper]
     stresses, joining, before = [], [], None
@@ -88,14 +89,14 @@ def course(filaments, simulation, upper):
         if share == 0:
             before = current(simulation)
         moved = points + [STRAIN * THICKNESS * share, 0, 0]
-        filaments.move_tethers(simulation.context, tethers, moved)
+        here.move_tethers(tethers, moved)
         forces = []
         for _ in range(10):
             simulation.step(interval // 10)
             forces.append(np.sum(moved[:, 0] - current(simulation)[particles, 0]) * TETHER)
         # 1 pN/um^2 is 1 Pa.
         stresses.append(np.mean(forces) / PICONEWTON / (WIDTH * DEPTH * 1e-6))
-        joining.append(filaments.linkers_in(simulation.context).counts()[2])
+        joining.append(here.linkers().counts()[2])
     return np.array(stresses), np.array(joining), before
 
 

@@ -66,6 +66,7 @@ topology, system, positions = filaments.build()
 integrator = filaments.create_integrator(system, STEP, random_seed=1, checks=False)
 simulation = app.Simulation(topology, system, integrator, openmm.Platform.getPlatformByName("CPU"))
 context = simulation.context
+here = filaments.in_context(context)
 context.setPositions(positions)
 with open(folder / "sliding.cif", "w") as file:
     app.PDBxFile.writeFile(topology, positions, file, keepIds=True)
@@ -78,7 +79,7 @@ for _ in range(steps // interval):
     simulation.step(interval)
     now = context.getState(positions=True).getPositions(asNumpy=True).value_in_unit(unit.micrometer)
     frames.append(now[nodes])
-    joining.append(filaments.linkers_in(context).counts()[2])
+    joining.append(here.linkers().counts()[2])
 frames = np.array(frames)
 divided = integrator.getNumDividedSteps() / (len(filaments) * steps)
 
@@ -98,7 +99,7 @@ figure, ((before, after), (panel, detail)) = plt.subplots(
     2, 2, figsize=(12, 8.4), height_ratios=(1.4, 1), layout="constrained"
 )
 colours = ("#c0392b", "#1f6f8b")
-pulls = filaments.linker_pulls(context)
+pulls = here.linker_pulls()
 for axes, shape, title in ((before, frames[0], "Before"), (after, frames[-1], f"After {time[-1]:.3g} s")):
     for own in shape:
         right = bool(own[-1, 0] > own[0, 0])

@@ -52,6 +52,7 @@ from .mechanics.friction import EndCorrections, SegmentFriction, stokes_friction
 from .output.reporters import CrosslinkReporter, FilamentReporter, LinkerReporter, TensionReporter, TetherReporter
 from .output.structure_files import write_lammps_data, write_psf
 from .systems.filaments import Filaments
+from .systems.filaments_in_context import FilamentsInContext
 from .systems.periodic import make_trajectory_whole, make_whole, remove_jumps
 from .systems.run_reporter import RunReporter
 from .systems.step_check import check_time_step
@@ -97,6 +98,7 @@ __all__ = [
     "JointWarning",
     "LinkerWarning",
     "Filaments",
+    "FilamentsInContext",
     "Flow",
     "InputError",
     "InstabilityError",

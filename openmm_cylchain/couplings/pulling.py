@@ -227,12 +227,12 @@ class ConstantVelocityPulling(FilamentsReporter):
         return self._start + self._velocity * max(0.0, time - self._start_time)
 
     def _points(self, context):
-        tethers = self._filaments.tethers_in(context)
+        tethers = self._filaments.in_context(context).tethers()
         return np.array([tethers[number].point for number in self._tethers])
 
     def _move(self, context, points):
         if not np.array_equal(points, self._points(context)):
-            self._filaments.move_tethers(context, self._tethers, points)
+            self._filaments.in_context(context).move_tethers(self._tethers, points)
 
     def _table(self, simulation, state):
         positions = state.getPositions(asNumpy=True)._value

@@ -203,7 +203,7 @@ def _refuse_unless_implicit(scheme):
     if scheme not in (SCHEMES[name] for name in IMPLICIT_SCHEMES):
         raise InputError(
             "Mean tensions belong to the implicit schemes: the explicit schemes have those of the configuration alone "
-            "(Filaments.joint_tensions)."
+            "(FilamentsInContext.joint_tensions)."
         )
 
 
@@ -401,8 +401,8 @@ class NativeIntegrator(CylinderChainIntegrator):
     def setRecordsTensions(self, records):
         """Set whether mean tensions are recorded, in the last step of each call of ``step``.
 
-        ``Filaments.mean_joint_tensions`` and ``mean_tensions`` return them. The last step takes about a third longer
-        then.
+        ``mean_joint_tensions`` and ``mean_tensions`` of a FilamentsInContext return them. The last step takes about a
+        third longer then.
 
         Raises
         ------

@@ -97,7 +97,7 @@ class PortableEngine(Engine):
         """Refused: only the implicit schemes solve for tensions."""
         raise InputError(
             "Mean tensions belong to the implicit schemes of the compiled engine: the portable engine has those of the "
-            "configuration alone (Filaments.joint_tensions)."
+            "configuration alone (FilamentsInContext.joint_tensions)."
         )
 
 

@@ -68,7 +68,7 @@ def filament_tensions(
     forces: FloatArray,
     flow: Flow | None = None,
 ) -> list[FloatArray]:
-    """Virtual forces Phi at the joints of all filaments, see ``Filaments.joint_tensions``.
+    """Virtual forces Phi at the joints of all filaments, see ``FilamentsInContext.joint_tensions``.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def axial_tensions(nodes: FloatArray, virtual_forces: FloatArray, closed: bool =
     """Components (joints,) of virtual forces (joints, 3) along a chain with nodes (n, 3), positive under tension.
 
     The direction at a joint is that of the sum of the unit vectors along its two segments. Forces are in the order of
-    ``Filaments.joint_tensions``.
+    ``FilamentsInContext.joint_tensions``.
     """
     tangents = segment_vectors(nodes, closed)
     tangents /= np.linalg.norm(tangents, axis=1)[:, None]

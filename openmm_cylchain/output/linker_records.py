@@ -1,11 +1,11 @@
 """What linkers do at a report: numbers and tensions of each type, and where each one is, in a file that grows."""
 
 from pathlib import Path
-from typing import Any, Protocol
 
 import numpy as np
 import openmm
 
+from ..filaments.collection import FilamentCollection
 from .record_file import RecordFile
 
 LINKER_COLUMNS = (
@@ -34,24 +34,12 @@ LINKER_RECORD = np.dtype(
 """Of a linker with a hand that is bound: as in LinkerTable; places in nm, tension in kJ/(mol nm), both NaN if none."""
 
 
-class LinkedFilaments(Protocol):
-    """What is seen of a Filaments object, whose docstrings say what is what."""
-
-    @property
-    def linkers(self) -> tuple[Any, ...]: ...
-
-    def linkers_in(self, context: openmm.Context) -> Any: ...
-
-    def linker_places(self, context: openmm.Context) -> Any: ...
-
-    def linker_events(self, context: openmm.Context, linker_type: int | None = None) -> tuple[int, int]: ...
-
-
 def measure_linkers(
-    filaments: LinkedFilaments, context: openmm.Context, step: int
+    filaments: FilamentCollection, context: openmm.Context, step: int
 ) -> tuple[list[tuple[float, ...]], np.ndarray]:
     """Rows of LINKER_COLUMNS, one for each type, and an array of LINKER_RECORD of linkers with a hand that is bound."""
-    table, places = filaments.linkers_in(context), filaments.linker_places(context)._value
+    here = filaments.in_context(context)
+    table, places = here.linkers(), here.linker_places()._value
     lengths = np.linalg.norm(places[:, 1] - places[:, 0], axis=1)
     kinds = [own.kind for own in filaments.linkers]
     stiffness, rest = np.array([(kind.stiffness, kind.rest_length) for kind in kinds])[table.types].T
@@ -60,7 +48,7 @@ def measure_linkers(
     for number in range(len(kinds)):
         pulling = tensions[(table.types == number) & ~np.isnan(tensions)]
         mean, largest = (pulling.mean(), pulling.max()) if len(pulling) else (np.nan, np.nan)
-        rows.append((*table.counts(number), float(mean), float(largest), *filaments.linker_events(context, number)))
+        rows.append((*table.counts(number), float(mean), float(largest), *here.linker_events(number)))
     bound = table.bound.any(axis=1)
     records = np.zeros(int(bound.sum()), dtype=LINKER_RECORD)
     records["step"] = step

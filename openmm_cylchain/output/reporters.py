@@ -25,14 +25,10 @@ from ..mechanics.tension import axial_tensions, filament_tensions
 from ..units.quantities import whole_number
 from ..units.types import FloatArray, IntArray
 from .files import TextFile
-from .linker_records import LINKER_COLUMNS, LinkedFilaments, LinkerFile, measure_linkers
+from .linker_records import LINKER_COLUMNS, LinkerFile, measure_linkers
 
 if TYPE_CHECKING:
     from openmm import app
-
-
-class LinkedFilamentCollection(FilamentCollection, LinkedFilaments, Protocol):
-    """What a LinkerReporter sees of a Filaments object."""
 
 
 class MeasuredCrosslinks(Protocol):
@@ -192,8 +188,8 @@ class TensionReporter(FilamentsReporter):
     """Reports the tension in filaments: the component of the virtual force Phi of a joint along the chain.
 
     Phi, eqs. (22)-(24), is the force that the segment after a joint exerts on the one before it, of all forces but the
-    random ones; see ``Filaments.joint_tensions``. The direction of the chain at a joint is that of the sum of the unit
-    vectors along its two segments. Tension is positive, compression negative.
+    random ones; see ``FilamentsInContext.joint_tensions``. The direction of the chain at a joint is that of the sum of
+    the unit vectors along its two segments. Tension is positive, compression negative.
 
     Columns: ``mean_tension``, ``minimum_tension`` and ``maximum_tension`` over the joints of a filament, or with
     ``joints=True`` a line for each joint with ``tension``, all in kJ/(mol nm); 1 pN is 0.602214 of these. Filaments of
@@ -212,9 +208,10 @@ class TensionReporter(FilamentsReporter):
     joints : bool
         Report every joint rather than every filament.
     mean : bool
-        Report tensions as means over the last step, with friction and noise (``Filaments.mean_axial_tensions``), which
-        scheme "implicit" of the compiled engine has; the integrator records them then. By default, they are
-        instantaneous ones without noise, of the configuration. ``mean_tension`` is the mean over joints in both cases.
+        Report tensions as means over the last step, with friction and noise
+        (``FilamentsInContext.mean_axial_tensions``), which scheme "implicit" of the compiled engine has; the integrator
+        records them then. By default, they are instantaneous ones without noise, of the configuration. ``mean_tension``
+        is the mean over joints in both cases.
 
     Raises
     ------
@@ -257,7 +254,7 @@ class TensionReporter(FilamentsReporter):
 
     def describeNextReport(self, simulation: "app.Simulation") -> dict[str, Any]:  # noqa: N802 - OpenMM's name
         if self._mean:
-            self._filaments.record_tensions(simulation.context)
+            self._filaments.in_context(simulation.context).record_tensions()
         return super().describeNextReport(simulation)
 
     def _table(self, simulation, state):
@@ -268,13 +265,15 @@ class TensionReporter(FilamentsReporter):
         return labels, [(tension.mean(), tension.min(), tension.max()) for tension in tensions]
 
     def _means(self, simulation):
-        return [part._value for part in self._filaments.mean_axial_tensions(simulation.context) if len(part)]
+        return [
+            part._value for part in self._filaments.in_context(simulation.context).mean_axial_tensions() if len(part)
+        ]
 
     def _present(self, simulation, state):
         if self._chains is None:
             self._chains = self._filaments.chain_set(simulation.system)
         positions, forces = (values._value for values in (state.getPositions(True), state.getForces(True)))
-        flow = self._filaments.flow(simulation.context)
+        flow = self._filaments.in_context(simulation.context).flow()
         virtual = filament_tensions(self._filaments, self._nodes, self._chains, positions, forces, flow)
         return [
             axial_tensions(positions[nodes], phi, filament.closed)
@@ -291,7 +290,8 @@ class TetherReporter(FilamentsReporter):
     """Reports where every tether's point and node are, and the force of the tether on its node, -k (x - point).
 
     Columns: ``point_x``, ``point_y``, ``point_z``, ``extension_x``, ``extension_y``, ``extension_z`` (x - point) in nm,
-    ``force_x``, ``force_y``, ``force_z`` in kJ/(mol nm). Points and stiffnesses are those of ``Filaments.move_tether``.
+    ``force_x``, ``force_y``, ``force_z`` in kJ/(mol nm). Points and stiffnesses are those of
+    ``FilamentsInContext.tethers``.
 
     Parameters
     ----------
@@ -318,7 +318,7 @@ class TetherReporter(FilamentsReporter):
     def _table(self, simulation, state):
         positions = state.getPositions(asNumpy=True)._value
         rows = []
-        for tether in self._filaments.tethers_in(simulation.context):
+        for tether in self._filaments.in_context(simulation.context).tethers():
             extension = positions[self._nodes[tether.filament][tether.node]] - tether.point
             rows.append((*tether.point, *extension, *(-tether.stiffness * extension)))
         return range(len(rows)), rows
@@ -437,7 +437,7 @@ class LinkerReporter(FilamentsReporter):
         self,
         file: TextFile | None,
         reportInterval: int,  # noqa: N803 - OpenMM's name
-        filaments: LinkedFilamentCollection,
+        filaments: FilamentCollection,
         append: bool = False,
         places: str | Path | None = None,
     ) -> None:

@@ -66,7 +66,7 @@ class MovingTethers:
     def move(self, context, step):
         """Put the points where they are from a step on."""
         if len(self):
-            self._filaments.move_tethers(context, self._tethers, self._points_at(step))
+            self._filaments.in_context(context).move_tethers(self._tethers, self._points_at(step))
 
     def rows(self, step, positions):
         """Lines of PULLING_TABLE_COLUMNS without the step, for positions (particles, 3) in nm.

@@ -10,12 +10,13 @@ from openmm import unit
 from ..couplings.periodicity import is_periodic
 from ..couplings.stiff_joints import warn_of_stiff_joints
 from ..engine_choice import default_scheme
-from ..engines.description import filament_label
+from ..engines.description import describe_chains, filament_label
 from ..engines.protocol import IntegratorSettings
 from ..errors import InputError
 from ..filaments.attachments import add_virtual_site, attachment_positions, neighbors
 from ..filaments.beam_refusals import refuse_beams
 from ..mechanics.flow import Flow, as_flow
+from ..mechanics.redistribution import ChainSet
 from ..time_steps.bead_spring_step import refuse_modes
 from ..time_steps.coupled_forces import CoupledForces
 from ..time_steps.precision import check_precision, refuse_mixed_precision_of_beams
@@ -25,7 +26,7 @@ from ..time_steps.step_warnings import warn_of_long_step
 from ..time_steps.time_step import TimeStep, as_step
 from ..units.quantities import TEMPERATURE, non_negative
 from ..units.types import BoxVectors, Numbers, Scalar, Vectors
-from .filaments_in_contexts import FilamentsInContexts
+from .filaments_in_context import FilamentsInContext
 from .insertion import (
     add_nodes_to_system,
     add_noninteracting_entries,
@@ -35,12 +36,13 @@ from .insertion import (
     set_box_vectors,
 )
 from .periodic_forces import warn_of_forces_without_images
+from .tied_filaments import TiedFilaments
 
 if TYPE_CHECKING:
     from openmm import app
 
 
-class Filaments(FilamentsInContexts):
+class Filaments(TiedFilaments):
     """Filaments in a solvent, to be added to an OpenMM System.
 
     Parameters
@@ -348,6 +350,28 @@ class Filaments(FilamentsInContexts):
             warn_of_stiff_joints(system, self)
         settings = IntegratorSettings(step_size, scheme, bath, particle_friction, random_seed, flow, checks, precision)
         return self._engine.create_integrator(system, self._placed(), settings)
+
+    def in_context(self, context: openmm.Context) -> FilamentsInContext:
+        """The filaments in a Context of their System, to ask for what they have there, and to change it.
+
+        Parameters
+        ----------
+        context : openmm.Context
+            Of the System that these filaments were put into.
+
+        Returns
+        -------
+        FilamentsInContext
+        """
+        return FilamentsInContext(self._placed(), self._engine, context, self._moved_tethers.setdefault(context, {}))
+
+    def chain_set(self, system: openmm.System) -> ChainSet:
+        """The filaments as an engine sees them (a ``ChainSet``): friction of segments and fixed nodes.
+
+        Raises InputError for beam elements, which are no such chains.
+        """
+        refuse_beams(self, "properties of a ChainSet")
+        return describe_chains(system, self._placed())
 
     def _bath(self, temperature):
         return self._temperature if temperature is None else non_negative(temperature, TEMPERATURE, "temperature")

@@ -298,7 +298,8 @@ class _Run:
     def state(self):
         # What a run can begin with: positions, the box, and linkers.
         state = self.context.getState(positions=True)
-        linkers = None if find_binding_force(self._system) is None else self._filaments.linkers_in(self.context)
+        has_linkers = find_binding_force(self._system) is not None
+        linkers = self._filaments.in_context(self.context).linkers() if has_linkers else None
         return state.getPositions(asNumpy=True), state.getPeriodicBoxVectors(), linkers
 
     def begin(self, state):
@@ -306,7 +307,7 @@ class _Run:
         self.context.setPeriodicBoxVectors(*box)
         self.context.setPositions(positions)
         if linkers is not None:
-            self._filaments.set_linkers(self.context, linkers)
+            self._filaments.in_context(self.context).set_linkers(linkers)
         self._before = None
 
     def look(self, probe):

@@ -16,7 +16,6 @@ from ..filaments.filament import Filament
 from ..kinetics.binding_force import find_binding_force
 from ..units.quantities import thermal_energy
 from ..units.types import FloatArray, IntArray, Scalar
-from .filaments_in_contexts import FilamentsInContexts
 
 STEPS_PER_FRAME = 10
 """Steps h between two looks at both runs."""
@@ -58,7 +57,7 @@ def _kinds(filaments):
 class Probe:
     """What is looked at in a Context: names, units, and values of one frame."""
 
-    def __init__(self, filaments: FilamentsInContexts, system: openmm.System, temperature: Scalar) -> None:
+    def __init__(self, filaments: FilamentCollection, system: openmm.System, temperature: Scalar) -> None:
         self._temperature, self._kT = temperature, thermal_energy(temperature)
         self._filaments = filaments
         self.kinds = _kinds(filaments)
@@ -131,7 +130,7 @@ class Probe:
             if self._filaments.tethers:
                 values.append(self._tether_energy(positions))
             if self._has_linkers:
-                values.append(np.array([float(self._filaments.linkers_in(context).bound.sum())]))
+                values.append(np.array([float(self._filaments.in_context(context).linkers().bound.sum())]))
         return values + self.energies(context), after
 
     def energies(self, context: openmm.Context) -> list[FloatArray]:

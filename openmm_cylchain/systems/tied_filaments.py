@@ -34,7 +34,7 @@ class TiedFilaments(AddedFilaments):
 
     @property
     def tethers(self) -> tuple[Tether, ...]:
-        """Tuple of the tethers, in the order of their numbers, as they were added; see ``tethers_in``."""
+        """Tuple of the tethers as they were added, in order of their numbers; see ``FilamentsInContext.tethers``."""
         return tuple(self._tethers)
 
     @property
@@ -74,7 +74,7 @@ class TiedFilaments(AddedFilaments):
         Returns
         -------
         int
-            The tether's number, for ``move_tether``.
+            The tether's number, for ``FilamentsInContext.move_tether``.
 
         Raises
         ------
@@ -205,7 +205,7 @@ class TiedFilaments(AddedFilaments):
         While they are not bound, they are anywhere: a linker binds its first hand with the rate
         ``binding_rate/(2 reach) v/V`` for each length of filament, where V is the volume in which unbound linkers are
         and v = (4 pi/3) R^3 with the reach R (of hands that differ, the geometric mean of both v). How many there are
-        of them, and where they are bound, belongs to each Context: ``linkers_in``.
+        of them, and where they are bound, belongs to each Context: ``FilamentsInContext.linkers``.
 
         In every step, filaments stand still while linkers bind and unbind as long as the step takes; then filaments
         move, with the springs of linkers in their equations if the scheme is implicit.

@@ -134,7 +134,7 @@ class Bundle:
 
     def linkers(self):
         """The linkers now, a LinkerTable."""
-        return self.filaments.linkers_in(self.context)
+        return self.filaments.in_context(self.context).linkers()
 
     def length(self):
         """How long the bundle is, in nm: 12^(1/2) times the standard deviation of x of segments.
@@ -168,7 +168,7 @@ class Bundle:
             tangents = vectors / lengths[:, None]
             energies["stretching"] += float(ACTIN.stretching_energy(lengths).sum())
             energies["bending"] += float(ACTIN.bending_energy(np.sum(tangents[1:] * tangents[:-1], axis=1)).sum())
-        pulls, table = self.filaments.linker_pulls(self.context), self.linkers()
+        pulls, table = self.filaments.in_context(self.context).linker_pulls(), self.linkers()
         types = table.types[np.searchsorted(table.numbers, pulls.numbers)]
         for number, linkers in enumerate(self.filaments.linkers):
             extensions = pulls.lengths[types == number] - linkers.kind.rest_length
@@ -240,7 +240,7 @@ def create_bundle(system, step, seed=1, positions=None, table=None, linkers=True
     nodes = drawn._value if positions is None else positions
     context = systems.one_thread_context(openmm_system, integrator, nodes)
     if table is not None:
-        filaments.set_linkers(context, table)
+        filaments.in_context(context).set_linkers(table)
     return Bundle(system, filaments, context)
 
 

@@ -77,7 +77,7 @@ class Network:
 
     def springs(self, linker_type):
         """The pairs of places that linkers of a type join: a list of pairs of SegmentPlaces."""
-        table = self.filaments.linkers_in(self.context)
+        table = self.filaments.in_context(self.context).linkers()
         joining = (table.held == 2) & (table.types == linker_type)
         return [
             [self.filaments.segment_place(number, arc_length=along) for number, along in zip(*own)]

@@ -69,7 +69,7 @@ def test_tensions_are_the_pulls_of_bonds():
     # Cylinders beside them change nothing.
     filaments.add_straight(F_ACTIN, 3, [0, 900, 0], [1, 0, 0])
     context, _ = context_of(filaments, "implicit", 0.01)
-    tensions = filaments.joint_tensions(context)[0]._value
+    tensions = filaments.in_context(context).joint_tensions()[0]._value
     nodes = positions_of(context)[:7]
     vectors = np.diff(nodes, axis=0)
     lengths = np.linalg.norm(vectors, axis=1)

@@ -242,7 +242,7 @@ def test_joints_of_a_pulled_chain_carry_the_force():
     samples = []
     for _ in range(1500):
         integrator.step(1)
-        samples.append([tensions._value for tensions in filaments.mean_joint_tensions(context)])
+        samples.append([tensions._value for tensions in filaments.in_context(context).mean_joint_tensions()])
     by_chain = np.mean(samples, axis=0)[:, :, 0]
     error = by_chain.std(axis=0, ddof=1) / np.sqrt(count)
     assert np.all(SIGMAS * error < 0.1 * force)

@@ -187,7 +187,7 @@ def test_benchmark_of_kinetics(monkeypatch, tmp_path, capsys):
 def test_springs_of_many_linkers_are_those_of_their_network():
     networks, joined = many_linkers.linked_networks(FEW)
     with_linkers, with_springs = networks["with_linkers"], networks["with_springs"]
-    table = with_linkers.filaments.linkers_in(with_linkers.context)
+    table = with_linkers.filaments.in_context(with_linkers.context).linkers()
     assert joined == table.counts()[2] > 20
     assert table.counts()[0] == 0
     energies = []

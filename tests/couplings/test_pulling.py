@@ -200,7 +200,9 @@ def test_the_motion_of_a_tether_is_recorded(engine, tmp_path):
     points = np.array([[300, 0, 0], [0, 1000, 0]]) + velocity * np.maximum(0, pulling.time - 80)[:, None, None]
     for index, axis in enumerate("xyz"):
         assert pulling[f"point_{axis}"] == pytest.approx(points[..., index])
-    assert filaments.tethers_in(simulation.context)[0].point == pytest.approx(points[0, 0] + 160 * velocity[0])
+    assert filaments.in_context(simulation.context).tethers()[0].point == pytest.approx(
+        points[0, 0] + 160 * velocity[0]
+    )
     nodes = np.array([[x[3], x[4]] for x in seen[1:]])
     directions = velocity / np.linalg.norm(velocity, axis=1)[:, None]
     stiffness = np.array([0.5, 0.25])
@@ -361,6 +363,7 @@ def test_bad_input_is_refused():
         with pytest.raises(InputError, match=message):
             constant_tension(filaments, *arguments)
     context = new_context(system, positions)
+    here = filaments.in_context(context)
     with pytest.raises(InputError, match="must be one that constant_force or constant_tension has made"):
         change_constant_force(system.getForce(0), context, [1, 0, 0])
     for arguments, message in (
@@ -387,5 +390,5 @@ def test_bad_input_is_refused():
         (([0], [[0, 0, np.nan]]), "points must be finite"),
     ):
         with pytest.raises(InputError, match=message):
-            filaments.move_tethers(context, *arguments)
-    assert [tether.point for tether in filaments.tethers_in(context)] == [(0, 0, 0), (0, 0, 0)]
+            here.move_tethers(*arguments)
+    assert [tether.point for tether in here.tethers()] == [(0, 0, 0), (0, 0, 0)]

@@ -38,12 +38,13 @@ def test_energy_and_force_of_a_tether_that_is_moved(engine):
     tether = filaments.add_tether(0, -1, [1.08, 0.01, 0] * unit.micrometer, 0.5 * unit.piconewton / unit.nanometer)
     stiffness = 0.5 * 0.602214076
     context = _context(filaments, 1.0, scheme="midpoint")
+    here = filaments.in_context(context)
     assert energy_of(context) == pytest.approx(0.5 * stiffness * 100, rel=1e-6)
     forces = forces_of(context)
     assert forces[3] == pytest.approx([0, 10 * stiffness, 0], rel=1e-6, abs=1e-6)
-    filaments.move_tether(context, tether, [1080, 0, -3])
+    here.move_tether(tether, [1080, 0, -3])
     assert energy_of(context) == pytest.approx(0.5 * stiffness * 9, rel=1e-6)
-    filaments.move_tether(context, tether, [1080, 0, -3], 2 * stiffness)
+    here.move_tether(tether, [1080, 0, -3], 2 * stiffness)
     assert energy_of(context) == pytest.approx(stiffness * 9, rel=1e-6)
 
 
@@ -96,21 +97,23 @@ def test_contexts_of_one_system_have_tethers_of_their_own(engine):
         context = openmm.Context(system, openmm.VerletIntegrator(1), openmm.Platform.getPlatform("Reference"))
         context.setPositions(positions)
         contexts.append(context)
+    first, second = (filaments.in_context(context) for context in contexts)
     rest = energy_of(contexts[0])
-    filaments.move_tether(contexts[0], 0, [0, 3, 0])
-    filaments.move_tether(contexts[1], 1, [1080, 4, 0], 2 * STIFFNESS)
+    first.move_tether(0, [0, 3, 0])
+    second.move_tether(1, [1080, 4, 0], 2 * STIFFNESS)
     assert energy_of(contexts[0]) - rest == pytest.approx(0.5 * STIFFNESS * 9)
     assert energy_of(contexts[1]) - rest == pytest.approx(STIFFNESS * 16)
-    filaments.move_tether(contexts[0], 1, [1080, 1, 0])
+    first.move_tether(1, [1080, 1, 0])
     assert energy_of(contexts[0]) - rest == pytest.approx(0.5 * STIFFNESS * 10)
-    assert [tether.point for tether in filaments.tethers_in(contexts[0])] == [(0, 3, 0), (1080, 1, 0)]
-    assert [tether.point for tether in filaments.tethers_in(contexts[1])] == [(0, 0, 0), (1080, 4, 0)]
-    assert [tether.stiffness for tether in filaments.tethers_in(contexts[1])] == [STIFFNESS, 2 * STIFFNESS]
+    assert [tether.point for tether in first.tethers()] == [(0, 3, 0), (1080, 1, 0)]
+    assert [tether.point for tether in second.tethers()] == [(0, 0, 0), (1080, 4, 0)]
+    assert filaments.in_context(contexts[1]).tethers() == second.tethers()
+    assert [tether.stiffness for tether in second.tethers()] == [STIFFNESS, 2 * STIFFNESS]
     # A new Context begins as the filaments were described.
     fresh = openmm.Context(system, openmm.VerletIntegrator(1), openmm.Platform.getPlatform("Reference"))
     fresh.setPositions(positions)
     assert energy_of(fresh) == pytest.approx(rest, abs=1e-9)
-    assert filaments.tethers_in(fresh) == filaments.tethers
+    assert filaments.in_context(fresh).tethers() == filaments.tethers
 
 
 @pytest.mark.parametrize("step", [0.1, 5, 40])
@@ -157,7 +160,7 @@ def test_a_moving_trap_drags_a_filament_with_a_lag_of_friction_over_stiffness():
     step, speed = 0.005 * MICROSECOND, 1e-5
     context = _context(filaments, step, scheme="implicit", temperature=0)
     for index in range(1, 401):
-        filaments.move_tether(context, 0, [speed * step * (index - 0.5), 0, 0])
+        filaments.in_context(context).move_tether(0, [speed * step * (index - 0.5), 0, 0])
         context.getIntegrator().step(1)
     node = positions_of(context)[0]
     friction = 3 * F_ACTIN.segment_friction(VISCOSITY, TEMPERATURE, 3).parallel
@@ -183,4 +186,4 @@ def test_bad_tethers_are_refused():
     with pytest.raises(InputError, match="Tether 1 comes too late"):
         filaments.add_tether(0, 1, [0, 0, 0], 1)
     with pytest.raises(InputError, match="Tether 1 does not exist; there are 1"):
-        filaments.move_tether(context, 1, [0, 0, 0])
+        filaments.in_context(context).move_tether(1, [0, 0, 0])

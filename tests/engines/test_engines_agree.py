@@ -59,7 +59,7 @@ def _trajectory(engine, platform, scheme, steps=100):
         system, 200.0, scheme=scheme, temperature=0, particle_friction=friction, random_seed=1
     )
     context = new_context(system, positions, integrator, platform)
-    tensions = np.concatenate([tension._value for tension in filaments.joint_tensions(context)])
+    tensions = np.concatenate([tension._value for tension in filaments.in_context(context).joint_tensions()])
     energy = energy_of(context)
     integrator.step(steps)
     return positions_of(context) - positions._value, tensions, energy
@@ -99,7 +99,7 @@ def _chains_of_beads(engine, platform, scheme):
     _, system, positions = filaments.build()
     integrator = filaments.create_integrator(system, 100.0, scheme=scheme, temperature=0, flow=FLOW, checks=False)
     context = new_context(system, positions, integrator, platform)
-    tensions = np.concatenate([tension._value for tension in filaments.joint_tensions(context)])
+    tensions = np.concatenate([tension._value for tension in filaments.in_context(context).joint_tensions()])
     energy, forces, start = energy_of(context), forces_of(context), positions_of(context)
     integrator.step(1)
     velocities = (positions_of(context) - start) / 100.0

@@ -323,7 +323,7 @@ def test_moved_tethers_hold_filaments_elsewhere(gpu, work_items):
         contexts.append(context)
         integrator.step(5)
         if len(contexts) < 3:
-            filaments.move_tether(context, 0, [300.0, 100.0, -50.0], 4e-3)
+            filaments.in_context(context).move_tether(0, [300.0, 100.0, -50.0], 4e-3)
         integrator.step(5)
         ends.append(positions_of(context))
     assert np.abs(ends[1] - ends[0]).max() < TOLERANCES["double"]
@@ -438,9 +438,10 @@ def test_linkers_bind_walk_and_pull_at_explicit_steps(gpu):
     tables, ends, energies = [], [], []
     for platform, precision in (("Reference", None), (gpu, "double")):
         filaments, context = _linked_context(platform, precision)
-        start = filaments.linkers_in(context)
+        here = filaments.in_context(context)
+        start = here.linkers()
         context.getIntegrator().step(100)
-        tables.append(filaments.linkers_in(context))
+        tables.append(here.linkers())
         ends.append(positions_of(context))
         energies.append(energy_of(context))
     assert tables[0].counts()[2] > 20 and start.counts()[2] == 0
@@ -458,7 +459,7 @@ def test_linkers_continue_from_checkpoints(gpu):
     ends = []
     for _ in range(2):
         integrator.step(40)
-        ends.append((positions_of(context), filaments.linkers_in(context)))
+        ends.append((positions_of(context), filaments.in_context(context).linkers()))
         context.loadCheckpoint(checkpoint)
     assert ends[0][1].counts()[2] > 20
     assert np.array_equal(ends[0][0], ends[1][0])

@@ -303,10 +303,11 @@ def test_what_filaments_of_beam_elements_cannot_have():
             filaments.create_integrator(system, 1.0, scheme)
     integrator = filaments.create_integrator(system, filaments.recommended_time_step())
     context = new_context(system, positions, integrator)
+    here = filaments.in_context(context)
     for ask in (
         lambda: filaments.chain_set(system),
-        lambda: filaments.joint_tensions(context),
-        lambda: filaments.record_tensions(context),
+        here.joint_tensions,
+        here.record_tensions,
     ):
         with pytest.raises(InputError, match="beam elements"):
             ask()

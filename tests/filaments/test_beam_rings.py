@@ -252,9 +252,10 @@ def test_motors_walk_around_a_ring():
     step = 2e-6 * SECOND
     integrator = filaments.create_integrator(system, step, random_seed=1, checks=False)
     context = new_context(system, positions, integrator)
-    before = filaments.linkers_in(context)
+    here = filaments.in_context(context)
+    before = here.linkers()
     integrator.step(300)
-    after = filaments.linkers_in(context)
+    after = here.linkers()
     length = 4 * LENGTH
     bound = before.bound & after.bound
     assert np.count_nonzero(bound) >= 200

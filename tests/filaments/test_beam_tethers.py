@@ -37,13 +37,14 @@ def test_energy_and_forces_of_tethers_that_are_moved(platform):
     filaments = tethered({0: [3, 4, 0], -1: [3 * LENGTH, 0, 1]}, 0.2)
     _, system, positions = filaments.build()
     context = new_context(system, positions, platform=platform)
+    here = filaments.in_context(context)
     rest = 0.25 * 5.0**2
     free = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
     free.add_straight(BEAM, 3, [0, 0, 0], [1, 0, 0])
     of_beam = energy_of(new_context(free.build()[1], positions[3:]))
     assert energy_of(context) - of_beam == pytest.approx(rest + 0.1 * 25 + 0.1 * 1, rel=1e-9)
     before = forces_of(context)
-    filaments.move_tether(context, 1, [3, 4, 5], 0.4)
+    here.move_tether(1, [3, 4, 5], 0.4)
     node, control = filaments.node_indices[1][0], filaments.control_point_indices[1][0]
     assert energy_of(context) - of_beam == pytest.approx(rest + 0.2 * 50 + 0.1, rel=1e-9)
     change = forces_of(context) - before
@@ -52,7 +53,7 @@ def test_energy_and_forces_of_tethers_that_are_moved(platform):
     # A new Context begins as filaments were described, and the tether of the straight filament has stayed.
     fresh = new_context(system, positions, platform=platform)
     assert energy_of(fresh) - of_beam == pytest.approx(rest + 2.6, rel=1e-9)
-    assert [tether.stiffness for tether in filaments.tethers_in(context)] == [0.5, 0.4, 0.2]
+    assert [tether.stiffness for tether in here.tethers()] == [0.5, 0.4, 0.2]
 
 
 def test_copies_and_xml_keep_tethers():
@@ -223,5 +224,5 @@ def test_pulling_at_constant_velocity():
         simulation.currentStep += 10
         pulling.report(simulation, context.getState(positions=True, energy=True, enforcePeriodicBox=False))
     friction = 2 * BEAM.segment_friction(VISCOSITY, 0.0, 2).parallel
-    lag = filaments.tethers_in(context)[0].point[0] - positions_of(context)[filaments.node_indices[0][-1], 0]
+    lag = filaments.in_context(context).tethers()[0].point[0] - positions_of(context)[filaments.node_indices[0][-1], 0]
     assert lag == pytest.approx(friction * velocity / 0.1 + 0.5 * 10 * 1e5 * velocity, rel=0.01)

@@ -267,7 +267,7 @@ def test_joint_tensions_balance_every_segment(mixed_system):
     context = new_context(system, positions, filaments.create_integrator(system, 1.0, temperature=0))
     start = positions_of(context)
     forces = forces_of(context)
-    tensions = filaments.joint_tensions(context)
+    tensions = filaments.in_context(context).joint_tensions()
     assert [phi.shape for phi in tensions] == [(9, 3), (3, 3), (6, 3)]
     for number in (0, 2):
         filament, indices = filaments[number], filaments.node_indices[number]

@@ -53,13 +53,14 @@ def differ(first, second):
 
 @pytest.mark.parametrize("shape", ["open", "rings", "planar", "clamped", "single segments"])
 def test_forces_are_those_of_the_springs_on_all_kinds_of_filaments(shape):
-    """In a triclinic box, after steps: energy and forces on particles, from what linkers_in says of places."""
+    """In a triclinic box, after steps: energy and forces on particles, from what linkers() says of places."""
     filaments = shapes(shape)
     context = linked(filaments)
     context.getIntegrator().step(60)
     find_binding_force(context.getSystem()).setForceGroup(7)
     context.reinitialize(preserveState=True)
-    table, pulls = filaments.linkers_in(context), filaments.linker_pulls(context)
+    here = filaments.in_context(context)
+    table, pulls = here.linkers(), here.linker_pulls()
     assert len(pulls.numbers) > 5
     energy = 0.5 * SPRING.stiffness * np.sum((pulls.lengths - SPRING.rest_length) ** 2)
     assert energy_of(context, {7}) == pytest.approx(energy, rel=1e-9)
@@ -89,7 +90,7 @@ def test_random_numbers_are_those_of_the_integrator_of_a_context():
         # Filaments are where they were.
         context.getIntegrator().setTemperature(0.0)
         context.getIntegrator().step(5)
-    tables = [filaments.linkers_in(context) for context in contexts]
+    tables = [filaments.in_context(context).linkers() for context in contexts]
     assert differ(tables[0], tables[1]) and not differ(tables[0], tables[2])
 
 
@@ -102,6 +103,7 @@ def test_states_of_other_contexts_are_noticed():
     for seed in (1, 2):
         integrator = filaments.create_integrator(system, STEP, random_seed=seed, checks=False)
         contexts.append(new_context(system, positions, integrator))
+    first, second = (filaments.in_context(context) for context in contexts)
     contexts[0].setState(contexts[1].getState(positions=True, parameters=True))
     for context in contexts:
         context.getIntegrator().step(10)
@@ -109,27 +111,28 @@ def test_states_of_other_contexts_are_noticed():
     contexts[0].setState(state)
     with pytest.raises(InputError, match="of another Context, that does not say it"):
         contexts[0].getIntegrator().step(1)
-    filaments.set_linkers(contexts[0], filaments.linkers_in(contexts[1]))
+    first.set_linkers(second.linkers())
     contexts[0].getIntegrator().step(1)
     # One that says it.
     contexts[0].setState(contexts[1].getState(positions=True, parameters=True, integratorParameters=True))
-    assert not differ(filaments.linkers_in(contexts[0]), filaments.linkers_in(contexts[1]))
+    assert not differ(first.linkers(), second.linkers())
     contexts[0].getIntegrator().step(1)
 
 
 def test_numbers_that_are_used_up_are_given_anew():
     filaments = shapes("open")
     context = linked(filaments, concentration=1e-6)
+    here = filaments.in_context(context)
     context.getIntegrator().step(20)
-    table = filaments.linkers_in(context)
+    table = here.linkers()
     assert len(table) > 20
-    filaments.set_linkers(context, replace(table, next_number=2 * 10**9 + 1))
+    here.set_linkers(replace(table, next_number=2 * 10**9 + 1))
     with pytest.raises(openmm.OpenMMException, match="Two thousand million linkers have come out"):
         context.getIntegrator().step(1)
     numbers = np.arange(len(table))
-    filaments.set_linkers(context, replace(table, numbers=numbers, next_number=len(table)))
+    here.set_linkers(replace(table, numbers=numbers, next_number=len(table)))
     context.getIntegrator().step(1)
-    assert filaments.linkers_in(context).next_number >= len(table)
+    assert here.linkers().next_number >= len(table)
 
 
 @pytest.mark.slow
@@ -149,7 +152,7 @@ def test_a_hundred_thousand_come_out_of_a_concentration_in_a_step():
     expected = 2.0 * weight * 12 * 300.0 * passed
     assert expected > 1.5e5
     # A few of them bind with the other hand as well.
-    assert len(filaments.linkers_in(context)) == pytest.approx(expected, rel=0.01)
+    assert len(filaments.in_context(context).linkers()) == pytest.approx(expected, rel=0.01)
 
 
 def test_reaches_that_are_tiny_bind_hardly_anything():
@@ -157,7 +160,7 @@ def test_reaches_that_are_tiny_bind_hardly_anything():
     filaments = shapes("open")
     context = linked(filaments, kind)
     context.getIntegrator().step(20)
-    assert filaments.linkers_in(context).counts()[2] == 0
+    assert filaments.in_context(context).linkers().counts()[2] == 0
 
 
 @pytest.mark.parametrize("speed", [1e300, -1e300])
@@ -166,7 +169,7 @@ def test_hands_of_any_speed_come_to_an_end_or_an_error(speed):
     filaments = shapes("open")
     context = linked(filaments, replace(SPRING, hands=hand))
     context.getIntegrator().step(2)
-    table = filaments.linkers_in(context)
+    table = filaments.in_context(context).linkers()
     ends = table.arc_lengths[table.bound]
     assert np.isin(ends, [0.0, 300.0]).sum() >= 150
     context = linked(shapes("rings"), replace(SPRING, hands=hand))
@@ -184,15 +187,16 @@ def test_linkers_follow_any_integrator():
     rate = HAND.unbinding_rate
     integrator = openmm.LangevinMiddleIntegrator(TEMPERATURE * unit.kelvin, 1e-3 / unit.picosecond, 0.05 / rate)
     context = new_context(system, positions, integrator)
+    here = filaments.in_context(context)
     integrator.step(10)
     checkpoint = context.createCheckpoint()
     integrator.step(4)
-    left = filaments.linkers_in(context).counts()[1]
+    left = here.linkers().counts()[1]
     share = np.exp(-0.7)
     assert abs(left - 400 * share) < 4.0 * np.sqrt(400 * share * (1.0 - share))
     context.loadCheckpoint(checkpoint)
     with pytest.raises(InputError, match="not known"):
-        filaments.linkers_in(context)
+        here.linkers()
 
 
 @pytest.mark.parametrize("anchor", ["node", "virtual site"])
@@ -216,6 +220,6 @@ def test_recommended_steps_know_what_linkers_are_anchored_to(anchor):
     squares = []
     for _ in range(2000):
         integrator.step(5)
-        squares.append((float(filaments.linker_pulls(context).lengths[0]) - linker.rest_length) ** 2)
+        squares.append((float(filaments.in_context(context).linker_pulls().lengths[0]) - linker.rest_length) ** 2)
     # Springs of 10 pN/nm are near their rest length, where they fluctuate along one direction.
     assert linker.stiffness * np.mean(squares) == pytest.approx(KT, rel=0.3)

@@ -27,7 +27,8 @@ def begun(filaments, box=None):
     """The table and the springs of a Context in which nothing has happened yet."""
     _, system, positions = filaments.build(box_vectors=box)
     context = new_context(system, positions)
-    return filaments.linkers_in(context), filaments.linker_pulls(context)
+    here = filaments.in_context(context)
+    return here.linkers(), here.linker_pulls()
 
 
 @pytest.mark.parametrize("shift", [0.0, 1.0])

@@ -90,11 +90,11 @@ def test_linkers_pull_rods_together_as_their_free_energy_says(step, samples):
     filaments, system, positions = _pairs(copies, hand)
     integrator = filaments.create_integrator(system, step * relaxation, random_seed=4, checks=False)
     context = new_context(system, positions, integrator)
+    here = filaments.in_context(context)
     ends = np.tile(2 * np.arange(copies), (len(PLACES), 1)).T.ravel()
-    filaments.set_linkers(
-        context,
+    here.set_linkers(
         replace(
-            filaments.linkers_in(context),
+            here.linkers(),
             filaments=np.column_stack([ends, np.full(len(ends), -1)]),
             arc_lengths=np.column_stack([np.tile(PLACES, copies), np.zeros(len(ends))]),
         ),
@@ -105,7 +105,7 @@ def test_linkers_pull_rods_together_as_their_free_energy_says(step, samples):
     bound, heights = [], []
     for _ in range(samples):
         integrator.step(interval)
-        bound.append(filaments.linkers_in(context).bound[:, 1].sum() / copies)
+        bound.append(here.linkers().bound[:, 1].sum() / copies)
         middles = positions_of(context)[nodes].mean(axis=2)
         heights.append((middles[:, 1, 1] - middles[:, 0, 1]).mean())
     expected = _expected(hand.rate_per_length / hand.unbinding_rate)

@@ -207,7 +207,7 @@ def test_more_than_there_are_sites_is_refused():
     with pytest.raises(InputError, match="only 1800 sites"):
         network([(spring, {"count": 2000, "bound": 1801})])
     filaments, context = network([(spring, {"count": 2000, "bound": 1800})])
-    table = filaments.linkers_in(context)
+    table = filaments.in_context(context).linkers()
     sites = {
         (int(f), round(s / 8.0 - 0.5, 6)) for f, s in zip(table.filaments[:, 0], table.arc_lengths[:, 0]) if f >= 0
     }
@@ -247,7 +247,7 @@ def test_the_temperature_is_that_of_the_integrator():
         filaments, context = network([(SPRING, {"count": 800, "bound": 800})])
         context.getIntegrator().setTemperature(temperature)
         context.getIntegrator().step(10)
-        bound.append(filaments.linkers_in(context).counts()[2])
+        bound.append(filaments.in_context(context).linkers().counts()[2])
     assert bound[0] > 3 and bound[1] < 0.4 * bound[0]
 
 
@@ -266,7 +266,7 @@ def test_hands_bind_to_their_types_of_filaments():
     seen = np.zeros(2, dtype=int)
     for _ in range(20):
         context.getIntegrator().step(10)
-        table = filaments.linkers_in(context)
+        table = filaments.in_context(context).linkers()
         for side in (0, 1):
             on = table.filaments[table.bound[:, side], side]
             assert np.all(on % 2 == side)
@@ -277,12 +277,13 @@ def test_hands_bind_to_their_types_of_filaments():
 @pytest.mark.slow
 def test_linkers_out_of_a_concentration_come_and_go():
     filaments, context = network([(SPRING, {"concentration": 5e-8})])
-    table = filaments.linkers_in(context)
+    here = filaments.in_context(context)
+    table = here.linkers()
     assert len(table) == 0
     means = []
     for _ in range(220):
         context.getIntegrator().step(12)
-        table = filaments.linkers_in(context)
+        table = here.linkers()
         assert table.counts()[0] == 0 and np.all(np.diff(table.numbers) > 0)
         means.append(table.counts()[1])
     # Of two hands; few bind with the other one as well, which changes nothing of the first.
@@ -315,14 +316,15 @@ def test_checkpoints_of_systems_without_linkers_are_refused():
 
 def test_states_that_do_not_say_where_linkers_are_are_noticed():
     filaments, context = network()
+    here = filaments.in_context(context)
     context.getIntegrator().step(10)
     state = context.getState(positions=True, parameters=True)
-    table = filaments.linkers_in(context)
+    table = here.linkers()
     context.getIntegrator().step(10)
     context.setState(state)
     with pytest.raises(InputError, match="not known"):
         context.getIntegrator().step(1)
-    filaments.set_linkers(context, table)
+    here.set_linkers(table)
     context.getIntegrator().step(1)
 
 
@@ -334,26 +336,27 @@ def test_states_without_parameters_are_noticed(integrator_of):
     if integrator_of == "OpenMM's":
         context = new_context(system, positions_of(first), openmm.LangevinIntegrator(300.0, 1.0, 0.01))
     context.getIntegrator().step(10)
-    table, state = filaments.linkers_in(context), context.getState(positions=True, velocities=True)
+    table, state = filaments.in_context(context).linkers(), context.getState(positions=True, velocities=True)
     # At once: nothing has changed.
     context.setState(state)
     context.getIntegrator().step(10)
     context.setState(state)
-    with pytest.raises((InputError, openmm.OpenMMException), match="not known.*linkers_in"):
+    with pytest.raises((InputError, openmm.OpenMMException), match="not known.*linkers that it had before"):
         context.getIntegrator().step(1)
     with pytest.raises(InputError, match="not known"):
-        filaments.linkers_in(context)
-    filaments.set_linkers(context, table)
+        filaments.in_context(context).linkers()
+    filaments.in_context(context).set_linkers(table)
     context.getIntegrator().step(2)
     assert context.getStepCount() == 12
     # Given before the State comes.
-    filaments.set_linkers(context, table)
+    filaments.in_context(context).set_linkers(table)
     context.setState(state)
     context.getIntegrator().step(2)
 
 
 def test_clocks_that_are_set_alone_say_nothing_of_linkers():
     filaments, context = network()
+    here = filaments.in_context(context)
     context.getIntegrator().step(10)
     context.setTime(0.0)
     context.getIntegrator().step(1)
@@ -362,7 +365,7 @@ def test_clocks_that_are_set_alone_say_nothing_of_linkers():
     context.setPositions(positions_of(context))
     context.getIntegrator().step(1)
     # Both look like a State, unless linkers are given.
-    filaments.set_linkers(context, filaments.linkers_in(context))
+    here.set_linkers(here.linkers())
     context.setTime(0.0)
     context.setStepCount(0)
     context.getIntegrator().step(1)
@@ -374,16 +377,18 @@ def test_two_contexts_have_linkers_of_their_own():
     other = new_context(
         system, positions_of(context), filaments.create_integrator(system, 2e7, random_seed=6, checks=False)
     )
-    before = filaments.linkers_in(other)
+    here = filaments.in_context(other)
+    before = here.linkers()
     context.getIntegrator().step(20)
-    assert same_linkers(filaments.linkers_in(other), before)
+    assert same_linkers(here.linkers(), before)
     other.getIntegrator().step(20)
-    assert not same_linkers(filaments.linkers_in(other), filaments.linkers_in(context))
+    assert not same_linkers(here.linkers(), filaments.in_context(context).linkers())
 
 
 def test_tables_are_checked():
     filaments, context = network()
-    table = filaments.linkers_in(context)
+    here = filaments.in_context(context)
+    table = here.linkers()
     for changed, message in [
         ({"types": table.types + 1}, "illegal type"),
         ({"filaments": table.filaments + 100}, "does not bind"),
@@ -393,7 +398,7 @@ def test_tables_are_checked():
         ({"next_number": 3}, "next number"),
     ]:
         with pytest.raises(InputError, match=message):
-            filaments.set_linkers(context, replace(table, **changed))
+            here.set_linkers(replace(table, **changed))
     with pytest.raises(InputError, match="shape"):
         replace(table, filaments=table.filaments[:5])
     context.getIntegrator().step(1)
@@ -410,7 +415,7 @@ def test_threads_change_nothing(threads):
     for number in ("1", threads):
         filaments, context = network(linkers, platform="CPU", properties={"Threads": number})
         context.getIntegrator().step(60)
-        results.append((filaments.linkers_in(context), positions_of(context)))
+        results.append((filaments.in_context(context).linkers(), positions_of(context)))
     assert same_linkers(results[0][0], results[1][0])
     assert np.array_equal(results[0][1], results[1][1])
 
@@ -433,7 +438,7 @@ def test_forces_of_systems_survive_xml():
 def test_forces_and_energies_are_those_of_the_springs():
     filaments, context = network()
     context.getIntegrator().step(120)
-    pulls = filaments.linker_pulls(context)
+    pulls = filaments.in_context(context).linker_pulls()
     assert len(pulls.numbers) > 1
     force = find_binding_force(context.getSystem())
     force.setForceGroup(7)

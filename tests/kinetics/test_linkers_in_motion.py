@@ -74,13 +74,14 @@ def test_binding_and_motion_are_in_equilibrium_together(step, rest_length, strai
         system, step * relaxation, particle_friction=friction, random_seed=3, checks=False
     )
     context = new_context(system, positions, integrator)
+    here = filaments.in_context(context)
     interval = max(1, round(1.5 / step))
     integrator.step(8 * interval)
     bound, squares = [], []
     for _ in range(300):
         integrator.step(interval)
-        bound.append(filaments.linkers_in(context).bound[:, 1].mean())
-        lengths = filaments.linker_pulls(context).lengths
+        bound.append(here.linkers().bound[:, 1].mean())
+        lengths = here.linker_pulls().lengths
         squares.append((lengths**2).mean())
     weight = hand.rate_per_length / hand.unbinding_rate
     ratio, square = expected_binding(weight, stiffness, rest_length, trap, above)
@@ -156,14 +157,15 @@ def test_a_motor_near_stall_has_the_speed_of_its_law():
     for factor in (1.0, 2.0):
         step = factor * recommended
         context = new_context(system, positions, filaments.create_integrator(system, step, random_seed=3, checks=False))
-        table = filaments.linkers_in(context)
+        here = filaments.in_context(context)
+        table = here.linkers()
         bound, places = table.filaments.copy(), table.arc_lengths.copy()
         bound[:, 1], places[:, 1] = np.arange(number), 8000.0
-        filaments.set_linkers(context, replace(table, filaments=bound, arc_lengths=places))
+        here.set_linkers(replace(table, filaments=bound, arc_lengths=places))
         context.getIntegrator().step(50)
-        before = filaments.linkers_in(context).arc_lengths[:, 1]
+        before = here.linkers().arc_lengths[:, 1]
         context.getIntegrator().step(2000)
-        speeds = (filaments.linkers_in(context).arc_lengths[:, 1] - before) / (2000 * step / SECOND)
+        speeds = (here.linkers().arc_lengths[:, 1] - before) / (2000 * step / SECOND)
         error = speeds.std(ddof=1) / np.sqrt(number)
         assert 4.0 * error < 0.05 * expected
         assert abs(speeds.mean() - expected) < 4.0 * error
@@ -193,14 +195,15 @@ def test_motors_with_two_hands_slide_antiparallel_filaments():
     _, system, positions = filaments.build()
     integrator = filaments.create_integrator(system, 5e-5 * SECOND, random_seed=2, checks=False)
     context = new_context(system, positions, integrator)
+    here = filaments.in_context(context)
     # Each begins on both, where they face each other.
     along = np.linspace(1500.0, 4500.0, 30)
     table = replace(
-        filaments.linkers_in(context),
+        here.linkers(),
         filaments=np.tile([0, 1], (30, 1)),
         arc_lengths=np.column_stack([along, 6000.0 - along]),
     )
-    filaments.set_linkers(context, table)
+    here.set_linkers(table)
 
     def offset():
         # Of the second filament against the first one, along both.
@@ -244,8 +247,9 @@ def test_catch_bonds_live_longest_under_the_load_of_their_closed_form():
     context = new_context(
         system, positions, filaments.create_integrator(system, 0.1 / rates.max(), random_seed=7, checks=False)
     )
-    table = filaments.linkers_in(context)
-    filaments.set_linkers(context, replace(table, arc_lengths=np.where(table.bound, 50.0, 0.0)))
+    here = filaments.in_context(context)
+    table = here.linkers()
+    here.set_linkers(replace(table, arc_lengths=np.where(table.bound, 50.0, 0.0)))
     times, steps = [], 0
     for rate in np.sort(rates)[::-1]:
         target = round(1.0 / rate * rates.max() / 0.1)
@@ -254,9 +258,9 @@ def test_catch_bonds_live_longest_under_the_load_of_their_closed_form():
         times.append(steps * context.getIntegrator().getStepSize()._value)
         # Those of this rate have lived for one lifetime.
         type_ = types[int(np.flatnonzero(rates == rate)[0])]
-        left = filaments.linkers_in(context).counts(type_)[2]
+        left = here.linkers().counts(type_)[2]
         expected = np.exp(-rate * times[-1])
         assert left / number == pytest.approx(expected, abs=4.0 * np.sqrt(expected * (1.0 - expected) / number))
-    survivors = [filaments.linkers_in(context).counts(type_)[2] for type_ in types]
+    survivors = [here.linkers().counts(type_)[2] for type_ in types]
     assert np.argmax(survivors) == 2
     assert np.argmin(rates) == 2

@@ -86,12 +86,13 @@ def test_binding_and_bending_are_in_equilibrium_together(rest_length, step):
     _, system, positions = filaments.build()
     integrator = filaments.create_integrator(system, step * time, random_seed=3, checks=False)
     context = new_context(system, positions, integrator)
+    here = filaments.in_context(context)
     interval = max(1, round(1.0 / step))
     integrator.step(8 * interval)
     found = []
     for _ in range(240):
         integrator.step(interval)
-        table, pulls = filaments.linkers_in(context), filaments.linker_pulls(context)
+        table, pulls = here.linkers(), here.linker_pulls()
         bound = table.bound[:, 1]
         energies = 0.5 * stiffness * (pulls.lengths - rest_length) ** 2
         found.append((bound.mean(), energies.sum() / copies, table.arc_lengths[bound, 1].sum() / copies))
@@ -145,7 +146,7 @@ def test_threads_change_nothing():
     for number in ("1", "2", "3"):
         filaments, context = network(ALL, platform="CPU", properties={"Threads": number})
         context.getIntegrator().step(60)
-        results.append((filaments.linkers_in(context), positions_of(context)))
+        results.append((filaments.in_context(context).linkers(), positions_of(context)))
     for table, positions in results[1:]:
         assert same_linkers(results[0][0], table)
         assert np.array_equal(results[0][1], positions)
@@ -156,30 +157,32 @@ def test_filaments_keep_their_numbers():
     hands = [replace(HAND, binds_to=F_ACTIN), replace(HAND, binds_to="BEAM")]
     kind = replace(SPRING, hands=hands)
     filaments, context = network([(kind, {"count": 200, "bound": 100})])
+    here = filaments.in_context(context)
     seen = np.zeros(2, dtype=int)
     for _ in range(10):
         context.getIntegrator().step(20)
-        table = filaments.linkers_in(context)
-        places = filaments.linker_places(context)._value
+        table = here.linkers()
+        places = here.linker_places()._value
         for side in (0, 1):
             bound = table.bound[:, side]
             assert np.all(on_beams(filaments, table)[bound, side] == side)
             seen[side] += np.count_nonzero(bound)
-        assert filaments.linker_pulls(context).lengths.max(initial=0.0) < 4.0 * HAND.reach
+        assert here.linker_pulls().lengths.max(initial=0.0) < 4.0 * HAND.reach
         assert np.all(np.isfinite(places[table.bound]))
     assert seen.min() > 20
     with pytest.raises(InputError, match="bound to filament 1, to which its hand does not bind"):
-        filaments.set_linkers(context, replace(table, filaments=np.where(table.filaments == 0, 1, table.filaments)))
+        here.set_linkers(replace(table, filaments=np.where(table.filaments == 0, 1, table.filaments)))
     with pytest.raises(InputError, match="along filament 2, which is only 600"):
         lengths = np.where(table.filaments == 2, 700.0, table.arc_lengths)
-        filaments.set_linkers(context, replace(table, arc_lengths=lengths))
+        here.set_linkers(replace(table, arc_lengths=lengths))
 
 
 def test_forces_are_those_of_springs_on_curves():
     filaments, context = network(ALL)
+    here = filaments.in_context(context)
     context.getIntegrator().step(120)
-    pulls = filaments.linker_pulls(context)
-    assert np.count_nonzero(on_beams(filaments, filaments.linkers_in(context)).all(axis=1)) > 3
+    pulls = here.linker_pulls()
+    assert np.count_nonzero(on_beams(filaments, here.linkers()).all(axis=1)) > 3
     forces = [force for force in context.getSystem().getForces() if force.getName() == "Linkers"]
     forces[0].setForceGroup(7)
     context.reinitialize(preserveState=True)
@@ -223,11 +226,12 @@ def test_hands_walk_along_the_arc_at_their_speed(direction):
     filaments.add_linkers(Crosslinker(hands=hand, stiffness=1.0), count=60, volume=1e9, bound=60, seed=3)
     _, system, positions = filaments.build()
     context = new_context(system, positions, filaments.create_integrator(system, 1e-3 * SECOND, checks=False))
-    begins = filaments.linkers_in(context).arc_lengths[:, 0]
+    here = filaments.in_context(context)
+    begins = here.linkers().arc_lengths[:, 0]
     context.getIntegrator().step(300)
     lengths = arc_lengths(filaments[0].positions, filaments[0].control_points)
     np.testing.assert_allclose(lengths, ACTIN.segment_length, rtol=1e-4)
-    places = filaments.linker_places(context)._value[:, 0]
+    places = here.linker_places()._value[:, 0]
     along = np.clip(begins + direction * 300.0, 0.0, ARC)
     at_end = along == (ARC if direction > 0.0 else 0.0)
     # That of the last element fluctuates.
@@ -256,7 +260,8 @@ def test_anchored_linkers_begin_in_the_equilibrium_of_their_springs(shift):
     filaments.add_linkers(kind, anchors=np.tile(image, (3000, 1)), bound=3000)
     _, system, positions = filaments.build(box_vectors=1500.0 * np.eye(3))
     context = new_context(system, positions)
-    table, pulls = filaments.linkers_in(context), filaments.linker_pulls(context)
+    here = filaments.in_context(context)
+    table, pulls = here.linkers(), here.linker_pulls()
     assert table.counts() == (0, 0, 3000)
     along = np.arange(0.0, ARC, 0.05)
     curve = element_points(filaments[0].positions, filaments[0].control_points, np.arange(4000) / 4000).reshape(-1, 3)

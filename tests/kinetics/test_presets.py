@@ -89,7 +89,7 @@ def test_presets_bind_to_filaments_of_their_type(name):
     integrator = filaments.create_integrator(system, 5 * unit.millisecond, random_seed=3, checks=False)
     context = new_context(system, positions, integrator)
     integrator.step(60)
-    assert filaments.linkers_in(context).counts()[2] >= 5
+    assert filaments.in_context(context).linkers().counts()[2] >= 5
 
 
 def test_presets_refuse_filaments_that_they_do_not_bind_to():

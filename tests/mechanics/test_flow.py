@@ -271,11 +271,12 @@ def test_joint_tensions_are_those_in_the_flow(engine):
     filaments, system, positions = _chains_and_particles(engine)
     integrator = filaments.create_integrator(system, 1.0, particle_friction=1e5, flow=GENERAL)
     context = new_context(system, positions, integrator)
+    here = filaments.in_context(context)
     start = positions_of(context)
     forces = forces_of(context)
-    tensions = filaments.joint_tensions(context)
+    tensions = here.joint_tensions()
     integrator.setFlow(None)
-    resting = filaments.joint_tensions(context)
+    resting = here.joint_tensions()
     friction = F_ACTIN.segment_friction(VISCOSITY, TEMPERATURE)
     for number, indices in enumerate(filaments.node_indices):
         filament, nodes, force = filaments[number], start[indices], forces[indices]

@@ -40,7 +40,9 @@ def mean_forces(context, filaments, integrator, steps):
     forces = 0.0
     for _ in range(steps):
         integrator.step(1)
-        forces = forces + np.array([part._value for part in filaments.mean_joint_tensions(context)]) / steps
+        forces = (
+            forces + np.array([part._value for part in filaments.in_context(context).mean_joint_tensions()]) / steps
+        )
     return forces
 
 
@@ -71,9 +73,10 @@ def test_without_noise_a_short_step_has_the_instantaneous_tensions(what):
     for step in (20.0, 10.0):
         filaments, flow, pull = filaments_that_are(what)
         context, integrator = context_of(filaments, step, pull, temperature=0.0, flow=flow)
-        expected = filaments.joint_tensions(context)
+        here = filaments.in_context(context)
+        expected = here.joint_tensions()
         integrator.step(1)
-        found = filaments.mean_joint_tensions(context)
+        found = here.mean_joint_tensions()
         assert [len(part) for part in found] == [len(one.joint_stiffnesses) for one in filaments]
         scale = max(np.abs(part._value).max() for part in expected)
         assert scale > 1e-3
@@ -91,7 +94,7 @@ def test_without_noise_tension_is_elastic_force_and_friction_of_the_length(what)
     before = positions_of(context)
     integrator.step(1)
     after = positions_of(context)
-    for filament, nodes, found in zip(filaments, filaments.node_indices, filaments.mean_tensions(context)):
+    for filament, nodes, found in zip(filaments, filaments.node_indices, filaments.in_context(context).mean_tensions()):
         friction = filament.type.segment_friction(VISCOSITY, TEMPERATURE, filament.segments).extensional
         start, end = (np.linalg.norm(segment_vectors(x[nodes], filament.closed), axis=1) for x in (before, after))
         elastic = filament.type.stretching_derivative(0.5 * (start + end))
@@ -128,7 +131,10 @@ def test_joints_between_two_traps_carry_the_force_of_the_traps():
     trap = 0.0
     for _ in range(steps):
         integrator.step(1)
-        forces = forces + np.array([part._value for part in filaments.mean_joint_tensions(context)])[:, :, 0] / steps
+        forces = (
+            forces
+            + np.array([part._value for part in filaments.in_context(context).mean_joint_tensions()])[:, :, 0] / steps
+        )
         positions = positions_of(context)
         trap = trap + stiffness * (length + 30 - positions[last, 0]) / steps
     error = standard_error(forces - trap[:, None])
@@ -147,7 +153,7 @@ def test_recording_changes_no_trajectory_and_ends_with_the_last_step():
             integrator.step(steps)
         ends.append(positions_of(context))
         if recording:
-            values.append(np.concatenate([part._value for part in filaments.mean_joint_tensions(context)]))
+            values.append(np.concatenate([part._value for part in filaments.in_context(context).mean_joint_tensions()]))
     assert all(np.array_equal(ends[0], end) for end in ends)
     assert all(np.array_equal(values[0], value) for value in values)
     assert copy.deepcopy(integrator).getRecordsTensions()
@@ -161,16 +167,17 @@ def test_reporter_of_means(tmp_path):
     step = filaments.recommended_time_step()
     integrator = filaments.create_integrator(system, step, random_seed=3)
     simulation = new_simulation(topology, system, positions, integrator)
+    here = filaments.in_context(simulation.context)
     summary = TensionReporter(tmp_path / "tension.csv", 5, filaments, mean=True)
     joints = TensionReporter(None, 5, filaments, joints=True, mean=True)
     simulation.reporters += [summary, joints]
     simulation.step(20)
     assert joints["tension"].shape == (4, 6) and summary["mean_tension"].shape == (4, 2)
     assert np.array_equal(joints.step, [5, 10, 15, 20])
-    axial = [part._value for part in filaments.mean_axial_tensions(simulation.context)]
+    axial = [part._value for part in here.mean_axial_tensions()]
     assert joints["tension"][-1] == pytest.approx(np.concatenate(axial))
     assert summary["maximum_tension"][-1] == pytest.approx([axial[0].max(), axial[2].max()])
-    forces = [part._value for part in filaments.mean_joint_tensions(simulation.context)]
+    forces = [part._value for part in here.mean_joint_tensions()]
     for along, vectors in zip(axial, forces):
         assert np.all(np.abs(along) <= np.linalg.norm(vectors, axis=1) * (1 + 1e-12))
 
@@ -179,19 +186,20 @@ def test_what_cannot_be_recorded_is_refused():
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
     filaments.add_equilibrium(F_ACTIN, 3, seed=1)
     context, integrator = context_of(filaments, 10.0, recording=False)
+    here = filaments.in_context(context)
     integrator.step(1)
-    for call in (filaments.mean_joint_tensions, filaments.mean_tensions, filaments.mean_axial_tensions):
+    for call in (here.mean_joint_tensions, here.mean_tensions, here.mean_axial_tensions):
         with pytest.raises(InputError, match=r"No mean tensions were recorded .*setRecordsTensions\(True\)"):
-            call(context)
+            call()
     integrator.setRecordsTensions(True)
     with pytest.raises(InputError, match="No mean tensions were recorded"):
-        filaments.mean_tensions(context)
+        here.mean_tensions()
     integrator.step(1)
-    assert len(filaments.mean_tensions(context)[0]) == 3
+    assert len(here.mean_tensions()[0]) == 3
     integrator.setRecordsTensions(False)
     integrator.step(1)
     with pytest.raises(InputError, match="No mean tensions were recorded"):
-        filaments.mean_tensions(context)
+        here.mean_tensions()
 
 
 @pytest.mark.parametrize("kind", ["compiled", "portable"])
@@ -199,9 +207,10 @@ def test_explicit_schemes_have_no_means(kind):
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine=kind)
     filaments.add_equilibrium(F_ACTIN, 3, seed=1)
     context, integrator = context_of(filaments, 10.0, recording=False, scheme="midpoint")
-    for call in (filaments.mean_joint_tensions, filaments.mean_tensions, filaments.record_tensions):
+    here = filaments.in_context(context)
+    for call in (here.mean_joint_tensions, here.mean_tensions, here.record_tensions):
         with pytest.raises(InputError, match="Mean tensions belong to the implicit schemes"):
-            call(context)
+            call()
     if kind == "compiled":
         with pytest.raises(InputError, match="Mean tensions belong to the implicit schemes"):
             integrator.setRecordsTensions(True)

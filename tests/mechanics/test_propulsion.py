@@ -105,7 +105,7 @@ def test_joints_carry_what_the_segments_beyond_push(engine):
         filaments.add_nodes(F_ACTIN, nodes, clamped=clamped, propulsion=propulsion)
     _, system, positions = filaments.build()
     context = new_context(system, positions, filaments.create_integrator(system, 1.0))
-    free, pulled, pushed = (tensions._value for tensions in filaments.joint_tensions(context))
+    free, pulled, pushed = (tensions._value for tensions in filaments.in_context(context).joint_tensions())
     assert np.abs(free).max() < 1e-9
     assert pulled[:, 1] == pytest.approx(0.3 * np.arange(4, 0, -1), rel=1e-6)
     assert pushed[:, 1] == pytest.approx(-0.3 * np.arange(4, 0, -1), rel=1e-6)

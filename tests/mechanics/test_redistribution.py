@@ -64,7 +64,7 @@ def test_both_forms_agree_and_give_the_joint_tensions(mixed_system):
     state = context.getState(positions=True, forces=True)
     start, forces = state.getPositions(asNumpy=True)._value, state.getForces(asNumpy=True)._value
     velocities = redistribution.redistribute(filaments.chain_set(system), start, forces)
-    tensions = filaments.joint_tensions(context)
+    tensions = filaments.in_context(context).joint_tensions()
     for (kind, _, _), indices, tension in zip(CHAINS, filaments.node_indices, tensions):
         nodes, friction = start[indices], kind.segment_friction(VISCOSITY, TEMPERATURE)
         nodal = _dense_velocity(nodes, friction, forces[indices])

@@ -57,21 +57,20 @@ def places_by_hand(filaments, positions, table, points):
 
 def test_table_and_places(simulated, tmp_path):
     filaments, points, simulation = simulated
+    here = filaments.in_context(simulation.context)
     reporter = LinkerReporter(tmp_path / "linkers.csv", 5, filaments, places=str(tmp_path / "linkers.npy"))
     simulation.reporters.append(reporter)
     seen = 0
     for report in range(4):
         simulation.step(5)
-        table = filaments.linkers_in(simulation.context)
+        table = here.linkers()
         places = places_by_hand(filaments, positions_of(simulation.context), table, points)
         vectors = places[:, 1] - places[:, 0]
         vectors -= EDGES * np.round(vectors / EDGES)
         lengths = np.linalg.norm(vectors, axis=1)
-        np.testing.assert_allclose(
-            filaments.linker_places(simulation.context)._value[:, 0], places[:, 0], atol=1e-6, equal_nan=True
-        )
-        events = [filaments.linker_events(simulation.context, number) for number in range(2)]
-        assert filaments.linker_events(simulation.context) == tuple(np.sum(events, axis=0))
+        np.testing.assert_allclose(here.linker_places()._value[:, 0], places[:, 0], atol=1e-6, equal_nan=True)
+        events = [here.linker_events(number) for number in range(2)]
+        assert here.linker_events() == tuple(np.sum(events, axis=0))
         assert np.subtract(*np.sum(events, axis=0)) == table.bound.sum() - 30
         for number, rest in enumerate((30.0, 0.0)):
             of_type = table.types == number

@@ -57,7 +57,7 @@ def test_tethers(simulated, tmp_path):
     reporter = TetherReporter(str(tmp_path / "tethers.csv"), 2, filaments)
     simulation.reporters.append(reporter)
     simulation.step(2)
-    filaments.move_tether(simulation.context, 0, [1600, 0, 10])
+    filaments.in_context(simulation.context).move_tether(0, [1600, 0, 10])
     simulation.step(2)
     assert reporter["point_x"].tolist() == [[1500], [1600]] and reporter["point_z"].tolist() == [[0], [10]]
     node = positions_of(simulation.context)[5]

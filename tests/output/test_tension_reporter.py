@@ -117,7 +117,7 @@ def test_numbers_are_those_of_the_trajectory_in_a_periodic_box(engine, wrapped, 
         # Single precision in lengths, times the stiffness, in the sum over segments.
         assert reporter["stretching_energy"][:, number] == pytest.approx(stretching, rel=0.05, abs=0.5)
         assert reporter["bending_energy"][:, number] == pytest.approx(bending, rel=0.01)
-    last = filaments.joint_tensions(simulation.context)
+    last = filaments.in_context(simulation.context).joint_tensions()
     for (number, joint), tension in zip(tensions.places, tensions["tension"][-1]):
         nodes = frames[-1, filaments.node_indices[number]][joint : joint + 3]
         tangents = np.diff(nodes, axis=0) / np.linalg.norm(np.diff(nodes, axis=0), axis=1)[:, None]

@@ -182,7 +182,7 @@ def test_flow_is_that_of_python():
     rows = '[["0 1/s", "1 1/s", "0 1/s"], ["0 1/s", "2 1/s", "0 1/s"], ["0 1/s", "0 1/s", "-2 1/s"]]'
     np.testing.assert_allclose(parse(f"[flow]\ngradient = {rows}\n").flow.gradient[0], [0, 1e-12, 0])
     simulation, one = create_simulation(parse(text))
-    assert one.filaments.flow(simulation.context) == flow
+    assert one.filaments.in_context(simulation.context).flow() == flow
     assert_refused("line 9: .flow. says nothing", "[flow]\n")
     assert_refused(
         "line 10: .flow. The gradient of the flow has the trace", f"[flow]\ngradient = {rows.replace('-2', '2')}\n"

@@ -28,21 +28,22 @@ def check_that_runs_go_on_to_the_bit(network):
     filaments, linkers at the end
     """
     filaments, context = network()
+    here = filaments.in_context(context)
     integrator = context.getIntegrator()
     integrator.step(100)
     checkpoint = context.createCheckpoint()
     state = context.getState(positions=True, parameters=True, integratorParameters=True)
     integrator.step(60)
-    expected = filaments.linkers_in(context), positions_of(context)
+    expected = here.linkers(), positions_of(context)
     context.loadCheckpoint(checkpoint)
     integrator.step(60)
-    assert same_linkers(filaments.linkers_in(context), expected[0])
+    assert same_linkers(here.linkers(), expected[0])
     assert np.array_equal(positions_of(context), expected[1])
     # In another Context of the same System, from XML.
     other, fresh = network()
     fresh.setState(openmm.XmlSerializer.deserialize(openmm.XmlSerializer.serialize(state)))
     fresh.getIntegrator().step(60)
-    assert same_linkers(other.linkers_in(fresh), expected[0])
+    assert same_linkers(other.in_context(fresh).linkers(), expected[0])
     assert np.array_equal(positions_of(fresh), expected[1])
     return filaments, expected[0]
 

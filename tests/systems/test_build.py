@@ -311,7 +311,7 @@ def tensions_after(filaments, forces, steps, platform):
     integrator = filaments.create_integrator(system, 0.02 * unit.microsecond, temperature=0)
     context = new_context(system, positions, integrator, platform)
     integrator.step(steps)
-    tension = filaments.joint_tensions(context)
+    tension = filaments.in_context(context).joint_tensions()
     assert len(tension) == len(filaments)
     return tension[0].value_in_unit(unit.kilojoule_per_mole / unit.nanometer) / PN
 

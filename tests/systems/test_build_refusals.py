@@ -218,7 +218,7 @@ def test_questions_asked_too_early(filaments, reference):
         filaments.create_integrator(system, STEP)
     context = new_context(system, positions, platform=reference)
     with refused("not in a System yet: call build or add_to first"):
-        filaments.joint_tensions(context)
+        filaments.in_context(context).joint_tensions()
 
 
 # Integrator

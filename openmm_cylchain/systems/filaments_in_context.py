@@ -1,4 +1,4 @@
-"""What is asked of filaments, or changed, in a Context."""
+"""What can differ between Contexts: what is asked of filaments, or changed, in one of them."""
 
 from dataclasses import replace
 
@@ -8,6 +8,7 @@ from openmm import unit
 
 from ..couplings.beam_curves import BeamCurves
 from ..engines.description import describe_chains
+from ..engines.protocol import Engine, PlacedFilaments
 from ..errors import InputError
 from ..filaments.beam_refusals import refuse_beams
 from ..filaments.filament import Tether
@@ -22,53 +23,66 @@ from ..kinetics.binding_force import (
 from ..kinetics.linker_table import LinkerTable
 from ..kinetics.linkers import LinkerPulls
 from ..mechanics.flow import Flow
-from ..mechanics.redistribution import ChainSet
 from ..mechanics.tension import components_along, filament_tensions
 from ..units.quantities import FORCE, LENGTH, STIFFNESS, in_units_of, positive, vector, whole_number
 from ..units.types import Indices, Scalar, Vector, Vectors
-from .tied_filaments import TiedFilaments
 
 
-class FilamentsInContexts(TiedFilaments):
-    """Filaments whose tensions, linkers and tethers each Context has: what ``Filaments`` asks and moves there."""
+class FilamentsInContext:
+    """Filaments in a Context: the tensions, linkers, tethers and flow that they have there.
 
-    def linkers_in(self, context: openmm.Context) -> LinkerTable:
-        """The linkers of a Context, and where they are bound: a LinkerTable.
+    ``Filaments.in_context`` makes it, at hardly any cost; all that it makes for a Context show and change the same.
+
+    Examples
+    --------
+    >>> filaments.in_context(simulation.context).move_tether(0, [100, 0, 0])  # doctest: +SKIP
+    """
+
+    def __init__(
+        self, placed: PlacedFilaments, engine: Engine, context: openmm.Context, moved_tethers: dict[int, Tether]
+    ) -> None:
+        self._placed = placed
+        self._engine = engine
+        self._context = context
+        # By number, and shared by all that are made for the Context.
+        self._moved_tethers = moved_tethers
+
+    def linkers(self) -> LinkerTable:
+        """The linkers that there are, and where they are bound: a LinkerTable.
 
         Raises
         ------
         InputError
             If there are none, or the Context has got a State that does not say where linkers are.
         """
-        return table_of(self._binding_force(context), context)
+        return table_of(self._binding_force(), self._context)
 
-    def set_linkers(self, context: openmm.Context, table: LinkerTable) -> None:
-        """Give a Context other linkers.
+    def set_linkers(self, table: LinkerTable) -> None:
+        """Put other linkers in the place of those that there are.
 
         Raises
         ------
         InputError
             For linkers that do not fit their types, the anchors or the filaments.
         """
-        set_table(self._binding_force(context), context, table)
+        set_table(self._binding_force(), self._context, table)
 
-    def linker_pulls(self, context: openmm.Context) -> LinkerPulls:
-        """What the springs of linkers do that join two places in a Context: a LinkerPulls."""
-        return pulls_of(*self._seen_linkers(context))
+    def linker_pulls(self) -> LinkerPulls:
+        """What the springs of linkers do that join two places: a LinkerPulls."""
+        return pulls_of(*self._seen_linkers())
 
-    def linker_places(self, context: openmm.Context) -> unit.Quantity:
-        """Where the two ends of each linker of ``linkers_in`` are in a Context: (n, 2, 3) in nm, NaN where not bound.
+    def linker_places(self) -> unit.Quantity:
+        """Where the two ends of each linker of ``linkers`` are: (n, 2, 3) in nm, NaN where not bound.
 
         In a periodic box, the second end is at the image that is nearest to the first one.
         """
-        return places_of(*self._seen_linkers(context)) * unit.nanometer
+        return places_of(*self._seen_linkers()) * unit.nanometer
 
-    def linker_events(self, context: openmm.Context, linker_type: int | None = None) -> tuple[int, int]:
-        """How often hands have bound and unbound in a Context since the start, with all that its checkpoint knew.
+    def linker_events(self, linker_type: int | None = None) -> tuple[int, int]:
+        """How often hands have bound and unbound since the start, with all that the Context's checkpoint knew.
 
         Parameters
         ----------
-        context : openmm.Context
         linker_type : int, optional
             What ``add_linkers`` returned; linkers of all types if not given.
 
@@ -78,18 +92,18 @@ class FilamentsInContexts(TiedFilaments):
             If there are no linkers, or none of this type, or the Context has got a State that does not say where
             linkers are.
         """
-        force = self._binding_force(context)
+        force = self._binding_force()
         if linker_type is not None:
             whole_number(linker_type, 0, "linker_type")
-            if linker_type >= len(self._linkers):
-                raise InputError(f"There is no type {linker_type} of linkers: there are {len(self._linkers)}.")
-        types = range(len(self._linkers)) if linker_type is None else [linker_type]
+            if linker_type >= len(self._placed.linkers):
+                raise InputError(f"There is no type {linker_type} of linkers: there are {len(self._placed.linkers)}.")
+        types = range(len(self._placed.linkers)) if linker_type is None else [linker_type]
         with naming_unknown_linkers():
-            bindings, unbindings = zip(*(force.getNumEventsInContext(context, number) for number in types))
+            bindings, unbindings = zip(*(force.getNumEventsInContext(self._context, number) for number in types))
         return sum(bindings), sum(unbindings)
 
-    def joint_tensions(self, context: openmm.Context) -> list[unit.Quantity]:
-        """Instantaneous virtual forces Phi at the joints, without noise, in the context's configuration and flow.
+    def joint_tensions(self) -> list[unit.Quantity]:
+        """Instantaneous virtual forces Phi at the joints, without noise, in the Context's configuration and flow.
 
         Phi of joint i, eqs. (22)-(24), is the force that segment i + 1 exerts on segment i; its component along the
         chain is positive under tension. Random forces are left out: this is the mean over the noise of an
@@ -97,26 +111,22 @@ class FilamentsInContexts(TiedFilaments):
         Stretching, bending and propulsion belong to their segments; any other force on a shared node is given to the
         two segments in equal parts.
 
-        Parameters
-        ----------
-        context : openmm.Context
-            Of a System that these filaments were put into.
-
         Returns
         -------
         list of (joints, 3) Quantity in kJ/(mol nm), one for each filament
             An open filament has segments - 1 joints. A ring has as many as segments: the last is node 0, where the
             force is that of segment 0 on the last one.
         """
-        state = context.getState(positions=True, forces=True)
+        filaments, nodes = self._placed.filaments, self._placed.node_indices
+        refuse_beams(filaments, "instantaneous tensions of joints")
+        state = self._context.getState(positions=True, forces=True)
         positions = state.getPositions(asNumpy=True)._value
         forces = state.getForces(asNumpy=True)._value
-        chains = self.chain_set(context.getSystem())
-        flow = self._engine.flow_of(context)
-        parts = filament_tensions(self._filaments, self._nodes, chains, positions, forces, flow)
+        chains = describe_chains(self._context.getSystem(), self._placed)
+        parts = filament_tensions(filaments, nodes, chains, positions, forces, self.flow())
         return [part * FORCE for part in parts]
 
-    def mean_joint_tensions(self, context: openmm.Context) -> list[unit.Quantity]:
+    def mean_joint_tensions(self) -> list[unit.Quantity]:
         """Virtual forces Phi at the joints as means over the last step, with friction and noise.
 
         Phi of joint i is the force that segment i + 1 exerts on segment i, as in ``joint_tensions``, but of the step
@@ -124,13 +134,8 @@ class FilamentsInContexts(TiedFilaments):
         Where the nodes of the joint are free to move, the forces q on the ends of the two segments, which they exert
         themselves, and those from outside balance, q_plus(i) + q_minus(i+1) + f = 0, and f acts on both in equal parts:
         Phi = (q_minus(i+1) - q_plus(i))/2. Averages over time are the forces that a filament transmits, such as that
-        of a trap at its end; the noise of a single step is large.
-
-        Parameters
-        ----------
-        context : openmm.Context
-            Of a System that these filaments were put into, in which a step was taken after
-            ``integrator.setRecordsTensions(True)``.
+        of a trap at its end; the noise of a single step is large. The integrator records them from the first step after
+        ``record_tensions`` on.
 
         Returns
         -------
@@ -142,18 +147,14 @@ class FilamentsInContexts(TiedFilaments):
         InputError
             With the portable engine or an explicit scheme, or if nothing was recorded.
         """
-        return [forces * FORCE for _, forces, _ in self._engine.mean_tensions(context, len(self))]
+        return [forces * FORCE for _, forces, _ in self._recorded()]
 
-    def mean_tensions(self, context: openmm.Context) -> list[unit.Quantity]:
+    def mean_tensions(self) -> list[unit.Quantity]:
         """Tensions T of the segments as means over the last step, with friction and noise.
 
         T is the elastic force of the segment's length, its friction against becoming longer and the noise of both, as
         an implicit scheme has solved for them, along the direction of the segment half-way through the step; it is
         positive where it pulls the ends together. See ``mean_joint_tensions``.
-
-        Parameters
-        ----------
-        context : openmm.Context
 
         Returns
         -------
@@ -164,17 +165,13 @@ class FilamentsInContexts(TiedFilaments):
         InputError
             As for ``mean_joint_tensions``.
         """
-        return [tensions * FORCE for tensions, _, _ in self._engine.mean_tensions(context, len(self))]
+        return [tensions * FORCE for tensions, _, _ in self._recorded()]
 
-    def mean_axial_tensions(self, context: openmm.Context) -> list[unit.Quantity]:
+    def mean_axial_tensions(self) -> list[unit.Quantity]:
         """Components of ``mean_joint_tensions`` along the filaments, positive under tension.
 
         The direction of a filament at a joint is that of the sum of the unit vectors along its two segments half-way
         through the step. (That at its end would be correlated with the noise of the step.)
-
-        Parameters
-        ----------
-        context : openmm.Context
 
         Returns
         -------
@@ -185,42 +182,38 @@ class FilamentsInContexts(TiedFilaments):
         InputError
             As for ``mean_joint_tensions``.
         """
-        recorded = self._engine.mean_tensions(context, len(self))
-        return [components_along(directions, forces) * FORCE for _, forces, directions in recorded]
+        return [components_along(directions, forces) * FORCE for _, forces, directions in self._recorded()]
 
-    def record_tensions(self, context: openmm.Context) -> None:
-        """Let the integrator of a Context record mean tensions from its next step on; see ``mean_joint_tensions``.
+    def record_tensions(self) -> None:
+        """Let the integrator record mean tensions from its next step on; see ``mean_joint_tensions``.
 
         Raises
         ------
         InputError
             With the portable engine or an explicit scheme.
         """
-        refuse_beams(self, "records of mean tensions")
-        self._engine.record_tensions(context)
+        refuse_beams(self._placed.filaments, "records of mean tensions")
+        self._engine.record_tensions(self._context)
 
-    def flow(self, context: openmm.Context) -> Flow:
-        """The Flow of the solvent in a Context, at rest where its integrator knows of none."""
-        return self._engine.flow_of(context)
+    def flow(self) -> Flow:
+        """The Flow of the solvent, at rest where the integrator knows of none."""
+        return self._engine.flow_of(self._context)
 
-    def tethers_in(self, context: openmm.Context) -> tuple[Tether, ...]:
-        """Tuple of the tethers of a Context, in the order of their numbers, where they were moved to.
+    def tethers(self) -> tuple[Tether, ...]:
+        """Tuple of the tethers, in the order of their numbers, where they were moved to.
 
         A State or a checkpoint does not hold them, and ``context.reinitialize`` brings them back to where they were
         added: move them again then.
         """
-        moved = self._moved_tethers.get(context, {})
-        return tuple(moved.get(number, tether) for number, tether in enumerate(self._tethers))
+        return tuple(self._moved_tethers.get(number, own) for number, own in enumerate(self._placed.tethers))
 
-    def move_tether(self, context: openmm.Context, tether: int, point: Vector, stiffness: Scalar | None = None) -> None:
-        """Move the point of a tether in a Context, and change its stiffness if one is given.
+    def move_tether(self, tether: int, point: Vector, stiffness: Scalar | None = None) -> None:
+        """Move the point of a tether, and change its stiffness if one is given.
 
         Other Contexts of the System keep theirs.
 
         Parameters
         ----------
-        context : openmm.Context
-            Of the System that these filaments were put into.
         tether : int
             Number of the tether, as ``add_tether`` returned it.
         point : (3,) length
@@ -231,55 +224,50 @@ class FilamentsInContexts(TiedFilaments):
         InputError
             For a tether that does not exist, or a point or a stiffness that is no such thing.
         """
-        self._change_tethers(context, [self._moved(context, tether, point, stiffness)])
+        self._change_tethers([self._moved(tether, point, stiffness)])
 
-    def move_tethers(self, context: openmm.Context, tethers: Indices, points: Vectors) -> None:
-        """Move the points of several tethers in a Context, at hardly more cost than that of one.
+    def move_tethers(self, tethers: Indices, points: Vectors) -> None:
+        """Move the points of several tethers, at hardly more cost than that of one.
 
         Parameters
         ----------
-        context : openmm.Context
         tethers : sequence of int
         points : (tethers, 3) length
         """
         points = np.asarray(in_units_of(points, LENGTH, "points"))
         if points.shape != (len(tethers), 3):
             raise InputError(f"points must have the shape ({len(tethers)}, 3), but have {points.shape}.")
-        self._change_tethers(context, [self._moved(context, *each, None) for each in zip(tethers, points)])
+        self._change_tethers([self._moved(*each, None) for each in zip(tethers, points)])
 
-    def chain_set(self, system: openmm.System) -> ChainSet:
-        """The filaments as an engine sees them (a ``ChainSet``): friction of segments and fixed nodes.
+    def _recorded(self):
+        return self._engine.mean_tensions(self._context, len(self._placed.filaments))
 
-        Raises InputError for beam elements, which are no such chains.
-        """
-        refuse_beams(self, "tensions of joints and other properties of a ChainSet")
-        return describe_chains(system, self._placed())
-
-    def _seen_linkers(self, context):
-        force, state = self._binding_force(context), context.getState(positions=True)
+    def _seen_linkers(self):
+        force, state = self._binding_force(), self._context.getState(positions=True)
         positions = state.getPositions(asNumpy=True)._value
         box = state.getPeriodicBoxVectors(asNumpy=True)._value if force.usesPeriodicBoundaryConditions() else None
-        table, curves = self.linkers_in(context), BeamCurves.of_system(context.getSystem())
-        return force, table, self._filaments, self.node_indices, positions, box, curves
+        table, curves = self.linkers(), BeamCurves.of_system(self._context.getSystem())
+        return force, table, self._placed.filaments, self._placed.node_indices, positions, box, curves
 
-    def _binding_force(self, context):
-        force = find_binding_force(context.getSystem())
+    def _binding_force(self):
+        force = find_binding_force(self._context.getSystem())
         if force is None:
             raise InputError("There are no linkers here: add them by add_linkers, before the filaments are built.")
         return force
 
-    def _moved(self, context, tether, point, stiffness):
+    def _moved(self, tether, point, stiffness):
         tether = whole_number(tether, 0, "tether")
-        if tether >= len(self._tethers):
-            raise InputError(f"Tether {tether} does not exist; there are {len(self._tethers)}.")
+        added = self._placed.tethers
+        if tether >= len(added):
+            raise InputError(f"Tether {tether} does not exist; there are {len(added)}.")
         point = tuple(float(x) for x in vector(point, LENGTH, f"Tether {tether}: point"))
-        old = self._moved_tethers.get(context, {}).get(tether, self._tethers[tether])
+        old = self._moved_tethers.get(tether, added[tether])
         if stiffness is None:
             stiffness = old.stiffness
         stiffness = positive(stiffness, STIFFNESS, f"Tether {tether}: stiffness")
         return tether, replace(old, point=point, stiffness=stiffness)
 
-    def _change_tethers(self, context, changed):
-        moved = {**self._moved_tethers.get(context, {}), **dict(changed)}
-        self._engine.set_tethers(context, self._placed(), moved)
-        self._moved_tethers[context] = moved
+    def _change_tethers(self, changed):
+        moved = {**self._moved_tethers, **dict(changed)}
+        self._engine.set_tethers(self._context, self._placed, moved)
+        self._moved_tethers.update(moved)
