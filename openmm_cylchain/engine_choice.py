@@ -40,7 +40,8 @@ def choose_engine(name: str | None = None) -> str:
     if name is None:
         reason = reasons["compiled"]
         if reason not in (None, _NOT_INSTALLED):
-            warnings.warn(_about_slow_engine(reason), EngineWarning, stacklevel=3)
+            # The line that makes the Filaments, which come in layers.
+            warnings.warn(_about_slow_engine(reason), EngineWarning, stacklevel=4)
         return next(each for each in ENGINES if reasons[each] is None)
     reason = reasons[name]
     if reason is not None:
