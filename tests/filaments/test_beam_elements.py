@@ -7,7 +7,7 @@ import openmm
 import pytest
 from openmm import unit
 
-from openmm_cylchain import F_ACTIN, Filaments, FilamentType, InputError, make_whole, theory
+from openmm_cylchain import F_ACTIN, Filaments, FilamentType, InputError, InstabilityError, make_whole, theory
 from openmm_cylchain.analysis import contour_lengths, end_to_end_vectors, joint_cosines, segment_lengths, tangents
 from openmm_cylchain.beams.curve import arc_lengths, curve_points, element_energies, node_tangents
 from openmm_cylchain.beams.equilibrium import calibrated_rigidity, mean_cosine
@@ -326,8 +326,9 @@ def test_errors_of_steps_name_the_filament():
     broken = positions._value.copy()
     broken[filaments.node_indices[1][1]] *= 1e6
     contexts.append(new_context(system, broken, integrator))
-    with pytest.raises(RuntimeError, match=r"Filament 1 \(BEAM\) has blown up in step"):
+    with pytest.raises(InstabilityError, match=r"Filament 1 \(BEAM\) has blown up in step 1") as raised:
         integrator.step(10)
+    assert (raised.value.filament, raised.value.step) == (1, 1)
 
 
 @pytest.mark.parametrize("times", [20.0, 100.0, 1000.0])
