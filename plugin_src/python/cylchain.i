@@ -444,7 +444,7 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %ignore OpenMM::CylinderChainContactForce::ChainInfo;
 %ignore OpenMM::CylinderChainContactForce::SphereInfo;
 %ignore OpenMM::CylinderChainContactForce::ExclusionInfo;
-%ignore OpenMM::CylinderChainWallForce::ParticleInfo;
+%ignore OpenMM::CylinderChainWallForce::getWalls;
 %ignore OpenMM::CylinderChainBindingForce::getState;
 %ignore OpenMM::CylinderChainBindingForce::getHand;
 %ignore OpenMM::CylinderChainBindingForce::getLinkerType;

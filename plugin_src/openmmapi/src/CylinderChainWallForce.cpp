@@ -1,5 +1,4 @@
 #include "openmm/CylinderChainWallForce.h"
-#include "couplings/Walls.h"
 #include "openmm/OpenMMException.h"
 #include "openmm/internal/AssertionUtilities.h"
 #include "openmm/internal/CylinderChainWallForceImpl.h"
@@ -27,10 +26,11 @@ CylinderChainWallForce::CylinderChainWallForce(const string& shape, const Vec3& 
 }
 
 string CylinderChainWallForce::getRegion(Vec3& point, Vec3& vector, double& length) const {
-    point = this->point;
-    vector = this->vector;
-    length = this->length;
-    return shape;
+    const Wall& wall = walls.wall;
+    point = Vec3(wall.point[0], wall.point[1], wall.point[2]);
+    vector = Vec3(wall.vector[0], wall.vector[1], wall.vector[2]);
+    length = wall.length;
+    return Names<WallShape>::ALL[static_cast<int>(wall.shape)];
 }
 
 void CylinderChainWallForce::setRegion(const string& shape, const Vec3& point, const Vec3& vector, double length) {
@@ -56,38 +56,35 @@ void CylinderChainWallForce::setRegion(const string& shape, const Vec3& point, c
                 "The upper corner of a box must exceed the lower one along every axis");
     if (kind == WallShape::Ellipsoid)
         requireOfWall(vector[0] > 0 && vector[1] > 0 && vector[2] > 0, "Semi-axes must be positive");
-    this->shape = shape;
-    this->point = point;
-    this->vector = stored;
-    this->length = length;
+    walls.wall = {kind, {point[0], point[1], point[2]}, {stored[0], stored[1], stored[2]}, length};
 }
 
 void CylinderChainWallForce::setStiffness(double stiffness) {
     requireOfWall(stiffness >= 0 && isfinite(stiffness), "The stiffness cannot be negative and must be finite");
-    this->stiffness = stiffness;
+    walls.stiffness = stiffness;
 }
 
 int CylinderChainWallForce::addParticle(int particle, double radius) {
     requireOfWall(particle >= 0, "Illegal particle index: "+to_string(particle));
     requireOfWall(radius >= 0 && isfinite(radius), "A radius cannot be negative and must be finite");
-    particles.push_back({particle, radius});
-    return particles.size()-1;
+    walls.particles.push_back({particle, radius});
+    return walls.particles.size()-1;
 }
 
 int CylinderChainWallForce::getParticle(int index) const {
-    ASSERT_VALID_INDEX(index, particles);
-    return particles[index].particle;
+    ASSERT_VALID_INDEX(index, walls.particles);
+    return walls.particles[index].particle;
 }
 
 double CylinderChainWallForce::getParticleRadius(int index) const {
-    ASSERT_VALID_INDEX(index, particles);
-    return particles[index].radius;
+    ASSERT_VALID_INDEX(index, walls.particles);
+    return walls.particles[index].radius;
 }
 
 void CylinderChainWallForce::setParticleRadius(int index, double radius) {
-    ASSERT_VALID_INDEX(index, particles);
+    ASSERT_VALID_INDEX(index, walls.particles);
     requireOfWall(radius >= 0 && isfinite(radius), "A radius cannot be negative and must be finite");
-    particles[index].radius = radius;
+    walls.particles[index].radius = radius;
 }
 
 void CylinderChainWallForce::updateParametersInContext(Context& context) {
@@ -107,10 +104,10 @@ int CylinderChainWallForce::addForceReader(Context& context) {
 
 std::vector<cylchain::Place> CylinderChainWallForce::findPlaces(const PlaceResolver& resolver) const {
     std::vector<cylchain::Place> places;
-    for (const ParticleInfo& info : particles) {
+    for (const WallParticle& own : walls.particles) {
         // A particle between two others is not on a chain for a wall, but one on a curve is.
         cylchain::Place alone;
-        alone.first = info.particle;
+        alone.first = own.particle;
         const cylchain::Place place = resolver.resolve(alone);
         places.push_back(place.isOnCurve() ? place : alone);
     }

@@ -14,21 +14,15 @@ CylinderChainWallForceImpl::CylinderChainWallForceImpl(const CylinderChainWallFo
 }
 
 WallSystem CylinderChainWallForceImpl::describe() const {
-    WallSystem result;
-    Vec3 point, vector;
-    const string shape = owner.getRegion(point, vector, result.wall.length);
-    const std::vector<string> names = namesOf<WallShape>();
-    result.wall.shape = static_cast<WallShape>(find(names.begin(), names.end(), shape)-names.begin());
-    copy(&point[0], &point[0]+3, result.wall.point);
-    copy(&vector[0], &vector[0]+3, result.wall.vector);
-    result.stiffness = owner.getStiffness();
-    const std::vector<Place> found = owner.findPlaces(*places);
-    for (int i = 0; i < owner.getNumParticles(); i++) {
-        result.particles.push_back({owner.getParticle(i), owner.getParticleRadius(i),
-                found[i].isOnCurve() ? found[i] : Place()});
-        if (!(owner.getParticleRadius(i) < getRoom(result.wall)))
-            throw OpenMMException("CylinderChainWallForce: Particle "+to_string(owner.getParticle(i))+
-                    " with its radius does not fit into the "+shape);
+    WallSystem result = owner.getWalls();
+    const vector<Place> found = owner.findPlaces(*places);
+    for (size_t i = 0; i < found.size(); i++) {
+        WallParticle& own = result.particles[i];
+        if (found[i].isOnCurve())
+            own.onCurve = found[i];
+        if (!(own.radius < getRoom(result.wall)))
+            throw OpenMMException("CylinderChainWallForce: Particle "+to_string(own.particle)+
+                    " with its radius does not fit into the "+Names<WallShape>::ALL[(int) result.wall.shape]);
     }
     return result;
 }

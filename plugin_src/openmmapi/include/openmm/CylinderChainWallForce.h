@@ -1,6 +1,7 @@
 #ifndef OPENMM_CYLINDERCHAINWALLFORCE_H_
 #define OPENMM_CYLINDERCHAINWALLFORCE_H_
 
+#include "couplings/Walls.h"
 #include "openmm/Context.h"
 #include "openmm/CylinderChainCoupling.h"
 #include <string>
@@ -68,7 +69,7 @@ public:
      * @return the stiffness, measured in kJ/mol/nm^2
      */
     double getStiffness() const {
-        return stiffness;
+        return walls.stiffness;
     }
     /**
      * Set the stiffness k.
@@ -80,7 +81,7 @@ public:
      * Get the number of particles.
      */
     int getNumParticles() const {
-        return particles.size();
+        return walls.particles.size();
     }
     /**
      * Add a particle.
@@ -146,23 +147,16 @@ public:
         return false;
     }
     std::vector<cylchain::Place> findPlaces(const PlaceResolver& resolver) const;
+    /**
+     * Get the wall and its particles.
+     */
+    const cylchain::WallSystem& getWalls() const {
+        return walls;
+    }
 protected:
     ForceImpl* createImpl() const;
 private:
-    class ParticleInfo;
-    std::string shape;
-    Vec3 point, vector;
-    double length, stiffness;
-    std::vector<ParticleInfo> particles;
-};
-
-/**
- * A particle.
- */
-class CylinderChainWallForce::ParticleInfo {
-public:
-    int particle;
-    double radius;
+    cylchain::WallSystem walls;
 };
 
 } // namespace OpenMM
