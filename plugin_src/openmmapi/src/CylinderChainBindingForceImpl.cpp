@@ -165,8 +165,8 @@ void CylinderChainBindingForceImpl::follow() const {
     string message = "CylinderChainBindingForce: Where the linkers of this Context are is not known: it has got a "
             "State or checkpoint of another time, or of another Context, that does not say it. Give it the linkers "
             "that belong to it by setLinkersInContext(), or in_context(context).set_linkers() of Filaments in "
-            "Python. The checkpoints of a CylinderChainIntegrator, and States that hold its parameters (getState(integratorParameters=True)), "
-            "restore linkers themselves";
+            "Python. The checkpoints of a CylinderChainIntegrator, and States that hold its parameters "
+            "(getState(integratorParameters=True)), restore linkers themselves";
     if (isKnown)
         message += ". If you have set both time and step count yourself, give it the linkers that it had before: "
                 "in_context(context).set_linkers(linkers) of Filaments, with its linkers() of that time";
