@@ -5,7 +5,7 @@
 
 #include "TestBeamChains.h"
 #include "couplings/CapsuleGeometry.h"
-#include "mechanics/ElementPlace.h"
+#include "mechanics/ElementHold.h"
 #include <algorithm>
 
 static void testForces() {
@@ -94,11 +94,11 @@ static void testPlacesOfElements() {
     const double length = 2.5;
     for (double x : {0.0, 0.1, 0.37, 0.5, 0.92, 1.0}) {
         const Array place = at(BezierWeights(x)), plus = at(BezierWeights(x+1e-6)), minus = at(BezierWeights(x-1e-6));
-        const Array same = at(ElementPlace::weightsOf(x, length));
-        const Array tangent = at(ElementPlace::weightsOf(ElementPlace::ofTangent(x, true), length));
-        const Array back = at(ElementPlace::weightsOf(ElementPlace::ofTangent(x, false), length));
+        const Array same = at(weightsOf({}, x, length));
+        const Array tangent = at(weightsOf({1, 0}, x, length));
+        const Array back = at(weightsOf({-1, 0}, x, length));
         const int pieces = 4;
-        const Array piece = at(ElementPlace::weightsOf(ElementPlace::onPieces(x, pieces), length));
+        const Array piece = at(weightsOf({0, pieces}, x, length));
         const int left = min(pieces-1, (int) (x*pieces));
         const double share = x*pieces-left;
         const Array one = at(BezierWeights(left/4.0)), other = at(BezierWeights((left+1)/4.0));
@@ -108,9 +108,6 @@ static void testPlacesOfElements() {
             checkClose(-tangent[i], back[i], 1, 1e-15, "weight of the opposite of a tangent");
             checkClose((1-share)*one[i]+share*other[i], piece[i], 1, 1e-14, "weight of a place on a piece");
         }
-        for (double number : {x, ElementPlace::ofTangent(x, true), ElementPlace::ofTangent(x, false),
-                ElementPlace::onPieces(x, pieces)})
-            checkClose(x, ElementPlace::parameterOf(number), 1, 1e-14, "parameter");
     }
 }
 
