@@ -31,10 +31,9 @@ static void check(const BeamChain& chain, int index) {
         throw invalid_argument(name+" must have two particles for each of at least two nodes");
     if (chain.fixed.size() != chain.particles.size())
         throw invalid_argument(name+" must say for each particle whether it is fixed");
-    for (size_t i = 0; i < chain.particles.size(); i += 2)
-        if (chain.fixed[i+1] && !chain.fixed[i])
-            throw invalid_argument(name+": the control point of node "+to_string(i/2)+
-                    " is fixed, but its position is not");
+    if (chain.findLoneControlPoint() >= 0)
+        throw invalid_argument(name+": the control point of node "+to_string(chain.findLoneControlPoint())+
+                " is fixed, but its position is not");
     for (const Tether& tether : chain.tethers)
         if (tether.node < 0 || tether.node >= chain.numNodes())
             throw invalid_argument(name+" has a tether at node "+to_string(tether.node)+", which it has not");

@@ -66,6 +66,13 @@ struct BeamChain {
     int numNodes() const {
         return particles.size()/2;
     }
+    /** The first node whose control point is fixed while its position is not, which no chain may have, or -1. */
+    int findLoneControlPoint() const {
+        for (int node = 0; node < numNodes(); node++)
+            if (fixed[2*node+1] && !fixed[2*node])
+                return node;
+        return -1;
+    }
     int numElements() const {
         return numNodes()-(closed ? 0 : 1);
     }

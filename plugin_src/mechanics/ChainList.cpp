@@ -4,13 +4,6 @@
 using namespace cylchain;
 using namespace std;
 
-ChainList::ChainList(const vector<Chain>& ofSegments, const vector<BeamChain>& ofElements) {
-    for (const Chain& chain : ofSegments)
-        add(chain);
-    for (const BeamChain& beam : ofElements)
-        add(beam);
-}
-
 int ChainList::addEntry(ChainKind kind, int index) {
     const int number = size();
     entries.push_back({kind, index, "Chain "+to_string(number)});

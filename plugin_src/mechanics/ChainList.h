@@ -19,9 +19,6 @@ enum class ChainKind : int {StraightSegments, BeamElements};
  */
 class ChainList {
 public:
-    ChainList() = default;
-    /** Chains of straight segments, and those of beam elements behind them. */
-    explicit ChainList(const std::vector<Chain>& chains, const std::vector<BeamChain>& beams = {});
     int size() const {
         return entries.size();
     }

@@ -81,7 +81,7 @@ private:
     CoupledEquations coupled;
     ReflectedGaps gaps;
     std::vector<CouplingEquation> equations;
-    /** Where those of each kind of couplings begin. */
+    /** Where those of each force begin. */
     std::vector<std::size_t> firstEquations;
     std::vector<double> moved, compliances;
     LaneFlags unfinished, flags;

@@ -376,8 +376,7 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
  * those.  Copies and pickles go through XML.
  */
 
-%define %concreteClass(Class, Base)
-%newobject OpenMM::Class::_fromXml;
+%define %castable(Class, Base)
 %extend OpenMM::Class {
     static OpenMM::Class& cast(OpenMM::Base& object) {
         OpenMM::Class* result = dynamic_cast<OpenMM::Class*>(&object);
@@ -388,6 +387,13 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
     static bool isinstance(OpenMM::Base& object) {
         return dynamic_cast<OpenMM::Class*>(&object) != NULL;
     }
+}
+%enddef
+
+%define %concreteClass(Class, Base)
+%castable(Class, Base)
+%newobject OpenMM::Class::_fromXml;
+%extend OpenMM::Class {
     static OpenMM::Class* _fromXml(const std::string& xml) {
         std::stringstream stream(xml);
         OpenMM::Base* object = OpenMM::XmlSerializer::deserialize<OpenMM::Base>(stream);
@@ -420,17 +426,7 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 }
 %enddef
 
-%extend OpenMM::CylinderChainCoupling {
-    static OpenMM::CylinderChainCoupling& cast(OpenMM::Force& object) {
-        OpenMM::CylinderChainCoupling* result = dynamic_cast<OpenMM::CylinderChainCoupling*>(&object);
-        if (result == NULL)
-            throw OpenMM::OpenMMException("The object is not a CylinderChainCoupling");
-        return *result;
-    }
-    static bool isinstance(OpenMM::Force& object) {
-        return dynamic_cast<OpenMM::CylinderChainCoupling*>(&object) != NULL;
-    }
-}
+%castable(CylinderChainCoupling, Force)
 %concreteClass(CylinderChainForce, Force)
 %concreteClass(CylinderChainBindingForce, Force)
 %concreteClass(CylinderChainContactForce, Force)

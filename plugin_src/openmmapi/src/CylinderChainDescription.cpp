@@ -27,12 +27,11 @@ static void checkFriction(const cylchain::ChainList& chains) {
 /** A control point alone cannot be fixed: a tangent would lead from nowhere. */
 static void checkFixed(const cylchain::ChainList& chains) {
     for (size_t index = 0; index < chains.getBeams().size(); index++) {
-        const vector<bool>& fixed = chains.getBeams()[index].fixed;
-        for (size_t i = 0; i < fixed.size(); i += 2)
-            if (fixed[i+1] && !fixed[i])
-                throw OpenMMException("CylinderChainForce: The control point of node "+to_string(i/2)+" of chain "+
-                        to_string(chains.getNumber(cylchain::ChainKind::BeamElements, index))+
-                        " is fixed, but its position is not");
+        const int node = chains.getBeams()[index].findLoneControlPoint();
+        if (node >= 0)
+            throw OpenMMException("CylinderChainForce: The control point of node "+to_string(node)+" of chain "+
+                    to_string(chains.getNumber(cylchain::ChainKind::BeamElements, index))+
+                    " is fixed, but its position is not");
     }
 }
 

@@ -15,7 +15,6 @@ CylinderChainLinkForceImpl::CylinderChainLinkForceImpl(const CylinderChainLinkFo
 }
 
 void CylinderChainLinkForceImpl::initialize(ContextImpl& context) {
-    this->context = &context;
     const System& system = context.getSystem();
     places.reset(new PlaceResolver(system));
 
