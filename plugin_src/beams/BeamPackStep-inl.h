@@ -35,7 +35,7 @@ public:
     }
     void eliminate(const CouplingTerm* newTerms, int count, double* moves) override {
         given = newTerms;
-        joints.clear();
+        joints = NULL;
         terms.set(newTerms, count);
         step->eliminate(y, &terms);
         terms.gather(step->getChange(), moves);
@@ -53,16 +53,16 @@ public:
         return settings.kT > 0;
     }
     void setJointStiffness(const double* stiffness) override {
-        joints.assign(given, given+terms.size());
-        for (CouplingTerm& term : joints) {
-            std::copy(stiffness, stiffness+6, term.stiffness);
-            stiffness += 6;
-        }
+        const int count = terms.size();
+        joints = jointMemory.reserve<CouplingTerm>(count);
+        std::copy(given, given+count, joints);
+        for (int i = 0; i < count; i++)
+            std::copy(stiffness+6*i, stiffness+6*i+6, joints[i].stiffness);
     }
     void advance(const double* forces, const ShareOfChange& share, bool* unfinished, double* moves) override {
         if (forces != NULL)
             addForces(forces, moves);
-        if (!joints.empty())
+        if (joints != NULL)
             softenJoints();
         step->advance(y, iteration, active*splat<Real>(share.part));
         iteration++;
@@ -98,7 +98,9 @@ private:
     typename BeamStep<W>::Memory memory;
     std::unique_ptr<BeamStep<W> > step;
     const CouplingTerm* given;
-    std::vector<CouplingTerm> joints;
+    /** The terms, softened; no std::vector, whose functions files for other instruction sets would share. */
+    CouplingTerm* joints = NULL;
+    Scratch jointMemory;
     int iteration;
 
     void addForces(const double* forces, double* moves) {
@@ -124,10 +126,10 @@ private:
     void softenJoints() {
         Six* const change = step->getChange();
         std::copy(change, change+pack.nodes, moved);
-        terms.set(joints.data(), joints.size());
+        terms.set(joints, terms.size());
         step->eliminate(y, &terms);
         std::copy(moved, moved+pack.nodes, change);
-        joints.clear();
+        joints = NULL;
     }
 
     /** Call a function with each coordinate of the particles of active lanes, and how much that has changed. */
