@@ -437,9 +437,7 @@ _SEGMENT_UNITS = (_LENGTH, _STIFFNESS, _LENGTH, _FRICTION, _FRICTION, _ROTATIONA
 %ignore findPlaces;
 %ignore OpenMM::CylinderChainForce::getChains;
 %ignore OpenMM::CylinderChainForce::describeChains;
-%ignore OpenMM::CylinderChainContactForce::ChainInfo;
-%ignore OpenMM::CylinderChainContactForce::SphereInfo;
-%ignore OpenMM::CylinderChainContactForce::ExclusionInfo;
+%ignore OpenMM::CylinderChainContactForce::getBodies;
 %ignore OpenMM::CylinderChainWallForce::getWalls;
 %ignore OpenMM::CylinderChainBindingForce::getState;
 %ignore OpenMM::CylinderChainBindingForce::getHand;

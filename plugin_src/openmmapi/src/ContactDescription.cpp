@@ -11,43 +11,12 @@ namespace OpenMM {
 /** Parameters of curves that differ by less are the same. */
 static const double SAME_PLACE = 1e-9;
 
-int countSegments(const CylinderChainContactForce& owner, int chain) {
-    return owner.getChainParticles(chain).size()-(owner.isChainClosed(chain) ? 0 : 1);
-}
-
-CapsuleSystem describeCapsules(const CylinderChainContactForce& owner, int numParticles) {
-    auto checkParticle = [&] (int particle) {
-        if (particle >= numParticles)
-            throw OpenMMException("CylinderChainContactForce: Illegal particle index: "+to_string(particle));
-    };
-    CapsuleSystem capsules;
-    vector<int> firstOfChain;
-    for (int chain = 0; chain < owner.getNumChains(); chain++) {
-        const vector<int>& particles = owner.getChainParticles(chain);
-        for (int particle : particles)
-            checkParticle(particle);
-        const int segments = countSegments(owner, chain);
-        firstOfChain.push_back(capsules.capsules.size());
-        for (int segment = 0; segment < segments; segment++)
-            capsules.capsules.push_back({particles[segment], particles[(segment+1)%particles.size()],
-                    0.5*owner.getChainDiameter(chain), chain, segment});
-        capsules.chains.push_back({segments, owner.isChainClosed(chain), owner.getChainExcludedNeighbors(chain)});
-    }
-    firstOfChain.push_back(capsules.capsules.size());
-    for (int sphere = 0; sphere < owner.getNumSpheres(); sphere++) {
-        checkParticle(owner.getSphereParticle(sphere));
-        capsules.capsules.push_back({owner.getSphereParticle(sphere), -1, 0.5*owner.getSphereDiameter(sphere), -1,
-                sphere});
-    }
-    for (int exclusion = 0; exclusion < owner.getNumExclusions(); exclusion++) {
-        int chain1, segment1, chain2, segment2;
-        owner.getExclusion(exclusion, chain1, segment1, chain2, segment2);
-        // Spheres come after the segments of all chains.
-
-        const int first = firstOfChain[chain1 == -1 ? owner.getNumChains() : chain1]+segment1;
-        const int second = firstOfChain[chain2 == -1 ? owner.getNumChains() : chain2]+segment2;
-        capsules.exclusions.push_back({first, second});
-    }
+CapsuleSystem describeCapsules(const ContactBodies& bodies, const System& system) {
+    const CapsuleSystem capsules = bodies.getCapsules();
+    for (const Capsule& capsule : capsules.capsules)
+        for (int particle : {capsule.first, capsule.end()})
+            if (particle >= system.getNumParticles())
+                throw OpenMMException("CylinderChainContactForce: Illegal particle index: "+to_string(particle));
     return capsules;
 }
 

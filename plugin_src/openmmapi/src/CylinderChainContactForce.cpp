@@ -49,67 +49,67 @@ int CylinderChainContactForce::addChain(const vector<int>& particles, double dia
     checkDiameter(diameter, "The diameter of a chain");
     if (excludedNeighbors < 0)
         throw OpenMMException("CylinderChainContactForce: The number of excluded neighbors cannot be negative");
-    chains.push_back({particles, diameter, excludedNeighbors, closed});
-    return chains.size()-1;
+    bodies.chains.push_back({particles, diameter, excludedNeighbors, closed});
+    return bodies.chains.size()-1;
 }
 
 const vector<int>& CylinderChainContactForce::getChainParticles(int chain) const {
-    ASSERT_VALID_INDEX(chain, chains);
-    return chains[chain].particles;
+    ASSERT_VALID_INDEX(chain, bodies.chains);
+    return bodies.chains[chain].particles;
 }
 
 int CylinderChainContactForce::getChainExcludedNeighbors(int chain) const {
-    ASSERT_VALID_INDEX(chain, chains);
-    return chains[chain].excludedNeighbors;
+    ASSERT_VALID_INDEX(chain, bodies.chains);
+    return bodies.chains[chain].excludedNeighbors;
 }
 
 bool CylinderChainContactForce::isChainClosed(int chain) const {
-    ASSERT_VALID_INDEX(chain, chains);
-    return chains[chain].closed;
+    ASSERT_VALID_INDEX(chain, bodies.chains);
+    return bodies.chains[chain].closed;
 }
 
 double CylinderChainContactForce::getChainDiameter(int chain) const {
-    ASSERT_VALID_INDEX(chain, chains);
-    return chains[chain].diameter;
+    ASSERT_VALID_INDEX(chain, bodies.chains);
+    return bodies.chains[chain].diameter;
 }
 
 void CylinderChainContactForce::setChainDiameter(int chain, double diameter) {
-    ASSERT_VALID_INDEX(chain, chains);
+    ASSERT_VALID_INDEX(chain, bodies.chains);
     checkDiameter(diameter, "The diameter of a chain");
-    chains[chain].diameter = diameter;
+    bodies.chains[chain].diameter = diameter;
 }
 
 int CylinderChainContactForce::addSphere(int particle, double diameter) {
     if (particle < 0)
         throw OpenMMException("CylinderChainContactForce: Illegal particle index: "+to_string(particle));
     checkDiameter(diameter, "The diameter of a sphere");
-    spheres.push_back({particle, diameter});
-    return spheres.size()-1;
+    bodies.spheres.push_back({particle, diameter});
+    return bodies.spheres.size()-1;
 }
 
 int CylinderChainContactForce::getSphereParticle(int sphere) const {
-    ASSERT_VALID_INDEX(sphere, spheres);
-    return spheres[sphere].particle;
+    ASSERT_VALID_INDEX(sphere, bodies.spheres);
+    return bodies.spheres[sphere].particle;
 }
 
 double CylinderChainContactForce::getSphereDiameter(int sphere) const {
-    ASSERT_VALID_INDEX(sphere, spheres);
-    return spheres[sphere].diameter;
+    ASSERT_VALID_INDEX(sphere, bodies.spheres);
+    return bodies.spheres[sphere].diameter;
 }
 
 void CylinderChainContactForce::setSphereDiameter(int sphere, double diameter) {
-    ASSERT_VALID_INDEX(sphere, spheres);
+    ASSERT_VALID_INDEX(sphere, bodies.spheres);
     checkDiameter(diameter, "The diameter of a sphere");
-    spheres[sphere].diameter = diameter;
+    bodies.spheres[sphere].diameter = diameter;
 }
 
 void CylinderChainContactForce::checkBody(int chain, int segment) const {
     if (chain == -1) {
-        ASSERT_VALID_INDEX(segment, spheres);
+        ASSERT_VALID_INDEX(segment, bodies.spheres);
         return;
     }
-    ASSERT_VALID_INDEX(chain, chains);
-    const int segments = chains[chain].particles.size()-(chains[chain].closed ? 0 : 1);
+    ASSERT_VALID_INDEX(chain, bodies.chains);
+    const int segments = bodies.chains[chain].countSegments();
     if (segment < 0 || segment >= segments)
         throw OpenMMException("CylinderChainContactForce: Chain "+to_string(chain)+" has no segment "+
                 to_string(segment));
@@ -118,14 +118,14 @@ void CylinderChainContactForce::checkBody(int chain, int segment) const {
 int CylinderChainContactForce::addExclusion(int chain1, int segment1, int chain2, int segment2) {
     checkBody(chain1, segment1);
     checkBody(chain2, segment2);
-    exclusions.push_back({chain1, segment1, chain2, segment2});
-    return exclusions.size()-1;
+    bodies.exclusions.push_back({chain1, segment1, chain2, segment2});
+    return bodies.exclusions.size()-1;
 }
 
 void CylinderChainContactForce::getExclusion(int index, int& chain1, int& segment1, int& chain2,
         int& segment2) const {
-    ASSERT_VALID_INDEX(index, exclusions);
-    const ExclusionInfo& exclusion = exclusions[index];
+    ASSERT_VALID_INDEX(index, bodies.exclusions);
+    const cylchain::ContactBodies::Exclusion& exclusion = bodies.exclusions[index];
     chain1 = exclusion.chain1;
     segment1 = exclusion.segment1;
     chain2 = exclusion.chain2;
@@ -162,8 +162,7 @@ int CylinderChainContactForce::addForceReader(Context& context) {
 }
 
 vector<cylchain::Place> CylinderChainContactForce::findPlaces(const PlaceResolver& resolver) const {
-    const vector<cylchain::Capsule> capsules =
-            describeCapsules(*this, resolver.getSystem().getNumParticles()).capsules;
+    const vector<cylchain::Capsule> capsules = describeCapsules(bodies, resolver.getSystem()).capsules;
     vector<cylchain::Place> places(capsules.size());
     for (size_t i = 0; i < capsules.size(); i++) {
         places[i].first = capsules[i].first;

@@ -25,7 +25,7 @@ CylinderChainContactForceImpl::CylinderChainContactForceImpl(const CylinderChain
 
 void CylinderChainContactForceImpl::initialize(ContextImpl& context) {
     const System& system = context.getSystem();
-    const CapsuleSystem capsules = describeCapsules(owner, system.getNumParticles());
+    const CapsuleSystem capsules = describeCapsules(owner.getBodies(), system);
     search.reset(new ContactSearch(capsules));
     findCurves(capsules.capsules, PlaceResolver(system), onCurves, sites);
     kernel = context.getPlatform().createKernel(CalcCylinderChainContactForceKernel::Name(), context);
@@ -46,20 +46,14 @@ vector<string> CylinderChainContactForceImpl::getKernelNames() {
 }
 
 void CylinderChainContactForceImpl::updateParametersInContext(ContextImpl& context) {
-    int capsules = owner.getNumSpheres();
-    for (int chain = 0; chain < owner.getNumChains(); chain++)
-        capsules += countSegments(owner, chain);
-    if (capsules != (int) search->getSystem().capsules.size())
+    const CapsuleSystem changed = owner.getBodies().getCapsules();
+    if (changed.capsules.size() != search->getSystem().capsules.size())
         throw OpenMMException("CylinderChainContactForce: Chains and spheres cannot be added to a Context");
-    if (owner.getNumExclusions() != (int) search->getSystem().exclusions.size())
+    if (changed.exclusions.size() != search->getSystem().exclusions.size())
         throw OpenMMException("CylinderChainContactForce: Exclusions cannot be added to a Context");
     stiffness = owner.getStiffness();
-    int capsule = 0;
-    for (int chain = 0; chain < owner.getNumChains(); chain++)
-        for (int segment = 0; segment < countSegments(owner, chain); segment++)
-            search->setRadius(capsule++, 0.5*owner.getChainDiameter(chain));
-    for (int sphere = 0; sphere < owner.getNumSpheres(); sphere++)
-        search->setRadius(capsule++, 0.5*owner.getSphereDiameter(sphere));
+    for (size_t i = 0; i < changed.capsules.size(); i++)
+        search->setRadius(i, changed.capsules[i].radius);
     kernel.getAs<CalcCylinderChainContactForceKernel>().copyParametersToContext(context, stiffness);
     context.systemChanged();
 }

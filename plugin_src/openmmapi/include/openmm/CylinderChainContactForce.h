@@ -1,6 +1,7 @@
 #ifndef OPENMM_CYLINDERCHAINCONTACTFORCE_H_
 #define OPENMM_CYLINDERCHAINCONTACTFORCE_H_
 
+#include "couplings/ContactBodies.h"
 #include "openmm/Context.h"
 #include "openmm/CylinderChainCoupling.h"
 #include <vector>
@@ -48,7 +49,7 @@ public:
      * Get the number of chains.
      */
     int getNumChains() const {
-        return chains.size();
+        return bodies.chains.size();
     }
     /**
      * Add a chain.
@@ -97,7 +98,7 @@ public:
      * Get the number of spheres.
      */
     int getNumSpheres() const {
-        return spheres.size();
+        return bodies.spheres.size();
     }
     /**
      * Add a sphere.
@@ -131,7 +132,7 @@ public:
      * Get the number of exclusions that were added.
      */
     int getNumExclusions() const {
-        return exclusions.size();
+        return bodies.exclusions.size();
     }
     /**
      * Let two segments or spheres not touch each other.
@@ -205,47 +206,20 @@ public:
      * Get whether this Force makes use of periodic boundary conditions.
      */
     bool usesPeriodicBoundaryConditions() const;
+    /**
+     * Get what touches each other.
+     */
+    const cylchain::ContactBodies& getBodies() const {
+        return bodies;
+    }
     std::vector<cylchain::Place> findPlaces(const PlaceResolver& resolver) const;
 protected:
     ForceImpl* createImpl() const;
 private:
-    class ChainInfo;
-    class SphereInfo;
-    class ExclusionInfo;
     void checkBody(int chain, int segment) const;
-    std::vector<ChainInfo> chains;
-    std::vector<SphereInfo> spheres;
-    std::vector<ExclusionInfo> exclusions;
+    cylchain::ContactBodies bodies;
     double stiffness;
     bool usePeriodic;
-};
-
-/**
- * A chain.
- */
-class CylinderChainContactForce::ChainInfo {
-public:
-    std::vector<int> particles;
-    double diameter;
-    int excludedNeighbors;
-    bool closed;
-};
-
-/**
- * A sphere.
- */
-class CylinderChainContactForce::SphereInfo {
-public:
-    int particle;
-    double diameter;
-};
-
-/**
- * Two segments or spheres that do not touch each other.
- */
-class CylinderChainContactForce::ExclusionInfo {
-public:
-    int chain1, segment1, chain2, segment2;
 };
 
 } // namespace OpenMM

@@ -1,25 +1,17 @@
 #ifndef OPENMM_CONTACTDESCRIPTION_H_
 #define OPENMM_CONTACTDESCRIPTION_H_
 
-#include "couplings/ContactSearch.h"
+#include "couplings/ContactBodies.h"
 #include "networks/CurveSites.h"
-#include "openmm/CylinderChainContactForce.h"
 #include "openmm/internal/PlaceResolver.h"
 #include <vector>
 
 namespace OpenMM {
 
 /**
- * Count the segments of a chain of a CylinderChainContactForce.
+ * Describe what touches.  An exception is thrown for particles that the System has not.
  */
-int countSegments(const CylinderChainContactForce& owner, int chain);
-
-/**
- * Describe what touches: the segments of all chains, in their order, then the spheres.
- *
- * @param numParticles  of the System; an exception is thrown for particles that it has not
- */
-cylchain::CapsuleSystem describeCapsules(const CylinderChainContactForce& owner, int numParticles);
+cylchain::CapsuleSystem describeCapsules(const cylchain::ContactBodies& bodies, const System& system);
 
 /**
  * Find capsules that are straight pieces of beam elements: between virtual sites at neighbouring ones of places at
