@@ -225,10 +225,11 @@ class FilamentsInContext:
             For a tether that does not exist, or a point or a stiffness that is no such thing.
         """
         tether = self._tether_number(tether)
-        changes = {"point": tuple(float(x) for x in vector(point, LENGTH, f"Tether {tether}: point"))}
+        x, y, z = (float(x) for x in vector(point, LENGTH, f"Tether {tether}: point"))
+        old = self.tethers()[tether]
         if stiffness is not None:
-            changes["stiffness"] = positive(stiffness, STIFFNESS, f"Tether {tether}: stiffness")
-        self._change_tethers({tether: replace(self.tethers()[tether], **changes)})
+            old = replace(old, stiffness=positive(stiffness, STIFFNESS, f"Tether {tether}: stiffness"))
+        self._change_tethers({tether: replace(old, point=(x, y, z))})
 
     def move_tethers(self, tethers: Indices, points: Vectors) -> None:
         """Move the points of several tethers, at hardly more cost than that of one.

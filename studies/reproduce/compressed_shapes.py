@@ -166,10 +166,9 @@ class HeldElastica:
         """The largest distance from the line, k l/K(k), in nm."""
         return np.sqrt(self.parameter) * self.free_length / ellipk(self.parameter)
 
-    @property
-    def average_distance(self):
-        """The mean distance from the line along the filament, in nm."""
-        return float(np.mean(self.shape(np.linspace(0.0, self.length, 501))[:, 1]))
+    def average_distance(self, points):
+        """The measure ``average_distance`` of so many evenly spaced points of it, both ends included, in nm."""
+        return float(np.mean(self.shape(np.linspace(0.0, self.length, points))[:, 1]))
 
     def shape(self, arc_lengths):
         """Points (n, 2) in nm at lengths along the filament, whose ends are at the height 0."""
