@@ -261,11 +261,14 @@ def _later(values):
     return simulation.mean(values[_FIRST:].mean(axis=0))
 
 
-def _load(data):
-    """The slope of the bending energy over the shortening in pN: of each replicate, and of Euler's elastica."""
+def _load(folder, data):
+    """The slope of the bending energy over the shortening in pN: the engine's, with its error, and the elastica's."""
+    finished = analysis.load(folder)
+    energies = finished.energies["bending energy (kJ/mol)"] / len(finished.filaments) / _PICONEWTON
     shortenings, exact = _later_elastica(data)
-    slopes = np.polyfit(shortenings, data["energy"][_FIRST:], 1)[0]
-    return slopes, float(np.polyfit(shortenings, [own.energy for own in exact], 1)[0])
+    line, covariance = np.polyfit(shortenings, energies[_FIRST:], 1, cov=True)
+    theory = np.polyfit(shortenings, [own.energy for own in exact], 1)[0]
+    return Estimate(float(line[0]), float(np.sqrt(covariance[0, 0]))), float(theory)
 
 
 def _their_energy(own):
@@ -274,14 +277,14 @@ def _their_energy(own):
     return scale * own["calc_bending_energy"], scale * own["calc_bending_energy_error"]
 
 
-def _results(velocity, data, theirs):
+def _results(velocity, data, theirs, folder):
     at, thermal = f"at_{velocity:g}_um/s", _THERMAL_UNITS * thermal_energy(_TEMPERATURE) / _PICONEWTON
     _, exact = _later_elastica(data)
-    slopes, exact_slope = _load(data)
+    load, exact_load = _load(folder, data)
     cytosim = {name: Printed(theirs[name], theirs[f"{name}_error"]) for name in _PUBLISHED_COLUMNS}
     ours = {name: _later(data[name]) for name in (*_PUBLISHED_COLUMNS, "energy")}
     return [
-        Result(f"load_{at}", "pN", simulation.mean(slopes), Rule(3.0, 0.01, 0.02), exact_slope),
+        Result(f"load_{at}", "pN", load, Rule(3.0, 0.01, 0.02), exact_load),
         Result(
             f"bending_energy_less_{_THERMAL_UNITS}_k_BT_{at}",
             "pN nm",
@@ -386,7 +389,11 @@ def evaluate(records, quick):
     points, means = published()
     names = {velocity: f"velocity-{velocity:g}" for velocity in _KEYS}
     runs = {own: _run(records, name, configuration_of(own, replicates)) for own, name in names.items()}
-    results = [result for own, data in runs.items() for result in _results(own, data, means["cytosim", own])]
+    results = [
+        result
+        for own, data in runs.items()
+        for result in _results(own, data, means["cytosim", own], records.directory / names[own])
+    ]
     for velocity in _FINE[quick]:
         fine = _run(records, f"{names[velocity]}-fine", configuration_of(velocity, replicates, 10))
         results += _of_steps(velocity, runs[velocity], fine)
