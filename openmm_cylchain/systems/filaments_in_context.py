@@ -224,7 +224,12 @@ class FilamentsInContext:
         InputError
             For a tether that does not exist, or a point or a stiffness that is no such thing.
         """
-        self._change_tethers([self._moved(tether, point, stiffness)])
+        tether = self._tether_number(tether)
+        x, y, z = (float(x) for x in vector(point, LENGTH, f"Tether {tether}: point"))
+        old = self.tethers()[tether]
+        if stiffness is not None:
+            old = replace(old, stiffness=positive(stiffness, STIFFNESS, f"Tether {tether}: stiffness"))
+        self._change_tethers({tether: replace(old, point=(x, y, z))})
 
     def move_tethers(self, tethers: Indices, points: Vectors) -> None:
         """Move the points of several tethers, at hardly more cost than that of one.
@@ -237,7 +242,10 @@ class FilamentsInContext:
         points = np.asarray(in_units_of(points, LENGTH, "points"))
         if points.shape != (len(tethers), 3):
             raise InputError(f"points must have the shape ({len(tethers)}, 3), but have {points.shape}.")
-        self._change_tethers([self._moved(*each, None) for each in zip(tethers, points)])
+        old = self.tethers()
+        numbers = [self._tether_number(tether) for tether in tethers]
+        # The points are plain numbers by now: nothing is checked once more for each.
+        self._change_tethers({own: replace(old[own], point=tuple(to)) for own, to in zip(numbers, points.tolist())})
 
     def _recorded(self):
         return self._engine.mean_tensions(self._context, len(self._placed.filaments))
@@ -255,19 +263,13 @@ class FilamentsInContext:
             raise InputError("There are no linkers here: add them by add_linkers, before the filaments are built.")
         return force
 
-    def _moved(self, tether, point, stiffness):
-        tether = whole_number(tether, 0, "tether")
-        added = self._placed.tethers
-        if tether >= len(added):
-            raise InputError(f"Tether {tether} does not exist; there are {len(added)}.")
-        point = tuple(float(x) for x in vector(point, LENGTH, f"Tether {tether}: point"))
-        old = self._moved_tethers.get(tether, added[tether])
-        if stiffness is None:
-            stiffness = old.stiffness
-        stiffness = positive(stiffness, STIFFNESS, f"Tether {tether}: stiffness")
-        return tether, replace(old, point=point, stiffness=stiffness)
+    def _tether_number(self, tether):
+        tether, count = whole_number(tether, 0, "tether"), len(self._placed.tethers)
+        if tether >= count:
+            raise InputError(f"Tether {tether} does not exist; there are {count}.")
+        return tether
 
     def _change_tethers(self, changed):
-        moved = {**self._moved_tethers, **dict(changed)}
+        moved = {**self._moved_tethers, **changed}
         self._engine.set_tethers(self._context, self._placed, moved)
         self._moved_tethers.update(moved)

@@ -15,11 +15,14 @@ class Outcome:
         What draws each picture, by its title.
     remarks : str
         A paragraph for the page.
+    files : dict of str to callable (Path)
+        What writes each further file, by its path in the directory.
     """
 
     results: list
     pictures: dict = field(default_factory=dict)
     remarks: str = ""
+    files: dict = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -21,11 +21,17 @@ class Records:
         Measure anew what is there.
     say : callable (str), optional
         Told what is measured.
+
+    Attributes
+    ----------
+    directory : Path
+    seconds : float
+        That measurements took.
     """
 
     def __init__(self, directory, force=False, say=lambda message: None):
-        self._directory = Path(directory)
-        self._directory.mkdir(parents=True, exist_ok=True)
+        self.directory = Path(directory)
+        self.directory.mkdir(parents=True, exist_ok=True)
         self._force = force
         self._say = say
         self.seconds = 0.0
@@ -46,7 +52,7 @@ class Records:
         -------
         dict of str to float or array
         """
-        path = self._directory / f"{name}.json"
+        path = self.directory / f"{name}.json"
         asked = {"measurement": function.__name__, "settings": settings, "version": __version__}
         asked = json.loads(json.dumps(asked))
         content = None if self._force else _read(path)

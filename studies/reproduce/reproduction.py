@@ -11,11 +11,17 @@ from openmm_cylchain.errors import InputError
 from openmm_cylchain.output.files import write_atomically
 from openmm_cylchain.version import __version__
 
-from . import beam_accuracy, chandran2009, panja2015, pesek2016, style
+from . import actin_compression, beam_accuracy, chandran2009, panja2015, pesek2016, style
 from .page import format_page
 from .records import Records
 
-PAPERS = {"pesek2016": pesek2016, "diffusion": chandran2009, "panja2015": panja2015, "beams": beam_accuracy}
+PAPERS = {
+    "pesek2016": pesek2016,
+    "diffusion": chandran2009,
+    "panja2015": panja2015,
+    "beams": beam_accuracy,
+    "compression": actin_compression,
+}
 _RESULTS, _MEASUREMENTS = "results.json", "measurements"
 
 
@@ -103,6 +109,9 @@ def _evaluated(case, records, quick, directory):
         name = f"{case.key}{chr(ord('a') + number) if len(outcome.pictures) > 1 else ''}.png"
         _write_picture(draw, directory / name)
         pictures[title] = name
+    for name, write in outcome.files.items():
+        (directory / name).parent.mkdir(parents=True, exist_ok=True)
+        write(directory / name)
     return {
         "key": case.key,
         "title": case.title,
