@@ -14,7 +14,8 @@ import warnings
 from dataclasses import replace
 from pathlib import Path
 
-from .errors import BoxWarning, ContactWarning, InputError, InstabilityError, SegmentLengthWarning, TimeStepWarning
+from . import errors
+from .errors import InputError, InstabilityError
 from .export import command as export
 from .rendering import command as rendering
 from .runs.beginnings import START_NAMES
@@ -23,6 +24,7 @@ from .version import __version__
 
 _FAILED, _WRONG_INPUT, _WRONG_STEP, _KEYBOARD_INTERRUPT, _OUTPUT_CLOSED = 1, 2, 3, 130, 141
 _SECONDS_OF_CHECK = 20.0
+_WARNINGS = tuple(one for one in vars(errors).values() if isinstance(one, type) and issubclass(one, UserWarning))
 
 
 def main(arguments=None):
@@ -34,14 +36,20 @@ def run_command(parser, arguments=None):
     """Do what a parser sets as ``command``, tell its warnings and errors, and return the exit code."""
     options = parser.parse_args(arguments)
     with warnings.catch_warnings():
-        told = (BoxWarning, ContactWarning, SegmentLengthWarning, TimeStepWarning)
-        for category in told:
+        for category in _WARNINGS:
             warnings.simplefilter("always", category)
-        show = warnings.showwarning
-        warnings.showwarning = lambda message, category, *rest: (
-            say("warning", message) if issubclass(category, told) else show(message, category, *rest)
-        )
+        said, show = set(), warnings.showwarning
+
+        def tell(message, category, *rest):
+            if not issubclass(category, _WARNINGS):
+                show(message, category, *rest)
+            elif str(message) not in said:
+                said.add(str(message))
+                say("warning", message)
+
+        warnings.showwarning = tell
         try:
+            _refuse_empty(options)
             options.command(options)
             sys.stdout.flush()
         except InputError as error:
@@ -88,12 +96,18 @@ def _output_is_closed():
     return True
 
 
+def _refuse_empty(options):
+    for name, value in vars(options).items():
+        if value == "":
+            raise InputError(f"{name} is an empty text: give a name, or leave it out.")
+
+
 def _has_lost_its_directory(options):
-    return options.command is _run and options.output is not None and not Path(options.output).is_dir()
+    return options.command is _run and options.output is not None and not os.path.isdir(options.output)
 
 
 def _resumable(options):
-    return options.command is _run and options.output is not None and Path(options.output).is_dir()
+    return options.command is _run and options.output is not None and os.path.isdir(options.output)
 
 
 def say(kind, message):
@@ -159,9 +173,10 @@ def _run(options):
 
     configuration = read_configuration(options.configuration)
     if options.dry_run:
-        from .runs.dry_run import format_dry_run
+        from .runs.dry_run import dry_run
 
-        print(format_dry_run(configuration))
+        for line in dry_run(configuration):
+            print(line, flush=True)
         return
     if options.output is None:
         raise InputError("Say where the files of the run go: --output DIR, or give --dry-run.")

@@ -22,6 +22,7 @@ from ..output.run_files import RunFiles
 from ..units.quantities import VOLUME, positive, thermal_energy, whole_number
 from ..units.types import FloatArray, Indices, IntArray, Scalar
 from .run_filaments import PIECES_OF_ELEMENT, RunParticles, chain_of, described_filament
+from .run_topology import read_topology
 
 _COARSE = 0.2
 _SHAPES = {
@@ -252,7 +253,7 @@ class Run:
             All if not given.
         """
         chosen = self._chosen(frames)
-        topology = mdtraj.load_topology(str(self._files.topology))
+        topology = read_topology(self._files.topology, self._description.particles)
         xyz = np.array([self.positions(frame) for frame in chosen], dtype=np.float32)
         trajectory = mdtraj.Trajectory(xyz, topology, time=self.times[chosen])
         if self.box is not None:
@@ -285,7 +286,7 @@ class Run:
             from MDAnalysis.coordinates.memory import MemoryReader
         except ImportError:
             raise InputError("A Universe needs MDAnalysis: install it by pip install MDAnalysis.") from None
-        topology = mdtraj.load_topology(str(self._files.topology))
+        topology = read_topology(self._files.topology, self._description.particles)
         atoms, residues = list(topology.atoms), list(topology.residues)
         universe = MDAnalysis.Universe.empty(
             len(atoms),

@@ -20,6 +20,7 @@ from ..beams.curve import particle_weights, place_weights
 from ..errors import InputError
 from ..units.quantities import DIMENSIONLESS, LENGTH, in_units_of, non_negative, whole_number
 from ..units.types import FloatArray, Indices, IntArray, Scalar
+from .chain_type import ChainType
 from .filament import Filament
 
 ATTACHMENT_NAME = "ATT"
@@ -93,10 +94,15 @@ def locate(
     return Attachment(number, segment, min(place - segment, 1.0))
 
 
+def lengths_along(filament_type: ChainType, segments: int, closed: bool) -> FloatArray:
+    """The lengths in nm of segments by which arc lengths count: those of a straight chain, or of a ring, at rest."""
+    return filament_type.segment_lengths(segments, True) if closed else filament_type.straight_lengths(segments)
+
+
 def _along(filament, arc_length):
     # An arc length in segments, and that of the whole filament, at rest.
     kind, segments = filament.type, filament.segments
-    lengths = kind.segment_lengths(segments, True) if filament.closed else kind.straight_lengths(segments)
+    lengths = lengths_along(kind, segments, filament.closed)
     if np.all(lengths == kind.segment_length):
         return arc_length / kind.segment_length, segments * kind.segment_length
     ends = np.concatenate([[0.0], np.cumsum(lengths)])

@@ -65,14 +65,11 @@ def make_binding_force(
     force.setName(BINDING_FORCE_NAME)
     force.setUsesPeriodicBoundaryConditions(box is not None)
     hands: dict[Hand, int] = {}
-    columns: list[Any] = [[], [], [], []]
-    first_places = FirstPlaces(filaments, thermal_energy(temperature), box)
     for own in linkers:
         numbers = []
         for hand in own.kind.hands:
             if hand not in hands:
-                bound_to = [i for i, filament in enumerate(filaments) if hand.binds(filament.type)]
-                hands[hand] = _add_hand(force, hand, bound_to, own.kind.name)
+                hands[hand] = _add_hand(force, hand, filaments, own.kind.name)
             numbers.append(hands[hand])
         first = -1 if own.anchors is not None else numbers[0]
         number = force.addLinkerType(
@@ -80,9 +77,29 @@ def make_binding_force(
         )
         density = -1.0 if own.concentration is None else own.concentration
         force.setLinkerTypeReservoir(number, own.volume or 0.0, density)
+        for anchor in () if own.anchors is None else own.anchors:
+            _add_anchor(force, anchor)
+    place_linkers(force, linkers, filaments, temperature, positions, box)
+    return force
+
+
+def place_linkers(
+    force: Any,
+    linkers: Sequence[Linkers],
+    filaments: Sequence[Filament],
+    temperature: float,
+    positions: FloatArray,
+    box: FloatArray | None,
+) -> None:
+    """Have the linkers of a force begin where they do on filaments at given places; see ``make_binding_force``."""
+    columns: list[Any] = [[], [], [], []]
+    first_places = FirstPlaces(filaments, thermal_energy(temperature), box)
+    anchored = 0
+    for number, own in enumerate(linkers):
         anchors = np.full(own.count, -1)
         if own.anchors is not None:
-            anchors = np.array([_add_anchor(force, anchor) for anchor in own.anchors], dtype=int)
+            anchors = np.arange(anchored, anchored + own.count)
+            anchored += own.count
         chains, places = np.full((own.count, 2), -1), np.zeros((own.count, 2))
         generator = np.random.default_rng((own.seed, number))
         if own.anchors is None:
@@ -96,14 +113,20 @@ def make_binding_force(
     rows: list[list[Any]] = [np.concatenate(column).ravel().tolist() for column in columns]
     count = len(rows[0])
     force.setLinkers(list(range(count)), *rows, count)
-    return force
 
 
-def _add_hand(force, hand, chains, name):
+def _add_hand(force, hand, filaments, name):
+    chains = [i for i, filament in enumerate(filaments) if hand.binds(filament.type)]
     if not chains:
         raise InputError(
             f"Linkers {name!r}: a hand binds to filaments of the type {' or '.join(hand.binds_to)}, of which there are "
             "none: change its binds_to."
+        )
+    longest = max(contour_of(filament)[-1] for filament in filaments if hand.binds(filament.type))
+    if hand.site_spacing is not None and hand.site_spacing > longest * (1.0 + 1e-9):
+        raise InputError(
+            f"Linkers {name!r}: a hand has no sites, {hand.site_spacing:g} nm apart, on filaments of {longest:g} nm: "
+            "make its site_spacing smaller."
         )
     number = force.addHand(hand.rate_per_length, hand.reach, hand.unbinding_rate, chains)
     force.setHandUnbinding(

@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ..errors import InputError
 from ..filaments.chain_type import ChainType
 from ..units.quantities import (
@@ -15,11 +17,14 @@ from ..units.quantities import (
     finite_number,
     non_negative,
     positive,
+    shown,
 )
 from ..units.types import Scalar
 
 AT_ENDS = ("release", "hold")
 """What a hand may do at the end of a filament to which it has walked."""
+
+_OPTIONAL = ("unbinding_force", "catch_force", "stall_force", "site_spacing")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,7 +115,7 @@ class Hand:
 
     def __post_init__(self) -> None:
         def convert(name, check, target):
-            if getattr(self, name) is not None:
+            if getattr(self, name) is not None or name not in _OPTIONAL:
                 object.__setattr__(self, name, check(getattr(self, name), target, f"Hand: {name}"))
 
         convert("binding_rate", non_negative, RATE)
@@ -123,6 +128,8 @@ class Hand:
         convert("speed", finite_number, VELOCITY)
         convert("stall_force", positive, FORCE)
         convert("site_spacing", positive, LENGTH)
+        if not isinstance(self.walks_backward, (bool, np.bool_)):
+            raise InputError(f"Hand: walks_backward must be True or False, but is {shown(self.walks_backward)}.")
         if self.strain_share > 1.0:
             raise InputError(f"Hand: strain_share must be between 0 and 1, but is {self.strain_share:g}.")
         if self.strain_share > 0.0 and self.unbinding_force is not None:
@@ -134,10 +141,13 @@ class Hand:
         if self.at_end not in AT_ENDS:
             raise InputError(f"Hand: at_end must be one of {', '.join(AT_ENDS)}, but is {self.at_end!r}.")
         if self.binds_to is not None:
-            kinds = [self.binds_to] if isinstance(self.binds_to, (str, ChainType)) else list(self.binds_to)
+            kinds = [self.binds_to] if isinstance(self.binds_to, (str, ChainType)) else self.binds_to
+            kinds = kinds if isinstance(kinds, (Sequence, set, frozenset)) else ()
             names = tuple(kind.name if isinstance(kind, ChainType) else kind for kind in kinds)
             if not names or not all(isinstance(name, str) for name in names):
-                raise InputError(f"Hand: binds_to must be types of filaments or their names, but is {self.binds_to!r}.")
+                raise InputError(
+                    f"Hand: binds_to must be types of filaments or their names, but is {shown(self.binds_to)}."
+                )
             object.__setattr__(self, "binds_to", names)
 
     @property

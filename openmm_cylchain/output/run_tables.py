@@ -12,7 +12,7 @@ from .dcd_frames import DCDFrames
 if TYPE_CHECKING:
     from openmm import app
 
-_DCD_HEADER_SIZE = 92
+_DCD_HEADER_SIZE, _DCD_DATE, _DCD_TITLE_LINE = 92, 180, 80
 
 
 def _open_at(path, size):
@@ -76,6 +76,11 @@ class TrajectoryFile:
             # The number of frames stands in the header, which may be ahead of the checkpoint.
             self._file.write(header)
         self._dcd = app.DCDFile(self._file, topology, time_step, 0, steps_per_frame, append=size is not None)
+        if size is None:
+            # Not when it was made: files of the same run are the same.
+            self._file.seek(_DCD_DATE)
+            self._file.write(b"openmm-cylchain".ljust(_DCD_TITLE_LINE, b"\0"))
+            self._file.seek(0, os.SEEK_END)
 
     def write(self, positions: FloatArray) -> None:
         """Append a frame of (particles, 3) positions in nm."""

@@ -96,6 +96,11 @@ class Configuration:
     start_files: dict = dataclasses.field(default_factory=dict, compare=False)
     lines: dict = dataclasses.field(default_factory=dict, compare=False, repr=False)
 
+    @property
+    def relaxes(self):
+        """Whether filaments that overlap come apart before a run begins."""
+        return self.contacts is not None and self.contacts.relax
+
 
 def read_configuration(path):
     """Read and check a configuration file: a Configuration.

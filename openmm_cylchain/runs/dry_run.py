@@ -1,37 +1,37 @@
 """What a run would be, without one: what is built, what binds its step, how long it takes, how large its files get."""
 
-import time
+import tempfile
 
-from ..errors import InstabilityError
 from ..output.run_tables import ENERGY_COLUMNS, LINKER_TABLE_COLUMNS
 from ..units.text import format_time
 from .configuration import linker_labels, named_bound
 from .initial_state import recommended_step
-from .relaxation import relaxed_positions
-from .run import create_simulation
+from .run import Recorder, begin, create_simulation, steps
+from .run_directory import RunDirectory
 from .summary import group_labels
 
-_MEASURED_SECONDS = 2.0
+_MEASURED_SECONDS = 3.0
 _BYTES_OF_NUMBER = 20
 """Of a number in a table, with its comma."""
 
 
-def format_dry_run(configuration):
-    """A description of the run of a configuration: text for a terminal. It takes some steps, and their time.
+def dry_run(configuration):
+    """A description of the run of a configuration, line by line. It takes some steps, and their time.
 
-    InputError if the configuration cannot be simulated.
+    InputError if the configuration cannot be simulated, InstabilityError if its first steps cannot be taken.
     """
     settings = configuration.simulation
     simulation, built = create_simulation(configuration)
-    simulation.context.setPositions(relaxed_positions(configuration, built))
+    begin(configuration, simulation, built)
     recommended = recommended_step(configuration, settings.scheme, settings.engine, settings.seed)
-    lines = [configuration.title or "Run", *_what_is_built(configuration, built)]
-    lines += [
+    yield configuration.title or "Run"
+    yield from _what_is_built(configuration, built)
+    yield (
         f"  {settings.steps} steps of {format_time(settings.time_step)}, scheme {settings.scheme}, "
-        f"{built.filaments.engine} engine, platform {simulation.context.getPlatform().getName()}",
-        f"  recommended {format_time(recommended.step)}: {_binding(configuration, recommended)}",
-    ]
-    return "\n".join([*lines, *_cost(configuration, simulation)])
+        f"{built.filaments.engine} engine, platform {simulation.context.getPlatform().getName()}"
+    )
+    yield f"  recommended {format_time(recommended.step)}: {_binding(configuration, recommended)}"
+    yield from _cost(configuration, simulation, built.filaments)
 
 
 def _what_is_built(configuration, built):
@@ -58,33 +58,22 @@ def _binding(configuration, recommended):
     return f"{named_bound(configuration, names[0])}" if names and ":" in names[0] else recommended.reason
 
 
-def _cost(configuration, simulation):
+def _cost(configuration, simulation, filaments):
     settings = configuration.simulation
-    try:
-        step = _seconds_of_step(simulation, settings.steps)
-    except InstabilityError as error:
-        return [f"  its first steps fail: {error}"]
+    with tempfile.TemporaryDirectory() as folder, steps():
+        recorder = Recorder(configuration, filaments, simulation, RunDirectory(folder), None)
+        step, seconds = recorder.seconds_of_run(_MEASURED_SECONDS)
     particles, reports = simulation.system.getNumParticles(), settings.steps // settings.steps_per_report + 1
     # A frame of a DCD file has three records of single-precision numbers, and one of the box.
     trajectory = 276 + reports * (3 * (4 * particles + 8) + (56 if configuration.box is not None else 0))
     tables = reports * _BYTES_OF_NUMBER * len(ENERGY_COLUMNS)
     tables += reports * _BYTES_OF_NUMBER * len(LINKER_TABLE_COLUMNS) * len(configuration.linkers)
     return [
-        f"  about {_duration(step * settings.steps)}: {1e3 * step:.3g} ms a step, as its first steps took",
+        f"  about {_duration(seconds)} for steps and reports: {1e3 * step:.3g} ms a step at first",
         f"  {reports} frames, every {format_time(settings.steps_per_report * settings.time_step)}: trajectory of "
         f"{_size(trajectory)}, tables of about {_size(tables)}"
         + (", and a record of 100 bytes for each linker that is bound" if configuration.linkers else ""),
     ]
-
-
-def _seconds_of_step(simulation, most):
-    simulation.step(1)  # which sets things up
-    taken, start = 0, time.monotonic()
-    while taken < most and (taken == 0 or time.monotonic() - start < _MEASURED_SECONDS):
-        count = max(1, min(taken, most - taken))
-        simulation.step(count)
-        taken += count
-    return (time.monotonic() - start) / taken
 
 
 def _duration(seconds):

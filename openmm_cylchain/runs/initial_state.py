@@ -18,6 +18,7 @@ from ..couplings.pulling import constant_force, constant_tension
 from ..couplings.walls import filament_wall_force, wall_force
 from ..errors import InputError
 from ..filaments import shapes
+from ..filaments.attachments import lengths_along
 from ..filaments.segment_place import SegmentPlace
 from ..systems.filaments import Filaments
 from ..theory import chain_mean_square_end_to_end
@@ -156,13 +157,15 @@ def place_filaments(configuration, engine, seed, linkers=True):
             filaments.add_tether(number, own.node, point, own.stiffness)
     for own in configuration.linkers if linkers else ():
         anchors = None if own.anchors is None else np.array(own.anchors)
+        # What is within reach of an anchor is known when overlaps have come apart: see ``relaxation``.
+        later = anchors is not None and configuration.relaxes
         filaments.add_linkers(
             own.kind,
             own.count,
             concentration=own.concentration,
             volume=own.volume,
             anchors=anchors,
-            bound=own.bound,
+            bound=0 if later else own.bound,
             seed=seed,
         )
     return filaments
@@ -275,8 +278,10 @@ def _extent(group, temperature):
 
 
 def _add_particles(configuration, seed, topology, system, positions):
-    # Behind the filaments. All positions, and the indices, radii and friction of particles.
-    everything, spheres, radii, friction = [positions.value_in_unit(unit.nanometer)], [], [], []
+    # Behind the filaments. All positions, the indices and radii of particles, and the friction of all that is no node:
+    # none of beads on filaments, which are no particles of their own.
+    everything, spheres, radii = [positions.value_in_unit(unit.nanometer)], [], []
+    friction = [0.0] * sum(map(system.isVirtualSite, range(system.getNumParticles())))
     for number, own in enumerate(configuration.particles):
         chain = topology.addChain(f"P{number}")
         for place in range(own.count):
@@ -326,6 +331,13 @@ def _add_links(configuration, filaments, system, seed):
             pairs = _pairs(own, filaments, configuration.box, np.random.default_rng([seed, number, 5]))
             for one, other, distance in pairs:
                 rest = distance if own.rest_length is None else own.rest_length
+                if own.maximum_extension is not None and abs(distance - rest) >= own.maximum_extension:
+                    raise ConfigurationError(
+                        f"{own.label} begins with a length of {distance:g} nm, but its FENE spring of {rest:g} nm "
+                        f"becomes longer or shorter by less than {own.maximum_extension:g} nm: move what it joins, or "
+                        "change rest_length or maximum_extension.",
+                        ("link", number),
+                    )
                 links.add(None, one, other, own.stiffness, rest, own.maximum_extension)
             count += len(pairs)
         links.add_to(system)
@@ -413,7 +425,7 @@ def _position_of(place, filaments, number):
 def _random_pairs(own, filaments, box, generator):
     places, points, owners = [], [], []
     for number, filament in enumerate(filaments):
-        length = float(filament.type.segment_lengths(filament.segments, filament.closed).sum())
+        length = float(lengths_along(filament.type, filament.segments, filament.closed).sum())
         spacing = 0.5 * filament.type.segment_length if own.spacing is None else own.spacing
         # In the middle of equal parts, so that ends have no more links than other places.
         parts = max(1, int(length / spacing + 1e-9))

@@ -1,12 +1,15 @@
 """Filaments that are drawn on top of each other come apart before a run begins."""
 
 import time
+from dataclasses import replace
 
 from openmm import Context, OpenMMException, Platform
 
 from ..errors import InputError, InstabilityError
+from ..kinetics.binding_force import find_binding_force, place_linkers
 from ..output.progress import ProgressMessages
-from .initial_state import build_system
+from ..systems.refused_context import refusal
+from .initial_state import box_vectors, build_system
 
 # Lengths of steps in those of the run or, where those are longer, in recommended ones; first in the cold.
 _COLD, _WARM = (1e-3, 1e-2, 0.1, 0.5), (0.1, 0.5, 1.0)
@@ -19,7 +22,8 @@ _SECONDS_BETWEEN_MESSAGES = 2.0
 def relaxed_positions(configuration, built, say=None):
     """Positions in which a run begins: those of a BuiltSystem, or where contacts have pushed what overlapped.
 
-    That takes 140 steps without linkers: in the cold, in steps that grow, and then at the temperature of the solvent.
+    Linkers that begin bound near anchors are bound then, which a Context has that is made or initialised later.
+    It takes 140 steps without linkers: in the cold, in steps that grow, and then at the temperature of the solvent.
     The result depends on the configuration alone.
 
     Parameters
@@ -33,15 +37,38 @@ def relaxed_positions(configuration, built, say=None):
     InputError
         If they do not come apart.
     """
-    if configuration.contacts is None or not configuration.contacts.relax:
+    if not configuration.relaxes:
         return built.positions
     if say is not None:
-        return _come_apart(configuration, built.positions, _Progress(say))
+        return _begun(configuration, built, _Progress(say))
     messages = ProgressMessages()
     try:
-        return _come_apart(configuration, built.positions, _Progress(messages))
+        return _begun(configuration, built, _Progress(messages))
     finally:
         messages.finish()
+
+
+def _begun(configuration, built, progress):
+    positions = _come_apart(configuration, built.positions, progress)
+    if any(own.bound and own.anchors is not None for own in configuration.linkers):
+        _bind_linkers(configuration, built, positions._value)
+    return positions
+
+
+def _bind_linkers(configuration, built, positions):
+    filaments = built.filaments
+    nodes, controls = filaments.node_indices, filaments.control_point_indices
+    moved = [
+        replace(
+            own,
+            positions=positions[nodes[number]],
+            control_points=None if own.control_points is None else positions[controls[number]],
+        )
+        for number, own in enumerate(filaments)
+    ]
+    linkers = [replace(own, bound=group.bound) for own, group in zip(filaments.linkers, configuration.linkers)]
+    box = None if configuration.box is None else box_vectors(configuration.box)
+    place_linkers(find_binding_force(built.system), linkers, moved, filaments.temperature, positions, box)
 
 
 def _come_apart(configuration, positions, progress):
@@ -58,7 +85,11 @@ def _come_apart(configuration, positions, progress):
         precision="double",
         **alone.arguments(),
     )
-    context = Context(alone.system, integrator, Platform.getPlatformByName("Reference"))
+    reference = Platform.getPlatform("Reference")
+    try:
+        context = Context(alone.system, integrator, reference)
+    except OpenMMException as error:
+        raise refusal(error, alone.system, integrator, reference) from None
     context.setPositions(positions)
     try:
         for bath, lengths in ((_COLD_TEMPERATURE, _COLD), (temperature, _WARM)):

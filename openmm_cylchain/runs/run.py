@@ -1,6 +1,7 @@
 """The run: filaments from a configuration, simulated into a directory, resumable after any interruption."""
 
 import contextlib
+import math
 import signal
 import threading
 import time
@@ -27,10 +28,12 @@ from ..output.run_tables import (
     TrajectoryFile,
 )
 from ..systems.described_runs import energy_cells, total_energies, write_topology
+from ..systems.refused_context import refusal
 from ..systems.step_check import check_time_step
 from ..time_steps.precision import PRECISIONS
 from ..units.quantities import thermal_energy
 from ..units.text import format_time
+from .countless_events import refuse_countless_events
 from .description import describe
 from .initial_state import build_system
 from .moving_tethers import MovingTethers
@@ -38,6 +41,8 @@ from .relaxation import relaxed_positions
 from .run_directory import Checkpoint, RunDirectory
 
 _SECONDS_BETWEEN_CHECKS = 0.2
+_MEASURED_REPORTS = 3
+_LEAST_POWER, _MOST_GROWTH = 0.1, 3.0
 
 
 class RunInterrupted(Exception):  # noqa: N818 - not an error
@@ -85,17 +90,17 @@ def run(configuration, output, resume=False):
         if checkpoint is None:
             if resume:
                 print("No checkpoint yet: starting from the beginning.")
-            positions = relaxed_positions(configuration, built)
+            positions = begin(configuration, simulation, built)
             write_topology(directory, simulation.topology, simulation.system, positions)
             describe(configuration, filaments, simulation.system, simulation.topology).write(directory.description)
-            simulation.context.setPositions(positions)
             _write_crosslinks(directory, simulation)
         else:
             _restore(simulation.context, checkpoint, filaments.engine)
             _check_crosslinks(directory, simulation, checkpoint.step)
             print(f"Resuming at step {checkpoint.step}, {format_time(checkpoint.step * settings.time_step)}.")
         try:
-            _Recorder(configuration, filaments, simulation, directory, checkpoint).run_to_end()
+            with steps():
+                Recorder(configuration, filaments, simulation, directory, checkpoint).run_to_end()
         except InstabilityError as error:
             raise type(error)(
                 f"{error} What came before is kept in {directory.path}; run the changed configuration in another "
@@ -112,6 +117,7 @@ def create_simulation(configuration):
     settings = configuration.simulation
     built = build_system(configuration, settings.engine, settings.seed)
     filaments = built.filaments
+    refuse_countless_events(configuration, filaments)
     platform, properties = _platform(settings, filaments.engine)
     integrator = filaments.create_integrator(
         built.system,
@@ -125,9 +131,26 @@ def create_simulation(configuration):
     try:
         return app.Simulation(built.topology, built.system, integrator, platform, properties), built
     except openmm.OpenMMException as error:
-        raise InputError(
-            f'[simulation] platform = "{settings.platform}" cannot be used: {error}. "Reference" always can.'
-        ) from None
+        raise refusal(error, built.system, integrator, platform) from None
+
+
+def begin(configuration, simulation, built):
+    """Bring a Simulation of a configuration to where the run begins, and return the positions."""
+    positions = relaxed_positions(configuration, built)
+    if configuration.relaxes and configuration.linkers:
+        # Linkers may begin elsewhere now.
+        simulation.context.reinitialize()
+    simulation.context.setPositions(positions)
+    return positions
+
+
+@contextlib.contextmanager
+def steps():
+    """InstabilityError in place of any other error with which OpenMM ends a step."""
+    try:
+        yield
+    except openmm.OpenMMException as error:
+        raise InstabilityError(f"A step cannot be taken: {error}.") from None
 
 
 def check_step(configuration, seconds=20.0, say=lambda message: None):
@@ -153,10 +176,11 @@ def check_step(configuration, seconds=20.0, say=lambda message: None):
     """
     settings = configuration.simulation
     built = build_system(configuration, settings.engine, settings.seed)
+    refuse_countless_events(configuration, built.filaments)
     positions = relaxed_positions(configuration, built, say)
     platform, properties = _platform(settings, built.filaments.engine)
     # An interruption that Python raises within a step may end as an error of OpenMM.
-    with _Signals() as signals:
+    with _Signals() as signals, steps():
         check = check_time_step(
             built.filaments,
             built.system,
@@ -243,7 +267,7 @@ def _restore(context, checkpoint, engine):
         ) from None
 
 
-class _Recorder:
+class Recorder:
     # Advances the simulation and writes frames, energies, linkers and checkpoints at their times.
 
     def __init__(self, configuration, filaments, simulation, directory, checkpoint):
@@ -258,6 +282,19 @@ class _Recorder:
         self._has_forces = bool(configuration.walls), configuration.contacts is not None
 
     def run_to_end(self):
+        settings = self._settings
+        with self.files(), _Signals() as signals:
+            if self._checkpoint is None:
+                self._report()
+            self._progress = RunProgress(settings.steps, self._step, settings.time_step)
+            try:
+                self._advance(signals)
+            finally:
+                self._progress.finish(self._step)
+
+    @contextlib.contextmanager
+    def files(self):
+        """A context in which the files of the run are open."""
         settings, begun = self._settings, self._checkpoint
         self._trajectory = TrajectoryFile(
             self._directory.trajectory,
@@ -278,26 +315,56 @@ class _Recorder:
             files.append(self._pulling)
         self._forces = ForceTables(self._directory, *self._has_forces, begun and begun.force_sizes)
         files.append(self._forces)
-        with contextlib.ExitStack() as stack, _Signals() as signals:
+        with contextlib.ExitStack() as stack:
             for file in files:
                 stack.enter_context(contextlib.closing(file))
-            if self._checkpoint is None:
+            yield
+
+    def seconds_of_run(self, most):
+        """Seconds that a step takes at first, and all steps, reports and checkpoints of the run.
+
+        Steps are taken for ``most`` seconds, but no more than the run has; then a few reports and a checkpoint. Where
+        linkers bring filaments together, steps become slower: by a power of their number, which is that of the second
+        half of those that are taken to the first, and threefold in all at most.
+        """
+        settings, moving, chunk = self._settings, self._moving, 1
+        with self.files():
+            moving.move(self._simulation.context, 0)
+            self._timed_steps(1)  # which sets things up
+            self._report()
+            start, first, work = time.monotonic(), self._step, [(0, time.process_time())]
+            while self._step < max(settings.steps, 2) and time.monotonic() - start < most:
+                chunk = self._timed_steps(self._limited(chunk))
+                if moving and self._step % moving.interval == 0:
+                    moving.move(self._simulation.context, self._step)
+                work.append((self._step - first, time.process_time()))
+            taken = self._step - first
+            step = (time.monotonic() - start) / taken
+            start = time.monotonic()
+            for _ in range(_MEASURED_REPORTS):
                 self._report()
-            self._progress = RunProgress(settings.steps, self._step, settings.time_step)
-            try:
-                self._advance(signals)
-            finally:
-                self._progress.finish(self._step)
+            report = (time.monotonic() - start) / _MEASURED_REPORTS
+            start = time.monotonic()
+            self._write_checkpoint()
+            checkpoint = time.monotonic() - start
+        slower = _growth(work, settings.steps / taken) if self._filaments.linkers else 1.0
+        reports = settings.steps // settings.steps_per_report + 1
+        checkpoints = math.ceil(settings.steps / settings.steps_per_checkpoint)
+        return step, settings.steps * slower * step + reports * report + checkpoints * checkpoint
+
+    def _limited(self, chunk):
+        # Up to the next report, or motion of tethers.
+        limits = [self._settings.steps_per_report - self._step % self._settings.steps_per_report]
+        if self._moving:
+            limits.append(self._moving.interval - self._step % self._moving.interval)
+        return min(chunk, *limits)
 
     def _advance(self, signals):
         settings, moving = self._settings, self._moving
         chunk = 1
         moving.move(self._simulation.context, self._step)
         while self._step < settings.steps:
-            limits = [settings.steps_per_report - self._step % settings.steps_per_report]
-            if moving:
-                limits.append(moving.interval - self._step % moving.interval)
-            chunk = self._timed_steps(min(chunk, *limits))
+            chunk = self._timed_steps(self._limited(chunk))
             if self._step % settings.steps_per_report == 0:
                 self._report()
             if moving and self._step % moving.interval == 0:
@@ -395,6 +462,15 @@ class _Recorder:
                 state=self._simulation.context.createCheckpoint(),
             )
         )
+
+
+def _growth(work, longer):
+    # By which factor steps of a run so many times longer are slower, on average, by numbers of steps and the work until
+    # then.
+    steps, seconds = np.array(work).T
+    half, whole = np.interp(0.5 * steps[-1], steps, seconds - seconds[0]), seconds[-1] - seconds[0]
+    power = np.log2(whole / half) - 1.0 if half > 0.0 else 0.0
+    return min(_MOST_GROWTH, max(1.0, longer) ** power) if power > _LEAST_POWER else 1.0
 
 
 class _Signals:

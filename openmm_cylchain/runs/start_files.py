@@ -1,6 +1,7 @@
 """Files that filaments start from: arrays, structure files, frames of trajectories."""
 
 import hashlib
+import os
 from pathlib import Path
 
 import mdtraj
@@ -21,7 +22,7 @@ _STRUCTURES = (".cif", ".pdb")
 def find_start_file(folder, name):
     """The path of a file that a configuration in a folder names: the copy that a run has kept, if there is one."""
     copy = Path(folder) / COPIES / Path(name).name
-    return copy if copy.is_file() else Path(folder) / name
+    return copy if os.path.isfile(copy) else Path(folder) / name
 
 
 def digest_of(path):
@@ -62,7 +63,7 @@ def read_start(folder, place, name, topology, frame, numbers, type_name):
     suffix = path.suffix.lower()
     if suffix not in (*_ARRAYS, *_TRAJECTORIES, *_STRUCTURES):
         raise place.error(f"must be a {', '.join((*_ARRAYS, *_STRUCTURES, *_TRAJECTORIES))} file, but is {name!r}.")
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise place.error(f"{str(path)!r} does not exist.")
     if (suffix in _TRAJECTORIES) != (topology is not None):
         raise place.error(f"{name!r}: give a topology for a trajectory, and only for one.")

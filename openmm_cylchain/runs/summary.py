@@ -10,6 +10,7 @@ import numpy as np
 from .. import theory
 from ..analysis.bending import bending_drift, joint_cosines, persistence_length
 from ..analysis.filament_shapes import control_point_positions, end_to_end_vectors, node_positions, segment_lengths
+from ..analysis.run_topology import read_topology
 from ..analysis.statistics import FEWEST_FRAMES_OF_DRIFT, SIGNIFICANT_DRIFT, mean_with_error, statistical_inefficiency
 from ..bead_spring.bead_spring_type import BEAD_BONDS
 from ..beams.curve import element_energies
@@ -17,6 +18,7 @@ from ..errors import EquilibrationWarning, InputError
 from ..filaments.beam_elements import BEAM_ELEMENTS
 from ..filaments.equilibrium import SegmentLengthDistribution
 from ..filaments.straight_segments import STRAIGHT_SEGMENTS
+from ..output.dcd_frames import DCDFrames
 from ..theory import beam_elements
 from ..units.quantities import thermal_energy
 from .silence import silenced_c_library
@@ -85,7 +87,7 @@ class GroupSummary:
 
 def load_trajectory(configuration, directory):
     """The trajectory of a run as an mdtraj.Trajectory with its times in ps."""
-    topology = mdtraj.load_topology(str(directory.topology))
+    topology = read_topology(directory.topology, DCDFrames(directory.trajectory).particles)
     with silenced_c_library():
         trajectory = mdtraj.load_dcd(str(directory.trajectory), top=topology)
     settings = configuration.simulation

@@ -33,6 +33,7 @@ _COLOURS = (*FILAMENT_COLORS, "#CC79A7", "#000000")
 _EXACT_COLOUR = "0.25"  # Of a line that is that of several kinds of filaments.
 _STRETCHING_COLOUR, _BENDING_COLOUR = "#D55E00", "#0072B2"
 _FONT_SIZE = 11
+_LEAST_ANGLE = 1e-9
 
 
 def write_figure(configuration, directory, trajectory):
@@ -370,7 +371,8 @@ def _draw_joint_angles(axis, groups, temperature, trajectory):
 
 
 def _draw_exact_joint_angles(axis, group, temperature, widest, colour):
-    angle = np.linspace(0.0, np.pi, 20001)
+    # As fine near zero as the stiffest joints need.
+    angle = np.geomspace(_LEAST_ANGLE, np.pi, 20001)
     density = np.ones_like(angle) if group.planar else np.sin(angle)
     if group.type.bending_rigidity > 0:
         with np.errstate(divide="ignore"):

@@ -101,7 +101,8 @@ class Entries:
             message = str(error)
             named = {name for name in self._values if re.search(rf"\b{name}\b", message)}
             path = (*self.place.path, *named) if len(named) == 1 else self.place.path
-            text = message if message.startswith(self.label) else f"{self.label} {message}"
+            # Messages may begin with the name of the table, with or without its colon.
+            text = message if message.startswith(self.label.rstrip(":")) else f"{self.label} {message}"
             raise ConfigurationError(text, path) from None
 
 

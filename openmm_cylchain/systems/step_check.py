@@ -49,6 +49,7 @@ from ..units.quantities import DIMENSIONLESS, positive, thermal_energy, whole_nu
 from ..units.text import format_time
 from ..units.types import Numbers, Scalar, Vectors
 from .filaments import Filaments
+from .refused_context import refusal
 from .step_check_comparison import ExactAverages, bends_grow, compare, compare_growth, find_strained
 from .step_check_observables import STEPS_PER_FRAME, Probe
 from .step_check_results import StepCheck
@@ -289,8 +290,7 @@ class _Run:
         try:
             self.context = openmm.Context(self._system, self._integrator, *arguments)
         except openmm.OpenMMException as error:
-            name = "OpenMM" if platform is None else f"The platform {platform.getName()}"
-            raise InputError(f'{name} cannot run this System: {error}. "Reference" always can.') from None
+            raise refusal(error, self._system, self._integrator, platform) from None
         self.context.setPositions(positions)
         self.context.computeVirtualSites()
         self._before = None

@@ -103,7 +103,7 @@ def parse_quantity(text: str, target: unit.Unit, name: str) -> float:
         raise InputError(f"{name} must be finite, but is {text!r}.")
     if not unit:
         raise InputError(f"{name} needs a unit, {written}, but is {text!r}.")
-    return _convert(number, _parse_unit(unit, target, name), target, name)
+    return _convert(number, unit, target, name)
 
 
 def _parse_unit(unit, target, name):
@@ -121,22 +121,25 @@ def _parse_unit(unit, target, name):
     raise InputError(f'{name} has the unit {unit!r}: {reason}. Write a {kind} as in "{written}".')
 
 
-def _convert(number, unit, target, name):
-    registry = _registry()
+def _convert(number, written, target, name):
+    registry, unit = _registry(), _parse_unit(written, target, name)
     # pint reads "1/ps", not "/ps".
     symbol = re.sub("^/", "1/", target.get_symbol())
-    quantity = registry.Quantity(number, unit)
-    candidates = [quantity]
-    if "mol" in symbol or target is NUMBER_DENSITY:
-        candidates.append(quantity.to_base_units() * (AVOGADRO / registry.mole))
-    elif "Da" in symbol:
-        candidates.append(quantity.to_base_units() * (registry.mole / AVOGADRO))
-    for candidate in candidates:
-        if candidate.is_compatible_with(symbol):
-            # 15 digits drop the rounding noise of the conversion: 10 ns are 10000 ps.
-            return float(f"{candidate.m_as(symbol):.15g}")
-    kind, written = _EXAMPLES[target]
-    raise InputError(f'{name} has the unit {unit:~}, which is not one of {kind}: write it as in "{written}".')
+    try:
+        quantity = registry.Quantity(number, unit)
+        candidates = [quantity]
+        if "mol" in symbol or target is NUMBER_DENSITY:
+            candidates.append(quantity.to_base_units() * (AVOGADRO / registry.mole))
+        elif "Da" in symbol:
+            candidates.append(quantity.to_base_units() * (registry.mole / AVOGADRO))
+        for candidate in candidates:
+            if candidate.is_compatible_with(symbol):
+                # 15 digits drop the rounding noise of the conversion: 10 ns are 10000 ps.
+                return float(f"{candidate.m_as(symbol):.15g}")
+    except Exception:  # noqa: S110 - logarithmic units, such as decibels, make pint raise anything as well.
+        pass
+    kind, example_of_kind = _EXAMPLES[target]
+    raise InputError(f'{name} has the unit {written}, which is not one of {kind}: write it as in "{example_of_kind}".')
 
 
 _TIME_UNITS = (("s", 1e12), ("ms", 1e9), ("us", 1e6), ("ns", 1e3), ("ps", 1.0))

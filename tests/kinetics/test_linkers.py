@@ -101,6 +101,11 @@ def test_concentrations_take_units():
         ({"site_spacing": -8.0}, "site_spacing must be positive"),
         ({"binds_to": [3]}, "binds_to"),
         ({"binds_to": []}, "binds_to"),
+        ({"binds_to": 3}, "binds_to must be types of filaments or their names, but is 3"),
+        *(({name: None}, f"{name} must be a number") for name in ("binding_rate", "reach", "unbinding_rate")),
+        *(({name: None}, f"{name} must be a number") for name in ("strain_share", "catch_rate", "speed")),
+        ({"walks_backward": None}, "walks_backward must be True or False, but is None"),
+        ({"at_end": None}, "release, hold"),
     ],
 )
 def test_bad_hands_are_refused(changed, message):

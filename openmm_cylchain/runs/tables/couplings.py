@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from ...filaments.attachments import lengths_along
 from ...units import quantities as units
 from ..keys import (
     REQUIRED,
@@ -340,6 +341,6 @@ def check_place(place, groups):
     group = group_of(place["filament"], groups)
     if "segment" in place and not -group.segments <= place["segment"] < group.segments:
         raise place.at("segment").error(f"{place['segment']} does not exist; there are {group.segments}.")
-    length = float(group.type.segment_lengths(group.segments, group.closed).sum())
+    length = float(lengths_along(group.type, group.segments, group.closed).sum())
     if "arc_length" in place and place["arc_length"] > length * (1.0 + 1e-9):
         raise place.at("arc_length").error(f"is beyond the end of the filament, which is {length:g} nm long.")

@@ -41,7 +41,7 @@ FILAMENT = TableKind(
             "segments",
             Either(((list, Listing(_SEGMENTS, "whole numbers", "[8, 10, 12]")), (object, _SEGMENTS))),
             None,
-            "How many segments a filament has; a list gives the numbers that filaments have in turn.",
+            "How many segments a filament has; of a list, equal shares have each number, in the order of the list.",
         ),
         Key("count", Whole(1, MOST_NODES, "10"), None, "How many there are; 1 if not given."),
         Key(

@@ -106,6 +106,12 @@ class Region:
 
     def draw(self, generator):
         """A random point in it: a (3,) array in nm."""
+        if isinstance(self._shape, Cylinder):
+            # A long one that is tilted fills next to nothing of the box around it.
+            shape, (_, side, other) = self._shape, np.linalg.svd(self._shape.axis[None])[2]
+            radius, angle = shape.radius * np.sqrt(generator.uniform()), generator.uniform(0.0, 2.0 * np.pi)
+            along = self._length * generator.uniform(-0.5, 0.5)
+            return shape.point + along * shape.axis + radius * (np.cos(angle) * side + np.sin(angle) * other)
         while True:
             point = generator.uniform(self._lower, self._upper)
             if self.contains(point):
