@@ -13,8 +13,8 @@ using namespace cylchain;
 using namespace std;
 
 /**
- * In an implicit step, a periodic box must be wider than twice the sum of the longest segment and so many of the
- * largest diameters: contacts are looked for beyond the surfaces of segments, and on their way.
+ * In an implicit step, a periodic box must be wider than twice the sum of a segment and so many of its diameters:
+ * contacts are looked for beyond the surfaces of segments, and on their way.
  */
 static const double DIAMETERS_OF_BOX = 2;
 
@@ -124,29 +124,45 @@ void CylinderChainContactForceImpl::refuseChains(const CylinderChainDescription&
 void CylinderChainContactForceImpl::refuseBox(ContextImpl& context, const CylinderChainDescription& chains) const {
     if (!periodic)
         return;
-    double longest = 0, longestElement = 0, diameter = 0;
+    // How long the segment is that begins at a particle.
+
+    map<int, double> lengths;
+    double longestElement = 0;
     for (const Chain& chain : chains.getChains())
-        for (const Segment& segment : chain.segments)
-            longest = max(longest, segment.restLength);
+        for (size_t i = 0; i < chain.segments.size(); i++)
+            lengths[chain.nodes[i]] = chain.segments[i].restLength;
     for (const BeamChain& beam : chains.getBeams())
         longestElement = max(longestElement, beam.elementLength);
-    for (const CapsuleOnCurve& capsule : onCurves)
-        longest = max(longest, longestElement/capsule.pieces);
-    for (const Capsule& capsule : search->getSystem().capsules)
-        diameter = max(diameter, 2*capsule.radius);
+    const vector<Capsule>& capsules = search->getSystem().capsules;
+    for (const CapsuleOnCurve& own : onCurves)
+        lengths[capsules[own.capsule].first] = longestElement/own.pieces;
+    double size = 0, length = 0, diameter = 0;
+    for (const Capsule& capsule : capsules) {
+        const auto found = capsule.second < 0 ? lengths.end() : lengths.find(capsule.first);
+        const double own = found == lengths.end() ? 0 : found->second;
+        if (own+DIAMETERS_OF_BOX*2*capsule.radius <= size)
+            continue;
+        size = own+DIAMETERS_OF_BOX*2*capsule.radius;
+        length = own;
+        diameter = 2*capsule.radius;
+    }
     Vec3 a, b, c;
     context.getPeriodicBoxVectors(a, b, c);
     double narrowest = INFINITY;
     for (const Vec3& face : {b.cross(c), c.cross(a), a.cross(b)})
         narrowest = min(narrowest, a[0]*b[1]*c[2]/sqrt(face.dot(face)));
-    const double needed = 2*(longest+DIAMETERS_OF_BOX*diameter);
+    const double needed = 2*size;
     if (narrowest >= needed)
         return;
     stringstream message;
     message << "The periodic box is too small for contacts in implicit steps: it is " << narrowest <<
-            " nm wide between two of its faces, but segments of " << longest << " nm with contacts of " << diameter <<
-            " nm need twice their length and " << DIAMETERS_OF_BOX << " diameters, " << needed <<
-            " nm. Take a larger box or shorter segments";
+            " nm wide between two of its faces, but ";
+    if (length > 0)
+        message << "segments of " << length << " nm with contacts of " << diameter << " nm need twice the sum of their "
+                "length and " << DIAMETERS_OF_BOX << " diameters, ";
+    else
+        message << "spheres of " << diameter << " nm need " << 2*DIAMETERS_OF_BOX << " diameters, ";
+    message << needed << " nm. Take a larger box" << (length > 0 ? " or shorter segments" : "");
     throw OpenMMException(message.str());
 }
 
