@@ -1,6 +1,6 @@
 """Insertion of filaments into a Topology and a System that may hold other things already."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -75,30 +75,6 @@ def add_to_topology(topology: "app.Topology", filament: Filament, name: str, att
         topology.addBond(first, second)
     if filament.closed:
         topology.addBond(atoms[nodes - 1], atoms[0])
-
-
-def add_noninteracting_entries(system: openmm.System, existing: int, coinciding: Iterable[tuple[int, int]]) -> None:
-    """Give forces that ask for parameters of every particle those of particles that do not interact.
-
-    ``existing`` particles have parameters; of the new ones, pairs that are ``coinciding`` may be in one place.
-    """
-    missing, coinciding = system.getNumParticles() - existing, list(coinciding)
-    for force in system.getForces():
-        if isinstance(force, openmm.NonbondedForce):
-            for _ in range(missing):
-                force.addParticle(0.0, 1.0, 0.0)
-            # Particles in one place would give 0/0, even if they do not interact.
-            for pair in coinciding:
-                force.addException(*pair, 0.0, 1.0, 0.0)
-        elif isinstance(force, openmm.CustomNonbondedForce):
-            _exclude_from_custom_nonbonded(force, existing, missing)
-
-
-def _exclude_from_custom_nonbonded(force, existing, missing):
-    for _ in range(missing):
-        force.addParticle([0.0] * force.getNumPerParticleParameters())
-    if missing and force.getNumInteractionGroups() == 0:
-        force.addInteractionGroup(range(existing), range(existing))
 
 
 def set_box_vectors(system: openmm.System, box_vectors: BoxVectors) -> list[openmm.Vec3]:
