@@ -10,7 +10,7 @@ from openmm import unit
 from ..couplings.periodicity import is_periodic
 from ..couplings.stiff_joints import warn_of_stiff_joints
 from ..engine_choice import default_scheme
-from ..engines.description import describe_chains, filament_label
+from ..engines.description import describe_chains, filament_label, refuse_constraints
 from ..engines.protocol import IntegratorSettings
 from ..errors import InputError
 from ..filaments.attachments import add_virtual_site, attachment_positions, neighbors
@@ -240,11 +240,12 @@ class Filaments(TiedFilaments):
         Raises
         ------
         InputError
-            If there are no filaments, they are not in the System, particles lack a friction, or contacts or walls are
-            in two stages.
+            If there are no filaments, they are not in the System, it has constraints, particles lack a friction, or
+            contacts or walls are in two stages.
         """
         if system is not None:
             self._refuse_if_not_in(system)
+            refuse_constraints(system, self._placed())
         return recommended_step_of(
             self,
             default_scheme(self._engine_name) if scheme is None else scheme,
@@ -338,12 +339,13 @@ class Filaments(TiedFilaments):
         ------
         InputError
             If the engine does not have the scheme or the precision, all filaments have beam elements and the precision
-            is "mixed", contacts or walls are in two stages, or the System does not hold the filaments.
+            is "mixed", contacts or walls are in two stages, the System has constraints or does not hold the filaments.
         """
         step_size = as_step(step_size)
         check_precision(precision)
         refuse_mixed_precision_of_beams(self, precision)
         self._refuse_if_not_in(system)
+        refuse_constraints(system, self._placed())
         scheme = default_scheme(self._engine_name) if scheme is None else scheme
         check_scheme(scheme)
         if scheme == MODES:
