@@ -86,7 +86,7 @@ def run(configuration, output, resume=False):
             if resume:
                 print("No checkpoint yet: starting from the beginning.")
             positions = relaxed_positions(configuration, built)
-            write_topology(directory, simulation.topology, simulation.system, positions)
+            write_topology(directory, simulation.topology, filaments, simulation.system, positions)
             describe(configuration, filaments, simulation.system, simulation.topology).write(directory.description)
             simulation.context.setPositions(positions)
             _write_crosslinks(directory, simulation)

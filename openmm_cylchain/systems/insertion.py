@@ -49,14 +49,19 @@ def check_force_groups(*groups: int) -> None:
 def add_nodes_to_system(system: openmm.System, filament: Filament) -> tuple[IntArray, IntArray]:
     """Add the nodes of a Filament to a System, and behind them the control points of beam elements: the indices of
     both."""
-    masses = filament.type.node_masses(len(filament.positions), filament.closed)
-    if filament.control_points is not None:
-        masses *= 0.5
-    control_masses = masses[: 0 if filament.control_points is None else len(masses)].copy()
+    masses, control_masses = filament_masses(filament)
     masses[list(filament.clamped)] = 0.0
     control_masses[list(filament.clamped_tangents)] = 0.0
     nodes, control_points = ([system.addParticle(mass) for mass in own] for own in (masses, control_masses))
     return np.array(nodes), np.array(control_points, dtype=int)
+
+
+def filament_masses(filament: Filament) -> tuple[FloatArray, FloatArray]:
+    """Masses in Da of the nodes of a Filament, and of their control points, also of those that are clamped."""
+    masses = filament.type.node_masses(len(filament.positions), filament.closed)
+    if filament.control_points is None:
+        return masses, masses[:0]
+    return 0.5 * masses, 0.5 * masses
 
 
 def add_to_topology(topology: "app.Topology", filament: Filament, name: str, attachment_names: Sequence[str]) -> None:
