@@ -39,14 +39,14 @@ class PlanarSegments:
     def crossing(self, number: int, nodes: FloatArray, closed: bool) -> PlanarCrossing | None:
         """The first segment of a filament, if any, that crosses another one of it or one of those that are there."""
         starts, vectors = _segments(nodes, closed)
-        every = [(number, segment) for segment in range(len(starts))]
         for segment, (start, vector) in enumerate(zip(starts, vectors)):
             found = self._crossed(start, vector, self._starts, self._vectors)
             if len(found):
-                return PlanarCrossing(*self._numbers[found[0]], number, segment)
+                there, one = self._numbers[found[0]]
+                return PlanarCrossing(there, one, number, segment)
             for other in segment + 1 + self._crossed(start, vector, starts[segment + 1 :], vectors[segment + 1 :]):
                 if not _are_neighbors(segment, other, len(starts), closed):
-                    return PlanarCrossing(*every[segment], *every[other])
+                    return PlanarCrossing(number, segment, number, other)
         return None
 
     def _crossed(self, start, p, starts, q):

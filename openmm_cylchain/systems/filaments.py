@@ -145,7 +145,8 @@ class Filaments(TiedFilaments):
         InputError
             If there are no filaments, or they are in a System; Topology, System, positions and entries of forces do not
             match; or a force has no entries that leave all else as it is: a GBSAOBCForce with a surface energy,
-            AmoebaGeneralizedKirkwoodForce, ATMForce, or, with beads, one that divides by all distances.
+            AmoebaGeneralizedKirkwoodForce, ATMForce, and, where particles are in one place, or may be with beads, those
+            that divide by all distances.
         """
         if not self._filaments:
             raise InputError("There are no filaments to add: call add_straight, add_nodes or add_equilibrium first.")
@@ -153,7 +154,7 @@ class Filaments(TiedFilaments):
             raise InputError("These filaments are already in a System; make another Filaments for another System.")
         positions = check_target(topology, system, positions)
         check_force_groups(stretching_force_group, bending_force_group)
-        refuse_forces(system, may_coincide=bool(self._attachments))
+        refuse_forces(system, positions, self._filaments, may_coincide=bool(self._attachments))
         self._nodes, self._control_points = [], []
         self._attachment_indices = np.zeros(len(self._attachments), dtype=int)
         everything = [positions]

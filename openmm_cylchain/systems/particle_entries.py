@@ -4,12 +4,16 @@ Most such forces have parameters of a particle that does not interact. A CustomN
 parameter more, which their energies are asked by; energies of what was there stay as they are to the last digit.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 
+import numpy as np
 import openmm
 
 from ..couplings.crosslinks import Crosslinks
+from ..couplings.periodicity import default_box, is_periodic
+from ..engines.description import filament_label
 from ..errors import InputError
+from ..filaments.filament import Filament
 from ..units.types import FloatArray
 
 _TAKES_PART = "takes_part"
@@ -29,13 +33,18 @@ _REFUSED = {
 }
 
 
-def refuse_forces(system: openmm.System, may_coincide: bool) -> None:
+def refuse_forces(
+    system: openmm.System, positions: FloatArray, filaments: Sequence[Filament], may_coincide: bool
+) -> None:
     """Raise InputError if filaments cannot have entries without interaction in a force of a System.
 
     Parameters
     ----------
     system : openmm.System
         Without the filaments.
+    positions : (particles, 3) array
+        In nm, of what is there.
+    filaments : sequence of Filament
     may_coincide : bool
         Whether particles of filaments may be in one place, as beads at nodes are.
     """
@@ -49,6 +58,8 @@ def refuse_forces(system: openmm.System, may_coincide: bool) -> None:
                     f"{label} has entries for {count} particles, but the System has {system.getNumParticles()} "
                     "particles: complete it before filaments are added."
                 )
+            if count is not None:
+                _refuse_same_places(system, positions, filaments, label)
 
 
 def _refuse_force(force, label, may_coincide):
@@ -69,6 +80,28 @@ def _refuse_force(force, label, may_coincide):
             f"{label} divides by distances of all pairs, but beads and attachment points may be where nodes are. Leave "
             "them out: capsule_contact_force and crosslinks need none."
         )
+
+
+def _refuse_same_places(system, positions, filaments, label):
+    # Nodes and particles that are there; control points are beside nodes.
+    places = np.concatenate([positions, *(filament.positions for filament in filaments)])
+    if is_periodic(system):
+        places = np.round(places @ np.linalg.inv(default_box(system)), 9) % 1.0
+    _, first, which = np.unique(np.round(places, 9), axis=0, return_index=True, return_inverse=True)
+    found = np.flatnonzero(first[which.reshape(-1)] != np.arange(len(places)))
+    found = found[found >= len(positions)]
+    if not len(found):
+        return
+    owners = [(number, node) for number, own in enumerate(filaments) for node in range(len(own.positions))]
+    number, node = owners[found[0] - len(positions)]
+    other = first[which.reshape(-1)[found[0]]]
+    where = f"particle {other}"
+    if other >= len(positions):
+        where = "node {1} of filament {0}".format(*owners[other - len(positions)])
+    raise InputError(
+        f"{filament_label(number, filaments[number])}: node {node} is in the same place as {where}, but {label} "
+        "divides by the distance of all particles, also of those that do not interact. Move one of them."
+    )
 
 
 def _has_pairs_without_exclusions(force):

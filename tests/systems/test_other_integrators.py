@@ -5,7 +5,7 @@ import openmm
 import pytest
 from openmm import app
 
-from openmm_cylchain import Crosslinks, FilamentType, Filaments, analysis, theory
+from openmm_cylchain import Crosslinks, Filaments, FilamentType, analysis, theory
 from support.solvent import VISCOSITY
 
 TEMPERATURE = 300.0
@@ -50,7 +50,7 @@ def simulated(steps, interval):
     topology, system, positions = water()
     filaments = Filaments(VISCOSITY, TEMPERATURE)
     for number in range(FILAMENTS):
-        filaments.add_equilibrium(THREAD, SEGMENTS, seed=number + 1, start=[0.1 * number, 0.3, 0.2])
+        filaments.add_equilibrium(THREAD, SEGMENTS, seed=number + 1, start=[0.09 * number, 0.3, 0.2])
     positions = filaments.add_to(topology, system, positions, CHAIN_GROUP, CHAIN_GROUP)
     # A spring to a molecule at one end changes no free chain.
     links = Crosslinks(100.0, 0.3)
@@ -89,7 +89,6 @@ def test_equilibrium_beside_rigid_water_is_that_of_theory():
         (*analysis.statistics.mean_with_error(energies), energy),
         (independent.mean(), independent.std(ddof=1) / np.sqrt(FILAMENTS), square),
     ):
-        print(mean, error, exact)
         # 5 % would fail.
         assert error < 0.05 / 4 * exact
         assert abs(mean - exact) < 4 * error

@@ -1,5 +1,7 @@
 """Forces that ask for an entry of every particle: filaments join them and change nothing else, or they are refused."""
 
+import re
+
 import numpy as np
 import openmm
 import pytest
@@ -235,6 +237,31 @@ def test_what_cannot_be_filled_is_refused_before_anything_changes():
             with_filament(topology, system)
         assert openmm.XmlSerializer.serialize(system) == before
         assert topology.getNumAtoms() == COUNT
+
+
+@pytest.mark.parametrize(
+    "nodes, other, box",
+    [
+        ([[5, 5, 5], [0.2, 0, 0]], "node 1 is in the same place as particle 1", None),
+        ([[-9.0, 0.22, 3.0], [5, 5, 5]], "node 0 is in the same place as particle 2", 3.0),
+        ([[7, 7, 7], [1, 1, 1]], "node 0 is in the same place as node 1 of filament 0", None),
+    ],
+)
+def test_nodes_in_the_place_of_another_particle_are_refused(nodes, other, box):
+    """OpenMM gives no energy then, or crashes on its CPU platform."""
+    for force, refused in ((nonbonded(), True), (openmm.HarmonicBondForce(), False)):
+        topology, system = system_with(force)
+        if box:
+            system.setDefaultPeriodicBoxVectors(*box * np.eye(3))
+        filaments = Filaments(VISCOSITY, 300.0)
+        filaments.add_nodes(DSDNA, [[3.5, 3, 3], [7, 7, 7]])
+        filaments.add_nodes(DSDNA, nodes)
+        if not refused:
+            filaments.add_to(topology, system, POSITIONS)
+            continue
+        with pytest.raises(InputError, match=f"{re.escape('Filament 1 (DNA)')}: {other}"):
+            filaments.add_to(topology, system, POSITIONS)
+        assert system.getNumParticles() == COUNT
 
 
 def test_every_force_of_openmm_with_entries_is_known():
