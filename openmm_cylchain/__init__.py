@@ -50,7 +50,7 @@ from .kinetics.presets import ALPHA_ACTININ, DYNEIN, FILAMIN, KINESIN_1, MYOSIN_
 from .mechanics.flow import Flow
 from .mechanics.friction import EndCorrections, SegmentFriction, stokes_friction
 from .output.reporters import CrosslinkReporter, FilamentReporter, LinkerReporter, TensionReporter, TetherReporter
-from .output.structure_files import write_lammps_data, write_psf
+from .output.structure_files import write_lammps_data, write_mmcif, write_psf
 from .systems.filaments import Filaments
 from .systems.filaments_in_context import FilamentsInContext
 from .systems.periodic import make_trajectory_whole, make_whole, remove_jumps
@@ -153,6 +153,7 @@ __all__ = [
     "wall_force",
     "wall_forces",
     "write_lammps_data",
+    "write_mmcif",
     "write_psf",
 ]
 

@@ -272,7 +272,7 @@ class Run:
         return chosen
 
     def mdanalysis(self) -> Any:
-        """An ``MDAnalysis.Universe`` with times in ps, bonds, radii, the periodic box, and positions in angstrom.
+        """An ``MDAnalysis.Universe`` with times in ps, bonds, radii, masses, the box, and positions in angstrom.
 
         Each filament is a segment (``segid``) with a residue for each node. All frames are held in memory.
 
@@ -284,6 +284,7 @@ class Run:
         try:
             import MDAnalysis
             from MDAnalysis.coordinates.memory import MemoryReader
+            from MDAnalysis.topology.PSFParser import PSFParser
         except ImportError:
             raise InputError("A Universe needs MDAnalysis: install it by pip install MDAnalysis.") from None
         topology = read_topology(self._files.topology, self._description.particles)
@@ -304,6 +305,7 @@ class Run:
         universe.add_TopologyAttr("names", names)
         universe.add_TopologyAttr("types", [self._type_names.get(i, name) for i, name in enumerate(names)])
         universe.add_TopologyAttr("radii", radii)
+        universe.add_TopologyAttr("masses", PSFParser(str(self._files.topology_psf)).parse().masses.values)
         universe.add_TopologyAttr("resnames", [residue.name for residue in residues])
         universe.add_TopologyAttr("resids", [residue.resSeq for residue in residues])
         universe.add_TopologyAttr("segids", [f"F{number}" for number in range(topology.n_chains)])

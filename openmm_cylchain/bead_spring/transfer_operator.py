@@ -301,11 +301,13 @@ def _invert(density, probability):
     left, right, area = density[draw, cell], density[draw, cell + 1], areas[draw, cell]
     wanted = target - (cumulative[draw, cell] - area)
     second, third = 3.0 * area - 2.0 * left - right, left + right - 2.0 * area
-    place = np.clip(wanted / np.maximum(area, 1e-300), 0.0, 1.0)
+    place = np.minimum(np.maximum(wanted / np.maximum(area, 1e-300), 0.0), 1.0)
     for _ in range(_NEWTON_STEPS):
         excess = place * (left + place * (second + place * third)) - wanted
         slope = left + place * (2.0 * second + 3.0 * place * third)
-        place = np.clip(place - excess / np.maximum(slope, 1e-300), 0.0, 1.0)
+        before, place = place, np.minimum(np.maximum(place - excess / np.maximum(slope, 1e-300), 0.0), 1.0)
+        if (place == before).all():
+            break
     return cell + place
 
 

@@ -28,7 +28,6 @@ from .description import (
     filament_label,
     fixed_nodes,
     friction_of_segments,
-    refuse_constraints,
 )
 from .protocol import Engine
 
@@ -117,7 +116,6 @@ class CompiledEngine(Engine):
 
     def create_integrator(self, system, placed, settings):
         """Create a NativeIntegrator."""
-        refuse_constraints(system, placed)
         fixed_nodes(system, placed)
         others, frictions = describe_other_particles(system, placed.nodes, settings.particle_friction)
         integrator = NativeIntegrator(

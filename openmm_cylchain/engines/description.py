@@ -40,8 +40,8 @@ def refuse_constraints(system, placed):
                     "Segments are held by stiff springs, not by constraints: remove it."
                 )
     raise InputError(
-        f"Particles {first} and {second} have a System constraint, which the dynamics of filaments cannot keep: "
-        "replace it by a bond."
+        f"Particles {first} and {second} have a System constraint, which the integrators of filaments cannot keep. "
+        "Take openmm.LangevinMiddleIntegrator, which keeps it, and filaments in equilibrium, or replace it by a bond."
     )
 
 

@@ -11,7 +11,6 @@ from .description import (
     describe_chains,
     describe_lengths,
     filament_label,
-    refuse_constraints,
 )
 from .portable_displacements import ChainDisplacements, add_redistribution
 from .portable_forces import (
@@ -55,7 +54,6 @@ class PortableEngine(Engine):
                 "The portable engine computes filaments in double precision alone: use the compiled engine, or leave "
                 "precision out."
             )
-        refuse_constraints(system, placed)
         filaments = placed.filaments
         computation = ChainDisplacements(
             describe_chains(system, placed),

@@ -1,10 +1,13 @@
 """Files with the bonds of a Topology, for programs that show trajectories.
 
-A PSF file is what VMD loads before a DCD or XTC trajectory, a LAMMPS data file what OVITO does. Both hold everything
-that is in the Topology, filaments and other molecules alike.
+A PSF file is what VMD loads before a DCD or XTC trajectory, a LAMMPS data file what OVITO does, an mmCIF file what
+mdtraj does. They hold everything that is in the Topology, filaments and other molecules alike.
 """
 
+import io
 import re
+from collections import Counter
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +16,7 @@ from openmm import unit
 
 from ..errors import InputError
 from ..units.quantities import LENGTH, MASS, in_units_of
-from ..units.types import BoxVectors, Vectors
+from ..units.types import BoxVectors, Numbers, Vectors
 from ..version import __version__
 from .files import TextFile
 
@@ -34,7 +37,59 @@ _PSF_EMPTY_SECTIONS = (
 _ANGSTROM = 10.0  # in a nanometre
 
 
-def write_psf(topology: "app.Topology", file: TextFile, system: openmm.System | None = None) -> None:
+def write_mmcif(topology: "app.Topology", positions: Vectors, file: TextFile) -> None:
+    """Write an mmCIF file with the ids of chains and residues, which readers such as mdtraj find bonds by.
+
+    It is that of ``openmm.app.PDBxFile`` with ``keepIds=True``, where ids can be read: chains whose id is blank, has
+    blanks in it or is that of another one too, and residues of a chain in which an id is no number, are numbered.
+
+    Parameters
+    ----------
+    topology : openmm.app.Topology
+    positions : (particles, 3) length
+    file : str, Path or file object
+
+    Raises
+    ------
+    InputError
+        If the topology is none, or the number of positions does not fit.
+
+    Examples
+    --------
+    >>> write_mmcif(topology, positions, "topology.cif")  # doctest: +SKIP
+    """
+    from openmm import app
+
+    positions, text = _positions_of(topology, positions), io.StringIO()
+    with _readable_ids(topology):
+        app.PDBxFile.writeFile(topology, positions * unit.nanometer, text, keepIds=True)
+    _write(file, text.getvalue())
+
+
+@contextmanager
+def _readable_ids(topology):
+    chains, residues = list(topology.chains()), list(topology.residues())
+    there = [one.id for one in (*chains, *residues)]
+    names = Counter(str(chain.id) for chain in chains)
+    for number, chain in enumerate(chains, 1):
+        if names[str(chain.id)] > 1 or not re.fullmatch(r"[\w+-]+", str(chain.id), re.ASCII):
+            name = f"C{number:X}"
+            chain.id = name if name not in names else f"{name}_{number:X}"
+        for residue, own in zip(chain.residues(), _residue_numbers(chain)):
+            residue.id = str(own)
+    try:
+        yield
+    finally:
+        for one, own in zip((*chains, *residues), there):
+            one.id = own
+
+
+def write_psf(
+    topology: "app.Topology",
+    file: TextFile,
+    system: openmm.System | None = None,
+    masses: Numbers | None = None,
+) -> None:
     """Write a PSF file: atoms, masses, charges and bonds, in CHARMM's extended X-PLOR format.
 
     Chains become segments of the file. Names are cut to the seven characters that VMD reads. Where ids of chains are
@@ -47,20 +102,25 @@ def write_psf(topology: "app.Topology", file: TextFile, system: openmm.System | 
     system : openmm.System, optional
         Gives masses, and charges if it has a NonbondedForce. Without it, masses are those of the elements, zero for
         atoms of no element such as nodes, and charges are zero.
+    masses : (particles,) masses, optional
+        Instead of these: a System has none for particles that do not move.
 
     Raises
     ------
     InputError
-        If the topology is none, or the System has another number of particles.
+        If the topology is none, or the System or the masses have another number of particles.
 
     Examples
     --------
     >>> write_psf(topology, "topology.psf", system)  # doctest: +SKIP
     """
     _check_topology(topology, system)
+    masses = np.asarray(_masses(topology, system) if masses is None else in_units_of(masses, MASS, "masses"))
+    if masses.shape != (topology.getNumAtoms(),):
+        raise InputError(f"masses must have the shape ({topology.getNumAtoms()},), but have {masses.shape}.")
     numbers = _atom_numbers(topology)
     lines = ["PSF EXT XPLOR", "", f"{1:10d} !NTITLE", f" REMARKS openmm-cylchain {__version__}", ""]
-    lines += [f"{len(numbers):10d} !NATOM", *_psf_atoms(topology, system), ""]
+    lines += [f"{len(numbers):10d} !NATOM", *_psf_atoms(topology, system, masses), ""]
     lines += [f"{topology.getNumBonds():10d} !NBOND: bonds"]
     bonds = [f"{numbers[first]:10d}{numbers[second]:10d}" for first, second in topology.bonds()]
     lines += ["".join(bonds[i : i + _PSF_BONDS_PER_LINE]) for i in range(0, len(bonds), _PSF_BONDS_PER_LINE)]
@@ -69,8 +129,8 @@ def write_psf(topology: "app.Topology", file: TextFile, system: openmm.System | 
     _write(file, "\n".join([*lines, ""]))
 
 
-def _psf_atoms(topology, system):
-    properties = enumerate(zip(_masses(topology, system), _charges(topology, system)), 1)
+def _psf_atoms(topology, system, masses):
+    properties = enumerate(zip(masses, _charges(topology, system)), 1)
     for chain, segment in zip(topology.chains(), _segment_names(topology)):
         for residue, residue_number in zip(chain.residues(), _residue_numbers(chain)):
             for atom in residue.atoms():
@@ -115,10 +175,7 @@ def write_lammps_data(
     --------
     >>> write_lammps_data(topology, positions, "topology.data", system)  # doctest: +SKIP
     """
-    _check_topology(topology, system)
-    positions = np.asarray(in_units_of(positions, LENGTH, "positions"))
-    if positions.shape != (topology.getNumAtoms(), 3):
-        raise InputError(f"positions must have the shape ({topology.getNumAtoms()}, 3), but have {positions.shape}.")
+    positions = _positions_of(topology, positions, system)
     numbers, bonds = _atom_numbers(topology), list(topology.bonds())
     names = [_word(atom.name, None) for atom in numbers]
     pairs = ["-".join(sorted(_word(atom.name, None) for atom in bond)) for bond in bonds]
@@ -143,6 +200,14 @@ def write_lammps_data(
     _write(file, "\n".join([*lines, ""]))
 
 
+def _positions_of(topology, positions, system=None):
+    _check_topology(topology, system)
+    positions = np.asarray(in_units_of(positions, LENGTH, "positions"))
+    if positions.shape != (topology.getNumAtoms(), 3):
+        raise InputError(f"positions must have the shape ({topology.getNumAtoms()}, 3), but have {positions.shape}.")
+    return positions
+
+
 def _check_topology(topology, system):
     from openmm import app
 
@@ -163,7 +228,7 @@ def _write(file, text):
     if hasattr(file, "write"):
         file.write(text)
     else:
-        with open(file, "w", encoding="ascii") as opened:
+        with open(file, "w", encoding="utf-8") as opened:
             opened.write(text)
 
 

@@ -14,6 +14,7 @@ from ..beams.curve import curve_points, element_points, element_slopes
 from ..couplings.capsule_contacts import capsule_contact_force, contact_spacing
 from ..couplings.crosslinks import Crosslinks
 from ..couplings.joints import Joints
+from ..couplings.planar_crossings import PlanarSegments
 from ..couplings.pulling import constant_force, constant_tension
 from ..couplings.walls import filament_wall_force, wall_force
 from ..errors import InputError
@@ -129,6 +130,7 @@ def place_filaments(configuration, engine, seed, linkers=True):
     Filaments without a position are laid out side by side on a grid in the xy plane, centred on the origin, for the eye
     and for the digits of the single-precision trajectory. In a periodic box, their middles are at random places in it,
     and those that begin straight without a direction have random ones. With ``inside``, all of their nodes are in it.
+    Planar filaments at random places that would cross others are drawn again, where there are contacts.
 
     Parameters
     ----------
@@ -141,11 +143,16 @@ def place_filaments(configuration, engine, seed, linkers=True):
     solvent, box = configuration.solvent, configuration.box
     filaments = Filaments(solvent.viscosity, solvent.temperature, engine)
     centers = _grid_centers(configuration.filaments, solvent.temperature) if box is None else None
+    planar = None if configuration.contacts is None else PlanarSegments(box_vectors(box))
     for group in configuration.filaments:
         for index in range(group.count):
             number = len(filaments)
             places = np.random.default_rng([seed, number, 1])
-            _add(filaments, group, *_nodes(group, index, solvent.temperature, seed, number, places, box, centers))
+            own = group, index, solvent.temperature, seed, number, places, box, centers
+            nodes, control_points = _nodes(*own, planar if group.planar else None)
+            if planar is not None and group.planar:
+                planar.add(number, nodes, group.closed)
+            _add(filaments, group, nodes, control_points)
     if configuration.contacts is not None:
         for number, filament in enumerate(filaments):
             if not filament.type.segment_kind.straight:
@@ -189,21 +196,35 @@ def _add(filaments, group, nodes, control_points):
     )
 
 
-def _nodes(group, index, temperature, seed, number, places, box, centers):
+def _nodes(group, index, temperature, seed, number, places, box, centers, planar):
     # Nodes and control points, which straight segments do not have.
     if group.positions is not None:
         controls = None if group.control_points is None else group.control_points[index]
         return _moved(group, (group.positions[index], controls), 0.0, 0.0)
     if group.inside is not None:
-        return _inside(group, temperature, seed, number, places)
-    free = box is not None
-    shape = _shape(group, temperature, seed, number, places if free else None)
+        return _inside(group, temperature, seed, number, places, planar)
+    if box is not None and group.position is None:
+        return _in_box(group, temperature, seed, number, places, box, planar)
+    shape = _shape(group, temperature, seed, number, None if box is None else places)
     nodes, _ = shape
     if group.position is not None:
         shift = np.array(group.position) - (nodes.mean(axis=0) if group.closed else 0.0)
         return tuple(None if points is None else points + shift for points in shape)
-    center = places.uniform(0.0, box) if free else next(centers)
-    return _moved(group, shape, center, nodes.mean(axis=0), group.height)
+    return _moved(group, shape, next(centers), nodes.mean(axis=0), group.height)
+
+
+def _in_box(group, temperature, seed, number, places, box, planar):
+    attempts = 1 if planar is None else _attempts(group)
+    for attempt in range(attempts):
+        shape = _shape(group, temperature, seed, number, places, attempt)
+        nodes, controls = _moved(group, shape, places.uniform(0.0, box), shape[0].mean(axis=0), group.height)
+        if planar is None or planar.crossing(number, nodes, group.closed) is None:
+            return nodes, controls
+    raise ConfigurationError(
+        f"[[filament]] number {group.table}: planar filament {number} crosses another one, or itself, at each of "
+        f"{attempts} random places. Take fewer or shorter filaments, another height or a larger box.",
+        ("filament", group.table - 1, "planar"),
+    )
 
 
 def _moved(group, shape, to, middle, height=None):
@@ -216,25 +237,33 @@ def _moved(group, shape, to, middle, height=None):
     return nodes, controls
 
 
-def _inside(group, temperature, seed, number, places):
-    attempts = _attempts(group)
+def _inside(group, temperature, seed, number, places, planar):
+    attempts, crossed = _attempts(group), 0
     for attempt in range(attempts):
         shape = _shape(group, temperature, seed, number, places, attempt)
         nodes, controls = _moved(group, shape, group.inside.draw(places), shape[0].mean(axis=0), group.height)
         curve = nodes if controls is None else curve_points(nodes, controls, _POINTS_OF_ELEMENT, group.closed)
         if group.inside.contains(curve):
-            return nodes, controls
+            if planar is None or planar.crossing(number, nodes, group.closed) is None:
+                return nodes, controls
+            crossed += 1
+    reason = f"none of {attempts} random places has all of its nodes inside"
+    if crossed:
+        reason = f"at all {crossed} of {attempts} random places inside it crosses another planar filament, or itself"
     raise ConfigurationError(
         f"[[filament]] number {group.table}: filament {number} of {group.segments} segments does not fit into its "
-        f"region: none of {attempts} random places has all of its nodes inside. Take shorter filaments or a "
-        "larger region.",
+        f"region: {reason}. Take shorter filaments or a larger region.",
         ("filament", group.table - 1, "inside"),
     )
 
 
 def _attempts(group):
     # One for a straight filament that fits nowhere.
-    if group.start == "straight" and group.segments * group.type.segment_length > group.inside.diameter:
+    if (
+        group.inside is not None
+        and group.start == "straight"
+        and group.segments * group.type.segment_length > group.inside.diameter
+    ):
         return 1
     return max(20, min(_ATTEMPTS, _NODES_OF_ATTEMPTS // group.nodes))
 

@@ -91,7 +91,7 @@ def run(configuration, output, resume=False):
             if resume:
                 print("No checkpoint yet: starting from the beginning.")
             positions = begin(configuration, simulation, built)
-            write_topology(directory, simulation.topology, simulation.system, positions)
+            write_topology(directory, simulation.topology, filaments, simulation.system, positions)
             describe(configuration, filaments, simulation.system, simulation.topology).write(directory.description)
             _write_crosslinks(directory, simulation)
         else:

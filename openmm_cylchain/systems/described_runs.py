@@ -21,8 +21,9 @@ from ..output.run_description import (
     RunDescription,
 )
 from ..output.run_files import RunFiles
-from ..output.structure_files import write_lammps_data, write_psf
+from ..output.structure_files import write_lammps_data, write_mmcif, write_psf
 from ..units.types import FloatArray
+from .insertion import filament_masses
 
 if TYPE_CHECKING:
     from openmm import app
@@ -158,16 +159,25 @@ def _contacts(force):
     )
 
 
-def write_topology(files: RunFiles, topology: "app.Topology", system: openmm.System, positions: Any) -> None:
+def write_topology(
+    files: RunFiles, topology: "app.Topology", filaments: Any, system: openmm.System, positions: Any
+) -> None:
     """Write what programs need to know of a trajectory: files for mdtraj, VMD and OVITO."""
-    from openmm import app
-
     mmcif, psf, data = io.StringIO(), io.StringIO(), io.StringIO()
-    app.PDBxFile.writeFile(topology, positions, mmcif, keepIds=True)
-    write_psf(topology, psf, system)
+    write_mmcif(topology, positions, mmcif)
+    write_psf(topology, psf, system, _particle_masses(filaments, system))
     write_lammps_data(topology, positions, data, system)
     for path, text in zip((files.topology, files.topology_psf, files.topology_data), (mmcif, psf, data)):
         write_atomically(path, text.getvalue().encode())
+
+
+def _particle_masses(filaments, system):
+    # A System has none of nodes that are clamped.
+    masses = np.array([system.getParticleMass(index)._value for index in range(system.getNumParticles())])
+    for filament, *indices in zip(filaments, filaments.node_indices, filaments.control_point_indices):
+        for particles, own in zip(indices, filament_masses(filament)):
+            masses[particles] = own
+    return masses
 
 
 def total_energies(filaments: Any, positions: FloatArray) -> tuple[float, float]:

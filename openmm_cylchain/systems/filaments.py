@@ -10,7 +10,7 @@ from openmm import unit
 from ..couplings.periodicity import is_periodic
 from ..couplings.stiff_joints import warn_of_stiff_joints
 from ..engine_choice import default_scheme
-from ..engines.description import describe_chains, filament_label
+from ..engines.description import describe_chains, filament_label, refuse_constraints
 from ..engines.protocol import IntegratorSettings
 from ..errors import InputError
 from ..filaments.attachments import add_virtual_site, attachment_positions, neighbors
@@ -29,12 +29,12 @@ from ..units.types import BoxVectors, Numbers, Scalar, Vectors
 from .filaments_in_context import FilamentsInContext
 from .insertion import (
     add_nodes_to_system,
-    add_noninteracting_entries,
     add_to_topology,
     check_force_groups,
     check_target,
     set_box_vectors,
 )
+from .particle_entries import add_noninteracting_entries, refuse_forces
 from .periodic_forces import warn_of_forces_without_images
 from .tied_filaments import TiedFilaments
 
@@ -123,9 +123,11 @@ class Filaments(TiedFilaments):
         topology : openmm.app.Topology
             Changed in place.
         system : openmm.System
-            Changed in place. NonbondedForce and CustomNonbondedForce, which ask for parameters of every
-            particle, are given non-interacting entries for the nodes. (Where they use a long-range dispersion
-            correction, its constant changes, because OpenMM averages it over all particles.)
+            Changed in place. Forces that ask for parameters of every particle are given non-interacting entries for
+            the nodes: nonbonded forces, implicit solvents, AMOEBA and others. CustomNonbondedForce and CustomGBForce
+            have a parameter more then, by which their expressions leave out nodes; forces that act on all particles
+            where none are named, such as RGForce, get those that are there. (Where a long-range dispersion correction
+            is used, its constant changes, because OpenMM averages it over all particles.)
             Its box counts, if it is to have one: set it before.
         positions : (particles, 3) length
             Positions of the particles that are there.
@@ -137,6 +139,14 @@ class Filaments(TiedFilaments):
         -------
         (particles, 3) Quantity in nm
             The positions of everything.
+
+        Raises
+        ------
+        InputError
+            If there are no filaments, or they are in a System; Topology, System, positions and entries of forces do not
+            match; or a force has no entries that leave all else as it is: a GBSAOBCForce with a surface energy,
+            AmoebaGeneralizedKirkwoodForce, ATMForce, and, where particles are in one place, or may be with beads, those
+            that divide by all distances.
         """
         if not self._filaments:
             raise InputError("There are no filaments to add: call add_straight, add_nodes or add_equilibrium first.")
@@ -144,6 +154,7 @@ class Filaments(TiedFilaments):
             raise InputError("These filaments are already in a System; make another Filaments for another System.")
         positions = check_target(topology, system, positions)
         check_force_groups(stretching_force_group, bending_force_group)
+        refuse_forces(system, positions, self._filaments, may_coincide=bool(self._attachments))
         self._nodes, self._control_points = [], []
         self._attachment_indices = np.zeros(len(self._attachments), dtype=int)
         everything = [positions]
@@ -156,9 +167,9 @@ class Filaments(TiedFilaments):
                 everything.insert(-1, filament.control_points)
             names = [self._attachments[index].name for index in self._attachments_of[number]]
             add_to_topology(topology, filament, f"F{number}", names)
-        add_noninteracting_entries(system, len(positions), self._coinciding())
+        count, positions = len(positions), np.concatenate(everything)
+        add_noninteracting_entries(system, count, positions, self._coinciding())
         self._periodic = is_periodic(system)
-        positions = np.concatenate(everything)
         placed = replace(self._placed(), positions=positions)
         self._engine.add_forces(system, placed, stretching_force_group, bending_force_group)
         return positions * unit.nanometer
@@ -230,11 +241,12 @@ class Filaments(TiedFilaments):
         Raises
         ------
         InputError
-            If there are no filaments, they are not in the System, particles lack a friction, or contacts or walls are
-            in two stages.
+            If there are no filaments, they are not in the System, it has constraints, particles lack a friction, or
+            contacts or walls are in two stages.
         """
         if system is not None:
             self._refuse_if_not_in(system)
+            refuse_constraints(system, self._placed())
         return recommended_step_of(
             self,
             default_scheme(self._engine_name) if scheme is None else scheme,
@@ -328,12 +340,13 @@ class Filaments(TiedFilaments):
         ------
         InputError
             If the engine does not have the scheme or the precision, all filaments have beam elements and the precision
-            is "mixed", contacts or walls are in two stages, or the System does not hold the filaments.
+            is "mixed", contacts or walls are in two stages, the System has constraints or does not hold the filaments.
         """
         step_size = as_step(step_size)
         check_precision(precision)
         refuse_mixed_precision_of_beams(self, precision)
         self._refuse_if_not_in(system)
+        refuse_constraints(system, self._placed())
         scheme = default_scheme(self._engine_name) if scheme is None else scheme
         check_scheme(scheme)
         if scheme == MODES:

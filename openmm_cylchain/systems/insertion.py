@@ -1,6 +1,6 @@
 """Insertion of filaments into a Topology and a System that may hold other things already."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -49,14 +49,19 @@ def check_force_groups(*groups: int) -> None:
 def add_nodes_to_system(system: openmm.System, filament: Filament) -> tuple[IntArray, IntArray]:
     """Add the nodes of a Filament to a System, and behind them the control points of beam elements: the indices of
     both."""
-    masses = filament.type.node_masses(len(filament.positions), filament.closed)
-    if filament.control_points is not None:
-        masses *= 0.5
-    control_masses = masses[: 0 if filament.control_points is None else len(masses)].copy()
+    masses, control_masses = filament_masses(filament)
     masses[list(filament.clamped)] = 0.0
     control_masses[list(filament.clamped_tangents)] = 0.0
     nodes, control_points = ([system.addParticle(mass) for mass in own] for own in (masses, control_masses))
     return np.array(nodes), np.array(control_points, dtype=int)
+
+
+def filament_masses(filament: Filament) -> tuple[FloatArray, FloatArray]:
+    """Masses in Da of the nodes of a Filament, and of their control points, also of those that are clamped."""
+    masses = filament.type.node_masses(len(filament.positions), filament.closed)
+    if filament.control_points is None:
+        return masses, masses[:0]
+    return 0.5 * masses, 0.5 * masses
 
 
 def add_to_topology(topology: "app.Topology", filament: Filament, name: str, attachment_names: Sequence[str]) -> None:
@@ -75,30 +80,6 @@ def add_to_topology(topology: "app.Topology", filament: Filament, name: str, att
         topology.addBond(first, second)
     if filament.closed:
         topology.addBond(atoms[nodes - 1], atoms[0])
-
-
-def add_noninteracting_entries(system: openmm.System, existing: int, coinciding: Iterable[tuple[int, int]]) -> None:
-    """Give forces that ask for parameters of every particle those of particles that do not interact.
-
-    ``existing`` particles have parameters; of the new ones, pairs that are ``coinciding`` may be in one place.
-    """
-    missing, coinciding = system.getNumParticles() - existing, list(coinciding)
-    for force in system.getForces():
-        if isinstance(force, openmm.NonbondedForce):
-            for _ in range(missing):
-                force.addParticle(0.0, 1.0, 0.0)
-            # Particles in one place would give 0/0, even if they do not interact.
-            for pair in coinciding:
-                force.addException(*pair, 0.0, 1.0, 0.0)
-        elif isinstance(force, openmm.CustomNonbondedForce):
-            _exclude_from_custom_nonbonded(force, existing, missing)
-
-
-def _exclude_from_custom_nonbonded(force, existing, missing):
-    for _ in range(missing):
-        force.addParticle([0.0] * force.getNumPerParticleParameters())
-    if missing and force.getNumInteractionGroups() == 0:
-        force.addInteractionGroup(range(existing), range(existing))
 
 
 def set_box_vectors(system: openmm.System, box_vectors: BoxVectors) -> list[openmm.Vec3]:

@@ -153,7 +153,7 @@ class RunReporter:
                 self._diameters_of(simulation.topology),
             )
             description.write(files.description)
-            write_topology(files, simulation.topology, system, state.getPositions(asNumpy=True))
+            write_topology(files, simulation.topology, filaments, system, state.getPositions(asNumpy=True))
 
         def table(path, columns):
             return ReportTable(path, columns, size_of_lines(path, step)[0] if self._append else None)

@@ -7,7 +7,9 @@ import shutil
 import MDAnalysis
 import mdtraj
 import numpy as np
+import openmm
 import pytest
+from openmm import app
 
 from openmm_cylchain import (
     DSDNA_BASE_PAIRS,
@@ -15,8 +17,10 @@ from openmm_cylchain import (
     MICROTUBULE,
     Box,
     Cylinder,
+    Filaments,
     InputError,
     PrecisionWarning,
+    RunReporter,
     Sphere,
     analysis,
     filament_wall_force,
@@ -115,6 +119,8 @@ def test_mdanalysis_has_times_bonds_and_radii(network):
     assert [frame.time for frame in universe.trajectory] == pytest.approx(list(run.times), rel=1e-12)
     assert len(universe.bonds) == 80 and len(universe.segments) == 20
     assert set(universe.atoms.radii) == {30.0} and set(universe.atoms.types) == {"ACT"}
+    masses = [own.type.node_masses(len(own.nodes)) for own in run.filaments]
+    np.testing.assert_allclose(universe.atoms.masses, np.concatenate(masses), rtol=1e-6)
     universe.trajectory[4]
     np.testing.assert_allclose(universe.atoms.positions, 10.0 * run.positions(4), rtol=1e-6)
     np.testing.assert_allclose(universe.dimensions, [4000.0, 4000.0, 5000.0, 90.0, 90.0, 90.0])
@@ -129,6 +135,28 @@ def test_radii_of_mdanalysis_are_those_of_each_filament(two_types):
         np.testing.assert_allclose(atoms.radii[own.nodes], 5.0 * own.diameter)
 
 
+def test_radii_of_gyration_of_mdanalysis_are_weighted_by_masses_also_of_clamped_nodes(tmp_path):
+    filaments = Filaments(602.0, 300.0)
+    filaments.add_straight(F_ACTIN.with_segment_length(100.0), 5, [0, 0, 0], [1, 0, 0], clamped=[0])
+    topology, system, positions = filaments.build()
+    integrator = filaments.create_integrator(system, 1e3, random_seed=1)
+    simulation = app.Simulation(topology, system, integrator, openmm.Platform.getPlatform("CPU"))
+    simulation.context.setPositions(positions)
+    simulation.reporters.append(RunReporter(tmp_path / "run", 5, filaments))
+    simulation.step(5)
+    run = analysis.load(tmp_path / "run")
+    segment_file = MDAnalysis.Universe(str(tmp_path / "run/topology.psf"), str(tmp_path / "run/trajectory.dcd"))
+    masses = np.array([1.0, 2.0, 2.0, 2.0, 2.0, 1.0])
+    for universe in (run.mdanalysis(), segment_file):
+        for frame in range(2):
+            universe.trajectory[frame]
+            places = run.positions(frame)
+            center = np.average(places, axis=0, weights=masses)
+            radius = np.sqrt(np.average(np.sum((places - center) ** 2, axis=1), weights=masses))
+            np.testing.assert_allclose(universe.atoms.center_of_mass(), 10.0 * center, rtol=1e-5, atol=1e-3)
+            assert universe.atoms.radius_of_gyration() == pytest.approx(10.0 * radius, rel=1e-5)
+
+
 @pytest.mark.parametrize(("name", "kind"), [("topology.psf", "PSF"), ("topology.data", "DATA")])
 def test_mdanalysis_reads_the_files_as_they_are(two_types, network, name, kind):
     for directory in (two_types, network):
@@ -136,6 +164,8 @@ def test_mdanalysis_reads_the_files_as_they_are(two_types, network, name, kind):
         universe = MDAnalysis.Universe(str(directory / name), str(directory / "trajectory.dcd"), topology_format=kind)
         expected = [(node, node + 1) for own in run.filaments for node in own.nodes[:-1]]
         assert sorted(map(tuple, np.sort(universe.bonds.indices, axis=1))) == expected
+        if kind == "PSF":
+            np.testing.assert_allclose(universe.atoms.masses, run.mdanalysis().atoms.masses)
         # The header of a DCD file has the time between frames in single precision.
         np.testing.assert_allclose([frame.time for frame in universe.trajectory], run.times, rtol=1e-7)
         universe.trajectory[-1]

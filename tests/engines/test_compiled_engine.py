@@ -413,3 +413,14 @@ def test_an_instruction_set_computes_the_same_or_says_that_it_was_not_built(inst
         # No better one than AVX-512 is built.
         assert instruction_set != "avx512"
         assert "CYLCHAIN_FOR_THIS_PROCESSOR=OFF" in result.stderr.splitlines()[-1]
+
+
+def test_other_integrators_refuse_planar_filaments():
+    filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
+    filaments.add_straight(F_ACTIN, 3, planar=True)
+    _, system, positions = filaments.build()
+    simulation = openmm.Context(system, openmm.VerletIntegrator(1.0), openmm.Platform.getPlatform("Reference"))
+    simulation.setPositions(positions)
+    assert energy_of(simulation) == pytest.approx(0.0, abs=1e-9)
+    with pytest.raises(openmm.OpenMMException, match="Filament 0 .* is planar, but this Integrator"):
+        simulation.getIntegrator().step(1)

@@ -10,7 +10,7 @@ import pytest
 from openmm import app, unit
 
 from openmm_cylchain import DSDNA, F_ACTIN, Filaments, InputError
-from openmm_cylchain.output.structure_files import write_lammps_data, write_psf
+from openmm_cylchain.output.structure_files import write_lammps_data, write_mmcif, write_psf
 from support.solvent import TEMPERATURE, VISCOSITY
 
 BOX = np.array([[1500.0, 0.0, 0.0], [400.0, 1400.0, 0.0], [-600.0, 500.0, 1600.0]])
@@ -106,6 +106,44 @@ def test_psf_by_other_readers(tmp_path):
     assert [atom.mass.value_in_unit(unit.dalton) for atom in read.atom_list] == pytest.approx(
         [system.getParticleMass(particle)._value for particle in range(20)], rel=1e-6
     )
+
+
+def test_mmcif_has_ids_that_others_read(tmp_path):
+    """A PDB file may leave ids of chains blank, or say one twice; ids of residues may be no numbers."""
+    topology = app.Topology()
+    for name, residues in ((" ", ["1", "2"]), ("A", ["7", "8"]), ("A", ["1", "x"]), ("", ["1"]), ("B c", ["-3"])):
+        chain = topology.addChain(name)
+        atoms = [topology.addAtom("CA", None, topology.addResidue("XYZ", chain, number)) for number in residues]
+        for first, second in zip(atoms, atoms[1:]):
+            topology.addBond(first, second)
+    filaments = Filaments(VISCOSITY, TEMPERATURE)
+    filaments.add_straight(F_ACTIN, 2, [0, 0, 0], [1, 0, 0])
+    system = openmm.System()
+    for _ in range(topology.getNumAtoms()):
+        system.addParticle(1.0)
+    positions = filaments.add_to(topology, system, np.arange(24.0).reshape(8, 3))
+    ids = [(chain.id, [one.id for one in chain.residues()]) for chain in topology.chains()]
+    write_mmcif(topology, positions, tmp_path / "all.cif")
+    assert [(chain.id, [one.id for one in chain.residues()]) for chain in topology.chains()] == ids
+    read = mdtraj.load(str(tmp_path / "all.cif"))
+    assert [chain.n_residues for chain in read.topology.chains] == [2, 2, 2, 1, 1, 3]
+    bonds = [(first.index, second.index) for first, second in topology.bonds()]
+    assert [(first.index, second.index) for first, second in read.topology.bonds] == bonds
+    np.testing.assert_allclose(read.xyz[0], positions._value, atol=1e-4)
+    again = app.PDBxFile(str(tmp_path / "all.cif")).topology
+    assert [chain.id for chain in again.chains()] == ["C1", "C2", "C3", "C4", "C5", "F0"]
+    assert [[one.id for one in chain.residues()] for chain in again.chains()][1:3] == [["7", "8"], ["1", "2"]]
+    with pytest.raises(InputError, match="positions must have the shape"):
+        write_mmcif(topology, positions[:3], tmp_path / "all.cif")
+
+
+def test_masses_of_a_psf_may_be_given(tmp_path):
+    topology, system, _ = mixed_system()
+    write_psf(topology, tmp_path / "mixed.psf", system, np.arange(20) * unit.dalton)
+    atoms, _ = read_psf_columns(tmp_path / "mixed.psf")
+    assert [atom[7] for atom in atoms] == list(range(20))
+    with pytest.raises(InputError, match="masses must have the shape"):
+        write_psf(topology, tmp_path / "mixed.psf", system, [1.0])
 
 
 def chain_length(chain):

@@ -223,7 +223,7 @@ def test_other_particles_keep_their_forces_and_energy(filaments, kind, reference
 
 def test_existing_topology_and_system_come_first(filaments):
     topology, system, positions = lennard_jones_system("nonbonded")
-    filaments.add_straight(F_ACTIN, 2, [0, 0, 0], [1, 0, 0])
+    filaments.add_straight(F_ACTIN, 2, [0.1, 0, 0], [1, 0.1, 0.3])
     everything = filaments.add_to(topology, system, positions * unit.nanometer)
     np.testing.assert_array_equal(nanometers(everything)[:64], positions)
     np.testing.assert_array_equal(nanometers(everything)[64:], filaments[0].positions)

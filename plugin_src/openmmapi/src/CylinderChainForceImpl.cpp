@@ -1,4 +1,5 @@
 #include "openmm/internal/CylinderChainForceImpl.h"
+#include "openmm/CylinderChainIntegrator.h"
 #include "openmm/CylinderChainKernels.h"
 #include "openmm/OpenMMException.h"
 #include "openmm/System.h"
@@ -25,7 +26,17 @@ void CylinderChainForceImpl::initialize(ContextImpl& context) {
         }
     kernel = context.getPlatform().createKernel(CalcCylinderChainForceKernel::Name(), context);
     description.reset(new CylinderChainDescription(system, owner));
+    for (int chain = 0; chain < owner.getNumChains() && planar == -1; chain++)
+        if (description->getList().isPlanar(chain))
+            planar = chain;
     kernel.getAs<CalcCylinderChainForceKernel>().initialize(system, *description);
+}
+
+void CylinderChainForceImpl::updateContextState(ContextImpl& context, bool&) {
+    if (planar == -1 || dynamic_cast<const CylinderChainIntegrator*>(&context.getIntegrator()) != NULL)
+        return;
+    throw OpenMMException("CylinderChainForce: "+description->getList().getName(planar)+" is planar, but this Integrator "
+            "would take it out of its plane: use a CylinderChainIntegrator");
 }
 
 double CylinderChainForceImpl::calcForcesAndEnergy(ContextImpl& context, bool includeForces, bool includeEnergy,

@@ -23,6 +23,10 @@ public:
     const CylinderChainForce& getOwner() const {
         return owner;
     }
+    /**
+     * Throw an exception if an Integrator that knows nothing of planes would take a planar chain out of its own.
+     */
+    void updateContextState(ContextImpl& context, bool& forcesInvalid);
     double calcForcesAndEnergy(ContextImpl& context, bool includeForces, bool includeEnergy, int groups);
     std::map<std::string, double> getDefaultParameters() {
         return std::map<std::string, double>();
@@ -47,6 +51,9 @@ private:
     const CylinderChainForce& owner;
     std::unique_ptr<CylinderChainDescription> description;
     Kernel kernel;
+    // The first chain that is planar, or -1.
+
+    int planar = -1;
 };
 
 } // namespace OpenMM
