@@ -417,7 +417,7 @@ def test_an_instruction_set_computes_the_same_or_says_that_it_was_not_built(inst
 
 def test_other_integrators_refuse_planar_filaments():
     filaments = Filaments(VISCOSITY, TEMPERATURE, engine="compiled")
-    filaments.add_straight(F_ACTIN, 3, planar=True)
+    filaments.add_straight(F_ACTIN, 3, [0, 0, 0], [1, 0, 0], planar=True)
     _, system, positions = filaments.build()
     simulation = openmm.Context(system, openmm.VerletIntegrator(1.0), openmm.Platform.getPlatform("Reference"))
     simulation.setPositions(positions)
