@@ -18,6 +18,7 @@ from ..output.colors import FILAMENT_COLORS, LINKER_COLORS
 from ..output.files import write_atomically
 from ..output.read_tables import read_reports, read_table
 from ..output.record_file import read_records
+from ..output.run_tables import MILLISECOND
 from ..units.quantities import PICONEWTON, thermal_energy
 from ..units.text import time_unit
 from .configuration import linker_labels
@@ -104,6 +105,12 @@ def _time_unit(time):
     return name.replace("us", "µs"), length
 
 
+def _times(column):
+    # A column of times in ms, in the unit that is named.
+    name, length = _time_unit(MILLISECOND * column[-1])
+    return name, MILLISECOND * column / length
+
+
 def _length_unit(length):
     return ("µm", 1e3) if length >= 1e3 else ("nm", 1.0)
 
@@ -185,8 +192,7 @@ def _linker_colour(number):
 
 
 def _draw_numbers_bound(axis, labels, table):
-    name, length = _time_unit(table["time (ps)"][-1, 0])
-    time = table["time (ps)"][:, 0] / length
+    name, time = _times(table["time (ms)"][:, 0])
     for number, label in enumerate(labels):
         for state, line in (("both hands bound", "-"), ("one hand bound", ":")):
             axis.plot(
@@ -206,13 +212,12 @@ def _draw_numbers_bound(axis, labels, table):
 
 
 def _draw_tensions(axis, labels, table):
-    name, length = _time_unit(table["time (ps)"][-1, 0])
-    time = table["time (ps)"][:, 0] / length
+    name, time = _times(table["time (ms)"][:, 0])
     for number, label in enumerate(labels):
         for which, line, width in (("mean", "-", 1.5), ("maximum", ":", 1.0)):
             axis.plot(
                 time,
-                table[f"{which} tension (kJ/mol/nm)"][:, number] / PICONEWTON,
+                table[f"{which} tension (pN)"][:, number],
                 line,
                 color=_linker_colour(number),
                 linewidth=width,
@@ -231,14 +236,14 @@ def _draw_forces(axes, configuration, directory, times):
     name, length = _time_unit(times[-1])
     if configuration.walls:
         table = read_reports(directory.wall_forces)
-        time, loads = table["time (ps)"][1:, 0] / length, table["load (kJ/mol/nm)"][1:] / PICONEWTON
+        time, loads = table["time (ms)"][1:, 0] * MILLISECOND / length, table["load (pN)"][1:]
         faces = zip(table["wall"][0].astype(int), table["face"][0].astype(int))
         for number, (wall, face) in enumerate(faces):
             label = _face_label(configuration.walls[wall], wall, face)
             axes[0].plot(time, loads[:, number], color=_COLOURS[number % len(_COLOURS)], linewidth=1.2, label=label)
     if configuration.contacts:
         table = read_reports(directory.contact_forces)
-        time, loads = table["time (ps)"][1:, 0] / length, table["load (kJ/mol/nm)"][1:] / PICONEWTON
+        time, loads = table["time (ms)"][1:, 0] * MILLISECOND / length, table["load (pN)"][1:]
         axes[1].plot(time, loads.mean(axis=1), color=_COLOURS[0], linewidth=1.5, label="mean over filaments")
         axes[1].plot(time, loads.max(axis=1), ":", color=_COLOURS[0], linewidth=1.0, label="largest")
     titles = "Forces of walls, by faces", "Forces of contacts on a filament"
@@ -265,8 +270,7 @@ def _face_label(wall, number, face):
 
 def _draw_energies(axis, groups, temperature, energies):
     kT = thermal_energy(temperature)
-    name, length = _time_unit(energies["time (ps)"][-1])
-    time = energies["time (ps)"] / length
+    name, time = _times(energies["time (ms)"])
     kinds = [group for group, *_ in groups]
     segments = np.array([group.count * group.segments for group in kinds])
     joints = np.array([group.count * group.joints for group in kinds])

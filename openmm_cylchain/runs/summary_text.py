@@ -6,6 +6,7 @@ from dataclasses import asdict
 import openmm
 
 from ..output.files import write_atomically
+from ..output.run_tables import MILLISECOND
 from ..units.text import format_time, format_with_error
 from ..version import __version__
 from .summary import AGREEMENT_FRACTION, AGREEMENT_SIGMA
@@ -31,8 +32,8 @@ def write_summary(configuration, directory, groups, linkers=()):
         "platform": settings.platform,
         "scheme": settings.scheme,
         "temperature (K)": configuration.solvent.temperature,
-        "time step (ps)": settings.time_step,
-        "simulated time (ps)": settings.steps * settings.time_step,
+        "time step (ms)": settings.time_step / MILLISECOND,
+        "simulated time (ms)": settings.steps * settings.time_step / MILLISECOND,
         "groups": [asdict(group) for group in groups],
         **({"linkers": [asdict(own) for own in linkers]} if linkers else {}),
     }

@@ -14,6 +14,7 @@ from openmm_cylchain.cli import main
 from openmm_cylchain.output.linker_records import LINKER_RECORD
 from openmm_cylchain.output.read_tables import read_reports
 from openmm_cylchain.runs.configuration import changed_keys, parse_configuration, read_configuration
+from openmm_cylchain.units.quantities import PICONEWTON
 from support import small_runs
 from support.checkpoints import resealed
 from support.commands import finish, start, wait_for_size
@@ -239,7 +240,7 @@ def test_tables_and_places_are_those_of_the_linkers(unbroken):
     table = read_reports(unbroken / "linkers.csv")
     assert table["step"].shape == (FRAMES, 2)
     np.testing.assert_array_equal(table["step"][:, 0], np.arange(0, 801, 20))
-    np.testing.assert_allclose(table["time (ps)"][:, 1], 5e6 * table["step"][:, 1])
+    np.testing.assert_allclose(table["time (ms)"][:, 1], 5e-3 * table["step"][:, 1])
     states = np.stack([table[name] for name in ("unbound", "one hand bound", "both hands bound")], axis=2)
     np.testing.assert_array_equal(states.sum(axis=2), np.broadcast_to((60, 40), (FRAMES, 2)))
     np.testing.assert_array_equal(states[0], [[30, 30, 0], [0, 40, 0]])
@@ -262,7 +263,7 @@ def test_tables_and_places_are_those_of_the_linkers(unbroken):
             lengths = np.linalg.norm(here["places"][both, 1] - here["places"][both, 0], axis=1)
             tensions = group.kind.stiffness * (lengths - group.kind.rest_length)
             np.testing.assert_allclose(here["tension"][both], tensions, atol=2e-3)
-            mean, largest = (table[f"{name} tension (kJ/mol/nm)"][report, number] for name in ("mean", "maximum"))
+            mean, largest = (PICONEWTON * table[f"{name} tension (pN)"][report, number] for name in ("mean", "maximum"))
             if both.any():
                 np.testing.assert_allclose((mean, largest), (tensions.mean(), tensions.max()), atol=2e-3)
             else:
@@ -313,8 +314,8 @@ def test_summary_has_linkers(unbroken, capsys):
         assert own["name"] == name
         late = table["both hands bound"][FRAMES // 2 :, number]
         assert own["both_hands_bound"] == pytest.approx(late.mean())
-        tension = table["mean tension (kJ/mol/nm)"][FRAMES // 2 :, number]
-        largest = table["maximum tension (kJ/mol/nm)"][:, number]
+        tension = table["mean tension (pN)"][FRAMES // 2 :, number]
+        largest = table["maximum tension (pN)"][:, number]
         if np.isnan(largest).all():
             assert own["mean_tension"] is None and own["largest_tension"] is None
             continue
