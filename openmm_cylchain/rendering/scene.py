@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..mechanics.geometry import segment_vectors
 from ..units.quantities import PICONEWTON
 from ..units.types import FloatArray, IntArray
-from .colors import filament_colors, linker_color, particle_colors
+from .colors import filament_colors, linker_colors, particle_colors
 from .outlines import box_edges, wall_lines
 from .tubes import Tubes
 
@@ -122,9 +122,9 @@ class Scene:
     def _linkers(self, frame):
         radius = 0.5 * float(np.median(self.diameters))
         parts = []
-        for kind in range(len(self.run.spring_names)):
+        for kind, name in enumerate(linker_colors(self.run, self.scale is not None)):
             lines, places = self.run.springs(frame, kind)
-            color = _rgb(linker_color(kind, self.scale is not None))
+            color = _rgb(name)
             springs, _ = self._wrapped(lines)
             hands, _ = self._wrapped(np.repeat(places[:, None], 2, axis=1))
             parts.append(Tubes.of_one_kind(springs, 0.55 * radius, color))
@@ -188,9 +188,8 @@ def legend_of(run: Run, look: Look) -> list[tuple[str, str, str]]:
     if look.particles:
         legend += [(name, color, "particle") for name, color in particle_colors(run).items()]
     if look.linkers:
-        legend += [
-            (name, linker_color(kind, look.color != "type"), "linker") for kind, name in enumerate(run.spring_names)
-        ]
+        colors_of_linkers = linker_colors(run, look.color != "type")
+        legend += [(name, color, "linker") for name, color in zip(run.spring_names, colors_of_linkers)]
     return legend
 
 

@@ -1,6 +1,7 @@
 """What a run of its kind is made for: order, bundles and contraction of a network, the speed of gliding, forces."""
 
 import math
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,15 +9,18 @@ import scipy
 
 from .. import analysis
 from ..analysis.statistics import mean_with_error
-from ..errors import InputError
+from ..errors import InputError, PrecisionWarning
 from ..mechanics.geometry import segment_vectors
+from ..output.run_tables import MILLISECOND
 from ..units.quantities import thermal_energy
-from .summary import group_members, mean_over_filaments
+from .summary import group_members, is_in_equilibrium, mean_over_filaments
 from .tables.linkers import binds_to
 
-_BUNDLE_ANGLE, _BUNDLE_OVERLAP = math.radians(20.0), 0.2
-_PER_SECOND = 1e12
-"""Of a time in ps."""
+_BUNDLE_ANGLE, _BUNDLE_OVERLAP = math.radians(20.0), 0.4
+"""At most between filaments side by side, and the share of the shortest one that is so."""
+_FEWEST_OF_NETWORK, _FRAMES_OF_COURSE = 8, 40
+_SECOND = 1e12
+"""In ps."""
 
 ORDER = "nematic order of filaments"
 BUNDLED = "share of filaments in bundles"
@@ -26,16 +30,13 @@ GLIDING = {1.0: "gliding speed, last node (plus end) ahead", -1.0: "gliding spee
 PULLING = "force of moving tethers along their velocity"
 WALLS = "sum of forces of walls"
 CONTACTS = "sum of forces of contacts on a filament"
-UNITS = {
-    ORDER: "",
-    BUNDLED: "",
-    JOINED: "",
+MEASURES = {
+    **dict.fromkeys((ORDER, BUNDLED, JOINED), ""),
     GYRATION: "nm",
     **dict.fromkeys(GLIDING.values(), "nm/s"),
-    PULLING: "pN",
-    WALLS: "pN",
-    CONTACTS: "pN",
+    **dict.fromkeys((PULLING, WALLS, CONTACTS), "pN"),
 }
+"""Their units by their names."""
 
 
 @dataclass(frozen=True)
@@ -58,35 +59,67 @@ class Measure:
     standard_error: float | None = None
 
 
+@dataclass(frozen=True)
+class Course:
+    """What a network does: values by their names, at times in ms. Lengths are those over the first one."""
+
+    times: np.ndarray
+    shares: dict
+
+
 def measure(configuration, directory):
     """What matters of a run that is complete: a list of Measure, empty for free filaments."""
-    run = analysis.load(directory.path)
-    found = [*_of_networks(configuration, run), *_of_gliding(configuration, run), *_of_forces(configuration, run)]
-    return [Measure(name, UNITS[name], **values) for name, values in found]
+    run = _load(directory)
+    ends = (0, len(run) - 1)
+    found = [
+        *((name, dict(zip(("first", "last"), values))) for name, values in _of_networks(configuration, run, ends)),
+        *_of_gliding(configuration, run),
+        *_of_forces(configuration, run),
+    ]
+    return [Measure(name, MEASURES[name], **values) for name, values in found]
 
 
-def _of_networks(configuration, run):
+def course(configuration, directory):
+    """The Course of a network of filaments in up to forty frames; None where filaments are not one."""
+    run = _load(directory)
+    if len(run.filaments) < _FEWEST_OF_NETWORK or any(map(is_in_equilibrium, configuration.filaments)):
+        return None
+    frames = np.unique(np.linspace(0, len(run) - 1, min(len(run), _FRAMES_OF_COURSE)).round().astype(int)).tolist()
+    found = dict(_of_networks(configuration, run, frames))
+    if not found:
+        return None
+    if GYRATION in found:
+        radii = np.array(found.pop(GYRATION))
+        found["radius of gyration of all, over that at the start"] = radii / radii[0]
+    return Course(run.times[frames] / MILLISECOND, found)
+
+
+def _load(directory):
+    with warnings.catch_warnings():
+        # The notes of the summary say it.
+        warnings.simplefilter("ignore", PrecisionWarning)
+        return analysis.load(directory.path)
+
+
+def _of_networks(configuration, run, frames):
+    # Names with their values in frames.
     joined = bool(configuration.linkers or configuration.links or configuration.contacts or configuration.walls)
     if len(run.filaments) < 2 or not (joined or any(group.propulsion for group in configuration.filaments)):
         return
-    yield ORDER, _of_ends(_order, run)
+    yield ORDER, [_order(run, frame) for frame in frames]
     free = [own.kind for own in configuration.linkers if own.anchors is None]
     if free:
         kT = thermal_energy(configuration.solvent.temperature)
-        gap = max(kind.rest_length + 2.0 * math.sqrt(kT / kind.stiffness) for kind in free)
+        gap = min(kind.rest_length + 2.0 * math.sqrt(kT / kind.stiffness) for kind in free)
         overlap = _BUNDLE_OVERLAP * min(_length(own) for own in run.filaments)
         try:
-            yield BUNDLED, _of_ends(lambda own, frame: _bundled(own, frame, gap, overlap), run)
+            yield BUNDLED, [_bundled(run, frame, gap, overlap) for frame in frames]
         except InputError:
             # A periodic box that is narrower than two segments has no neighbours that are known.
             pass
-        yield JOINED, _of_ends(_joined, run)
+        yield JOINED, [_joined(run, frame) for frame in frames]
     if run.box is None:
-        yield GYRATION, _of_ends(_radius, run)
-
-
-def _of_ends(function, run):
-    return {"first": function(run, 0), "last": function(run, len(run) - 1)}
+        yield GYRATION, [_radius(run, frame) for frame in frames]
 
 
 def _length(filament):
@@ -135,7 +168,7 @@ def _of_gliding(configuration, run):
     axes = ends[:, :, 1] - ends[:, :, 0]
     axes = axes[1:] + axes[:-1]
     axes /= np.linalg.norm(axes, axis=2, keepdims=True)
-    times = np.diff(run.times[first:])[:, None] / _PER_SECOND
+    times = np.diff(run.times[first:])[:, None] / _SECOND
     mean, error = mean_over_filaments(np.sum(np.diff(centers, axis=0) * axes, axis=2) / times)
     yield GLIDING[math.copysign(1.0, mean)], {"mean": abs(mean), "standard_error": error}
 

@@ -18,7 +18,7 @@ from ..filaments.beam_elements import BEAM_ELEMENTS
 from ..filaments.equilibrium import SegmentLengthDistribution
 from ..filaments.straight_segments import STRAIGHT_SEGMENTS
 from ..theory import beam_elements
-from ..units.quantities import thermal_energy
+from ..units.quantities import PICONEWTON, thermal_energy
 from .silence import silenced_c_library
 
 _STRETCHING, _STRETCHING_OF_ELEMENTS = "stretching energy per segment", "stretching energy per element"
@@ -107,6 +107,9 @@ def group_labels(configuration):
         f"{group.type.segment_kind.name}{'s' * (group.segments > 1)}"
         for group in configuration.filaments
     ]
+    if len(set(labels)) < len(labels) and all(group.tension for group in configuration.filaments):
+        tensions = [f"{group.tension[0] / PICONEWTON:.3g} pN" for group in configuration.filaments]
+        labels = [f"{label}, {tension}" for label, tension in zip(labels, tensions)]
     if len(set(labels)) < len(labels):
         labels = [f"{label} (table {group.table})" for label, group in zip(labels, configuration.filaments)]
     return labels

@@ -1,5 +1,6 @@
 """Filaments as they are added: before they are in a System."""
 
+from collections import Counter
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,8 @@ from ..units.types import IntArray, Scalar, Vector, Vectors
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
+
+_MOST_KINDS = 4
 
 
 class AddedFilaments:
@@ -38,6 +41,12 @@ class AddedFilaments:
 
     def __len__(self) -> int:
         return len(self._filaments)
+
+    def __repr__(self) -> str:
+        kinds = Counter((own.type.name, own.type.segment_kind.name, own.segments) for own in self._filaments)
+        parts = [f"{count} × {name}, {size} {kind}{'s' * (size > 1)}" for (name, kind, size), count in kinds.items()]
+        shown = "; ".join(parts[:_MOST_KINDS]) + "; ..." * (len(parts) > _MOST_KINDS)
+        return f"<Filaments at {self._temperature:g} K, {self._engine_name} engine: {shown or 'none yet'}>"
 
     def __getitem__(self, index: int) -> Filament:
         return self._filaments[index]

@@ -13,7 +13,7 @@ from openmm_cylchain.cli import main
 from openmm_cylchain.couplings.shapes import Box, Cylinder, Ellipsoid
 from openmm_cylchain.rendering.annotations import Margins, clock_text, margins, scale_bar_length
 from openmm_cylchain.rendering.camera import camera_on
-from openmm_cylchain.rendering.colors import filament_colors, linker_color
+from openmm_cylchain.rendering.colors import filament_colors, linker_colors
 from openmm_cylchain.rendering.pictures import View, images, write_film
 from openmm_cylchain.rendering.scene import COLORINGS, Look, make_scene
 from support.small_runs import AMONG_SPHERES, NETWORK, TWO_TYPES, simulated
@@ -260,7 +260,8 @@ def test_a_gif_keeps_the_colors_of_its_legend(network, tmp_path):
     options = ["--film", "--frames", ":2", "--size", "640x480"]
     assert main(["render", str(network), "--output", str(path), *options]) == 0
     there = {tuple(color) for color in np.asarray(Image.open(path).convert("RGB")).reshape(-1, 3)}
-    for color in (*filament_colors(analysis.load(network)).values(), linker_color(0), linker_color(1)):
+    run = analysis.load(network)
+    for color in (*filament_colors(run).values(), *linker_colors(run)):
         assert tuple(bytes.fromhex(color[1:])) in there, color
 
 

@@ -6,7 +6,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from openmm_cylchain import analysis
-from openmm_cylchain.rendering.colors import filament_colors, linker_color
+from openmm_cylchain.rendering.colors import filament_colors, linker_colors
 from support.small_runs import NETWORK, simulated
 
 
@@ -61,4 +61,4 @@ def test_colours_are_those_of_pictures(drawn):
             for line in axis.lines
             if str(line.get_label()).startswith(f"{name}, ")
         }
-        assert colours == {linker_color(kind)}
+        assert colours == {linker_colors(run)[kind]}
