@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..mechanics.geometry import segment_vectors
 from ..units.quantities import PICONEWTON
 from ..units.types import FloatArray, IntArray
-from .colors import filament_colors, linker_colors, particle_colors
+from .colors import PLUS_END_COLOR, filament_colors, linker_colors, particle_colors
 from .outlines import box_edges, wall_lines
 from .tubes import Tubes
 
@@ -21,6 +21,7 @@ COLORINGS = ("type", "tension", "orientation", "bending")
 _LINE_COLOR, _LINE_WIDTH = np.array([0.62, 0.64, 0.68]), 0.0011
 _VISIBLE = 0.009  # Of the extent of the scene: what a tube is wide at least.
 _VISIBLE_BALL = 0.012
+_PLUS_END = 0.75  # Of the diameter of a filament: the radius of the ball at its last node.
 
 
 @dataclass(frozen=True)
@@ -103,6 +104,9 @@ class Scene:
             color = np.tile(_rgb(colors[own.type.name]), (len(ends), 1))
             if self.scale is not None and values is not None:
                 color = self.scale.colors(values[number])
+            if has_polarity(self.run) and not own.ring:
+                plus, _ = self._wrapped(np.repeat(points[-1:, None], 2, axis=1).astype(float))
+                parts.append(Tubes.of_one_kind(plus, _PLUS_END * self.diameters[number], _rgb(PLUS_END_COLOR)))
             ends, which = self._wrapped(ends)
             parts.append(Tubes.of_one_kind(ends, 0.5 * self.diameters[number], color[which]))
         if self.look.linkers:
@@ -135,6 +139,11 @@ class Scene:
         if self.run.box is None or self.look.whole or not len(ends):
             return ends, np.arange(len(ends))
         return cut_at_faces(ends, self.run.box)
+
+
+def has_polarity(run: Run) -> bool:
+    """Whether the last nodes of filaments are marked: where motors walk to them."""
+    return any(own.motor for own in run.linker_types) and not all(own.ring for own in run.filaments)
 
 
 def cut_at_faces(ends: FloatArray, box: FloatArray) -> tuple[FloatArray, IntArray]:
@@ -185,6 +194,8 @@ def legend_of(run: Run, look: Look) -> list[tuple[str, str, str]]:
     """Labels, colors "#RRGGBB" and kinds of what the legend of a picture has; see ``Scene``."""
     colors = filament_colors(run)
     legend = [(name, color, "filament") for name, color in colors.items()] if look.color == "type" else []
+    if has_polarity(run):
+        legend.append(("last node (plus end)", PLUS_END_COLOR, "particle"))
     if look.particles:
         legend += [(name, color, "particle") for name, color in particle_colors(run).items()]
     if look.linkers:
