@@ -7,6 +7,7 @@ import matplotlib
 import numpy as np
 
 from ..analysis.order import director
+from ..analysis.run_filaments import RunParticles
 from ..analysis.runs import Run
 from ..errors import InputError
 from ..mechanics.geometry import segment_vectors
@@ -15,6 +16,9 @@ from ..units.types import FloatArray, IntArray
 from .colors import PLUS_END_COLOR, filament_colors, linker_colors, particle_colors
 from .outlines import box_edges, wall_lines
 from .tubes import Tubes
+
+WATER = ("HOH", "WAT", "SOL", "TIP3", "H2O")
+"""Names of residues of water."""
 
 COLORINGS = ("type", "tension", "orientation", "bending")
 
@@ -42,6 +46,8 @@ class Look:
         Over how many frames a tension is averaged.
     particles : bool
         Whether particles beside filaments are drawn.
+    hidden : tuple of str
+        Names of residues that are not: of water if not given, which would cover all else.
     """
 
     color: str = "type"
@@ -50,6 +56,11 @@ class Look:
     linkers: bool = True
     average: int = 1
     particles: bool = True
+    hidden: tuple[str, ...] = WATER
+
+    def particles_of(self, run: Run) -> list[RunParticles]:
+        """The particles beside filaments that are drawn."""
+        return [own for own in run.particles if own.name not in self.hidden] if self.particles else []
 
     def __post_init__(self) -> None:
         if self.color not in COLORINGS:
@@ -111,14 +122,12 @@ class Scene:
             parts.append(Tubes.of_one_kind(ends, 0.5 * self.diameters[number], color[which]))
         if self.look.linkers:
             parts += self._linkers(frame)
-        if self.look.particles:
-            parts += self._balls(frame)
-        return Tubes.joined(parts)
+        return Tubes.joined(parts + self._balls(frame))
 
     def _balls(self, frame):
         colors, positions = particle_colors(self.run), self.run.positions(frame)
         parts = []
-        for own, diameter in zip(self.run.particles, self.ball_diameters):
+        for own, diameter in zip(self.look.particles_of(self.run), self.ball_diameters):
             balls, _ = self._wrapped(np.repeat(positions[own.indices][:, None], 2, axis=1).astype(float))
             parts.append(Tubes.of_one_kind(balls, 0.5 * diameter, _rgb(colors[own.name])))
         return parts
@@ -180,7 +189,7 @@ def make_scene(run: Run, look: Look, frames: list[int]) -> Scene:
         diameters = np.maximum(own, _VISIBLE * extent * own / own.max())
     else:
         diameters = own if look.diameter == 0.0 else np.full(len(own), look.diameter)
-    balls = [max(own.diameter, _VISIBLE_BALL * extent) for own in run.particles] if look.particles else []
+    balls = [max(own.diameter, _VISIBLE_BALL * extent) for own in look.particles_of(run)]
     # Tubes and balls stand out from the points by half their width.
     widest = max(diameters.max(), *balls) if balls else diameters.max()
     points = np.concatenate([points + 0.5 * widest, points - 0.5 * widest])
@@ -196,8 +205,8 @@ def legend_of(run: Run, look: Look) -> list[tuple[str, str, str]]:
     legend = [(name, color, "filament") for name, color in colors.items()] if look.color == "type" else []
     if has_polarity(run):
         legend.append(("last node (plus end)", PLUS_END_COLOR, "particle"))
-    if look.particles:
-        legend += [(name, color, "particle") for name, color in particle_colors(run).items()]
+    shown = {own.name for own in look.particles_of(run)}
+    legend += [(name, color, "particle") for name, color in particle_colors(run).items() if name in shown]
     if look.linkers:
         colors_of_linkers = linker_colors(run, look.color != "type")
         legend += [(name, color, "linker") for name, color in zip(run.spring_names, colors_of_linkers)]
@@ -210,9 +219,9 @@ def _framed_points(run, look, frames):
         return corners @ run.box
     sampled = {frames[round(place)] for place in np.linspace(0, len(frames) - 1, min(len(frames), 20))}
     points = np.concatenate([own for frame in sampled for own in run.curves(frame)])
-    if look.particles:
-        own = [run.positions(frame)[each.indices] for frame in sampled for each in run.particles]
-        points = np.concatenate([points, *own])
+    points = np.concatenate(
+        [points, *(run.positions(frame)[own.indices] for frame in sampled for own in look.particles_of(run))]
+    )
     return np.concatenate([points, *wall_lines(run, points)])
 
 
