@@ -1,5 +1,7 @@
 """A run as one object: times, filaments, linkers, energies; for mdtraj and MDAnalysis."""
 
+from __future__ import annotations
+
 import warnings
 from functools import cached_property
 from typing import Any

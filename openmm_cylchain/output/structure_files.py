@@ -4,6 +4,8 @@ A PSF file is what VMD loads before a DCD or XTC trajectory, a LAMMPS data file 
 that is in the Topology, filaments and other molecules alike.
 """
 
+from __future__ import annotations
+
 import re
 from typing import TYPE_CHECKING
 
@@ -34,7 +36,7 @@ _PSF_EMPTY_SECTIONS = (
 _ANGSTROM = 10.0  # in a nanometre
 
 
-def write_psf(topology: "app.Topology", file: TextFile, system: openmm.System | None = None) -> None:
+def write_psf(topology: app.Topology, file: TextFile, system: openmm.System | None = None) -> None:
     """Write a PSF file: atoms, masses, charges and bonds, in CHARMM's extended X-PLOR format.
 
     Chains become segments of the file. Names are cut to the seven characters that VMD reads. Where ids of chains are
@@ -83,7 +85,7 @@ def _psf_atoms(topology, system):
 
 
 def write_lammps_data(
-    topology: "app.Topology",
+    topology: app.Topology,
     positions: Vectors,
     file: TextFile,
     system: openmm.System | None = None,

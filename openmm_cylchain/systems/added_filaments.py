@@ -1,5 +1,7 @@
 """Filaments as they are added: before they are in a System."""
 
+from __future__ import annotations
+
 from collections import Counter
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
@@ -83,7 +85,7 @@ class AddedFilaments:
         segments: int,
         start: Vector,
         direction: Vector,
-        **options: "Unpack[FilamentOptions]",
+        **options: Unpack[FilamentOptions],
     ) -> int:
         """Add a straight filament with segments of rest length.
 
@@ -121,7 +123,7 @@ class AddedFilaments:
         closed: bool = False,
         tangents: Vectors | None = None,
         control_points: Vectors | None = None,
-        **options: "Unpack[FilamentOptions]",
+        **options: Unpack[FilamentOptions],
     ) -> int:
         """Add a filament with given node positions.
 
@@ -157,7 +159,7 @@ class AddedFilaments:
         segments: int,
         center: Vector,
         normal: Vector = (0.0, 0.0, 1.0),
-        **options: "Unpack[FilamentOptions]",
+        **options: Unpack[FilamentOptions],
     ) -> int:
         """Add a ring: a regular polygon with segments of rest length, or a circle of beam elements without strains.
 
@@ -189,7 +191,7 @@ class AddedFilaments:
         seed: int,
         start: Vector = (0.0, 0.0, 0.0),
         direction: Vector | None = None,
-        **options: "Unpack[FilamentOptions]",
+        **options: Unpack[FilamentOptions],
     ) -> int:
         """Add a filament drawn from the exact equilibrium of the free discrete chain.
 
