@@ -14,7 +14,6 @@ from openmm_cylchain.cli import main
 from openmm_cylchain.output.linker_records import LINKER_RECORD
 from openmm_cylchain.output.read_tables import read_reports
 from openmm_cylchain.runs.configuration import changed_keys, parse_configuration, read_configuration
-from openmm_cylchain.units.quantities import PICONEWTON
 from support import small_runs
 from support.checkpoints import resealed
 from support.commands import finish, start, wait_for_size
@@ -263,7 +262,7 @@ def test_tables_and_places_are_those_of_the_linkers(unbroken):
             lengths = np.linalg.norm(here["places"][both, 1] - here["places"][both, 0], axis=1)
             tensions = group.kind.stiffness * (lengths - group.kind.rest_length)
             np.testing.assert_allclose(here["tension"][both], tensions, atol=2e-3)
-            mean, largest = (PICONEWTON * table[f"{name} tension (pN)"][report, number] for name in ("mean", "maximum"))
+            mean, largest = (PN * table[f"{name} tension (pN)"][report, number] for name in ("mean", "maximum"))
             if both.any():
                 np.testing.assert_allclose((mean, largest), (tensions.mean(), tensions.max()), atol=2e-3)
             else:
@@ -319,8 +318,8 @@ def test_summary_has_linkers(unbroken, capsys):
         if np.isnan(largest).all():
             assert own["mean_tension"] is None and own["largest_tension"] is None
             continue
-        assert own["mean_tension"] == pytest.approx(np.average(tension[late > 0], weights=late[late > 0]) / PN)
-        assert own["largest_tension"] == pytest.approx(np.nanmax(largest) / PN)
+        assert own["mean_tension"] == pytest.approx(np.average(tension[late > 0], weights=late[late > 0]))
+        assert own["largest_tension"] == pytest.approx(np.nanmax(largest))
     assert summary["linkers"][1]["largest_tension"] > 0
     assert main(["run", str(unbroken / "configuration.toml"), "--output", str(unbroken), "--resume"]) == 0
     text = capsys.readouterr().out
